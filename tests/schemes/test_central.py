@@ -1,0 +1,177 @@
+"""The centred scheme against exact discrete solutions, published numbers and its own algebra."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+
+from vibsim.engine import integrate
+from vibsim.models import MODELS
+from vibsim.schemes import SCHEMES
+
+CENTRAL = SCHEMES["central"]
+ARITHMETICS = next(o.choices for o in CENTRAL.options if o.name == "arithmetic")
+
+
+def run(kind, level, *, theta=1.0, omega=0.0, end=20.0, g=1.0, **options):
+    steps = 2**level
+    return integrate(
+        MODELS[kind],
+        CENTRAL,
+        {**CENTRAL.defaults(), **options},
+        np.array([[g, 1.0, 1.0]]),
+        np.array([[theta, omega]]),
+        np.array([end / steps]),
+        steps,
+        1,
+    )
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+@pytest.mark.parametrize(
+    ("level", "theta"), [(6, 0.9996677748139638), (7, 0.9971663759228251), (8, 0.9961666300804089)]
+)
+def test_theta_at_20_on_three_levels(arithmetic, level, theta):
+    assert run("pendulum", level, arithmetic=arithmetic).position[0, -1] == pytest.approx(
+        theta, abs=1e-11
+    )
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+@pytest.mark.parametrize(
+    ("theta", "omega", "g"), [(1.0, 0.0, 1.0), (0.3, -2.0, 4.0), (-2.0, 0.5, 9.81)]
+)
+def test_linear_motion_is_the_exact_discrete_solution(arithmetic, theta, omega, g):
+    """``theta^n = A cos(n a) + B sin(n a)``, ``sin(a/2) = w dt/2``: vibration text, section 4.2."""
+    level, end = 9, 20.0
+    dt = end / 2**level
+    n = np.arange(2**level + 1)
+    angle = 2 * math.asin(math.sqrt(g) * dt / 2)
+    exact = theta * np.cos(n * angle) + omega * dt / math.sin(angle) * np.sin(n * angle)
+    error = run(
+        "linear_pendulum", level, theta=theta, omega=omega, end=end, g=g, arithmetic=arithmetic
+    )
+    scale = abs(theta) + abs(omega)
+    # each of N roundings acts on the velocity at most: N^2 eps is the worst that the three-term form can do
+    assert np.max(np.abs(error.position[0] - exact)) <= scale * (2**level) ** 2 * 2.0**-53
+
+
+def test_round_off_separates_the_three_arithmetics():
+    """Against the same discrete solution at 60 digits: three_term, increment, compensated, each far better."""
+    level = 14
+    with mpmath.workdps(60):
+        dt = mpmath.mpf(20) / 2**level
+        exact = mpmath.cos(2**level * 2 * mpmath.asin(dt / 2))
+        errors = [
+            float(
+                abs(exact - mpmath.mpf(run("linear_pendulum", level, arithmetic=a).position[0, -1]))
+            )
+            for a in ("three_term", "increment", "compensated")
+        ]
+    assert errors[0] > 20 * errors[1]
+    assert errors[2] <= 2.0**-52
+
+
+def test_increment_beats_three_term_by_four_orders_at_level_20():
+    exact = 0.9958006771243681
+    level = 20
+    fine = run("pendulum", level + 1).position[0, -1]
+    defects = {}
+    for arithmetic in ("increment", "three_term"):
+        value = run("pendulum", level, arithmetic=arithmetic).position[0, -1]
+        # the error of the scheme itself, known from the compensated form one level finer, is taken off
+        defects[arithmetic] = abs((value - exact) - 4 * (fine - exact))
+    assert defects["increment"] <= 1e-3 * defects["three_term"]
+
+
+@pytest.mark.parametrize("start", ["centred", "first_order"])
+@pytest.mark.parametrize("kind", MODELS)
+def test_first_step(kind, start):
+    runs = run(kind, 6, theta=0.7, omega=0.4, start=start)
+    dt = 20.0 / 64
+    force = math.sin(0.7) if kind == "pendulum" else 0.7
+    expected = 0.7 + dt * 0.4 - (0.5 * dt**2 * force if start == "centred" else 0.0)
+    assert runs.position[0, 1] == pytest.approx(expected, rel=1e-15)
+
+
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+def test_velocity_is_the_centred_difference_and_its_end_formulas(arithmetic):
+    dt = 20.0 / 64
+    kick, extrapolate, backward = (
+        run("pendulum", 6, arithmetic=arithmetic, end_velocity=rule)
+        for rule in ("kick", "extrapolate", "backward")
+    )
+    u, v = kick.position[0], kick.velocity[0]
+    np.testing.assert_allclose(v[1:-1], (u[2:] - u[:-2]) / (2 * dt), atol=1e-13)
+    assert v[0] == 0.0
+    assert v[-1] == pytest.approx((u[-1] - u[-2]) / dt - dt * math.sin(u[-1]) / 2, abs=1e-13)
+    assert extrapolate.velocity[0, -1] == pytest.approx(2 * v[-2] - v[-3], abs=1e-13)
+    assert backward.velocity[0, -1] == pytest.approx((u[-1] - u[-2]) / dt, abs=1e-13)
+    for other in (extrapolate, backward):
+        np.testing.assert_array_equal(other.position, kick.position)
+        np.testing.assert_array_equal(other.velocity[0, :-1], v[:-1])
+
+
+def test_the_scheme_runs_backwards_to_where_it_came_from():
+    """The centred scheme is symmetric: with the kick velocity at the end, reversed, it returns."""
+    there = run("pendulum", 10, theta=1.2, omega=0.3, end_velocity="kick")
+    back = run(
+        "pendulum",
+        10,
+        theta=there.position[0, -1],
+        omega=-there.velocity[0, -1],
+        end_velocity="kick",
+    )
+    assert back.position[0, -1] == pytest.approx(1.2, abs=1e-13)
+    assert back.velocity[0, -1] == pytest.approx(-0.3, abs=1e-13)
+
+
+@pytest.mark.parametrize(("theta", "end", "with_end"), [(3.0, 20.0, 3.43), (1.0, 25.0, 3.87)])
+def test_what_the_end_point_does_to_the_energy(theta, end, with_end):
+    """The extrapolated end velocity spoils the maximum of the energy deviation; the kick does not."""
+    coarse, fine = (run("pendulum", level, theta=theta, end=end) for level in (7, 8))
+    assert coarse.deviation[0] / fine.deviation[0] == pytest.approx(with_end, abs=0.005)
+    assert coarse.deviation_interior[0] / fine.deviation_interior[0] == pytest.approx(
+        4.0, abs=0.005
+    )
+    coarse, fine = (
+        run("pendulum", level, theta=theta, end=end, end_velocity="kick") for level in (7, 8)
+    )
+    assert coarse.deviation[0] / fine.deviation[0] == pytest.approx(4.0, abs=0.005)
+
+
+def test_backward_end_velocity_makes_the_largest_energy_deviation_first_order():
+    """Errata, vibration text section 2.1."""
+    sizes = [
+        run("pendulum", level, end_velocity="backward").deviation[0] for level in (8, 9, 10, 11)
+    ]
+    np.testing.assert_allclose(sizes, [3.17e-3, 1.50e-3, 7.20e-4, 3.52e-4], rtol=4e-3)
+
+
+def test_period_converges_to_the_elliptic_integral():
+    exact = 6.699975664370453  # 4 K(sin 1/2)
+    errors = [run("pendulum", level, end=50.0).period[0] - exact for level in (9, 10, 11, 12)]
+    np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 4.0, rtol=0.02)
+
+
+def test_time_of_a_turn_converges():
+    exact = float(
+        MODELS["pendulum"].exact_period(
+            {"theta": 2.0, "omega": -3.0}, {"g": 1.0, "L": 1.0, "m": 1.0}
+        )
+    )
+    errors = [
+        run("pendulum", level, theta=2.0, omega=-3.0, end=50.0).period[0] - exact
+        for level in (10, 11, 12)
+    ]
+    np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 4.0, rtol=0.02)
+
+
+def test_one_step_and_two_steps():
+    for level in (0, 1):
+        for rule in ("kick", "extrapolate", "backward"):
+            runs = run("pendulum", level, end=0.1, end_velocity=rule)
+            assert runs.position.shape == (1, 2**level + 1)
+            assert np.isfinite(runs.velocity).all()
+            assert runs.last_step[0] == 2**level

@@ -1,0 +1,16 @@
+"""The registry of models; a model is one file of this package and one line here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from vibsim.models.base import ENERGIES, Model, Parameter, State, quantities
+from vibsim.models.linear_pendulum import LINEAR_PENDULUM
+from vibsim.models.pendulum import PENDULUM
+
+MODELS: Mapping[str, Model] = MappingProxyType(
+    {model.kind: model for model in (PENDULUM, LINEAR_PENDULUM)}
+)
+
+__all__ = ["ENERGIES", "MODELS", "Model", "Parameter", "State", "quantities"]

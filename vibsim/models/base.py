@@ -1,0 +1,86 @@
+"""What a model is: data about an equation of motion, its formulas as text.
+
+A formula is text so that one statement of it serves every reader: the engine compiles it for each lane, sympy
+differentiates it, a report prints it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Numbers = Mapping[str, Any]
+"""Values by name: floats, or arrays that broadcast against each other."""
+
+
+@dataclass(frozen=True)
+class State:
+    """One component of the state."""
+
+    name: str
+    unit: str
+    long_name: str
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter, with its unit and its bound."""
+
+    name: str
+    default: float
+    unit: str
+    description: str
+    minimum: float | None = None
+    exclusive: bool = False
+    """Whether `minimum` itself is refused."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """An equation of motion ``position'' = acceleration(position, velocity, t)``."""
+
+    kind: str
+    title: str
+    source: str
+    equation: str
+    states: tuple[State, State]
+    """Position and velocity."""
+    parameters: tuple[Parameter, ...]
+    acceleration: str
+    """Formula in the state names, ``t`` and the parameters."""
+    kinetic_energy: str
+    potential_energy: str
+    energy_unit: str
+    linear: bool
+    conservative: bool
+    natural_frequency: Callable[[Numbers], Any]
+    """Angular frequency of small oscillations [rad per unit of time], from the parameters."""
+    turn: float | None = None
+    """The angle after which the position repeats; None where it does not."""
+    exact: Callable[[Floats, Numbers, Numbers], dict[str, Floats]] | None = None
+    """Exact states at times t, shape (..., n_t), from initial values and parameters of shape (..., 1) or ()."""
+    exact_period: Callable[[Numbers, Numbers], Any] | None = None
+    """Exact period from initial values and parameters: of an oscillation, or of one turn."""
+
+    @property
+    def position(self) -> str:
+        """Name of the position."""
+        return self.states[0].name
+
+    @property
+    def velocity(self) -> str:
+        """Name of the velocity."""
+        return self.states[1].name
+
+
+ENERGIES = ("kinetic_energy", "potential_energy", "energy", "energy_deviation")
+
+
+def quantities(model: Model) -> tuple[str, ...]:
+    """Name every quantity of `model` that is stored as a series."""
+    return (*(state.name for state in model.states), *ENERGIES)

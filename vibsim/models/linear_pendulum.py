@@ -1,0 +1,48 @@
+r"""The pendulum for small angles, ``theta'' = -(g/L) theta``.
+
+Source: pendulum lecture (A), section 1.3 and the end of section 2.6. Units: g [m s-2], L [m], m [kg], theta [rad],
+omega [rad s-1], energy [J]; with g = L = m = 1 all of them are dimensionless. The energy is the small-angle one:
+``m (L omega)^2 / 2 + m g L theta^2 / 2``, not that of the nonlinear pendulum.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from vibsim.models.base import Floats, Model, Numbers
+from vibsim.models.pendulum import PARAMETERS, STATES, natural_frequency
+
+
+def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
+    """Return theta and omega of the harmonic oscillation at times `t` (A, section 1.3)."""
+    w = natural_frequency(parameters)
+    theta_0, omega_0 = initial["theta"], initial["omega"]
+    cos, sin = np.cos(w * t), np.sin(w * t)
+    return {"theta": theta_0 * cos + omega_0 / w * sin, "omega": omega_0 * cos - theta_0 * w * sin}
+
+
+def exact_period(initial: Numbers, parameters: Numbers) -> Any:
+    """Return ``2 pi sqrt(L/g)``, whatever the amplitude; NaN at rest."""
+    rest = (np.asarray(initial["theta"]) == 0) & (np.asarray(initial["omega"]) == 0)
+    return np.where(rest, np.nan, 2 * np.pi / natural_frequency(parameters))
+
+
+LINEAR_PENDULUM = Model(
+    kind="linear_pendulum",
+    title="Linear pendulum",
+    source="pendulum lecture, sections 1.3 and 2.6",
+    equation="theta'' = -(g/L) theta",
+    states=STATES,
+    parameters=PARAMETERS,
+    acceleration="-(g/L)*theta",
+    kinetic_energy="0.5*m*(L*omega)**2",
+    potential_energy="0.5*m*g*L*theta**2",
+    energy_unit="J",
+    linear=True,
+    conservative=True,
+    natural_frequency=natural_frequency,
+    exact=exact,
+    exact_period=exact_period,
+)

@@ -1,0 +1,167 @@
+r"""Centred differences (Stoermer-Verlet), ``(u^(n+1) - 2 u^n + u^(n-1))/dt^2 = a(u^n, t^n)``.
+
+Order 2, symplectic and symmetric, explicit, one evaluation of the acceleration per step; stable for w dt <= 2. The
+velocity is the centred difference ``(u^(n+1) - u^(n-1))/(2 dt)``. Not to be confused with Euler-Cromer: the same
+recurrence, but a first-order solution with plain initial values.
+
+One scheme written three ways, algebraically equal, with different round-off:
+
+- ``three_term``, as in the source texts: ``u^(n+1) = 2 u^n - u^(n-1) + dt^2 a``. Each rounding of u acts like a kick of
+  the velocity by eps/dt and is carried on for the rest of the run: round-off grows like eps N^(3/2).
+- ``increment``: ``d^(n+1) = d^n + dt^2 a``, ``u^(n+1) = u^n + d^(n+1)``. Grows like eps N^(1/2).
+- ``compensated``: the same with both additions carrying their rounding error along (Knuth's two-sum). Does not grow.
+
+Source: pendulum lecture (A), equations (7)-(11) and section 3; vibration text (B), equations (7)-(8) and section 2.1.
+Compensated summation: E. Hairer, C. Lubich and G. Wanner, Geometric Numerical Integration, section VIII.5.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from vibsim.models.base import Model
+from vibsim.schemes.base import Acceleration, Option, Options, Scheme, Stepper
+
+EPSILON = 2.0**-53
+
+
+def start_three_term(
+    first_order: bool, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
+) -> tuple[float, float]:
+    """Return u^1 and u^0; u^1 by A (11), or without its dt^2 term (the trap of A, section 2.3)."""
+    kick = 0.0 if first_order else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
+    return u + dt * v + kick, u
+
+
+def step_three_term(
+    state: tuple[float, float], t: float, dt: float, p: Any, acceleration: Acceleration
+) -> tuple[tuple[float, float], float]:
+    """Return u^(n+1), u^n and the velocity at n: A (9)."""
+    u, behind = state
+    ahead = 2.0 * u - behind + (dt * dt) * acceleration(u, 0.0, t, p)
+    return (ahead, u), (ahead - behind) * (0.5 / dt)
+
+
+def backward_three_term(state: tuple[float, float], dt: float) -> float:
+    """Return ``(u^n - u^(n-1))/dt``: B, section 2.1."""
+    u, behind = state
+    return (u - behind) / dt
+
+
+def start_increment(
+    first_order: bool, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
+) -> tuple[float, float]:
+    """Return u^1 and the increment u^1 - u^0."""
+    kick = 0.0 if first_order else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
+    d = dt * v + kick
+    return u + d, d
+
+
+def step_increment(
+    state: tuple[float, float], t: float, dt: float, p: Any, acceleration: Acceleration
+) -> tuple[tuple[float, float], float]:
+    """Return u^(n+1), its increment and the velocity at n."""
+    u, d = state
+    ahead = d + (dt * dt) * acceleration(u, 0.0, t, p)
+    return (u + ahead, ahead), (d + ahead) * (0.5 / dt)
+
+
+def backward_increment(state: tuple[float, float], dt: float) -> float:
+    """Return ``(u^n - u^(n-1))/dt``."""
+    return state[1] / dt
+
+
+def start_compensated(
+    first_order: bool, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
+) -> tuple[float, float, float, float]:
+    """Return u^1, the increment u^1 - u^0, and the rounding errors that both still have to get."""
+    kick = 0.0 if first_order else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
+    push = dt * v
+    d = push + kick
+    part = d - push
+    d_rest = (push - (d - part)) + (kick - part)
+    ahead = u + d
+    part = ahead - u
+    u_rest = (u - (ahead - part)) + (d - part)
+    return ahead, d, u_rest, d_rest
+
+
+def step_compensated(
+    state: tuple[float, float, float, float],
+    t: float,
+    dt: float,
+    p: Any,
+    acceleration: Acceleration,
+) -> tuple[tuple[float, float, float, float], float]:
+    """Return u^(n+1), its increment, their rounding errors, and the velocity at n."""
+    u, d, u_rest, d_rest = state
+    kick = (dt * dt) * acceleration(u, 0.0, t, p) + d_rest
+    d_ahead = d + kick
+    part = d_ahead - d
+    d_rest = (d - (d_ahead - part)) + (kick - part)
+    # the rest of d belongs to u as well, but only in the sum that u keeps
+    drift = d_ahead + u_rest
+    ahead = u + drift
+    part = ahead - u
+    u_rest = (u - (ahead - part)) + (drift - part)
+    return (ahead, d_ahead, u_rest, d_rest), (d + d_ahead) * (0.5 / dt)
+
+
+def backward_compensated(state: tuple[float, float, float, float], dt: float) -> float:
+    """Return ``(u^n - u^(n-1))/dt``."""
+    return state[1] / dt
+
+
+_STEPPERS = {
+    "compensated": Stepper(start_compensated, step_compensated, backward_compensated),
+    "increment": Stepper(start_increment, step_increment, backward_increment),
+    "three_term": Stepper(start_three_term, step_three_term, backward_three_term),
+}
+
+_GROWTH = {"compensated": 0.0, "increment": 0.5, "three_term": 1.5}
+
+
+def formal_order(quantity: str, model: Model, options: Options) -> int:
+    """Return 2: the scheme, its start and its velocity are centred, for every quantity of every model."""
+    return 2
+
+
+def round_off(options: Options, steps: int) -> float:
+    """Return the predicted round-off after `steps` steps, relative to the solution."""
+    return float(EPSILON * steps ** _GROWTH[options["arithmetic"]])
+
+
+def even_powers(options: Options) -> bool:
+    """Tell whether the start is centred too, so that the error has even powers of dt only (A, section 2.4)."""
+    return options["start"] == "centred" and options["end_velocity"] == "kick"
+
+
+CENTRAL = Scheme(
+    kind="central",
+    title="Centred differences (Stoermer-Verlet)",
+    source="pendulum lecture, sections 2.2-2.3; vibration text, section 1.2",
+    options=(
+        Option(
+            "start",
+            ("centred", "first_order"),
+            "formula of the first step: A (11), or without its dt^2 term",
+        ),
+        Option(
+            "end_velocity",
+            ("extrapolate", "backward", "kick"),
+            "velocity at the last point: linear extrapolation, one-sided difference, "
+            "or (u_N - u_(N-1))/dt + dt a_N/2",
+        ),
+        Option(
+            "arithmetic",
+            ("compensated", "increment", "three_term"),
+            "how the scheme is written: equal in exact arithmetic, different in round-off",
+        ),
+    ),
+    stepper=lambda options: _STEPPERS[options["arithmetic"]],
+    formal_order=formal_order,
+    round_off=round_off,
+    even_powers=even_powers,
+    stability_limit=2.0,
+    force_evaluations=1,
+)
