@@ -1,0 +1,87 @@
+"""Compiled kernels on disk, under the digest of their text.
+
+numba keys its cache by the file a function stands in, so each kernel gets a file of its own, named after what is in
+it. The file is written once and never changed: a kernel of other text, another numba or another Python is another
+file. Jobs that want the same kernel at the same time wait for the first one to compile it.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import importlib.util
+import os
+import platform
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from vibsim.errors import SimulationError
+
+
+def folder() -> Path:
+    """Return the folder of compiled kernels: ``$VIBSIM_CACHE_DIR``, else the user's cache folder."""
+    named = os.environ.get("VIBSIM_CACHE_DIR")
+    if named:
+        return Path(named)
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "vibsim" / "kernels"
+
+
+def load(text: str) -> Callable[..., None]:
+    """Return the function ``kernel`` of the module `text`, compiled now or before.
+
+    Raises
+    ------
+    SimulationError
+        Where the cache folder cannot be written.
+    """
+    key = "\n".join((text, version("numba"), platform.python_version()))
+    name = f"kernel_{hashlib.sha256(key.encode()).hexdigest()[:24]}"
+    try:
+        home = folder()
+        home.mkdir(parents=True, exist_ok=True)
+        path = home / f"{name}.py"
+        with _lock(home / f"{name}.lock"):
+            if not path.exists():
+                _write(path, text)
+            return _compile(path, name)
+    except OSError as error:
+        raise SimulationError(
+            f"compiled kernels cannot be kept: {error}; set VIBSIM_CACHE_DIR to a folder that can be written"
+        ) from error
+
+
+def _write(path: Path, text: str) -> None:
+    with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".tmp", delete=False) as file:
+        file.write(text)
+    Path(file.name).replace(path)
+
+
+def _compile(path: Path, name: str) -> Callable[..., None]:
+    """Import the kernel and compile it for the one set of types that the engine calls it with."""
+    from numba import boolean, float64, int64, void
+
+    specification = importlib.util.spec_from_file_location(name, path)
+    assert specification is not None
+    assert specification.loader is not None
+    module = importlib.util.module_from_spec(specification)
+    sys.modules[name] = module
+    specification.loader.exec_module(module)
+    array, table, cube = float64[::1], float64[:, ::1], float64[:, :, ::1]
+    kernel: Any = module.kernel
+    kernel.compile(
+        void(table, table, array, int64, int64, boolean, int64, float64, cube, table, int64[:, ::1])
+    )
+    return kernel  # type: ignore[no-any-return]
+
+
+@contextmanager
+def _lock(path: Path) -> Iterator[None]:
+    """Hold the lock file `path`; it goes with the process, so that a killed job leaves nothing locked."""
+    with path.open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield

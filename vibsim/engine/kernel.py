@@ -1,0 +1,144 @@
+"""From (model, scheme) to one function that steps members: text first, then a lane.
+
+A kernel is written out as one Python module that holds everything it runs: the elementary functions, the gathering,
+the scheme's functions and the model's formulas. The *plain* lane runs that module as it stands, which needs no
+compiler; the *compiled* lane runs the same module through numba, strictly (no contraction, no reassociation), so that
+both give the same bits. The text is also the key of the cache: a changed formula, scheme or loop is another kernel.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import types
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import Any
+
+from vibsim import expression
+from vibsim.engine import elementary, loop
+from vibsim.engine.cache import load
+from vibsim.models import Model
+from vibsim.schemes import Stepper
+
+Kernel = Callable[..., None]
+
+_PLAIN = """\
+def compiled(function):
+    return function
+
+entry = compiled
+"""
+
+_COMPILED = """\
+from numba import njit
+
+compiled = njit(error_model="numpy", nogil=True, forceinline=True)
+entry = njit(error_model="numpy", nogil=True, cache=True)
+"""
+
+BOUND = ("start", "step", "backward", "acceleration", "energies", "parameters_of")
+"""Functions that a kernel knows by name instead of being handed them: numba does not cache what is handed functions."""
+
+ELEMENTARY: Mapping[str, Callable[..., float]] = {"sin": elementary.sin}
+"""The functions that a model's formulas may call."""
+
+
+@cache
+def kernel(model: Model, stepper: Stepper, lane: str) -> Kernel:
+    """Return the function that steps members of `model` by `stepper`.
+
+    Parameters
+    ----------
+    lane
+        ``plain`` or ``compiled``: the same bits at different speeds.
+
+    Raises
+    ------
+    SimulationError
+        Where the kernel cannot be compiled.
+    """
+    body = source(model, stepper)
+    if lane == "plain":
+        namespace: dict[str, Any] = {}
+        exec(compile(_PLAIN + body, f"<{model.kind} kernel>", "exec"), namespace)
+        return namespace["kernel"]  # type: ignore[no-any-return]
+    return load(_COMPILED + body)
+
+
+def source(model: Model, stepper: Stepper) -> str:
+    """Return the text of the kernel of `model` and `stepper`, without the header that chooses its lane."""
+    functions: dict[str, str] = {}
+    for name, function in ELEMENTARY.items():
+        _collect(function, name, functions)
+    for name in ("start", "step", "backward"):
+        _collect(getattr(stepper, name), name, functions)
+    functions |= _formulas(model)
+    _collect(loop.run, "kernel", functions)
+    return "import math\n\n" + "\n\n".join(functions.values()) + "\n"
+
+
+def _collect(function: Callable[..., Any], name: str, functions: dict[str, str]) -> None:
+    """Write `function` under `name`, after whatever it uses of its own module.
+
+    Names that a module binds to numbers are written as numbers; functions are collected in their turn; ``math`` is
+    imported by every kernel.
+    """
+    if not isinstance(function, types.FunctionType):
+        raise TypeError(f"{name} is no plain Python function, so it cannot enter a kernel")
+    tree = ast.parse(inspect.cleandoc("\n" + inspect.getsource(function))).body[0]
+    assert isinstance(tree, ast.FunctionDef)
+    _strip(tree, name)
+    local = set(function.__code__.co_varnames)
+    used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} - local
+    for other in sorted(used & function.__globals__.keys()):
+        value = function.__globals__[other]
+        if isinstance(value, (int, float)):
+            text = f"{other} = {value!r}"
+            if functions.setdefault(other, text) != text:
+                raise ValueError(f"{other} means two things in one kernel")
+        elif isinstance(value, types.FunctionType) and other not in functions:
+            _collect(value, other, functions)
+    text = f"@{'entry' if name == 'kernel' else 'compiled'}\n{ast.unparse(tree)}"
+    if functions.setdefault(name, text) != text:
+        raise ValueError(f"{name} means two things in one kernel")
+
+
+def _strip(tree: ast.FunctionDef, name: str) -> None:
+    """Rename a function; drop its docstring, its annotations, and the functions it is handed."""
+    tree.name = name
+    tree.returns = None
+    tree.args.args = [argument for argument in tree.args.args if argument.arg not in BOUND]
+    for argument in tree.args.args:
+        argument.annotation = None
+    if ast.get_docstring(tree) is not None:
+        tree.body = tree.body[1:]
+    for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
+        call.args = [
+            argument for argument in call.args if getattr(argument, "id", None) not in BOUND
+        ]
+
+
+def _formulas(model: Model) -> dict[str, str]:
+    """Write the model's acceleration and energies as functions of ``(u, v, t, p)``."""
+    names = [parameter.name for parameter in model.parameters]
+    unpack = [f"({', '.join(names)},) = p"] if names else []
+    known = (model.position, model.velocity, "t", *names)
+    arguments = f"{model.position}, {model.velocity}, t, p"
+
+    def function(name: str, results: Mapping[str, str]) -> str:
+        lines = list(unpack)
+        for result, formula in results.items():
+            tree = expression.parse(formula, known)
+            lines += expression.to_statements(tree, result)
+        lines.append(f"return {', '.join(results)}")
+        return f"@compiled\ndef {name}({arguments}):\n    " + "\n    ".join(lines)
+
+    values = ", ".join(f"float(parameters[case, {i}])" for i in range(len(names))) or "0.0"
+    return {
+        "acceleration": function("acceleration", {"_result": model.acceleration}),
+        "energies": function(
+            "energies", {"_kinetic": model.kinetic_energy, "_potential": model.potential_energy}
+        ),
+        "parameters_of": f"@compiled\ndef parameters_of(parameters, case):\n    return ({values},)",
+    }

@@ -1,0 +1,277 @@
+"""From an experiment and a level to the data of that level: every scheme, every member, one record.
+
+The record holds what design and files call by name: the states, the energies, their exact values where they are
+known, and what was gathered over every step. Shapes are (scheme, case, t), (case, t), (scheme, case) or (case,).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim import plan
+from vibsim.engine import Trajectories, integrate
+from vibsim.models import MODELS, Model
+from vibsim.record import Record, Variable
+from vibsim.schemes import SCHEMES
+
+if TYPE_CHECKING:
+    import xarray
+
+    from vibsim.spec import Experiment
+
+Floats = NDArray[np.float64]
+
+STATUS = ("ok", "non_finite")
+"""Meaning of the variable ``status``."""
+
+
+@dataclass(frozen=True)
+class Members:
+    """The numbers of members start..stop-1; every array has shape (case,)."""
+
+    index: NDArray[np.int64]
+    columns: Mapping[str, Floats]
+    """Swept values by dotted key."""
+    parameters: Mapping[str, Floats]
+    initial: Mapping[str, Floats]
+    end: Floats
+
+
+def simulate(experiment: Experiment, level: int) -> xarray.Dataset:
+    """Run every scheme and member of `experiment` at `level`.
+
+    Returns
+    -------
+    xarray.Dataset
+        What the file ``level_LL.nc`` holds (design, section 4.4).
+
+    Raises
+    ------
+    ValueError
+        Where the experiment does not have the level.
+    SimulationError
+        Where a kernel cannot be compiled.
+    """
+    return simulate_record(experiment, level).to_xarray()
+
+
+def simulate_record(
+    experiment: Experiment, level: int, start: int = 0, stop: int | None = None
+) -> Record:
+    """Run members start..stop-1 (default: all) and return plain arrays; see `simulate`."""
+    if level not in experiment.levels:
+        raise ValueError(f"level {level} is none of {list(experiment.levels)}")
+    model = MODELS[experiment.model.kind]
+    group = members(experiment, start, plan.count(experiment) if stop is None else stop)
+    steps, every = experiment.steps(level), plan.sampling(experiment, level)
+    runs = [
+        integrate(
+            model,
+            SCHEMES[scheme.kind],
+            scheme.options,
+            np.stack([group.parameters[p.name] for p in model.parameters], axis=-1),
+            np.stack([group.initial[state.name] for state in model.states], axis=-1),
+            group.end / steps,
+            steps,
+            every,
+        )
+        for scheme in experiment.schemes
+    ]
+    coords = _coords([scheme.name for scheme in experiment.schemes], group, steps, every)
+    variables = {
+        **_series(model, runs),
+        **_exact(model, group, steps, every),
+        **_gathered(model, runs, group, steps),
+        **_constants(model, group, steps),
+    }
+    attrs = {"model": model.kind, "level": level, "steps": steps, "every": every}
+    return Record(coords, variables, attrs)
+
+
+def members(experiment: Experiment, start: int, stop: int) -> Members:
+    """Work out the numbers of members start..stop-1 from the experiment and its sweep."""
+    columns = plan.columns(experiment, start, stop)
+
+    def fill(section: str, values: Mapping[str, float]) -> dict[str, Floats]:
+        return {
+            name: columns.get(f"{section}.{name}", np.full(stop - start, value, dtype=float))
+            for name, value in values.items()
+        }
+
+    return Members(
+        index=np.arange(start, stop, dtype=np.int64),
+        columns=columns,
+        parameters=fill("model", experiment.model.parameters),
+        initial=fill("initial", experiment.initial),
+        end=fill("time", {"end": experiment.time.end})["end"],
+    )
+
+
+def _attrs(long_name: str, units: str, **more: Any) -> dict[str, Any]:
+    return {"long_name": long_name, "units": units, **more}
+
+
+def _fractions(steps: int, every: int) -> NDArray[np.int64]:
+    return np.arange(0, steps + 1, every, dtype=np.int64)
+
+
+def _coords(schemes: list[str], group: Members, steps: int, every: int) -> dict[str, Variable]:
+    same_end = bool(np.all(group.end == group.end[0]))
+    number = _fractions(steps, every)
+    t = number * (group.end[0] / steps) if same_end else number / steps
+    coords = {
+        "scheme": Variable(("scheme",), np.array(schemes), _attrs("name of the scheme", "1")),
+        "case": Variable(("case",), group.index, _attrs("index of the member of the sweep", "1")),
+        "t": Variable(
+            ("t",),
+            np.asarray(t, dtype=float),
+            _attrs("time", "s") if same_end else _attrs("time as a fraction of the end time", "1"),
+        ),
+    }
+    if not same_end:
+        coords["end"] = Variable(("case",), group.end, _attrs("end time of the member", "s"))
+    for key, values in group.columns.items():
+        coords[key.replace(".", "_")] = Variable(
+            ("case",), values, _attrs(f"swept value of {key}", "1", sweep_key=key)
+        )
+    return coords
+
+
+def _series(model: Model, runs: list[Trajectories]) -> dict[str, Variable]:
+    kinetic, potential = (
+        np.stack([getattr(run, name) for run in runs])
+        for name in ("kinetic_energy", "potential_energy")
+    )
+    energy = kinetic + potential
+    states = zip(model.states, ("position", "velocity"), strict=True)
+    table = {
+        **{
+            s.name: (np.stack([getattr(r, f) for r in runs]), s.long_name, s.unit)
+            for s, f in states
+        },
+        "kinetic_energy": (kinetic, "kinetic energy", model.energy_unit),
+        "potential_energy": (potential, "potential energy", model.energy_unit),
+        "energy": (energy, "total mechanical energy", model.energy_unit),
+        "energy_deviation": (
+            energy - energy[..., :1],
+            "deviation of the total energy from its initial value",
+            model.energy_unit,
+        ),
+    }
+    return {
+        name: Variable(("scheme", "case", "t"), values, _attrs(long_name, unit))
+        for name, (values, long_name, unit) in table.items()
+    }
+
+
+def _exact(model: Model, group: Members, steps: int, every: int) -> dict[str, Variable]:
+    if model.exact is None:
+        return {}
+    t = _fractions(steps, every) * (group.end / steps)[:, None]
+    exact = model.exact(
+        t,
+        {name: values[:, None] for name, values in group.initial.items()},
+        {name: values[:, None] for name, values in group.parameters.items()},
+    )
+    return {
+        f"{state.name}_exact": Variable(
+            ("case", "t"), exact[state.name], _attrs(f"exact {state.long_name}", state.unit)
+        )
+        for state in model.states
+    }
+
+
+def _gathered(
+    model: Model, runs: list[Trajectories], group: Members, steps: int
+) -> dict[str, Variable]:
+    """Return what was gathered over every step, shape (scheme, case)."""
+    table: dict[str, tuple[Any, dict[str, Any]]] = {}
+
+    def add(name: str, values: list[Any], long_name: str, units: str, **more: Any) -> None:
+        table[name] = (np.stack(values), _attrs(long_name, units, **more))
+
+    for state, field in zip(model.states, ("position_range", "velocity_range"), strict=True):
+        for i, (name, word) in enumerate((("min", "least"), ("max", "largest"))):
+            add(
+                f"{state.name}_{name}",
+                [getattr(run, field)[:, i] for run in runs],
+                f"{word} {state.long_name} over every step",
+                state.unit,
+            )
+    position, energy = model.states[0], model.energy_unit
+    add(
+        "energy_deviation_max_abs",
+        [run.deviation for run in runs],
+        "largest absolute energy deviation over every step",
+        energy,
+    )
+    add(
+        "energy_deviation_max_abs_interior",
+        [run.deviation_interior for run in runs],
+        "largest absolute energy deviation over every step but the last point",
+        energy,
+    )
+    add(
+        "amplitude",
+        [0.5 * (run.last_peak - run.last_trough) for run in runs],
+        "half the height between the last peak and the last trough, interpolated",
+        position.unit,
+    )
+    for name, word in (("first_peak", "first"), ("last_peak", "last")):
+        add(
+            name,
+            [getattr(run, name) for run in runs],
+            f"height of the {word} peak, interpolated",
+            position.unit,
+        )
+    add(
+        "period",
+        [run.period for run in runs],
+        "mean period over every step, interpolated (time of a turn for a member that goes over the top)",
+        "s",
+    )
+    add(
+        "period_grid",
+        [run.period_grid for run in runs],
+        "mean period over every step, between peaks at grid points",
+        "s",
+    )
+    add("period_count", [run.period_count for run in runs], "number of periods in the mean", "1")
+    last = [run.last_step for run in runs]
+    add(
+        "status",
+        [(step < steps).astype(np.int8) for step in last],
+        "what became of the member",
+        "1",
+        flag_values=np.arange(len(STATUS), dtype=np.int8),
+        flag_meanings=" ".join(STATUS),
+    )
+    add("last_step", last, "last step with finite values", "1")
+    failed = [np.where(step < steps, (step + 1) * group.end / steps, np.nan) for step in last]
+    add("failure_time", failed, "time of the first value that is not finite or too large", "s")
+    return {
+        name: Variable(("scheme", "case"), values, attrs) for name, (values, attrs) in table.items()
+    }
+
+
+def _constants(model: Model, group: Members, steps: int) -> dict[str, Variable]:
+    frequency = np.broadcast_to(model.natural_frequency(group.parameters), group.end.shape)
+    table = {
+        "natural_frequency": (
+            frequency,
+            _attrs("angular frequency of small oscillations", "rad s-1"),
+        ),
+        "omega_dt": (
+            frequency * (group.end / steps),
+            _attrs("angular frequency of small oscillations times the time step", "1"),
+        ),
+    }
+    if model.exact_period is not None:
+        period = model.exact_period(group.initial, group.parameters)
+        table["exact_period"] = (np.asarray(period, dtype=float), _attrs("exact period", "s"))
+    return {name: Variable(("case",), values, attrs) for name, (values, attrs) in table.items()}
