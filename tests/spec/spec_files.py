@@ -1,0 +1,62 @@
+"""Experiment files for the tests of `vibsim.spec`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from vibsim.errors import Fault, InputError
+from vibsim.spec import Experiment
+
+GOOD = """\
+title: A pendulum
+model: {kind: pendulum}
+initial: {theta: 1.0}
+time: {end: 20.0}
+levels: {from: 6, to: 9}
+schemes: [central]
+"""
+
+
+def content(**changes: Any) -> dict[str, Any]:
+    """Return a good experiment as a dictionary, with `changes`; None takes a section out."""
+    data: dict[str, Any] = {
+        "title": "A pendulum",
+        "model": {"kind": "pendulum"},
+        "initial": {"theta": 1.0},
+        "time": {"end": 20.0},
+        "levels": {"from": 6, "to": 9},
+        "schemes": ["central"],
+    }
+    return {key: value for key, value in (data | changes).items() if value is not None}
+
+
+def build(**changes: Any) -> Experiment:
+    return Experiment.from_dict(content(**changes))
+
+
+def faults_of(**changes: Any) -> tuple[Fault, ...]:
+    """Return the faults of the good experiment with `changes`."""
+    with pytest.raises(InputError) as caught:
+        build(**changes)
+    return caught.value.faults
+
+
+def only_fault(**changes: Any) -> Fault:
+    faults = faults_of(**changes)
+    assert len(faults) == 1, "\n".join(map(str, faults))
+    return faults[0]
+
+
+def write(folder: Path, text: str | bytes, name: str = "case.yaml") -> Path:
+    path = folder / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def file_faults(folder: Path, text: str | bytes) -> tuple[Fault, ...]:
+    with pytest.raises(InputError) as caught:
+        Experiment.from_yaml(write(folder, text))
+    return caught.value.faults

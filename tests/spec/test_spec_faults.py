@@ -1,0 +1,393 @@
+"""Every class of fault: where it is, which rule it breaks, what would have been right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from spec_files import GOOD, build, faults_of, file_faults, only_fault
+
+LAPTOP = {"levels": [6, 7, 8, 9]}
+
+
+def check(**fields: Any) -> dict[str, Any]:
+    return {"checks": [fields]}
+
+
+def value(**fields: Any) -> dict[str, Any]:
+    return check(**({"value": "max", "quantity": "theta", "below": 1} | fields))
+
+
+def at(**fields: Any) -> dict[str, Any]:
+    return value(value="end", at=fields)
+
+
+CASES: list[tuple[dict[str, Any], str, str, str]] = [
+    # sections
+    ({"title": None}, "title", "required key is missing", ""),
+    ({"title": 3}, "title", "must be text", ""),
+    ({"title": ""}, "title", "must not be empty", ""),
+    ({"modle": 1}, "modle", "unknown key", "did you mean 'model'?"),
+    ({"time": None}, "time", "required key is missing", ""),
+    ({"time": 3}, "time", "must be a mapping", ""),
+    ({"schemes": []}, "schemes", "must not be empty", ""),
+    ({"schemes": "central"}, "schemes", "must be a list", ""),
+    ({"checks": {}}, "checks", "must be a list", ""),
+    ({"sweep": {}}, "sweep", "must not be empty", ""),
+    # model
+    ({"model": "pendulum"}, "model", "must be a mapping with the key kind", "e.g. {kind:"),
+    (
+        {"model": {}},
+        "model.kind",
+        "required key is missing",
+        "choose from linear_pendulum, pendulum",
+    ),
+    ({"model": {"kind": "pendulun"}}, "model.kind", "unknown model", "did you mean 'pendulum'?"),
+    ({"model": {"kind": 3}}, "model.kind", "unknown model", "choose from"),
+    (
+        {"model": {"kind": "pendulum", "l": 1}},
+        "model.l",
+        "unknown key",
+        "choose from kind, g, L, m",
+    ),
+    ({"model": {"kind": "pendulum", "g": 0}}, "model.g", "must be greater than 0", ""),
+    ({"model": {"kind": "pendulum", "g": -1}}, "model.g", "must be greater than 0", ""),
+    ({"model": {"kind": "pendulum", "g": True}}, "model.g", "must be a number", ""),
+    ({"model": {"kind": "pendulum", "g": None}}, "model.g", "must be a number", ""),
+    ({"model": {"kind": "pendulum", "g": [1]}}, "model.g", "must be a number", ""),
+    ({"model": {"kind": "pendulum", "g": float("nan")}}, "model.g", "must be a finite number", ""),
+    ({"model": {"kind": "pendulum", "g": 10**400}}, "model.g", "must be a finite number", ""),
+    ({"model": {"kind": "pendulum", "g": "2*q"}}, "model.g", "unknown name 'q'", "e, pi"),
+    ({"model": {"kind": "pendulum", "g": "yes"}}, "model.g", "unknown name 'yes'", ""),
+    ({"model": {"kind": "pendulum", "g": "1/0"}}, "model.g", "no finite value", ""),
+    # initial
+    ({"initial": {"theta": float("inf")}}, "initial.theta", "must be a finite number", ""),
+    ({"initial": {"thetaa": 1}}, "initial.thetaa", "unknown state", "did you mean 'theta'?"),
+    ({"initial": [1]}, "initial", "must be a mapping", ""),
+    # time
+    ({"time": {}}, "time.end", "required key is missing", "or periods"),
+    ({"time": {"end": 0}}, "time.end", "must be greater than 0", ""),
+    ({"time": {"end": 1, "base_steps": 0}}, "time.base_steps", "must be at least 1", ""),
+    ({"time": {"end": 1, "base_steps": 1.5}}, "time.base_steps", "must be a whole number", ""),
+    ({"time": {"end": 1, "base_steps": "2"}}, "time.base_steps", "must be a whole number", ""),
+    ({"time": {"end": 1, "base_steps": True}}, "time.base_steps", "must be a whole number", ""),
+    ({"time": {"end": 1, "base_dt": 0.3}}, "time.base_dt", "whole number of base_dt", "3.333"),
+    ({"time": {"end": 1, "base_dt": 3}}, "time.base_dt", "whole number of base_dt", ""),
+    ({"time": {"end": 1, "base_dt": 1 + 1e-11}}, "time.base_dt", "whole number", ""),
+    ({"time": {"end": 1, "base_dt": 1, "base_steps": 1}}, "time.base_dt", "together", ""),
+    ({"time": {"end": 1, "periods": 1}}, "time.periods", "together with end", ""),
+    ({"time": {"periods": 1}}, "time.steps_per_period", "required key is missing", ""),
+    ({"time": {"steps_per_period": 4}}, "time.periods", "required key is missing", ""),
+    ({"time": {"periods": 1.1, "steps_per_period": 4}}, "time.steps_per_period", "whole", "4.4"),
+    (
+        {"time": {"periods": 2, "steps_per_period": 4, "base_steps": 2}},
+        "time.base_steps",
+        "together with periods",
+        "",
+    ),
+    # levels
+    ({"levels": []}, "levels", "must not be empty", ""),
+    ({"levels": 6}, "levels", "must be a list", ""),
+    ({"levels": [6, 6]}, "levels[1]", "must not be repeated", ""),
+    ({"levels": [7, 6]}, "levels[1]", "increasing order", ""),
+    ({"levels": [6, 7.5]}, "levels[1]", "must be a whole number", ""),
+    ({"levels": [6, 41]}, "levels[1]", "must be at most 40", ""),
+    ({"levels": [-1, 6]}, "levels[0]", "must be at least 0", ""),
+    ({"levels": {"from": 9, "to": 6}}, "levels.to", "must be at least 'from', which is 9", ""),
+    ({"levels": {"from": 6}}, "levels.to", "required key is missing", ""),
+    ({"levels": {"from": 6, "to": 10**12}}, "levels.to", "must be at most 40", ""),
+    ({"levels": {"from": 6, "to": 7, "step": 2}}, "levels.step", "unknown key", "from, to"),
+    ({"levels": [0, 1]}, "levels", "at least 2 steps, has 1", ""),
+    # schemes
+    ({"schemes": ["centrall"]}, "schemes[0]", "unknown scheme", "did you mean 'central'?"),
+    ({"schemes": [{"kind": "cntral"}]}, "schemes[0].kind", "unknown scheme", "'central'"),
+    ({"schemes": [{"label": "x"}]}, "schemes[0].kind", "required key is missing", "central"),
+    ({"schemes": [3]}, "schemes[0]", "must be a mapping with the key kind", ""),
+    (
+        {"schemes": [{"kind": "central", "start": "centered"}]},
+        "schemes[0].start",
+        "unknown",
+        "centred",
+    ),
+    (
+        {"schemes": [{"kind": "central", "strt": "centred"}]},
+        "schemes[0].strt",
+        "unknown key",
+        "start",
+    ),
+    ({"schemes": [{"kind": "central", "label": 3}]}, "schemes[0].label", "must be text", ""),
+    ({"schemes": ["central", "central"]}, "schemes[1]", "two schemes are named 'central'", "label"),
+    # sweep
+    ({"sweep": {"initial.thta": [1]}}, "sweep.initial.thta", "cannot be swept", "initial.theta"),
+    ({"sweep": {"g": [1]}}, "sweep.g", "cannot be swept", "choose from initial.theta"),
+    ({"sweep": {"model.kind": [1]}}, "sweep.model.kind", "cannot be swept", ""),
+    ({"sweep": {"levels": [1]}}, "sweep.levels", "levels cannot be swept", ""),
+    ({"sweep": {"levels.from": [1]}}, "sweep.levels.from", "levels cannot be swept", ""),
+    ({"sweep": {"time.base_steps": [1]}}, "sweep.time.base_steps", "step counts cannot be", ""),
+    ({"sweep": {"time.base_dt": [1]}}, "sweep.time.base_dt", "step counts cannot be", ""),
+    ({"sweep": {"model.g": []}}, "sweep.model.g", "must not be empty", ""),
+    ({"sweep": {"model.g": 3}}, "sweep.model.g", "must be a list", ""),
+    ({"sweep": {"model.g": [1, 0]}}, "sweep.model.g[1]", "must be greater than 0", ""),
+    ({"sweep": {"model.g": [1, True]}}, "sweep.model.g[1]", "must be a number", ""),
+    ({"sweep": {"time.end": [1, -1]}}, "sweep.time.end[1]", "must be greater than 0", ""),
+    (
+        {"sweep": {"time.end": [1]}, "time": {"end": 1, "base_dt": 1}},
+        "sweep.time.end",
+        "the end can be swept only",
+        "",
+    ),
+    (
+        {"sweep": {"time.end": [1]}, "time": {"periods": 1, "steps_per_period": 4}},
+        "sweep.time.end",
+        "the end can be swept only",
+        "",
+    ),
+    ({"sweep": {"model.g": {"linspace": [-1, 1, 3]}}}, "sweep.model.g.linspace[0]", "greater", ""),
+    ({"sweep": {"model.g": {"linspace": [1, 2, 1]}}}, "sweep.model.g.linspace[2]", "least 2", ""),
+    ({"sweep": {"model.g": {"linspace": [1, 2]}}}, "sweep.model.g.linspace", "[first, last,", ""),
+    ({"sweep": {"model.g": {"linspace": [1, 2, 3, 4]}}}, "sweep.model.g.linspace", "[first,", ""),
+    ({"sweep": {"model.g": {"linspace": 3}}}, "sweep.model.g.linspace", "[first, last,", ""),
+    ({"sweep": {"model.g": {"linspace": [1, 2, 2.5]}}}, "sweep.model.g.linspace[2]", "whole", ""),
+    # samples
+    ({"samples": "some"}, "samples", "unknown choice", "choose from auto, common, all"),
+    ({"samples": {"every": 0}}, "samples.every", "must be at least 1", ""),
+    ({"samples": {"every": 3}}, "samples.every", "must divide the 64 steps", ""),
+    ({"samples": {"evry": 2, "every": 2}}, "samples.evry", "unknown key", "every"),
+    # checks
+    (check(foo=1), "checks[0]", "must be a mapping with the key converges, value or claim", ""),
+    ({"checks": ["theta"]}, "checks[0]", "must be a mapping with the key converges", ""),
+    (check(converges="thta"), "checks[0].converges", "unknown quantity", "did you mean 'theta'?"),
+    (check(converges="theta", id="A"), "checks[0].id", "a to z, 0 to 9", ""),
+    (check(converges="theta", id=""), "checks[0].id", "a to z, 0 to 9", ""),
+    (check(converges="theta", order="schem"), "checks[0].order", "unknown name", ""),
+    (check(converges="theta", order=-2), "checks[0].order", "greater than 0", ""),
+    (check(converges="theta", tolerance=0), "checks[0].tolerance", "greater than 0", ""),
+    (check(converges="theta", norm="l3"), "checks[0].norm", "unknown choice", "l2"),
+    (check(converges="theta", schemes=[]), "checks[0].schemes", "must not be empty", ""),
+    (
+        check(converges="theta", schemes=["rk4"]),
+        "checks[0].schemes[0]",
+        "not a scheme of",
+        "central",
+    ),
+    (
+        check(converges="theta", schemes=["central", "central"]),
+        "checks[0].schemes[1]",
+        "must not be repeated",
+        "",
+    ),
+    (check(converges="theta", quantity="x"), "checks[0].quantity", "unknown key", ""),
+    (
+        check(converges="theta", expect={"status": "FAILED"}),
+        "checks[0].expect.status",
+        "unknown choice",
+        "did you mean 'FAIL'?",
+    ),
+    (
+        check(converges="theta", expect={"status": "FAIL", "reason": "order_lo"}),
+        "checks[0].expect.reason",
+        "unknown reason",
+        "did you mean 'order_low'?",
+    ),
+    (
+        check(converges="theta", expect={"status": "INCONCLUSIVE", "reason": "order_low"}),
+        "checks[0].expect.reason",
+        "reason of status FAIL",
+        "round_off",
+    ),
+    (value(value="maxx"), "checks[0].value", "unknown value", "did you mean 'max'?"),
+    (value(quantity="thta"), "checks[0].quantity", "unknown quantity", "did you mean 'theta'?"),
+    (value(quantity="energy"), "checks[0].quantity", "is not known of this quantity", "theta"),
+    (value(quantity=None), "checks[0].quantity", "required key is missing", "theta"),
+    (value(value="period"), "checks[0].quantity", "takes no quantity", ""),
+    (value(above=0), "checks[0]", "exactly one of equals, below, above", ""),
+    (check(value="period"), "checks[0]", "exactly one of equals, below, above", ""),
+    (value(rtol=0.1), "checks[0].rtol", "used with equals only", ""),
+    (value(atol=0.1), "checks[0].atol", "used with equals only", ""),
+    (check(value="period", equals=6, rtol=-1), "checks[0].rtol", "must be at least 0", ""),
+    (value(below=float("nan")), "checks[0].below", "finite", ""),
+    (value(at={"level": 10}), "checks[0].at.level", "not a level of this", "nearest is 9"),
+    (value(at={"level": "top"}), "checks[0].at.level", "must be a whole number", ""),
+    (value(at={"level": 41}), "checks[0].at.level", "from 0 to 40", ""),
+    (value(at={"level": "best"}), "checks[0].at.level", "extrapolated", ""),
+    (value(at={"best": False}), "checks[0].at", "best must be true", ""),
+    (value(at={"best": True, "level": 6}), "checks[0].at", "not both", ""),
+    (value(at={"case": 1}), "checks[0].at.case", "must be at most 0", ""),
+    (value(at={"case": -1}), "checks[0].at.case", "must be at least 0", ""),
+    (value(at={"scheme": "rk4"}), "checks[0].at.scheme", "not a scheme of", "central"),
+    (value(at={"t": 1}), "checks[0].at.t", "max takes no t", "level, scheme, case"),
+    (value(at={"shceme": "x"}), "checks[0].at.shceme", "unknown key", "scheme"),
+    (value(at=3), "checks[0].at", "must be a mapping", ""),
+    (at(t=0.1), "checks[0].at.t", "not a stored sample time", "nearest are 0.078125 and 0.1171875"),
+    (at(t=21), "checks[0].at.t", "must be between 0 and the end 20", ""),
+    (at(t=-1), "checks[0].at.t", "must be between 0", ""),
+    (at(step=513), "checks[0].at.step", "must be at most 512", ""),
+    (at(step=1, t=0), "checks[0].at.step", "together with t", ""),
+    (value(value="at"), "checks[0].at", "at needs t or step", ""),
+    (
+        value(value="error_estimate_defect", at={"level": 9}),
+        "checks[0].at.level",
+        "needs 1 finer level(s)",
+        "",
+    ),
+    (value(value="ratio", at={"level": 8}), "checks[0].at.level", "needs 2 finer level(s)", ""),
+    (value(value="richardson_error", at={"level": 6}), "checks[0].at.level", "takes no level", ""),
+    (check(claim="x"), "checks[0].that", "required key is missing", ""),
+    (check(claim="x", that={"claim": "y"}), "checks[0].that", "key converges or value", ""),
+    (check(claim="x", that={"converges": "x"}), "checks[0].that.converges", "unknown quantity", ""),
+    (
+        check(claim="x", holds="yes", that={"converges": "theta"}),
+        "checks[0].holds",
+        "must be true or false",
+        "",
+    ),
+    (
+        check(claim="x", that={"converges": "theta", "id": "y"}),
+        "checks[0].that.id",
+        "belongs to the claim",
+        "",
+    ),
+]
+
+
+@pytest.mark.parametrize(("changes", "key", "rule", "hint"), CASES)
+def test_one_fault(changes: dict[str, Any], key: str, rule: str, hint: str) -> None:
+    fault = only_fault(**changes)
+    assert fault.key == key
+    assert rule in fault.rule
+    assert hint in fault.hint
+
+
+@pytest.mark.parametrize("name", ["logspace", "range", "zip", "sample"])
+def test_later_kinds_of_sweep_are_unknown_keys(name: str) -> None:
+    rules = [(f.key, f.rule) for f in faults_of(sweep={"model.g": {name: [1, 2, 3]}})]
+    assert (f"sweep.model.g.{name}", "unknown key") in rules
+    (fault,) = faults_of(sweep={name: [1, 2]})
+    assert fault.rule == "cannot be swept"
+
+
+def test_two_checks_with_one_id() -> None:
+    two = [{"id": "a", "converges": "theta"}, {"id": "a", "converges": "omega"}]
+    assert only_fault(checks=two).key == "checks[1].id"
+
+
+def test_stored_times_follow_the_samples() -> None:
+    """Level 6 of 20 s: 64 steps of 0.3125 s; at level 9 only every 8th is stored with `common`."""
+    ends = [20.0, 0.3125, 40 * 0.3125, 0.0]
+    for t in ends:
+        build(samples="common", **at(t=t))
+    fault = only_fault(samples="common", **at(t=0.0390625))
+    assert "nearest are 0 and 0.3125" in fault.hint
+    build(samples="all", **at(t=0.0390625))
+    build(samples="common", **at(step=16))
+    assert "nearest are 0 and 8" in only_fault(samples="common", **at(step=7)).hint
+
+
+def test_time_is_a_fraction_where_the_end_varies() -> None:
+    sweep = {"time.end": [10, 20]}
+    build(sweep=sweep, **at(t=0.5))
+    build(sweep=sweep, **at(t=1))
+    assert "fraction" in only_fault(sweep=sweep, **at(t=20)).rule
+    build(sweep={"time.end": [10, 10]}, **at(t=10))
+    assert "the end 10" in only_fault(sweep={"time.end": [10]}, **at(t=20)).rule
+    time = {"periods": 2, "steps_per_period": 4}
+    assert "fraction" in only_fault(sweep={"model.g": [1, 2]}, time=time, **at(t=2)).rule
+
+
+def test_case_in_range_of_the_sweep() -> None:
+    sweep = {"model.g": [1, 2, 3], "initial.theta": {"linspace": [0, 1, 4]}}
+    build(sweep=sweep, **value(at={"case": 11}))
+    assert "at most 11" in only_fault(sweep=sweep, **value(at={"case": 12})).rule
+
+
+FAULTY = """\
+title: A pendulum
+titel: again
+model:
+  kind: pendulum
+  g: -1.0
+initial:
+  theta: .nan
+  omga: 0
+time: {end: 20.0, base_steps: 0}
+levels: [6, 7,
+  55]
+schemes:
+  - centrall
+  - kind: central
+    start: late
+  - central
+sweep:
+  model.L: [1, 2,
+    0]
+  levels: [6]
+checks:
+  - converges: thta
+  - value: maximum
+    below: 1
+  - claim: x
+    that:
+      value: max
+      quantity: theta
+      rtol: 1
+      above: 2
+"""
+
+
+def test_all_faults_of_a_file_at_once_with_their_lines(tmp_path: Path) -> None:
+    found = [(f.line, f.key, f.value) for f in file_faults(tmp_path, FAULTY)]
+    assert found == [
+        (2, "titel", "again"),
+        (5, "model.g", "-1.0"),
+        (7, "initial.theta", ".nan"),
+        (9, "time.base_steps", "0"),
+        (11, "levels[2]", "55"),
+        (13, "schemes[0]", "centrall"),
+        (15, "schemes[1].start", "late"),
+        (19, "sweep.model.L[2]", "0"),
+        (20, "sweep.levels", ""),
+        (22, "checks[0].converges", "thta"),
+        (23, "checks[1].value", "maximum"),
+        (29, "checks[2].that.rtol", "1"),
+    ]
+
+
+def test_missing_keys_are_reported_at_their_section(tmp_path: Path) -> None:
+    text = "title: x\nmodel:\n  g: 1\nlevels:\n  from: 6\ntime: {}\nchecks:\n  - claim: x\n"
+    found = {(f.line, f.key) for f in file_faults(tmp_path, text)}
+    assert found == {
+        (1, "schemes"),
+        (2, "model.kind"),
+        (4, "levels.to"),
+        (6, "time.end"),
+        (8, "checks[0].that"),
+    }
+
+
+def test_message_reads_as_the_issue_asks(tmp_path: Path) -> None:
+    (fault,) = file_faults(tmp_path, GOOD.replace("kind: pendulum", "kind: pendulun"))
+    expected = "case.yaml:2: model.kind: pendulun: unknown model: did you mean 'pendulum'?"
+    assert str(fault) == f"{tmp_path}/{expected}"
+
+
+def test_no_jargon_in_any_message() -> None:
+    """The words of the validation library, of its types and of unions stay out of messages."""
+    words = ("Input", "input", "pydantic", "\0", "Field", "tag", "float", "int ", "str", "dict")
+    for changes, *_ in CASES:
+        for fault in faults_of(**changes):
+            text = f"{fault.rule} {fault.hint}".replace("stride", "")
+            assert not [word for word in words if word in text], fault
+
+
+def test_a_broken_list_does_not_hide_other_checks() -> None:
+    faults = faults_of(
+        schemes=["centrall"],
+        checks=[{"foo": 1}, {"converges": "thta", "schemes": ["central"]}, {"id": "x"}],
+    )
+    assert [f.key for f in faults] == [
+        "checks[0]",
+        "checks[1].converges",
+        "checks[2]",
+        "schemes[0]",
+    ]

@@ -1,0 +1,105 @@
+"""What is too large is refused from its counts, quickly and in little memory."""
+
+from __future__ import annotations
+
+import json
+import resource
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from spec_files import build, faults_of, only_fault
+
+from vibsim.spec.sweep import line
+
+HUGE = {"linspace": [1, 2, 10**6]}
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "number"),
+    [
+        ({"levels": [60]}, "levels[0]", "40"),
+        ({"levels": [38, 39, 40]}, "levels", str(7 * 2**38)),
+        ({"levels": [40], "time": {"end": 1, "base_steps": 2}}, "levels", str(2**41)),
+        (
+            {"levels": [30], "sweep": {"model.g": {"linspace": [1, 2, 2000]}}},
+            "levels",
+            str(2000 * 2**30),
+        ),
+        ({"time": {"end": 1, "base_steps": 10**30}}, "levels", str(960 * 10**30)),
+        ({"levels": [1], "sweep": {"model.g": HUGE, "model.L": HUGE}}, "sweep", str(10**12)),
+        (
+            {"levels": [24, 25], "samples": "all", "time": {"end": 1, "base_steps": 16}},
+            "levels",
+            "bytes",
+        ),
+        ({"levels": [28]}, "levels", str(64 * (2**28 + 1))),
+    ],
+)
+def test_message_carries_the_number(changes: dict[str, Any], key: str, number: str) -> None:
+    faults = faults_of(**changes)
+    assert any(fault.key == key and number in str(fault) for fault in faults), faults
+
+
+def test_the_largest_that_is_allowed() -> None:
+    assert build(levels=[6, 30]).steps(30) == 2**30
+    assert build(levels=[1], sweep={"model.g": {"linspace": [1, 2, 10**5]}}).members == 10**5
+
+
+def test_dt_must_not_vanish() -> None:
+    assert "time step" in only_fault(time={"end": 5e-324}).rule
+
+
+def test_linspace_has_exact_ends() -> None:
+    values = line(0.1, 0.7, 7)
+    assert (values[0], values[-1], len(values)) == (0.1, 0.7, 7)
+    assert values[2] == 0.1 + (0.7 - 0.1) * 2 / 6
+
+
+PROBE = """
+import json, resource, sys, time
+from vibsim.spec import Experiment
+from vibsim.errors import InputError
+start = time.perf_counter()
+try:
+    Experiment.from_yaml(sys.argv[1])
+    print(json.dumps(None))
+except InputError as error:
+    print(json.dumps([time.perf_counter() - start, str(error)]))
+"""
+
+TOO_LARGE = {
+    "level": "levels: [60]",
+    "levels": "levels: {from: 0, to: 1000000000000}",
+    "sweep": "levels: [6]\nsweep: {model.g: {linspace: [1, 2, 1000000000000]}}",
+    "grid": "levels: [6]\nsweep: {model.g: {linspace: [1, 2, 1000000]}, "
+    "model.L: {linspace: [1, 2, 1000000]}}",
+    "steps": "levels: [6]\ntime: {end: 1, base_steps: 1" + "0" * 300 + "}",
+    "digits": "levels: [" + "9" * 100_000 + "]",
+    "list": "levels: [6]\nsweep: {model.g: [" + "x," * 90_000 + "]}",
+    "names": "levels: [6]\nsweep: {model.g: [" + ",".join(f"x{i}" for i in range(90_000)) + "]}",
+    "numbers": "levels: [6, " + "x, " * 90_000 + "]",
+    "checks": "levels: [6]\nchecks: [" + "x, " * 90_000 + "]",
+    "schemes": "levels: [6]\nschemes: [" + "central, " * 90_000 + "]",
+    "formulas": "levels: [6]\ninitial: {theta: '" + "9**" * 600 + "9'}",
+    "alias": "levels: [6]\na: &a [" + "1," * 3000 + "]\nb: [" + "*a," * 49 + "]",
+    "keys": "levels: [6]\ninitial: {" + ", ".join(f"k{i}: 1" for i in range(50_000)) + "}",
+}
+
+
+@pytest.mark.parametrize("name", TOO_LARGE)
+def test_refused_within_a_second_and_300_megabytes(tmp_path: Path, name: str) -> None:
+    body = TOO_LARGE[name]
+    time = "" if "time:" in body else "time: {end: 20}\n"
+    head = "title: x\nmodel: {kind: pendulum}\n"
+    head += "" if "schemes:" in body else "schemes: [central]\n"
+    path = tmp_path / "large.yaml"
+    path.write_text(head + time + body + "\n")
+    command = [sys.executable, "-c", PROBE, str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    seconds, message = json.loads(done.stdout)
+    assert "large.yaml:" in message
+    assert seconds < 1.0
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < 300 * 1024

@@ -1,0 +1,89 @@
+"""The JSON Schema that editors use says what the loader does."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator
+from spec_files import content
+from test_spec_experiment import DESIGN
+from test_spec_faults import CASES
+
+from vibsim.models import MODELS
+from vibsim.schemes import SCHEMES
+from vibsim.spec.schema import FILE, main, schema, text
+from vibsim.spec.source import parse
+
+ROOT = Path(__file__).resolve().parents[2]
+VALIDATOR = Draft202012Validator(schema())
+
+
+def test_kept_schema_is_current() -> None:
+    assert (ROOT / FILE).read_text(encoding="utf-8") == text()
+
+
+def test_check_tells_whether_it_is_current(tmp_path: Path) -> None:
+    assert main(["--check"], tmp_path) == 1
+    assert main([], tmp_path) == 0
+    assert main(["--check"], tmp_path) == 0
+    (tmp_path / FILE).write_text("{}")
+    assert main(["--check"], tmp_path) == 1
+
+
+def test_schema_is_a_schema() -> None:
+    Draft202012Validator.check_schema(schema())
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"levels": [6, 7]},
+        {"schemes": ["central", {"kind": "central", "label": "x", "start": "first_order"}]},
+        {"time": {"periods": 3, "steps_per_period": 8}},
+        {"time": {"end": "2*pi", "base_dt": "pi"}},
+        {"sweep": {"model.g": [1, "2*pi"], "model.L": {"linspace": [1, 2, 3]}}},
+        {"samples": {"every": 2}},
+        {"checks": [{"value": "error_l2", "quantity": "theta", "below": 1, "at": {"best": True}}]},
+    ],
+)
+def test_accepts_what_the_loader_accepts(changes: dict[str, Any]) -> None:
+    VALIDATOR.validate(content(**changes))
+
+
+def test_accepts_the_designs_example() -> None:
+    VALIDATOR.validate(parse(DESIGN.encode(), "design").data)
+
+
+BY_SHAPE = ("unknown key", "required key", "unknown choice", "must be a mapping", "must be a list")
+
+
+@pytest.mark.parametrize(("changes", "rule"), [(case[0], case[2]) for case in CASES])
+def test_refuses_what_has_a_wrong_shape(changes: dict[str, Any], rule: str) -> None:
+    needs_model = rule == "required key is missing" and "checks" in changes
+    if rule.startswith(BY_SHAPE) and not (needs_model and "value" in changes["checks"][0]):
+        assert not VALIDATOR.is_valid(content(**changes))
+
+
+def _properties(node: Any) -> list[tuple[str, dict[str, Any]]]:
+    found: list[tuple[str, dict[str, Any]]] = []
+    if isinstance(node, dict):
+        found += list(node.get("properties", {}).items())
+        found += [row for value in node.values() for row in _properties(value)]
+    elif isinstance(node, list):
+        found += [row for value in node for row in _properties(value)]
+    return found
+
+
+def test_every_key_is_described() -> None:
+    assert [name for name, row in _properties(schema()) if not row.get("description")] == []
+
+
+def test_choices_follow_the_registries() -> None:
+    kinds = {row["const"] for name, row in _properties(schema()) if name == "kind"}
+    assert kinds == {*MODELS, *SCHEMES}
+    defaults = {name: row["default"] for name, row in _properties(schema()) if "default" in row}
+    for scheme in SCHEMES.values():
+        assert scheme.defaults().items() <= defaults.items()

@@ -1,0 +1,148 @@
+"""The YAML that is read, and the YAML that is refused."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+from spec_files import GOOD, file_faults, write
+
+from vibsim.errors import InputError
+from vibsim.spec import Experiment
+from vibsim.spec.scalars import resolve
+from vibsim.spec.source import MAX_BYTES, dotted, parse
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1e-3", 1e-3),
+        ("1.", 1.0),
+        (".5", 0.5),
+        ("1E5", 1e5),
+        ("+.5e+2", 50.0),
+        ("-3", -3),
+        ("010", 10),
+        ("0o17", 15),
+        ("0x1F", 31),
+        ("yes", "yes"),
+        ("No", "No"),
+        ("on", "on"),
+        ("OFF", "OFF"),
+        ("y", "y"),
+        ("1:30", "1:30"),
+        ("1_000", "1_000"),
+        ("2001-01-01", "2001-01-01"),
+        ("true", True),
+        ("false", False),
+        ("null", None),
+        ("~", None),
+        ("", None),
+        (".inf", math.inf),
+        ("-.INF", -math.inf),
+        ("1e", "1e"),
+        (".", "."),
+        ("\u0661", "\u0661"),
+        ("9" * 5000, math.inf),
+    ],
+)
+def test_core_schema(text: str, value: object) -> None:
+    found = resolve(text)
+    assert found == value
+    assert type(found) is type(value)
+
+
+def test_nan_is_a_float() -> None:
+    assert math.isnan(resolve(".nan"))  # type: ignore[arg-type]
+
+
+def test_quoted_is_text() -> None:
+    assert parse(b"a: '1'\nb: \"true\"\nc: |\n  1\nd: 1", "f").data == {
+        "a": "1",
+        "b": "true",
+        "c": "1\n",
+        "d": 1,
+    }
+
+
+def test_aliases_and_byte_order_mark() -> None:
+    assert parse(b"\xef\xbb\xbfa: &x [1, 2]\nb: *x\n", "f").data == {"a": [1, 2], "b": [1, 2]}
+
+
+def test_places() -> None:
+    source = parse(b"a: 1\nb:\n  - x\n  -\n    c:\n      7\n", "f")
+    place = source.place(("b", 1, "c"))
+    assert place is not None
+    assert (place.key_line, place.line, place.text) == (5, 6, "7")
+    assert source.place(("b", 2)) is None
+    assert source.place(("a", "deeper")) is None
+    assert dotted(("b", 1, "c")) == "b[1].c"
+
+
+LAUGHS = "a: &a [1,1,1,1,1,1,1,1,1]\n" + "".join(
+    f"{new}: &{new} [*{old},*{old},*{old},*{old},*{old}]\n"
+    for old, new in zip("abcdefghi", "bcdefghij", strict=True)
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "word"),
+    [
+        ("a: 1\nb: [1, 2\n", 3, "not valid YAML"),
+        ("a: 1\n\tb: 2\n", 2, "not valid YAML"),
+        ("a: 'x\n", 2, "not valid YAML"),
+        ("a: 1\nb: 2\na: 3\n", 3, "duplicate key, first on line 1"),
+        ("a:\n  x: 1\n  'x': 2\n", 3, "duplicate key, first on line 2"),
+        ("a: 1\nb: !!float 2\n", 2, "tags are not allowed"),
+        ("a: 1\nb: !!python/object/apply:os.getcwd []\n", 2, "tags are not allowed"),
+        ("a: ! b\n", 1, "tags are not allowed"),
+        ("a: 1\n---\nb: 2\n", 2, "one YAML document"),
+        ("a: 1\nb: *x\n", 2, "alias"),
+        ("a: &x [*x]\n", 1, "alias"),
+        ("a: &x 1\nb: [" + "*x, " * 51 + "]\n", 2, "more than 50 aliases"),
+        (LAUGHS, 7, "more than 200000 values"),
+        ("<<: &x {a: 1}\nb: {<<: *x}\n", 1, "unknown key"),
+        ("? [1, 2]\n: 3\n", 1, "key must be plain text"),
+        ("? {a: 1}\n: 3\n", 1, "key must be plain text"),
+        ("- 1\n- 2\n", 1, "must be a mapping"),
+        ("\n\njust text\n", 3, "must be a mapping"),
+        ("", 0, "must be a mapping"),
+        ("# nothing\n", 0, "must be a mapping"),
+        ("a: " + "[" * 40 + "]" * 40, 1, "nest deeper than 32"),
+        ("[" * 100_000, 1, "nest deeper than 32"),
+        ("{a: " * 100_000, 1, "nest deeper than 32"),
+        ("- " * 50_000, 1, "nest deeper than 32"),
+        ("b: 1\na: \x07\n", 2, "plain text"),
+        ("a: \x00\n", 1, "plain text"),
+        (b"a: 1\nb: \xff\n", 2, "UTF-8"),
+        ("a: 1\n".encode("utf-16"), 1, "UTF-8"),
+        (b"#" * (MAX_BYTES + 1), 0, "larger than 1048576 bytes"),
+    ],
+)
+def test_refused(tmp_path: Path, text: str | bytes, line: int, word: str) -> None:
+    faults = file_faults(tmp_path, text)
+    assert any(word in fault.rule for fault in faults), faults
+    hit = next(fault for fault in faults if word in fault.rule)
+    assert hit.line == line
+
+
+def test_every_duplicate_is_named(tmp_path: Path) -> None:
+    faults = file_faults(tmp_path, GOOD + "title: again\nmodel: {kind: pendulum, g: 1, g: 2}\n")
+    assert [(f.line, f.key) for f in faults] == [(7, "title"), (8, "model"), (8, "model.g")]
+
+
+def test_missing_file_folder_and_odd_names(tmp_path: Path) -> None:
+    for path in (tmp_path / "none.yaml", tmp_path, tmp_path / ("x" * 300), Path("a\0b")):
+        with pytest.raises(InputError, match="cannot be read"):
+            Experiment.from_yaml(path)
+
+
+def test_unreadable_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    path = write(tmp_path, GOOD)
+    monkeypatch.setattr(Path, "open", refuse)
+    with pytest.raises(InputError, match="Permission denied"):
+        Experiment.from_yaml(path)

@@ -1,0 +1,43 @@
+"""Formulas as text: read safely, kept as a frozen tree, written out for the engine.
+
+A formula is read with Python's grammar (``**`` binds tighter than a sign on its left, ``-x**2`` is ``-(x**2)``) and an
+allow-list of what it may hold: numbers, declared names, ``+ - * / **``, comparisons, and calls of `FUNCTIONS`. Text of
+a user is never compiled or evaluated as Python.
+"""
+
+from vibsim.expression.parser import MAX_CHARACTERS, MAX_DEPTH, MAX_POWER, ExpressionError, parse
+from vibsim.expression.render import constant, evaluate, to_python, to_statements
+from vibsim.expression.tree import (
+    CONSTANTS,
+    FUNCTIONS,
+    Binary,
+    Call,
+    Compare,
+    Expression,
+    Name,
+    Negate,
+    Number,
+    names_in,
+)
+
+__all__ = [
+    "CONSTANTS",
+    "FUNCTIONS",
+    "MAX_CHARACTERS",
+    "MAX_DEPTH",
+    "MAX_POWER",
+    "Binary",
+    "Call",
+    "Compare",
+    "Expression",
+    "ExpressionError",
+    "Name",
+    "Negate",
+    "Number",
+    "constant",
+    "evaluate",
+    "names_in",
+    "parse",
+    "to_python",
+    "to_statements",
+]

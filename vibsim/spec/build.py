@@ -1,0 +1,203 @@
+"""From a file's content to an `Experiment`: section by section, so that one fault does not hide another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from vibsim.errors import nearest
+from vibsim.models import MODELS, Model, quantities
+from vibsim.schemes import SCHEMES
+from vibsim.spec import limits, sweep
+from vibsim.spec.check_rules import Ladder, finish_checks
+from vibsim.spec.checks import ConvergesCheck
+from vibsim.spec.document import Document, Every, LevelRange, Partial
+from vibsim.spec.experiment import Experiment, ModelSpec, SchemeSpec, Sweep, TimeSpec
+from vibsim.spec.faults import Report
+from vibsim.spec.source import Path_, Source
+from vibsim.spec.timing import time_spec
+
+_LISTS = ("schemes", "checks")
+_OPTIONAL = [name for name, field in Document.model_fields.items() if not field.is_required()]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Names of an experiment and where it was read."""
+
+    collection: str
+    name: str
+    file: Path | None = None
+
+
+def build(source: Source, place: Place, report: Report) -> Experiment:
+    """Validate the content of a file and fill in every default.
+
+    Raises
+    ------
+    InputError
+        With every fault of the file, and those already in `report`.
+    """
+    part = _sections(source, report)
+    model = _model(source)
+    parameters = _parameters(part, model)
+    levels = _levels(part, report)
+    schemes = _schemes(part, report)
+    time = time_spec(part.time, model, parameters, report) if part.time else None
+    initial = _initial(part, model, report)
+    axes = sweep.axes(part.sweep, part.time, model, report) if part.sweep else ()
+    samples = part.samples.every if isinstance(part.samples, Every) else part.samples
+    shape = limits.Shape(
+        base_steps=time.base_steps if time else None,
+        levels=levels,
+        schemes=len(part.schemes),
+        members=None if _lacks(part.sweep, source, "sweep") else sweep.count(axes),
+        samples=samples,
+        variables=len(quantities(model)) if model else 0,
+        end=time.end if time else None,
+    )
+    limits.check(shape, report)
+    checks = _checks(part, source, model, shape, time, axes, report)
+    report.raise_any()
+    assert model is not None
+    assert time is not None
+    experiment = Experiment(
+        collection=place.collection,
+        name=place.name,
+        title=part.title,
+        source=part.source,
+        model=ModelSpec(kind=model.kind, parameters=parameters),
+        initial=initial,
+        time=time,
+        levels=levels,
+        schemes=tuple(schemes),
+        sweep=Sweep(axes=sweep.expand(axes)) if axes else None,
+        samples=samples,
+        checks=checks,
+    )
+    experiment._file = place.file
+    return experiment
+
+
+def _sections(source: Source, report: Report) -> Any:
+    """Return the sections without fault as a `Partial`; faulty schemes and checks are None in their lists."""
+    data = {k: v for k, v in source.data.items() if v is not None or k not in _OPTIONAL}
+    try:
+        Document.model_validate(data)
+    except ValidationError as error:
+        faulty = report.add_invalid(error)
+    else:
+        return Partial.model_validate(data)
+    return Partial.model_validate(_without(data, faulty))
+
+
+def _without(data: Mapping[str, Any], faulty: list[Path_]) -> dict[str, Any]:
+    whole = {path[0] for path in faulty if path[0] not in _LISTS or len(path) == 1}
+    items = {path[:2] for path in faulty if len(path) > 1}
+    kept: dict[str, Any] = {}
+    for key, value in data.items():
+        if key in whole:
+            continue
+        kept[key] = value
+        if key in _LISTS:
+            kept[key] = [None if (key, i) in items else item for i, item in enumerate(value)]
+    return kept
+
+
+def _lacks(section: object, source: Source, key: str) -> bool:
+    """Tell whether the file has a section that is left out because of a fault."""
+    return section is None and source.data.get(key) is not None
+
+
+def _model(source: Source) -> Model | None:
+    """Return the model; a model section with a fault elsewhere still names it."""
+    section = source.data.get("model")
+    kind = section.get("kind") if isinstance(section, Mapping) else None
+    return MODELS.get(kind) if isinstance(kind, str) else None
+
+
+def _parameters(part: Any, model: Model | None) -> dict[str, float]:
+    if part.model is None or model is None:
+        return {}
+    return {row.name: getattr(part.model, row.name) for row in model.parameters}
+
+
+def _initial(part: Any, model: Model | None, report: Report) -> dict[str, float]:
+    if model is None:
+        return {}
+    states = [state.name for state in model.states]
+    for name in part.initial or ():
+        if name not in states:
+            report.add(("initial", name), "unknown state", nearest(name, states), at_key=True)
+    return {name: (part.initial or {}).get(name, 0.0) for name in states}
+
+
+def _levels(part: Any, report: Report) -> tuple[int, ...]:
+    """Return the levels; none where the section is missing or faulty."""
+    section = part.levels
+    if isinstance(section, LevelRange):
+        if section.from_ > section.to:
+            report.add(("levels", "to"), f"must be at least 'from', which is {section.from_}")
+        return tuple(range(section.from_, section.to + 1))
+    levels: tuple[int, ...] = section or ()
+    good = True
+    for i, (low, high) in enumerate(pairwise(levels)):
+        if low >= high:
+            word = "must not be repeated" if low == high else "must be in increasing order"
+            report.add(("levels", i + 1), f"levels {word}", value=high)
+            good = False
+    return levels if good else ()
+
+
+def _scheme(section: Any) -> SchemeSpec:
+    if isinstance(section, str):
+        return SchemeSpec(name=section, kind=section, options=SCHEMES[section].defaults())
+    options = {row.name: getattr(section, row.name) for row in SCHEMES[section.kind].options}
+    return SchemeSpec(name=section.label or section.kind, kind=section.kind, options=options)
+
+
+def _schemes(part: Any, report: Report) -> list[SchemeSpec]:
+    found: list[SchemeSpec] = []
+    first: dict[str, int] = {}
+    for i, section in enumerate(part.schemes):
+        if isinstance(section, str) and section not in SCHEMES:
+            hint = nearest(section, sorted(SCHEMES))
+            report.add(("schemes", i), "unknown scheme", hint, section)
+        elif section is not None:
+            spec = _scheme(section)
+            found.append(spec)
+            if first.setdefault(spec.name, i) != i:
+                rule = f"two schemes are named '{spec.name}'"
+                report.add(("schemes", i), rule, "give one of them a label")
+    return found
+
+
+def scheme_names(data: Any) -> Iterator[str]:
+    """Yield the names that a list of schemes gives, right or wrong."""
+    for item in data if isinstance(data, list) else ():
+        name = item if not isinstance(item, Mapping) else item.get("label") or item.get("kind")
+        if isinstance(name, str):
+            yield name
+
+
+def _checks(
+    part: Any,
+    source: Source,
+    model: Model | None,
+    shape: limits.Shape,
+    time: TimeSpec | None,
+    axes: tuple[sweep.Axis, ...],
+    report: Report,
+) -> tuple[Any, ...]:
+    names = tuple(dict.fromkeys(scheme_names(source.data.get("schemes"))))
+    end = sweep.fixed_end(axes, time) if time else None
+    ladder = Ladder(model, names, shape, time, end)
+    checks = list(part.checks)
+    if not checks and model is not None:
+        checks = [ConvergesCheck(converges=model.position)]
+    return finish_checks(checks, ladder, report)

@@ -1,0 +1,223 @@
+"""What a file may claim about its outcome: the checks, as written and as used."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    StrictBool,
+    Tag,
+    WithJsonSchema,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
+
+from vibsim.spec.fields import (
+    MAX_LEVEL,
+    Identifier,
+    Index,
+    NonNegative,
+    Number,
+    Positive,
+    Section,
+    Text,
+    number,
+    tag,
+    whole,
+)
+from vibsim.spec.values import VALUES
+
+Status = Literal["PASS", "FAIL", "INCONCLUSIVE"]
+Norm = Literal["l2", "l1", "linf", "linf_interior"]
+
+REASONS: dict[str, str] = {
+    **dict.fromkeys(("asymptotic", "exact", "match"), "PASS"),
+    **dict.fromkeys(
+        ("order_low", "order_high", "mismatch", "wrong_limit", "unstable", "non_finite"), "FAIL"
+    ),
+    **dict.fromkeys(
+        (
+            "pre_asymptotic",
+            "round_off",
+            "oscillating",
+            "non_smooth",
+            "too_few_levels",
+            "not_applicable",
+        ),
+        "INCONCLUSIVE",
+    ),
+}
+"""Every reason of a verdict, with the status that it belongs to."""
+
+
+class Expect(Section):
+    """The verdict that a check should get."""
+
+    status: Status = "PASS"
+    """The expected status."""
+    reason: Annotated[str, Field(json_schema_extra={"enum": list(REASONS)})] | None = None
+    """The expected reason; any reason when left out."""
+
+
+def _order(value: Any) -> Any:
+    if value == "scheme":
+        return value
+    order = number(value)
+    if order <= 0.0:
+        raise PydanticCustomError("order", "must be 'scheme' or a number greater than 0")
+    return order
+
+
+def _level(value: Any) -> Any:
+    if value == "best":
+        return value
+    level = whole(value)
+    if not 0 <= level <= MAX_LEVEL:
+        raise PydanticCustomError("level", f"must be a level from 0 to {MAX_LEVEL}, or best")
+    return level
+
+
+def _no_default(schema: dict[str, Any]) -> None:
+    """Leave the default out of the schema: an empty id stands for a generated one."""
+    schema.pop("default", None)
+
+
+GivenId = Annotated[Identifier, Field(json_schema_extra=_no_default)]
+Order = Annotated[
+    Literal["scheme"] | float,
+    BeforeValidator(_order),
+    WithJsonSchema({"anyOf": [{"const": "scheme"}, {"type": ["number", "string"]}]}),
+]
+LevelOrBest = Annotated[
+    Literal["best"] | int,
+    BeforeValidator(_level),
+    WithJsonSchema({"anyOf": [{"const": "best"}, {"type": "integer", "minimum": 0}]}),
+]
+
+
+def _describe_best(schema: dict[str, Any]) -> None:
+    description = "`best: true` is the same as `level: best`."
+    schema["properties"]["best"] = {"const": True, "description": description}
+
+
+class At(Section):
+    """Where a value is taken; left out means every scheme, every case, the finest level."""
+
+    model_config = ConfigDict(json_schema_extra=_describe_best)
+
+    t: Number | None = None
+    """A stored sample time; where the end differs between members, the fraction 0 to 1 of it."""
+    step: Index | None = None
+    """A stored step of the level, from 0."""
+    level: LevelOrBest | None = None
+    """A level, or `best` for the Richardson-extrapolated solution."""
+    scheme: Text | None = None
+    """Name of a scheme."""
+    case: Index | None = None
+    """Index of a member of the sweep, from 0."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _best(cls, data: Any) -> Any:
+        if not isinstance(data, dict) or "best" not in data:
+            return data
+        rest = {key: value for key, value in data.items() if key != "best"}
+        if data["best"] is not True:
+            raise PydanticCustomError("best", "best must be true, or left out")
+        if rest.setdefault("level", "best") != "best":
+            raise PydanticCustomError("best", "must have a level or best, not both")
+        return rest
+
+
+class ConvergesCheck(Section):
+    """A quantity converges with an order, and the verdict can be trusted."""
+
+    kind: ClassVar[Literal["converges"]] = "converges"
+    id: GivenId = ""
+    """Name of the check, unique in the file; `check_1` and so on when left out."""
+    converges: Text
+    """The quantity: a state, or energy, energy_deviation, kinetic_energy, potential_energy."""
+    order: Order = "scheme"
+    """The order: `scheme` for the order that the scheme promises, or a number."""
+    tolerance: Positive = 0.1
+    """How far the observed order may be from the expected one."""
+    norm: Norm = "l2"
+    """The norm over time in which differences are measured."""
+    schemes: Annotated[tuple[Text, ...], Field(min_length=1)] | None = None
+    """Names of the schemes; every scheme when left out."""
+    expect: Expect = Expect()
+    """The verdict that passes; PASS when left out."""
+
+
+class ValueCheck(Section):
+    """A number of the outcome equals, is below or is above a given one."""
+
+    kind: ClassVar[Literal["value"]] = "value"
+    id: GivenId = ""
+    """Name of the check, unique in the file; `check_1` and so on when left out."""
+    value: Annotated[str, Field(json_schema_extra={"enum": sorted(VALUES)})]
+    """Name of the number, see `vibsim list checks`."""
+    quantity: Text | None = None
+    """The quantity that it is of, where it is of one."""
+    at: At = At()
+    """Where it is taken."""
+    equals: Number | None = None
+    """The number that it must equal, within `rtol` and `atol`."""
+    below: Number | None = None
+    """The number that it must be below."""
+    above: Number | None = None
+    """The number that it must be above."""
+    rtol: NonNegative | None = None
+    """Relative tolerance of `equals`."""
+    atol: NonNegative | None = None
+    """Absolute tolerance of `equals`."""
+
+
+def _which(value: Any) -> str | None:
+    """Tell the kind of a check from its leading key."""
+    if isinstance(value, ConvergesCheck | ValueCheck | ClaimCheck):
+        return tag(value.kind)
+    keys = value if isinstance(value, dict) else ()
+    return next((tag(key) for key in ("claim", "converges", "value") if key in keys), None)
+
+
+Measured = Annotated[
+    Annotated[ConvergesCheck, Tag(tag("converges"))] | Annotated[ValueCheck, Tag(tag("value"))],
+    Discriminator(
+        _which,
+        custom_error_type="check",
+        custom_error_message="must be a mapping with the key converges or value",
+    ),
+]
+
+
+class ClaimCheck(Section):
+    """A statement of a source, true or false, and the measurement that decides it."""
+
+    kind: ClassVar[Literal["claim"]] = "claim"
+    id: GivenId = ""
+    """Name of the check, unique in the file; `check_1` and so on when left out."""
+    claim: Text
+    """The statement, in words."""
+    source: Text | None = None
+    """Where the statement stands."""
+    that: Measured
+    """The check that measures it."""
+    holds: StrictBool = True
+    """Whether the statement is expected to be true."""
+
+
+Check = Annotated[
+    Annotated[ConvergesCheck, Tag(tag("converges"))]
+    | Annotated[ValueCheck, Tag(tag("value"))]
+    | Annotated[ClaimCheck, Tag(tag("claim"))],
+    Discriminator(
+        _which,
+        custom_error_type="check",
+        custom_error_message="must be a mapping with the key converges, value or claim",
+    ),
+]

@@ -1,0 +1,239 @@
+"""The experiment file as it is written: one class per section, built from the registries."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Union
+
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    WithJsonSchema,
+    create_model,
+)
+
+from vibsim.models import MODELS, Model
+from vibsim.schemes import SCHEMES, Scheme
+from vibsim.spec.checks import Check
+from vibsim.spec.fields import (
+    FORMULA,
+    MAX_ENTRIES,
+    MAX_LEVEL,
+    Count,
+    Level,
+    Number,
+    Positive,
+    Section,
+    Text,
+    plain,
+    short,
+    tag,
+)
+
+
+def _class_name(kind: str) -> str:
+    return kind.title().replace("_", "")
+
+
+def _model_section(model: Model) -> type[Section]:
+    fields: dict[str, Any] = {"kind": (Literal[model.kind], Field(description=model.title))}
+    for row in model.parameters:
+        bound: dict[str, float] = {}
+        if row.minimum is not None:
+            bound = {"gt": row.minimum} if row.exclusive else {"ge": row.minimum}
+        description = f"{row.description} [{row.unit}]"
+        number = Annotated[float, Field(**bound), FORMULA]
+        fields[row.name] = (number, Field(default=row.default, description=description))
+    doc = f"{model.title}: {model.equation} ({model.source})."
+    return create_model(_class_name(model.kind), __base__=Section, __doc__=doc, **fields)
+
+
+def _scheme_section(scheme: Scheme) -> type[Section]:
+    label = Field(
+        default=None, description="Name of the scheme in this experiment, if not its kind."
+    )
+    fields: dict[str, Any] = {
+        "kind": (Literal[scheme.kind], Field(description=scheme.title)),
+        "label": (Text | None, label),
+    }
+    for option in scheme.options:
+        choices: Any = Literal[option.choices]
+        fields[option.name] = (
+            choices,
+            Field(default=option.default, description=option.description),
+        )
+    doc = f"{scheme.title} ({scheme.source})."
+    return create_model(
+        f"{_class_name(scheme.kind)}Scheme", __base__=Section, __doc__=doc, **fields
+    )
+
+
+def _kind(value: Any) -> str | None:
+    kind = value.get("kind") if isinstance(value, Mapping) else getattr(value, "kind", None)
+    return tag(kind) if isinstance(kind, str) else None
+
+
+def _scheme_tag(value: Any) -> str | None:
+    return tag("name") if isinstance(value, str) else _kind(value)
+
+
+def _by_kind(sections: Mapping[str, type[Section]], more: tuple[Any, ...] = ()) -> Any:
+    return Union[(*more, *(Annotated[s, Tag(tag(kind))] for kind, s in sections.items()))]
+
+
+_SCHEME_NAME = Annotated[
+    str,
+    Field(json_schema_extra={"enum": sorted(SCHEMES)}, description="A scheme with its defaults."),
+    Tag(tag("name")),
+]
+AnyModel: Any = Annotated[
+    _by_kind({kind: _model_section(model) for kind, model in MODELS.items()}), Discriminator(_kind)
+]
+AnyScheme: Any = Annotated[
+    _by_kind({kind: _scheme_section(s) for kind, s in SCHEMES.items()}, (_SCHEME_NAME,)),
+    Discriminator(_scheme_tag),
+]
+
+
+class TimeSection(Section):
+    """The time interval and the number of steps at level 0; level l has 2**l times as many."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "oneOf": [
+                {
+                    "required": ["end"],
+                    "not": {
+                        "anyOf": [
+                            {"required": ["periods"]},
+                            {"required": ["steps_per_period"]},
+                            {"required": ["base_steps", "base_dt"]},
+                        ]
+                    },
+                },
+                {
+                    "required": ["periods", "steps_per_period"],
+                    "not": {
+                        "anyOf": [
+                            {"required": ["end"]},
+                            {"required": ["base_steps"]},
+                            {"required": ["base_dt"]},
+                        ]
+                    },
+                },
+            ]
+        }
+    )
+
+    end: Positive | None = None
+    """The last time; the first one is 0."""
+    base_steps: Count | None = None
+    """Number of steps at level 0; 1 when left out."""
+    base_dt: Positive | None = None
+    """Step at level 0, instead of `base_steps`; the end must be a whole number of it."""
+    periods: Positive | None = None
+    """Length in natural periods of the model (small oscillations), instead of `end`."""
+    steps_per_period: Positive | None = None
+    """Steps per natural period at level 0, with `periods`."""
+
+
+class LevelRange(Section):
+    """Consecutive levels, both ends included."""
+
+    from_: Level = Field(alias="from")
+    """The coarsest level."""
+    to: Level
+    """The finest level."""
+
+
+class Linspace(Section):
+    """Equally spaced values."""
+
+    linspace: Annotated[tuple[Number, Number, Count], Field()]
+    """First value, last value (both included), and how many: a + (b - a)*i/(n - 1)."""
+
+
+class Every(Section):
+    """Store every n-th step."""
+
+    every: Count
+    """n; it must divide the number of steps of the coarsest level."""
+
+
+def _shape(value: Any) -> str:
+    return tag("mapping") if isinstance(value, Mapping | Section) else tag("other")
+
+
+Levels = Annotated[
+    Annotated[LevelRange, Tag(tag("mapping"))]
+    | Annotated[tuple[Level, ...], Field(min_length=1), short(MAX_LEVEL + 1), Tag(tag("other"))],
+    Discriminator(_shape),
+]
+SweepValues = Annotated[
+    Annotated[Linspace, Tag(tag("mapping"))]
+    | Annotated[tuple[Number, ...], Field(min_length=1), BeforeValidator(plain), Tag(tag("other"))],
+    Discriminator(_shape),
+]
+Samples = Annotated[
+    Annotated[Every, Tag(tag("mapping"))]
+    | Annotated[Literal["auto", "common", "all"], Tag(tag("other"))],
+    Discriminator(_shape),
+]
+
+
+def _initial_schema() -> dict[str, Any]:
+    """Describe the initial values of every model's states, for editors."""
+    states = {state.name: state for model in MODELS.values() for state in model.states}
+    properties = {
+        name: {
+            "type": ["number", "string"],
+            "default": 0.0,
+            "description": f"{state.long_name} [{state.unit}]",
+        }
+        for name, state in states.items()
+    }
+    return {"type": "object", "properties": properties, "additionalProperties": False}
+
+
+class Document(Section):
+    """An experiment of vibsim: what is simulated, and what is claimed about the outcome."""
+
+    title: Text
+    """What the experiment shows, in a line."""
+    source: Text | None = None
+    """What the experiment comes from."""
+    model: AnyModel
+    """The equation of motion and its parameters."""
+    initial: Annotated[dict[str, Number], WithJsonSchema(_initial_schema())] = Field({})
+    """Initial values of the states; 0 for those left out."""
+    time: TimeSection
+    """The time interval and the number of steps."""
+    levels: Levels
+    """The levels of refinement: each halves the time step of the one before."""
+    schemes: Annotated[tuple[AnyScheme, ...], Field(min_length=1), short(MAX_ENTRIES)]
+    """The schemes, each a kind or a mapping with its options."""
+    sweep: Annotated[dict[str, SweepValues], Field(min_length=1)] | None = None
+    """Parameters that vary, by dotted path; several make a grid, the last one fastest."""
+    samples: Samples = "auto"
+    """Which steps are stored."""
+    checks: Annotated[tuple[Check, ...], short(MAX_ENTRIES)] = ()
+    """What must come out; when left out, that the position converges as the scheme promises."""
+
+
+def _part(name: str) -> tuple[Any, Any]:
+    field = Document.model_fields[name]
+    if name in ("schemes", "checks"):
+        item: Any = AnyScheme if name == "schemes" else Check
+        return (tuple[item | None, ...], ())
+    if field.is_required():
+        return (field.rebuild_annotation() | None, None)
+    return (field.rebuild_annotation(), field.default)
+
+
+_PARTS: dict[str, Any] = {name: _part(name) for name in Document.model_fields}
+
+Partial: Any = create_model("Partial", __base__=Section, **_PARTS)
+"""A document without its faulty sections; faulty schemes and checks are None in their lists."""

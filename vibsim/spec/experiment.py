@@ -1,0 +1,174 @@
+"""A validated experiment: every default filled in, every number a number, nothing that could change."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, PrivateAttr
+
+from vibsim.models import MODELS
+from vibsim.spec.checks import Check
+from vibsim.spec.fields import Count, FrozenDict, Identifier, Level, Positive, Section, Text
+
+Numbers = Annotated[dict[str, float], AfterValidator(FrozenDict)]
+Words = Annotated[dict[str, str], AfterValidator(FrozenDict)]
+
+
+class ModelSpec(Section):
+    """The model, with every parameter."""
+
+    kind: Text
+    parameters: Numbers
+
+
+class TimeSpec(Section):
+    """The time interval and the number of steps at level 0."""
+
+    end: Positive
+    """The last time of a member that is not swept."""
+    base_steps: Count
+    """Steps at level 0."""
+    periods: float | None = None
+    """The end in natural periods, where the file gives it so: each member then has its own end."""
+
+
+class SchemeSpec(Section):
+    """A scheme, with every option."""
+
+    name: Text
+    """The label, else the kind."""
+    kind: Text
+    options: Words
+
+
+class Sweep(Section):
+    """Parameters that vary: a grid, the last axis fastest."""
+
+    axes: tuple[tuple[str, tuple[float, ...]], ...]
+    """Dotted key and values, in the order written."""
+
+    @property
+    def count(self) -> int:
+        """Number of members."""
+        product = 1
+        for _, values in self.axes:
+            product *= len(values)
+        return product
+
+
+class Experiment(Section):
+    """One experiment. Build it with `from_yaml` or `from_dict`, which check everything."""
+
+    collection: Identifier
+    name: Identifier
+    title: Text
+    source: Text | None
+    model: ModelSpec
+    initial: Numbers
+    """Initial value of every state."""
+    time: TimeSpec
+    levels: tuple[Level, ...]
+    """Strictly increasing."""
+    schemes: tuple[SchemeSpec, ...]
+    sweep: Sweep | None = None
+    samples: Annotated[int, Field(ge=1)] | Literal["auto", "common", "all"] = "auto"
+    """Which steps are stored; a number n stands for every n-th."""
+    checks: tuple[Check, ...] = ()
+    _file: Path | None = PrivateAttr(default=None)
+
+    @property
+    def file(self) -> Path | None:
+        """Where the experiment was read; not part of its identity."""
+        return self._file
+
+    @property
+    def members(self) -> int:
+        """Number of members of the sweep, 1 without one."""
+        return self.sweep.count if self.sweep else 1
+
+    @property
+    def end_varies(self) -> bool:
+        """Whether the end time differs between members, so that ``t`` is the fraction 0 to 1 of it.
+
+        Where the end is a number of natural periods, it counts as different as soon as a parameter
+        of the model is.
+        """
+        keys = (
+            [key for key, values in self.sweep.axes if min(values) < max(values)]
+            if self.sweep
+            else []
+        )
+        by_periods = self.time.periods is not None
+        return "time.end" in keys or (by_periods and any(key.startswith("model.") for key in keys))
+
+    def natural_end(self, parameters: Mapping[str, Any]) -> Any:
+        """Return the end time of a member with these `parameters` (numbers or arrays), unless swept."""
+        if self.time.periods is None:
+            return self.time.end
+        model = MODELS[self.model.kind]
+        return self.time.periods * (2.0 * math.pi / model.natural_frequency(parameters))
+
+    def steps(self, level: int) -> int:
+        """Return the number of steps at `level`: ``base_steps * 2**level``."""
+        return self.time.base_steps << level
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Experiment) and self.__dict__ == other.__dict__
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.__dict__.values()))
+
+    @staticmethod
+    def from_yaml(
+        path: str | Path, *, collection: str | None = None, configs: Path | None = None
+    ) -> Experiment:
+        """Read the experiment file at `path`; see `vibsim.spec.load`."""
+        from vibsim.spec.load import load
+
+        return load(path, collection=collection, configs=configs)
+
+    @staticmethod
+    def from_dict(
+        data: Mapping[str, Any], *, name: str = "experiment", collection: str = "adhoc"
+    ) -> Experiment:
+        """Build an experiment from the content of a file; see `vibsim.spec.from_dict`."""
+        from vibsim.spec.load import from_dict
+
+        return from_dict(data, name=name, collection=collection)
+
+
+def canonical(experiment: Experiment) -> dict[str, Any]:
+    """Return `experiment` as JSON-able data: the same for files that mean the same.
+
+    The sections stand apart, so that a digest can take those that a job uses: ``collection``, ``name``, ``title``,
+    ``source``, ``model``, ``initial``, ``time``, ``levels``, ``schemes``, ``sweep``, ``samples``, ``checks``.
+    """
+    data = experiment.model_dump(mode="json", exclude={"checks"})
+    data["sweep"] = data["sweep"] and data["sweep"]["axes"]
+    data["checks"] = [_check(check) for check in experiment.checks]
+    return data
+
+
+def restore(content: Mapping[str, Any]) -> Experiment:
+    """Return the experiment that `content`, made by `canonical`, describes."""
+    data = dict(content)
+    data["sweep"] = data["sweep"] and {"axes": data["sweep"]}
+    data["checks"] = [_without_kind(check) for check in data["checks"]]
+    return Experiment.model_validate(data)
+
+
+def _without_kind(check: Mapping[str, Any]) -> dict[str, Any]:
+    data = {key: value for key, value in check.items() if key != "kind"}
+    if "that" in data:
+        data["that"] = _without_kind(data["that"])
+    return data
+
+
+def _check(check: Check) -> dict[str, Any]:
+    data: dict[str, Any] = {"kind": check.kind, **check.model_dump(mode="json")}
+    if check.kind == "claim":
+        data["that"] = _check(check.that)
+    return data

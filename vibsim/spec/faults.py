@@ -1,0 +1,182 @@
+"""Collect every fault of an input, each with its line, in the words of the person who wrote it."""
+
+from __future__ import annotations
+
+import re
+from typing import Any, cast
+
+from pydantic import ValidationError
+
+from vibsim.errors import Fault, InputError, nearest
+from vibsim.models import MODELS
+from vibsim.schemes import SCHEMES
+from vibsim.spec.checks import At, ClaimCheck, ConvergesCheck, Expect, ValueCheck
+from vibsim.spec.document import Document, Every, LevelRange, Linspace, TimeSection
+from vibsim.spec.fields import Section
+from vibsim.spec.source import Path_, Source, dotted
+
+MAX_FAULTS = 1000
+MAX_VALUE = 60
+
+_RULES = {
+    "missing": "required key is missing",
+    "extra_forbidden": "unknown key",
+    "greater_than": "must be greater than {gt:g}",
+    "greater_than_equal": "must be at least {ge:g}",
+    "less_than_equal": "must be at most {le:g}",
+    "literal_error": "unknown choice",
+    "string_type": "must be text",
+    "string_too_short": "must not be empty",
+    "string_pattern_mismatch": "must consist of a to z, 0 to 9 and _",
+    "too_short": "must not be empty",
+    "tuple_type": "must be a list",
+    "dict_type": "must be a mapping",
+    "model_type": "must be a mapping",
+    "model_attributes_type": "must be a mapping",
+    "bool_type": "must be true or false",
+    "union_tag_invalid": "unknown kind",
+    "union_tag_not_found": "must be a mapping with the key kind",
+}
+_LINSPACE = "must be [first, last, count]"
+
+
+class Report:
+    """The faults of one input."""
+
+    def __init__(self, source: Source) -> None:
+        self.source = source
+        self.faults: set[Fault] = set()
+
+    def add(
+        self, path: Path_, rule: str, hint: str = "", value: object = None, at_key: bool = False
+    ) -> None:
+        """Note a fault of the value at `path`, or with `at_key` of the key itself.
+
+        Raises
+        ------
+        InputError
+            Where there are `MAX_FAULTS` already: nobody reads more of them.
+        """
+        place = self.source.place(path)
+        nested = place is not None and not place.text
+        line = (
+            self.line(path) if place is None else place.key_line if at_key or nested else place.line
+        )
+        written = place.text if place and place.text else "" if value is None else str(value)
+        self.faults.add(Fault(self.source.file, line, dotted(path), shorten(written), rule, hint))
+        if len(self.faults) == MAX_FAULTS:
+            self.faults.add(Fault(self.source.file, 0, "", "", "has more faults than are listed"))
+            self.raise_any()
+
+    def line(self, path: Path_) -> int:
+        """Return the line of the nearest key above `path` that the file has, 0 without one."""
+        for length in range(len(path), 0, -1):
+            place = self.source.place(path[:length])
+            if place is not None:
+                return place.key_line
+        return self.source.top.line if self.source.top else 0
+
+    def add_invalid(self, error: ValidationError) -> list[Path_]:
+        """Note every fault that pydantic found; return their places."""
+        return [self._add_row(row) for row in error.errors(include_url=False)]
+
+    def _add_row(self, row: Any) -> Path_:
+        kind: str = row["type"]
+        path = plain_path(row["loc"], keep_last=kind == "extra_forbidden")
+        context = row.get("ctx", {})
+        rule = _RULES.get(kind, "{msg}").format(**{**context, "msg": worded(row["msg"])})
+        value = None if kind == "missing" else row["input"]
+        hint = context.get("hint", "")
+        match kind:
+            case "extra_forbidden":
+                hint = nearest(path[-1], known_keys(path[:-1], self.source.data))
+            case "literal_error":
+                hint = nearest(value, re.findall(r"'([^']*)'", context["expected"]))
+            case "union_tag_invalid" | "union_tag_not_found":
+                return self._add_kind(path, value)
+        if "linspace" in path and kind in ("missing", "too_long", "tuple_type"):
+            rule = _LINSPACE
+            path = path[: path.index("linspace") + 1]
+        # a list with wrong items is too short only for pydantic, which counts the right ones
+        if kind != "too_short" or not value:
+            self.add(path, rule, hint, value, at_key=kind == "extra_forbidden")
+        return path
+
+    def _add_kind(self, path: Path_, value: object) -> Path_:
+        """Note that a model or a scheme has no kind that exists."""
+        kinds = sorted(MODELS if path[0] == "model" else SCHEMES)
+        if not isinstance(value, dict):
+            hint = f"e.g. {{kind: {kinds[0]}}}"
+            self.add(path, "must be a mapping with the key kind", hint, value)
+        elif "kind" in value:
+            self.add(
+                (*path, "kind"),
+                f"unknown {path[0]}".rstrip("s"),
+                nearest(value["kind"], kinds),
+                value["kind"],
+            )
+        else:
+            self.add((*path, "kind"), _RULES["missing"], nearest("", kinds))
+        return path
+
+    def raise_any(self) -> None:
+        """Raise `InputError` with every fault, if there is one."""
+        if self.faults:
+            raise InputError(self.faults)
+
+
+def plain_path(loc: tuple[str | int, ...], keep_last: bool) -> Path_:
+    """Return a place without the names of union members, which no file contains."""
+    last = len(loc) - 1 if keep_last else len(loc)
+    named = [
+        part
+        for index, part in enumerate(loc)
+        if index == last or not (isinstance(part, str) and part.startswith("\0"))
+    ]
+    return tuple(named)
+
+
+def worded(message: str) -> str:
+    """Return one of pydantic's messages in the imperative of the others."""
+    return message.replace("Input should", "must", 1)
+
+
+def shorten(text: str) -> str:
+    """Return `text` on one line, cut to `MAX_VALUE` characters."""
+    line = " ".join(text[: 4 * MAX_VALUE].split())
+    return line if len(line) <= MAX_VALUE else line[: MAX_VALUE - 3] + "..."
+
+
+def known_keys(path: Path_, data: Any) -> list[str]:
+    """Name the keys that a mapping at `path` may have."""
+    value: Any = data
+    for part in path:
+        value = cast(Any, value)[part]
+    match path:
+        case ():
+            return list(Document.model_fields)
+        case ("model",):
+            return ["kind", *(row.name for row in MODELS[value["kind"]].parameters)]
+        case ("time",):
+            return list(TimeSection.model_fields)
+        case ("levels",):
+            return [str(field.alias or name) for name, field in LevelRange.model_fields.items()]
+        case ("samples",):
+            return list(Every.model_fields)
+        case ("sweep", _):
+            return list(Linspace.model_fields)
+        case ("schemes", _):
+            options = (row.name for row in SCHEMES[value["kind"]].options)
+            return ["kind", "label", *options]
+        case (*_, "at"):
+            return list(At.model_fields)
+        case (*_, "expect"):
+            return list(Expect.model_fields)
+        case _:
+            return list(_check_class(value).model_fields)
+
+
+def _check_class(value: Any) -> type[Section]:
+    if "claim" in value:
+        return ClaimCheck
+    return ConvergesCheck if "converges" in value else ValueCheck

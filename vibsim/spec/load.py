@@ -1,0 +1,99 @@
+"""The ways into an experiment: a file, or its content as a dictionary."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from numbers import Integral, Real
+from pathlib import Path
+from typing import Any
+
+from vibsim.errors import Fault, InputError
+from vibsim.spec.build import Place, build
+from vibsim.spec.experiment import Experiment
+from vibsim.spec.faults import Report
+from vibsim.spec.source import MAX_DEPTH, Source, read
+
+ADHOC = "adhoc"
+"""Collection of the experiments that are in none."""
+
+_NAME = re.compile(r"[a-z0-9_]+")
+_NAME_RULE = "must consist of a to z, 0 to 9 and _"
+
+
+def load(
+    path: str | Path, *, collection: str | None = None, configs: Path | None = None
+) -> Experiment:
+    """Read the experiment file at `path`.
+
+    Parameters
+    ----------
+    path
+        A YAML file; its name without the ending is the experiment's.
+    collection
+        Name of the collection; by default the folder of the file if that is below `configs`, else ``adhoc``.
+    configs
+        The folder of collections; by default any folder of that name above the file.
+
+    Raises
+    ------
+    InputError
+        With every fault of the file.
+    """
+    path = Path(path)
+    source = read(path)
+    report = Report(source)
+    place = Place(collection or collection_of(path, configs), path.stem, path)
+    _check_names(place, report)
+    return build(source, place, report)
+
+
+def from_dict(
+    data: Mapping[str, Any], *, name: str = "experiment", collection: str = ADHOC
+) -> Experiment:
+    """Build an experiment from what a file would hold.
+
+    Raises
+    ------
+    InputError
+        With every fault of `data`.
+    """
+    source = Source(name, _plain(data, name))
+    report = Report(source)
+    place = Place(collection, name)
+    _check_names(place, report)
+    return build(source, place, report)
+
+
+def collection_of(path: Path, configs: Path | None = None) -> str:
+    """Name the collection of a file: its folder if that is below `configs`, else ``adhoc``."""
+    folder = path.absolute().parent
+    if configs is None:
+        configs = next((up for up in folder.parents if up.name == "configs"), None)
+    if configs is None or configs.absolute() not in folder.parents:
+        return ADHOC
+    return folder.name
+
+
+def _check_names(place: Place, report: Report) -> None:
+    for what, text in (("experiment", place.name), ("collection", place.collection)):
+        if not _NAME.fullmatch(text):
+            report.add((), f"the name of the {what}, '{text}', {_NAME_RULE}")
+
+
+def _plain(data: Any, name: str, depth: int = 0) -> Any:
+    """Return `data` with Python's own numbers, lists and dictionaries."""
+    if depth > MAX_DEPTH:
+        rule = f"must not nest deeper than {MAX_DEPTH} levels"
+        raise InputError([Fault(name, 0, "", "", rule)])
+    if isinstance(data, Mapping):
+        return {str(key): _plain(value, name, depth + 1) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_plain(value, name, depth + 1) for value in data]
+    if hasattr(data, "tolist"):
+        return _plain(data.tolist(), name, depth + 1)
+    if isinstance(data, bool):
+        return data
+    if isinstance(data, Integral):
+        return int(data)
+    return float(data) if isinstance(data, Real) else data

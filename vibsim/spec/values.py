@@ -1,0 +1,90 @@
+"""The numbers that a ``value`` check can ask for: one row per name, worked out in the analysis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Literal
+
+AtPart = Literal["t", "step", "level", "scheme", "case"]
+Which = Literal["series", "convergent", "extremal", "none"]
+"""Which quantities a value is of: every one, those that are compared between levels, those with extrema over every
+step, or none because the value belongs to the motion as a whole."""
+
+
+@dataclass(frozen=True)
+class Value:
+    """One number that can be checked."""
+
+    name: str
+    description: str
+    of: Which
+    """Which quantities it can be of."""
+    at: tuple[AtPart, ...] = ("level", "scheme", "case")
+    """Which parts of ``at:`` it takes."""
+    finer_levels: int = 0
+    """How many finer levels a level must have beside it."""
+    best: bool = False
+    """Whether it also exists for the Richardson-extrapolated solution, ``level: best``."""
+    needs_time: bool = False
+    """Whether ``t`` or ``step`` must be given."""
+    needs_exact: bool = False
+    """Whether the model must have an exact solution (or exact period)."""
+
+
+_ANYWHERE: tuple[AtPart, ...] = ("t", "step", "level", "scheme", "case")
+_LADDER: tuple[AtPart, ...] = ("scheme", "case")
+
+_ROWS = (
+    Value("end", "value at the last time, or at `t` or `step`", "series", _ANYWHERE, best=True),
+    Value(
+        "at",
+        "value at the time `t` or after `step` steps",
+        "series",
+        _ANYWHERE,
+        best=True,
+        needs_time=True,
+    ),
+    Value("min", "smallest value over every step", "extremal"),
+    Value("max", "largest value over every step", "extremal"),
+    Value("max_abs", "largest absolute value over every step", "extremal"),
+    Value("max_abs_interior", "the same without the last point", "extremal"),
+    Value("period", "period, from interpolated peaks", "none"),
+    Value("period_grid", "period, from peaks at grid points", "none"),
+    Value("exact_period", "period of the exact solution", "none", ("case",), needs_exact=True),
+    Value("period_error", "period over the exact period, less one", "none", needs_exact=True),
+    Value("frequency", "angular frequency, 2 pi over the period", "none"),
+    Value("amplitude", "largest absolute position over every step", "none"),
+    Value("growth_factor", "last peak over the first peak", "none"),
+    Value("relative_energy_error", "max |E(t) - E(0)| / |E(0)| over every step", "none"),
+    Value("error_l1", "L1 norm of the true error", "convergent", best=True, needs_exact=True),
+    Value("error_l2", "L2 norm of the true error", "convergent", best=True, needs_exact=True),
+    Value("error_linf", "largest true error", "convergent", best=True, needs_exact=True),
+    Value(
+        "error_linf_interior",
+        "largest true error without the last point",
+        "convergent",
+        best=True,
+        needs_exact=True,
+    ),
+    Value(
+        "error_estimate_defect",
+        "max |estimate - true error| over max |true error|",
+        "convergent",
+        finer_levels=1,
+        needs_exact=True,
+    ),
+    Value("observed_order", "order of a triple of levels, L2 norm", "convergent", finer_levels=2),
+    Value("ratio", "ratio of the differences of a triple, L2 norm", "convergent", finer_levels=2),
+    Value("coincidence", "how well rescaled differences coincide", "convergent", finer_levels=2),
+    Value(
+        "richardson_error",
+        "largest error bound of the extrapolated solution",
+        "convergent",
+        _LADDER,
+    ),
+)
+
+VALUES: Mapping[str, Value] = MappingProxyType({row.name: row for row in _ROWS})
+"""Every value name with its meaning, as `vibsim list checks` prints it."""
