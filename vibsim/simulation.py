@@ -82,7 +82,8 @@ def simulate_record(
         )
         for scheme in experiment.schemes
     ]
-    coords = _coords([scheme.name for scheme in experiment.schemes], group, steps, every)
+    names = [scheme.name for scheme in experiment.schemes]
+    coords = _coords(names, group, steps, every, same_end=not experiment.end_varies)
     variables = {
         **_series(model, runs),
         **_exact(model, group, steps, every),
@@ -103,12 +104,17 @@ def members(experiment: Experiment, start: int, stop: int) -> Members:
             for name, value in values.items()
         }
 
+    parameters = fill("model", experiment.model.parameters)
+    end = fill("time", {"end": experiment.time.end})["end"]
+    if experiment.end_varies and "time.end" not in columns:
+        # the end is a number of natural periods, and each member has its own
+        end = np.asarray(experiment.natural_end(parameters), dtype=float)
     return Members(
         index=np.arange(start, stop, dtype=np.int64),
         columns=columns,
-        parameters=fill("model", experiment.model.parameters),
+        parameters=parameters,
         initial=fill("initial", experiment.initial),
-        end=fill("time", {"end": experiment.time.end})["end"],
+        end=end,
     )
 
 
@@ -120,8 +126,9 @@ def _fractions(steps: int, every: int) -> NDArray[np.int64]:
     return np.arange(0, steps + 1, every, dtype=np.int64)
 
 
-def _coords(schemes: list[str], group: Members, steps: int, every: int) -> dict[str, Variable]:
-    same_end = bool(np.all(group.end == group.end[0]))
+def _coords(
+    schemes: list[str], group: Members, steps: int, every: int, same_end: bool
+) -> dict[str, Variable]:
     number = _fractions(steps, every)
     t = number * (group.end[0] / steps) if same_end else number / steps
     coords = {

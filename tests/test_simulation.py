@@ -1,0 +1,139 @@
+"""A level as a record: names, shapes, what every member gets, and what does not apply."""
+
+import numpy as np
+import pytest
+
+from vibsim import Experiment, simulate
+from vibsim.simulation import simulate_record
+
+BASE = {
+    "title": "t",
+    "model": {"kind": "pendulum", "g": 2.0, "L": 0.5, "m": 3.0},
+    "initial": {"theta": 1.0, "omega": 0.25},
+    "time": {"end": 10.0},
+    "levels": [6, 7, 8],
+    "schemes": ["central", {"kind": "central", "label": "kicked", "end_velocity": "kick"}],
+}
+
+
+def experiment(**changes):
+    return Experiment.from_dict({**BASE, **changes})
+
+
+def test_a_level_has_the_names_and_shapes_of_the_design():
+    data = simulate(experiment(sweep={"initial.theta": [0.5, 1.0, 3.0]}), 7)
+    assert data.sizes["scheme"] == 2
+    assert data.sizes["case"] == 3
+    assert list(data.scheme.values) == ["central", "kicked"]
+    assert list(data.initial_theta.values) == [0.5, 1.0, 3.0]
+    for name in (
+        "theta",
+        "omega",
+        "energy",
+        "kinetic_energy",
+        "potential_energy",
+        "energy_deviation",
+    ):
+        assert data[name].dims == ("scheme", "case", "t")
+    assert data.theta_exact.dims == ("case", "t")
+    for variable in data.variables.values():
+        assert variable.attrs["long_name"]
+        assert variable.attrs["units"]
+    assert (data.status == 0).all()
+    assert (data.last_step == 128).all()
+    assert data.t[-1] == 10.0
+
+
+def test_energies_are_the_models_own():
+    data = simulate(experiment(), 8)
+    kinetic = 0.5 * 3.0 * (0.5 * data.omega) ** 2
+    potential = 3.0 * 2.0 * 0.5 * (1 - np.cos(data.theta))
+    np.testing.assert_allclose(data.kinetic_energy, kinetic, atol=1e-14)
+    np.testing.assert_allclose(data.potential_energy, potential, atol=1e-14)
+    np.testing.assert_array_equal(data.energy, data.kinetic_energy + data.potential_energy)
+    np.testing.assert_array_equal(data.energy_deviation, data.energy - data.energy.isel(t=0))
+
+
+def test_what_is_gathered_agrees_with_all_steps_stored():
+    data = simulate(experiment(samples="all"), 8).isel(case=0)
+    np.testing.assert_array_equal(data.theta_max, data.theta.max("t"))
+    np.testing.assert_array_equal(data.theta_min, data.theta.min("t"))
+    np.testing.assert_array_equal(data.omega_max, data.omega.max("t"))
+    np.testing.assert_array_equal(
+        data.energy_deviation_max_abs, abs(data.energy_deviation).max("t")
+    )
+    interior = abs(data.energy_deviation.isel(t=slice(None, -1))).max("t")
+    np.testing.assert_array_equal(data.energy_deviation_max_abs_interior, interior)
+
+
+def test_samples_do_not_change_the_numbers():
+    every_step = simulate(experiment(samples="all"), 8)
+    common = simulate(experiment(samples="common"), 8)
+    assert common.sizes["t"] == 65
+    np.testing.assert_array_equal(common.theta, every_step.theta.isel(t=slice(None, None, 4)))
+    np.testing.assert_array_equal(common.t, every_step.t.isel(t=slice(None, None, 4)))
+    np.testing.assert_array_equal(common.period, every_step.period)
+
+
+def test_members_of_a_shard_have_the_bits_of_the_whole():
+    swept = experiment(sweep={"initial.theta": {"linspace": [0.1, 3.1, 7]}, "model.g": [1.0, 4.0]})
+    whole = simulate_record(swept, 7)
+    for start, stop in ((0, 1), (1, 5), (5, 14)):
+        part = simulate_record(swept, 7, start, stop)
+        for name, variable in part.variables.items():
+            axis = variable.dims.index("case")
+            expected = np.take(whole[name], np.arange(start, stop), axis=axis)
+            np.testing.assert_array_equal(variable.values, expected, err_msg=name)
+
+
+def test_grid_of_two_keys_runs_with_the_last_key_fastest():
+    data = simulate(experiment(sweep={"initial.theta": [0.5, 1.0], "model.g": [1.0, 2.0, 3.0]}), 6)
+    assert list(data.initial_theta.values) == [0.5, 0.5, 0.5, 1.0, 1.0, 1.0]
+    assert list(data.model_g.values) == [1.0, 2.0, 3.0, 1.0, 2.0, 3.0]
+    alone = simulate(
+        experiment(initial={"theta": 1.0, "omega": 0.25}, model={**BASE["model"], "g": 2.0}), 6
+    )
+    np.testing.assert_array_equal(data.theta.isel(case=4), alone.theta.isel(case=0))
+
+
+def test_where_the_end_differs_t_is_a_fraction():
+    data = simulate(experiment(sweep={"time.end": [5.0, 10.0]}), 6)
+    assert data.t[-1] == 1.0
+    assert list(data.end.values) == [5.0, 10.0]
+    alone = simulate(experiment(time={"end": 5.0}), 6)
+    np.testing.assert_array_equal(data.theta.isel(case=0), alone.theta.isel(case=0))
+    np.testing.assert_array_equal(data.theta_exact.isel(case=0), alone.theta_exact.isel(case=0))
+
+
+def test_an_end_in_natural_periods_is_each_members_own():
+    swept = experiment(
+        time={"periods": 3, "steps_per_period": 8}, sweep={"model.g": [2.0, 8.0]}, levels=[1, 2, 3]
+    )
+    data = simulate(swept, 2)
+    np.testing.assert_allclose(data.end, 3 * 2 * np.pi / np.sqrt(np.array([2.0, 8.0]) / 0.5))
+    assert data.attrs["steps"] == 3 * 8 * 4
+    shard = simulate_record(swept, 2, 1, 2).to_xarray()
+    np.testing.assert_array_equal(shard.t, data.t)
+    np.testing.assert_array_equal(shard.theta[:, 0], data.theta[:, 1])
+
+
+def test_a_member_that_overflows_is_reported_and_the_others_stand():
+    unstable = experiment(
+        model={"kind": "linear_pendulum"},
+        time={"end": 400.0},
+        levels=[7, 8, 9],
+        sweep={"model.g": [1.0, 64.0]},
+    )
+    data = simulate(unstable, 8)
+    assert data.status.values.tolist() == [[0, 1], [0, 1]]
+    step = int(data.last_step.values[0, 1])
+    assert 0 < step < 256
+    assert data.failure_time.values[0, 1] == pytest.approx((step + 1) * 400 / 256)
+    assert np.isnan(data.failure_time.values[0, 0])
+    assert np.isfinite(data.theta.values[:, 0]).all()
+    assert data.omega_dt.values[1] == pytest.approx(12.5)
+
+
+def test_a_level_that_the_experiment_does_not_have_is_refused():
+    with pytest.raises(ValueError, match=r"level 5 is none of \[6, 7, 8\]"):
+        simulate(experiment(), 5)
