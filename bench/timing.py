@@ -1,0 +1,78 @@
+"""Interleaved timing: A B C A B C ..., so that a machine whose speed drifts is the same to all of them."""
+
+from __future__ import annotations
+
+import os
+import resource
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Process:
+    """What one whole process cost."""
+
+    wall: float
+    cpu: float
+    peak_mib: float
+
+
+def interleave(contestants: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, float]:
+    """Return the median of what each contestant returns, after one round that does not count."""
+    for run in contestants.values():
+        run()
+    times: dict[str, list[float]] = {name: [] for name in contestants}
+    for _ in range(rounds):
+        for name, run in contestants.items():
+            times[name].append(run())
+    return {name: statistics.median(values) for name, values in times.items()}
+
+
+def seconds(function: Callable[[], object]) -> Callable[[], float]:
+    """Wrap `function` so that it returns how long it took."""
+
+    def timed() -> float:
+        began = time.perf_counter()
+        function()
+        return time.perf_counter() - began
+
+    return timed
+
+
+def process(command: Sequence[str], **environment: str) -> Process:
+    """Run `command` to its end and return what it cost, itself and its children.
+
+    Raises
+    ------
+    RuntimeError
+        Where the command fails: a benchmark of a failure means nothing.
+    """
+    program = (
+        "import resource, subprocess, sys, time\n"
+        "began = time.perf_counter()\n"
+        "done = subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)\n"
+        "wall = time.perf_counter() - began\n"
+        "use = resource.getrusage(resource.RUSAGE_CHILDREN)\n"
+        "sys.stderr.write(done.stderr.decode()[-2000:] if done.returncode else '')\n"
+        "print(wall, use.ru_utime + use.ru_stime, use.ru_maxrss / 1024, done.returncode)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, *command],
+        capture_output=True,
+        text=True,
+        env={**os.environ, **environment},
+        check=True,
+    )
+    wall, cpu, peak, status = map(float, done.stdout.split())
+    if status:
+        raise RuntimeError(f"{' '.join(command)} exited with {status:.0f}: {done.stderr}")
+    return Process(wall, cpu, peak)
+
+
+def peak_of_self_mib() -> float:
+    """Return the largest memory this process has held so far."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
