@@ -1,0 +1,47 @@
+"""Everything that vibsim writes to disk and reads back: whole, as it was written, or not at all.
+
+Every file appears under its name in one step, carries a digest of its own bytes and the digest of
+the job that made it. This package alone opens netCDF files, and it imports netCDF4 only then; reading
+a summary imports not even numpy.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from vibsim.store.atomic import replacing, write_bytes, write_text
+    from vibsim.store.netcdf import read, write
+    from vibsim.store.shards import join
+    from vibsim.store.summary import FORMAT, read_json, write_json
+
+_HOME = {
+    "FORMAT": "summary",
+    "join": "shards",
+    "read": "netcdf",
+    "read_json": "summary",
+    "replacing": "atomic",
+    "write": "netcdf",
+    "write_bytes": "atomic",
+    "write_json": "summary",
+    "write_text": "atomic",
+}
+
+__all__ = [
+    "FORMAT",
+    "join",
+    "read",
+    "read_json",
+    "replacing",
+    "write",
+    "write_bytes",
+    "write_json",
+    "write_text",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'vibsim.store' has no attribute {name!r}")
+    return getattr(import_module(f"vibsim.store.{_HOME[name]}"), name)

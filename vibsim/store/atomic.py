@@ -1,0 +1,82 @@
+"""Files that appear whole: a hidden temporary file beside the target, flushed, then renamed.
+
+A reader sees the old file or the new one and nothing between, also after a crash or a power cut.
+What a killed writer leaves behind is removed by the next one with the same target.
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+_SUFFIX = ".part"
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give a temporary path to write to; rename it to `path` when the block ends well.
+
+    Parameters
+    ----------
+    path
+        The target; its folder is created where it is missing.
+
+    Yields
+    ------
+    Path
+        A name of its own in the same folder, so that writers of one target do not meet.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    _remove_stale(path)
+    pid = os.getpid()
+    owner = f"{pid}-{_started(pid)}-{secrets.token_hex(4)}"
+    temporary = path.with_name(f".{path.name}.{owner}{_SUFFIX}")
+    try:
+        yield temporary
+        _flush(temporary)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+    _flush(path.parent)
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write `content` to `path` in one step."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write `text` to `path` in one step, as UTF-8 with the line ends it has."""
+    write_bytes(path, text.encode())
+
+
+def _flush(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _remove_stale(path: Path) -> None:
+    prefix = f".{path.name}."
+    for entry in os.scandir(path.parent):
+        if entry.name.startswith(prefix) and entry.name.endswith(_SUFFIX):
+            owner = entry.name[len(prefix) : -len(_SUFFIX)].split("-")
+            if len(owner) == 3 and owner[0].isdigit() and _started(int(owner[0])) != owner[1]:
+                Path(entry.path).unlink(missing_ok=True)
+
+
+def _started(pid: int) -> str:
+    """Return when process `pid` started, in ticks since boot; empty when there is no such process.
+
+    The number tells a living writer from a later process that was given the same id.
+    """
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[19]
+    except OSError:
+        return ""

@@ -1,0 +1,58 @@
+"""The seal of a binary file: the SHA-256 of all its bytes, appended behind them.
+
+HDF5 reads what its superblock says and ignores bytes behind it, so that a sealed file opens in
+every netCDF program. The library's own checksums (fletcher32) see damaged data but not damaged
+metadata; the seal sees every bit, and it is checked before the library is given a single one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+from vibsim.errors import DamagedFileError
+
+_MARK = b"\nvibsim-sha256:"
+LENGTH = len(_MARK) + 64 + 1
+"""Size of the seal in bytes."""
+_BLOCK = 1 << 20
+
+
+def _seal(path: Path, size: int) -> bytes:
+    digest = hashlib.sha256()
+    with path.open("rb", buffering=0) as file:
+        while size > 0 and (block := file.read(min(_BLOCK, size))):
+            digest.update(block)
+            size -= len(block)
+    return _MARK + digest.hexdigest().encode() + b"\n"
+
+
+def attach(path: Path) -> None:
+    """Append the seal to the finished file `path`."""
+    seal = _seal(path, path.stat().st_size)
+    with path.open("ab") as file:
+        file.write(seal)
+
+
+def check(path: Path) -> None:
+    """Compare `path` with its seal.
+
+    Raises
+    ------
+    DamagedFileError
+        When there is no such file, when it has no seal, or when a single bit differs from
+        what was sealed.
+    """
+    try:
+        size = path.stat().st_size - LENGTH
+        with path.open("rb") as file:
+            file.seek(max(size, 0))
+            found = file.read(LENGTH + 1)
+        expected = _seal(path, size)
+    except OSError as error:
+        raise DamagedFileError(path, f"cannot be read: {error.strerror}") from error
+    if found == expected:
+        return
+    if found.startswith(_MARK):
+        raise DamagedFileError(path, "its bytes are not those that were written")
+    raise DamagedFileError(path, "it does not end with a seal: truncated, or not vibsim's")
