@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from vibsim.errors import InputError
+from vibsim.plan import Choice, code, load, load_all
+
+from .conftest import TEXT
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "tiny.yaml"
+    path.write_text(TEXT)
+    return path
+
+
+def entry(results: Path) -> Path:
+    (found,) = (results / ".vibsim/plans").iterdir()
+    return found
+
+
+def refuse_to_build(*_: object, **__: object) -> None:
+    raise AssertionError("built again")
+
+
+def test_a_cached_plan_is_the_plan(
+    tmp_path: Path, file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    built = load(Choice("adhoc", file), tmp_path)
+    monkeypatch.setattr("vibsim.plan.build.build", refuse_to_build)
+    assert load(Choice("adhoc", file), tmp_path) == built
+    with pytest.raises(AssertionError, match="built again"):
+        load(Choice("other", file), tmp_path)
+
+
+@pytest.mark.parametrize("fault", ["flip", "cut", "empty", "foreign"])
+def test_a_damaged_entry_is_built_again(tmp_path: Path, file: Path, fault: str) -> None:
+    built = load(Choice("adhoc", file), tmp_path)
+    path = entry(tmp_path)
+    content = path.read_bytes()
+    places = range(0, len(content), 37) if fault == "flip" else [0]
+    for place in places:
+        damaged = bytearray(content)
+        damaged[place] ^= 1
+        kinds = {"flip": damaged, "cut": content[:-9], "empty": b"", "foreign": b"{}"}
+        path.write_bytes(kinds[fault])
+        assert load(Choice("adhoc", file), tmp_path) == built
+        assert path.read_bytes() == content
+
+
+def test_a_changed_file_and_changed_code_are_planned_again(
+    tmp_path: Path, file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    load(Choice("adhoc", file), tmp_path)
+    file.write_text(TEXT.replace("A tiny", "Another"))
+    assert load(Choice("adhoc", file), tmp_path).title == "Another pendulum"
+    monkeypatch.setattr(code, "everything", lambda: "other code")
+    monkeypatch.setattr("vibsim.plan.build.build", refuse_to_build)
+    with pytest.raises(AssertionError, match="built again"):
+        load(Choice("adhoc", file), tmp_path)
+
+
+def test_faults_of_all_files_are_told_at_once(tmp_path: Path, file: Path) -> None:
+    bad = [tmp_path / "a.yaml", tmp_path / "b.yaml"]
+    for path in bad:
+        path.write_text(TEXT.replace("end: 20.0", "end: -1"))
+    missing = tmp_path / "none.yaml"
+    with pytest.raises(InputError) as caught:
+        load_all([Choice("adhoc", p) for p in (*bad, missing, file)], tmp_path)
+    told = str(caught.value)
+    assert all(str(path) in told for path in (*bad, missing))
+    assert not [p for p in (tmp_path / ".vibsim/plans").iterdir() if p.name != "adhoc.tiny.json"]
+
+
+def test_results_that_cannot_be_written_do_without_a_cache(tmp_path: Path, file: Path) -> None:
+    blocked = tmp_path / "blocked"
+    blocked.write_text("a file where the folder should be")
+    assert load(Choice("adhoc", file), blocked).name == "tiny"
+
+
+MANY = """
+import sys, time
+from pathlib import Path
+from vibsim.plan import Choice, load_all
+folder = Path(sys.argv[1])
+choices = [Choice("adhoc", p) for p in sorted(folder.glob("*.yaml"))]
+start = time.process_time()
+plans = load_all(choices, folder)
+print(len(plans), time.process_time() - start)
+heavy = {"numpy", "pydantic", "yaml", "netCDF4", "xarray", "numba"} & set(sys.modules)
+assert len(sys.argv) < 3 or not heavy, heavy
+"""
+
+
+def test_a_hundred_cached_plans_load_quickly_and_lightly(tmp_path: Path) -> None:
+    for number in range(100):
+        (tmp_path / f"e{number}.yaml").write_text(TEXT + f"# {number}\n")
+    command = [sys.executable, "-c", MANY, str(tmp_path)]
+    subprocess.run(command, check=True)
+    spent = []
+    for _ in range(3):
+        ended = subprocess.run([*command, "light"], check=True, capture_output=True, text=True)
+        count, seconds = ended.stdout.split()
+        assert count == "100"
+        spent.append(float(seconds))
+    assert min(spent) < 0.1, spent

@@ -1,0 +1,148 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from vibsim.plan import Plan
+from vibsim.plan.jobs import from_json, to_json
+
+Plans = Callable[..., Plan]
+
+
+def digests(plan: Plan) -> tuple[dict[int, str], str, str]:
+    return (
+        {level.level: level.shards[0].digest for level in plan.levels},
+        plan.analysis,
+        plan.report,
+    )
+
+
+NOTHING = {
+    "comment": ("title:", "# a comment\ntitle:"),
+    "spelling": ("end: 20.0", "end: 2.0e+1"),
+    "whole": ("g: 1.0", "g: 1"),
+    "order": ("theta: 1.0, omega: 0.0", "omega: 0.0, theta: 1.0"),
+    "default": (", omega: 0.0", ""),
+    "ladder": ("levels: [5, 6, 7]", "levels: {from: 5, to: 7}"),
+    "formula": ("end: 20.0", "end: 4*5"),
+}
+
+
+@pytest.mark.parametrize("change", NOTHING.values(), ids=NOTHING)
+def test_writing_the_same_otherwise_changes_nothing(
+    plan_of: Plans, change: tuple[str, str]
+) -> None:
+    assert digests(plan_of(change)) == digests(plan_of())
+
+
+def test_a_title_changes_the_analysis_and_the_report(plan_of: Plans) -> None:
+    levels, analysis, report = digests(plan_of())
+    changed = digests(plan_of(("A tiny", "Another")))
+    assert changed[0] == levels
+    assert changed[1] != analysis
+    assert changed[2] != report
+
+
+def test_a_check_changes_the_analysis_and_the_report(plan_of: Plans) -> None:
+    levels, analysis, report = digests(plan_of())
+    changed = digests(plan_of(("order: scheme", "order: 2")))
+    assert changed[0] == levels
+    assert changed[1] != analysis
+    assert changed[2] != report
+
+
+def test_a_source_changes_the_report_alone(plan_of: Plans) -> None:
+    levels, analysis, report = digests(plan_of())
+    changed = digests(plan_of(("nowhere", "somewhere")))
+    assert changed[:2] == (levels, analysis)
+    assert changed[2] != report
+
+
+@pytest.mark.parametrize("levels", ["[5, 6, 7, 8]", "[5, 6, 7, 9, 10]", "[5, 6]"])
+def test_other_levels_leave_the_old_ones_alone(plan_of: Plans, levels: str) -> None:
+    old, analysis, _ = digests(plan_of())
+    new, changed, _ = digests(plan_of(("[5, 6, 7]", levels)))
+    assert all(old[level] == digest for level, digest in new.items() if level in old)
+    assert changed != analysis
+
+
+def test_a_coarser_level_matters_only_where_it_changes_the_samples(plan_of: Plans) -> None:
+    old, _, _ = digests(plan_of())
+    new, _, _ = digests(plan_of(("[5, 6, 7]", "[4, 5, 6, 7]")))
+    assert {level: new[level] for level in old} == old
+    common = ("schemes:", "samples: common\nschemes:")
+    old, _, _ = digests(plan_of(common))
+    new, _, _ = digests(plan_of(common, ("[5, 6, 7]", "[4, 5, 6, 7]")))
+    assert not {new[level] for level in old} & set(old.values())
+
+
+SIMULATION = {
+    "parameter": ("g: 1.0", "g: 1.0000000000000002"),
+    "other parameter": ("L: 1.0", "L: 2.0"),
+    "model": ("kind: pendulum", "kind: linear_pendulum"),
+    "initial": ("theta: 1.0", "theta: 1.1"),
+    "time": ("end: 20.0", "end: 21.0"),
+    "scheme option": ("[central]", "[{kind: central, start: first_order}]"),
+    "scheme name": ("[central]", "[{kind: central, label: mine}]"),
+    "sweep": ("schemes:", "sweep: {model.m: [1.0, 2.0]}\nschemes:"),
+}
+
+
+@pytest.mark.parametrize("change", SIMULATION.values(), ids=SIMULATION)
+def test_what_a_simulation_uses_changes_every_level(
+    plan_of: Plans, change: tuple[str, str]
+) -> None:
+    old, analysis, _ = digests(plan_of())
+    new, changed, _ = digests(plan_of(change))
+    assert not set(old.values()) & set(new.values())
+    assert changed != analysis
+
+
+def test_no_two_jobs_share_a_digest(plan_of: Plans) -> None:
+    plans = [plan_of(), plan_of(name="other")]
+    found = [d for p in plans for d in (*digests(p)[0].values(), p.analysis, p.report)]
+    assert len(set(found)) == len(found)
+
+
+def test_the_place_of_the_file_is_no_part_of_the_digests(plan_of: Plans, tmp_path: Path) -> None:
+    from vibsim.plan import Choice, load
+
+    here = plan_of()
+    there = tmp_path / "there" / "tiny.yaml"
+    there.parent.mkdir()
+    there.write_bytes(Path(here.file).read_bytes())
+    assert digests(load(Choice("adhoc", there))) == digests(here)
+
+
+def test_paths_follow_the_contract(plan_of: Plans) -> None:
+    assert [s.path for s in plan_of().shards] == [f"adhoc/tiny/level_0{n}.nc" for n in (5, 6, 7)]
+    swept = plan_of(("schemes:", "sweep: {initial.theta: [0.5, 1.0]}\nschemes:"))
+    assert swept.cases == 2
+    assert swept.shards[0].path == "adhoc/tiny/level_05/shard_0000.nc"
+    assert [(s.start, s.stop) for s in swept.shards] == [(0, 2)] * 3
+
+
+def test_a_plan_survives_json(plan_of: Plans) -> None:
+    plan = plan_of(("schemes:", "sweep: {initial.theta: [0.5, 1.0]}\nschemes:"))
+    text = to_json(plan)
+    assert from_json(text, Path(plan.file)) == plan
+    assert json.loads(text)["file"] == ""
+
+
+def test_the_experiment_comes_back_without_its_file(plan_of: Plans) -> None:
+    from vibsim.spec import Experiment
+
+    claim = (
+        "  - {claim: c, source: s, that: {value: end, quantity: theta, below: 2}, holds: true}\n"
+    )
+    plan = plan_of(
+        ("checks:\n", "checks:\n" + claim),
+        ("schemes:", "sweep: {initial.theta: [0.5, 1.0]}\nschemes:"),
+    )
+    expected = Experiment.from_yaml(plan.file, collection="adhoc")
+    Path(plan.file).unlink()
+    assert replace(plan).experiment == expected

@@ -1,0 +1,27 @@
+"""What there is to do: members, levels, shards, names, digests and costs; no arrays, no netCDF.
+
+Loading a plan that is cached imports neither numpy nor the validation library: Snakemake asks for the
+plans of all experiments each time it starts.
+"""
+
+from vibsim.plan.cache import load, load_all
+from vibsim.plan.cases import columns, count, sampling
+from vibsim.plan.choose import Choice, checkout, choose, experiments
+from vibsim.plan.jobs import LevelJob, Plan, ShardJob
+from vibsim.plan.names import Names
+
+__all__ = [
+    "Choice",
+    "LevelJob",
+    "Names",
+    "Plan",
+    "ShardJob",
+    "checkout",
+    "choose",
+    "columns",
+    "count",
+    "experiments",
+    "load",
+    "load_all",
+    "sampling",
+]

@@ -1,0 +1,127 @@
+"""Find the experiments that a user names: by file, by name, or by collection."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from vibsim.errors import Fault, InputError, VibsimError, nearest
+
+DEFAULT = ("pendulum_lab", "showcase")
+ADHOC = "adhoc"
+"""Collection of a file outside ``configs/``."""
+_PLAIN = re.compile(r"[a-z0-9_]+")
+
+
+@dataclass(frozen=True)
+class Choice:
+    """An experiment file and the collection it belongs to."""
+
+    collection: str
+    file: Path
+
+    @property
+    def name(self) -> str:
+        """Name of the experiment."""
+        return self.file.stem
+
+    @property
+    def key(self) -> str:
+        """The name of the experiment over all collections."""
+        return f"{self.collection}/{self.name}"
+
+
+def checkout() -> Path:
+    """Return the folder with the Snakefile and the experiments that come with vibsim.
+
+    Raises
+    ------
+    VibsimError
+        When the package was installed without it.
+    """
+    for folder in (Path(__file__).resolve().parents[2], Path.cwd()):
+        if (folder / "Snakefile").is_file() and (folder / "configs").is_dir():
+            return folder
+    raise VibsimError("no Snakefile beside the package nor here: vibsim runs from its checkout")
+
+
+def experiments(root: Path) -> list[Choice]:
+    """Return every experiment in the collections of the checkout `root`, in order."""
+    return [_choice(file, root) for file in sorted((root / "configs").glob("*/*.yaml"))]
+
+
+def choose(words: Sequence[str], root: Path) -> list[Choice]:
+    """Find the experiments that `words` name.
+
+    Parameters
+    ----------
+    words
+        Files, names of experiments (``name`` or ``collection/name``) or collections; none of them
+        means the default collections.
+    root
+        The checkout.
+
+    Returns
+    -------
+    list
+        Each experiment once, in the order named.
+
+    Raises
+    ------
+    InputError
+        With every word that names nothing, and every pair of files that would share a name.
+    """
+    known = experiments(root)
+    if not words:
+        words = [c for c in DEFAULT if any(k.collection == c for k in known)]
+    chosen: dict[Path, Choice] = {}
+    faults: list[Fault] = []
+    for word in words:
+        found, rule = _find(word, known, root)
+        if rule:
+            faults.append(Fault(word, 0, "", "", *rule))
+        chosen.update((choice.file, choice) for choice in found)
+    faults.extend(_clashes(list(chosen.values())))
+    if faults:
+        raise InputError(faults)
+    return list(chosen.values())
+
+
+def _find(
+    word: str, known: list[Choice], root: Path
+) -> tuple[list[Choice], tuple[str, str] | None]:
+    if word.endswith((".yaml", ".yml")):
+        return [_choice(Path(word), root)], None
+    if found := [c for c in known if c.collection == word]:
+        return found, None
+    found = [c for c in known if word in (c.key, c.name)]
+    if len(found) > 1:
+        return [], ("is the name of several experiments", "choose from " + _list(found))
+    if found:
+        return found, None
+    names = [*dict.fromkeys(c.collection for c in known), *(c.key for c in known)]
+    names += [c.name for c in known]
+    rule = "is no experiment, no collection and no YAML file"
+    return [], (rule, nearest(word, names) if known else "")
+
+
+def _choice(file: Path, root: Path) -> Choice:
+    file = file.absolute()
+    folder = file.resolve().parent
+    is_shipped = folder.parent == (root / "configs").resolve() and _PLAIN.fullmatch(folder.name)
+    return Choice(folder.name if is_shipped else ADHOC, file)
+
+
+def _clashes(choices: list[Choice]) -> Iterator[Fault]:
+    first: dict[str, Choice] = {}
+    for choice in choices:
+        other = first.setdefault(choice.key, choice)
+        if other.file.resolve() != choice.file.resolve():
+            rule = "two experiments of one collection cannot share a name"
+            yield Fault(str(choice.file), 0, "", choice.name, rule, f"the other is {other.file}")
+
+
+def _list(choices: list[Choice]) -> str:
+    return ", ".join(choice.key for choice in choices)
