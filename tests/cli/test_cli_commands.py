@@ -1,0 +1,132 @@
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from vibsim.cli import main
+
+TEXT = """\
+title: A tiny pendulum
+model: {kind: pendulum}
+initial: {theta: 1.0}
+time: {end: 20.0}
+levels: [5, 6, 7]
+schemes: [central]
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "tiny.yaml"
+    path.write_text(TEXT)
+    return path
+
+
+Capture = pytest.CaptureFixture[str]
+
+
+def test_check_accepts_a_sound_file(file: Path, capsys: Capture) -> None:
+    assert main(["check", str(file)]) == 0
+    assert "sound" in capsys.readouterr().out
+
+
+def test_check_tells_all_faults_of_all_files_without_a_traceback(
+    file: Path, tmp_path: Path, capsys: Capture
+) -> None:
+    bad = tmp_path / "bad.yaml"
+    bad.write_text(TEXT.replace("kind: pendulum", "kind: pendulm").replace("20.0", ".nan"))
+    assert main(["check", str(bad), str(file), str(tmp_path / "none.yaml")]) == 2
+    captured = capsys.readouterr()
+    assert f"{bad}:2:" in captured.err
+    assert "did you mean 'pendulum'" in captured.err
+    assert f"{bad}:4:" in captured.err
+    assert "none.yaml" in captured.err
+    assert "Traceback" not in captured.err
+
+
+def test_plan_shows_what_a_run_costs(file: Path, capsys: Capture) -> None:
+    assert main(["plan", str(file)]) == 0
+    assert "adhoc/tiny" in capsys.readouterr().out
+    assert main(["plan", "--json", str(file)]) == 0
+    (plan,) = json.loads(capsys.readouterr().out)
+    assert [level["steps"] for level in plan["levels"]] == [32, 64, 128]
+
+
+@pytest.mark.parametrize(
+    ("what", "shown"), [("models", "pendulum"), ("schemes", "central"), ("checks", "converges")]
+)
+def test_lists(what: str, shown: str, capsys: Capture) -> None:
+    assert main(["list", what]) == 0
+    assert shown in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["simulate", "FILE", "--level", "4"], ["simulate", "FILE", "--level", "5", "--shard", "1"]],
+)
+def test_a_job_that_does_not_exist_is_refused(
+    file: Path, tmp_path: Path, capsys: Capture, arguments: list[str]
+) -> None:
+    out = tmp_path / "out.nc"
+    named = [str(file) if word == "FILE" else word for word in arguments]
+    assert main([*named, "--out", str(out), "--results", str(tmp_path)]) == 2
+    assert "must be" in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_a_file_of_another_job_is_refused_by_name_and_kept(
+    file: Path, tmp_path: Path, capsys: Capture
+) -> None:
+    common = ["--results", str(tmp_path)]
+    for level in ("5", "6", "7"):
+        out = tmp_path / f"adhoc/tiny/level_0{level}.nc"
+        assert main(["simulate", str(file), "--level", level, "--out", str(out), *common]) == 0
+    file.write_text(TEXT.replace("theta: 1.0", "theta: 1.1"))
+    assert main(["analyse", str(file), *common]) == 1
+    assert "level_05.nc" in capsys.readouterr().err
+    assert (tmp_path / "adhoc/tiny/level_05.nc").exists()
+    assert main(["analyse", str(file), *common, "--discard"]) == 1
+    assert not (tmp_path / "adhoc/tiny/level_05.nc").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments", [[], ["fly"], ["run", "--cores", "0"], ["list", "planets"], ["check"]]
+)
+def test_a_wrong_command_line_is_refused(arguments: list[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert caught.value.code == 2
+
+
+def test_results_that_cannot_be_written_are_named(
+    file: Path, tmp_path: Path, capsys: Capture
+) -> None:
+    blocked = tmp_path / "blocked"
+    blocked.touch()
+    assert main(["run", str(file), "--results", str(blocked)]) == 1
+    assert str(blocked) in capsys.readouterr().err
+
+
+def test_a_closed_pipe_is_no_fault() -> None:
+    command = f"{sys.executable} -m vibsim list checks | head -1"
+    ended = subprocess.run(command, shell=True, capture_output=True, text=True, check=True)
+    assert ended.stderr == ""
+
+
+def test_the_command_starts_quickly() -> None:
+    program = (
+        "import sys; import vibsim.cli.run\n"
+        "heavy = {'numpy', 'pydantic', 'yaml', 'netCDF4', 'xarray', 'numba', 'snakemake'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)"
+    )
+    spent = []
+    for _ in range(5):
+        start = time.perf_counter()
+        subprocess.run([sys.executable, "-c", program], check=True)
+        spent.append(time.perf_counter() - start)
+    assert min(spent) < 0.15, spent

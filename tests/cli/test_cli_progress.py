@@ -1,0 +1,44 @@
+from __future__ import annotations
+
+from vibsim.cli.progress import describe
+from vibsim.cli.workflow import Job, _Reader
+
+TEXT = """\
+Building DAG of jobs...
+[Sat Nov 21 01:05:16 2026]
+localrule simulate:
+    output: a/x/level_07.nc
+    log: a/x/logs/level_07.log
+    jobid: 3
+    reason: Missing output files: a/x/level_07.nc
+    wildcards: experiment=a/x, level=07
+[Sat Nov 21 01:05:16 2026]
+Finished jobid: 2 (Rule: simulate)
+1 of 4 steps (25%) done
+[Sat Nov 21 01:05:16 2026]
+Error in rule analyse:
+    message: None
+    jobid: 1
+    input: a/x/level_07.nc
+    output: a/x/convergence.nc, a/x/summary.json
+    log: a/x/logs/analyse.log (check log file(s) for error details)
+    shell:
+        python -m vibsim
+rule all:
+    input: index.html
+rule index:
+    output: index.html, summary.csv
+"""
+
+
+def test_jobs_failures_and_steps_are_read_from_what_snakemake_writes() -> None:
+    seen: list[tuple[int, int, Job | None]] = []
+    reader = _Reader(lambda *told: seen.append(told))
+    for line in [*TEXT.splitlines(), ""]:
+        reader.take(line)
+    assert [describe(job) for job in reader.jobs] == ["simulate a/x level_07.nc", "index"]
+    assert reader.jobs[0].reason == "Missing output files: a/x/level_07.nc"
+    (failed,) = reader.failed
+    assert describe(failed) == "analyse a/x"
+    assert failed.log == "a/x/logs/analyse.log"
+    assert (1, 4, None) in seen

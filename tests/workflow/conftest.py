@@ -1,0 +1,106 @@
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+TEXT = """\
+title: A tiny pendulum
+source: nowhere
+model: {kind: pendulum, g: 1.0, L: 1.0}
+initial: {theta: 1.0}
+time: {end: 20.0}
+levels: [6, 7, 8, 9]
+schemes: [central]
+checks:
+  - {id: order, converges: theta, order: scheme, tolerance: 0.5}
+"""
+
+
+def vibsim(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "vibsim", *map(str, arguments)]
+    return subprocess.run(
+        command, capture_output=True, text=True, check=False, cwd=cwd, timeout=300
+    )
+
+
+@dataclass(frozen=True)
+class Place:
+    """An experiment file and a results folder, both under names that a shell would trip over."""
+
+    folder: Path
+
+    @property
+    def file(self) -> Path:
+        return self.folder / "my files" / "tiny.yaml"
+
+    @property
+    def results(self) -> Path:
+        return self.folder / "re sults {x} 'y' $z"
+
+    @property
+    def tiny(self) -> Path:
+        return self.results / "adhoc/tiny"
+
+    def run(self, *options: str, files: Sequence[Path] = ()) -> subprocess.CompletedProcess[str]:
+        named = files or [self.file]
+        return vibsim("run", *named, "--results", self.results, "--cores", "2", *options)
+
+    def jobs(self, *, files: Sequence[Path] = ()) -> list[str]:
+        """Return what a run would do."""
+        ended = self.run("--dry-run", "--json", files=files)
+        assert ended.returncode == 0, ended.stderr
+        return [short(entry["job"]) for entry in json.loads(ended.stdout)["jobs"]]
+
+    def outcome(self) -> dict[str, Any]:
+        ended = self.run("--json")
+        found: dict[str, Any] = json.loads(ended.stdout)
+        return found
+
+    def change(self, old: str, new: str) -> None:
+        text = self.file.read_text()
+        assert old in text
+        self.file.write_text(text.replace(old, new))
+
+    def content(self) -> dict[str, bytes]:
+        """Return every result that must come back with the same bytes."""
+        kinds = (".nc", ".json", ".html", ".csv", ".tex", ".svg")
+        return {
+            path.relative_to(self.results).as_posix(): path.read_bytes()
+            for path in sorted(self.results.rglob("*"))
+            if path.suffix in kinds and not {".snakemake", ".vibsim"} & set(path.parts)
+        }
+
+
+def short(job: str) -> str:
+    """Shorten ``simulate adhoc/tiny level_06.nc`` to ``level_06``."""
+    words = job.split()
+    return words[-1].removesuffix(".nc") if len(words) == 3 else words[0]
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Place:
+    """Run the tiny experiment once."""
+    place = Place(tmp_path_factory.mktemp("finished"))
+    place.file.parent.mkdir(parents=True)
+    place.file.write_text(TEXT)
+    ended = place.run()
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    return place
+
+
+@pytest.fixture
+def place(finished: Place, tmp_path: Path) -> Place:
+    """Return a copy of the finished results, at another place."""
+    os.sync()
+    shutil.copytree(finished.folder, tmp_path / "copy")
+    return Place(tmp_path / "copy")

@@ -1,0 +1,161 @@
+"""Damage, kills and runs at the same time: afterwards the same command just works."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from .conftest import TEXT, Place, vibsim
+
+
+def flip(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 4
+    path.write_bytes(content)
+
+
+def cut(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-100])
+
+
+@pytest.mark.parametrize("harm", [flip, cut], ids=lambda harm: harm.__name__)
+@pytest.mark.parametrize("name", ["level_07.nc", "convergence.nc", "summary.json"])
+def test_a_damaged_file_is_named_deleted_and_made_again(
+    place: Place, finished: Place, name: str, harm: object
+) -> None:
+    assert callable(harm)
+    harm(place.tiny / name)
+    ended = place.run()
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert "to be made again" in ended.stderr
+    assert name in ended.stderr
+    assert place.content() == finished.content()
+    assert place.jobs() == []
+
+
+def test_damage_that_keeps_the_time_of_the_file_is_seen_by_whatever_reads_it(
+    place: Place, finished: Place
+) -> None:
+    path = place.tiny / "level_07.nc"
+    status = path.stat()
+    flip(path)
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+    place.change("order: scheme", "order: 2")
+    ended = place.run()
+    assert ended.returncode == 0
+    assert "level_07.nc" in ended.stderr
+    assert place.content()["adhoc/tiny/level_07.nc"] == finished.content()["adhoc/tiny/level_07.nc"]
+
+
+def test_swapped_files_are_seen(place: Place, finished: Place) -> None:
+    first, second = place.tiny / "level_06.nc", place.tiny / "level_07.nc"
+    other = place.tiny / "swap"
+    first.rename(other)
+    second.rename(first)
+    other.rename(second)
+    os.utime(first)
+    os.utime(second)
+    ended = place.run()
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert place.content() == finished.content()
+
+
+def test_results_without_snakemakes_records_are_not_taken_for_others(place: Place) -> None:
+    """Snakemake sees no changed parameter when its records are gone; the digests in the files do."""
+    import shutil
+
+    shutil.rmtree(place.results / ".snakemake")
+    place.change("g: 1.0", "g: 1.5")
+    ended = place.run()
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    for name in ("level_06.nc", "level_09.nc", "summary.json"):
+        assert name in ended.stderr
+
+
+def start(place: Place) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "vibsim", "run", str(place.file), "--results"]
+    return subprocess.Popen(
+        [*command, str(place.results), "--cores", "2"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+@pytest.mark.parametrize(
+    "delay", [0.8, 1.6, *(pytest.param(d, marks=pytest.mark.slow) for d in (0.3, 1.2, 2.2, 3.0))]
+)
+@pytest.mark.parametrize("whole", [True, False], ids=["all processes", "the run alone"])
+def test_after_a_kill_the_same_command_works(
+    tmp_path: Path, finished: Place, delay: float, whole: bool
+) -> None:
+    place = Place(tmp_path)
+    place.file.parent.mkdir()
+    place.file.write_text(TEXT)
+    with start(place) as process:
+        time.sleep(delay)
+        (os.killpg if whole else os.kill)(process.pid, signal.SIGKILL)
+    ended = place.run()
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert place.content() == finished.content()
+    assert not list(place.results.rglob(".*.part"))
+
+
+def test_two_runs_at_once_both_succeed_and_one_waits(tmp_path: Path, finished: Place) -> None:
+    place = Place(tmp_path)
+    place.file.parent.mkdir()
+    place.file.write_text(TEXT)
+    with start(place) as first:
+        time.sleep(0.6)
+        second = place.run()
+        out, err = first.communicate()
+    assert first.returncode == 0, out + err
+    assert second.returncode == 0, second.stdout + second.stderr
+    assert f"waiting for another run in {place.results} (process {first.pid})" in second.stderr
+    assert place.content() == finished.content()
+
+
+def test_a_job_refuses_when_its_file_changed_after_it_was_planned(
+    place: Place, tmp_path: Path
+) -> None:
+    out = tmp_path / "x.nc"
+    command = ["simulate", place.file, "--level", 6, "--out", out, "--results", place.results]
+    ended = vibsim(*command, "--digest", "0" * 64)
+    assert ended.returncode == 2
+    assert "changed after this job was planned" in ended.stderr
+    assert not out.exists()
+
+
+TRAP = """
+import os, sys
+if "simulate" in sys.orig_argv and "07" in sys.orig_argv and "other.yaml" in str(sys.orig_argv):
+    print("out of luck", flush=True)
+    os._exit(1)
+"""
+
+
+def test_a_failing_job_is_named_with_its_log_and_the_others_go_on(
+    place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = place.file.with_name("other.yaml")
+    other.write_text(TEXT)
+    trap = tmp_path / "trap"
+    trap.mkdir()
+    (trap / "sitecustomize.py").write_text(TRAP)
+    paths = [str(trap), *filter(None, [os.environ.get("PYTHONPATH")])]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(paths))
+    place.change("A tiny", "Another")
+    ended = place.run(files=[place.file, other])
+    assert ended.returncode == 1
+    assert "failed: simulate adhoc/other level_07.nc" in ended.stdout
+    assert "level_07.log" in ended.stdout
+    assert "out of luck" in ended.stdout
+    assert "Another" in (place.tiny / "report.html").read_text()
+    assert "other" in (place.results / "index.html").read_text()

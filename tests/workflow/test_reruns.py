@@ -1,0 +1,76 @@
+"""What runs again after a change, and what does not."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from .conftest import TEXT, Place
+
+EVERYTHING = {"level_06", "level_07", "level_08", "level_09", "analyse", "report", "index"}
+
+
+def test_a_finished_experiment_at_another_place_has_nothing_to_do(place: Place) -> None:
+    assert place.jobs() == []
+    ended = place.run()
+    assert ended.returncode == 0
+    assert "nothing to do" in ended.stdout
+
+
+MATRIX = {
+    "comment": ("title:", "# a comment\ntitle:", set()),
+    "spelling": ("g: 1.0", "g: 1.00", set()),
+    "key order": ("kind: pendulum, g: 1.0, L: 1.0", "L: 1.0, g: 1.0, kind: pendulum", set()),
+    "source": ("nowhere", "somewhere", {"report", "index"}),
+    "title": ("A tiny", "Another", {"analyse", "report", "index"}),
+    "check": ("order: scheme", "order: 2.1", {"analyse", "report", "index"}),
+    "finer level": ("8, 9]", "8, 9, 10]", {"level_10", "analyse", "report", "index"}),
+    "level left out": ("8, 9]", "8]", {"analyse", "report", "index"}),
+    "parameter": ("g: 1.0", "g: 1.5", EVERYTHING),
+    "scheme option": ("[central]", "[{kind: central, end_velocity: kick}]", EVERYTHING),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "expected"), MATRIX.values(), ids=MATRIX)
+def test_exactly_what_uses_a_change_runs_again(
+    place: Place, old: str, new: str, expected: set[str]
+) -> None:
+    place.change(old, new)
+    found = place.jobs()
+    assert set(found) == expected
+    assert len(found) == len(expected)
+
+
+def test_touching_the_file_runs_nothing(place: Place) -> None:
+    os.utime(place.file)
+    assert place.jobs() == []
+
+
+def test_a_second_experiment_leaves_the_first_alone(place: Place) -> None:
+    other = place.file.with_name("other.yaml")
+    other.write_text(TEXT)
+    found = place.jobs(files=[place.file, other])
+    assert sorted(found) == sorted(EVERYTHING)
+    assert place.run(files=[other]).returncode == 0
+    index = (place.results / "index.html").read_text()
+    assert "tiny" in index
+    assert "other" in index
+    assert place.jobs(files=[place.file, other]) == []
+    # The index covers all that is there, whichever experiments are chosen.
+    assert place.jobs() == []
+
+
+@pytest.mark.parametrize("name", ["level_07.nc", "convergence.nc", "summary.json", "report.html"])
+def test_a_lost_file_comes_back_with_the_same_bytes(place: Place, name: str) -> None:
+    before = place.content()
+    (place.tiny / name).unlink()
+    assert place.run().returncode == 0
+    assert place.content() == before
+
+
+def test_everything_again_gives_the_same_bytes(place: Place, finished: Place) -> None:
+    for path in place.tiny.glob("level_*.nc"):
+        path.unlink()
+    assert place.run().returncode == 0
+    assert place.content() == finished.content()

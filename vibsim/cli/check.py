@@ -1,0 +1,16 @@
+"""``vibsim check``: validate, quickly, without Snakemake."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+
+from vibsim.plan import checkout, choose, load_all
+
+
+def check(options: Namespace) -> int:
+    """Validate experiment files and say that they are sound."""
+    plans = load_all(choose(options.experiments, checkout()))
+    for plan in plans.values():
+        levels = ", ".join(str(level.level) for level in plan.levels)
+        print(f"{plan.file}: sound ({plan.cases} members, levels {levels})")
+    return 0

@@ -1,0 +1,35 @@
+"""Files that were deleted because they must not be used, told from a job to the run that started it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from vibsim.errors import FileError
+
+_NOTE = ".vibsim/deleted.txt"
+
+
+def delete(error: FileError, results: Path) -> None:
+    """Delete the file that `error` names and leave a note, so that the run makes it again."""
+    error.path.unlink(missing_ok=True)
+    note = results / _NOTE
+    note.parent.mkdir(parents=True, exist_ok=True)
+    line = f"{error}\n".encode()
+    # One write of a line in append mode: jobs that note at the same time do not mix.
+    descriptor = os.open(note, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
+    try:
+        os.write(descriptor, line)
+    finally:
+        os.close(descriptor)
+
+
+def take(results: Path) -> list[str]:
+    """Return what was deleted since the last time, and why."""
+    note = results / _NOTE
+    try:
+        lines = note.read_text().splitlines()
+    except FileNotFoundError:
+        return []
+    note.unlink()
+    return lines

@@ -1,0 +1,131 @@
+"""What a run has found: every experiment and every check, as a table or as JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from vibsim.cli import deleted
+from vibsim.errors import FileError
+from vibsim.plan import Plan
+from vibsim.store import read_json
+
+_LOG_LINES = 12
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A job that failed, with the end of its log."""
+
+    job: str
+    log: str
+    tail: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The summary of an experiment, or why there is none."""
+
+    plan: Plan
+    summary: Mapping[str, Any] | None
+    problem: str
+
+    @property
+    def status(self) -> str:
+        """Status of the whole experiment; one without a summary has failed."""
+        return str(self.summary["status"]) if self.summary else "FAIL"
+
+
+def collect(plans: Sequence[Plan], results: Path) -> list[Finding]:
+    """Read the summary of every plan; delete one that is damaged or outdated."""
+    return [_collect(plan, results) for plan in plans]
+
+
+def _collect(plan: Plan, results: Path) -> Finding:
+    path = results / plan.summary
+    if not path.is_file():
+        return Finding(plan, None, "did not come to its end")
+    try:
+        return Finding(plan, read_json(path, digest=plan.analysis), "")
+    except FileError as error:
+        deleted.delete(error, results)
+        return Finding(plan, None, f"summary.json: {error.reason}")
+
+
+def tail(path: Path) -> tuple[str, ...]:
+    """Return the last lines of a log."""
+    try:
+        lines = path.read_text(errors="replace").splitlines()
+    except OSError:
+        return ()
+    return tuple(line for line in lines if line.strip())[-_LOG_LINES:]
+
+
+def passed(findings: Sequence[Finding], failures: Sequence[Failure]) -> bool:
+    """Tell whether every check of every experiment passed and every job ended well."""
+    return not failures and all(finding.status == "PASS" for finding in findings)
+
+
+def as_json(findings: Sequence[Finding], failures: Sequence[Failure], results: Path) -> str:
+    """Return the outcome as JSON text."""
+    content = {
+        "vibsim_format": 1,
+        "status": _worst([finding.status for finding in findings] + ["FAIL"] * bool(failures)),
+        "results": str(results),
+        "experiments": [_entry(finding) for finding in findings],
+        "failed_jobs": [
+            {"job": failure.job, "log": failure.log, "tail": list(failure.tail)}
+            for failure in failures
+        ],
+    }
+    return json.dumps(content, indent=1, ensure_ascii=False)
+
+
+def _entry(finding: Finding) -> dict[str, Any]:
+    if finding.summary is not None:
+        return dict(finding.summary)
+    plan = finding.plan
+    return {
+        "collection": plan.collection,
+        "experiment": plan.name,
+        "title": plan.title,
+        "status": finding.status,
+        "checks": [],
+        "failures": [],
+        "error": finding.problem,
+    }
+
+
+def as_text(findings: Sequence[Finding], failures: Sequence[Failure]) -> Iterator[str]:
+    """Yield the lines of the table, the failed jobs and the count of all checks."""
+    rows = [row for finding in findings for row in _rows(finding)]
+    widths = [max((len(row[i]) for row in rows), default=0) for i in range(3)]
+    for row in rows:
+        cells = [cell.ljust(width) for cell, width in zip(row[:3], widths, strict=True)]
+        yield "  ".join([*cells, row[3]]).rstrip()
+    for failure in failures:
+        yield f"\nfailed: {failure.job} (log: {failure.log})"
+        yield from (f"  {line}" for line in failure.tail)
+    checks = [check["status"] for f in findings if f.summary for check in f.summary["checks"]]
+    yield (
+        f"\n{len(findings)} experiments, {checks.count('PASS')} of {len(checks)} checks passed: "
+        + _worst([finding.status for finding in findings] + ["FAIL"] * bool(failures))
+    )
+
+
+def _rows(finding: Finding) -> Iterator[tuple[str, str, str, str]]:
+    name = finding.plan.key
+    if finding.summary is None:
+        yield name, "FAIL", "", finding.problem
+        return
+    for check in finding.summary["checks"]:
+        text = f"{check['id']}: {check['text']}"
+        yield name, str(check["status"]), str(check["reason"] or ""), text
+        name = " " * len(name)
+
+
+def _worst(statuses: Sequence[str]) -> str:
+    return next((s for s in ("FAIL", "INCONCLUSIVE") if s in statuses), "PASS")

@@ -1,0 +1,52 @@
+"""Progress on the terminal: one line that is rewritten, or plain lines where the output is kept."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+
+from vibsim.cli.workflow import Job
+
+
+class Progress:
+    """Tells on stderr how far a run is."""
+
+    def __init__(self) -> None:
+        self.is_terminal = sys.stderr.isatty()
+        self.done = 0
+        self.total = 0
+        self.current = ""
+
+    def __call__(self, done: int, total: int, job: Job | None) -> None:
+        """Take what the workflow tells: steps done of all, or a job that has started."""
+        if job is not None:
+            self.current = describe(job)
+            if not self.is_terminal:
+                print(self.current, file=sys.stderr, flush=True)
+        else:
+            self.done, self.total = done, total
+        if self.is_terminal:
+            count = f"{self.done}/{self.total} " if self.total else ""
+            self._rewrite(f"{count}{self.current}")
+
+    def clear(self) -> None:
+        """Remove the line."""
+        if self.is_terminal:
+            self._rewrite("")
+
+    def _rewrite(self, text: str) -> None:
+        width = shutil.get_terminal_size().columns - 1
+        sys.stderr.write(f"\r\033[K{text[:width]}")
+        sys.stderr.flush()
+
+
+def describe(job: Job) -> str:
+    """Say what a job does: ``simulate pendulum_lab/convergence level_06.nc``."""
+    if not job.folder:
+        return job.rule
+    name = job.output.split(", ")[0].removeprefix(job.folder + "/")
+    return (
+        f"{job.rule} {job.folder} {name}"
+        if job.rule.startswith("sim")
+        else f"{job.rule} {job.folder}"
+    )

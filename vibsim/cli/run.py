@@ -1,0 +1,105 @@
+"""``vibsim run``: from experiment files to verdicts, again and again until nothing is left to do."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from argparse import Namespace
+from collections.abc import Sequence
+from pathlib import Path
+
+from vibsim.cli import deleted, lock, outcome, workflow
+from vibsim.cli.jobs import results_folder
+from vibsim.cli.progress import Progress, describe
+from vibsim.errors import VibsimError
+from vibsim.plan import Plan, checkout, choose, load_all
+
+_STAGES = 4
+"""How often the workflow is started at most: once, and once for each kind of file found bad."""
+
+
+def run(options: Namespace) -> int:
+    """Run the chosen experiments and show every verdict."""
+    root, results = checkout(), results_folder(options)
+    choices = choose(options.experiments, root)
+    # Everything is validated before anything is written but the cache of plans.
+    plans = list(load_all(choices, results if results.is_dir() else None).values())
+    _prepare(results)
+    held = lock.hold(results)
+    arguments = ["--cores", str(options.cores or len(os.sched_getaffinity(0)))]
+    if options.dry_run:
+        return _show_jobs(plans, results, root, held, [*arguments, "--dry-run"], options.json)
+    progress = Progress()
+    deleted.take(results)
+    jobs: list[workflow.Job] = []
+    for _ in range(_STAGES):
+        ended = workflow.run(plans, results, root, held, arguments, progress)
+        findings = outcome.collect(plans, results)
+        progress.clear()
+        jobs.extend(ended.jobs)
+        notes = deleted.take(results)
+        for note in notes:
+            print(f"vibsim: deleted, to be made again: {note}", file=sys.stderr)
+        if not notes:
+            break
+    return _show(options, findings, ended, results, bool(jobs))
+
+
+def _prepare(results: Path) -> None:
+    try:
+        (results / ".vibsim").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise VibsimError(f"{results}: cannot be written ({error.strerror})") from error
+
+
+def _show_jobs(
+    plans: Sequence[Plan], results: Path, root: Path, held: int, arguments: list[str], as_json: bool
+) -> int:
+    ended = workflow.run(plans, results, root, held, arguments, lambda *_: None)
+    _check(ended)
+    if as_json:
+        jobs = [
+            {"job": describe(job), "rule": job.rule, "reason": job.reason} for job in ended.jobs
+        ]
+        print(json.dumps({"jobs": jobs}, indent=1))
+        return 0
+    for job in ended.jobs:
+        print(f"{describe(job)}: {job.reason}")
+    if not ended.jobs:
+        print("nothing to do")
+    return 0
+
+
+def _check(ended: workflow.Outcome) -> None:
+    """Refuse to go on where Snakemake itself broke down, rather than one of its jobs."""
+    if ended.status and not ended.failed:
+        raise VibsimError(f"the workflow broke down:\n{ended.text}")
+
+
+def _show(
+    options: Namespace,
+    findings: list[outcome.Finding],
+    ended: workflow.Outcome,
+    results: Path,
+    worked: bool,
+) -> int:
+    _check(ended)
+    failures = [
+        outcome.Failure(describe(job), str(results / job.log), outcome.tail(results / job.log))
+        for job in ended.failed
+    ]
+    if failures:
+        # The index waits for every report; after a failure it is written from what there is.
+        command = [sys.executable, "-P", "-m", "vibsim", "report", "--results", str(results)]
+        subprocess.run(command, check=False)
+    if options.json:
+        print(outcome.as_json(findings, failures, results))
+    else:
+        if not worked:
+            print("nothing to do: all results are up to date\n")
+        for line in outcome.as_text(findings, failures):
+            print(line)
+        print(f"report: {results / 'index.html'}")
+    return 0 if outcome.passed(findings, failures) else 1

@@ -1,0 +1,18 @@
+# All levels of one experiment compared, and the verdicts.
+rule analyse:
+    input:
+        names.shards,
+    output:
+        "{experiment}/convergence.nc",
+        "{experiment}/summary.json",
+    log:
+        "{experiment}/logs/analyse.log",
+    benchmark:
+        "{experiment}/benchmarks/analyse.tsv"
+    conda:
+        "../envs/vibsim.yaml"
+    params:
+        digest=names.analysis_digest,
+        file=names.file,
+    shell:
+        "vibsim analyse {params.file:q} --results . --discard --digest {params.digest} > {log:q} 2>&1"

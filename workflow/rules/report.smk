@@ -1,0 +1,39 @@
+# The page over all experiments: those chosen, and those that were found among the results.
+rule index:
+    input:
+        names.indexed,
+    output:
+        "index.html",
+        "summary.csv",
+    log:
+        ".vibsim/logs/index.log",
+    benchmark:
+        ".vibsim/benchmarks/index.tsv"
+    conda:
+        "../envs/vibsim.yaml"
+    params:
+        digest=names.index_digest,
+    shell:
+        "vibsim report --results . > {log:q} 2>&1"
+
+
+# One page, its figures and its tables.
+rule report:
+    input:
+        "{experiment}/convergence.nc",
+        "{experiment}/summary.json",
+    output:
+        "{experiment}/report.html",
+        directory("{experiment}/figures"),
+        directory("{experiment}/tables"),
+    log:
+        "{experiment}/logs/report.log",
+    benchmark:
+        "{experiment}/benchmarks/report.tsv"
+    conda:
+        "../envs/vibsim.yaml"
+    params:
+        digest=names.report_digest,
+        file=names.file,
+    shell:
+        "vibsim report {params.file:q} --results . --discard --digest {params.digest} > {log:q} 2>&1"
