@@ -50,12 +50,21 @@ _ROWS = (
     Value("max", "largest value over every step", "extremal"),
     Value("max_abs", "largest absolute value over every step", "extremal"),
     Value("max_abs_interior", "the same without the last point", "extremal"),
+    Value(
+        "max_abs_ratio",
+        "largest absolute value over every step, over that of the next finer level",
+        "extremal",
+        finer_levels=1,
+    ),
+    Value(
+        "max_abs_interior_ratio", "the same without the last point", "extremal", finer_levels=1
+    ),
     Value("period", "period, from interpolated peaks", "none"),
     Value("period_grid", "period, from peaks at grid points", "none"),
     Value("exact_period", "period of the exact solution", "none", ("case",), needs_exact=True),
     Value("period_error", "period over the exact period, less one", "none", needs_exact=True),
     Value("frequency", "angular frequency, 2 pi over the period", "none"),
-    Value("amplitude", "largest absolute position over every step", "none"),
+    Value("amplitude", "half the height from the last trough to the last peak", "none"),
     Value("growth_factor", "last peak over the first peak", "none"),
     Value("relative_energy_error", "max |E(t) - E(0)| / |E(0)| over every step", "none"),
     Value("error_l1", "L1 norm of the true error", "convergent", best=True, needs_exact=True),
