@@ -1,0 +1,41 @@
+# Each target sets itself up: requirements/install.sh makes .venv once and costs milliseconds after that.
+SHELL := /bin/sh
+BIN := .venv/bin
+
+.DEFAULT_GOAL := run
+.PHONY: run test test-slow lint bench clean help set-up-run set-up-dev
+
+run: set-up-run  ## run the default experiments and write results/index.html (this is what plain `make` does)
+	@$(BIN)/vibsim run
+
+test: set-up-dev  ## run the tests, without those marked slow
+	$(BIN)/pytest -n 2 -m "not slow"
+
+test-slow: set-up-dev  ## run the tests marked slow
+	$(BIN)/pytest -n 2 -m slow
+
+lint: set-up-dev  ## check style, types, layers, workflow and generated files
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/python -m vibsim.spec.schema --check
+	$(BIN)/snakefmt --check Snakefile workflow
+	$(BIN)/python workflow/lint.py
+
+bench: set-up-run  ## measure the engine, against C where gcc is there
+	$(BIN)/python bench/run.py
+
+clean:  ## remove what runs and tools made; .venv stays
+	find results -mindepth 1 -maxdepth 1 ! -name README.md -exec rm -rf {} +
+	rm -rf .snakemake .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache build vibsim.egg-info
+	find vibsim tests bench -name __pycache__ -type d -prune -exec rm -rf {} +
+
+help:  ## list the targets
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST)
+
+set-up-run:
+	@sh requirements/install.sh run
+
+set-up-dev:
+	@sh requirements/install.sh dev

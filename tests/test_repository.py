@@ -1,0 +1,362 @@
+"""The repository as a whole: what no single room of the code can promise."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import yaml
+
+from vibsim.cli.arguments import parser
+from vibsim.spec import Experiment
+
+ROOT = Path(__file__).resolve().parents[1]
+EDITOR_LINE = "# yaml-language-server: $schema=../../workflow/schemas/experiment.schema.json"
+BASE = """\
+title: base
+model: {kind: pendulum}
+initial: {theta: 1.0}
+time: {end: 20.0}
+levels: {from: 6, to: 9}
+schemes: [central]
+"""
+
+
+def is_ours(path: Path) -> bool:
+    """Tell whether a file of an archive comes with it; tools and runs make the others."""
+    if path.parts[0].startswith(".") and path.parts[0] not in (".ci", ".gitignore"):
+        return False
+    if path.parts[0] == "results":
+        return path.name == "README.md" and len(path.parts) == 2
+    return not any(part == "__pycache__" or part.endswith(".egg-info") for part in path.parts)
+
+
+def tracked() -> list[Path]:
+    """Return the files that are, or would be, under version control."""
+    command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    if (ROOT / ".git").exists():
+        done = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
+        files = [ROOT / name for name in done.stdout.split("\0") if name]
+    else:  # an archive without its history
+        files = [path for path in ROOT.rglob("*") if is_ours(path.relative_to(ROOT))]
+    return [path for path in files if path.is_file()]
+
+
+def texts() -> Iterator[tuple[Path, str]]:
+    """Return every tracked file that is text."""
+    for path in tracked():
+        content = path.read_bytes()
+        if b"\0" not in content:
+            yield path, content.decode("utf-8")
+
+
+def pages() -> list[Path]:
+    return [path for path in tracked() if path.suffix == ".md"]
+
+
+def blocks(path: Path, language: str) -> list[str]:
+    """Return the fenced blocks of a page in one language."""
+    return re.findall(rf"^```{language}\n(.*?)^```", path.read_text(), re.DOTALL | re.MULTILINE)
+
+
+# --- requirements -----------------------------------------------------------------------------------
+
+
+def pins(name: str) -> dict[str, tuple[str, list[str]]]:
+    """Return version and hashes of every package that requirements/<name>.txt holds."""
+    logical = (ROOT / "requirements" / f"{name}.txt").read_text().replace("\\\n", " ")
+    found = {}
+    for line in logical.splitlines():
+        package, *options = line.split()
+        match = re.fullmatch(r"([a-z0-9][a-z0-9._-]*)==([^=]+)", package)
+        assert match, f"{name}.txt: not a pinned package: {line[:80]}"
+        hashes = [
+            option for option in options if re.fullmatch(r"--hash=sha256:[0-9a-f]{64}", option)
+        ]
+        assert hashes == options, f"{name}.txt: {package} has more than hashes"
+        found[match[1]] = (match[2], hashes)
+    return found
+
+
+@pytest.mark.parametrize("name", ["build", "run", "dev"])
+def test_requirements_are_pinned_and_hashed(name: str) -> None:
+    found = pins(name)
+    assert found
+    assert [package for package, (_, hashes) in found.items() if not hashes] == []
+
+
+def test_requirements_hold_no_address() -> None:
+    for path in (ROOT / "requirements").iterdir():
+        text = path.read_text()
+        assert not re.search(r"://|--(extra-)?index|--find-links|--trusted-host| @ ", text), (
+            path.name
+        )
+
+
+def test_sets_of_requirements_agree() -> None:
+    run, dev = pins("run"), pins("dev")
+    assert {package: dev.get(package) for package in run} == run
+    assert {package: run.get(package) for package in pins("build")} == pins("build")
+
+
+def test_requirements_hold_what_the_package_names() -> None:
+    text = (ROOT / "pyproject.toml").read_text()
+    block = re.search(r"^dependencies = \[(.*?)^\]", text, re.DOTALL | re.MULTILINE)
+    assert block
+    named = {re.split(r"[<>=~! ]", name)[0].lower() for name in re.findall(r'"([^"]+)"', block[1])}
+    assert named
+    listed = {line.lower() for line in (ROOT / "requirements/run.in").read_text().split()}
+    assert named == listed - {"-r", "build.in"}
+    assert named <= set(pins("run"))
+
+
+# --- experiments ------------------------------------------------------------------------------------
+
+
+def configs() -> list[Path]:
+    return sorted((ROOT / "configs").glob("*/*.yaml"))
+
+
+def test_there_are_experiments() -> None:
+    assert len(configs()) >= 3
+    assert list((ROOT / "configs").rglob("*.yml")) == []
+
+
+@pytest.mark.parametrize("path", configs(), ids=lambda path: path.stem)
+def test_experiment_begins_with_the_editor_line(path: Path) -> None:
+    assert path.read_text().splitlines()[0] == EDITOR_LINE
+    schema = EDITOR_LINE.partition("$schema=")[2]
+    assert (path.parent / schema).is_file()
+
+
+# --- documentation ----------------------------------------------------------------------------------
+
+
+def test_relative_links_resolve() -> None:
+    missing = []
+    links = 0
+    for page in pages():
+        text = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
+        for target in re.findall(r"\]\(([^)\s]+)\)", text):
+            if re.match(r"[a-z]+:|#", target):
+                continue
+            links += 1
+            if not (page.parent / target.partition("#")[0]).exists():
+                missing.append(f"{page.relative_to(ROOT)}: {target}")
+    assert links > 10
+    assert missing == []
+
+
+def commands(name: str) -> list[list[str]]:
+    """Return every call of `name` in the pages, as words."""
+    found = []
+    for page in pages():
+        text = page.read_text()
+        inline = re.findall(r"(?<!`)`([^`\n]+)`(?!`)", text)
+        for line in [*inline, *"\n".join(blocks(page, "sh")).splitlines()]:
+            words = line.partition("#")[0].split()
+            if words and words[0].removeprefix(".venv/bin/") == name:
+                found.append(words[1:])
+    return found
+
+
+def test_documented_targets_are_in_the_makefile() -> None:
+    makefile = (ROOT / "Makefile").read_text()
+    targets = set(re.findall(r"^([a-z-]+):", makefile, re.MULTILINE))
+    used = {word for words in commands("make") for word in words}
+    assert {"test", "lint", "test-slow"} <= used
+    assert used <= targets
+
+
+def test_documented_commands_are_understood() -> None:
+    calls = commands("vibsim")
+    assert len(calls) > 5
+    for words in calls:
+        # a page may name a command without what it needs to run
+        if words in ([], ["check"], ["plan"], ["list"], ["simulate"], ["analyse"], ["report"]):
+            continue
+        try:
+            parser().parse_args(words)
+        except SystemExit:
+            pytest.fail(f"vibsim {' '.join(words)} is documented and refused")
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/experiment-file.md"])
+def test_documented_experiments_are_accepted(page: str, tmp_path: Path) -> None:
+    count = 0
+    for text in blocks(ROOT / page, "yaml"):
+        part = yaml.safe_load(text)
+        if part is None:  # the editor line alone
+            continue
+        whole = {**yaml.safe_load(BASE), **part}
+        file = tmp_path / "documented.yaml"
+        file.write_text(yaml.safe_dump(whole))
+        assert Experiment.from_yaml(file).name == "documented"
+        count += 1
+    assert count >= 1
+
+
+def test_every_value_name_is_documented() -> None:
+    from vibsim.spec.values import VALUES
+
+    text = (ROOT / "docs/experiment-file.md").read_text()
+    assert [name for name in VALUES if f"`{name}`" not in text] == []
+
+
+def test_every_reason_is_documented_with_its_status() -> None:
+    from vibsim.analysis.verdict import STATUS_OF
+
+    text = (ROOT / "docs/verdicts.md").read_text()
+    rows = dict(re.findall(r"^\| `([a-z_]+)` \| ([A-Z]+) \|", text, re.MULTILINE))
+    assert rows == STATUS_OF
+
+
+# --- every file -------------------------------------------------------------------------------------
+
+
+def test_no_file_names_a_folder_of_one_machine() -> None:
+    pattern = re.compile(r"(?<![\w.$~}/])/(home|root|Users|work)/[\w.-]+")
+    found = [
+        f"{path.relative_to(ROOT)}: {match[0]}"
+        for path, text in texts()
+        for match in pattern.finditer(text)
+    ]
+    assert found == []
+
+
+def test_no_file_holds_the_place_of_this_checkout() -> None:
+    places = {str(ROOT), str(Path.home())} - {"/"}
+    found = [path for path, text in texts() if any(place + os.sep in text for place in places)]
+    assert found == []
+
+
+def test_scripts_can_be_executed() -> None:
+    for name in (".ci/run", "requirements/install.sh"):
+        assert os.access(ROOT / name, os.X_OK), name
+
+
+# --- set-up -----------------------------------------------------------------------------------------
+
+
+def install(folder: Path, *arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:
+    """Run the set-up of a copy of the repository that can install nothing."""
+    return subprocess.run(
+        ["sh", "requirements/install.sh", *arguments],
+        cwd=folder,
+        env={**os.environ, **variables},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Path:
+    """Return a folder with what the set-up reads, and a python3.11 that makes empty environments."""
+    folder = tmp_path / "checkout"
+    (folder / "requirements").mkdir(parents=True)
+    for path in (ROOT / "requirements").iterdir():
+        (folder / "requirements" / path.name).write_bytes(path.read_bytes())
+    (folder / "pyproject.toml").write_bytes((ROOT / "pyproject.toml").read_bytes())
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    # Stands for Python and pip: notes each call, makes itself the environment's python, fails where told to.
+    script = f"""#!/bin/sh
+echo "$@" >>{tmp_path}/calls
+case "$*" in
+    "-m venv .venv") mkdir -p .venv/bin && cp "$0" .venv/bin/python ;;
+    *"$FAIL"*) [ -z "$FAIL" ] || exit 9 ;;
+esac
+"""
+    (tools / "python3.11").write_text(script)
+    (tools / "python3.11").chmod(0o755)
+    return folder
+
+
+def calls(copy: Path) -> list[str]:
+    """Return the calls of Python since the last time."""
+    log = copy.parent / "calls"
+    found = log.read_text().splitlines() if log.exists() else []
+    log.unlink(missing_ok=True)
+    return found
+
+
+def set_up(copy: Path, chosen: str, fail: str = "") -> int:
+    path = f"{copy.parent / 'tools'}:{os.environ['PATH']}"
+    return install(copy, chosen, PATH=path, FAIL=fail).returncode
+
+
+def test_second_set_up_does_nothing(copy: Path) -> None:
+    assert set_up(copy, "run") == 0
+    assert any("requirements/run.txt" in call for call in calls(copy))
+    assert set_up(copy, "run") == 0
+    assert calls(copy) == []
+
+
+def test_run_installs_no_development_tools(copy: Path) -> None:
+    assert set_up(copy, "run") == 0
+    assert not any("requirements/dev.txt" in call for call in calls(copy))
+
+
+def test_dev_adds_to_run(copy: Path) -> None:
+    assert set_up(copy, "run") == 0
+    calls(copy)
+    assert set_up(copy, "dev") == 0
+    added = calls(copy)
+    assert not any("venv" in call for call in added)
+    assert any("requirements/dev.txt" in call for call in added)
+    assert set_up(copy, "run") == 0
+    assert calls(copy) == []
+
+
+@pytest.mark.parametrize("step", ["build.txt", "run.txt", "--editable"])
+def test_interrupted_set_up_is_done_again(copy: Path, step: str) -> None:
+    assert set_up(copy, "run", fail=step) != 0
+    calls(copy)
+    assert set_up(copy, "run") == 0
+    assert any("-m venv" in call for call in calls(copy))
+
+
+@pytest.mark.parametrize("name", ["requirements/run.txt", "pyproject.toml"])
+def test_changed_requirements_make_a_new_environment(copy: Path, name: str) -> None:
+    assert set_up(copy, "dev") == 0
+    calls(copy)
+    with (copy / name).open("a") as file:
+        file.write("\n# changed\n")
+    assert set_up(copy, "run") == 0
+    assert any("-m venv" in call for call in calls(copy))
+    assert set_up(copy, "dev") == 0
+    assert any("requirements/dev.txt" in call for call in calls(copy))
+
+
+def test_moved_checkout_makes_a_new_environment(copy: Path) -> None:
+    assert set_up(copy, "run") == 0
+    calls(copy)
+    moved = copy.rename(copy.with_name("moved"))
+    assert set_up(moved, "run") == 0
+    assert any("-m venv" in call for call in calls(moved))
+
+
+def test_broken_environment_is_made_again(copy: Path) -> None:
+    assert set_up(copy, "run") == 0
+    calls(copy)
+    (copy / ".venv/bin/python").unlink()
+    assert set_up(copy, "run") == 0
+    assert any("-m venv" in call for call in calls(copy))
+
+
+def test_old_python_is_refused_with_a_reason(copy: Path) -> None:
+    tools = copy.parent / "old"
+    tools.mkdir()
+    for name in ("python3.11", "python3"):
+        (tools / name).write_text("#!/bin/sh\nexit 1\n")
+        (tools / name).chmod(0o755)
+    done = install(copy, "run", PATH=f"{tools}:{os.environ['PATH']}")
+    assert done.returncode != 0
+    assert "CPython 3.11 or newer" in done.stderr
+    assert not (copy / ".venv").exists()
