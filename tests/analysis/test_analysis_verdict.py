@@ -1,0 +1,370 @@
+"""The verdict on ladders with known truth: every status and reason, and no false PASS."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from ladders import T, evidence_of, random_truth, shape_in_time
+
+from vibsim.analysis import rules, series, verdict
+from vibsim.analysis.verdict import REASONS, STATUSES, judge
+
+EXACT = np.cos(T)
+RNG = np.random.default_rng(5)
+A, B, C = (shape_in_time(RNG) for _ in range(3))
+H = {level: 2.0**-level for level in range(30)}
+
+
+def ladder(levels: tuple[int, ...], *terms: tuple[float, float, Any]) -> list[np.ndarray]:
+    """Return solutions with error sum of size * e(t) * (h / h_0)^p."""
+    fields = []
+    for level in levels:
+        h = 2.0 ** (levels[0] - level)
+        fields.append(EXACT - sum(size * e * h**p for size, p, e in terms))
+    return fields
+
+
+def decide(fields: list[np.ndarray], levels: tuple[int, ...], **more: Any) -> tuple[str, str]:
+    found = judge(evidence_of(fields, levels, **more))
+    return STATUSES[int(found.status[0])], REASONS[int(found.reason[0])]
+
+
+FOUR, FIVE, THREE = (6, 7, 8, 9), (6, 7, 8, 9, 10), (6, 7, 8)
+SMALL = 1e-3
+
+
+@pytest.mark.parametrize("levels", [THREE, FOUR, FIVE, (3, 5, 6, 8), (4, 6, 8), (2, 3, 5, 9)])
+@pytest.mark.parametrize("p", [1.0, 2.0, 4.0])
+@pytest.mark.parametrize("norm", series.NORMS)
+def test_right_order_passes_and_wrong_order_is_named(
+    levels: tuple[int, ...], p: float, norm: str
+) -> None:
+    fields = ladder(levels, (SMALL, p, A), (0.02 * SMALL, p + 1, B))
+    common = {"norm": norm, "exact": EXACT}
+    assert decide(fields, levels, order=p, **common) == ("PASS", "asymptotic")
+    assert decide(fields, levels, order=p + 1, **common) == ("FAIL", "order_low")
+    assert decide(fields, levels, order=p - 0.5, **common) == ("FAIL", "order_high")
+
+
+def test_few_levels() -> None:
+    for count in (1, 2):
+        levels = FOUR[:count]
+        fields = ladder(levels, (SMALL, 2, A))
+        assert decide(fields, levels) == ("INCONCLUSIVE", "too_few_levels")
+
+
+def test_three_levels_need_proportional_series() -> None:
+    spoiled = ladder(THREE, (SMALL, 2, A), (0.4 * SMALL, 4, B))
+    assert decide(spoiled, THREE) == ("INCONCLUSIVE", "pre_asymptotic")
+    # norms that fall by four alone do not make a PASS
+    d = [A, B / 4]
+    fields = [EXACT, EXACT - d[0], EXACT - d[0] - d[1]]
+    assert decide(fields, THREE)[0] == "INCONCLUSIVE"
+
+
+def test_unsettled_orders_are_pre_asymptotic() -> None:
+    fields = ladder(FOUR, (SMALL, 2, A), (3 * SMALL, 4, B))
+    assert decide(fields, FOUR) == ("INCONCLUSIVE", "pre_asymptotic")
+
+
+def test_an_emerging_lower_order_is_not_passed() -> None:
+    # at the finest level the second-order term is still ten times the first-order one
+    fine = 2.0 ** -(FIVE[-1] - FIVE[0])
+    fields = ladder(FIVE, (SMALL, 2, A), (SMALL * fine / 10, 1, B))
+    assert decide(fields, FIVE) == ("INCONCLUSIVE", "pre_asymptotic")
+    parallel = ladder(FIVE, (SMALL, 2, A), (SMALL * fine / 10, 1, A))
+    assert decide(parallel, FIVE) == ("INCONCLUSIVE", "pre_asymptotic")
+
+
+@pytest.mark.parametrize("levels", [THREE, FOUR, FIVE])
+def test_alternating_differences_oscillate(levels: tuple[int, ...]) -> None:
+    fields = [EXACT - SMALL * (-1) ** i * 4.0**-i * A for i, _ in enumerate(levels)]
+    # the norms of these differences fall by four exactly
+    assert decide(fields, levels) == ("INCONCLUSIVE", "oscillating")
+
+
+def test_swinging_orders_oscillate() -> None:
+    levels = tuple(range(4, 11))
+    sizes = np.cumprod([1.0, 4, 2, 4, 2, 4, 2])
+    d = [SMALL / size * A for size in sizes]
+    fields = [EXACT - sum(d[i:], np.zeros_like(A)) for i in range(len(levels))]
+    assert decide(fields, levels) == ("INCONCLUSIVE", "oscillating")
+
+
+def noise_like(size: float, seed: int) -> np.ndarray:
+    return size * np.random.default_rng(seed).normal(size=len(T))
+
+
+@pytest.mark.parametrize("growth", [0.0, 0.5, 1.5])
+def test_a_floor_in_the_ladder_leaves_the_window_before_it(growth: float) -> None:
+    levels = tuple(range(6, 16))
+    floor = np.array([1e-8 * 2 ** (growth * (level - 12)) for level in levels])
+    fields = ladder(levels, (SMALL, 2, A), (0.02 * SMALL, 4, B))
+    fields = [u + noise_like(f, i) for i, (u, f) in enumerate(zip(fields, floor, strict=True))]
+    evidence = evidence_of(fields, levels, floor=floor, exact=EXACT)
+    found = judge(evidence)
+    assert REASONS[int(found.reason[0])] == "asymptotic"
+    assert found.last[0] < levels[-1]
+    assert np.any(np.abs(found.orders[0] - 2) > 0.5)
+    # and only the floor makes it one: without it the same ladder is no PASS
+    unknown = evidence_of(fields, levels, floor=1e-15, exact=EXACT)
+    assert STATUSES[int(judge(unknown).status[0])] != "PASS"
+
+
+def test_nothing_but_floor_is_round_off() -> None:
+    levels = (17, 18, 19, 20, 21, 22)
+    floor = np.array([1e-9 * 2 ** (1.5 * (level - 17)) for level in levels])
+    fields = [EXACT + noise_like(f, i) for i, f in enumerate(floor)]
+    assert decide(fields, levels, floor=floor, exact=EXACT) == ("INCONCLUSIVE", "round_off")
+
+
+def test_a_wrong_order_does_not_hide_behind_round_off() -> None:
+    floor = np.array([1e-9] * 5)
+    # the finest difference is 1e4 times the floor
+    first_order = ladder(FIVE, (2e-4, 1, A))
+    assert decide(first_order, FIVE, floor=floor) == ("FAIL", "order_low")
+    # within the blamed factor, but proportional series cannot be noise
+    near = ladder(FIVE, (8e-7, 1, A))
+    assert decide(near, FIVE, floor=floor) == ("FAIL", "order_low")
+    # scattered differences far above the floor are not excused
+    loose = [EXACT + noise_like(1e-3 * 2.0**-i, i) for i in range(5)]
+    status, reason = decide(loose, FIVE, floor=floor)
+    assert (status, reason) != ("INCONCLUSIVE", "round_off")
+    assert status != "PASS"
+
+
+def test_exact_and_its_limit() -> None:
+    fields = [EXACT + noise_like(2e-16, i) for i in range(4)]
+    assert decide(fields, FOUR, exact=EXACT) == ("PASS", "exact")
+    assert decide(fields, FOUR) == ("PASS", "exact")
+    assert decide([EXACT] * 4, FOUR, exact=EXACT) == ("PASS", "exact")
+    assert decide([0 * EXACT] * 4, FOUR, floor=0.0, exact=0 * EXACT) == ("PASS", "exact")
+    assert decide(fields, FOUR, exact=EXACT + 1e-6) == ("FAIL", "wrong_limit")
+    assert decide([EXACT] * 3, THREE) == ("PASS", "exact")
+    assert decide([EXACT] * 2, FOUR[:2]) == ("INCONCLUSIVE", "too_few_levels")
+    # so fine that an ordinary error would not be seen either
+    fine = (24, 25, 26, 27)
+    assert decide(fields, fine) == ("INCONCLUSIVE", "round_off")
+
+
+@pytest.mark.parametrize("levels", [THREE, FOUR, FIVE])
+def test_convergence_to_something_else(levels: tuple[int, ...]) -> None:
+    fields = ladder(levels, (SMALL, 2, A))
+    assert decide(fields, levels, exact=EXACT) == ("PASS", "asymptotic")
+    assert decide(fields, levels, exact=EXACT + SMALL * C) == ("FAIL", "wrong_limit")
+    # without an exact solution it cannot be seen
+    assert decide(fields, levels) == ("PASS", "asymptotic")
+
+
+def test_breakdown() -> None:
+    fields = ladder(FOUR, (SMALL, 2, A))
+    steady = np.array([[1.0, 1.0, 1.0, 1.0]])
+    limit = np.array([2.0])
+    none = np.zeros((1, 4), dtype=bool)
+    broken = np.array([[True, False, False, False]])
+    common: dict[str, Any] = {"stability_limit": limit, "growth": steady}
+    assert decide(fields, FOUR, failed=none, **common) == ("PASS", "asymptotic")
+    assert decide(fields, FOUR, failed=broken, **common) == ("FAIL", "non_finite")
+    small = {**common, "stability_limit": np.array([0.2])}
+    # w dt = 20/64 = 0.31 at level 6, 0.16 at level 7
+    assert decide(fields, FOUR, failed=none, **small) == ("FAIL", "unstable")
+    assert judge(evidence_of(fields, FOUR, failed=none, **small)).culprit[0] == 6
+    at_limit = {**common, "stability_limit": np.array([20 / 64])}
+    assert decide(fields, FOUR, failed=none, **at_limit) == ("PASS", "asymptotic")
+    assert decide(fields, FOUR, failed=broken, **small) == ("FAIL", "unstable")
+
+
+def test_growth_is_unstable_unless_refinement_removes_it() -> None:
+    fields = ladder(FOUR, (SMALL, 2, A))
+    growing = np.array([[30.0, 60.0, 100.0, 200.0]])
+    assert decide(fields, FOUR, growth=growing) == ("FAIL", "unstable")
+    removed = np.array([[1e8, 1e4, 200.0, 20.0]])
+    assert decide(fields, FOUR, growth=removed) == ("PASS", "asymptotic")
+    unknown = np.full((1, 4), np.nan)
+    assert decide(fields, FOUR, growth=unknown) == ("PASS", "asymptotic")
+
+
+def test_a_quantity_that_does_not_exist() -> None:
+    fields = [np.full_like(EXACT, np.nan)] * 4
+    exists = np.array([False])
+    assert decide(fields, FOUR, applicable=exists) == ("INCONCLUSIVE", "not_applicable")
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("where", [0, 2, 3])
+def test_a_number_that_is_not_finite_never_passes(bad: float, where: int) -> None:
+    fields = ladder(FOUR, (SMALL, 2, A))
+    fields[where] = fields[where].copy()
+    fields[where][10] = bad
+    with np.errstate(invalid="ignore"):
+        evidence = evidence_of(fields, FOUR, exact=EXACT)
+    found = judge(evidence)
+    assert REASONS[int(found.reason[0])] == "non_finite"
+    assert np.isnan(found.order[0])
+    assert found.first[0] == found.last[0] == -1
+
+
+@pytest.mark.parametrize("place", ["difference", "scatter", "floor", "order"])
+def test_no_nan_among_the_evidence_passes(place: str) -> None:
+    evidence = evidence_of(ladder(FOUR, (SMALL, 2, A)), FOUR)
+    values = np.array(getattr(evidence, place), dtype=float)
+    values[..., -1] = np.nan
+    fields = {**vars(evidence), place: values}
+    assert STATUSES[int(judge(rules.Evidence(**fields)).status[0])] != "PASS"
+
+
+def test_many_ladders_at_once_are_judged_as_one_by_one() -> None:
+    rng = np.random.default_rng(9)
+    rows = []
+    while len(rows) < 20:
+        truth = random_truth(rng)
+        if len(truth.levels) == 5:
+            rows.append(evidence_of(truth.fields, FIVE, floor=truth.floor, exact=truth.exact))
+    names = ("difference", "scatter", "floor", "order", "error", "size", "omega_dt")
+    stacked = {
+        name: np.stack([getattr(row, name)[0] for row in rows]).reshape(
+            (4, 5, *rows[0].__dict__[name].shape[1:])
+        )
+        for name in (*names, "relative_floor")
+    }
+    together = judge(rules.Evidence(levels=FIVE, **stacked))
+    alone = [judge(row) for row in rows]
+    assert together.reason.shape == (4, 5)
+    assert together.reason.ravel().tolist() == [int(one.reason[0]) for one in alone]
+    np.testing.assert_array_equal(together.order.ravel(), [one.order[0] for one in alone])
+
+
+@pytest.mark.parametrize("norm", ["l2", "linf"])
+def test_random_ladders_have_no_false_pass(norm: str) -> None:
+    rng = np.random.default_rng(2026)
+    false_pass, false_fail, right, passed, widths = [], [], 0, 0, []
+    for i in range(700):
+        truth = random_truth(rng)
+        p, q = truth.orders
+        formal = float(rng.choice([p, p, p, q, p + 1, max(p - 1, 0.5)]))
+        evidence = evidence_of(
+            truth.fields,
+            truth.levels,
+            order=formal,
+            floor=truth.floor,
+            exact=truth.exact,
+            norm=norm,
+        )
+        found = judge(evidence)
+        status, reason = STATUSES[int(found.status[0])], REASONS[int(found.reason[0])]
+        mixed = np.isnan(truth.order)
+        # with three clean levels, a mixture of two powers may look like the second one alone
+        visible = min(truth.clean, len(truth.levels)) > 3
+        if status == "PASS" and (truth.order != formal if not mixed else visible):
+            false_pass.append((i, formal, truth.orders, reason))
+        if truth.order == formal and truth.clean > 2:
+            right += 1
+            passed += status == "PASS"
+            widths.append(float(found.high[0] - found.low[0]) if status == "PASS" else np.nan)
+            if status == "FAIL":
+                false_fail.append((i, formal, reason, found.orders))
+    assert false_pass == []
+    assert len(false_fail) < 0.02 * right, false_fail
+    assert passed > 0.6 * right
+    assert np.nanmedian(widths) < 0.1
+
+
+def test_every_reason_has_its_status() -> None:
+    from vibsim.spec import REASONS as KNOWN
+
+    assert {name: verdict.STATUS_OF[name] for name in REASONS} == KNOWN
+
+
+@pytest.mark.parametrize("fault", ["sign", "factor", "stride", "twice", "float32"])
+def test_broken_analyses_are_noticed(fault: str) -> None:
+    """Faults in taking the differences do not end in a PASS."""
+    fields = ladder(FIVE, (SMALL, 2, A), (0.02 * SMALL, 4, B))
+    assert decide(fields, FIVE, exact=EXACT)[0] == "PASS"
+    if fault == "sign":
+        fields = [u * (-1) ** i for i, u in enumerate(fields)]
+    elif fault == "factor":
+        fields = [EXACT - (EXACT - u) * 1.2**i for i, u in enumerate(fields)]
+    elif fault == "stride":
+        fields = [np.roll(u, i) for i, u in enumerate(fields)]
+    elif fault == "twice":
+        fields[3] = fields[2]
+    else:
+        fields = ladder(FIVE, (1e-5, 2, A), (2e-7, 4, B))
+        assert decide(fields, FIVE, exact=EXACT)[0] == "PASS"
+        fields = [u.astype(np.float32).astype(float) for u in fields]
+    assert decide(fields, FIVE, exact=EXACT)[0] != "PASS"
+
+
+def from_orders(
+    orders: list[float], scatter: list[float], *, floor: float = 1e-15, **more: Any
+) -> tuple[str, str]:
+    """Decide on a ladder of neighbouring levels from its local orders and its scatter alone."""
+    difference = SMALL / np.cumprod([1.0, *(2.0**p for p in orders)])
+    levels = tuple(range(6, 8 + len(orders)))
+    evidence = rules.Evidence(
+        levels=levels,
+        difference=difference[None],
+        scatter=np.array([scatter]),
+        floor=np.full((1, len(levels)), floor),
+        order=np.array([2.0]),
+        omega_dt=0.3 * 0.5 ** np.arange(len(levels))[None],
+        size=np.ones(1),
+        relative_floor=np.array([floor]),
+        **more,
+    )
+    found = judge(evidence)
+    return STATUSES[int(found.status[0])], REASONS[int(found.reason[0])]
+
+
+UNDECIDED = ("INCONCLUSIVE", "pre_asymptotic")
+
+
+@pytest.mark.parametrize(
+    ("orders", "scatter", "expected"),
+    [
+        ([2.02], [0.03], ("PASS", "asymptotic")),
+        ([2.02], [0.06], UNDECIDED),
+        ([1.05], [0.09], ("FAIL", "order_low")),
+        ([1.3], [0.02], UNDECIDED),
+        ([1.05], [0.3], UNDECIDED),
+        ([3.01], [0.03], ("FAIL", "order_high")),
+        ([3.01], [0.12], UNDECIDED),
+        ([2.02, 2.01], [0.04, 0.01], ("PASS", "asymptotic")),
+        # near the order, but still changing
+        ([2.2, 2.05], [0.1, 0.03], UNDECIDED),
+        # the change does not fade
+        ([2.06, 2.0], [0.03, 0.03], UNDECIDED),
+        # a lower order emerges
+        ([1.99, 1.97], [0.02, 0.04], UNDECIDED),
+        ([3.0, 3.0], [0.02, 0.04], UNDECIDED),
+        ([3.0, 3.0], [0.04, 0.02], ("FAIL", "order_high")),
+        ([4.4, 3.1], [0.3, 0.15], UNDECIDED),
+        # on the way to 2
+        ([0.7, 1.2], [0.4, 0.2], UNDECIDED),
+        ([0.8, 0.9], [0.1, 0.05], ("FAIL", "order_low")),
+        # series that have nothing to do with each other
+        ([1.6, 1.2], [0.9, 0.3], UNDECIDED),
+        ([1.2, 1.05, 1.01], [0.3, 0.1, 0.05], ("FAIL", "order_low")),
+        ([0.5, 0.5, 0.5], [0.01, 0.005, 0.002], ("FAIL", "order_low")),
+        ([0.7, 0.7, 0.7], [1e-9, 1e-9, 1e-9], ("FAIL", "order_low")),
+        ([1.73, 1.72, 1.74], [0.05, 0.03, 0.02], UNDECIDED),
+        ([2.0, 2.0, 2.0], [0.9, 0.9, 0.9], UNDECIDED),
+    ],
+)
+def test_the_borders_of_the_rules(
+    orders: list[float], scatter: list[float], expected: tuple[str, str]
+) -> None:
+    assert from_orders(orders, scatter) == expected
+
+
+def test_a_change_that_scatter_does_not_explain_is_no_round_off() -> None:
+    # the last two differences are within the blamed factor of the floor
+    floor = 5e-6
+    assert from_orders([2.0, 1.5], [0.02, 0.4], floor=floor) == ("PASS", "asymptotic")
+    assert from_orders([2.0, 1.5], [0.02, 0.03], floor=floor)[0] != "PASS"
+
+
+def test_three_levels_must_be_proportional_however_wide_the_tolerance() -> None:
+    assert from_orders([2.02], [0.2], tolerance=0.5) == UNDECIDED

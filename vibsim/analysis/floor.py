@@ -1,0 +1,58 @@
+"""The floor that round-off puts under differences between levels.
+
+A scheme predicts the size of its accumulated round-off relative to the solution, from the arithmetic and the number of
+steps. It is an order of magnitude; the verdict blames it only where the data show it too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.schemes import Scheme
+
+Floats = NDArray[np.float64]
+
+EPSILON = float(np.finfo(np.float64).eps)
+"""No stored number is known better than this, relative to its size."""
+
+
+def relative_floor(scheme: Scheme, options: Mapping[str, str], steps: tuple[int, ...]) -> Floats:
+    """Return the predicted round-off at every level relative to the solution's size, shape (level,)."""
+    return np.array([max(scheme.round_off(options, n), EPSILON) for n in steps])
+
+
+def solution_size(series: list[Floats]) -> Floats:
+    """Return the size of a solution, shape (scheme, case): its largest value at the finest level that has one.
+
+    Parameters
+    ----------
+    series
+        The solution at every level from coarse to fine, each of shape (scheme, case, t).
+    """
+    size = np.zeros(series[0].shape[:-1])
+    for values in series:
+        finite = np.isfinite(values)
+        largest = np.max(np.abs(np.where(finite, values, 0.0)), axis=-1)
+        size = np.where(np.any(finite, axis=-1), largest, size)
+    return size
+
+
+def norm_of_floor(floor: Floats, kind: str, points: int, spacing: Floats) -> Floats:
+    """Return the norm over time of noise as large as `floor` at every point; the shape of `floor`.
+
+    Parameters
+    ----------
+    floor
+        Size of the noise at one point, shape (..., case).
+    kind
+        One of `series.NORMS`.
+    points
+        Number of points of the grid.
+    spacing
+        Distance between them, shape (case,) or (1,).
+    """
+    weight = {"l1": spacing * points, "l2": np.sqrt(spacing * points)}.get(kind, np.ones(1))
+    return np.asarray(floor * weight)

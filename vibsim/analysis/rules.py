@@ -1,0 +1,222 @@
+"""The evidence that a verdict rests on, and the rules that read it, for any number of ladders at once.
+
+The order in which the rules apply, and why, stands at the head of `vibsim.analysis.verdict`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.analysis.series import safe_ratio
+from vibsim.analysis.window import Trend
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+BLAME = 100.0
+"""Round-off may be blamed for a difference up to so many times its predicted floor, an order of magnitude."""
+TINY = 1e-10
+"""Differences of a scheme that is exact are no larger part of the solution."""
+VISIBLE = 100.0
+"""An ordinary error, (w dt)^p at the coarsest level, this many times above the blamed floor would have been seen."""
+COINCIDENT = 0.2
+"""Largest scatter (see `series.scatter`) of curves that count as proportional."""
+UNRELATED = 0.7
+"""Series with so much scatter have nothing to do with each other, and a change from there says nothing."""
+SINGLE = 0.05
+"""The same where one triple is the only evidence."""
+NARROW = 0.2
+"""Half the width of the interval of an order that is called too high, at most."""
+PURE = 1e-3
+"""Scatter, or change of the order, below which a ladder is one pure power, whatever the power."""
+BLOWN_UP = 10.0
+"""A solution so many times larger than the exact one has grown."""
+EXCESS = 1.5
+"""An error so many times the one that the differences allow, or so many times smaller, contradicts them."""
+EXACT_ACCURACY = 1e-12
+"""An exact solution is trusted to this part of its size."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """The numbers of ladders that a verdict rests on."""
+
+    levels: tuple[int, ...]
+    """The n levels, strictly increasing."""
+    difference: Floats
+    """Norms of the differences, shape (..., n-1)."""
+    scatter: Floats
+    """Signed scatter of the triples in the same norm (`series.scatter`), shape (..., n-2)."""
+    floor: Floats
+    """Predicted round-off at every level in the same norm, shape (..., n)."""
+    order: Floats
+    """The order p that is expected, shape (...)."""
+    omega_dt: Floats
+    """w dt, shape (..., n)."""
+    size: Floats
+    """Norm of the solution, shape (...)."""
+    relative_floor: Floats
+    """Predicted round-off relative to the solution at the coarsest level, shape (...)."""
+    tolerance: float = 0.1
+    """How far from p an order may be."""
+    error: Floats | None = None
+    """Norms of the true errors, shape (..., n); NaN where the exact solution is not known."""
+    failed: Flags | None = None
+    """Whether a member broke down, shape (..., n)."""
+    applicable: Flags | None = None
+    """Whether the quantity exists, shape (...)."""
+    stability_limit: Floats | None = None
+    """Largest stable w dt, infinite where there is no limit, shape (...)."""
+    growth: Floats | None = None
+    """Largest position over the largest exact position, shape (..., n); NaN where not known."""
+
+
+def breakdown(e: Evidence, shape: tuple[int, ...]) -> tuple[Flags, Flags, Flags]:
+    """Say of every level whether it broke down or is beyond the limit, and of every ladder whether it grows."""
+    none = np.zeros((*shape, len(e.levels)), dtype=bool)
+    broken = none if e.failed is None else none | e.failed
+    beyond = none
+    if e.stability_limit is not None:
+        # at the limit itself a scheme may still be stable, and w dt carries rounding
+        beyond = none | (e.omega_dt > e.stability_limit[..., None] * (1 + 1e-9))
+    if e.growth is None:
+        return broken, beyond, np.zeros(shape, dtype=bool)
+    last = e.growth[..., -1]
+    before = e.growth[..., -2] if len(e.levels) > 1 else last
+    return broken, beyond, (last > BLOWN_UP) & ~(last < 0.5 * before)
+
+
+def rules(e: Evidence, t: Trend) -> list[tuple[Flags, str]]:
+    """Return the rules for ladders of three levels and more, first to last."""
+    p, tol = e.order, e.tolerance
+    nothing = t.count == 0
+    near = (np.abs(t.order - p) <= tol) & (t.width <= tol)
+    several = t.count > 1
+    together = np.abs(t.scatter) <= np.where(several, COINCIDENT, SINGLE)
+    right = near & (t.scatter >= 0) & together
+    right &= ~t.gap & ~t.drifting & ~_leaving(t, p)
+    excluded = (t.high < p - tol) | (t.low > p + tol)
+    pure = several & (np.abs(t.scatter) <= PURE) & (np.abs(t.change) <= PURE)
+    wrong = excluded & (pure | _plausible(t, p, tol)) & ~_on_the_way(t, p, tol)
+    wrong &= ~t.gap & ~t.turning & ~(t.scatter_before > UNRELATED)
+    above = t.order > p
+    # a lower power may hide below or emerge from a higher one, not the other way round
+    wrong &= np.where(
+        above,
+        together & (t.width <= NARROW) & ~t.drifting & ~_leaving(t, p),
+        several | (t.scatter <= COINCIDENT),
+    )
+    too_large, too_small = _contradicts(e, t)
+    missed = too_large & (right | (wrong & _errors_stay(e, t)))
+    return [
+        (nothing & _truly_exact(e) & _far_from_exact(e), "wrong_limit"),
+        (nothing & _truly_exact(e), "exact"),
+        (nothing, "round_off"),
+        (t.alternating, "oscillating"),
+        (missed, "wrong_limit"),
+        (right & ~too_small, "asymptotic"),
+        (wrong & ~above, "order_low"),
+        (wrong & above, "order_high"),
+        (t.cut, "round_off"),
+    ]
+
+
+def _leaving(t: Trend, p: Floats) -> Flags:
+    """Say where the local orders move away from p, on one side of it: a lower power may be emerging."""
+    away = t.local - p
+    before = t.local - t.change - p
+    return (
+        (t.count > 1)
+        & (away * before > 0)
+        & (np.abs(away) > np.abs(before))
+        & (np.abs(t.change) > 0.005)
+        & (np.abs(away) > 0.012)
+        & ~t.noisy
+    )
+
+
+def _plausible(t: Trend, p: Floats, tol: float) -> Flags:
+    """Say where an order that an expansion can have, a multiple of 1/2 other than p, is near.
+
+    A ladder that only passes by (towards p, and away from that multiple) has not settled there. An order that is no
+    whole number is believed where the series are nearly proportional only.
+    """
+    several = t.count > 1
+    before = t.local - t.change
+    towards_p = np.abs(t.local - p) < np.abs(before - p)
+    found = np.zeros(p.shape, dtype=bool)
+    for candidate in (np.floor(2.0 * t.order) / 2, np.ceil(2.0 * t.order) / 2):
+        whole = candidate == np.round(candidate)
+        passing = several & towards_p
+        passing &= np.abs(t.local - candidate) > np.abs(before - candidate) + 0.01
+        # one triple tells a pure power from two proportional terms by nothing but the number
+        least = np.where(several & whole, 0.1, 0.05)
+        reach = np.maximum(np.where(several, t.width, 2 * t.width), least)
+        near = (np.abs(t.order - candidate) <= reach) & (np.abs(candidate - p) > tol)
+        found |= near & ~passing & (whole | (np.abs(t.scatter) <= 2 * SINGLE))
+    return found
+
+
+def _on_the_way(t: Trend, p: Floats, tol: float) -> Flags:
+    """Say where the local orders approach p so fast that they may reach it: three last changes cover the way."""
+    way = np.abs(t.local - p) - tol
+    approach = np.abs(t.local - t.change - p) - np.abs(t.local - p)
+    return np.asarray((t.count > 1) & (3 * approach >= way))
+
+
+def _floor_of_pairs(e: Evidence) -> Floats:
+    return np.asarray(e.floor[..., :-1] + e.floor[..., 1:])
+
+
+def _truly_exact(e: Evidence) -> Flags:
+    """Say where all differences are round-off although an ordinary error would have been seen."""
+    small = np.asarray(np.all(e.difference <= BLAME * _floor_of_pairs(e), axis=-1))
+    ordinary = np.minimum(e.omega_dt[..., 0], 1.0) ** e.order
+    tiny = np.all(e.difference <= TINY * e.size[..., None], axis=-1)
+    return np.asarray(small & tiny & (ordinary >= VISIBLE * BLAME * e.relative_floor))
+
+
+def _accuracy(e: Evidence) -> Floats:
+    """Return how well the finest error is known, shape (...)."""
+    return np.asarray(BLAME * e.floor[..., -1] + EXACT_ACCURACY * e.size)
+
+
+def _far_from_exact(e: Evidence) -> Flags:
+    if e.error is None:
+        return np.zeros(e.order.shape, dtype=bool)
+    return np.asarray(np.nan_to_num(e.error[..., -1], nan=0.0) > _accuracy(e))
+
+
+def _contradicts(e: Evidence, t: Trend) -> tuple[Flags, Flags]:
+    """Say where the error at the last level of the window is larger, or smaller, than its difference allows.
+
+    Larger: the limit is another one. Smaller: the differences are not those of the power that they look like.
+    """
+    if e.error is None:
+        return np.zeros(e.order.shape, dtype=bool), np.zeros(e.order.shape, dtype=bool)
+    finer = t.last + 2
+    gap = np.diff(np.array(e.levels))[finer - 1]
+    difference, error = _pick(e.difference, finer - 1), _pick(e.error, finer)
+    most, least = (
+        difference / np.expm1(np.maximum(order, 0.25) * gap * np.log(2.0))
+        for order in (t.low, t.high)
+    )
+    too_large = np.nan_to_num(error, nan=0.0) > EXCESS * most + _accuracy(e)
+    return too_large, np.asarray(error < least / EXCESS - _accuracy(e))
+
+
+def _errors_stay(e: Evidence, t: Trend) -> Flags:
+    """Say where the errors fall at less than half the stated order over the last two levels of the window."""
+    if e.error is None:
+        return np.zeros(e.order.shape, dtype=bool)
+    gap = np.diff(np.array(e.levels))[t.last + 1]
+    fall = safe_ratio(_pick(e.error, t.last + 1), _pick(e.error, t.last + 2))
+    return np.asarray(fall < np.exp2(0.5 * np.maximum(t.low, 0.0) * gap))
+
+
+def _pick(values: Floats, index: NDArray[np.int64]) -> Floats:
+    """Return one entry of the last axis for each ladder."""
+    return np.take_along_axis(values, index[..., None], axis=-1)[..., 0]

@@ -1,0 +1,217 @@
+r"""Formulas on series: norms, differences between levels, ratios, orders, coincidence.
+
+With ``u_l = u - h_l^p e_p + ...`` and ``h_l = 2^-l``, two levels differ by ``d = u_l - u_next = -(1 - 1/R) h_l^p e_p``,
+``R = 2^(p (next - l))``. So ``-R/(R - 1) d`` estimates the error ``exact - u_l`` (-4/3 for neighbours and p = 2), and
+successive differences of equally spaced levels have the ratio R.
+
+Source: pendulum lecture, section 2.5. Series have the shape (..., t); time is the last axis throughout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+NORMS = ("l1", "l2", "linf", "linf_interior")
+NEAR_ZERO = 0.1
+"""A denominator below this part of its surroundings is taken for a zero crossing."""
+ABOVE_FLOOR = 10.0
+"""A denominator must exceed the round-off floor so many times for a ratio to mean something."""
+
+
+def norm(error: Floats, kind: str, spacing: Floats, end_included: bool = True) -> Floats:
+    """Return a norm over time.
+
+    ``l1 = dt sum |e|``, ``l2 = sqrt(dt sum e^2)``, ``linf = max |e|``; ``linf_interior`` leaves the end point out.
+
+    Parameters
+    ----------
+    error
+        Shape (..., case, t).
+    kind
+        One of `NORMS`.
+    spacing
+        Distance between the points, shape (case,) or (1,).
+    end_included
+        Whether the last point is the end of the time interval.
+
+    Returns
+    -------
+    array
+        Shape (..., case). NaN where the series has a NaN.
+    """
+    size = np.abs(error)
+    if kind == "linf_interior" and end_included:
+        size = size[..., :-1]
+    largest = np.max(size, axis=-1)
+    if kind in {"linf", "linf_interior"}:
+        return np.asarray(largest)
+    # scaled by the largest entry, so that squares neither overflow nor vanish
+    scale = np.where((largest > 0) & np.isfinite(largest), largest, 1.0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        scaled = size / scale[..., None]
+        if kind == "l1":
+            return np.asarray(scale * spacing * np.sum(scaled, axis=-1))
+        return np.asarray(scale * np.sqrt(spacing * np.sum(scaled * scaled, axis=-1)))
+
+
+def gap_ratio(order: Floats | float, gap: int) -> Floats:
+    """Return ``R = 2^(p gap)``, the factor by which an error of order p falls over `gap` levels."""
+    return np.asarray(np.exp2(np.asarray(order, dtype=np.float64) * gap))
+
+
+def error_factor(order: Floats | float, gap: int) -> Floats:
+    """Return ``-R/(R - 1)``, which turns a difference into the error of its coarser level."""
+    return np.asarray(1.0 / np.expm1(-np.asarray(order, dtype=np.float64) * gap * np.log(2.0)))
+
+
+def target_ratio(order: Floats | float, levels: Sequence[int]) -> Floats:
+    """Return the ratio of the two differences of a triple of levels, for an error of one power.
+
+    ``(2^(p a) - 1)/(1 - 2^(-p b))`` for the gaps a and b: 2^p where both are 1, and a/b at p = 0.
+    """
+    first, second, third = levels
+    p = np.asarray(order, dtype=np.float64) * np.log(2.0)
+    flat = p == 0
+    safe = np.where(flat, 1.0, p)
+    ratio = np.expm1(safe * (second - first)) / -np.expm1(-safe * (third - second))
+    return np.asarray(np.where(flat, (second - first) / (third - second), ratio))
+
+
+STEEPEST = 64.0
+"""Orders are sought between -STEEPEST and STEEPEST."""
+
+
+def order_of_ratio(ratio: Floats, levels: Sequence[int]) -> Floats:
+    """Solve `target_ratio` for the order.
+
+    The ratio grows with the order, so there is one root; it is found by bisection, for all entries at once.
+
+    Returns
+    -------
+    array
+        The shape of `ratio`; NaN where the ratio is not positive, not finite, or beyond what any order in
+        [-`STEEPEST`, `STEEPEST`] gives.
+    """
+    first, second, third = levels
+    ratio = np.asarray(ratio, dtype=np.float64)
+    usable = np.isfinite(ratio) & (ratio > 0)
+    safe = np.where(usable, ratio, 1.0)
+    if second - first == third - second:
+        order = np.log2(safe) / (second - first)
+        return np.asarray(np.where(usable & (np.abs(order) <= STEEPEST), order, np.nan))
+    low, high = np.full(safe.shape, -STEEPEST), np.full(safe.shape, STEEPEST)
+    with np.errstate(over="ignore"):
+        bounds = [target_ratio(b, levels) for b in (-STEEPEST, STEEPEST)]
+        usable &= (safe >= bounds[0]) & (safe <= bounds[1])
+        for _ in range(64):
+            middle = 0.5 * (low + high)
+            above = target_ratio(middle, levels) > safe
+            low, high = np.where(above, low, middle), np.where(above, middle, high)
+    return np.asarray(np.where(usable, 0.5 * (low + high), np.nan))
+
+
+def safe_ratio(top: Floats, bottom: Floats) -> Floats:
+    """Return ``top/bottom``, NaN where the bottom is zero or either is not finite."""
+    usable = np.isfinite(top) & np.isfinite(bottom) & (bottom != 0)
+    with np.errstate(over="ignore"):
+        return np.asarray(np.where(usable, top, np.nan) / np.where(usable, bottom, 1.0))
+
+
+def local_scale(series: Floats) -> Floats:
+    """Return the size of a series in the surroundings of each point, shape (..., t).
+
+    The smaller of the largest value so far and the largest value still to come: it follows a growing error as well
+    as a decaying one, and does not vanish at a zero crossing between two humps.
+    """
+    size = np.nan_to_num(np.abs(series), nan=0.0, posinf=0.0)
+    before = np.maximum.accumulate(size, axis=-1)
+    after = np.maximum.accumulate(size[..., ::-1], axis=-1)[..., ::-1]
+    return np.asarray(np.minimum(before, after))
+
+
+def masked_ratio(first: Floats, second: Floats, floor: Floats | float = 0.0) -> Floats:
+    """Return the ratio of successive differences as a function of time.
+
+    Masked (NaN) where the denominator is below `NEAR_ZERO` times its `local_scale` (a zero crossing), or below
+    `ABOVE_FLOOR` times the round-off floor.
+
+    Parameters
+    ----------
+    first, second
+        Differences of the coarser and the finer pair, shape (..., t).
+    floor
+        Round-off floor of the finer difference, shape (..., 1) or a number.
+    """
+    size = np.abs(second)
+    keep = size > np.maximum(NEAR_ZERO * local_scale(second), ABOVE_FLOOR * np.asarray(floor))
+    return np.where(keep, safe_ratio(first, second), np.nan)
+
+
+def inner(first: Floats, second: Floats) -> Floats:
+    """Return the cosine of the angle between two series, shape (...); NaN where one of them vanishes."""
+    unit = []
+    for series in (first, second):
+        largest = np.max(np.abs(series), axis=-1, keepdims=True)
+        scaled = safe_ratio(series, np.broadcast_to(largest, series.shape))
+        unit.append(scaled / np.sqrt(np.sum(scaled * scaled, axis=-1, keepdims=True)))
+    return np.asarray(np.sum(unit[0] * unit[1], axis=-1))
+
+
+def proportionality(first: Floats, second: Floats) -> Floats:
+    """Return the least-squares factor ``r = <d, d'>/<d', d'>`` of ``d = r d'``, shape (...)."""
+    sizes = [np.max(np.abs(series), axis=-1) for series in (first, second)]
+    lengths = [
+        norm(safe_ratio(series, np.broadcast_to(size[..., None], series.shape)), "l2", np.ones(1))
+        for series, size in zip((first, second), sizes, strict=True)
+    ]
+    return inner(first, second) * safe_ratio(sizes[0], sizes[1]) * safe_ratio(*lengths)
+
+
+def coincidence(first: Floats, second: Floats, ratio: Floats) -> Floats:
+    """Return ``||d - R d'|| / ||d||`` in the L2 norm: 0 where the rescaled curves coincide.
+
+    Parameters
+    ----------
+    first, second
+        Differences of the coarser and the finer pair, shape (..., t).
+    ratio
+        R, the ratio that the order gives (`target_ratio`), shape (...) or ().
+
+    Returns
+    -------
+    array
+        Shape (...); 0 where both differences vanish, NaN where only the first does.
+    """
+    one = np.ones(1)
+    whole = norm(first, "l2", one)
+    with np.errstate(over="ignore", invalid="ignore"):
+        rest = norm(first - np.asarray(ratio)[..., None] * second, "l2", one)
+    return np.where((whole == 0) & (rest == 0), 0.0, safe_ratio(rest, whole))
+
+
+def scatter(first: Floats, second: Floats, kind: str, end_included: bool = True) -> Floats:
+    """Return how far two successive differences are from being proportional, in a norm.
+
+    ``||d/||d|| - s d'/||d'||||`` with s the sign of their inner product: 0 for proportional series, 1 and more for
+    unrelated ones. Each norm sees its own part of the series: one bad point matters to linf as much as it weighs
+    there.
+
+    Returns
+    -------
+    array
+        Shape (...); negative where s is negative; NaN where a difference vanishes.
+    """
+    one = np.ones(1)
+    unit = []
+    for series in (first, second):
+        length = norm(series, kind, one, end_included)
+        unit.append(safe_ratio(series, np.broadcast_to(length[..., None], series.shape)))
+    if kind == "linf_interior" and end_included:
+        first, second = first[..., :-1], second[..., :-1]
+    sign = np.where(inner(first, second) < 0, -1.0, 1.0)
+    return sign * norm(unit[0] - sign[..., None] * unit[1], kind, one, end_included)

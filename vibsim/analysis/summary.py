@@ -1,0 +1,106 @@
+"""The content of ``summary.json`` (design, section 4.4): plain data, None where a number does not exist."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vibsim.analysis.checks import Verdict
+from vibsim.record import Record
+
+if TYPE_CHECKING:
+    import xarray
+
+    from vibsim.spec import Experiment
+
+FORMAT = 1
+WORST = 10
+"""Of a sweep, so many results of a check and so many failures are listed."""
+
+
+def summarise(
+    experiment: Experiment, verdicts: Sequence[Verdict], convergence: xarray.Dataset | Record
+) -> dict[str, Any]:
+    """Return the summary of an experiment.
+
+    Parameters
+    ----------
+    verdicts, convergence
+        What `verdicts` and `analyse` returned for the experiment.
+
+    Returns
+    -------
+    dict
+        Ready for JSON: no NaN, no infinity, no numpy type. With a sweep the `WORST` results of each check and the
+        first `WORST` failures are listed; ``counts`` and ``failure_count`` count all of them.
+    """
+    record = convergence if isinstance(convergence, Record) else Record.from_xarray(convergence)
+    most = None if experiment.sweep is None else WORST
+    failures = _failures(record)
+    plain: dict[str, Any] = _plain(
+        {
+            "vibsim_format": FORMAT,
+            "collection": experiment.collection,
+            "experiment": experiment.name,
+            "title": experiment.title,
+            "status": overall([verdict.status for verdict in verdicts]),
+            "checks": [_check(verdict, most) for verdict in verdicts],
+            "failures": failures[:most],
+            "failure_count": len(failures),
+        }
+    )
+    return plain
+
+
+def overall(statuses: Sequence[str]) -> str:
+    """Return the status of a whole: FAIL before INCONCLUSIVE before PASS."""
+    return next((name for name in ("FAIL", "INCONCLUSIVE") if name in statuses), "PASS")
+
+
+def _check(verdict: Verdict, most: int | None) -> dict[str, Any]:
+    results = [asdict(result) for result in verdict.results[:most]]
+    return {name: getattr(verdict, name) for name in verdict.__dataclass_fields__} | {
+        "results": results
+    }
+
+
+def _failures(record: Record) -> list[dict[str, Any]]:
+    """List the members that broke down, the earliest first."""
+    names = _meanings(record)
+    rows = [
+        {
+            "scheme": _text(record["scheme"][s]),
+            "level": int(record["level"][lv]),
+            "case": int(record["case"][c]),
+            "t": float(record["failure_time"][s, c, lv]),
+            "step": int(record["last_step"][s, c, lv]) + 1,
+            "error": names[int(record["status"][s, c, lv])],
+        }
+        for s, c, lv in np.argwhere(record["status"] != 0)
+    ]
+    return sorted(rows, key=lambda row: (row["t"], row["scheme"], row["case"], row["level"]))
+
+
+def _meanings(record: Record) -> dict[int, str]:
+    attrs = record.variables["status"].attrs
+    values = np.ravel(np.asarray(attrs["flag_values"]))
+    return dict(zip(map(int, values), str(attrs["flag_meanings"]).split(), strict=True))
+
+
+def _text(name: Any) -> str:
+    return name.decode() if isinstance(name, bytes) else str(name)
+
+
+def _plain(value: Any) -> Any:
+    """Return plain JSON data: numbers that are not finite become None."""
+    if isinstance(value, dict):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value

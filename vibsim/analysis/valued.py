@@ -1,0 +1,120 @@
+"""What a ``value`` check measures: a number for every scheme and member, and whether it is as it should be."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Outcome, text
+from vibsim.analysis.verdict import REASONS
+from vibsim.analysis.wording import number
+from vibsim.record import Record
+
+if TYPE_CHECKING:
+    from vibsim.spec.checks import ValueCheck
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+SEES_SEVERAL_LEVELS = frozenset(
+    {
+        "error_estimate_defect",
+        "observed_order",
+        "ratio",
+        "coincidence",
+        "richardson_error",
+        "max_abs_ratio",
+        "max_abs_interior_ratio",
+    }
+)
+SURVIVES_FAILURE = frozenset({"at", "exact_period"})
+"""Numbers that may be sound although the member broke down later."""
+DEFAULT_RTOL, DEFAULT_ATOL = 1e-9, 1e-12
+"""Tolerance of ``equals`` where a check gives none."""
+
+
+def valued(record: Record, check: ValueCheck, measured: Floats) -> Outcome:
+    """Compare a measured number, shape (scheme, case), with what the check asks of it."""
+    names = [text(name) for name in record["scheme"]]
+    at = check.at
+    schemes = [i for i, name in enumerate(names) if at.scheme is None or name == at.scheme]
+    every = [int(case) for case in record["case"]]
+    cases = [i for i, case in enumerate(every) if at.case is None or case == at.case]
+    holds, away, rule = _compare(check, measured)
+    lost = _failed(record, check) & ~(
+        np.isfinite(measured) if check.value in SURVIVES_FAILURE else np.zeros_like(holds)
+    )
+    masks = [lost | np.isinf(measured), np.isnan(measured), holds]
+    status = np.select(masks, [FAIL, INCONCLUSIVE, PASS], FAIL)
+    codes = [REASONS.index(name) for name in ("non_finite", "not_applicable", "match")]
+    reason = np.select(masks, codes, REASONS.index("mismatch"))
+    what = f"{check.value} of {check.quantity}" if check.quantity else check.value
+
+    def tell(scheme: int, case: int) -> str:
+        found = float(measured[scheme, case])
+        return _tell(what, REASONS[int(reason[scheme, case])], found, rule)
+
+    return Outcome(
+        schemes=[names[i] for i in schemes],
+        scheme_index=schemes,
+        cases=np.asarray(record["case"]),
+        case_index=cases,
+        status=status,
+        reason=reason,
+        compared=status,
+        away=away,
+        expected=rule,
+        expects_pass=True,
+        quantity=check.quantity,
+        tell=tell,
+        advise=lambda scheme, case: _ADVICE.get(REASONS[int(reason[scheme, case])], ""),
+        value=measured,
+    )
+
+
+_ADVICE = {
+    "non_finite": "Start `levels:` at a finer level, or shorten `time: end`.",
+    "not_applicable": (
+        "Ask for a level, a step and a time that are stored (`at:`, `samples: all`), and choose `time: end` so that "
+        "the number exists."
+    ),
+    "mismatch": "Add finer `levels:`, or correct the number that the check asks for.",
+}
+
+
+def _tell(what: str, reason: str, found: float, rule: str) -> str:
+    match reason:
+        case "non_finite":
+            return f"{what} means nothing here: the calculation met a number that is not finite."
+        case "not_applicable":
+            return f"{what} does not exist here, or was not stored."
+    verb = "is" if reason == "match" else "is not"
+    return f"{what} is {found:.10g}; it {verb} {rule}."
+
+
+def _failed(record: Record, check: ValueCheck) -> Flags:
+    """Say which members broke down at a level that the value depends on, shape (scheme, case)."""
+    broken = record["status"] != 0
+    level = check.at.level
+    if check.value in SEES_SEVERAL_LEVELS or level == "best":
+        return np.asarray(np.any(broken, axis=-1))
+    levels = [int(known) for known in record["level"]]
+    index = levels.index(level) if isinstance(level, int) and level in levels else -1
+    return np.asarray(broken[..., index])
+
+
+def _compare(check: ValueCheck, measured: Floats) -> tuple[Flags, Floats, str]:
+    """Return where the number is as it should be, how far beyond the border it is, and the rule in words."""
+    if check.below is not None:
+        return measured < check.below, measured - check.below, f"below {number(check.below)}"
+    if check.above is not None:
+        return measured > check.above, check.above - measured, f"above {number(check.above)}"
+    wanted = float("nan") if check.equals is None else check.equals
+    plain = check.rtol is None and check.atol is None
+    rtol = DEFAULT_RTOL if plain else check.rtol or 0.0
+    atol = DEFAULT_ATOL if plain else check.atol or 0.0
+    allowed = atol + rtol * abs(wanted)
+    away = np.asarray(np.abs(measured - wanted))
+    return away <= allowed, away - allowed, f"equal to {wanted!r} within {number(allowed)}"

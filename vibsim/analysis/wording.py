@@ -1,0 +1,198 @@
+"""Verdicts in sentences that a student understands, and advice that names what to change in the YAML."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Story:
+    """What a sentence on a convergence verdict needs to know about the member that decided it."""
+
+    quantity: str
+    reason: str
+    order: float
+    low: float
+    high: float
+    first: int
+    last: int
+    expected: float
+    """The order that was expected."""
+    tolerance: float
+    norm: str
+    levels: tuple[int, ...]
+    culprit: int
+    """Level that failed or is beyond the stability limit; -1 for none."""
+    omega_dt: float
+    """w dt at the culprit; NaN for none."""
+    limit: float
+    """Stability limit of the scheme; infinite for none."""
+    options: Mapping[str, str]
+    """Options of the scheme."""
+    is_position: bool
+    scheme: str
+
+
+def number(value: float) -> str:
+    """Write a number with up to 6 significant digits."""
+    return f"{value:.6g}"
+
+
+def _measured(s: Story) -> str:
+    """Return the stated order with its interval and levels; empty where there is none."""
+    if math.isnan(s.order):
+        return ""
+    return f"order {s.order:.3f} (between {s.low:.3f} and {s.high:.3f}) on levels {s.first} to {s.last}"
+
+
+def tell(s: Story) -> str:
+    """Say what was measured of a convergence, in one sentence."""
+    measured, promised = _measured(s), f"order {number(s.expected)}"
+    match s.reason:
+        case "asymptotic":
+            return (
+                f"{s.quantity} converges with {measured}, as promised ({promised}): the rescaled "
+                "differences coincide."
+            )
+        case "exact":
+            return (
+                f"{s.quantity} is exact: the levels differ by round-off only, so there is no order "
+                "to measure."
+            )
+        case "order_low" | "order_high":
+            word = "slower" if s.reason == "order_low" else "faster"
+            return f"{s.quantity} converges {word} than {promised}: with {measured}.{_cause(s)}"
+        case "wrong_limit":
+            return (
+                f"The levels of {s.quantity} approach each other, but not the exact solution: the "
+                "remaining error is larger than their differences allow."
+            )
+        case "unstable":
+            return _unstable(s)
+        case "non_finite":
+            where = f" at level {s.culprit}" if s.culprit >= 0 else ""
+            return f"The calculation of {s.quantity} met a number that is not finite{where}."
+        case "round_off":
+            kept = f"; before it, {measured} is all that is left" if measured else ""
+            return (
+                f"The differences of {s.quantity} have reached the floor of round-off, where they say "
+                f"nothing about the scheme{kept}."
+            )
+        case "oscillating":
+            return (
+                f"The differences of {s.quantity} change their sign or swing from level to level, so "
+                "no order can be read from them."
+            )
+        case "non_smooth":
+            return f"{s.quantity} is not smooth, so its error has no regular expansion in powers of dt."
+        case "too_few_levels":
+            count = len(s.levels)
+            return (
+                f"{count} level{'s are' if count > 1 else ' is'} too few to judge the convergence of "
+                f"{s.quantity}: three are needed, four are better."
+            )
+        case "not_applicable":
+            return f"{s.quantity} does not exist here, so there is nothing to judge."
+    so_far = f": the last estimate is {measured}" if measured else ""
+    return f"The step is still too coarse to tell the order of {s.quantity}{so_far}."
+
+
+def advise(s: Story) -> str:
+    """Say what to change in the YAML; empty for a PASS."""
+    arithmetic = s.options.get("arithmetic", "compensated")
+    match s.reason:
+        case "asymptotic" | "exact":
+            return ""
+        case "order_low" if _starts_low(s):
+            return f"Set `start: centred` for scheme {s.scheme}."
+        case "pre_asymptotic" if _ends_low(s):
+            return (
+                f"Add levels {_finer(s)} to `levels:`, or set `end_velocity: kick` for scheme "
+                f"{s.scheme}."
+            )
+        case "order_low" if _ends_low(s):
+            return f"Set `end_velocity: kick` for scheme {s.scheme}, or measure with `norm: linf_interior`."
+        case "order_low":
+            return f"Look for a term of lower order in scheme {s.scheme}{_or_expect(s)}."
+        case "order_high":
+            return (
+                "Try other `initial:` values or another `time: end`, where nothing cancels by "
+                f"symmetry{_or_expect(s)}."
+            )
+        case "wrong_limit":
+            return (
+                "Check `model:` and `initial:` against the equation that you mean: finer levels will "
+                "not help."
+            )
+        case "unstable":
+            level = _first_stable(s)
+            return f"Start `levels:` at {level} or finer, or shorten `time: end`."
+        case "non_finite":
+            return f"Start `levels:` at {max(s.culprit, s.levels[0]) + 1} or finer, or shorten `time: end`."
+        case "round_off" if arithmetic != "compensated":
+            return f"Set `arithmetic: compensated` for scheme {s.scheme}, or use coarser `levels:`."
+        case "round_off":
+            return f"Use coarser `levels:`, below {s.levels[0] if s.last < 0 else s.last}."
+        case "oscillating":
+            return f"Add levels {_finer(s)} to `levels:`, or measure in another `norm:`."
+        case "non_smooth":
+            return "Set `order:` to what the kink allows, or end the time interval before it."
+        case "too_few_levels":
+            missing = max(4 - len(s.levels), 1)
+            names = " and ".join(str(s.levels[-1] + 1 + i) for i in range(min(missing, 2)))
+            return f"Add level{'s' if missing > 1 else ''} {names} to `levels:`."
+        case "not_applicable":
+            return "Choose a quantity that this model and scheme have."
+    return f"Add levels {_finer(s)} to `levels:`."
+
+
+def _or_expect(s: Story) -> str:
+    likely = round(2 * s.order) / 2
+    return f", or set `order: {number(likely)}` if you expect it" if likely > 0 else ""
+
+
+def _finer(s: Story) -> str:
+    return f"{s.levels[-1] + 1} and {s.levels[-1] + 2}"
+
+
+def _starts_low(s: Story) -> bool:
+    return s.options.get("start") == "first_order" and 0.5 < s.order < 1.5
+
+
+def _ends_low(s: Story) -> bool:
+    one_sided = s.options.get("end_velocity") in {"backward", "extrapolate"}
+    sees_end = s.norm != "linf_interior" and not s.is_position
+    backward = s.options.get("end_velocity") == "backward"
+    return one_sided and sees_end and (backward or s.reason == "pre_asymptotic")
+
+
+def _cause(s: Story) -> str:
+    if _starts_low(s):
+        return " The likely cause is the first step: `start: first_order` leaves its dt^2 term out."
+    if _ends_low(s):
+        return (
+            f" The likely cause is the last point: `end_velocity: {s.options['end_velocity']}` is a one-sided "
+            "formula of lower order."
+        )
+    return ""
+
+
+def _unstable(s: Story) -> str:
+    if math.isfinite(s.omega_dt) and s.omega_dt > s.limit:
+        return (
+            f"The run is unstable: at level {s.culprit}, w dt = {s.omega_dt:.4g} is beyond the limit "
+            f"{number(s.limit)} of scheme {s.scheme}."
+        )
+    return (
+        f"{s.quantity} is unstable: the solution grows where the exact one does not, and finer levels "
+        "do not remove that."
+    )
+
+
+def _first_stable(s: Story) -> int:
+    """Return the coarsest level whose w dt is within the limit."""
+    if not (math.isfinite(s.omega_dt) and s.omega_dt > s.limit):
+        return s.levels[-1] + 1
+    return s.culprit + math.ceil(math.log2(s.omega_dt / s.limit) - 1e-9)
