@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -99,13 +100,24 @@ def _entry(finding: Finding) -> dict[str, Any]:
     }
 
 
-def as_text(findings: Sequence[Finding], failures: Sequence[Failure]) -> Iterator[str]:
-    """Yield the lines of the table, the failed jobs and the count of all checks."""
-    rows = [row for finding in findings for row in _rows(finding)]
-    widths = [max((len(row[i]) for row in rows), default=0) for i in range(3)]
-    for row in rows:
-        cells = [cell.ljust(width) for cell, width in zip(row[:3], widths, strict=True)]
-        yield "  ".join([*cells, row[3]]).rstrip()
+def as_text(
+    findings: Sequence[Finding], failures: Sequence[Failure], columns: int
+) -> Iterator[str]:
+    """Yield the lines of the table, the failed jobs and the count of all checks.
+
+    Parameters
+    ----------
+    findings, failures
+        What was found.
+    columns
+        Width of the terminal: a check that passed has one line, any other its whole text.
+    """
+    for finding in findings:
+        yield f"{finding.plan.key}  {finding.status}"
+        if finding.summary is None:
+            yield f"  {finding.problem}"
+        else:
+            yield from _checks(finding.summary["checks"], columns)
     for failure in failures:
         yield f"\nfailed: {failure.job} (log: {failure.log})"
         yield from (f"  {line}" for line in failure.tail)
@@ -116,15 +128,19 @@ def as_text(findings: Sequence[Finding], failures: Sequence[Failure]) -> Iterato
     )
 
 
-def _rows(finding: Finding) -> Iterator[tuple[str, str, str, str]]:
-    name = finding.plan.key
-    if finding.summary is None:
-        yield name, "FAIL", "", finding.problem
-        return
-    for check in finding.summary["checks"]:
-        text = f"{check['id']}: {check['text']}"
-        yield name, str(check["status"]), str(check["reason"] or ""), text
-        name = " " * len(name)
+def _checks(checks: Sequence[Mapping[str, Any]], columns: int) -> Iterator[str]:
+    fields = ("status", "reason", "id")
+    rows = [[str(check[field] or "") for field in fields] for check in checks]
+    widths = [max(len(row[i]) for row in rows) for i in range(3)]
+    for row, check in zip(rows, checks, strict=True):
+        head = "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+        if check["status"] == "PASS":
+            room = max(columns - len(head) - 2, 30)
+            yield f"{head}  {textwrap.shorten(check['text'], room, placeholder=' ...')}"
+            continue
+        yield head.rstrip()
+        for text in filter(None, (check["text"], check["advice"])):
+            yield textwrap.indent(textwrap.fill(text, max(columns - 6, 30)), " " * 6)
 
 
 def _worst(statuses: Sequence[str]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from argparse import Namespace
@@ -99,7 +100,7 @@ def _show(
     else:
         if not worked:
             print("nothing to do: all results are up to date\n")
-        for line in outcome.as_text(findings, failures):
+        for line in outcome.as_text(findings, failures, shutil.get_terminal_size().columns):
             print(line)
         print(f"report: {results / 'index.html'}")
     return 0 if outcome.passed(findings, failures) else 1
