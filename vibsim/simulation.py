@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from vibsim import plan
 from vibsim.engine import Trajectories, integrate
 from vibsim.models import MODELS, Model
-from vibsim.record import Record, Variable
+from vibsim.record import Attribute, Record, Variable
 from vibsim.schemes import SCHEMES
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def simulate_record(
         **_gathered(model, runs, group, steps),
         **_constants(model, group, steps),
     }
-    attrs = {"model": model.kind, "level": level, "steps": steps, "every": every}
+    attrs: dict[str, Attribute] = {"model": model.kind, "level": level, "steps": steps, "every": every}
     return Record(coords, variables, attrs)
 
 

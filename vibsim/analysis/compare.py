@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vibsim.analysis import series
 from vibsim.analysis.grid import Grid
 from vibsim.analysis.richardson import extrapolate
-from vibsim.models.base import ENERGIES
+from vibsim.models import ENERGIES, MODELS
 from vibsim.record import Variable
 from vibsim.schemes import SCHEMES
 
@@ -112,7 +112,8 @@ def _norms(grid: Grid, values: Floats) -> Floats:
 
 def extrapolated(experiment: Experiment, grid: Grid, q: Ladder) -> Table:
     """Extrapolate to a vanishing step, with bound and true error; the finest and the exact series."""
-    even = [SCHEMES[s.kind].even_powers(s.options) for s in experiment.schemes]
+    model = MODELS[experiment.model.kind]
+    even = [SCHEMES[s.kind].even_powers(q.name, model, s.options) for s in experiment.schemes]
     value, bound = extrapolate(q.values, grid.levels, q.order, np.array(even))
     bound = bound + q.floor[..., -1:]
     table: dict[str, tuple[tuple[str, ...], Floats, str]] = {

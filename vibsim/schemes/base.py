@@ -61,8 +61,8 @@ class Scheme:
     """Order that the scheme promises for a quantity of a model when its options are sound."""
     round_off: Callable[[Options, int], float]
     """Predicted round-off after a number of steps, relative to the solution (order of magnitude)."""
-    even_powers: Callable[[Options], bool]
-    """Whether the error expands in h^p, h^(p+2), ... rather than h^p, h^(p+1), ..."""
+    even_powers: Callable[[str, Model, Options], bool]
+    """Whether the error of a quantity expands in h^p, h^(p+2), ... rather than h^p, h^(p+1), ..."""
     stability_limit: float | None
     """Largest stable ``w dt`` on ``u'' + w^2 u = 0``; None where there is no limit."""
     force_evaluations: int

@@ -131,9 +131,13 @@ def round_off(options: Options, steps: int) -> float:
     return float(EPSILON * steps ** _GROWTH[options["arithmetic"]])
 
 
-def even_powers(options: Options) -> bool:
-    """Tell whether the start is centred too, so that the error has even powers of dt only (A, section 2.4)."""
-    return options["start"] == "centred" and options["end_velocity"] == "kick"
+def even_powers(quantity: str, model: Model, options: Options) -> bool:
+    """Tell whether the error of `quantity` has even powers of dt only (A, section 2.4).
+
+    The start must be centred; whatever has the velocity in it also needs a centred velocity at the end.
+    """
+    centred_end = quantity == model.position or options["end_velocity"] == "kick"
+    return options["start"] == "centred" and centred_end
 
 
 CENTRAL = Scheme(

@@ -1,0 +1,51 @@
+"""Experiments of the pendulum, simulated and analysed in memory, for the report to show."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+from vibsim import spec
+from vibsim.analysis import analyse_records, summarise, verdicts
+from vibsim.simulation import simulate_record
+
+CENTRAL = ["central"]
+TRAP = [*CENTRAL, {"kind": "central", "label": "trap", "start": "first_order"}]
+
+
+def experiment(*, name: str = "theta", collection: str = "pendulum_lab", **changes: Any) -> Any:
+    content = {
+        "title": "Nonlinear pendulum on several levels",
+        "source": "pendulum lecture, section 2.5",
+        "model": {"kind": "pendulum"},
+        "initial": {"theta": 1.0},
+        "time": {"end": 20.0},
+        "levels": [6, 7, 8, 9],
+        "schemes": CENTRAL,
+    }
+    return spec.from_dict(content | changes, name=name, collection=collection)
+
+
+def record(exp: Any) -> Any:
+    return analyse_records(exp, {level: simulate_record(exp, level) for level in exp.levels})
+
+
+def summary(exp: Any, rec: Any, **changes: Any) -> dict[str, Any]:
+    return summarise(exp, verdicts(exp, rec), rec) | changes
+
+
+def plan(exp: Any) -> Any:
+    return SimpleNamespace(experiment=exp)
+
+
+def plain(**changes: Any) -> Any:
+    return experiment(**changes)
+
+
+def several(**changes: Any) -> Any:
+    return experiment(schemes=TRAP, levels=[6, 7, 8, 9, 10], **changes)
+
+
+def swept(count: int = 16, **changes: Any) -> Any:
+    sweep = {"initial.theta": {"linspace": [0.1, 3.1, count]}}
+    return experiment(**({"sweep": sweep, "levels": [7, 8, 9, 10]} | changes))

@@ -1,0 +1,303 @@
+"""The page: self-contained, valid, harmless, the same bytes every time, and saying what was found."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+import samples
+
+from vibsim import report
+from vibsim.errors import VibsimError
+from vibsim.record import Record, Variable
+from vibsim.report import figures_time, words
+from vibsim.report.data import Member
+from vibsim.spec import REASONS
+
+VOID = {"meta", "br", "img", "link", "hr", "input", "col"}
+
+
+class Reader(HTMLParser):
+    """Collects tags and text, and notes what is not closed in order."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.faults: list[str] = []
+        self.addresses: list[tuple[str, str]] = []
+        self.ids: list[str] = []
+        self.tags: list[str] = []
+        self.text: list[str] = []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        for key, value in attrs:
+            if key in {"src", "href", "xlink:href", "srcset", "action", "data"}:
+                self.addresses.append((tag, value or ""))
+            if key == "id":
+                self.ids.append(value or "")
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag):
+        if not self.open or self.open.pop() != tag:
+            self.faults.append(tag)
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+def read(path):
+    reader = Reader()
+    reader.feed(path.read_text(encoding="utf-8"))
+    reader.close()
+    return reader
+
+
+def make(directory, exp, summary=None, record=None, **options):
+    record = record or samples.record(exp)
+    summary = summary or samples.summary(exp, record)
+    report.write(samples.plan(exp), record, summary, directory, **options)
+    return directory
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("plain")
+    return make(
+        directory,
+        samples.plain(),
+        formats=("svg", "png", "pdf"),
+        provenance={"versions": {"numpy": "9.9"}},
+    )
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    return make(tmp_path_factory.mktemp("swept"), samples.swept())
+
+
+@pytest.fixture(scope="module")
+def trapped(tmp_path_factory):
+    return make(tmp_path_factory.mktemp("trapped"), samples.several())
+
+
+@pytest.mark.parametrize("which", ["plain", "swept", "trapped"])
+def test_the_page_is_well_formed_and_loads_nothing(which, request):
+    page = request.getfixturevalue(which) / "report.html"
+    text, reader = page.read_text(encoding="utf-8"), read(page)
+    assert text.startswith('<!DOCTYPE html>\n<html lang="en">')
+    assert 'name="viewport"' in text
+    assert not reader.faults
+    assert not reader.open
+    assert len(reader.ids) == len(set(reader.ids))
+    assert not {"script", "link", "iframe", "object", "embed"} & set(reader.tags)
+    inside = {f"#{name}" for name in reader.ids}
+    for tag, address in reader.addresses:
+        assert address in inside | {"../../index.html"} or address.startswith("data:image/png"), (
+            tag,
+            address,
+        )
+    assert "@import" not in text
+    assert "url(" not in text.replace("url(#", "")
+
+
+def test_the_verdict_comes_before_the_numbers_and_the_figures(plain):
+    text = (plain / "report.html").read_text(encoding="utf-8")
+    order = [
+        text.index(f'id="{part}"')
+        for part in ("verdict", "computed", "numbers", "figures", "provenance")
+    ]
+    assert order == sorted(order)
+
+
+def test_the_page_says_what_was_found(plain):
+    text = " ".join(read(plain / "report.html").text)
+    for part in (
+        "PASS", "pendulum lecture, section 2.5", "asymptotic", words.REASONS["asymptotic"].needs, "4.026", "6 to 9",
+        "θ converges with the order of its scheme ± 0.1 (l2 norm)", "divides the error by about 4",
+        ".venv/bin/vibsim run pendulum_lab/theta", "versions.numpy", "9.9", "arithmetic: compensated",
+    ):  # fmt: skip
+        assert part in text, part
+
+
+def test_a_trap_is_named_with_both_orders(trapped):
+    page = trapped / "report.html"
+    text = " ".join(read(page).text)
+    assert "FAIL" in text
+    assert "order_low" in text
+    assert "The likely cause is the first step" in text
+    assert (
+        "<strong>What to do:</strong> Set <code>start: centred</code> for scheme trap."
+        in page.read_text()
+    )
+
+
+def test_figures_and_tables_are_files_too(plain):
+    figures = {path.name for path in (plain / "figures").iterdir()}
+    stems = {name.rsplit(".", 1)[0] for name in figures} - {"thumbnail"}
+    assert len(stems) >= 4
+    assert figures == {f"{s}.{form}" for s in stems for form in ("svg", "png", "pdf")} | {
+        "thumbnail.svg"
+    }
+    names = {path.name for path in (plain / "tables").iterdir()}
+    assert {
+        "orders_theta_l2.csv",
+        "orders_theta_l2.tex",
+        "checks.csv",
+        "energy_maxima.csv",
+        "scalars.csv",
+    } <= names
+    first = (plain / "tables/orders_theta_l2.csv").read_text().splitlines()
+    exact = samples.record(samples.plain())["theta_difference_norm"][0, 0, 0, 1]
+    assert repr(float(exact)) in first[1]
+
+
+def test_writing_again_gives_the_same_bytes_and_clears_what_is_left(plain, tmp_path):
+    formats, provenance = ("svg", "png", "pdf"), {"versions": {"numpy": "9.9"}}
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures/of_another_time.svg").write_text("old")
+    make(tmp_path, samples.plain(), formats=formats, provenance=provenance)
+    for path in sorted(p for p in plain.rglob("*") if p.is_file()):
+        assert (tmp_path / path.relative_to(plain)).read_bytes() == path.read_bytes(), path.name
+    assert {p.name for p in (tmp_path / "figures").iterdir()} == {
+        p.name for p in (plain / "figures").iterdir()
+    }
+
+
+def test_markup_in_a_title_is_harmless(tmp_path):
+    evil = '<script>alert("1")</script>'
+    exp = samples.experiment(
+        schemes=[{"kind": "central", "label": "<b>s</b>"}], title=evil, source=evil + "&"
+    )
+    record = samples.record(exp)
+    summary = samples.summary(exp, record)
+    summary["checks"][0]["text"] = summary["checks"][0]["advice"] = evil
+    make(tmp_path, exp, summary, record, provenance={"<i>": evil})
+    reader = read(tmp_path / "report.html")
+    assert not {"script", "b", "i"} & set(reader.tags)
+    assert not reader.faults
+    assert evil in " ".join(reader.text)
+    assert "<script" not in "".join(p.read_text() for p in (tmp_path / "figures").glob("*.svg"))
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_few_levels_make_a_page(tmp_path, count):
+    exp = samples.experiment(levels=list(range(6, 6 + count)))
+    make(tmp_path, exp)
+    assert "too_few_levels" in (tmp_path / "report.html").read_text() or count == 3
+
+
+def test_nan_everywhere_makes_a_page_with_its_failures(tmp_path):
+    exp = samples.plain()
+    whole = samples.record(exp)
+    blank = {
+        name: Variable(v.dims, np.full_like(v.values, np.nan), v.attrs) if v.values.dtype.kind == "f" else v
+        for name, v in whole.variables.items()
+    }  # fmt: skip
+    failure = {
+        "scheme": "central",
+        "level": 6,
+        "case": 0,
+        "t": 3.125,
+        "step": 10,
+        "error": "non-finite theta",
+    }
+    summary = samples.summary(exp, whole, status="FAIL", failures=[failure])
+    make(tmp_path, exp, summary, Record(whole.coords, blank, whole.attrs))
+    reader = read(tmp_path / "report.html")
+    text = " ".join(reader.text)
+    assert "failures" in reader.ids
+    assert "non-finite theta" in text
+    assert "3.125" in text
+    assert not re.search(r"\bnan\b", text.lower())
+
+
+def test_a_sweep_shows_period_orders_and_the_worst_member(swept):
+    names = {path.stem for path in (swept / "figures").iterdir()}
+    assert {"period", "sweep_order_theta", "sweep_order_energy_deviation"} <= names
+    assert any(name.endswith("_worst") for name in names)
+    assert any(name.endswith("_typical") for name in names)
+    rows = (swept / "tables/members.csv").read_text().splitlines()
+    assert len(rows) == 17
+    assert rows[0].startswith("scheme,case,initial.theta [rad],status,reason,order")
+
+
+def test_a_large_sweep_stays_a_small_page(tmp_path):
+    exp = samples.swept(3000, levels=[5, 6, 7])
+    make(tmp_path, exp)
+    assert (tmp_path / "report.html").stat().st_size < 2_000_000
+    assert len((tmp_path / "tables/members.csv").read_text().splitlines()) == 3001
+
+
+def test_a_dense_grid_stays_a_small_page(tmp_path):
+    make(tmp_path, samples.experiment(levels=[12, 13, 14]))
+    assert (tmp_path / "report.html").stat().st_size < 1_000_000
+    assert all(path.stat().st_size < 300_000 for path in (tmp_path / "figures").iterdir())
+
+
+def test_a_ladder_lost_in_round_off_shows_what_is_there(tmp_path):
+    scheme = {"kind": "central", "arithmetic": "three_term"}
+    make(
+        tmp_path,
+        samples.experiment(
+            schemes=[scheme], levels=[17, 18, 19, 20], samples="common", time={"end": 0.5}
+        ),
+    )
+    text = " ".join(read(tmp_path / "report.html").text)
+    assert "round_off" in text
+    assert "lost in round-off" in text
+
+
+def test_uneven_levels_are_rescaled_so_that_they_coincide():
+    exp = samples.experiment(levels=[8, 9, 11, 12])
+    curves = figures_time.differences(exp, samples.record(exp), "theta", Member(0, 0, "central"))
+    largest = [np.abs(curve.values).max() for curve in curves]
+    np.testing.assert_allclose(largest, largest[-1], rtol=0.01)
+    assert [curve.label for curve in curves] == ["θ₈ − θ₉", "3.2 (θ₉ − θ₁₁)", "64 (θ₁₁ − θ₁₂)"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "parts"),
+    [
+        ({"time": {"periods": 3, "steps_per_period": 16}, "levels": [3, 4, 5],
+          "sweep": {"initial.theta": [0.5, 1.0, 2.0], "model.g": [1.0, 9.81]}},
+         ["differs between members", "model.g = 9.81 m s⁻²", "theta swept", "g swept"]),
+        ({"model": {"kind": "linear_pendulum"}, "time": {"end": 4000.0}, "levels": [8, 9, 10, 11, 12]},
+         ["unstable", "runs broke down", "non_finite", "broke down"]),
+        ({"initial": {"theta": 0.0, "omega": 2.5}, "levels": [8, 9, 10]}, ["asymptotic", "omega = 2.5 rad s⁻¹"]),
+        ({"initial": {"theta": 0.0, "omega": 0.0}}, ["θ converges"]),
+        ({"schemes": [{"kind": "central", "label": "_a $x$ \\frac{"}, "central"]}, ["_a $x$ \\frac{"]),
+        ({"checks": [{"claim": "it is round", "source": "a book", "holds": False,
+                      "that": {"value": "period", "above": 100.0}},
+                     {"converges": "omega", "order": 3, "schemes": ["central"]}]},
+         ["Claim: it is round", "Source: a book. Expected to be false. Measured by: period is above 100.0.",
+          "ω converges with order 3 ± 0.1 (l2 norm, scheme central)", "order_low"]),
+    ],
+)  # fmt: skip
+def test_all_kinds_of_experiments_make_a_page(tmp_path, changes, parts):
+    make(tmp_path, samples.experiment(**changes))
+    reader = read(tmp_path / "report.html")
+    text = " ".join(reader.text)
+    assert not reader.faults
+    assert not re.search(r"\b(nan|None)\b", text)
+    for part in parts:
+        assert part in text, part
+
+
+def test_every_reason_has_words():
+    assert set(words.REASONS) == set(REASONS)
+    assert all(r.meaning and r.needs for r in words.REASONS.values())
+
+
+def test_an_unknown_format_is_refused_before_anything_is_written(tmp_path):
+    with pytest.raises(VibsimError, match=r"'svgz'.*did you mean 'svg'"):
+        make(tmp_path, samples.plain(), formats=("svg", "svgz"))
+    assert not list(tmp_path.iterdir())

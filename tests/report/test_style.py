@@ -1,0 +1,122 @@
+"""Figures: thinning, axes, and the same bytes every time."""
+
+from __future__ import annotations
+
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import samples
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vibsim.report import figures_time, style
+from vibsim.report.data import Member
+
+VALUES = st.lists(
+    st.floats(allow_infinity=False, width=32) | st.just(float("nan")), min_size=1, max_size=400
+)
+
+
+@given(VALUES, st.integers(1, 40))
+def test_thinning_keeps_extremes_ends_and_order(values, width):
+    y = np.array(values)
+    t = np.arange(y.size, dtype=float)
+    x, z = style.thin(t, y, width)
+    assert x.size <= max(2 * width + 2, 2)
+    assert x.size == y.size or x.size <= 2 * width + 2
+    assert np.all(np.diff(x) > 0)
+    np.testing.assert_array_equal(z, y[x.astype(int)])
+    assert (x[0], x[-1]) == (t[0], t[-1])
+    if np.isfinite(y).any():
+        assert np.nanmin(z) == np.nanmin(y)
+        assert np.nanmax(z) == np.nanmax(y)
+
+
+def test_thinning_keeps_a_lone_spike_and_a_long_gap():
+    t = np.linspace(0, 1, 100_001)
+    y = np.sin(t)
+    y[54_321] = 9.0
+    y[70_000:80_000] = np.nan
+    x, z = style.thin(t, y, 100)
+    assert np.nanmax(z) == 9.0
+    assert np.isnan(z[(x > 0.71) & (x < 0.79)]).all()
+    assert x.size <= 202
+
+
+def test_thinning_leaves_short_series_alone():
+    t = np.arange(10.0)
+    assert style.thin(t, t, 4)[0] is t
+
+
+def test_a_log_tick_is_written_as_a_power():
+    assert style.log_tick(1e-12) == "10⁻¹²"
+    assert style.log_tick(2e-3) == "2·10⁻³"
+    assert style.log_tick(1.0) == "10⁰"
+
+
+def test_an_axis_label_has_power_and_unit():
+    assert style.label("dE", "J", -5) == "dE [10⁻⁵ J]"
+    assert style.label("ratio", "1") == "ratio"
+    assert style.scale(np.array([3e-5, np.nan])) == -5
+    assert style.scale(np.array([0.5])) == 0
+    assert style.scale(np.array([np.nan])) == 0
+
+
+def test_limits_hold_every_value_and_are_never_empty():
+    low, high = style.limits(np.array([2.0, np.nan, 3.0]))
+    assert low < 2.0 < 3.0 < high
+    for constant in (np.array([5.0]), np.array([0.0]), np.array([np.nan])):
+        low, high = style.limits(constant)
+        assert low < high
+
+
+@pytest.fixture(scope="module")
+def documents():
+    exp = samples.plain()
+    record = samples.record(exp)
+    with style.applied():
+        return [
+            style.svg(figures_time.overlay(exp, record, "theta", Member(0, 0, "central")))
+            for _ in range(2)
+        ]
+
+
+def test_a_figure_is_the_same_bytes_every_time(documents):
+    assert documents[0] == documents[1]
+
+
+def test_a_figure_carries_no_date_and_no_metadata(documents):
+    assert "metadata" not in documents[0]
+    assert not re.search(r"20\d\d-\d\d-\d\d", documents[0])
+
+
+def test_ids_of_a_figure_are_unique_and_references_resolve(documents):
+    ids = re.findall(r'\bid="([^"]*)"', documents[0])
+    used = set(re.findall(r'(?:url\(#|href="#)([^")]+)', documents[0]))
+    assert used
+    assert len(ids) == len(set(ids))
+    assert used == set(ids)
+    ElementTree.fromstring(documents[0])
+
+
+def test_an_inline_figure_has_an_escaped_name_and_scales(documents):
+    element = style.inline(documents[0], 'a "quoted" <name>')
+    assert element.startswith("<svg ")
+    assert 'aria-label="a &#34;quoted&#34; &lt;name&gt;"' in element
+    assert "xmlns" not in element
+    opening = element[: element.index(">")]
+    assert " width=" not in opening
+    assert "viewBox" in opening
+
+
+def test_a_name_with_markup_stays_text_in_a_figure():
+    exp = samples.experiment(schemes=[{"kind": "central", "label": "<script>x</script>"}])
+    record = samples.record(exp)
+    with style.applied():
+        from vibsim.report import figures_order
+
+        text = style.svg(figures_order.against_step(exp, record, "theta", 0))
+    assert "<script" not in text
+    ElementTree.fromstring(text)

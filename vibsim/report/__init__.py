@@ -1,0 +1,12 @@
+"""From numbers to a page: figures, tables, one self-contained report, and an index over all of them.
+
+Nothing is read here but what the analysis stored: the convergence Record and the summary. Matplotlib and jinja2 are
+imported where they are used, so that importing this package costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from vibsim.report.index import write_index
+from vibsim.report.page import write
+
+__all__ = ["write", "write_index"]

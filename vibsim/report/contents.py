@@ -1,0 +1,250 @@
+"""What the tables of a report hold."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from vibsim.record import Record
+from vibsim.report import words
+from vibsim.report.data import (
+    TYPICAL_NORM,
+    Member,
+    at,
+    case_name,
+    flags,
+    floor_norm,
+    names,
+    norm_unit,
+    pick,
+    sound_pairs,
+    steps_of,
+    swept,
+    swept_label,
+    unit,
+    whole,
+)
+from vibsim.report.tables import Cell, Column, Table
+
+LISTED = 10_000
+"""Most members that a table lists one by one."""
+
+
+def checks(summary: Mapping[str, Any]) -> Table:
+    """Return every check with every result that the summary lists."""
+    columns = (
+        Column("check"), Column("kind"), Column("quantity"), Column("status"), Column("reason"), Column("expected"),
+        Column("scheme"), Column("case", form="integer"), Column("measured status"), Column("measured reason"),
+        Column("order", form="order"), Column("order, low", form="order"), Column("order, high", form="order"),
+        Column("levels"), Column("value", form="full"),
+    )  # fmt: skip
+    rows = [row for check in summary["checks"] for row in _check_rows(check)]
+    return Table("checks", "Checks: expected and measured", columns, tuple(rows))
+
+
+def _check_rows(check: Mapping[str, Any]) -> Iterator[tuple[Cell, ...]]:
+    head = (check["id"], check["kind"], check.get("quantity"), check["status"], check["reason"],
+            words.expectation(check.get("expected")))  # fmt: skip
+    for result in check.get("results") or [{}]:
+        low, high = result.get("interval") or (None, None)
+        window = result.get("levels")
+        yield (
+            *head, result.get("scheme"), result.get("case"), result.get("status"), result.get("reason"),
+            result.get("order"), low, high, words.levels(window) if window else None, _number(result.get("value")),
+        )  # fmt: skip
+
+
+def _number(value: Any) -> Cell:
+    return value if value is None or isinstance(value, int | float | str) else str(value)
+
+
+def orders(
+    record: Record, quantity: str, shown: Sequence[Member], norm: str = TYPICAL_NORM
+) -> Table:
+    """Return norms, ratios and orders of a quantity, one row per scheme, member and level."""
+    measure, sweep = norm_unit(record, quantity, norm), bool(swept(record))
+    columns = (
+        Column("scheme"), *([Column("member")] if sweep else []), Column("level", form="integer"),
+        Column("steps", form="integer"), Column("dt", unit(record, "dt") or "s", "step"),
+        Column("difference", measure, "norm"), Column("ratio", form="order"), Column("order", form="order"),
+        Column("true error", measure, "norm"), Column("floor", measure, "norm"), Column("counts"),
+    )  # fmt: skip
+    rows = [row for member in shown for row in _order_rows(record, quantity, member, norm, sweep)]
+    letter = words.symbol(quantity)
+    return Table(
+        f"orders_{quantity}_{norm}",
+        f"{letter}: {norm} norm of {letter}(level) − {letter}(next level); "
+        "ratio and order from three levels starting here",
+        columns,
+        tuple(rows),
+    )
+
+
+def _order_rows(
+    record: Record, quantity: str, member: Member, norm: str, sweep: bool
+) -> Iterator[tuple[Cell, ...]]:
+    n = names(record, "norm").index(norm)
+    levels, dt = whole(record, "level"), steps_of(record, member.case)
+    columns = [
+        _padded(record, f"{quantity}_{name}", member, n, len(levels))
+        for name in ("difference_norm", "ratio_norm", "observed_order", "error_norm")
+    ]
+    floor = floor_norm(record, quantity, member, norm)
+    note = _notes(record, quantity, member)
+    for i, level in enumerate(levels):
+        who: list[Cell] = [member.scheme_name, *([member.case_name] if sweep else [])]
+        yield (
+            *who,
+            level,
+            int(record["steps"][i]),
+            float(dt[i]),
+            *(column[i] for column in columns),
+            float(floor[i]),
+            note[i],
+        )
+
+
+def _padded(record: Record, name: str, member: Member, norm: int, count: int) -> list[float]:
+    values = at(record, name, member, norm=norm).tolist() if name in record else []
+    return [*values, *[math.nan] * (count - len(values))]
+
+
+def _notes(record: Record, quantity: str, member: Member) -> list[str]:
+    """Say of every row whether the stated order rests on the three levels that start there."""
+    levels = whole(record, "level")
+    first, last = (int(at(record, f"{quantity}_window_{end}", member)) for end in ("first", "last"))
+    noise = (
+        [*(not ok for ok in sound_pairs(record, quantity, member)), False]
+        if len(levels) > 1
+        else [False]
+    )
+    notes = []
+    for i, level in enumerate(levels):
+        finest = levels[min(i + 2, len(levels) - 1)]
+        lost = noise[i] or (0 <= last < finest)
+        counts = "yes" if first <= level and finest <= last else "no"
+        notes.append("round-off" if lost else counts if i + 2 < len(levels) else "–")
+    return notes
+
+
+def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
+    """Return max|dE| over every step with and without the last point, and their ratios from level to level."""
+    if "energy_deviation_max_abs" not in record:
+        return None
+    measure = unit(record, "energy_deviation_max_abs")
+    columns = (
+        Column("scheme"), Column("level", form="integer"), Column("max |dE|", measure, "norm"),
+        Column("ratio", form="order"), Column("max |dE| without the last point", measure, "norm"),
+        Column("ratio, without", form="order"),
+    )  # fmt: skip
+    rows: list[tuple[Cell, ...]] = []
+    for member in shown:
+        both = [at(record, f"energy_deviation_max_abs{end}", member) for end in ("", "_interior")]
+        whole_runs = at(record, "status", member) == 0
+        for i, level in enumerate(whole(record, "level")):
+            sound = whole_runs[i : i + 2].all()
+            cells = [
+                cell
+                for values in both
+                for cell in (float(values[i]), _ratio(values, i) if sound else math.nan)
+            ]
+            rows.append((member.title, level, *cells))
+    caption = (
+        "Largest energy deviation over every step; the last point has an end formula of its own"
+    )
+    return Table("energy_maxima", caption, columns, tuple(rows))
+
+
+def _ratio(values: Any, i: int) -> float:
+    return (
+        float(values[i] / values[i + 1]) if i + 1 < len(values) and values[i + 1] != 0 else math.nan
+    )
+
+
+def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
+    """Return period, amplitude and the period's error on every level."""
+    if "period" not in record or not np.isfinite(np.asarray(record["period"], dtype=float)).any():
+        return None
+    time, angle = unit(record, "period"), unit(record, "amplitude")
+    columns = (
+        Column("scheme"), Column("level", form="integer"), Column("period", time, "full"),
+        Column("exact period", time, "full"), Column("relative error", form="norm"),
+        Column("amplitude", angle, "full"),
+    )  # fmt: skip
+    rows: list[tuple[Cell, ...]] = []
+    for member in shown:
+        period, amplitude = at(record, "period", member), at(record, "amplitude", member)
+        exact = float(at(record, "exact_period", member))
+        for i, level in enumerate(whole(record, "level")):
+            error = float(period[i]) / exact - 1.0
+            rows.append((member.title, level, float(period[i]), exact, error, float(amplitude[i])))
+    return Table("scalars", "Period (interpolated) and amplitude", columns, tuple(rows))
+
+
+def member_list(record: Record, quantity: str) -> Table | None:
+    """Return one row per scheme and member of a sweep; None without one or beyond `LISTED` members."""
+    found, count = swept(record), len(record["case"])
+    if not found or count > LISTED:
+        return None
+    columns = (
+        Column("scheme"), Column("case", form="integer"), *(_swept_column(record, name) for name in found),
+        Column("status"), Column("reason"), Column("order", form="order"), Column("order, low", form="order"),
+        Column("order, high", form="order"), Column("period", unit(record, "period"), "full"),
+        Column("relative error", form="norm"),
+    )  # fmt: skip
+    n = names(record, "norm").index(TYPICAL_NORM)
+    exact = np.asarray(record["exact_period"], dtype=np.float64)
+    rows: list[tuple[Cell, ...]] = []
+    for s, scheme in enumerate(names(record, "scheme")):
+        orders = [
+            pick(record, f"{quantity}_order{end}", scheme=s, norm=n)
+            for end in ("", "_low", "_high")
+        ]
+        words_of = [flags(record, f"{quantity}_{name}")[s] for name in ("status", "reason")]
+        period = np.asarray(record["period"], dtype=np.float64)[s, :, -1]
+        values = [
+            record["case"],
+            *(record[name] for name in found),
+            *words_of,
+            *orders,
+            period,
+            period / exact - 1.0,
+        ]
+        rows += zip(
+            [scheme] * count, *(np.asarray(column).tolist() for column in values), strict=True
+        )
+    caption = (
+        f"Members: order of {words.symbol(quantity)} ({TYPICAL_NORM}), period on the finest level"
+    )
+    return Table("members", caption, columns, tuple(rows))
+
+
+def _swept_column(record: Record, name: str) -> Column:
+    key, measure = swept_label(record, name)
+    return Column(key, measure, "step")
+
+
+def failures(summary: Mapping[str, Any], record: Record) -> Table | None:
+    """Return the runs that broke down; None where there is none."""
+    found = summary.get("failures") or []
+    if not found:
+        return None
+    columns = (
+        Column("scheme"), Column("level", form="integer"), Column("case", form="integer"), Column("member"),
+        Column("t", "s", "step"), Column("step", form="integer"), Column("error"),
+    )  # fmt: skip
+    cases = {int(case): i for i, case in enumerate(record["case"])}
+    rows = tuple(
+        (f["scheme"], f["level"], f["case"], case_name(record, cases[f["case"]]) if f["case"] in cases else "",
+         f["t"], f["step"], f["error"])
+        for f in found
+    )  # fmt: skip
+    return Table(
+        "failures",
+        "Runs that broke down: the first moment at which the solution was not finite",
+        columns,
+        rows,
+    )

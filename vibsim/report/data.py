@@ -1,0 +1,279 @@
+"""Reading a convergence Record: which slice a figure or table shows.
+
+The functions select by the names of dimensions, so that a variable with fewer of them (an exact solution knows no
+scheme) is read by the same call.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.record import Record
+
+if TYPE_CHECKING:
+    from vibsim.spec import Experiment
+
+Floats = NDArray[np.float64]
+
+SEVERITY = {"PASS": 0, "INCONCLUSIVE": 1, "FAIL": 2}
+TYPICAL_NORM = "l2"
+
+
+@dataclass(frozen=True)
+class Member:
+    """One scheme and one member of the sweep, with the words that name them."""
+
+    scheme: int
+    case: int
+    scheme_name: str
+    case_name: str = ""
+    """Empty without a sweep."""
+    role: str = ""
+    """Why it is shown: ``worst``, ``typical``, or empty."""
+
+    @property
+    def title(self) -> str:
+        """Name of the scheme, with the member where there is a sweep."""
+        return f"{self.scheme_name}, {self.case_name}" if self.case_name else self.scheme_name
+
+    @property
+    def stem(self) -> str:
+        """A plain name for files."""
+        plain = "".join(c if c.isascii() and c.isalnum() else "_" for c in self.scheme_name)
+        return f"{self.scheme}_{plain}_{self.role}" if self.role else f"{self.scheme}_{plain}"
+
+
+def pick(record: Record, name: str, **index: int) -> NDArray[Any]:
+    """Return the values of a variable at the given positions of its dimensions.
+
+    Parameters
+    ----------
+    record
+        The convergence Record.
+    name
+        A variable or coordinate of it.
+    **index
+        Position per dimension; a dimension that the variable lacks is passed over.
+
+    Returns
+    -------
+    array
+        The dimensions that were not named, in their order.
+    """
+    variable = record.variables.get(name) or record.coords[name]
+    return np.asarray(variable.values[tuple(index.get(dim, slice(None)) for dim in variable.dims)])
+
+
+def at(record: Record, name: str, member: Member, **index: int) -> Floats:
+    """Return the floats of a variable for one member (see `pick`)."""
+    values = pick(record, name, scheme=member.scheme, case=member.case, **index)
+    return np.asarray(values, dtype=np.float64)
+
+
+def unit(record: Record, name: str) -> str:
+    """Return the unit of a variable, with Unicode exponents; empty where it has none."""
+    variable = record.variables.get(name) or record.coords.get(name)
+    text = "" if variable is None else str(variable.attrs.get("units", ""))
+    return pretty_unit(text)
+
+
+def pretty_unit(text: str) -> str:
+    """Write a unit such as ``rad s-1`` with Unicode exponents."""
+    raised = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+    parts = (part.rstrip("-0123456789") for part in text.split())
+    words = [
+        base + part[len(base) :].translate(raised)
+        for base, part in zip(parts, text.split(), strict=True)
+    ]
+    return "" if text in {"", "1"} else " ".join(words)
+
+
+def times(record: Record, case: int) -> Floats:
+    """Return the common times of a member, shape (t,); where ends differ, `t` is stored as a fraction."""
+    t = np.asarray(record["t"], dtype=np.float64)
+    return t * float(pick(record, "end", case=case)) if "end" in record else t
+
+
+def steps_of(record: Record, case: int) -> Floats:
+    """Return dt of every level for a member, shape (level,)."""
+    return np.asarray(pick(record, "dt", case=case), dtype=np.float64)
+
+
+def flags(record: Record, name: str) -> NDArray[Any]:
+    """Return a flag variable as words, same shape."""
+    variable = record.variables[name]
+    meanings = str(variable.attrs["flag_meanings"]).split()
+    table = dict(zip(np.ravel(variable.attrs["flag_values"]).tolist(), meanings, strict=True))
+    found, place = np.unique(variable.values, return_inverse=True)
+    words = np.array([table[int(value)] for value in found], dtype=object)
+    return np.asarray(words[place].reshape(variable.values.shape))
+
+
+def names(record: Record, dim: str) -> list[str]:
+    """Return a coordinate of words (schemes, norms, checks) as strings."""
+    return [
+        value.decode() if isinstance(value, bytes) else str(value) for value in record[dim].tolist()
+    ]
+
+
+def whole(record: Record, dim: str) -> list[int]:
+    """Return a coordinate of whole numbers (levels, pairs, triples)."""
+    return [int(value) for value in record[dim]] if dim in record else []
+
+
+def swept(record: Record) -> list[str]:
+    """Return the names of the swept coordinates, in the order written."""
+    return [name for name, variable in record.coords.items() if "sweep_key" in variable.attrs]
+
+
+def swept_label(record: Record, name: str) -> tuple[str, str]:
+    """Return the dotted key of a swept coordinate and its unit."""
+    from vibsim.models import MODELS
+
+    key = str(record.coords[name].attrs["sweep_key"])
+    model = MODELS[str(record.attrs["model"])]
+    units = {f"initial.{state.name}": state.unit for state in model.states}
+    units |= {f"model.{parameter.name}": parameter.unit for parameter in model.parameters}
+    return key, pretty_unit(units.get(key, "s" if key == "time.end" else ""))
+
+
+def case_name(record: Record, case: int) -> str:
+    """Name a member by its swept values; empty without a sweep."""
+    parts = []
+    for name in swept(record):
+        key, measure = swept_label(record, name)
+        parts.append(f"{key} = {_value(pick(record, name, case=case))} {measure}".strip())
+    return ", ".join(parts)
+
+
+def _value(value: Any) -> str:
+    plain = np.asarray(value).item()
+    return f"{plain:.6g}" if isinstance(plain, float) else str(plain)
+
+
+def formal_order(experiment: Experiment, scheme: int, quantity: str) -> float:
+    """Return the order that a scheme promises for a quantity of the experiment's model."""
+    from vibsim.models import MODELS
+    from vibsim.schemes import SCHEMES
+
+    spec = experiment.schemes[scheme]
+    return float(
+        SCHEMES[spec.kind].formal_order(quantity, MODELS[experiment.model.kind], spec.options)
+    )
+
+
+def target_ratio(order: float, levels: tuple[int, int, int]) -> float:
+    """Return the ratio of successive differences that an error ``C dt**order`` gives on three levels."""
+    first, second = levels[1] - levels[0], levels[2] - levels[1]
+    return float(
+        2.0 ** (order * first) * (1 - 2.0 ** (-order * first)) / (1 - 2.0 ** (-order * second))
+    )
+
+
+def position(experiment: Experiment) -> str:
+    """Return the name of the model's position."""
+    from vibsim.models import MODELS
+
+    return MODELS[experiment.model.kind].position
+
+
+def quantities(experiment: Experiment, record: Record) -> list[str]:
+    """Return the quantities to show: the position, those that a check names, and the energy deviation."""
+    from vibsim.models import MODELS
+
+    extra = ["energy_deviation"] if MODELS[experiment.model.kind].conservative else []
+    wanted = dict.fromkeys([position(experiment), *asked(experiment), *extra])
+    return [name for name in wanted if f"{name}_finest" in record]
+
+
+def asked(experiment: Experiment) -> list[str]:
+    """Return the quantities that the checks name."""
+    inner = [getattr(check, "that", check) for check in experiment.checks]
+    found = [
+        getattr(check, "converges", None) or getattr(check, "quantity", None) for check in inner
+    ]
+    return [str(name) for name in found if name]
+
+
+def members(experiment: Experiment, record: Record, quantity: str) -> list[Member]:
+    """Return what the figures over time show of a quantity: of every scheme one member, or two of a sweep.
+
+    These are the worst and a typical member, judged by the verdicts on `quantity` and then by the distance of the
+    order from the promised one; of several schemes the worst decides.
+    """
+    schemes = names(record, "scheme")
+    if not swept(record):
+        return [Member(s, 0, name) for s, name in enumerate(schemes)]
+    promised = np.array([formal_order(experiment, s, quantity) for s in range(len(schemes))])
+    ranking = _ranking(record, quantity, promised)
+    roles = {int(ranking[ranking.size // 2]): "typical", int(ranking[-1]): "worst"}
+    return [
+        Member(s, case, name, case_name(record, case), role)
+        for case, role in reversed(roles.items())
+        for s, name in enumerate(schemes)
+    ]
+
+
+def _ranking(record: Record, quantity: str, promised: Floats) -> NDArray[np.intp]:
+    """Return the members from the best to the worst, shape (case,)."""
+    status = flags(record, f"{quantity}_status")
+    severity = np.max(
+        [np.where(status == word, rank, 0) for word, rank in SEVERITY.items()], axis=(0, 1)
+    )
+    norm = names(record, "norm").index(TYPICAL_NORM)
+    away = np.abs(pick(record, f"{quantity}_order", norm=norm) - promised[:, None])
+    return np.lexsort((np.max(np.where(np.isnan(away), np.inf, away), axis=0), severity))
+
+
+ABOVE = 3.0
+"""A difference counts as more than round-off when it exceeds this many times the floor."""
+
+
+def sound_pairs(record: Record, quantity: str, member: Member) -> list[bool]:
+    """Say of every pair of levels whether its difference stands above round-off.
+
+    The verdict's window decides where there is one: it ends where round-off begins. Else the predicted floor does.
+    """
+    levels, last = whole(record, "level"), int(at(record, f"{quantity}_window_last", member))
+    if last >= 0:
+        return [finer <= last for finer in levels[1:]]
+    floor = _floor(record, quantity, member)
+    differences = at(record, f"{quantity}_difference", member)
+    return [_largest(d) > ABOVE * max(floor[i], floor[i + 1]) for i, d in enumerate(differences)]
+
+
+def sound_levels(record: Record, quantity: str, member: Member) -> list[bool]:
+    """Say of every level whether its error is still seen in the difference from the next (or previous) level."""
+    if not whole(record, "pair"):
+        return [True]
+    pairs = sound_pairs(record, quantity, member)
+    return [*pairs, pairs[-1]]
+
+
+def _floor(record: Record, quantity: str, member: Member) -> Floats:
+    return np.nan_to_num(at(record, f"{quantity}_floor", member))
+
+
+def floor_norm(record: Record, quantity: str, member: Member, norm: str) -> Floats:
+    """Return the norm over time of noise as large as the predicted round-off, shape (level,)."""
+    from vibsim.analysis.floor import norm_of_floor
+
+    t = times(record, member.case)
+    spacing = t[1:2] - t[:1] if t.size > 1 else np.ones(1)
+    return norm_of_floor(at(record, f"{quantity}_floor", member), norm, t.size, spacing)
+
+
+def norm_unit(record: Record, quantity: str, norm: str) -> str:
+    """Return the unit of a norm over time: l1 and l2 carry the time, or its root, too."""
+    time = unit(record, "t") or "s"
+    extra = {"l1": time, "l2": f"√{time}"}.get(norm, "")
+    return f"{unit(record, f'{quantity}_difference_norm')} {extra}".strip()
+
+
+def _largest(values: Floats) -> float:
+    finite = np.abs(values[np.isfinite(values)])
+    return float(finite.max()) if finite.size else 0.0

@@ -1,0 +1,262 @@
+"""The size of the error against the step, and the order that three successive levels give.
+
+Source: pendulum lecture, section 2.5.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vibsim.record import Record
+from vibsim.report import style, words
+from vibsim.report.data import (
+    TYPICAL_NORM,
+    Floats,
+    Member,
+    at,
+    case_name,
+    floor_norm,
+    formal_order,
+    names,
+    norm_unit,
+    sound_pairs,
+    steps_of,
+    unit,
+    whole,
+)
+from vibsim.report.style import Picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from vibsim.spec import Experiment
+
+LEGEND_COLUMNS = 5
+DRAWN = 6
+"""Most schemes that a panel can tell apart."""
+
+
+def against_step(experiment: Experiment, record: Record, quantity: str, case: int) -> Picture:
+    """Draw the norms of differences and errors against the step, and the local order against the level."""
+    schemes = names(record, "scheme")
+    height = 3.15 + 0.2 * math.ceil((len(schemes) + 4) / LEGEND_COLUMNS)
+    figure = style.canvas(height)
+    low, tall = 0.5 / height, 2.2 / height
+    left, right = (
+        figure.add_axes((0.088, low, 0.365, tall)),
+        figure.add_axes((0.555, low, 0.425, tall)),
+    )
+    _draw_norms(left, experiment, record, quantity, case, schemes)
+    _draw_orders(right, experiment, record, quantity, case, schemes)
+    handles, texts = left.get_legend_handles_labels()
+    figure.legend(
+        handles,
+        texts,
+        loc="lower left",
+        bbox_to_anchor=(0.075, 3.02 / height),
+        ncols=LEGEND_COLUMNS,
+        fontsize=8,
+        borderaxespad=0.0,
+    )
+    member = case_name(record, case)
+    suffix = f", {member}" if member else ""
+    letter = words.symbol(quantity)
+    return Picture(
+        name=f"order_{quantity}_{case}",
+        title=f"How fast does the error shrink? {letter}{suffix}",
+        caption="Left: size of the level differences (filled) and of the true error where known (hollow) against dt; "
+        "parallel to the dashed line means the promised order, and points on the dotted line are round-off. Right: the "
+        "order that three successive levels give, drawn at the coarsest of the three; it should settle inside the "
+        "grey band; beyond the frame is what round-off makes of it. The bar is the stated order with its "
+        "interval, over the levels it rests on.",
+        alt=f"Norm of the level differences of {words.name(quantity)} against the step, and local order against level",
+        figure=figure,
+    )
+
+
+def _draw_norms(
+    ax: Axes, experiment: Experiment, record: Record, quantity: str, case: int, schemes: list[str]
+) -> None:
+    dt, norm = steps_of(record, case), names(record, "norm").index(TYPICAL_NORM)
+    measure = norm_unit(record, quantity, TYPICAL_NORM)
+    seen: list[Floats] = []
+    floors: list[Floats] = []
+    for s, scheme in enumerate(schemes):
+        member = Member(s, case, scheme)
+        colour, marker = style.COLOURS[s % 7], style.MARKERS[s % 7]
+        difference = style.no_zeros(at(record, f"{quantity}_difference_norm", member, norm=norm))
+        true = style.no_zeros(at(record, f"{quantity}_error_norm", member, norm=norm))
+        ax.plot(
+            dt[: difference.size],
+            difference,
+            color=colour,
+            marker=marker,
+            markersize=5,
+            linewidth=1.1,
+            linestyle=style.DASHES[s % 7],
+            label=style.entry(scheme),
+        )
+        if np.isfinite(true).any():
+            ax.plot(
+                dt,
+                true,
+                color=colour,
+                marker=marker,
+                markersize=7,
+                linestyle="none",
+                markerfacecolor="none",
+            )
+        floors.append(style.no_zeros(floor_norm(record, quantity, member, TYPICAL_NORM)))
+        ax.plot(dt, floors[-1], color=colour, linestyle=":", linewidth=1.0)
+        seen += [difference, true]
+    _reference(ax, dt, seen, formal_order(experiment, 0, quantity))
+    near = _step_limits(ax, dt, seen, floors)
+    _explain(ax, known=any(np.isfinite(true).any() for true in seen[1::2]), floor=near)
+    ax.set_xlabel(style.label("dt", unit(record, "dt") or "s"))
+    ax.set_ylabel(style.label(f"{TYPICAL_NORM} norm, {words.symbol(quantity)}", measure))
+    _level_axis(ax, dt, whole(record, "level"))
+
+
+def _explain(ax: Axes, *, known: bool, floor: bool) -> None:
+    """Add to the legend what filled, hollow and dotted mean, once for all schemes."""
+    look: dict[str, Any] = {"color": style.GREY, "marker": "o", "linestyle": "none"}
+    ax.plot([], [], **look, markersize=5, label="level difference")
+    if known:
+        ax.plot([], [], **look, markersize=7, markerfacecolor="none", label="true error")
+    if floor:
+        ax.plot([], [], color=style.GREY, linestyle=":", linewidth=1.0, label="predicted round-off")
+
+
+def _positive(parts: list[Floats]) -> Floats:
+    joined = np.concatenate([part[np.isfinite(part) & (part > 0)] for part in parts])
+    return joined if joined.size else np.array([1.0])
+
+
+def _reference(ax: Axes, dt: Floats, seen: list[Floats], order: float) -> None:
+    """Draw the promised slope a little above the largest value at the coarsest step."""
+    start = 2.5 * max((float(part[0]) for part in seen if np.isfinite(part[0])), default=1.0)
+    lowest = _positive(seen).min()
+    reach = dt[start * (dt / dt[0]) ** order >= lowest]
+    if reach.size > 1 and start > 0:
+        ax.plot(
+            reach,
+            start * (reach / dt[0]) ** order,
+            color="black",
+            linestyle=(0, (4, 3)),
+            linewidth=1.0,
+            label=f"slope {order:g} (promised)",
+        )
+
+
+def _step_limits(ax: Axes, dt: Floats, seen: list[Floats], floors: list[Floats]) -> bool:
+    """Set the ranges; show the floor, and say so, only where the data come within three decades of it."""
+    values = _positive(seen)
+    low, high = float(values.min()), float(values.max())
+    floor = float(_positive(floors).max())
+    near = floor > 1e-3 * low
+    bottom = min(low, floor) if near else low
+    top = max(8 * high, min(2 * floor, 1e3 * high)) if near else 8 * high
+    style.log_axis(ax, "y", bottom / 3, top)
+    style.log_axis(ax, "x", float(dt[-1]) / 1.5, float(dt[0]) * 1.5)
+    return near
+
+
+def _level_axis(ax: Axes, dt: Floats, levels: list[int]) -> None:
+    """Write the levels along the top."""
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+    top = ax.secondary_xaxis("top")
+    every = max(1, len(levels) // 8)
+    chosen = dict(zip(dt[::every].tolist(), levels[::every], strict=True))
+    top.xaxis.set_major_locator(FixedLocator(list(chosen)))
+    top.xaxis.set_minor_locator(NullLocator())
+    top.xaxis.set_major_formatter(
+        FuncFormatter(lambda x, _: str(chosen[min(chosen, key=lambda d: abs(d - x))]))
+    )
+    ax.text(-0.02, 1.03, "level", transform=ax.transAxes, ha="right", va="bottom", fontsize=8.5)
+
+
+def _draw_orders(
+    ax: Axes, experiment: Experiment, record: Record, quantity: str, case: int, schemes: list[str]
+) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    triples, norm = whole(record, "triple"), names(record, "norm").index(TYPICAL_NORM)
+    promised = formal_order(experiment, 0, quantity)
+    ax.axhspan(promised - 0.1, promised + 0.1, color="#ececec", zorder=0)
+    ax.axhline(promised, color="black", linestyle=(0, (4, 3)), linewidth=1.0, zorder=1)
+    sound: list[Floats] = []
+    for s, scheme in enumerate(schemes):
+        member = Member(s, case, scheme)
+        above = sound_pairs(record, quantity, member)
+        local = (
+            at(record, f"{quantity}_observed_order", member, norm=norm) if triples else np.empty(0)
+        )
+        good = [all(above[i : i + 2]) for i in range(local.size)]
+        sound.append(local[good] if any(good) else local)
+        ax.plot(
+            triples,
+            local,
+            color=style.COLOURS[s % 7],
+            linestyle=style.DASHES[s % 7],
+            marker=style.MARKERS[s % 7],
+            markersize=5,
+            linewidth=1.1,
+        )
+        _draw_stated(ax, record, quantity, member, norm)
+    ax.set_ylim(*_order_limits(sound, promised))
+    if len(schemes) == 1 and len(triples) <= 8:
+        for level, order in zip(triples, local, strict=True):
+            if np.isfinite(order):
+                ax.annotate(
+                    words.number(float(order), "order"),
+                    (level, order),
+                    xytext=(0, 7),
+                    textcoords="offset points",
+                    ha="center",
+                    fontsize=8,
+                    annotation_clip=True,
+                )
+    levels = whole(record, "level")
+    ax.set_xlim(levels[0] - 0.5, levels[-1] + 0.5)
+    ax.xaxis.set_major_locator(MaxNLocator(nbins=10, integer=True))
+    ax.set_xlabel("level (coarsest of three)")
+    ax.set_ylabel(f"local order of {words.symbol(quantity)} ({TYPICAL_NORM})")
+
+
+def _draw_stated(ax: Axes, record: Record, quantity: str, member: Member, norm: int) -> None:
+    """Draw the stated order as a bar over the levels of its window, with its interval."""
+    order = float(at(record, f"{quantity}_order", member, norm=norm))
+    low, high = (
+        float(at(record, f"{quantity}_order_{end}", member, norm=norm)) for end in ("low", "high")
+    )
+    first, last = (
+        float(at(record, f"{quantity}_window_{end}", member)) for end in ("first", "last")
+    )
+    if not np.isfinite([order, low, high, first, last]).all() or last <= first:
+        return
+    colour = style.COLOURS[member.scheme % 7]
+    ax.fill_between(
+        [first, last], [low, low], [high, high], color=colour, alpha=0.18, linewidth=0, zorder=0.5
+    )
+    ax.plot(
+        [first, last],
+        [order, order],
+        color=colour,
+        linewidth=4,
+        alpha=0.35,
+        solid_capstyle="butt",
+        zorder=1.2,
+    )
+
+
+def _order_limits(sound: list[Floats], promised: float) -> tuple[float, float]:
+    """Hold the target and the orders that count, within promised - 5 and promised + 2."""
+    values = np.concatenate([part[np.isfinite(part)] for part in sound] or [np.array([promised])])
+    low = min([promised - 0.3, *values.tolist()])
+    high = max([promised + 0.3, *values.tolist()])
+    room = 0.08 * (high - low)
+    return max(low - room, promised - 5), min(high + room, promised + 2)

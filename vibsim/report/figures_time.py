@@ -1,0 +1,189 @@
+"""Figures over time: do the rescaled differences coincide, and what is the ratio between them?
+
+Source: pendulum lecture, sections 2.5 and 2.6.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vibsim.record import Record
+from vibsim.report import style, words
+from vibsim.report.data import (
+    Floats,
+    Member,
+    at,
+    formal_order,
+    sound_levels,
+    sound_pairs,
+    target_ratio,
+    times,
+    unit,
+    whole,
+)
+from vibsim.report.panels import Curve, comparable, draw_curves, draw_spread, panels
+from vibsim.report.style import Picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from vibsim.spec import Experiment
+
+CURVES = 6
+"""Most curves in one panel; more cannot be told apart."""
+TARGET: dict[str, Any] = {"color": "black", "linestyle": (0, (4, 3)), "linewidth": 1.0}
+
+
+def overlay(experiment: Experiment, record: Record, quantity: str, member: Member) -> Picture:
+    """Draw the rescaled level differences of a quantity, their spread, and the ratio over time."""
+    t, order = times(record, member.case), formal_order(experiment, member.scheme, quantity)
+    letter, measure = words.symbol(quantity), unit(record, f"{quantity}_difference")
+    curves = differences(experiment, record, quantity, member)
+    spread, ratios = comparable(curves), len(whole(record, "triple")) > 0
+    axes = panels([2.4, *([1.3] if spread else []), *([1.5] if ratios else [])])
+    draw_curves(axes[0], t, curves, f"rescaled difference of {letter}", measure)
+    axes[0].set_title("Rescaled differences between successive levels")
+    if spread:
+        draw_spread(axes[1], t, curves, measure)
+    if ratios:
+        _draw_ratios(axes[-1], t, record, quantity, member, order)
+    axes[-1].set_xlabel(style.label("t", unit(record, "t") or "s"))
+    first = whole(record, "pair")[0]
+    low = words.lowered(first)
+    parts = [
+        f"{letter}{low} is {letter} on level {first}, and so on. Top: the differences between successive levels, "
+        f"multiplied by {2.0**order:g} from one to the next; if the error shrinks as dt{words.raised(order)}, the "
+        "curves fall on one another.",
+        "Then the spread: how far each curve is from the finest one above round-off."
+        if spread
+        else "",
+        "Bottom: the ratio of successive differences; it should settle at the dashed line. Near a zero crossing a "
+        "ratio of two small numbers means nothing: it is left out, or runs away."
+        if ratios
+        else "",
+    ]
+    return Picture(
+        name=f"differences_{quantity}_{member.stem}",
+        title=f"Do the levels agree? {letter}, {member.title}",
+        caption=" ".join(part for part in parts if part),
+        alt=f"Rescaled level differences of {words.name(quantity)} against time for {member.title}"
+        + (", with the ratio of successive differences" if ratios else ""),
+        figure=axes[0].get_figure(),  # type: ignore[arg-type]
+    )
+
+
+def energy(experiment: Experiment, record: Record, member: Member) -> Picture:
+    """Draw the energy deviation of every level times ``(2**p)**k``: convergence to conservation."""
+    order = formal_order(experiment, member.scheme, "energy_deviation")
+    measure, levels = unit(record, "energy_deviation_scaled"), whole(record, "level")
+    above = sound_levels(record, "energy_deviation", member)
+    curves = []
+    for i, level in enumerate(levels):
+        values = at(record, "energy_deviation_scaled", member, level=i)
+        text = f"{words.factor(order, level - levels[0])}dE{words.lowered(level)}"
+        curves.append(Curve(text, values, above[i]))
+    curves = [curves[i] for i in _few([curve.sound for curve in curves])]
+    spread = comparable(curves)
+    axes = panels([2.4, 1.3] if spread else [2.4])
+    t = times(record, member.case)
+    draw_curves(axes[0], t, curves, "rescaled dE", measure)
+    axes[0].set_title("Energy deviation dE = E(t) − E(0), rescaled")
+    if spread:
+        draw_spread(axes[1], t, curves, measure)
+    axes[-1].set_xlabel(style.label("t", unit(record, "t") or "s"))
+    caption = (
+        f"dE{words.lowered(levels[0])} is dE on level {levels[0]}, and so on. The exact energy is constant, so dE "
+        f"itself is an error. Multiplied by {2.0**order:g} from level to level the curves should coincide; look at the "
+        "last point too, where the velocity comes from a formula of its own."
+    )
+    if spread:
+        caption += " Below, the spread: how far each curve is from the finest one above round-off."
+    return Picture(
+        name=f"conservation_{member.stem}",
+        title=f"Convergence to conservation: {member.title}",
+        caption=caption,
+        alt=f"Rescaled energy deviation against time on levels {words.levels(levels)} for {member.title}",
+        figure=axes[0].get_figure(),  # type: ignore[arg-type]
+    )
+
+
+def differences(
+    experiment: Experiment, record: Record, quantity: str, member: Member
+) -> list[Curve]:
+    """Return the level differences, rescaled so that an error ``C dt**p`` makes them coincide; at most `CURVES`."""
+    order = formal_order(experiment, member.scheme, quantity)
+    levels, pairs = whole(record, "level"), whole(record, "pair")
+    above, letter = sound_pairs(record, quantity, member), words.symbol(quantity)
+    share = [1 - 2.0 ** (-order * (b - a)) for a, b in pairwise(levels)]
+    curves = []
+    for i in _few(above):
+        coarse, fine = levels[i], levels[i + 1]
+        gap = f"{letter}{words.lowered(coarse)} − {letter}{words.lowered(fine)}"
+        uneven = share[0] / share[i]
+        factor = words.factor(order, coarse - pairs[0], uneven)
+        values = at(record, f"{quantity}_difference", member, pair=i)
+        scaled = values * 2.0 ** (order * (coarse - pairs[0])) * uneven
+        curves.append(Curve(f"{factor}({gap})" if factor else gap, scaled, above[i]))
+    return curves
+
+
+def _few(sound: list[bool]) -> list[int]:
+    """Choose curves: the coarsest, the two finest sound ones, some between, and the first lost in round-off.
+
+    Where none is sound, round-off is what there is to see, and all count.
+    """
+    kept = [i for i, good in enumerate(sound) if good] or list(range(len(sound)))
+    lost = [i for i, good in enumerate(sound) if not good and i > max(kept, default=-1)][:1]
+    room = CURVES - len(lost)
+    if len(kept) > room:
+        between = np.linspace(0, len(kept) - 2, room - 1).round().astype(int)
+        kept = [*(kept[i] for i in between), kept[-1]]
+    return [*kept, *lost]
+
+
+def _draw_ratios(
+    ax: Axes, t: Floats, record: Record, quantity: str, member: Member, order: float
+) -> None:
+    levels, count = whole(record, "level"), len(whole(record, "triple"))
+    above = sound_pairs(record, quantity, member)
+    good = [all(above[i : i + 2]) for i in range(count)]
+    chosen = _few(good)
+    drawn: list[Floats] = []
+    for k, i in enumerate(chosen):
+        sound, values = good[i] or not any(good), at(record, f"{quantity}_ratio", member, triple=i)
+        if not np.isfinite(values).any():
+            continue
+        look: dict[str, Any] = {"color": "#b0b0b0", "linewidth": 0.6, "zorder": 1.5}
+        if sound:
+            look = {"color": style.COLOURS[k], "linestyle": style.DASHES[k], "linewidth": 1.3}
+            drawn.append(values)
+        text = "levels " + ", ".join(map(str, levels[i : i + 3]))
+        ax.plot(
+            *style.thin(t, values),
+            label=text + ("" if good[i] else "\n(lost in round-off)"),
+            **look,
+        )
+    if not drawn:
+        note = "nothing to divide: every difference is within round-off, or zero"
+        ax.text(0.5, 0.7, note, transform=ax.transAxes, ha="center", color=style.GREY)
+    triples = [(levels[i], levels[i + 1], levels[i + 2]) for i in chosen]
+    targets = sorted({target_ratio(order, triple) for triple in triples})
+    for k, target in enumerate(targets):
+        ax.axhline(target, zorder=1, label="" if k else "promised", **TARGET)
+    ax.set_ylim(*_ratio_limits(drawn, targets))
+    ax.set_ylabel("ratio")
+    ax.set_title("Ratio of successive differences", fontweight="normal", fontsize=9)
+    style.beside(ax)
+
+
+def _ratio_limits(drawn: list[Floats], targets: list[float]) -> tuple[float, float]:
+    """Return limits that hold the target and the middle nine tenths of the ratios, but no wild outlier."""
+    every = np.concatenate([values[np.isfinite(values)] for values in drawn] or [np.array(targets)])
+    every = every if every.size else np.array(targets)
+    low = min(float(np.quantile(every, 0.05)), 0.97 * targets[0])
+    high = max(float(np.quantile(every, 0.95)), 1.03 * targets[-1])
+    room = 0.15 * (high - low)
+    return max(low - room, -targets[-1]), min(high + room, 3 * targets[-1])

@@ -1,0 +1,181 @@
+"""The report of one experiment: one page that opens anywhere, with its figures and tables as files beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vibsim import store
+from vibsim.errors import VibsimError, nearest
+from vibsim.record import Record
+from vibsim.report import cards, contents, data, figures_time, gallery, style, thumbnail
+from vibsim.report.data import Member
+from vibsim.report.panels import Curve
+from vibsim.report.style import Picture
+from vibsim.report.tables import Table, to_csv, to_latex
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+    from vibsim.plan import Plan
+    from vibsim.spec import Experiment
+
+TEMPLATES = Path(__file__).parent / "templates"
+NOTHING: Mapping[str, Any] = {}
+LONG = 24
+"""Rows above which a table is folded away."""
+FOLDED = 500
+"""Most rows of members that the page itself holds; the CSV file holds more."""
+
+
+def write(
+    plan: Plan,
+    convergence: Record,
+    summary: Mapping[str, Any],
+    directory: Path,
+    formats: Sequence[str] = ("svg",),
+    provenance: Mapping[str, Any] = NOTHING,
+) -> None:
+    """Write ``report.html``, ``figures/`` and ``tables/`` of one experiment.
+
+    Parameters
+    ----------
+    plan
+        The plan of the experiment; its ``experiment`` is read.
+    convergence
+        What the analysis found, as stored in ``convergence.nc``.
+    summary
+        The verdicts, as stored in ``summary.json``.
+    directory
+        Folder of the experiment's results.
+    formats
+        Of ``svg``, ``png``, ``pdf``; the page itself always holds its figures as SVG.
+    provenance
+        What the results came from: digests, versions, the part of the experiment that the job used.
+
+    Raises
+    ------
+    VibsimError
+        For a format that does not exist.
+    """
+    unknown = [form for form in formats if form not in style.FORMATS]
+    if unknown:
+        raise VibsimError(f"figure format '{unknown[0]}': {nearest(unknown[0], style.FORMATS)}")
+    experiment = plan.experiment
+    shown, left_out = gallery.choose(experiment, convergence)
+    with style.applied():
+        pictures = gallery.pictures(experiment, convergence, shown)
+        drawn = [(picture, style.svg(picture)) for picture in pictures]
+        figures = dict(_figure_files(drawn, formats))
+    figures["thumbnail.svg"] = _stamp(experiment, convergence, shown[0]).encode()
+    listed, folded = _tables(experiment, convergence, summary)
+    beside = [contents.checks(summary), contents.failures(summary, convergence)]
+    beside.append(contents.member_list(convergence, data.position(experiment)))
+    everything = [*listed, *(table for _, group in folded for table in group)]
+    everything += [table for table in beside if table is not None and table not in everything]
+    _replace(directory / "figures", figures)
+    _replace(directory / "tables", dict(_table_files(everything)))
+    context = cards.context(experiment, convergence, summary, provenance) | {
+        "tables": listed,
+        "folded": folded,
+        "shown": left_out,
+        "pictures": [
+            (picture, _markup(style.inline(text, picture.alt))) for picture, text in drawn
+        ],
+    }
+    store.write_text(
+        directory / "report.html", environment().get_template("report.html").render(context)
+    )
+
+
+@cache
+def environment() -> Environment:
+    """Return the jinja2 environment of the templates, with escaping always on."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    loader = FileSystemLoader(TEMPLATES)
+    made = Environment(
+        loader=loader,
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    made.filters["code"] = _code
+    return made
+
+
+def _code(text: str) -> str:
+    """Escape a text, and set what stands between backticks as code."""
+    from markupsafe import Markup, escape
+
+    parts = text.split("`")
+    if len(parts) % 2 == 0:
+        return escape(text)
+    pieces = [
+        Markup("<code>{}</code>").format(p) if i % 2 else escape(p) for i, p in enumerate(parts)
+    ]
+    return Markup("").join(pieces)
+
+
+def _markup(text: str) -> str:
+    """Mark a drawing of our own as markup; its texts were escaped when it was drawn."""
+    from markupsafe import Markup
+
+    return Markup(text)
+
+
+def _figure_files(
+    drawn: Iterable[tuple[Picture, str]], formats: Sequence[str]
+) -> Iterable[tuple[str, bytes]]:
+    for picture, text in drawn:
+        for form in dict.fromkeys(formats):
+            content = text.encode() if form == "svg" else style.binary(picture, form)
+            yield f"{picture.name}.{form}", content
+
+
+def _table_files(tables: Iterable[Table]) -> Iterable[tuple[str, bytes]]:
+    for table in tables:
+        yield f"{table.name}.csv", to_csv(table).encode()
+        yield f"{table.name}.tex", to_latex(table).encode()
+
+
+def _replace(directory: Path, files: Mapping[str, bytes]) -> None:
+    """Write files, and remove those of an earlier report that this one does not have."""
+    for name, content in files.items():
+        store.write_bytes(directory / name, content)
+    for path in directory.iterdir() if directory.is_dir() else ():
+        if path.is_file() and path.name not in files:
+            path.unlink()
+
+
+def _stamp(experiment: Experiment, record: Record, member: Member) -> str:
+    """Return the small figure of the index: the rescaled differences; with a single level the solution."""
+    quantity, t = data.position(experiment), data.times(record, member.case)
+    if not data.whole(record, "pair"):
+        return thumbnail.draw(t, [Curve("", data.at(record, f"{quantity}_finest", member))])
+    return thumbnail.draw(t, figures_time.differences(experiment, record, quantity, member))
+
+
+def _tables(
+    experiment: Experiment, record: Record, summary: Mapping[str, Any]
+) -> tuple[list[Table], list[tuple[str, list[Table]]]]:
+    """Return the tables of the page, and those that it folds away under a heading."""
+    found = data.quantities(experiment, record)
+    shown = data.members(experiment, record, found[0])
+    norms = [name for name in data.names(record, "norm") if name != data.TYPICAL_NORM]
+    listed = [contents.orders(record, quantity, shown) for quantity in found]
+    optional = [contents.maxima(record, shown), contents.scalars(record, shown)]
+    listed += [table for table in optional if table is not None]
+    # the first table is what the page is about; a long one after it would push the figures away
+    long = [table for table in listed[1:] if len(table.rows) > LONG]
+    listed = [table for table in listed if table not in long]
+    folded = [(table.caption, [table]) for table in long]
+    other = [contents.orders(record, quantity, shown, norm) for quantity in found for norm in norms]
+    folded.append(("Norms and orders in the other norms", other))
+    members = contents.member_list(record, found[0])
+    if members is not None and len(members.rows) <= FOLDED:
+        folded.append((f"All {len(record['case'])} members", [members]))
+    return listed, folded

@@ -1,0 +1,123 @@
+"""Panels that share a time axis, and curves that may coincide."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vibsim.report import style
+from vibsim.report.data import Floats
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+APART = 8.0
+"""Spreads that differ by more than this are drawn on a logarithmic scale."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One curve of an overlay."""
+
+    label: str
+    values: Floats
+    sound: bool = True
+    """Whether it stands above round-off."""
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the run behind it lasted to the end."""
+        return bool(np.isfinite(self.values).all())
+
+
+def panels(heights: list[float]) -> list[Axes]:
+    """Return axes below each other with one common axis of abscissae; room for a legend at the right."""
+    total = sum(heights) + 0.28 * len(heights) + 0.42
+    figure = style.canvas(total)
+    axes: list[Any] = []
+    top = total
+    for height in heights:
+        top -= 0.28
+        box = (0.088, (top - height) / total, 0.652, height / total)
+        axes.append(figure.add_axes(box, sharex=axes[0] if axes else None))
+        top -= height
+        axes[-1].yaxis.set_label_coords(-0.088, 0.5)
+    for ax in axes[:-1]:
+        ax.tick_params(labelbottom=False)
+    return axes
+
+
+def draw_curves(ax: Axes, t: Floats, curves: list[Curve], text: str, measure: str) -> None:
+    """Draw curves that may coincide: from wide and solid below to narrow and dashed above, markers in turn.
+
+    The range is that of the sound curves that last to the end: a run that blew up would hide all others.
+    """
+    sound = [curve for curve in curves if curve.sound] or curves
+    shown = [curve.values for curve in sound if curve.is_whole] or [curve.values for curve in sound]
+    exponent = style.scale(*shown)
+    for i, curve in enumerate(curves):
+        x, y = style.thin(t, curve.values / 10.0**exponent)
+        note = "" if curve.sound else "\n(lost in round-off)"
+        note += "" if curve.is_whole else "\n(broke down)"
+        look = _look(i, len(curves), x.size)
+        if not curve.sound and any(c.sound for c in curves):
+            look = {"color": "#a0a0a0", "linewidth": 0.6, "zorder": 1.5}
+        ax.plot(x, y, label=curve.label + note, **look)
+    ax.set_xlim(float(t[0]), float(t[-1]))
+    ax.set_ylim(*style.limits(*(values / 10.0**exponent for values in shown)))
+    ax.set_ylabel(style.label(text, measure, exponent))
+    style.beside(ax)
+
+
+def _look(i: int, count: int, points: int) -> dict[str, Any]:
+    """Return a line's look such that later lines leave earlier ones visible beneath them."""
+    part = i / max(1, count - 1)
+    every = max(1, points // 9)
+    return {
+        "color": style.COLOURS[i],
+        "linestyle": style.DASHES[i],
+        "linewidth": 4.6 - 3.4 * part if count > 1 else 1.6,
+        "alpha": 0.55 + 0.45 * part if count > 1 else 1.0,
+        "marker": style.MARKERS[i],
+        "markersize": 5.0,
+        "markerfacecolor": "white",
+        "markeredgewidth": 1.0,
+        "markevery": (i * every // count, every),
+        "zorder": 2 + 0.1 * i,
+    }
+
+
+def comparable(curves: list[Curve]) -> bool:
+    """Say whether at least two curves stand above round-off and last to the end, so that a spread has a meaning."""
+    return sum(curve.sound and curve.is_whole for curve in curves) > 1
+
+
+def draw_spread(ax: Axes, t: Floats, curves: list[Curve], measure: str) -> None:
+    """Draw how far every comparable curve is from the finest of them; logarithmic where they differ much."""
+    sound = [i for i, curve in enumerate(curves) if curve.sound and curve.is_whole]
+    reference = curves[sound[-1]]
+    gaps = {i: curves[i].values - reference.values for i in sound[:-1]}
+    shown = list(gaps.values())
+    sizes = [size for gap in shown if (size := _typical(gap)) > 0]
+    logarithmic = bool(sizes) and max(sizes) > APART * min(sizes)
+    exponent = 0 if logarithmic else style.scale(*shown)
+    for i, gap in gaps.items():
+        values = style.no_zeros(gap) if logarithmic else gap / 10.0**exponent
+        x, y = style.thin(t, values)
+        look = _look(i, len(curves), x.size) | {"linewidth": 1.3, "alpha": 1.0, "markersize": 4.0}
+        ax.plot(x, y, **look)
+    if logarithmic:
+        highest = max(float(np.max(np.abs(gap))) for gap in shown)
+        style.log_axis(ax, "y", 0.02 * min(sizes), 2 * highest)
+    else:
+        ax.axhline(0.0, color=style.GREY, linewidth=0.7, zorder=1)
+        ax.set_ylim(*style.limits(*(gap / 10.0**exponent for gap in shown)))
+    ax.set_ylabel(style.label("|spread|" if logarithmic else "spread", measure, exponent))
+    ax.set_title(f"Spread: distance from {reference.label}", fontweight="normal", fontsize=9)
+
+
+def _typical(values: Floats) -> float:
+    """Return a size that nine tenths of the values stay below: an end point of its own kind does not count."""
+    return float(np.quantile(np.abs(values), 0.9))

@@ -1,0 +1,260 @@
+"""The look of the figures: colour-blind safe, legible in black-and-white print, the same bytes every time.
+
+Colours are those of Okabe and Ito (2008), each with a dash pattern and a marker of its own. Text stays text (a reader
+can search and copy it); it is laid out with a wide font, so that a narrower substitute still fits.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Floats = NDArray[np.float64]
+
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+DASHES: tuple[Any, ...] = (
+    "-",
+    (0, (5, 2)),
+    (0, (1.2, 1.6)),
+    (0, (6, 2, 1.2, 2)),
+    (0, (9, 2)),
+    (0, (3, 1.5, 1, 1.5, 1, 1.5)),
+    (0, (2, 3)),
+)
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+GREY = "#707070"
+PALE = "#d9d9d9"
+STATUS_COLOURS = {"PASS": "#009E73", "INCONCLUSIVE": "#E69F00", "FAIL": "#D55E00"}
+WIDTH = 9.0
+"""Width of a figure [inch]."""
+POINTS = 400
+"""Horizontal resolution to which a long series is thinned."""
+FAMILY = "'DejaVu Sans', Verdana, Arial, Helvetica, sans-serif"
+FORMATS = ("svg", "png", "pdf")
+
+_RC: dict[Any, Any] = {
+    "axes.edgecolor": "#404040",
+    "axes.formatter.useoffset": False,
+    "axes.grid": True,
+    "axes.labelsize": 9.5,
+    "axes.linewidth": 0.7,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlelocation": "left",
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "font.family": ["DejaVu Sans"],
+    "font.size": 9.0,
+    "grid.color": "#e6e6e6",
+    "grid.linewidth": 0.6,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "legend.handlelength": 3.4,
+    "lines.linewidth": 1.4,
+    "savefig.dpi": 160,
+    "svg.fonttype": "none",
+    "text.parse_math": False,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+}
+
+_PLACES = re.compile(r' (?:d|x|y)="[^"]*"')
+_DIGITS = re.compile(r"(\.\d\d)\d+")
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure with the words that belong to it."""
+
+    name: str
+    """Stem of its files; plain."""
+    title: str
+    caption: str
+    """What to look for."""
+    alt: str
+    """The same content for a reader who cannot see it."""
+    figure: Figure
+
+
+@contextmanager
+def applied() -> Iterator[None]:
+    """Use the look of this module while figures are built and saved."""
+    import matplotlib
+
+    with matplotlib.rc_context(_RC):
+        yield
+
+
+def canvas(height: float) -> Figure:
+    """Return an empty figure of the common width and of `height` [inch], free of pyplot's global state."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(WIDTH, height))
+
+
+def thin(t: Floats, y: Floats, width: int = POINTS) -> tuple[Floats, Floats]:
+    """Thin a series for drawing without losing an extreme.
+
+    Parameters
+    ----------
+    t, y
+        Abscissae in ascending order and values, shape (n,). A NaN is a gap in the curve.
+    width
+        Number of groups of neighbours; of each, the smallest and the largest value are kept.
+
+    Returns
+    -------
+    tuple of arrays
+        At most ``2 * width + 2`` points: the first, the last, every group's extremes in the order of `t`, and one
+        NaN for a group that has nothing else. Series of at most that many points are returned as they are.
+    """
+    n = y.size
+    if n <= 2 * width + 2:
+        return t, y
+    edges = np.linspace(1, n - 1, width + 1).astype(int)[:-1]
+    groups = np.repeat(np.arange(width), np.diff([*edges, n - 1]))
+    inner = np.where(np.isfinite(y[1:-1]), y[1:-1], np.nan)
+    order = np.lexsort((inner, groups))
+    finite = np.add.reduceat(np.isfinite(inner).astype(int), edges - 1)
+    low = order[edges - 1] + 1
+    high = order[edges - 1 + np.maximum(finite - 1, 0)] + 1
+    keep = np.unique([0, *low.tolist(), *high.tolist(), n - 1])
+    return t[keep], y[keep]
+
+
+def entry(text: str) -> str:
+    """Return a legend entry: matplotlib leaves out what begins with an underscore, a user's name may."""
+    return f"\N{ZERO WIDTH SPACE}{text}" if text.startswith("_") else text
+
+
+def no_zeros(values: Floats) -> Floats:
+    """Return absolute values; NaN for zero, which a logarithmic axis cannot show."""
+    return np.where(values == 0.0, np.nan, np.abs(values))
+
+
+def power(exponent: int) -> str:
+    """Write a power of ten in Unicode."""
+    return "10" + str(exponent).translate(_SUPERSCRIPT)
+
+
+def scale(*series: Floats) -> int:
+    """Return the exponent of ten that an axis should carry; 0 where plain numbers read well."""
+    values = [np.abs(part[np.isfinite(part)]) for part in series]
+    largest = max((float(part.max()) for part in values if part.size), default=0.0)
+    if largest == 0.0:
+        return 0
+    exponent = math.floor(math.log10(largest))
+    return 0 if -1 <= exponent <= 3 else exponent
+
+
+def label(text: str, unit: str, exponent: int = 0) -> str:
+    """Write an axis label: what is shown, and in brackets its power of ten and unit."""
+    scaled = [power(exponent)] if exponent else []
+    units = [unit] if unit and unit != "1" else []
+    return f"{text} [{' '.join(scaled + units)}]" if scaled or units else text
+
+
+def log_axis(ax: Axes, which: str, low: float, high: float) -> None:
+    """Make an axis logarithmic from `low` to `high`, with at most about eight labelled ticks in Unicode."""
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+    bottom, top = math.floor(math.log10(low)), math.ceil(math.log10(high))
+    getattr(ax, f"set_{which}scale")("log")
+    getattr(ax, f"set_{which}lim")(low, high)
+    step = max(1, math.ceil((top - bottom) / 7))
+    ticks = [10.0**e for e in range(bottom, top + 1, step)]
+    if math.log10(high / low) < 2.2:
+        ticks = [m * 10.0**e for e in range(bottom, top + 1) for m in (1, 2, 5)]
+    axis = getattr(ax, f"{which}axis")
+    axis.set_major_locator(FixedLocator([x for x in ticks if low <= x <= high]))
+    axis.set_minor_locator(NullLocator())
+    plain = low >= 0.005 and high <= 2000
+    axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}" if plain else log_tick(x)))
+
+
+def log_tick(value: float) -> str:
+    """Write a tick of a logarithmic axis as a power of ten, with a digit where it needs one."""
+    if value <= 0:
+        return ""
+    exponent = math.floor(math.log10(value) + 1e-9)
+    digit = round(value / 10.0**exponent)
+    return power(exponent) if digit == 1 else f"{digit}·{power(exponent)}"
+
+
+def limits(*series: Floats, margin: float = 0.08) -> tuple[float, float]:
+    """Return linear axis limits that hold every finite value, never of zero height."""
+    parts = [part[np.isfinite(part)] for part in series]
+    parts = [part for part in parts if part.size]
+    if not parts:
+        return -1.0, 1.0
+    low, high = min(float(p.min()) for p in parts), max(float(p.max()) for p in parts)
+    room = margin * (high - low) or margin * abs(high) or 1.0
+    return low - room, high + room
+
+
+def beside(ax: Axes, **options: Any) -> None:
+    """Put the legend to the right of the axes, where it hides nothing."""
+    if not ax.get_legend_handles_labels()[0]:
+        ax.text(0.5, 0.5, "no finite value", transform=ax.transAxes, ha="center", color=GREY)
+        return
+    ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.03), borderaxespad=0.0, **options)
+
+
+def svg(picture: Picture) -> str:
+    """Return the SVG document of a picture: no date, and the same bytes every time."""
+    import matplotlib
+
+    stream = io.StringIO()
+    nothing = {"Date": None, "Creator": None, "Format": None, "Type": None}
+    with matplotlib.rc_context({"svg.hashsalt": picture.name}):
+        picture.figure.savefig(stream, format="svg", metadata=nothing)
+    return _tidy(stream.getvalue(), picture.name)
+
+
+def _tidy(text: str, name: str) -> str:
+    """Make ids unique among the figures of one page, drop unused ones, and let the reader's fonts serve."""
+    used = set(re.findall(r'(?:url\(#|href="#)([^)"]+)', text))
+    text = re.sub(r' id="([^"]*)"', lambda m: f' id="{name}-{m[1]}"' if m[1] in used else "", text)
+    text = re.sub(r'(url\(#|href="#)', rf"\g<1>{name}-", text)
+    # hundredths of a point are more than anyone sees
+    text = _PLACES.sub(lambda match: _DIGITS.sub(r"\1", match[0]), text)
+    text = re.sub(
+        r"<!--.*?-->\s*|<metadata>.*?</metadata>\s*|<!DOCTYPE.*?>\s*", "", text, flags=re.DOTALL
+    )
+    return text.replace("'DejaVu Sans'", FAMILY)
+
+
+def inline(document: str, alt: str) -> str:
+    """Return the ``<svg>`` element of an SVG document for use within HTML, with `alt` as its accessible name."""
+    from markupsafe import escape
+
+    element = document[document.index("<svg") :]
+    element = re.sub(r' xmlns(:xlink)?="[^"]*"', "", element).replace("xlink:href", "href")
+    element = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", element, count=1)
+    element = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", element, count=1)
+    # a style sheet within the page would hold for all of it; the page has the same rule for its figures
+    element = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>\s*", "", element, flags=re.DOTALL)
+    return element.replace("<svg", f'<svg role="img" aria-label="{escape(alt)}"', 1)
+
+
+def binary(picture: Picture, form: str) -> bytes:
+    """Return a picture as PNG or PDF, free of dates."""
+    stream = io.BytesIO()
+    metadata = {"pdf": {"CreationDate": None, "Creator": None, "Producer": None}}.get(
+        form, {"Software": None}
+    )
+    picture.figure.savefig(stream, format=form, metadata=metadata)
+    return stream.getvalue()

@@ -1,0 +1,142 @@
+"""Tables: one object, written for reading (HTML, LaTeX) and for computing (CSV with every digit)."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from vibsim.report import words
+
+Cell = str | int | float | None
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column."""
+
+    header: str
+    unit: str = ""
+    form: str = "text"
+    """``text``, or a form of `vibsim.report.words.number`."""
+
+    @property
+    def title(self) -> str:
+        """Header with the unit in brackets."""
+        return f"{self.header} [{self.unit}]" if self.unit else self.header
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table with a caption; every row has one cell per column."""
+
+    name: str
+    caption: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+
+    def __post_init__(self) -> None:
+        if any(len(row) != len(self.columns) for row in self.rows):
+            raise ValueError(f"table {self.name}: a row does not have {len(self.columns)} cells")
+
+    def text_rows(self) -> Iterator[list[str]]:
+        """Yield every row as it is read."""
+        forms = [self._form(i) for i in range(len(self.columns))]
+        for row in self.rows:
+            yield [_text(cell, form) for cell, form in zip(row, forms, strict=True)]
+
+    def _form(self, i: int) -> str:
+        """Return the form of a column: norms have a power of ten where one of them needs it, so that they compare."""
+        form = self.columns[i].form
+        sizes = [abs(row[i]) for row in self.rows if isinstance(row[i], float)]  # type: ignore[arg-type]
+        nonzero = [size for size in sizes if 0 < size < math.inf]
+        return (
+            "small"
+            if form == "norm" and nonzero and not 0.1 <= min(nonzero) <= max(nonzero) < 1e4
+            else form
+        )
+
+
+def _text(cell: Cell, form: str) -> str:
+    if cell is None:
+        return "–"
+    return str(cell) if isinstance(cell, str) else words.number(cell, form)
+
+
+def to_csv(table: Table) -> str:
+    """Return a table as CSV: units in the header, floats with every digit, empty where nothing applies."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow([column.title for column in table.columns])
+    for row in table.rows:
+        writer.writerow([_exact(cell) for cell in row])
+    return stream.getvalue()
+
+
+def _exact(cell: Cell) -> str:
+    if cell is None or (isinstance(cell, float) and math.isnan(cell)):
+        return ""
+    return repr(float(cell)) if isinstance(cell, float) else str(cell)
+
+
+def to_latex(table: Table) -> str:
+    r"""Return a table as LaTeX for the package ``booktabs``: ``\input`` it into a document."""
+    alignment = "".join("l" if column.form == "text" else "r" for column in table.columns)
+    head = " & ".join(escape(column.title) for column in table.columns)
+    body = [" & ".join(escape(text) for text in row) + r" \\" for row in table.text_rows()]
+    lines = [
+        r"\begin{table}",
+        r"\centering",
+        rf"\caption{{{escape(table.caption)}}}",
+        rf"\begin{{tabular}}{{{alignment}}}",
+        r"\toprule",
+        head + r" \\",
+        r"\midrule",
+        *body,
+        r"\bottomrule",
+        r"\end{tabular}",
+        r"\end{table}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+_SPECIAL = {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "&": r"\&",
+    "%": r"\%",
+    "$": r"\$",
+    "#": r"\#",
+    "_": r"\_",
+    "{": r"\{",
+    "}": r"\}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "|": r"\textbar{}",
+    '"': r"\textquotedbl{}",
+    "\n": " ",
+    "–": "--",
+    "−": "$-$",
+    "±": r"$\pm$",
+    "·": r"$\cdot$",
+    "∞": r"$\infty$",
+    "θ": r"$\theta$",
+    "ω": r"$\omega$",
+    "Δ": r"$\Delta$",
+    "\N{NARROW NO-BREAK SPACE}": r"\,",
+}
+_RAISED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+
+
+def escape(text: str) -> str:
+    """Return text that LaTeX prints as it stands."""
+    parts = re.split("([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)", text)
+    raised = [rf"$^{{{part.translate(_RAISED)}}}$" for part in parts[1::2]]
+    plain = [
+        "".join(_SPECIAL.get(character, character) for character in part) for part in parts[::2]
+    ]
+    return "".join(a + b for a, b in zip(plain, [*raised, ""], strict=True))

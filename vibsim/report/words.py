@@ -1,0 +1,254 @@
+"""The words of a report: statuses, reasons, symbols and numbers, for a reader who meets them for the first time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from vibsim.report.style import power
+
+SYMBOLS = {
+    "theta": "θ",
+    "omega": "ω",
+    "energy": "E",
+    "kinetic_energy": "T",
+    "potential_energy": "V",
+    "energy_deviation": "dE",
+}
+NAMES = {
+    "theta": "the angle θ",
+    "omega": "the angular velocity ω",
+    "energy": "the energy E",
+    "kinetic_energy": "the kinetic energy T",
+    "potential_energy": "the potential energy V",
+    "energy_deviation": "the energy deviation dE = E(t) − E(0)",
+}
+
+
+def symbol(quantity: str) -> str:
+    """Return the letter of a quantity; its name where it has none."""
+    return SYMBOLS.get(quantity, quantity)
+
+
+def name(quantity: str) -> str:
+    """Return a quantity in words."""
+    return NAMES.get(quantity, quantity)
+
+
+@dataclass(frozen=True)
+class Reason:
+    """What a reason means and what would settle the question."""
+
+    meaning: str
+    needs: str
+
+
+STATUS = {
+    "PASS": "Every check came out as it should.",
+    "INCONCLUSIVE": "No check failed, but at least one could not be decided: treat its number as unproven.",
+    "FAIL": "At least one check came out wrong.",
+}
+
+REASONS = {
+    "asymptotic": Reason(
+        "The error shrinks from level to level as the scheme promises: the rescaled differences fall on top of each "
+        "other, and more closely so on finer levels.",
+        "Three levels at least, curves that coincide, ratios that settle, and differences well above round-off: all "
+        "four are met on the levels named.",
+    ),
+    "exact": Reason(
+        "The levels differ by round-off only: the scheme makes no truncation error here to measure.",
+        "Nothing more, if exactness is expected here; otherwise a problem on which the scheme does make an error.",
+    ),
+    "match": Reason(
+        "The outcome is the expected one. Expected was something other than plain convergence, for instance a trap "
+        "that the check is meant to notice.",
+        "The measured verdict and the expected one agree; look at the measured reason to see what was noticed.",
+    ),
+    "order_low": Reason(
+        "The error does shrink, but more slowly than the scheme promises. A first-order start, a one-sided formula at "
+        "the end, or a mistake in the code does this.",
+        "The ratios have settled, at the wrong number; more levels will not change it. Look for a step of lower order.",
+    ),
+    "order_high": Reason(
+        "The error shrinks faster than promised. Either the leading error term vanishes for this problem, or the order "
+        "was stated too low.",
+        "A problem without special symmetry, or the higher order stated as the expected one.",
+    ),
+    "mismatch": Reason(
+        "The measured outcome is not the expected one.",
+        "Compare the expected with the measured value below: one of the two is wrong.",
+    ),
+    "wrong_limit": Reason(
+        "The levels approach each other, but not the exact solution: the scheme converges to something else.",
+        "The differences alone cannot show this; the exact solution does. Check the equation that is being solved.",
+    ),
+    "unstable": Reason(
+        "The numerical solution grows where the exact one does not, and the finer of these levels do not cure it.",
+        "A smaller step (w dt below the stability limit), or a scheme without such a limit.",
+    ),
+    "non_finite": Reason(
+        "The calculation overflowed or met an undefined number; nothing after that moment means anything.",
+        "A smaller step, or a look at the member, level and time listed under Failures.",
+    ),
+    "pre_asymptotic": Reason(
+        "The step is still too coarse: the ratios have not settled, so the order read from them is an accident.",
+        "Finer levels, until the ratios settle and the rescaled curves coincide.",
+    ),
+    "round_off": Reason(
+        "The differences have reached the floor of the arithmetic: what is left is rounding noise, which says nothing "
+        "about the scheme.",
+        "Coarser levels, or an arithmetic with a lower floor (increment or compensated).",
+    ),
+    "oscillating": Reason(
+        "The ratios swing from level to level instead of settling.",
+        "More levels, another norm, or a comparison at times where the error does not change its sign.",
+    ),
+    "non_smooth": Reason(
+        "The problem is not smooth, so its error has no regular expansion in powers of dt.",
+        "Location of the events, or an expected order that takes the kink into account.",
+    ),
+    "too_few_levels": Reason(
+        "An order cannot be judged from two levels: one difference has nothing to be compared with.",
+        "Three levels at least; four or more let the trend of the ratios be seen.",
+    ),
+    "not_applicable": Reason(
+        "The measured number does not exist here, so there is nothing to judge.",
+        "A quantity, scheme or time for which the number exists.",
+    ),
+}
+
+_UNKNOWN = Reason("", "")
+_NUMBER = Reason(
+    "The measured number is what the check says.",
+    "A number that finer levels do not change, and that is not just inside its bound: the tables show both.",
+)
+
+
+def reason(word: str | None, kind: str) -> Reason:
+    """Return the explanation of a reason for a kind of check; empty words for one that has none."""
+    if word == "match" and kind != "converges":
+        return _NUMBER
+    return REASONS.get(word or "", _UNKNOWN)
+
+
+def overall(summary: Mapping[str, Any]) -> str:
+    """Return the verdict on a whole experiment in one or two sentences."""
+    checks: Sequence[Mapping[str, Any]] = summary["checks"]
+    total = len(checks)
+    passed = sum(check["status"] == "PASS" for check in checks)
+    failures = broken(summary)
+    told = f"{passed} of {total} {'check' if total == 1 else 'checks'} passed."
+    parts = [STATUS.get(summary["status"], ""), told if total > 1 else ""]
+    if not total:
+        parts = ["There is no check, so nothing was decided."]
+    if failures:
+        parts.append(f"{failures} {'run' if failures == 1 else 'runs'} broke down (see Failures).")
+    return " ".join(part for part in parts if part)
+
+
+def broken(summary: Mapping[str, Any]) -> int:
+    """Return the number of runs that broke down, listed or not."""
+    return int(summary.get("failure_count") or len(summary.get("failures") or []))
+
+
+def unsettled(summary: Mapping[str, Any]) -> list[str]:
+    """Return the texts of the checks that did not pass, with status and reason, while there are several checks."""
+    checks: Sequence[Mapping[str, Any]] = summary["checks"]
+    open_ones = [check for check in checks if check["status"] != "PASS"] if len(checks) > 1 else []
+    return [f"{check['status']} ({check['reason']}): {check['text']}" for check in open_ones]
+
+
+def number(value: Any, form: str = "norm") -> str:
+    """Write a number for reading.
+
+    Parameters
+    ----------
+    value
+        A number, or None; NaN and None give a dash.
+    form
+        ``norm``: 4 significant digits; ``small``: the same, always with a power of ten; ``order``: 3 decimals;
+        ``integer``; ``full``: 10 significant digits; ``step``, ``value``: up to 6 and 15 significant digits, no
+        trailing zeros.
+    """
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return "–"
+    if isinstance(value, float) and math.isinf(value):
+        return "∞" if value > 0 else "−∞"
+    if form == "integer":
+        return f"{int(value):,}".replace(",", "\N{NARROW NO-BREAK SPACE}").replace("-", "−")
+    if form == "order":
+        return f"{value:.3f}".replace("-", "−") if abs(value) < 1e4 else number(value)
+    text = _significant(
+        float(value), {"full": 10, "step": 6, "value": 15}.get(form, 4), fixed=form != "small"
+    )
+    if form not in {"step", "value"} or "." not in text:
+        return text
+    mantissa, dot, exponent = text.partition("·")
+    return mantissa.rstrip("0").rstrip(".") + dot + exponent
+
+
+def _significant(value: float, digits: int, fixed: bool) -> str:
+    if value == 0.0:
+        return "0"
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    if fixed and -3 <= int(exponent) < digits:
+        return f"{value:.{digits - 1 - int(exponent)}f}".replace("-", "−")
+    return f"{mantissa}·{power(int(exponent))}".replace("-", "−", 1)
+
+
+def lowered(level: int) -> str:
+    """Write a level as a subscript."""
+    return str(level).translate(str.maketrans("-0123456789", "₋₀₁₂₃₄₅₆₇₈₉"))
+
+
+def raised(exponent: float) -> str:
+    """Write an exponent: in Unicode where it is whole."""
+    return power(int(exponent))[2:] if exponent == int(exponent) else f"^{exponent:g}"
+
+
+def factor(order: float, finer: int, uneven: float = 1.0) -> str:
+    """Write the factor ``(2**order)**finer * uneven`` of a rescaled curve; empty for 1."""
+    value = 2.0 ** (order * finer) * uneven
+    if value == 1.0:
+        return ""
+    if value < 1e3 or uneven != 1.0 or 2.0**order != int(2.0**order):
+        return f"{number(value, 'step')} "
+    return f"{int(2.0**order)}{raised(finer)} "
+
+
+def interval(bounds: Sequence[float | None] | None) -> str:
+    """Write the interval of an order."""
+    if not bounds or any(b is None or math.isnan(b) for b in bounds):
+        return "–"
+    return f"{number(bounds[0], 'order')} to {number(bounds[1], 'order')}"
+
+
+def levels(window: Sequence[int] | None) -> str:
+    """Write the levels that a verdict rests on."""
+    found = [level for level in window or () if level is not None]
+    if not found:
+        return "–"
+    return str(found[0]) if len(found) == 1 else f"{min(found)} to {max(found)}"
+
+
+def expectation(expected: Any) -> str:
+    """Write what a check expected: text as it stands, a mapping as ``key value`` pairs."""
+    if expected is None:
+        return "–"
+    if isinstance(expected, Mapping):
+        return ", ".join(
+            f"{key} {expectation(value)}" for key, value in expected.items() if value is not None
+        )
+    if isinstance(expected, bool):
+        return "true" if expected else "false"
+    return number(expected, "step") if isinstance(expected, float) else str(expected)
+
+
+def ratio(order: float | None) -> str:
+    """Say by what factor the error falls when the step is halved."""
+    if order is None or math.isnan(order):
+        return ""
+    return f"Halving the step divides the error by about {2.0**order:.3g}."
