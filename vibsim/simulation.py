@@ -83,14 +83,19 @@ def simulate_record(
         for scheme in experiment.schemes
     ]
     names = [scheme.name for scheme in experiment.schemes]
-    coords = _coords(names, group, steps, every, same_end=not experiment.end_varies)
+    coords = _coords(model, names, group, steps, every, same_end=not experiment.end_varies)
     variables = {
         **_series(model, runs),
         **_exact(model, group, steps, every),
         **_gathered(model, runs, group, steps),
         **_constants(model, group, steps),
     }
-    attrs: dict[str, Attribute] = {"model": model.kind, "level": level, "steps": steps, "every": every}
+    attrs: dict[str, Attribute] = {
+        "model": model.kind,
+        "level": level,
+        "steps": steps,
+        "every": every,
+    }
     return Record(coords, variables, attrs)
 
 
@@ -126,8 +131,14 @@ def _fractions(steps: int, every: int) -> NDArray[np.int64]:
     return np.arange(0, steps + 1, every, dtype=np.int64)
 
 
+def _units(model: Model) -> dict[str, str]:
+    """Return the unit of everything that can be swept, by dotted key."""
+    states = {f"initial.{state.name}": state.unit for state in model.states}
+    return states | {f"model.{p.name}": p.unit for p in model.parameters} | {"time.end": "s"}
+
+
 def _coords(
-    schemes: list[str], group: Members, steps: int, every: int, same_end: bool
+    model: Model, schemes: list[str], group: Members, steps: int, every: int, same_end: bool
 ) -> dict[str, Variable]:
     number = _fractions(steps, every)
     t = number * (group.end[0] / steps) if same_end else number / steps
@@ -142,10 +153,10 @@ def _coords(
     }
     if not same_end:
         coords["end"] = Variable(("case",), group.end, _attrs("end time of the member", "s"))
+    units = _units(model)
     for key, values in group.columns.items():
-        coords[key.replace(".", "_")] = Variable(
-            ("case",), values, _attrs(f"swept value of {key}", "1", sweep_key=key)
-        )
+        attrs = _attrs(f"swept value of {key}", units[key], sweep_key=key)
+        coords[key.replace(".", "_")] = Variable(("case",), values, attrs)
     return coords
 
 

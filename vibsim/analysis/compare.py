@@ -66,7 +66,7 @@ def differences(grid: Grid, q: Ladder) -> Table:
         return table
     d = [coarse - fine for coarse, fine in pairs]
     over_time, of_pair = ("scheme", "case", "pair", "t"), ("scheme", "case", "pair", "norm")
-    rescaled = [x * series.gap_ratio(p, lv - levels[0]) for x, lv in zip(d, levels, strict=False)]
+    rescaled = [x * series.rescaling(p, levels[: i + 2]) for i, x in enumerate(d)]
     estimate = [x * series.error_factor(p, levels[i + 1] - levels[i]) for i, x in enumerate(d)]
     norms = np.stack([_norms(grid, x) for x in d], axis=2)
     add("difference", over_time, np.stack(d, 2), "level minus next level", q.units)

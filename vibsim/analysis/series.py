@@ -82,6 +82,17 @@ def target_ratio(order: Floats | float, levels: Sequence[int]) -> Floats:
     return np.asarray(np.where(flat, (second - first) / (third - second), ratio))
 
 
+def rescaling(order: Floats | float, levels: Sequence[int]) -> Floats:
+    """Return the factor that lays the last difference of `levels` upon the first, for an error of one power.
+
+    On successive levels it is ``(2^p)^k`` (A, section 2.5); on others the product of the target ratios.
+    """
+    factor = np.ones_like(np.asarray(order, dtype=np.float64))
+    for i in range(len(levels) - 2):
+        factor = factor * target_ratio(order, levels[i : i + 3])
+    return factor
+
+
 STEEPEST = 64.0
 """Orders are sought between -STEEPEST and STEEPEST."""
 
@@ -137,8 +148,9 @@ def local_scale(series: Floats) -> Floats:
 def masked_ratio(first: Floats, second: Floats, floor: Floats | float = 0.0) -> Floats:
     """Return the ratio of successive differences as a function of time.
 
-    Masked (NaN) where the denominator is below `NEAR_ZERO` times its `local_scale` (a zero crossing), or below
-    `ABOVE_FLOOR` times the round-off floor.
+    Masked (NaN) at a zero crossing of either difference, that is where one is below `NEAR_ZERO` times its
+    `local_scale` or has another sign than its neighbour, and where the denominator is below `ABOVE_FLOOR` times the
+    round-off floor.
 
     Parameters
     ----------
@@ -147,8 +159,12 @@ def masked_ratio(first: Floats, second: Floats, floor: Floats | float = 0.0) -> 
     floor
         Round-off floor of the finer difference, shape (..., 1) or a number.
     """
-    size = np.abs(second)
-    keep = size > np.maximum(NEAR_ZERO * local_scale(second), ABOVE_FLOOR * np.asarray(floor))
+    keep = np.abs(second) > ABOVE_FLOOR * np.asarray(floor)
+    for series in (first, second):
+        keep &= np.abs(series) > NEAR_ZERO * local_scale(series)
+        crossing = np.sign(series[..., 1:]) * np.sign(series[..., :-1]) < 0
+        keep[..., 1:] &= ~crossing
+        keep[..., :-1] &= ~crossing
     return np.where(keep, safe_ratio(first, second), np.nan)
 
 

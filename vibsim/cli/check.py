@@ -12,5 +12,6 @@ def check(options: Namespace) -> int:
     plans = load_all(choose(options.experiments, checkout()))
     for plan in plans.values():
         levels = ", ".join(str(level.level) for level in plan.levels)
-        print(f"{plan.file}: sound ({plan.cases} members, levels {levels})")
+        members = "1 member" if plan.cases == 1 else f"{plan.cases} members"
+        print(f"{plan.file}: sound ({members}, levels {levels})")
     return 0

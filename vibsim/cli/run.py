@@ -100,7 +100,12 @@ def _show(
     else:
         if not worked:
             print("nothing to do: all results are up to date\n")
-        for line in outcome.as_text(findings, failures, shutil.get_terminal_size().columns):
+        for line in outcome.as_text(findings, failures, _columns()):
             print(line)
         print(f"report: {results / 'index.html'}")
     return 0 if outcome.passed(findings, failures) else 1
+
+
+def _columns() -> int:
+    """Return the width of the terminal; what goes to a file is not cut."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else 10_000

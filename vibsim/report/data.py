@@ -132,13 +132,7 @@ def swept(record: Record) -> list[str]:
 
 def swept_label(record: Record, name: str) -> tuple[str, str]:
     """Return the dotted key of a swept coordinate and its unit."""
-    from vibsim.models import MODELS
-
-    key = str(record.coords[name].attrs["sweep_key"])
-    model = MODELS[str(record.attrs["model"])]
-    units = {f"initial.{state.name}": state.unit for state in model.states}
-    units |= {f"model.{parameter.name}": parameter.unit for parameter in model.parameters}
-    return key, pretty_unit(units.get(key, "s" if key == "time.end" else ""))
+    return str(record.coords[name].attrs["sweep_key"]), unit(record, name)
 
 
 def case_name(record: Record, case: int) -> str:

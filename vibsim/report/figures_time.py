@@ -61,7 +61,7 @@ def overlay(experiment: Experiment, record: Record, quantity: str, member: Membe
         if spread
         else "",
         "Bottom: the ratio of successive differences; it should settle at the dashed line. Near a zero crossing a "
-        "ratio of two small numbers means nothing: it is left out, or runs away."
+        "ratio of two small numbers means nothing: it is left out."
         if ratios
         else "",
     ]

@@ -56,9 +56,7 @@ _ROWS = (
         "extremal",
         finer_levels=1,
     ),
-    Value(
-        "max_abs_interior_ratio", "the same without the last point", "extremal", finer_levels=1
-    ),
+    Value("max_abs_interior_ratio", "the same without the last point", "extremal", finer_levels=1),
     Value("period", "period, from interpolated peaks", "none"),
     Value("period_grid", "period, from peaks at grid points", "none"),
     Value("exact_period", "period of the exact solution", "none", ("case",), needs_exact=True),
