@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
 import statistics
 import subprocess
 import sys
@@ -71,8 +70,3 @@ def process(command: Sequence[str], **environment: str) -> Process:
     if status:
         raise RuntimeError(f"{' '.join(command)} exited with {status:.0f}: {done.stderr}")
     return Process(wall, cpu, peak)
-
-
-def peak_of_self_mib() -> float:
-    """Return the largest memory this process has held so far."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

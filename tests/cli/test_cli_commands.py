@@ -3,7 +3,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -118,15 +117,10 @@ def test_a_closed_pipe_is_no_fault() -> None:
     assert ended.stderr == ""
 
 
-def test_the_command_starts_quickly() -> None:
+def test_the_command_starts_without_what_it_does_not_need() -> None:
     program = (
         "import sys; import vibsim.cli.run\n"
         "heavy = {'numpy', 'pydantic', 'yaml', 'netCDF4', 'xarray', 'numba', 'snakemake'}\n"
         "assert not heavy & set(sys.modules), heavy & set(sys.modules)"
     )
-    spent = []
-    for _ in range(5):
-        start = time.perf_counter()
-        subprocess.run([sys.executable, "-c", program], check=True)
-        spent.append(time.perf_counter() - start)
-    assert min(spent) < 0.15, spent
+    subprocess.run([sys.executable, "-c", program], check=True)

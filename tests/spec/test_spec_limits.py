@@ -62,12 +62,12 @@ PROBE = """
 import json, resource, sys, time
 from vibsim.spec import Experiment
 from vibsim.errors import InputError
-start = time.perf_counter()
+start = time.process_time()
 try:
     Experiment.from_yaml(sys.argv[1])
     print(json.dumps(None))
 except InputError as error:
-    print(json.dumps([time.perf_counter() - start, str(error)]))
+    print(json.dumps([time.process_time() - start, str(error)]))
 """
 
 TOO_LARGE = {

@@ -9,8 +9,6 @@ rule analyse:
         "{experiment}/logs/analyse.log",
     benchmark:
         "{experiment}/benchmarks/analyse.tsv"
-    conda:
-        "../envs/vibsim.yaml"
     params:
         digest=names.analysis_digest,
         file=names.file,

@@ -9,8 +9,6 @@ rule index:
         ".vibsim/logs/index.log",
     benchmark:
         ".vibsim/benchmarks/index.tsv"
-    conda:
-        "../envs/vibsim.yaml"
     params:
         digest=names.index_digest,
     shell:
@@ -30,8 +28,6 @@ rule report:
         "{experiment}/logs/report.log",
     benchmark:
         "{experiment}/benchmarks/report.tsv"
-    conda:
-        "../envs/vibsim.yaml"
     params:
         digest=names.report_digest,
         file=names.file,

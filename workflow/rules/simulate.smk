@@ -6,8 +6,6 @@ rule simulate:
         "{experiment}/logs/level_{level}.log",
     benchmark:
         "{experiment}/benchmarks/level_{level}.tsv"
-    conda:
-        "../envs/vibsim.yaml"
     params:
         digest=names.shard_digest,
         file=names.file,
@@ -23,8 +21,6 @@ rule simulate_shard:
         "{experiment}/logs/level_{level}_shard_{shard}.log",
     benchmark:
         "{experiment}/benchmarks/level_{level}_shard_{shard}.tsv"
-    conda:
-        "../envs/vibsim.yaml"
     params:
         digest=names.shard_digest,
         file=names.file,
