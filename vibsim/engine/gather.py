@@ -16,27 +16,29 @@ from typing import Any
 Extrema = tuple[float, float, float, float, float]
 """Least and largest position, least and largest velocity, largest absolute energy deviation."""
 
-STATS = (
-    "position_min",
-    "position_max",
-    "velocity_min",
-    "velocity_max",
-    "deviation",
-    "deviation_interior",
-    "first_peak_time",
-    "last_peak_time",
-    "first_peak_time_grid",
-    "last_peak_time_grid",
-    "first_peak",
-    "last_peak",
-    "last_trough",
-    "first_turn_time",
-    "last_turn_time",
-)
-"""Columns of `stats`."""
+# Columns of `stats`.
+POSITION_MIN = 0
+POSITION_MAX = 1
+VELOCITY_MIN = 2
+VELOCITY_MAX = 3
+DEVIATION = 4
+DEVIATION_INTERIOR = 5
+FIRST_PEAK_TIME = 6
+LAST_PEAK_TIME = 7
+FIRST_PEAK_TIME_GRID = 8
+LAST_PEAK_TIME_GRID = 9
+FIRST_PEAK = 10
+LAST_PEAK = 11
+LAST_TROUGH = 12
+FIRST_TURN_TIME = 13
+LAST_TURN_TIME = 14
+N_STATS = 15
 
-COUNTS = ("peaks", "turns", "last_step")
-"""Columns of `counts`."""
+# Columns of `counts`.
+PEAKS = 0
+TURNS = 1
+LAST_STEP = 2
+N_COUNTS = 3
 
 _ROUND = (
     6755399441055744.0  # 1.5 * 2^52: adding and subtracting it rounds to the nearest whole number
@@ -58,8 +60,13 @@ def next_extrema(extrema: Extrema, u: float, v: float, deviation: float) -> Extr
 
 def note_extrema(stats: Any, case: int, extrema: Extrema, interior: float) -> None:
     """Write the extrema of a member that has arrived, and its largest energy deviation without the last point."""
-    stats[case, 0], stats[case, 1], stats[case, 2], stats[case, 3], stats[case, 4] = extrema
-    stats[case, 5] = interior
+    u_min, u_max, v_min, v_max, largest = extrema
+    stats[case, POSITION_MIN] = u_min
+    stats[case, POSITION_MAX] = u_max
+    stats[case, VELOCITY_MIN] = v_min
+    stats[case, VELOCITY_MAX] = v_max
+    stats[case, DEVIATION] = largest
+    stats[case, DEVIATION_INTERIOR] = interior
 
 
 def note_peak(
@@ -75,21 +82,21 @@ def note_peak(
 ) -> None:
     """Write the peak between ``t - dt`` and `t`, where the velocity fell through zero."""
     share = v_before / (v_before - v)
-    stats[case, 7] = t + (share - 1.0) * dt
-    stats[case, 9] = t - dt if u_before >= u else t
-    stats[case, 11] = u_before + 0.5 * (share * dt) * v_before
-    if counts[case, 0] == 0:
-        stats[case, 6] = stats[case, 7]
-        stats[case, 8] = stats[case, 9]
-        stats[case, 10] = stats[case, 11]
-    counts[case, 0] += 1
+    stats[case, LAST_PEAK_TIME] = t + (share - 1.0) * dt
+    stats[case, LAST_PEAK_TIME_GRID] = t - dt if u_before >= u else t
+    stats[case, LAST_PEAK] = u_before + 0.5 * (share * dt) * v_before
+    if counts[case, PEAKS] == 0:
+        stats[case, FIRST_PEAK_TIME] = stats[case, LAST_PEAK_TIME]
+        stats[case, FIRST_PEAK_TIME_GRID] = stats[case, LAST_PEAK_TIME_GRID]
+        stats[case, FIRST_PEAK] = stats[case, LAST_PEAK]
+    counts[case, PEAKS] += 1
 
 
 def note_trough(
     stats: Any, case: int, dt: float, u_before: float, v_before: float, v: float
 ) -> None:
     """Write the height of the trough between ``t - dt`` and `t`, where the velocity rose through zero."""
-    stats[case, 12] = u_before + 0.5 * (v_before / (v_before - v) * dt) * v_before
+    stats[case, LAST_TROUGH] = u_before + 0.5 * (v_before / (v_before - v) * dt) * v_before
 
 
 def bottom_of(u: float, turn: float) -> float:
@@ -113,7 +120,9 @@ def note_turn(
     There the acceleration vanishes, so that the linear interpolation of the position has an error of dt^3 as well. A
     step of more than a turn counts once; such a member is far from resolved.
     """
-    stats[case, 14] = t + ((bottom + 0.5 * ahead - u_before) / (u - u_before) - 1.0) * dt
-    if counts[case, 1] == 0:
-        stats[case, 13] = stats[case, 14]
-    counts[case, 1] += 1
+    stats[case, LAST_TURN_TIME] = (
+        t + ((bottom + 0.5 * ahead - u_before) / (u - u_before) - 1.0) * dt
+    )
+    if counts[case, TURNS] == 0:
+        stats[case, FIRST_TURN_TIME] = stats[case, LAST_TURN_TIME]
+    counts[case, TURNS] += 1

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import math
 import types
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -17,11 +18,10 @@ from typing import Any
 
 from vibsim import expression
 from vibsim.engine import elementary, loop
-from vibsim.engine.cache import load
+from vibsim.engine.cache import Kernel, load
+from vibsim.errors import SimulationError
 from vibsim.models import Model
 from vibsim.schemes import Stepper
-
-Kernel = Callable[..., None]
 
 _PLAIN = """\
 def compiled(function):
@@ -81,27 +81,41 @@ def source(model: Model, stepper: Stepper) -> str:
 def _collect(function: Callable[..., Any], name: str, functions: dict[str, str]) -> None:
     """Write `function` under `name`, after whatever it uses of its own module.
 
-    Names that a module binds to numbers are written as numbers; functions are collected in their turn; ``math`` is
-    imported by every kernel.
+    Names that a module binds to numbers, or tuples of numbers, are written out; functions are collected in their turn;
+    ``math`` is imported by every kernel. Anything else is refused.
     """
     if not isinstance(function, types.FunctionType):
-        raise TypeError(f"{name} is no plain Python function, so it cannot enter a kernel")
+        raise SimulationError(f"{name} is no plain Python function, so it cannot enter a kernel")
     tree = ast.parse(inspect.cleandoc("\n" + inspect.getsource(function))).body[0]
-    assert isinstance(tree, ast.FunctionDef)
+    if not isinstance(tree, ast.FunctionDef):
+        raise SimulationError(f"{name} is no function with a name, so it cannot enter a kernel")
     _strip(tree, name)
     local = set(function.__code__.co_varnames)
     used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} - local
     for other in sorted(used & function.__globals__.keys()):
         value = function.__globals__[other]
-        if isinstance(value, (int, float)):
-            text = f"{other} = {value!r}"
-            if functions.setdefault(other, text) != text:
-                raise ValueError(f"{other} means two things in one kernel")
-        elif isinstance(value, types.FunctionType) and other not in functions:
-            _collect(value, other, functions)
-    text = f"@{'entry' if name == 'kernel' else 'compiled'}\n{ast.unparse(tree)}"
+        if isinstance(value, types.FunctionType):
+            if other not in functions:
+                _collect(value, other, functions)
+        elif _is_constant(value):
+            _add(functions, other, f"{other} = {value!r}")
+        elif value is not math:
+            raise SimulationError(
+                f"{name} uses {other}, which is no number, tuple of numbers or plain function"
+            )
+    mark = "entry" if name == "kernel" else "compiled"
+    _add(functions, name, f"@{mark}\n{ast.unparse(tree)}")
+
+
+def _is_constant(value: object) -> bool:
+    if isinstance(value, tuple):
+        return all(_is_constant(entry) for entry in value)
+    return isinstance(value, int | float)
+
+
+def _add(functions: dict[str, str], name: str, text: str) -> None:
     if functions.setdefault(name, text) != text:
-        raise ValueError(f"{name} means two things in one kernel")
+        raise SimulationError(f"{name} means two things in one kernel")
 
 
 def _strip(tree: ast.FunctionDef, name: str) -> None:
@@ -129,8 +143,7 @@ def _formulas(model: Model) -> dict[str, str]:
     def function(name: str, results: Mapping[str, str]) -> str:
         lines = list(unpack)
         for result, formula in results.items():
-            tree = expression.parse(formula, known)
-            lines += expression.to_statements(tree, result)
+            lines += expression.to_statements(_parsed(formula, known), result)
         lines.append(f"return {', '.join(results)}")
         return f"@compiled\ndef {name}({arguments}):\n    " + "\n    ".join(lines)
 
@@ -142,3 +155,15 @@ def _formulas(model: Model) -> dict[str, str]:
         ),
         "parameters_of": f"@compiled\ndef parameters_of(parameters, case):\n    return ({values},)",
     }
+
+
+def _parsed(formula: str, known: tuple[str, ...]) -> expression.Expression:
+    """Read a formula, and refuse functions that the engine does not have."""
+    tree = expression.parse(formula, known)
+    for node in expression.walk(tree):
+        if isinstance(node, expression.Call) and node.function not in ELEMENTARY:
+            raise SimulationError(
+                f"{formula}: the engine has no function {node.function}; it has "
+                + ", ".join(ELEMENTARY)
+            )
+    return tree

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from vibsim.engine.gather import (
+    LAST_STEP,
     bottom_of,
     next_extrema,
     note_extrema,
@@ -19,9 +20,6 @@ from vibsim.engine.gather import (
 
 OVERFLOW = 1e150
 """A member that grows beyond has failed: its energy could no longer be stored."""
-
-END_RULES = {"kick": 0, "extrapolate": 1, "backward": 2}
-"""Velocity at the last point: the scheme's own, linear extrapolation, one-sided difference."""
 
 
 def run(
@@ -36,7 +34,7 @@ def run(
     dt: Any,
     steps: int,
     every: int,
-    first_order: bool,
+    variant: int,
     end_rule: int,
     turn: float,
     samples: Any,
@@ -56,18 +54,18 @@ def run(
         Shapes (case, n_parameters), (case, 2) with position and velocity, and (case,).
     steps, every
         Number of steps; a sample is stored at each multiple of `every`, which divides `steps`.
-    first_order
-        Whether the first-order start is taken.
+    variant
+        Which of its starts the scheme takes.
     end_rule
-        One of `END_RULES`.
+        Velocity at the last point: index into `vibsim.schemes.base.END_RULES`.
     turn
         Angle of a whole turn; 0 where the position is no angle.
     samples
         Shape (4, case, n_samples), filled with NaN: position, velocity, kinetic and potential energy.
     stats
-        Shape (case, 15), filled with NaN: `vibsim.engine.gather.STATS`.
+        Shape (case, `N_STATS`), filled with NaN: columns of `vibsim.engine.gather`.
     counts
-        Shape (case, 3), filled with zeros: `vibsim.engine.gather.COUNTS`.
+        Shape (case, `N_COUNTS`), filled with zeros: columns of `vibsim.engine.gather`.
     """
     for case in range(len(dt)):
         h = float(dt[case])
@@ -82,9 +80,7 @@ def run(
         samples[3, case, 0] = potential
         extrema = (u, u, v, v, 0.0)
         bottom = bottom_of(u, turn) if turn > 0.0 else 0.0
-        if v == 0.0:
-            stats[case, 12] = u
-        state = start(first_order, u, v, h, p, acceleration)
+        state = start(variant, u, v, h, p, acceleration)
         interior = 0.0
         good = 0
         sample = 1
@@ -94,12 +90,14 @@ def run(
             t = n * h
             u_before, v_two_before, v_before = u, v_before, v
             u = state[0]
-            if n < steps or end_rule == 0:
-                state, v = step(state, t, h, p, acceleration)
-            elif end_rule == 1:
-                v = 2.0 * v_before - v_two_before
-            else:
-                v = backward(state, h)
+            following, own = step(state, t, h, p, acceleration)
+            v = own
+            if n == steps:
+                if end_rule == 1:
+                    v = 2.0 * v_before - v_two_before
+                elif end_rule == 2:
+                    v = backward(state, h)
+            state = following
             # written so that NaN fails as well
             if not abs(u) + abs(v) < OVERFLOW:
                 break
@@ -107,10 +105,11 @@ def run(
             kinetic, potential = energies(u, v, t, p)
             interior = extrema[4]
             extrema = next_extrema(extrema, u, v, (kinetic + potential) - energy_0)
-            if v_before >= 0.0 and v < 0.0:
-                note_peak(stats, counts, case, t, h, u_before, v_before, u, v)
-            if v_before <= 0.0 and v > 0.0:
-                note_trough(stats, case, h, u_before, v_before, v)
+            # the scheme's own velocity: an end formula would move a peak in the last step
+            if v_before >= 0.0 and own < 0.0:
+                note_peak(stats, counts, case, t, h, u_before, v_before, u, own)
+            if v_before <= 0.0 and own > 0.0:
+                note_trough(stats, case, h, u_before, v_before, own)
             if turn > 0.0 and abs(u - bottom) > 0.5 * turn:
                 ahead = turn if u > bottom else -turn
                 note_turn(stats, counts, case, t, h, ahead, bottom, u_before, u)
@@ -123,4 +122,4 @@ def run(
                 sample += 1
                 due += every
         note_extrema(stats, case, extrema, interior)
-        counts[case, 2] = good
+        counts[case, LAST_STEP] = good

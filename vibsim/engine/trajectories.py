@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.engine.gather import COUNTS, STATS
+from vibsim.engine import gather
 from vibsim.engine.kernel import kernel
-from vibsim.engine.loop import END_RULES
 from vibsim.models import Model
 from vibsim.schemes import Scheme
-from vibsim.schemes.base import Options
+from vibsim.schemes.base import END_RULES, Options
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -88,46 +87,43 @@ def integrate(
     """
     members = len(dt)
     samples = np.full((4, members, steps // every + 1), np.nan)
-    stats = np.full((members, len(STATS)), np.nan)
-    counts = np.zeros((members, len(COUNTS)), dtype=np.int64)
-    run = kernel(model, scheme.stepper(options), lane or lane_for(members * steps))
+    stats = np.full((members, gather.N_STATS), np.nan)
+    counts = np.zeros((members, gather.N_COUNTS), dtype=np.int64)
+    stepper = scheme.stepper(options)
+    run = kernel(model, stepper, lane or lane_for(members * steps))
     arrays = (np.ascontiguousarray(array, dtype=np.float64) for array in (parameters, initial, dt))
-    first_order = options.get("start") == "first_order"
-    end_rule = END_RULES[options.get("end_velocity", "kick")]
-    run(*arrays, steps, every, first_order, end_rule, model.turn or 0.0, samples, stats, counts)
+    end_rule = END_RULES.index(stepper.end)
+    turn = model.turn or 0.0
+    run(*arrays, steps, every, stepper.variant, end_rule, turn, samples, stats, counts)
     return _name(samples, stats, counts)
 
 
 def _name(samples: Floats, stats: Floats, counts: Integers) -> Trajectories:
-    stat = dict(zip(STATS, stats.T, strict=True))
-    count = dict(zip(COUNTS, counts.T, strict=True))
-    swings, turns = count["peaks"] - 1, count["turns"] - 1
+    peaks, turns = counts[:, gather.PEAKS] - 1, counts[:, gather.TURNS] - 1
     spinning = turns > 0
-    swinging = (swings > 0) & ~spinning
-    period = np.where(
-        spinning,
-        _mean_time(stat["first_turn_time"], stat["last_turn_time"], turns),
-        _mean_time(stat["first_peak_time"], stat["last_peak_time"], swings),
-    )
-    grid = _mean_time(stat["first_peak_time_grid"], stat["last_peak_time_grid"], swings)
+    swinging = (peaks > 0) & ~spinning
+
+    def mean_time(first: int, last: int, intervals: Integers) -> Floats:
+        span = np.where(intervals > 0, stats[:, last] - stats[:, first], np.nan)
+        return np.asarray(span / np.maximum(intervals, 1))
+
+    of_turn = mean_time(gather.FIRST_TURN_TIME, gather.LAST_TURN_TIME, turns)
+    of_peak = mean_time(gather.FIRST_PEAK_TIME, gather.LAST_PEAK_TIME, peaks)
+    on_grid = mean_time(gather.FIRST_PEAK_TIME_GRID, gather.LAST_PEAK_TIME_GRID, peaks)
     return Trajectories(
         position=samples[0],
         velocity=samples[1],
         kinetic_energy=samples[2],
         potential_energy=samples[3],
-        position_range=stats[:, 0:2],
-        velocity_range=stats[:, 2:4],
-        deviation=stat["deviation"],
-        deviation_interior=stat["deviation_interior"],
-        period=period,
-        period_grid=np.where(swinging, grid, np.nan),
-        period_count=np.where(spinning, turns, np.where(swinging, swings, 0)),
-        first_peak=stat["first_peak"],
-        last_peak=stat["last_peak"],
-        last_trough=stat["last_trough"],
-        last_step=count["last_step"],
+        position_range=stats[:, [gather.POSITION_MIN, gather.POSITION_MAX]],
+        velocity_range=stats[:, [gather.VELOCITY_MIN, gather.VELOCITY_MAX]],
+        deviation=stats[:, gather.DEVIATION],
+        deviation_interior=stats[:, gather.DEVIATION_INTERIOR],
+        period=np.where(spinning, of_turn, of_peak),
+        period_grid=np.where(swinging, on_grid, np.nan),
+        period_count=np.where(spinning, turns, np.where(swinging, peaks, 0)),
+        first_peak=stats[:, gather.FIRST_PEAK],
+        last_peak=stats[:, gather.LAST_PEAK],
+        last_trough=stats[:, gather.LAST_TROUGH],
+        last_step=counts[:, gather.LAST_STEP],
     )
-
-
-def _mean_time(first: Floats, last: Floats, intervals: Integers) -> Floats:
-    return np.asarray(np.where(intervals > 0, last - first, np.nan) / np.maximum(intervals, 1))

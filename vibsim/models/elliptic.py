@@ -104,16 +104,16 @@ def _bulirsch(u: Floats, complement: Floats) -> tuple[Floats, Floats, Floats]:
     return np.where(small, u, sn), np.where(small, 1.0, c * sn), np.where(small, 1.0, dn)
 
 
-def _energy(initial: Numbers, parameters: Numbers) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Return w, the turns before theta_0, sin(theta_0/2), omega_0/(2 w) and ``1 - k^2``."""
+def _energy(initial: Numbers, parameters: Numbers) -> tuple[Floats, ...]:
+    """Return w, the turns before theta_0, sin(theta_0/2), cos(theta_0/2), omega_0/(2 w) and ``1 - k^2``."""
     w, theta, omega = np.broadcast_arrays(
         np.sqrt(np.divide(parameters["g"], parameters["L"])), initial["theta"], initial["omega"]
     )
     turns = np.rint(theta / (2.0 * np.pi))
     half = 0.5 * (theta - 2.0 * np.pi * turns)
     speed = omega / (2.0 * w)
-    complement = (np.cos(half) - speed) * (np.cos(half) + speed)
-    return w, turns, np.sin(half), speed, complement
+    cosine = np.cos(half)
+    return w, turns, np.sin(half), cosine, speed, (cosine - speed) * (cosine + speed)
 
 
 def pendulum_motion(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
@@ -132,12 +132,14 @@ def pendulum_motion(t: Floats, initial: Numbers, parameters: Numbers) -> dict[st
     -----
     The rounding error is about ``(1 + w t)`` units in the last place, times the sensitivity to the initial values.
     """
-    w, turns, sine, speed, complement = _energy(initial, parameters)
+    w, turns, sine, cosine, speed, complement = _energy(initial, parameters)
     t = np.asarray(t, dtype=float)
     k = np.hypot(sine, speed)
     swings = complement >= 0.0
     swing = _libration(t, w, k, sine, speed, np.where(swings, complement, 1.0))
-    spin = _rotation(t, w, np.where(swings, 1.0, k), sine, speed, np.where(swings, 0.0, complement))
+    spin = _rotation(
+        t, w, np.where(swings, 1.0, k), sine, cosine, speed, np.where(swings, 0.0, complement)
+    )
     theta, omega = (np.where(swings, a, b) for a, b in zip(swing, spin, strict=True))
     return {"theta": theta + 2.0 * np.pi * turns, "omega": omega}
 
@@ -153,11 +155,17 @@ def _libration(
 
 
 def _rotation(
-    t: Floats, w: Floats, k: Floats, sine: Floats, speed: Floats, complement: Floats
+    t: Floats,
+    w: Floats,
+    k: Floats,
+    sine: Floats,
+    cosine: Floats,
+    speed: Floats,
+    complement: Floats,
 ) -> tuple[Floats, Floats]:
     sign = np.copysign(1.0, speed)
     inverse = -complement / (k * k)  # 1 - 1/k^2
-    start = _incomplete(sign * sine, np.sqrt(1.0 - sine * sine), inverse)
+    start = _incomplete(sign * sine, cosine, inverse)
     _, _, dn, amplitude = jacobi(w * k * t + start, inverse)
     return 2.0 * sign * amplitude, 2.0 * sign * w * k * dn
 
@@ -167,7 +175,7 @@ def pendulum_period(initial: Numbers, parameters: Numbers) -> Any:
 
     Infinite on the separatrix; NaN at rest. Units of time of the parameters; the shape of the arguments.
     """
-    w, _, sine, speed, complement = _energy(initial, parameters)
+    w, _, sine, _, speed, complement = _energy(initial, parameters)
     k = np.hypot(sine, speed)
     swings = complement >= 0.0
     with np.errstate(invalid="ignore"):

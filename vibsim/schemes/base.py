@@ -37,14 +37,22 @@ class Option:
 
 @dataclass(frozen=True)
 class Stepper:
-    """The arithmetic of a scheme: three functions on the carried state of one member."""
+    """The arithmetic of a scheme: three functions on the carried state of one member, and how it starts and ends."""
 
     start: Callable[..., CarriedState]
-    """``start(first_order, u, v, dt, p, acceleration)``: the state at the first step."""
+    """``start(variant, u, v, dt, p, acceleration)``: the state at the first step."""
     step: Callable[..., tuple[CarriedState, float]]
     """``step(state, t, dt, p, acceleration)``: the next state, and the velocity at the present time t."""
     backward: Callable[..., float]
     """``backward(state, dt)``: the one-sided velocity ``(u^n - u^(n-1))/dt`` at the present time."""
+    variant: int = 0
+    """Which of its starts `start` is to take."""
+    end: str = "own"
+    """Velocity at the last point: `END_RULES`."""
+
+
+END_RULES = ("own", "extrapolate", "backward")
+"""The scheme's own velocity, the linear extrapolation of the last two, or `Stepper.backward`."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +75,8 @@ class Scheme:
     """Largest stable ``w dt`` on ``u'' + w^2 u = 0``; None where there is no limit."""
     force_evaluations: int
     """Evaluations of the acceleration per step."""
+    velocity_forces: bool
+    """Whether the acceleration may depend on the velocity."""
 
     def defaults(self) -> dict[str, str]:
         """Return every option with its default."""

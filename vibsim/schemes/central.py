@@ -22,14 +22,14 @@ from typing import Any
 from vibsim.models.base import Model
 from vibsim.schemes.base import Acceleration, Option, Options, Scheme, Stepper
 
-EPSILON = 2.0**-53
+UNIT_ROUND_OFF = 2.0**-53
 
 
 def start_three_term(
-    first_order: bool, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
+    variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
 ) -> tuple[float, float]:
     """Return u^1 and u^0; u^1 by A (11), or without its dt^2 term (the trap of A, section 2.3)."""
-    kick = 0.0 if first_order else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
+    kick = 0.0 if variant else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
     return u + dt * v + kick, u
 
 
@@ -49,10 +49,10 @@ def backward_three_term(state: tuple[float, float], dt: float) -> float:
 
 
 def start_increment(
-    first_order: bool, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
+    variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
 ) -> tuple[float, float]:
     """Return u^1 and the increment u^1 - u^0."""
-    kick = 0.0 if first_order else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
+    kick = 0.0 if variant else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
     d = dt * v + kick
     return u + d, d
 
@@ -72,10 +72,10 @@ def backward_increment(state: tuple[float, float], dt: float) -> float:
 
 
 def start_compensated(
-    first_order: bool, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
+    variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
 ) -> tuple[float, float, float, float]:
     """Return u^1, the increment u^1 - u^0, and the rounding errors that both still have to get."""
-    kick = 0.0 if first_order else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
+    kick = 0.0 if variant else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
     push = dt * v
     d = push + kick
     part = d - push
@@ -112,13 +112,28 @@ def backward_compensated(state: tuple[float, float, float, float], dt: float) ->
     return state[1] / dt
 
 
-_STEPPERS = {
-    "compensated": Stepper(start_compensated, step_compensated, backward_compensated),
-    "increment": Stepper(start_increment, step_increment, backward_increment),
-    "three_term": Stepper(start_three_term, step_three_term, backward_three_term),
+_FUNCTIONS: dict[str, tuple[Any, Any, Any]] = {
+    "compensated": (start_compensated, step_compensated, backward_compensated),
+    "increment": (start_increment, step_increment, backward_increment),
+    "three_term": (start_three_term, step_three_term, backward_three_term),
 }
 
+_STARTS = ("centred", "first_order")
+_ENDS = {"extrapolate": "extrapolate", "backward": "backward", "kick": "own"}
+
 _GROWTH = {"compensated": 0.0, "increment": 0.5, "three_term": 1.5}
+
+
+def stepper(options: Options) -> Stepper:
+    """Return the arithmetic, the start and the end that the options ask for.
+
+    The velocity at n is known once u^(n+1) is. At the last point that is one more step, whose velocity is the kick:
+    ``(u^(N+1) - u^(N-1))/(2 dt) = (u^N - u^(N-1))/dt + dt a^N/2``.
+    """
+    functions = _FUNCTIONS[options["arithmetic"]]
+    return Stepper(
+        *functions, variant=_STARTS.index(options["start"]), end=_ENDS[options["end_velocity"]]
+    )
 
 
 def formal_order(quantity: str, model: Model, options: Options) -> int:
@@ -128,7 +143,7 @@ def formal_order(quantity: str, model: Model, options: Options) -> int:
 
 def round_off(options: Options, steps: int) -> float:
     """Return the predicted round-off after `steps` steps, relative to the solution."""
-    return float(EPSILON * steps ** _GROWTH[options["arithmetic"]])
+    return float(UNIT_ROUND_OFF * steps ** _GROWTH[options["arithmetic"]])
 
 
 def even_powers(quantity: str, model: Model, options: Options) -> bool:
@@ -147,25 +162,26 @@ CENTRAL = Scheme(
     options=(
         Option(
             "start",
-            ("centred", "first_order"),
+            _STARTS,
             "formula of the first step: A (11), or without its dt^2 term",
         ),
         Option(
             "end_velocity",
-            ("extrapolate", "backward", "kick"),
+            tuple(_ENDS),
             "velocity at the last point: linear extrapolation, one-sided difference, "
             "or (u_N - u_(N-1))/dt + dt a_N/2",
         ),
         Option(
             "arithmetic",
-            ("compensated", "increment", "three_term"),
+            tuple(_FUNCTIONS),
             "how the scheme is written: equal in exact arithmetic, different in round-off",
         ),
     ),
-    stepper=lambda options: _STEPPERS[options["arithmetic"]],
+    stepper=stepper,
     formal_order=formal_order,
     round_off=round_off,
     even_powers=even_powers,
     stability_limit=2.0,
     force_evaluations=1,
+    velocity_forces=False,
 )
