@@ -12,6 +12,8 @@ import pytest
 import yaml
 
 from vibsim.cli.arguments import parser
+from vibsim.models import MODELS
+from vibsim.schemes import SCHEMES
 from vibsim.spec import Experiment
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -207,12 +209,48 @@ def test_every_value_name_is_documented() -> None:
     assert [name for name in VALUES if f"`{name}`" not in text] == []
 
 
+def section(title: str) -> str:
+    """Return one section of the page about the experiment file."""
+    text = (ROOT / "docs/experiment-file.md").read_text()
+    return re.split(r"^##+ ", text.partition(f"\n## {title}\n")[2], flags=re.MULTILINE)[0]
+
+
+def table_rows(text: str) -> dict[str, str]:
+    """Return the rows of the tables in `text` by the name in their first column."""
+    return dict(re.findall(r"^\| `(\w+)` \|(.*)\|$", text, re.MULTILINE))
+
+
+def test_every_model_is_documented_with_its_states_and_parameters() -> None:
+    rows = table_rows(section("model"))
+    assert list(rows) == list(MODELS)
+    for kind, model in MODELS.items():
+        equation, states, parameters = rows[kind].split(" | ")
+        assert equation.strip() == model.equation
+        assert states == ", ".join(f"`{s.name}` [{s.unit}]" for s in model.states)
+        expected = [f"`{p.name}` ({p.default:g}) [{p.unit}]" for p in model.parameters]
+        assert parameters.strip() == ", ".join(expected)
+
+
+def test_every_scheme_is_documented_with_its_options() -> None:
+    """The paragraph of a scheme begins with its name and ends with the table of its options."""
+    text = section("schemes")
+    starts = [
+        (match[1], match.start()) for match in re.finditer(r"^`(\w+)` is ", text, re.MULTILINE)
+    ]
+    assert [kind for kind, _ in starts] == list(SCHEMES)
+    ends = [start for _, start in starts[1:]] + [len(text)]
+    for (kind, start), end in zip(starts, ends, strict=True):
+        rows = table_rows(text[start:end])
+        found = {name: re.findall(r"`(\w+)`", row) for name, row in rows.items()}
+        assert found == {option.name: list(option.choices) for option in SCHEMES[kind].options}
+
+
 def test_every_reason_is_documented_with_its_status() -> None:
-    from vibsim.analysis.verdict import STATUS_OF
+    from vibsim.vocabulary import REASONS
 
     text = (ROOT / "docs/verdicts.md").read_text()
     rows = dict(re.findall(r"^\| `([a-z_]+)` \| ([A-Z]+) \|", text, re.MULTILINE))
-    assert rows == STATUS_OF
+    assert rows == REASONS
 
 
 # --- every file -------------------------------------------------------------------------------------

@@ -34,6 +34,11 @@ class Variable:
             )
 
 
+def attributes(long_name: str, units: str, **more: Any) -> dict[str, Any]:
+    """Return the attributes of a variable."""
+    return {"long_name": long_name, "units": units, **more}
+
+
 @dataclass(frozen=True)
 class Record:
     """Coordinates, variables and attributes that belong together."""
@@ -44,7 +49,22 @@ class Record:
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         """Return the values of the variable or coordinate `name`."""
-        return (self.variables.get(name) or self.coords[name]).values
+        return self.variable(name).values
+
+    def variable(self, name: str) -> Variable:
+        """Return the variable or coordinate `name`."""
+        return self.variables[name] if name in self.variables else self.coords[name]
+
+    def words(self, name: str) -> list[str]:
+        """Return a coordinate of words (schemes, norms, checks) as text; files give bytes."""
+        entries = self[name].tolist()
+        return [entry.decode() if isinstance(entry, bytes) else str(entry) for entry in entries]
+
+    def meanings(self, name: str) -> dict[int, str]:
+        """Return the word for every value of a flag variable."""
+        attrs = self.variable(name).attrs
+        values = np.ravel(np.asarray(attrs["flag_values"])).tolist()
+        return dict(zip(values, str(attrs["flag_meanings"]).split(), strict=True))
 
     def __contains__(self, name: str) -> bool:
         return name in self.variables or name in self.coords

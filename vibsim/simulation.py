@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from vibsim import plan
 from vibsim.engine import Trajectories, integrate
 from vibsim.models import MODELS, Model
-from vibsim.record import Attribute, Record, Variable
+from vibsim.record import Attribute, Record, Variable, attributes
 from vibsim.schemes import SCHEMES
 
 if TYPE_CHECKING:
@@ -123,10 +123,6 @@ def members(experiment: Experiment, start: int, stop: int) -> Members:
     )
 
 
-def _attrs(long_name: str, units: str, **more: Any) -> dict[str, Any]:
-    return {"long_name": long_name, "units": units, **more}
-
-
 def _fractions(steps: int, every: int) -> NDArray[np.int64]:
     return np.arange(0, steps + 1, every, dtype=np.int64)
 
@@ -143,19 +139,23 @@ def _coords(
     number = _fractions(steps, every)
     t = number * (group.end[0] / steps) if same_end else number / steps
     coords = {
-        "scheme": Variable(("scheme",), np.array(schemes), _attrs("name of the scheme", "1")),
-        "case": Variable(("case",), group.index, _attrs("index of the member of the sweep", "1")),
+        "scheme": Variable(("scheme",), np.array(schemes), attributes("name of the scheme", "1")),
+        "case": Variable(
+            ("case",), group.index, attributes("index of the member of the sweep", "1")
+        ),
         "t": Variable(
             ("t",),
             np.asarray(t, dtype=float),
-            _attrs("time", "s") if same_end else _attrs("time as a fraction of the end time", "1"),
+            attributes("time", "s")
+            if same_end
+            else attributes("time as a fraction of the end time", "1"),
         ),
     }
     if not same_end:
-        coords["end"] = Variable(("case",), group.end, _attrs("end time of the member", "s"))
+        coords["end"] = Variable(("case",), group.end, attributes("end time of the member", "s"))
     units = _units(model)
     for key, values in group.columns.items():
-        attrs = _attrs(f"swept value of {key}", units[key], sweep_key=key)
+        attrs = attributes(f"swept value of {key}", units[key], sweep_key=key)
         coords[key.replace(".", "_")] = Variable(("case",), values, attrs)
     return coords
 
@@ -182,7 +182,7 @@ def _series(model: Model, runs: list[Trajectories]) -> dict[str, Variable]:
         ),
     }
     return {
-        name: Variable(("scheme", "case", "t"), values, _attrs(long_name, unit))
+        name: Variable(("scheme", "case", "t"), values, attributes(long_name, unit))
         for name, (values, long_name, unit) in table.items()
     }
 
@@ -198,7 +198,7 @@ def _exact(model: Model, group: Members, steps: int, every: int) -> dict[str, Va
     )
     return {
         f"{state.name}_exact": Variable(
-            ("case", "t"), exact[state.name], _attrs(f"exact {state.long_name}", state.unit)
+            ("case", "t"), exact[state.name], attributes(f"exact {state.long_name}", state.unit)
         )
         for state in model.states
     }
@@ -211,7 +211,7 @@ def _gathered(
     table: dict[str, tuple[Any, dict[str, Any]]] = {}
 
     def add(name: str, values: list[Any], long_name: str, units: str, **more: Any) -> None:
-        table[name] = (np.stack(values), _attrs(long_name, units, **more))
+        table[name] = (np.stack(values), attributes(long_name, units, **more))
 
     for state, field in zip(model.states, ("position_range", "velocity_range"), strict=True):
         for i, (name, word) in enumerate((("min", "least"), ("max", "largest"))):
@@ -282,14 +282,14 @@ def _constants(model: Model, group: Members, steps: int) -> dict[str, Variable]:
     table = {
         "natural_frequency": (
             frequency,
-            _attrs("angular frequency of small oscillations", "rad s-1"),
+            attributes("angular frequency of small oscillations", "rad s-1"),
         ),
         "omega_dt": (
             frequency * (group.end / steps),
-            _attrs("angular frequency of small oscillations times the time step", "1"),
+            attributes("angular frequency of small oscillations times the time step", "1"),
         ),
     }
     if model.exact_period is not None:
         period = model.exact_period(group.initial, group.parameters)
-        table["exact_period"] = (np.asarray(period, dtype=float), _attrs("exact period", "s"))
+        table["exact_period"] = (np.asarray(period, dtype=float), attributes("exact period", "s"))
     return {name: Variable(("case",), values, attrs) for name, (values, attrs) in table.items()}

@@ -31,7 +31,7 @@ def standard_error(t: Floats, h: float, scheme: int, case: int) -> tuple[Floats,
     """Errors (exact - computed) of theta and omega: h^2 e2 + h^4 e4."""
     size = 0.02 * (1 + scheme) * (1 + 0.1 * case)
     shape = t * np.sin(t) * size, t * np.cos(t + 0.3) * size
-    return h**2 * shape[0] + h**4 * size * np.cos(2 * t), h**2 * shape[1]
+    return h**2 * shape[0] + h**4 * size * np.sin(2 * t), h**2 * shape[1]
 
 
 def level_records(
@@ -68,6 +68,8 @@ def _record(
         for c in range(members):
             wrong = error(fraction * end[c], 2.0**-level, s, c)
             theta[s, c], omega[s, c] = exact[0][c] - wrong[0], exact[1][c] - wrong[1]
+            # every level starts from the same values
+            theta[s, c, 0], omega[s, c, 0] = exact[0][c, 0], exact[1][c, 0]
     status = np.zeros(theta.shape[:2], dtype=np.int8)
     failure_time = np.full(status.shape, np.nan)
     last_step = np.full(status.shape, steps)
@@ -96,6 +98,7 @@ def _record(
         "energy_deviation_max_abs": np.nanmax(np.abs(deviation), axis=-1),
         "energy_deviation_max_abs_interior": np.nanmax(np.abs(deviation[..., :-1]), axis=-1),
         "amplitude": np.nanmax(np.abs(theta), axis=-1),
+        "period_count": np.full(status.shape, 2),
         "first_peak": np.full(status.shape, 1.0),
         "last_peak": np.full(status.shape, 1.5),
         "period": np.full(status.shape, 2 * np.pi * (1 + 4.0**-level)),

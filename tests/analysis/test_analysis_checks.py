@@ -11,6 +11,7 @@ from level_records import experiment, level_records, standard_error
 
 from vibsim.analysis import Verdict, analyse_records, summarise, values, verdicts
 from vibsim.analysis.evidence import evidence
+from vibsim.analysis.valued import sees_several_levels
 from vibsim.spec import VALUES
 
 T = np.linspace(0.0, 8.0, 17)
@@ -132,17 +133,45 @@ def test_extrema_and_energies_over_every_step() -> None:
     exp = experiment()
     records = level_records(exp)
     theta, energy = records[7]["theta"][0, 0], records[7]["energy"][0, 0]
+    deviation = np.abs(energy - energy[0])
     found = run(
         {"value": "max", "quantity": "theta", "equals": theta.max()},
         {"value": "min", "quantity": "theta", "equals": theta.min()},
         {"value": "max_abs", "quantity": "theta", "equals": np.abs(theta).max()},
-        {"value": "max_abs_interior", "quantity": "theta", "equals": np.abs(theta[:-1]).max()},
+        {"value": "max_abs", "quantity": "energy_deviation", "equals": deviation.max()},
+        {
+            "value": "max_abs_interior",
+            "quantity": "energy_deviation",
+            "equals": deviation[:-1].max(),
+        },
         {
             "value": "relative_energy_error",
             "equals": np.abs(energy - energy[0]).max() / energy[0],
         },
     )
-    assert [v.status for v in found] == ["PASS"] * 5
+    assert [v.status for v in found] == ["PASS"] * 6
+
+
+def test_what_was_not_gathered_over_every_step_is_not_made_up_from_samples() -> None:
+    exp = experiment()
+    records = level_records(exp)
+    record = analyse_records(exp, records)
+    for name in ("min", "max", "max_abs", "max_abs_interior"):
+        place = values.Place(record, records, "energy", None, None, None)
+        assert np.isnan(values.value(name, place)).all(), name
+
+
+def test_numbers_that_rest_on_several_levels_are_those_of_the_registry() -> None:
+    found = {name for name in VALUES if sees_several_levels(name)}
+    assert found == {
+        "error_estimate_defect",
+        "observed_order",
+        "ratio",
+        "coincidence",
+        "richardson_error",
+        "max_abs_ratio",
+        "max_abs_interior_ratio",
+    }
 
 
 def test_numbers_of_triples_and_the_estimate() -> None:

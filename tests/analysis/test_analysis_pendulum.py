@@ -9,7 +9,8 @@ import pytest
 from ladders import evidence_of
 from reference_pendulum import pendulum
 
-from vibsim.analysis.verdict import REASONS, STATUSES, judge
+from vibsim.analysis.verdict import judge
+from vibsim.vocabulary import REASON_NAMES, STATUSES
 
 THETA_AT_20 = {6: 0.9996677748139638, 7: 0.9971663759228251, 8: 0.9961666300804089}
 
@@ -20,7 +21,7 @@ def decide(levels: range, quantity: str, **more: Any) -> tuple[str, str, float]:
     found = judge(evidence_of(fields, tuple(levels), norm=norm, floor=floor))
     return (
         STATUSES[int(found.status[0])],
-        REASONS[int(found.reason[0])],
+        REASON_NAMES[int(found.reason[0])],
         float(found.order[0]),
     )
 

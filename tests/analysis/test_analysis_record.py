@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from level_records import experiment, level_records, standard_error
 
 from vibsim.analysis import analyse, analyse_records, summarise, verdicts
 from vibsim.errors import VibsimError
-from vibsim.record import Record
+from vibsim.record import Record, Variable
 from vibsim.simulation import simulate
 
 T = np.linspace(0.0, 8.0, 17)
@@ -22,7 +23,7 @@ def test_signs_and_factors_of_every_series() -> None:
     record = analyse_records(exp, level_records(exp))
     h = 2.0**-4
     leading = h**2 * SIZE * T * np.sin(T)
-    fourth = h**4 * SIZE * np.cos(2 * T)
+    fourth = h**4 * SIZE * np.sin(2 * T)
     error = leading + fourth
     difference = -(0.75 * leading + (1 - 1 / 16) * fourth)
     assert record["t"] == pytest.approx(T)
@@ -44,8 +45,8 @@ def test_signs_and_factors_of_every_series() -> None:
     assert record["energy_error"][0, 0, 0] == pytest.approx(start - computed, abs=1e-15)
     ratio = record["theta_ratio"][0, 0, 1]
     assert np.nanmax(np.abs(ratio[1:] - 4)) < 0.05
-    # at t = 0 the h^4 term stands alone
-    assert ratio[0] == pytest.approx(16.0, rel=1e-5)
+    # both differences vanish at t = 0
+    assert np.isnan(ratio[0])
     assert record["theta_finest"][0, 0] == pytest.approx(np.cos(T) - _error_at(7), abs=1e-15)
     assert np.array_equal(record["theta_exact"][0], np.cos(T))
     assert record["theta_richardson"][0, 0] == pytest.approx(np.cos(T), abs=1e-14)
@@ -97,6 +98,7 @@ def test_dimensions_and_sizes_agree() -> None:
         "theta_error_norm": ("scheme", "case", "level", "norm"),
         "theta_richardson_error_norm": ("scheme", "case", "norm"),
         "theta_floor": ("scheme", "case", "level"),
+        "theta_formal_order": ("scheme",),
         "theta_order": ("scheme", "case", "norm"),
         "theta_status": ("scheme", "case"),
         "energy_deviation_scaled": ("scheme", "case", "level", "t"),
@@ -112,6 +114,20 @@ def test_dimensions_and_sizes_agree() -> None:
     for name, variable in record.variables.items():
         assert isinstance(variable.attrs.get("units"), str), name
         assert isinstance(variable.attrs.get("long_name"), str), name
+
+
+def test_what_differs_between_levels_has_a_level_whatever_its_name() -> None:
+    exp = experiment()
+    records = level_records(exp)
+    attrs = {"long_name": "made up", "units": "1"}
+    for level, record in records.items():
+        numbers = {"of_level": float(level), "of_all": 3.0, "unknown": np.nan}
+        extra = {n: Variable(("case",), np.array([v]), attrs) for n, v in numbers.items()}
+        records[level] = replace(record, variables={**record.variables, **extra})
+    found = analyse_records(exp, records).variables
+    assert found["of_level"].dims == ("case", "level")
+    np.testing.assert_array_equal(found["of_level"].values, [[4.0, 5.0, 6.0, 7.0]])
+    assert found["of_all"].dims == found["unknown"].dims == ("case",)
 
 
 def test_each_member_has_its_own_step_where_ends_differ() -> None:

@@ -3,11 +3,15 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from vibsim import schemes
 from vibsim.cli import main
+from vibsim.models import MODELS
+from vibsim.schemes import SCHEMES
 
 TEXT = """\
 title: A tiny pendulum
@@ -62,6 +66,39 @@ def test_plan_shows_what_a_run_costs(file: Path, capsys: Capture) -> None:
 def test_lists(what: str, shown: str, capsys: Capture) -> None:
     assert main(["list", what]) == 0
     assert shown in capsys.readouterr().out
+
+
+def test_list_of_models_tells_which_are_linear(capsys: Capture) -> None:
+    assert main(["list", "models"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    shapes = {line.split()[0]: line.rpartition("; ")[2] for line in lines}
+    assert shapes == {
+        kind: "linear" if model.linear else "nonlinear" for kind, model in MODELS.items()
+    }
+
+
+def test_list_of_schemes_tells_work_and_limit(
+    capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    free = replace(SCHEMES["central"], kind="free", stability_limit=None, force_evaluations=4)
+    monkeypatch.setattr(schemes, "SCHEMES", {**SCHEMES, "free": free})
+    assert main(["list", "schemes"]) == 0
+    lines = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
+    assert "1 force evaluation(s) per step; stable while w dt < 2" in lines["central"]
+    assert "4 force evaluation(s) per step; stable for every step" in lines["free"]
+
+
+@pytest.mark.parametrize(
+    "option", [["--digest", "0" * 64], ["--discard"], ["--formats", "png"]], ids=lambda o: o[0]
+)
+def test_the_index_takes_no_option_of_one_report(
+    tmp_path: Path, capsys: Capture, option: list[str]
+) -> None:
+    assert main(["report", "--results", str(tmp_path), *option]) == 2
+    assert f"{option[0]}" in capsys.readouterr().err
+    assert not (tmp_path / "index.html").exists()
+    assert main(["report", "--results", str(tmp_path)]) == 0
+    assert (tmp_path / "index.html").exists()
 
 
 @pytest.mark.parametrize(

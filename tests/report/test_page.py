@@ -3,19 +3,33 @@
 from __future__ import annotations
 
 import re
+import sys
+from dataclasses import replace
 from html.parser import HTMLParser
+from types import MappingProxyType
 
 import numpy as np
 import pytest
 import samples
 
 from vibsim import report
+from vibsim.analysis import verdicts
 from vibsim.errors import VibsimError
+from vibsim.models import MODELS
 from vibsim.record import Record, Variable
-from vibsim.report import figures_time, words
+from vibsim.report import (
+    data,
+    figures_grid,
+    figures_order,
+    figures_sweep,
+    figures_time,
+    style,
+    words,
+)
 from vibsim.report.data import Member
-from vibsim.spec import REASONS
+from vibsim.vocabulary import REASONS
 
+PROVENANCE = {"versions": {"vibsim": "1.2", "python": "3.99", "numpy": "9.9"}, "digest": "d1"}
 VOID = {"meta", "br", "img", "link", "hr", "input", "col"}
 
 
@@ -75,7 +89,7 @@ def plain(tmp_path_factory):
         directory,
         samples.plain(),
         formats=("svg", "png", "pdf"),
-        provenance={"versions": {"numpy": "9.9"}},
+        provenance=PROVENANCE,
     )
 
 
@@ -123,7 +137,8 @@ def test_the_page_says_what_was_found(plain):
     for part in (
         "PASS", "pendulum lecture, section 2.5", "asymptotic", words.REASONS["asymptotic"].needs, "4.026", "6 to 9",
         "θ converges with the order of its scheme ± 0.1 (l2 norm)", "divides the error by about 4",
-        ".venv/bin/vibsim run pendulum_lab/theta", "versions.numpy", "9.9", "arithmetic: compensated",
+        ".venv/bin/vibsim run pendulum_lab/theta", "vibsim 1.2, Python 3.99, numpy 9.9, matplotlib ", ", jinja2 ",
+        "arithmetic: compensated",
     ):  # fmt: skip
         assert part in text, part
 
@@ -161,7 +176,7 @@ def test_figures_and_tables_are_files_too(plain):
 
 
 def test_writing_again_gives_the_same_bytes_and_clears_what_is_left(plain, tmp_path):
-    formats, provenance = ("svg", "png", "pdf"), {"versions": {"numpy": "9.9"}}
+    formats, provenance = ("svg", "png", "pdf"), PROVENANCE
     (tmp_path / "figures").mkdir()
     (tmp_path / "figures/of_another_time.svg").write_text("old")
     make(tmp_path, samples.plain(), formats=formats, provenance=provenance)
@@ -199,7 +214,9 @@ def test_nan_everywhere_makes_a_page_with_its_failures(tmp_path):
     exp = samples.plain()
     whole = samples.record(exp)
     blank = {
-        name: Variable(v.dims, np.full_like(v.values, np.nan), v.attrs) if v.values.dtype.kind == "f" else v
+        name: Variable(v.dims, np.full_like(v.values, np.nan), v.attrs)
+        if v.values.dtype.kind == "f" and not name.endswith("formal_order")
+        else v
         for name, v in whole.variables.items()
     }  # fmt: skip
     failure = {
@@ -258,7 +275,7 @@ def test_a_ladder_lost_in_round_off_shows_what_is_there(tmp_path):
 
 def test_uneven_levels_are_rescaled_so_that_they_coincide():
     exp = samples.experiment(levels=[8, 9, 11, 12])
-    curves = figures_time.differences(exp, samples.record(exp), "theta", Member(0, 0, "central"))
+    curves = figures_time.differences(samples.record(exp), "theta", Member(0, 0, "central"))
     largest = [np.abs(curve.values).max() for curve in curves]
     np.testing.assert_allclose(largest, largest[-1], rtol=0.01)
     assert [curve.label for curve in curves] == ["θ₈ − θ₉", "3.2 (θ₉ − θ₁₁)", "64 (θ₁₁ − θ₁₂)"]
@@ -290,6 +307,105 @@ def test_all_kinds_of_experiments_make_a_page(tmp_path, changes, parts):
     assert not re.search(r"\b(nan|None)\b", text)
     for part in parts:
         assert part in text, part
+
+
+def promising(record, *orders, quantity="theta"):
+    """Return the record of schemes that promise other orders."""
+    name = f"{quantity}_formal_order"
+    promise = replace(record.variables[name], values=np.array(orders, dtype=float))
+    return replace(record, variables={**record.variables, name: promise})
+
+
+TOLERANT = [
+    {"converges": "theta", "tolerance": 0.3, "schemes": ["central"]},
+    {"converges": "theta", "schemes": ["trap"], "expect": {"status": "FAIL"}},
+]
+
+
+def test_every_promised_order_has_its_reference_and_its_tolerance():
+    exp = samples.several(checks=TOLERANT)
+    record = promising(samples.record(exp), 2, 1)
+    assert data.promises(exp, record, "theta") == [(1.0, 0.1), (2.0, 0.3)]
+    with style.applied():
+        text = style.svg(figures_order.against_step(exp, record, "theta", 0))
+    assert "slope 1 (promised)" in text
+    assert "slope 2 (promised)" in text
+
+
+def test_one_promise_of_several_schemes_is_drawn_once():
+    exp = samples.several()
+    record = samples.record(exp)
+    assert data.promises(exp, record, "theta") == [(2.0, 0.1)]
+    with style.applied():
+        text = style.svg(figures_order.against_step(exp, record, "theta", 0))
+    assert text.count("slope 2 (promised)") == 1
+
+
+def test_a_sweep_shows_every_promise_and_the_map_is_relative_to_it():
+    sweep = {"initial.theta": [0.5, 1.0], "model.g": [1.0, 2.0]}
+    exp = samples.several(checks=TOLERANT, sweep=sweep)
+    record = promising(samples.record(exp), 2, 1)
+    with style.applied():
+        text = style.svg(figures_sweep.orders(exp, record, "theta"))
+        picture = figures_grid.grid(record, "theta")
+    assert "promised, 1 ± 0.1" in text
+    assert "promised, 2 ± 0.3" in text
+    titles = [ax.get_title(loc="left") for ax in picture.figure.axes[:2]]
+    assert titles == ["central: 2 promised", "trap: 1 promised"]
+    for ax in picture.figure.axes[:2]:
+        assert np.abs(ax.collections[0].get_array()).max() < 0.2
+
+
+def test_the_rescaled_curves_are_those_that_are_stored():
+    exp = samples.experiment(levels=[8, 9, 11, 12])
+    record = samples.record(exp)
+    curves = figures_time.differences(record, "theta", Member(0, 0, "central"))
+    np.testing.assert_array_equal([c.values for c in curves], record["theta_rescaled"][0, 0])
+
+
+def test_a_promise_of_order_zero_makes_a_page(tmp_path):
+    exp = samples.plain()
+    record = samples.record(exp)
+    for quantity in ("theta", "energy_deviation"):
+        record = promising(record, 0, quantity=quantity)
+    make(tmp_path, exp, record=record)
+    assert not read(tmp_path / "report.html").faults
+
+
+@pytest.mark.parametrize("changes", [{}, {"sweep": {"initial.theta": [0.5, 1.0, 2.0]}}])
+def test_a_model_without_exact_solution_and_period_makes_a_page(tmp_path, monkeypatch, changes):
+    bare = replace(MODELS["pendulum"], exact=None, exact_period=None)
+    known = MappingProxyType({**MODELS, "pendulum": bare})
+    for module in [m for n, m in list(sys.modules.items()) if n.startswith("vibsim")]:
+        if getattr(module, "MODELS", None) is MODELS:
+            monkeypatch.setattr(module, "MODELS", known)
+    exp = samples.experiment(**changes)
+    record = samples.record(exp)
+    assert "theta_exact" not in record
+    assert "exact_period" not in record
+    (verdict,) = verdicts(exp, record)
+    assert (verdict.status, verdict.reason) == ("PASS", "asymptotic")
+    make(tmp_path, exp, record=record)
+    text = " ".join(read(tmp_path / "report.html").text)
+    assert "Estimated error" in text
+    assert "true error (dots)" not in text
+    assert not re.search(r"\bnan\b", text)
+
+
+def test_a_quantity_has_one_name_on_the_page(tmp_path):
+    checks = [
+        {"converges": "theta", "order": 3},
+        {"claim": "theta is `theta`", "that": {"converges": "energy_deviation", "order": 3}},
+    ]
+    make(tmp_path, samples.experiment(checks=checks))
+    text = re.sub(r"<[^>]*>", "", (tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert "θ converges slower than order 3" in text
+    assert "dE converges slower than order 3" in text
+    assert "theta converges" not in text
+    assert "energy_deviation converges" not in text
+    assert "Claim: theta is" in text
+    assert "θ is" not in text
+    assert "Measured: the statement is false. dE converges" in text
 
 
 def test_every_reason_has_words():

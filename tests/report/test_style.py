@@ -72,13 +72,19 @@ def test_limits_hold_every_value_and_are_never_empty():
         assert low < high
 
 
+def test_more_lines_than_colours_still_look_different():
+    looks = [style.look(i) for i in range(3 * len(style.COLOURS))]
+    assert len({(x["color"], str(x["linestyle"])) for x in looks}) == len(looks)
+    assert len({(x["color"], x["marker"]) for x in looks}) == len(looks)
+
+
 @pytest.fixture(scope="module")
 def documents():
     exp = samples.plain()
     record = samples.record(exp)
     with style.applied():
         return [
-            style.svg(figures_time.overlay(exp, record, "theta", Member(0, 0, "central")))
+            style.svg(figures_time.overlay(record, "theta", Member(0, 0, "central")))
             for _ in range(2)
         ]
 

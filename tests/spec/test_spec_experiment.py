@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import math
 import pickle
+import subprocess
+import sys
 from copy import deepcopy
 from pathlib import Path
 
@@ -15,9 +17,13 @@ from spec_files import GOOD, build, content, only_fault, write
 
 from vibsim.errors import InputError
 from vibsim.models import MODELS
-from vibsim.plan import sampling
+from vibsim.plan import choose, sampling
+from vibsim.plan import load as load_plan
 from vibsim.schemes import SCHEMES
 from vibsim.spec import Experiment, canonical, collection_of, load, restore, stride
+from vibsim.spec import collection as collections
+
+ROOT = Path(__file__).resolve().parents[2]
 
 DESIGN = """\
 # yaml-language-server: $schema=../../workflow/schemas/experiment.schema.json
@@ -284,7 +290,7 @@ def test_stride_is_the_plans(samples: object, levels: list[int]) -> None:
         steps = experiment.steps(level)
         every = stride(experiment.samples, coarsest, steps, 1)
         assert every == sampling(experiment, level)
-        assert (steps // coarsest) % every == 0
+        assert steps % every == 0
 
 
 def test_numpy_numbers_and_tuples() -> None:
@@ -303,20 +309,41 @@ def test_numpy_numbers_and_tuples() -> None:
     ("path", "collection"),
     [
         ("configs/lab/a.yaml", "lab"),
-        ("configs/deep/er/a.yaml", "er"),
+        ("configs/deep/er/a.yaml", "adhoc"),
         ("configs/a.yaml", "adhoc"),
+        ("elsewhere/configs/lab/a.yaml", "adhoc"),
         ("elsewhere/a.yaml", "adhoc"),
     ],
 )
-def test_collection(tmp_path: Path, path: str, collection: str) -> None:
+def test_collection(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, path: str, collection: str
+) -> None:
     file = tmp_path / path
     file.parent.mkdir(parents=True)
     file.write_text(GOOD)
-    assert load(file).collection == collection
+    assert load(file).collection == "adhoc"
     assert load(file, configs=tmp_path / "configs").collection == collection
     assert load(file, configs=tmp_path / "others").collection == "adhoc"
     assert load(file, collection="mine").collection == "mine"
-    assert collection_of(file) == collection
+    monkeypatch.setattr(collections, "find_checkout", lambda: tmp_path)
+    assert load(file).collection == Experiment.from_yaml(file).collection == collection
+    assert [choice.collection for choice in choose([str(file)], tmp_path)] == [collection]
+
+
+def test_without_a_checkout_every_file_is_ad_hoc(monkeypatch: pytest.MonkeyPatch) -> None:
+    file = next((ROOT / "configs/pendulum_lab").glob("*.yaml"))
+    assert collection_of(file) == "pendulum_lab"
+    monkeypatch.setattr(collections, "find_checkout", lambda: None)
+    assert collection_of(file) == "adhoc"
+
+
+def test_a_plan_that_is_kept_needs_no_validation() -> None:
+    program = (
+        "import sys; import vibsim.plan, vibsim.spec.collection\n"
+        "heavy = {'numpy', 'pydantic', 'yaml'} & set(sys.modules)\n"
+        "assert not heavy, heavy"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)
 
 
 @pytest.mark.parametrize("name", ["A", "a-b", "a b", "\u00e4", "a.b", ""])
@@ -331,7 +358,9 @@ def test_collection_must_be_plain(tmp_path: Path) -> None:
     folder = tmp_path / "configs" / "My Lab"
     folder.mkdir(parents=True)
     with pytest.raises(InputError, match="name of the collection, 'My Lab'"):
-        load(write(folder, GOOD))
+        load(write(folder, GOOD), configs=tmp_path / "configs")
+    with pytest.raises(InputError, match="name of the collection, 'My Lab'"):
+        load_plan(*choose([str(folder / "case.yaml")], tmp_path))
 
 
 def test_dictionary_that_contains_itself() -> None:
@@ -343,3 +372,39 @@ def test_dictionary_that_contains_itself() -> None:
 
 def test_dictionary_faults_have_no_line() -> None:
     assert only_fault(levels={"from": 9, "to": 6}).line == 0
+
+
+def test_every_check_tells_what_is_measured() -> None:
+    that = {"value": "period", "equals": 6.7, "rtol": 0.1}
+    checks = build(checks=[{"converges": "theta"}, that, {"claim": "c", "that": that}]).checks
+    assert [check.measured.kind for check in checks] == ["converges", "value", "value"]
+    assert checks[0].measured is checks[0]
+    assert checks[1].measured is checks[1]
+    assert checks[2].measured is checks[2].that
+
+
+@pytest.mark.parametrize(
+    "sweep",
+    [
+        None,
+        {"model.g": [1, 2]},
+        {"model.g": [2, 2]},
+        {"model.m": {"linspace": [1, 1, 3]}},
+        {"initial.theta": [1, 2]},
+    ],
+)
+@pytest.mark.parametrize(
+    "time", [{"end": 20}, {"periods": 2, "steps_per_period": 4}], ids=["end", "periods"]
+)
+def test_checks_and_jobs_agree_on_whether_the_end_varies(
+    sweep: dict[str, object] | None, time: dict[str, float]
+) -> None:
+    """A `t` is a fraction for checks exactly where it is one in the data."""
+    check = {"value": "at", "quantity": "theta", "at": {"t": 1}, "below": 9}
+    changes = {"sweep": sweep, "time": time, "samples": "common"}
+    varies = build(**changes).end_varies
+    changes["checks"] = [check]
+    if varies:
+        build(**changes)
+    else:
+        assert "not a stored sample time" in only_fault(**changes).rule

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from spec_files import GOOD, build, faults_of, file_faults, only_fault
+
+from vibsim.analysis import analyse_records
+from vibsim.errors import InputError
+from vibsim.models import MODELS, quantities
+from vibsim.schemes import SCHEMES
+from vibsim.simulation import simulate_record
+from vibsim.spec import VALUES
+from vibsim.spec import build as building
 
 LAPTOP = {"levels": [6, 7, 8, 9]}
 
@@ -199,6 +209,25 @@ CASES: list[tuple[dict[str, Any], str, str, str]] = [
     (value(value="maxx"), "checks[0].value", "unknown value", "did you mean 'max'?"),
     (value(quantity="thta"), "checks[0].quantity", "unknown quantity", "did you mean 'theta'?"),
     (value(quantity="energy"), "checks[0].quantity", "is not known of this quantity", "theta"),
+    (value(quantity="energy_deviation"), "checks[0].quantity", "not known", "from theta, omega"),
+    (
+        value(value="max_abs", quantity="energy"),
+        "checks[0].quantity",
+        "max_abs is not known of this quantity",
+        "choose from theta, omega, energy_deviation",
+    ),
+    (
+        value(value="max_abs_interior"),
+        "checks[0].quantity",
+        "max_abs_interior is not known of this quantity",
+        "choose from energy_deviation",
+    ),
+    (
+        value(value="max_abs_interior_ratio"),
+        "checks[0].quantity",
+        "max_abs_interior_ratio is not known of this quantity",
+        "choose from energy_deviation",
+    ),
     (value(quantity=None), "checks[0].quantity", "required key is missing", "theta"),
     (value(value="period"), "checks[0].quantity", "takes no quantity", ""),
     (value(above=0), "checks[0]", "exactly one of equals, below, above", ""),
@@ -259,6 +288,69 @@ def test_one_fault(changes: dict[str, Any], key: str, rule: str, hint: str) -> N
     assert hint in fault.hint
 
 
+@pytest.mark.parametrize("name", ["min", "max", "max_abs", "max_abs_interior"])
+@pytest.mark.parametrize("quantity", quantities(MODELS["pendulum"]))
+def test_an_extremum_that_is_accepted_is_measured(name: str, quantity: str) -> None:
+    """Samples are few here, so that nothing but what was gathered over every step can give it."""
+    changes = value(value=name, quantity=quantity)
+    try:
+        experiment = build(**changes, samples="common")
+    except InputError:
+        return
+    records = {level: simulate_record(experiment, level) for level in experiment.levels}
+    assert np.isfinite(analyse_records(experiment, records)["check_value"]).all()
+
+
+def change_model(monkeypatch: pytest.MonkeyPatch, **changes: Any) -> None:
+    models = {**MODELS, "pendulum": replace(MODELS["pendulum"], **changes)}
+    monkeypatch.setattr(building, "MODELS", models)
+
+
+@pytest.mark.parametrize("name", [name for name, row in VALUES.items() if row.needs_exact])
+@pytest.mark.parametrize("lost", ["exact", "exact_period"])
+def test_nothing_is_compared_with_an_exact_value_that_is_not_known(
+    monkeypatch: pytest.MonkeyPatch, name: str, lost: str
+) -> None:
+    of = {} if VALUES[name].of == "none" else {"quantity": "theta"}
+    changes = check(value=name, below=1, **of)
+    build(**changes)
+    change_model(monkeypatch, **{lost: None})
+    if (VALUES[name].needs_exact == "period") != (lost == "exact_period"):
+        build(**changes)
+        return
+    fault = only_fault(**changes)
+    assert fault.key == "checks[0].value"
+    assert "of pendulum is not known" in fault.rule
+
+
+def test_the_energy_is_known_exactly_where_it_is_conserved(monkeypatch: pytest.MonkeyPatch) -> None:
+    changes = value(value="error_l2", quantity="energy")
+    change_model(monkeypatch, exact=None)
+    build(**changes)
+    change_model(monkeypatch, conservative=False)
+    assert only_fault(**changes).rule == "the exact energy of pendulum is not known"
+
+
+def test_a_scheme_that_cannot_treat_the_model_is_refused(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    central = SCHEMES["central"]
+    schemes = {"central": replace(central, velocity_forces=False)}
+    monkeypatch.setattr(building, "SCHEMES", schemes)
+    build()
+    change_model(monkeypatch, acceleration="-(g/L)*sin(theta) - m*omega")
+    (fault,) = file_faults(tmp_path, GOOD)
+    assert (fault.line, fault.key, fault.value) == (6, "schemes[0]", "central")
+    assert fault.rule == "cannot treat pendulum, whose acceleration depends on omega"
+    assert fault.hint == "no scheme can"
+    schemes["other"] = replace(central, kind="other", velocity_forces=True)
+    schemes["third"] = replace(central, kind="third", velocity_forces=True)
+    labelled = only_fault(schemes=[{"kind": "central", "label": "mine"}])
+    assert labelled.hint == "choose from other, third"
+    schemes["central"] = schemes["other"]
+    build()
+
+
 @pytest.mark.parametrize("name", ["logspace", "range", "zip", "sample"])
 def test_later_kinds_of_sweep_are_unknown_keys(name: str) -> None:
     rules = [(f.key, f.rule) for f in faults_of(sweep={"model.g": {name: [1, 2, 3]}})]
@@ -282,6 +374,13 @@ def test_stored_times_follow_the_samples() -> None:
     build(samples="all", **at(t=0.0390625))
     build(samples="common", **at(step=16))
     assert "nearest are 0 and 8" in only_fault(samples="common", **at(step=7)).hint
+    # 512 steps at level 9, every 16th of them stored; the extrapolated solution has every 16th of the 64 of level 6
+    every = {"every": 16}
+    build(samples=every, **at(step=16))
+    build(samples=every, **at(t=0.625))
+    assert "nearest are 0 and 16" in only_fault(samples=every, **at(step=8)).hint
+    assert "nearest are 0 and 0.625" in only_fault(samples=every, **at(t=0.3125)).hint
+    assert "nearest are 0 and 5" in only_fault(samples=every, **at(t=0.625, best=True)).hint
 
 
 def test_time_is_a_fraction_where_the_end_varies() -> None:

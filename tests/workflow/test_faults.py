@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -89,19 +90,55 @@ def start(place: Place) -> subprocess.Popen[str]:
     )
 
 
+def wait_for(path: Path, process: subprocess.Popen[str]) -> None:
+    """Wait until a run that is still at work has come to make `path`."""
+    deadline = time.monotonic() + 120
+    while not path.exists():
+        assert process.poll() is None, f"the run ended before it made {path.name}"
+        assert time.monotonic() < deadline, f"{path.name} is not made"
+        time.sleep(0.005)
+    assert process.poll() is None, f"the run ended as soon as it had made {path.name}"
+
+
+def wait_for_end(group: int) -> None:
+    """Wait until no process of a killed group is left: until the system has reaped one, it counts as alive."""
+    deadline = time.monotonic() + 60
+    with suppress(ProcessLookupError):
+        while time.monotonic() < deadline:
+            os.killpg(group, 0)
+            time.sleep(0.01)
+
+
+MADE = {
+    "before any job": "../../.vibsim/run.json",
+    "first job": "logs/level_06.log",
+    "first level": "level_06.nc",
+    "last level": "level_09.nc",
+    "analysis": "convergence.nc",
+    "report": "report.html",
+}
+
+
 @pytest.mark.parametrize(
-    "delay", [0.8, 1.6, *(pytest.param(d, marks=pytest.mark.slow) for d in (0.3, 1.2, 2.2, 3.0))]
+    "made",
+    [
+        name if name in ("first level", "analysis") else pytest.param(name, marks=pytest.mark.slow)
+        for name in MADE
+    ],
 )
 @pytest.mark.parametrize("whole", [True, False], ids=["all processes", "the run alone"])
 def test_after_a_kill_the_same_command_works(
-    tmp_path: Path, finished: Place, delay: float, whole: bool
+    tmp_path: Path, finished: Place, made: str, whole: bool
 ) -> None:
     place = Place(tmp_path)
     place.file.parent.mkdir()
     place.file.write_text(TEXT)
     with start(place) as process:
-        time.sleep(delay)
+        wait_for(place.tiny / MADE[made], process)
         (os.killpg if whole else os.kill)(process.pid, signal.SIGKILL)
+    assert process.returncode == -signal.SIGKILL
+    if whole:
+        wait_for_end(process.pid)
     ended = place.run()
     assert ended.returncode == 0, ended.stdout + ended.stderr
     assert place.content() == finished.content()
@@ -113,7 +150,7 @@ def test_two_runs_at_once_both_succeed_and_one_waits(tmp_path: Path, finished: P
     place.file.parent.mkdir()
     place.file.write_text(TEXT)
     with start(place) as first:
-        time.sleep(0.6)
+        wait_for(place.results / ".vibsim/run.json", first)
         second = place.run()
         out, err = first.communicate()
     assert first.returncode == 0, out + err

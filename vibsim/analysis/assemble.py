@@ -9,15 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis import series
+from vibsim.analysis.belonging import check_belonging
 from vibsim.analysis.checks import measured_numbers
-from vibsim.analysis.compare import SERIES, Ladder, Table, attributes, differences, extrapolated
+from vibsim.analysis.compare import SERIES, Ladder, Table, differences, extrapolated
 from vibsim.analysis.evidence import evidence, formal_orders, relative_floors
 from vibsim.analysis.floor import solution_size
 from vibsim.analysis.grid import Grid, common_grid, take
-from vibsim.analysis.verdict import REASONS, STATUSES, judge
+from vibsim.analysis.sensitivity import sensitivity
+from vibsim.analysis.verdict import judge
+from vibsim.errors import VibsimError
 from vibsim.models import MODELS
 from vibsim.models.base import ENERGIES
-from vibsim.record import Record, Variable
+from vibsim.record import Record, Variable, attributes
+from vibsim.vocabulary import NORMS, REASON_NAMES, STATUSES, TOLERANCE, TYPICAL_NORM
 
 if TYPE_CHECKING:
     import xarray
@@ -25,9 +29,6 @@ if TYPE_CHECKING:
     from vibsim.spec import Experiment
 
 Floats = NDArray[np.float64]
-
-TOLERANCE = 0.1
-"""Tolerance of the verdict that every quantity gets, asked for or not."""
 
 
 def analyse(
@@ -48,23 +49,29 @@ def analyse(
     Raises
     ------
     VibsimError
-        Where there is no level, or the levels have no times in common.
+        Where there is no level, a level is given twice, the levels have no times in common, or they are not levels of
+        one and the same problem, that of the experiment.
     """
     rows = datasets.values() if isinstance(datasets, Mapping) else datasets
     records = [Record.from_xarray(dataset) for dataset in rows]
-    by_level = {int(np.asarray(record.attrs["level"]).item()): record for record in records}
-    return analyse_records(experiment, by_level).to_xarray()
+    levels = [int(np.asarray(record.attrs["level"]).item()) for record in records]
+    twice = sorted({level for level in levels if levels.count(level) > 1})
+    if twice:
+        raise VibsimError(f"level {twice[0]} is given more than once")
+    return analyse_records(experiment, dict(zip(levels, records, strict=True))).to_xarray()
 
 
 def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Record:
     """Compare the levels of an experiment, given and returned as plain arrays; see `analyse`."""
     grid = common_grid(records)
+    check_belonging(experiment, records)
     finest = records[grid.levels[-1]]
+    magnified = sensitivity(experiment, grid, finest)
     coords = _coords(experiment, grid, finest)
     table: Table = {}
     names = compared(experiment)
     for name in names:
-        ladder = _ladder(experiment, grid, records, name)
+        ladder = _ladder(experiment, grid, records, name, magnified)
         table |= differences(grid, ladder) | extrapolated(experiment, grid, ladder)
     table |= _scaled_deviation(experiment, grid, records) | _scalars(grid, records)
     attrs: dict[str, Any] = {
@@ -86,13 +93,15 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
 
 def compared(experiment: Experiment) -> tuple[str, ...]:
     """Name the quantities that are compared between levels: states, total energy, and what a check asks for."""
-    model = MODELS[experiment.model.kind]
-    asked = [
-        getattr(inner, "converges", None) or getattr(inner, "quantity", None)
-        for inner in (getattr(check, "that", check) for check in experiment.checks)
-    ]
-    always = [*(state.name for state in model.states), "energy", "energy_deviation"]
-    return tuple(dict.fromkeys([*always, *(str(name) for name in asked if name is not None)]))
+    states = (state.name for state in MODELS[experiment.model.kind].states)
+    return tuple(dict.fromkeys([*states, "energy", "energy_deviation", *asked(experiment)]))
+
+
+def asked(experiment: Experiment) -> tuple[str, ...]:
+    """Name the quantities that the checks are about."""
+    inner = [check.that if check.kind == "claim" else check for check in experiment.checks]
+    named = (check.converges if check.kind == "converges" else check.quantity for check in inner)
+    return tuple(dict.fromkeys(name for name in named if name is not None))
 
 
 def _coords(experiment: Experiment, grid: Grid, finest: Record) -> Table:
@@ -107,7 +116,7 @@ def _coords(experiment: Experiment, grid: Grid, finest: Record) -> Table:
     if len(levels) > 2:
         words = "coarsest level of three successive ones"
         coords["triple"] = Variable(("triple",), levels[:-2], attributes(words, "1"))
-    coords["norm"] = Variable(("norm",), np.array(series.NORMS), attributes("norm over time", "1"))
+    coords["norm"] = Variable(("norm",), np.array(NORMS), attributes("norm over time", "1"))
     ids = [check.id for check in experiment.checks]
     if ids:
         coords["check"] = Variable(("check",), np.array(ids), attributes("name of the check", "1"))
@@ -119,12 +128,16 @@ def _coords(experiment: Experiment, grid: Grid, finest: Record) -> Table:
     return coords
 
 
-def _ladder(experiment: Experiment, grid: Grid, records: Mapping[int, Record], name: str) -> Ladder:
+def _ladder(
+    experiment: Experiment,
+    grid: Grid,
+    records: Mapping[int, Record],
+    name: str,
+    magnified: Floats,
+) -> Ladder:
     values = [take(grid, records[level], name) for level in grid.levels]
     finest = records[grid.levels[-1]]
-    # what is left of an energy is known no better than the energy itself
-    whole = "energy" if name in ENERGIES else name
-    sizes = solution_size([take(grid, records[level], whole) for level in grid.levels])
+    sizes = _size(experiment, grid, records, name) * magnified
     attrs = finest.variables[name].attrs
     return Ladder(
         name=name,
@@ -135,6 +148,27 @@ def _ladder(experiment: Experiment, grid: Grid, records: Mapping[int, Record], n
         order=formal_orders(experiment, name),
         floor=relative_floors(experiment, grid.steps) * sizes[..., None],
     )
+
+
+def _size(experiment: Experiment, grid: Grid, records: Mapping[int, Record], name: str) -> Floats:
+    """Return the size that round-off is relative to, shape (scheme, case).
+
+    What is left of an energy is known no better than the energy itself; a velocity is known no better than what the
+    rounding of the position leaves of it over the run, or over a swing.
+    """
+    model = MODELS[experiment.model.kind]
+
+    def largest(of: str) -> Floats:
+        return solution_size([take(grid, records[level], of) for level in grid.levels])
+
+    if name in ENERGIES:
+        return largest("energy")
+    if name != model.velocity:
+        return largest(name)
+    finest = records[grid.levels[-1]]
+    duration = grid.dt[0] * grid.steps[0]
+    rate = np.maximum(finest["natural_frequency"], 1.0 / duration)
+    return np.asarray(np.maximum(largest(name), largest(model.position) * rate))
 
 
 def _exact(experiment: Experiment, grid: Grid, finest: Record, name: str) -> Floats | None:
@@ -175,7 +209,7 @@ def _scalars(grid: Grid, records: Mapping[int, Record]) -> Table:
             dims = ("scheme", "case", "level")
             table[name] = Variable(dims, np.stack(values, -1), variable.attrs)
         elif variable.dims == ("case",):
-            same = name != "omega_dt"
+            same = all(np.array_equal(value, values[-1], equal_nan=True) for value in values)
             dims = ("case",) if same else ("case", "level")
             stacked = values[-1] if same else np.stack(values, -1)
             table[name] = Variable(dims, stacked, variable.attrs)
@@ -192,18 +226,17 @@ def _flags(names: Sequence[str]) -> dict[str, Any]:
 
 
 def _verdict(experiment: Experiment, record: Record, name: str) -> Table:
-    """Judge a quantity by the formal order; the order in every norm, status and window in the L2 norm."""
+    """Judge a quantity by the formal order; the order in every norm, status and window in the typical norm."""
     order = formal_orders(experiment, name)
     by_norm = {
-        kind: judge(evidence(experiment, record, name, kind, order, TOLERANCE))
-        for kind in series.NORMS
+        kind: judge(evidence(experiment, record, name, kind, order, TOLERANCE)) for kind in NORMS
     }
-    typical = by_norm["l2"]
+    typical = by_norm[TYPICAL_NORM]
     member = ("scheme", "case")
     table: Table = {}
     words = {"order": "stated order", "order_low": "its lower end", "order_high": "its upper end"}
     for key, field in (("order", "order"), ("order_low", "low"), ("order_high", "high")):
-        values = np.stack([getattr(by_norm[kind], field) for kind in series.NORMS], axis=-1)
+        values = np.stack([getattr(by_norm[kind], field) for kind in NORMS], axis=-1)
         attrs = attributes(f"{name}: {words[key]}", "1")
         table[f"{name}_{key}"] = Variable((*member, "norm"), values, attrs)
     for key, levels in (("first", typical.first), ("last", typical.last)):
@@ -211,7 +244,7 @@ def _verdict(experiment: Experiment, record: Record, name: str) -> Table:
         table[f"{name}_window_{key}"] = Variable(member, levels, attributes(words_, "1"))
     for key, codes, names in (
         ("status", typical.status, STATUSES),
-        ("reason", typical.reason, REASONS),
+        ("reason", typical.reason, REASON_NAMES),
     ):
         attrs = attributes(f"{name}: {key} of the verdict on its order", "1", **_flags(names))
         table[f"{name}_{key}"] = Variable(member, codes, attrs)

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from vibsim.analysis import values
 from vibsim.analysis.converges import converges, judge_check
-from vibsim.analysis.outcome import FAIL, PASS, Outcome, number_at, text
+from vibsim.analysis.outcome import FAIL, PASS, Outcome, number_at
 from vibsim.analysis.valued import valued
-from vibsim.analysis.verdict import REASONS, STATUSES
 from vibsim.errors import VibsimError
 from vibsim.record import Record
+from vibsim.vocabulary import REASON_NAMES, STATUSES
 
 if TYPE_CHECKING:
     import xarray
@@ -79,7 +79,7 @@ def verdicts(experiment: Experiment, convergence: xarray.Dataset | Record) -> li
         Where `convergence` was made without one of the checks.
     """
     record = convergence if isinstance(convergence, Record) else Record.from_xarray(convergence)
-    known = [text(name) for name in record["check"]] if "check" in record else []
+    known = record.words("check") if "check" in record else []
     missing = [check.id for check in experiment.checks if check.id not in known]
     if missing:
         raise VibsimError(f"the analysis knows {known}, not {missing}: analyse the levels again")
@@ -157,7 +157,7 @@ def _compared_reason(outcome: Outcome, scheme: int, case: int) -> str:
         return "match"
     if status == FAIL and (not outcome.expects_pass or measured == PASS):
         return "mismatch"
-    return REASONS[int(outcome.reason[scheme, case])]
+    return REASON_NAMES[int(outcome.reason[scheme, case])]
 
 
 def _told(outcome: Outcome, scheme: int, case: int, reason: str) -> str:
@@ -192,7 +192,7 @@ def _results(outcome: Outcome) -> list[Result]:
             scheme=outcome.schemes[outcome.scheme_index.index(scheme)],
             case=int(outcome.cases[case]),
             status=STATUSES[int(outcome.status[scheme, case])],
-            reason=REASONS[int(outcome.reason[scheme, case])],
+            reason=REASON_NAMES[int(outcome.reason[scheme, case])],
             order=order,
             interval=None if low is None or high is None else (low, high),
             levels=levels,
@@ -207,7 +207,9 @@ def _claim(experiment: Experiment, record: Record, check: ClaimCheck, index: int
     inner = _verdict(check.that, _measure(experiment, record, check.that, index))
     truth = "true" if inner.status == "PASS" else "false"
     status, reason, advice = inner.status, inner.reason, inner.advice
-    if inner.status != "INCONCLUSIVE":
+    # a number that broke down shows neither a statement nor its opposite
+    unmeasured = check.that.kind == "value" and inner.reason == "non_finite"
+    if inner.status != "INCONCLUSIVE" and not unmeasured:
         right = (inner.status == "PASS") == check.holds
         status = "PASS" if right else "FAIL"
         reason = (inner.reason if check.holds else "match") if right else "mismatch"

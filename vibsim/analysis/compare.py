@@ -12,8 +12,9 @@ from vibsim.analysis import series
 from vibsim.analysis.grid import Grid
 from vibsim.analysis.richardson import extrapolate
 from vibsim.models import ENERGIES, MODELS
-from vibsim.record import Variable
+from vibsim.record import Variable, attributes
 from vibsim.schemes import SCHEMES
+from vibsim.vocabulary import NORMS
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
@@ -41,9 +42,8 @@ class Ladder:
     """Predicted round-off at one point, shape (scheme, case, level)."""
 
 
-def attributes(long_name: str, units: str, **more: Any) -> dict[str, Any]:
-    """Return the attributes of a variable."""
-    return {"long_name": long_name, "units": units, **more}
+ROUND_OFF_SAFETY = 10.0
+"""Factor on the predicted round-off in an error bound: the prediction is an order of magnitude."""
 
 
 def differences(grid: Grid, q: Ladder) -> Table:
@@ -62,6 +62,7 @@ def differences(grid: Grid, q: Ladder) -> Table:
     of_level = ("scheme", "case", "level")
     add("error_norm", (*of_level, "norm"), errors, _IN_NORM.format("true error"), q.units)
     add("floor", of_level, q.floor, "predicted round-off", q.units)
+    add("formal_order", ("scheme",), q.order, "order that the scheme promises", "1")
     if not pairs:
         return table
     d = [coarse - fine for coarse, fine in pairs]
@@ -106,7 +107,7 @@ def _add_triples(grid: Grid, q: Ladder, d: list[Floats], norms: Floats, add: Any
 
 def _norms(grid: Grid, values: Floats) -> Floats:
     """Return every norm, shape (scheme, case, norm)."""
-    rows = [series.norm(values, kind, grid.spacing, grid.end_included) for kind in series.NORMS]
+    rows = [series.norm(values, kind, grid.spacing, grid.end_included) for kind in NORMS]
     return np.stack(rows, axis=-1)
 
 
@@ -115,7 +116,7 @@ def extrapolated(experiment: Experiment, grid: Grid, q: Ladder) -> Table:
     model = MODELS[experiment.model.kind]
     even = [SCHEMES[s.kind].even_powers(q.name, model, s.options) for s in experiment.schemes]
     value, bound = extrapolate(q.values, grid.levels, q.order, np.array(even))
-    bound = bound + q.floor[..., -1:]
+    bound = bound + ROUND_OFF_SAFETY * q.floor[..., -1:]
     table: dict[str, tuple[tuple[str, ...], Floats, str]] = {
         f"{q.name}_richardson": (SERIES, value, "Richardson extrapolation"),
         f"{q.name}_richardson_error": (SERIES, bound, "error bound of the extrapolation"),

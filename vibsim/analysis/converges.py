@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis.evidence import evidence, formal_orders
-from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Outcome, text
-from vibsim.analysis.verdict import REASONS, STATUSES, Judgement, judge
+from vibsim.analysis.evidence import evidence, formal_orders, omega_dt
+from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
+from vibsim.analysis.verdict import Judgement, judge
 from vibsim.analysis.wording import Story, advise, tell
 from vibsim.models import MODELS
 from vibsim.record import Record
 from vibsim.schemes import SCHEMES
+from vibsim.vocabulary import REASON_NAMES, STATUSES
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
@@ -36,7 +37,7 @@ def judge_check(
 def converges(experiment: Experiment, record: Record, check: ConvergesCheck) -> Outcome:
     """Compare the verdict on a quantity, of every scheme and member, with the expected one."""
     judged, order = judge_check(experiment, record, check)
-    names = [text(name) for name in record["scheme"]]
+    names = record.words("scheme")
     chosen = [i for i, name in enumerate(names) if check.schemes is None or name in check.schemes]
 
     def story(scheme: int, case: int) -> Story:
@@ -45,7 +46,7 @@ def converges(experiment: Experiment, record: Record, check: ConvergesCheck) -> 
     expect = check.expect
     as_expected = judged.status == STATUSES.index(expect.status)
     if expect.reason is not None:
-        as_expected &= judged.reason == REASONS.index(expect.reason)
+        as_expected &= judged.reason == REASON_NAMES.index(expect.reason)
     open_ = judged.status == INCONCLUSIVE
     compared = np.where(as_expected, PASS, np.where(open_, INCONCLUSIVE, FAIL))
     words = expect.status if expect.reason is None else f"{expect.status} ({expect.reason})"
@@ -83,7 +84,7 @@ def _story(
     at = levels.index(culprit) if culprit >= 0 else None
     return Story(
         quantity=check.converges,
-        reason=REASONS[int(judged.reason[scheme, case])],
+        reason=REASON_NAMES[int(judged.reason[scheme, case])],
         order=float(judged.order[scheme, case]),
         low=float(judged.low[scheme, case]),
         high=float(judged.high[scheme, case]),
@@ -94,7 +95,7 @@ def _story(
         norm=check.norm,
         levels=levels,
         culprit=culprit,
-        omega_dt=float("nan") if at is None else float(record["omega_dt"][case, at]),
+        omega_dt=float("nan") if at is None else float(omega_dt(record)[case, at]),
         limit=float("inf") if limit is None else limit,
         options=spec.options,
         is_position=check.converges == MODELS[experiment.model.kind].position,

@@ -41,6 +41,13 @@ def spacing_of(record: Record) -> Floats:
     return np.asarray(apart * (record["end"] if "end" in record else np.ones(1)), dtype=np.float64)
 
 
+def omega_dt(record: Record) -> Floats:
+    """Return w dt of a convergence Record, shape (case, level); stored without levels where all have the same."""
+    values = np.asarray(record["omega_dt"], dtype=np.float64)
+    by_level = values if values.ndim == 2 else values[:, None]
+    return np.broadcast_to(by_level, (len(values), len(record["level"])))
+
+
 def ends_at_the_end(record: Record) -> bool:
     """Say whether the last common point is the end of the time interval."""
     return bool(np.asarray(record.attrs["end_included"]).item())
@@ -72,7 +79,7 @@ def evidence(
     spacing, end_included = spacing_of(record), ends_at_the_end(record)
     finest = record[f"{quantity}_finest"]
     shape = finest.shape[:2]
-    kind = [str(name) for name in record["norm"]].index(norm)
+    kind = record.words("norm").index(norm)
     pairs = len(levels) - 1
     difference = (
         record[f"{quantity}_difference"] if pairs else np.empty((*shape, 0, finest.shape[2]))
@@ -80,7 +87,7 @@ def evidence(
     points = len(record["t"])
     floor = np.moveaxis(record[f"{quantity}_floor"], -1, 0)
     relative = relative_floors(experiment, tuple(int(n) for n in record["steps"]))
-    size = record[f"{quantity}_floor"][..., 0] / relative[..., 0]
+    size = np.max(np.abs(np.nan_to_num(finest)), axis=-1)
     failed = record["status"] != 0
     scatters = [
         scatter(difference[:, :, i], difference[:, :, i + 1], norm, end_included)
@@ -100,11 +107,12 @@ def evidence(
         size=norm_of_floor(size, norm, points, spacing),
         failed=failed,
         applicable=np.any(np.isfinite(finest), axis=-1) | np.any(failed, axis=-1),
-        omega_dt=np.broadcast_to(record["omega_dt"], (*shape, len(levels))),
+        omega_dt=np.broadcast_to(omega_dt(record), (*shape, len(levels))),
         stability_limit=np.broadcast_to(
             np.array([np.inf if limit is None else limit for limit in limits])[:, None], shape
         ),
         growth=growth(experiment, record),
+        span=np.broadcast_to(omega_dt(record)[:, 0] * float(record["steps"][0]), shape),
         relative_floor=np.broadcast_to(relative[..., 0], shape),
     )
 

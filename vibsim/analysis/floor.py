@@ -15,13 +15,16 @@ from vibsim.schemes import Scheme
 
 Floats = NDArray[np.float64]
 
-EPSILON = float(np.finfo(np.float64).eps)
-"""No stored number is known better than this, relative to its size."""
+SPACING_AT_ONE = float(np.finfo(np.float64).eps)
+"""Distance from 1 to the next number, 2^-52: twice the unit round-off.
+
+No stored number is known better than this, relative to its size.
+"""
 
 
 def relative_floor(scheme: Scheme, options: Mapping[str, str], steps: tuple[int, ...]) -> Floats:
     """Return the predicted round-off at every level relative to the solution's size, shape (level,)."""
-    return np.array([max(scheme.round_off(options, n), EPSILON) for n in steps])
+    return np.array([max(scheme.round_off(options, n), SPACING_AT_ONE) for n in steps])
 
 
 def solution_size(series: list[Floats]) -> Floats:
@@ -48,7 +51,7 @@ def norm_of_floor(floor: Floats, kind: str, points: int, spacing: Floats) -> Flo
     floor
         Size of the noise at one point, shape (..., case).
     kind
-        One of `series.NORMS`.
+        One of `vocabulary.NORMS`.
     points
         Number of points of the grid.
     spacing

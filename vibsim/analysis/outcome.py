@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis.verdict import STATUSES, Judgement
+from vibsim.analysis.verdict import Judgement
+from vibsim.vocabulary import SEVERITY, STATUSES
 
 Floats = NDArray[np.float64]
 
-PASS, FAIL, INCONCLUSIVE = range(3)
+PASS, FAIL, INCONCLUSIVE = map(STATUSES.index, ("PASS", "FAIL", "INCONCLUSIVE"))
 """Index into `STATUSES`."""
-SEVERITY = np.array([0, 2, 1])
-"""How bad each of `STATUSES` is: FAIL before INCONCLUSIVE before PASS."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ class Outcome:
     status: NDArray[Any]
     """Measured, index into `STATUSES`."""
     reason: NDArray[Any]
-    """Measured, index into `verdict.REASONS`."""
+    """Measured, index into `vocabulary.REASON_NAMES`."""
     compared: NDArray[Any]
     """Status after comparison with what was expected."""
     away: Floats
@@ -54,7 +53,7 @@ class Outcome:
     def ranking(self) -> list[tuple[int, int]]:
         """Return the positions of all results that count, worst first; equals in their order."""
         chosen = np.ix_(self.scheme_index, self.case_index)
-        severity = SEVERITY[self.compared[chosen]].ravel()
+        severity = np.array([SEVERITY[name] for name in STATUSES])[self.compared[chosen]].ravel()
         away = np.where(np.isnan(self.away[chosen]), np.inf, self.away[chosen]).ravel()
         order = np.lexsort((-away, -severity))
         width = len(self.case_index)
@@ -77,8 +76,3 @@ def number_at(values: NDArray[Any] | None, scheme: int, case: int) -> float | No
     if values is None or not np.isfinite(values[scheme, case]):
         return None
     return float(values[scheme, case])
-
-
-def text(name: Any) -> str:
-    """Return an entry of a coordinate of words as text; files give bytes."""
-    return name.decode() if isinstance(name, bytes) else str(name)

@@ -44,8 +44,8 @@ def extrapolate(
     bound
         Bound of its error without round-off. With three levels and more it is the change between the last two first
         extrapolations, as large as it has been so far; `SAFETY` times that over K - 1 where four levels show that the
-        change falls by the factor K. It is honest for a solution of a lower order than p, too. With two levels it is
-        the estimated error of the finer one; with one level NaN.
+        change falls by the factor K, taken for no more than the next power gives. It is honest for a solution of a
+        lower order than p, too. With two levels it is the estimated error of the finer one; with one level NaN.
     """
     p = order[:, None, None]
     if len(series) == 1:
@@ -65,8 +65,14 @@ def extrapolate(
         slow = _fall(levels[-4:], p, p + 1)[..., 0]
         is_even = np.nan_to_num(seen, nan=2.0) > np.sqrt(quick * slow)
         value = _second(first[-1], change, levels[-3:], p, is_even[..., None])
-        factor = np.clip(np.nan_to_num(seen, nan=2.0), 2.0, np.maximum(quick, 2.0))
-        return value, SAFETY * _so_far(change) / (factor[..., None] - 1)
+        most = np.where(even[:, None], quick, slow)
+        factor = np.clip(np.nan_to_num(seen, nan=2.0), 2.0, np.maximum(most, 2.0))
+        # a change that fell faster than any term falls is one that happens to vanish here: trust the one before it
+        expected = _so_far(first[-2] - first[-3]) / np.maximum(slow, 2.0)[..., None]
+        vanishing = (seen > most * SAFETY)[..., None]
+        largest = np.maximum(_so_far(change), np.where(vanishing, expected, 0.0))
+        factor = np.where(vanishing[..., 0], np.minimum(factor, np.maximum(slow, 2.0)), factor)
+        return value, SAFETY * largest / (factor[..., None] - 1)
 
 
 def _so_far(change: Floats) -> Floats:

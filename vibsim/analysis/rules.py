@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis.series import safe_ratio
-from vibsim.analysis.window import Trend
+from vibsim.analysis.window import QUIET, Trend
+from vibsim.vocabulary import TOLERANCE
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -20,7 +21,7 @@ BLAME = 100.0
 """Round-off may be blamed for a difference up to so many times its predicted floor, an order of magnitude."""
 TINY = 1e-10
 """Differences of a scheme that is exact are no larger part of the solution."""
-VISIBLE = 100.0
+VISIBLE = 1e4
 """An ordinary error, (w dt)^p at the coarsest level, this many times above the blamed floor would have been seen."""
 COINCIDENT = 0.2
 """Largest scatter (see `series.scatter`) of curves that count as proportional."""
@@ -38,6 +39,23 @@ EXCESS = 1.5
 """An error so many times the one that the differences allow, or so many times smaller, contradicts them."""
 EXACT_ACCURACY = 1e-12
 """An exact solution is trusted to this part of its size."""
+
+MOVES = QUIET / 2
+"""A smaller last change of the order is no movement away: half of what is too small to read a trend from."""
+DEPARTED = 0.012
+"""An order no further from p has not left it: a little more than `QUIET`, so that p + QUIET still counts as p."""
+REACH = 0.05
+"""An order this near a multiple of 1/2 may be that multiple: a tenth of the distance between two of them."""
+REACH_SETTLED = 0.1
+"""The same for a whole number that several triples support: a tenth of the distance between whole numbers."""
+LEAST_CANDIDATE = 0.5
+"""The least order that an expansion has: a solution that stays away from its limit has none."""
+MOST_ABOVE = 2.0
+"""A superconvergent quantity gains at most the next even power."""
+AGREEMENT = 0.25
+"""Orders of differences and of errors agree within half of what separates two orders."""
+LEAST_ORDER = 0.25
+"""No stated order is taken for less when errors are predicted: half the least that an expansion has, 1/2."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +78,7 @@ class Evidence:
     """Norm of the solution, shape (...)."""
     relative_floor: Floats
     """Predicted round-off relative to the solution at the coarsest level, shape (...)."""
-    tolerance: float = 0.1
+    tolerance: float = TOLERANCE
     """How far from p an order may be."""
     error: Floats | None = None
     """Norms of the true errors, shape (..., n); NaN where the exact solution is not known."""
@@ -70,6 +88,8 @@ class Evidence:
     """Whether the quantity exists, shape (...)."""
     stability_limit: Floats | None = None
     """Largest stable w dt, infinite where there is no limit, shape (...)."""
+    span: Floats | None = None
+    """w T, the length of the run in units of the inverse frequency, shape (...); None counts as long."""
     growth: Floats | None = None
     """Largest position over the largest exact position, shape (..., n); NaN where not known."""
 
@@ -107,10 +127,11 @@ def rules(e: Evidence, t: Trend) -> list[tuple[Flags, str]]:
     wrong &= np.where(
         above,
         together & (t.width <= NARROW) & ~t.drifting & ~_leaving(t, p),
-        several | (t.scatter <= COINCIDENT),
+        several | (np.abs(t.scatter) <= COINCIDENT),
     )
     too_large, too_small = _contradicts(e, t)
     missed = too_large & (right | (wrong & _errors_stay(e, t)))
+    wrong &= _errors_agree(e, t)
     return [
         (nothing & _truly_exact(e) & _far_from_exact(e), "wrong_limit"),
         (nothing & _truly_exact(e), "exact"),
@@ -132,8 +153,8 @@ def _leaving(t: Trend, p: Floats) -> Flags:
         (t.count > 1)
         & (away * before > 0)
         & (np.abs(away) > np.abs(before))
-        & (np.abs(t.change) > 0.005)
-        & (np.abs(away) > 0.012)
+        & (np.abs(t.change) > MOVES)
+        & (np.abs(away) > DEPARTED)
         & ~t.noisy
     )
 
@@ -151,11 +172,13 @@ def _plausible(t: Trend, p: Floats, tol: float) -> Flags:
     for candidate in (np.floor(2.0 * t.order) / 2, np.ceil(2.0 * t.order) / 2):
         whole = candidate == np.round(candidate)
         passing = several & towards_p
-        passing &= np.abs(t.local - candidate) > np.abs(before - candidate) + 0.01
+        passing &= np.abs(t.local - candidate) > np.abs(before - candidate) + QUIET
         # one triple tells a pure power from two proportional terms by nothing but the number
-        least = np.where(several & whole, 0.1, 0.05)
-        reach = np.maximum(np.where(several, t.width, 2 * t.width), least)
+        least = np.where(several & whole, REACH_SETTLED, REACH)
+        wide = np.where(several, t.width, np.where(whole, 2 * t.width, 0.0))
+        reach = np.maximum(wide, least)
         near = (np.abs(t.order - candidate) <= reach) & (np.abs(candidate - p) > tol)
+        near &= (candidate >= LEAST_CANDIDATE) & (candidate <= p + MOST_ABOVE)
         found |= near & ~passing & (whole | (np.abs(t.scatter) <= 2 * SINGLE))
     return found
 
@@ -174,7 +197,10 @@ def _floor_of_pairs(e: Evidence) -> Floats:
 def _truly_exact(e: Evidence) -> Flags:
     """Say where all differences are round-off although an ordinary error would have been seen."""
     small = np.asarray(np.all(e.difference <= BLAME * _floor_of_pairs(e), axis=-1))
+    # what a short run has accumulated is smaller by (w T)^2
     ordinary = np.minimum(e.omega_dt[..., 0], 1.0) ** e.order
+    if e.span is not None:
+        ordinary = ordinary * np.minimum(e.span, 1.0) ** 2
     tiny = np.all(e.difference <= TINY * e.size[..., None], axis=-1)
     return np.asarray(small & tiny & (ordinary >= VISIBLE * BLAME * e.relative_floor))
 
@@ -201,7 +227,7 @@ def _contradicts(e: Evidence, t: Trend) -> tuple[Flags, Flags]:
     gap = np.diff(np.array(e.levels))[finer - 1]
     difference, error = _pick(e.difference, finer - 1), _pick(e.error, finer)
     most, least = (
-        difference / np.expm1(np.maximum(order, 0.25) * gap * np.log(2.0))
+        difference / np.expm1(np.maximum(order, LEAST_ORDER) * gap * np.log(2.0))
         for order in (t.low, t.high)
     )
     too_large = np.nan_to_num(error, nan=0.0) > EXCESS * most + _accuracy(e)
@@ -215,6 +241,25 @@ def _errors_stay(e: Evidence, t: Trend) -> Flags:
     gap = np.diff(np.array(e.levels))[t.last + 1]
     fall = safe_ratio(_pick(e.error, t.last + 1), _pick(e.error, t.last + 2))
     return np.asarray(fall < np.exp2(0.5 * np.maximum(t.low, 0.0) * gap))
+
+
+def _errors_agree(e: Evidence, t: Trend) -> Flags:
+    """Say where the errors fall with the stated order too, over the last three levels of the window.
+
+    Two terms of one size can look like another power in a few differences, but not in the errors at the same time.
+    Without an exact solution there is nothing to compare.
+    """
+    agree = np.ones(e.order.shape, dtype=bool)
+    if e.error is None:
+        return agree
+    levels = np.array(e.levels, dtype=np.float64)
+    for back in (0, 1):
+        coarse, fine = t.last + 1 - back, t.last + 2 - back
+        ratio = safe_ratio(_pick(e.error, coarse), _pick(e.error, fine))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found = np.log2(ratio) / (levels[fine] - levels[coarse])
+        agree &= ~np.isfinite(found) | (np.abs(found - t.order) <= np.maximum(AGREEMENT, t.width))
+    return agree
 
 
 def _pick(values: Floats, index: NDArray[np.int64]) -> Floats:

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-NORMS = ("l1", "l2", "linf", "linf_interior")
 NEAR_ZERO = 0.1
 """A denominator below this part of its surroundings is taken for a zero crossing."""
 ABOVE_FLOOR = 10.0
@@ -33,7 +32,7 @@ def norm(error: Floats, kind: str, spacing: Floats, end_included: bool = True) -
     error
         Shape (..., case, t).
     kind
-        One of `NORMS`.
+        One of `vocabulary.NORMS`.
     spacing
         Distance between the points, shape (case,) or (1,).
     end_included

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -11,13 +10,13 @@ import numpy as np
 
 from vibsim.analysis.checks import Verdict
 from vibsim.record import Record
+from vibsim.vocabulary import FORMAT, jsonable, worst
 
 if TYPE_CHECKING:
     import xarray
 
     from vibsim.spec import Experiment
 
-FORMAT = 1
 WORST = 10
 """Of a sweep, so many results of a check and so many failures are listed."""
 
@@ -41,24 +40,19 @@ def summarise(
     record = convergence if isinstance(convergence, Record) else Record.from_xarray(convergence)
     most = None if experiment.sweep is None else WORST
     failures = _failures(record)
-    plain: dict[str, Any] = _plain(
+    plain: dict[str, Any] = jsonable(
         {
             "vibsim_format": FORMAT,
             "collection": experiment.collection,
             "experiment": experiment.name,
             "title": experiment.title,
-            "status": overall([verdict.status for verdict in verdicts]),
+            "status": worst(verdict.status for verdict in verdicts),
             "checks": [_check(verdict, most) for verdict in verdicts],
             "failures": failures[:most],
             "failure_count": len(failures),
         }
     )
     return plain
-
-
-def overall(statuses: Sequence[str]) -> str:
-    """Return the status of a whole: FAIL before INCONCLUSIVE before PASS."""
-    return next((name for name in ("FAIL", "INCONCLUSIVE") if name in statuses), "PASS")
 
 
 def _check(verdict: Verdict, most: int | None) -> dict[str, Any]:
@@ -70,10 +64,10 @@ def _check(verdict: Verdict, most: int | None) -> dict[str, Any]:
 
 def _failures(record: Record) -> list[dict[str, Any]]:
     """List the members that broke down, the earliest first."""
-    names = _meanings(record)
+    names, schemes = record.meanings("status"), record.words("scheme")
     rows = [
         {
-            "scheme": _text(record["scheme"][s]),
+            "scheme": schemes[s],
             "level": int(record["level"][lv]),
             "case": int(record["case"][c]),
             "t": float(record["failure_time"][s, c, lv]),
@@ -83,24 +77,3 @@ def _failures(record: Record) -> list[dict[str, Any]]:
         for s, c, lv in np.argwhere(record["status"] != 0)
     ]
     return sorted(rows, key=lambda row: (row["t"], row["scheme"], row["case"], row["level"]))
-
-
-def _meanings(record: Record) -> dict[int, str]:
-    attrs = record.variables["status"].attrs
-    values = np.ravel(np.asarray(attrs["flag_values"]))
-    return dict(zip(map(int, values), str(attrs["flag_meanings"]).split(), strict=True))
-
-
-def _text(name: Any) -> str:
-    return name.decode() if isinstance(name, bytes) else str(name)
-
-
-def _plain(value: Any) -> Any:
-    """Return plain JSON data: numbers that are not finite become None."""
-    if isinstance(value, dict):
-        return {str(key): _plain(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(entry) for entry in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Outcome, text
-from vibsim.analysis.verdict import REASONS
+from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
 from vibsim.analysis.wording import number
 from vibsim.record import Record
+from vibsim.vocabulary import REASON_NAMES
 
 if TYPE_CHECKING:
     from vibsim.spec.checks import ValueCheck
@@ -18,17 +18,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-SEES_SEVERAL_LEVELS = frozenset(
-    {
-        "error_estimate_defect",
-        "observed_order",
-        "ratio",
-        "coincidence",
-        "richardson_error",
-        "max_abs_ratio",
-        "max_abs_interior_ratio",
-    }
-)
 SURVIVES_FAILURE = frozenset({"at", "exact_period"})
 """Numbers that may be sound although the member broke down later."""
 DEFAULT_RTOL, DEFAULT_ATOL = 1e-9, 1e-12
@@ -37,7 +26,7 @@ DEFAULT_RTOL, DEFAULT_ATOL = 1e-9, 1e-12
 
 def valued(record: Record, check: ValueCheck, measured: Floats) -> Outcome:
     """Compare a measured number, shape (scheme, case), with what the check asks of it."""
-    names = [text(name) for name in record["scheme"]]
+    names = record.words("scheme")
     at = check.at
     schemes = [i for i, name in enumerate(names) if at.scheme is None or name == at.scheme]
     every = [int(case) for case in record["case"]]
@@ -48,13 +37,13 @@ def valued(record: Record, check: ValueCheck, measured: Floats) -> Outcome:
     )
     masks = [lost | np.isinf(measured), np.isnan(measured), holds]
     status = np.select(masks, [FAIL, INCONCLUSIVE, PASS], FAIL)
-    codes = [REASONS.index(name) for name in ("non_finite", "not_applicable", "match")]
-    reason = np.select(masks, codes, REASONS.index("mismatch"))
+    codes = [REASON_NAMES.index(name) for name in ("non_finite", "not_applicable", "match")]
+    reason = np.select(masks, codes, REASON_NAMES.index("mismatch"))
     what = f"{check.value} of {check.quantity}" if check.quantity else check.value
 
     def tell(scheme: int, case: int) -> str:
         found = float(measured[scheme, case])
-        return _tell(what, REASONS[int(reason[scheme, case])], found, rule)
+        return _tell(what, REASON_NAMES[int(reason[scheme, case])], found, rule)
 
     return Outcome(
         schemes=[names[i] for i in schemes],
@@ -69,7 +58,7 @@ def valued(record: Record, check: ValueCheck, measured: Floats) -> Outcome:
         expects_pass=True,
         quantity=check.quantity,
         tell=tell,
-        advise=lambda scheme, case: _ADVICE.get(REASONS[int(reason[scheme, case])], ""),
+        advise=lambda scheme, case: _ADVICE.get(REASON_NAMES[int(reason[scheme, case])], ""),
         value=measured,
     )
 
@@ -94,11 +83,19 @@ def _tell(what: str, reason: str, found: float, rule: str) -> str:
     return f"{what} is {found:.10g}; it {verb} {rule}."
 
 
+def sees_several_levels(name: str) -> bool:
+    """Say whether a number rests on more than one level: on finer ones, or on the whole ladder."""
+    from vibsim.spec.values import VALUES
+
+    row = VALUES[name]
+    return row.finer_levels > 0 or (row.of == "convergent" and "level" not in row.at)
+
+
 def _failed(record: Record, check: ValueCheck) -> Flags:
     """Say which members broke down at a level that the value depends on, shape (scheme, case)."""
     broken = record["status"] != 0
     level = check.at.level
-    if check.value in SEES_SEVERAL_LEVELS or level == "best":
+    if sees_several_levels(check.value) or level == "best":
         return np.asarray(np.any(broken, axis=-1))
     levels = [int(known) for known in record["level"]]
     index = levels.index(level) if isinstance(level, int) and level in levels else -1

@@ -98,30 +98,22 @@ def _gathered(name: str) -> Callable[[Place], Floats]:
     return take
 
 
-def _extremum(which: str) -> Callable[[Place], Floats]:
+def _of_quantity(which: str) -> Callable[[Place], Floats]:
+    """Return what was gathered of the quantity over every step."""
+
     def take(p: Place) -> Floats:
-        stored = _gathered(f"{p.quantity}_{which}")(p)
-        return stored if np.any(np.isfinite(stored)) else _of_every_step(p, which)
+        return _gathered(f"{p.quantity}_{which}")(p)
 
     return take
 
 
-def _of_every_step(p: Place, which: str) -> Floats:
-    """Return an extremum from the stored samples, where every step was stored."""
-    data = p.data()
-    if data is None or int(np.asarray(data.attrs["every"]).item()) != 1 or p.quantity not in data:
-        return p.missing
-    series = np.asarray(data[p.quantity], dtype=float)
-    if which in {"min", "max"}:
-        return np.asarray((np.min if which == "min" else np.max)(series, axis=-1))
-    inside = series[..., :-1] if which == "max_abs_interior" else series
-    return np.asarray(np.max(np.abs(inside), axis=-1))
-
-
 def _max_abs(p: Place) -> Floats:
-    low, high = (_gathered(f"{p.quantity}_{which}")(p) for which in ("min", "max"))
-    largest = np.maximum(np.abs(low), np.abs(high))
-    return largest if np.any(np.isfinite(largest)) else _extremum("max_abs")(p)
+    """Return the largest absolute value: gathered as such, or from the least and the largest value."""
+    data, name = p.data(), f"{p.quantity}_max_abs"
+    if data is not None and name in data:
+        return _gathered(name)(p)
+    low, high = (_of_quantity(which)(p) for which in ("min", "max"))
+    return np.asarray(np.maximum(np.abs(low), np.abs(high)))
 
 
 def _fall(of: Callable[[Place], Floats]) -> Callable[[Place], Floats]:
@@ -146,6 +138,12 @@ def _quotient(top: str, bottom: str) -> Callable[[Place], Floats]:
     return take
 
 
+def _growth_factor(p: Place) -> Floats:
+    """Return the last peak over the first: two peaks at least."""
+    several = _gathered("period_count")(p) >= 1
+    return np.where(several, _quotient("last_peak", "first_peak")(p), np.nan)
+
+
 def _frequency(p: Place) -> Floats:
     period = _gathered("period")(p)
     return safe_ratio(np.full_like(period, 2 * np.pi), period)
@@ -164,7 +162,7 @@ def _relative_energy_error(p: Place) -> Floats:
 
 def _error(norm: str) -> Callable[[Place], Floats]:
     def take(p: Place) -> Floats:
-        which = [str(name) for name in p.record["norm"]].index(norm)
+        which = p.record.words("norm").index(norm)
         if p.level == "best":
             name = f"{p.quantity}_richardson_error_norm"
             return p.record[name][..., which] if name in p.record else p.missing
@@ -186,7 +184,7 @@ def _along(p: Place, name: str, dim: str, norm: int | None = None) -> Floats:
 
 def _of_triple(name: str, norm: str | None) -> Callable[[Place], Floats]:
     def take(p: Place) -> Floats:
-        which = None if norm is None else [str(n) for n in p.record["norm"]].index(norm)
+        which = None if norm is None else p.record.words("norm").index(norm)
         return _along(p, name, "triple", which)
 
     return take
@@ -214,19 +212,19 @@ def _richardson_error(p: Place) -> Floats:
 KNOWN: Mapping[str, Callable[[Place], Any]] = {
     "end": _sample,
     "at": _sample,
-    "min": _extremum("min"),
-    "max": _extremum("max"),
+    "min": _of_quantity("min"),
+    "max": _of_quantity("max"),
     "max_abs": _max_abs,
-    "max_abs_interior": _extremum("max_abs_interior"),
+    "max_abs_interior": _of_quantity("max_abs_interior"),
     "max_abs_ratio": _fall(_max_abs),
-    "max_abs_interior_ratio": _fall(_extremum("max_abs_interior")),
+    "max_abs_interior_ratio": _fall(_of_quantity("max_abs_interior")),
     "period": _gathered("period"),
     "period_grid": _gathered("period_grid"),
     "exact_period": _gathered("exact_period"),
     "period_error": _period_error,
     "frequency": _frequency,
     "amplitude": _gathered("amplitude"),
-    "growth_factor": _quotient("last_peak", "first_peak"),
+    "growth_factor": _growth_factor,
     "relative_energy_error": _relative_energy_error,
     "error_l1": _error("l1"),
     "error_l2": _error("l2"),

@@ -29,21 +29,11 @@ from numpy.typing import NDArray
 from vibsim.analysis.rules import BLAME, Evidence, breakdown, rules
 from vibsim.analysis.series import order_of_ratio, safe_ratio
 from vibsim.analysis.window import trend
+from vibsim.vocabulary import REASON_NAMES, REASONS, STATUSES
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Codes = NDArray[np.int8]
-
-STATUSES = ("PASS", "FAIL", "INCONCLUSIVE")
-REASONS = (
-    "asymptotic", "exact", "match",
-    "order_low", "order_high", "mismatch", "wrong_limit", "unstable", "non_finite",
-    "pre_asymptotic", "round_off", "oscillating", "non_smooth", "too_few_levels", "not_applicable",
-)  # fmt: skip
-STATUS_OF = {
-    reason: "PASS" if i < 3 else "FAIL" if i < 9 else "INCONCLUSIVE"
-    for i, reason in enumerate(REASONS)
-}
 
 
 @dataclass(frozen=True)
@@ -51,9 +41,9 @@ class Judgement:
     """What was decided of every ladder; arrays of shape (...)."""
 
     status: Codes
-    """Index into `STATUSES`."""
+    """Index into `vocabulary.STATUSES`."""
     reason: Codes
-    """Index into `REASONS`."""
+    """Index into `vocabulary.REASON_NAMES`."""
     order: Floats
     """The stated order; NaN where none is."""
     low: Floats
@@ -130,9 +120,9 @@ def _decide(
     last: NDArray[np.int64],
 ) -> Judgement:
     """Take the first rule that applies to each ladder; without one it is not yet asymptotic."""
-    codes = [REASONS.index(reason) for _, reason in cases]
-    reason = np.select([mask for mask, _ in cases], codes, REASONS.index("pre_asymptotic"))
-    of_reason = np.array([STATUSES.index(STATUS_OF[name]) for name in REASONS], dtype=np.int8)
+    codes = [REASON_NAMES.index(reason) for _, reason in cases]
+    reason = np.select([mask for mask, _ in cases], codes, REASON_NAMES.index("pre_asymptotic"))
+    of_reason = np.array([STATUSES.index(status) for status in REASONS.values()], dtype=np.int8)
     return Judgement(
         of_reason[reason], reason.astype(np.int8), order, low, high, first, last, culprit, orders
     )

@@ -23,6 +23,14 @@ QUIET = 0.01
 """Scatter or change of the order too small to read a trend from."""
 SHOWS = 3.0
 """Noise changes an order by no more than so many times its scatter (over log 2)."""
+UNRELATED_FIRST = 0.1
+"""A first triple with more scatter has no trend before it that could vouch for it: suspect differences spoil it."""
+FLAT_FIRST = 0.25
+"""The same for a first triple with a lower order, half the least that an expansion has: noise does not fall with dt."""
+GROWS = 1.3
+"""The scatter drifts when it grows by more per level; a power lower by 1/2 makes it grow by 2^0.5."""
+LOUD = 10.0
+"""Round-off may be so many times its predicted floor, an order of magnitude, and move the order accordingly."""
 LOG2 = float(np.log(2.0))
 
 
@@ -122,13 +130,13 @@ def trend(
             scatter=spread,
             scatter_before=np.where(several, np.abs(_at(scatter, last - 1)), 0.0),
             drifting=several
-            & (np.abs(spread) > 1.3 * np.abs(_at(scatter, last - 1)))
+            & (np.abs(spread) > GROWS * np.abs(_at(scatter, last - 1)))
             & (np.abs(spread) > QUIET)
             & unexplained,
             alternating=_alternating(scatter, last, several, change, earlier, tolerance),
             turning=(np.abs(change) > np.abs(earlier)) & (np.abs(change) > 5 * QUIET),
             gap=np.any(clean & np.isnan(orders), axis=-1),
-            noisy=np.abs(change) <= np.minimum(10 * rest, SHOWS * np.abs(spread)) / LOG2,
+            noisy=np.abs(change) <= np.minimum(LOUD * rest, SHOWS * np.abs(spread)) / LOG2,
         )
 
 
@@ -148,7 +156,7 @@ def _before_round_off(orders: Floats, scatter: Floats, noise: Floats, suspect: f
     """
     size = np.abs(scatter)
     spoiled = np.isnan(orders) | np.isnan(scatter) | (scatter < 0)
-    spoiled[..., 0] |= (size[..., 0] > 0.1) | (orders[..., 0] < 0.25)
+    spoiled[..., 0] |= (size[..., 0] > UNRELATED_FIRST) | (orders[..., 0] < FLAT_FIRST)
     change = np.abs(np.diff(orders, axis=-1))
     for i in range(1, orders.shape[-1]):
         usual = np.maximum(QUIET, change[..., i - 2]) if i > 1 else 5 * QUIET

@@ -95,7 +95,7 @@ def _add_jobs(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
     sub.add_argument("experiment", nargs="?", metavar="EXPERIMENT", help="experiment or FILE.yaml")
     sub.add_argument("--out", type=Path, metavar="DIR", help="folder to write to")
     text = "formats of the figure files: svg, png, pdf; several with commas (default: svg)"
-    sub.add_argument("--formats", default="svg", metavar="LIST", help=text)
+    sub.add_argument("--formats", metavar="LIST", help=text)
     _results(sub)
     _digest(sub)
 

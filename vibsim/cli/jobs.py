@@ -80,10 +80,7 @@ def analyse(options: Namespace) -> int:
 def report(options: Namespace) -> int:
     """Write the report of one experiment, or the index over all results."""
     if options.experiment is None:
-        from vibsim.report import write_index
-
-        write_index(options.out or results_folder(options))
-        return 0
+        return _index(options)
     plan, results = _plan(options)
     _check(plan, options.digest, plan.report)
     from vibsim import store
@@ -99,9 +96,22 @@ def report(options: Namespace) -> int:
         found[plan.convergence],
         found[plan.summary],
         options.out or results / plan.key,
-        formats=options.formats.split(","),
+        formats=(options.formats or "svg").split(","),
         provenance=_provenance(plan, plan.content) | {"digest": plan.analysis},
     )
+    return 0
+
+
+def _index(options: Namespace) -> int:
+    """Write the page over all results, which takes none of the options of one report."""
+    for name in ("digest", "discard", "formats"):
+        value = getattr(options, name)
+        if value:
+            text = "" if value is True else value
+            raise _refusal(f"--{name}", text, "belongs to the report of one experiment: name it")
+    from vibsim.report import write_index
+
+    write_index(options.out or results_folder(options))
     return 0
 
 

@@ -26,14 +26,18 @@ def _models() -> Iterable[tuple[str, str]]:
 
     for model in MODELS.values():
         parameters = ", ".join(f"{p.name} = {p.default:g} {p.unit}" for p in model.parameters)
-        yield model.kind, f"{model.title}: {model.equation}; {parameters}"
+        shape = "linear" if model.linear else "nonlinear"
+        yield model.kind, f"{model.title}: {model.equation}; {parameters}; {shape}"
 
 
 def _schemes() -> Iterable[tuple[str, str]]:
     from vibsim.schemes import SCHEMES
 
     for scheme in SCHEMES.values():
-        yield scheme.kind, scheme.title
+        work = f"{scheme.force_evaluations} force evaluation(s) per step"
+        limit = scheme.stability_limit
+        stable = "stable for every step" if limit is None else f"stable while w dt < {limit:g}"
+        yield scheme.kind, f"{scheme.title}; {work}; {stable}"
         for option in scheme.options:
             yield f"  {option.name}", f"{' | '.join(option.choices)}: {option.description}"
 

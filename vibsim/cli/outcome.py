@@ -13,6 +13,7 @@ from vibsim.cli import deleted
 from vibsim.errors import FileError
 from vibsim.plan import Plan
 from vibsim.store import read_json
+from vibsim.vocabulary import FORMAT, worst
 
 _LOG_LINES = 12
 
@@ -73,8 +74,8 @@ def passed(findings: Sequence[Finding], failures: Sequence[Failure]) -> bool:
 def as_json(findings: Sequence[Finding], failures: Sequence[Failure], results: Path) -> str:
     """Return the outcome as JSON text."""
     content = {
-        "vibsim_format": 1,
-        "status": _worst([finding.status for finding in findings] + ["FAIL"] * bool(failures)),
+        "vibsim_format": FORMAT,
+        "status": worst([finding.status for finding in findings] + ["FAIL"] * bool(failures)),
         "results": str(results),
         "experiments": [_entry(finding) for finding in findings],
         "failed_jobs": [
@@ -124,7 +125,7 @@ def as_text(
     checks = [check["status"] for f in findings if f.summary for check in f.summary["checks"]]
     yield (
         f"\n{len(findings)} experiments, {checks.count('PASS')} of {len(checks)} checks passed: "
-        + _worst([finding.status for finding in findings] + ["FAIL"] * bool(failures))
+        + worst([finding.status for finding in findings] + ["FAIL"] * bool(failures))
     )
 
 
@@ -141,7 +142,3 @@ def _checks(checks: Sequence[Mapping[str, Any]], columns: int) -> Iterator[str]:
         yield head.rstrip()
         for text in filter(None, (check["text"], check["advice"])):
             yield textwrap.indent(textwrap.fill(text, max(columns - 6, 30)), " " * 6)
-
-
-def _worst(statuses: Sequence[str]) -> str:
-    return next((s for s in ("FAIL", "INCONCLUSIVE") if s in statuses), "PASS")

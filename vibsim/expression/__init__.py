@@ -18,6 +18,7 @@ from vibsim.expression.tree import (
     Negate,
     Number,
     names_in,
+    walk,
 )
 
 __all__ = [
@@ -40,4 +41,5 @@ __all__ = [
     "parse",
     "to_python",
     "to_statements",
+    "walk",
 ]

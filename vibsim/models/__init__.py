@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from vibsim.models.base import ENERGIES, Model, Parameter, State, quantities
+from vibsim.models.base import ENERGIES, Model, Parameter, State, natural_end, quantities
 from vibsim.models.linear_pendulum import LINEAR_PENDULUM
 from vibsim.models.pendulum import PENDULUM
 
@@ -13,4 +13,4 @@ MODELS: Mapping[str, Model] = MappingProxyType(
     {model.kind: model for model in (PENDULUM, LINEAR_PENDULUM)}
 )
 
-__all__ = ["ENERGIES", "MODELS", "Model", "Parameter", "State", "quantities"]
+__all__ = ["ENERGIES", "MODELS", "Model", "Parameter", "State", "natural_end", "quantities"]

@@ -6,6 +6,7 @@ differentiates it, a report prints it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -76,6 +77,11 @@ class Model:
     def velocity(self) -> str:
         """Name of the velocity."""
         return self.states[1].name
+
+
+def natural_end(model: Model, periods: float, parameters: Numbers) -> Any:
+    """Return the time that a number of natural periods (small oscillations) takes, as a number or an array."""
+    return periods * (2.0 * math.pi / model.natural_frequency(parameters))
 
 
 ENERGIES = ("kinetic_energy", "potential_energy", "energy", "energy_deviation")

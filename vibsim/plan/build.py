@@ -105,6 +105,8 @@ def _code_of(model: str, schemes: tuple[str, ...]) -> str:
         "vibsim.simulation",
         "vibsim.store.netcdf",
         "vibsim.plan.cases",
+        "vibsim.spec.members",
+        "vibsim.spec.sampling",
         code.home(MODELS[model], "vibsim.models"),
         *(code.home(SCHEMES[kind], "vibsim.schemes") for kind in schemes),
     )
@@ -128,7 +130,11 @@ def _analysis(
 @cache
 def _analysis_code() -> str:
     return code.used_by(
-        "vibsim.analysis", "vibsim.store.netcdf", "vibsim.store.summary", "vibsim.store.shards"
+        "vibsim.analysis",
+        "vibsim.spec.values",
+        "vibsim.store.netcdf",
+        "vibsim.store.summary",
+        "vibsim.store.shards",
     )
 
 

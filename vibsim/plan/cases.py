@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def count(experiment: Experiment) -> int:
     """Return the number of members: 1 without a sweep."""
-    return 1 if experiment.sweep is None else experiment.sweep.count
+    return experiment.members
 
 
 def columns(experiment: Experiment, start: int, stop: int) -> dict[str, NDArray[np.float64]]:
@@ -46,12 +46,11 @@ def columns(experiment: Experiment, start: int, stop: int) -> dict[str, NDArray[
 def sampling(experiment: Experiment, level: int) -> int:
     """Return the stride of the stored samples: every how many steps of `level` one is kept.
 
-    The times of the coarsest level and the last one are always among them. Where ``every: n`` does
-    not divide the coarsest step, the stride is their greatest common divisor, so that the samples
-    asked for are among those kept.
+    The first and the last time are always among them, and so are all times of the coarsest level
+    unless the file asks for every n-th step of each level.
     """
     from vibsim.spec.sampling import stride
 
     coarsest = experiment.steps(experiment.levels[0])
-    trajectories = len(experiment.schemes) * count(experiment)
+    trajectories = len(experiment.schemes) * experiment.members
     return stride(experiment.samples, coarsest, experiment.steps(level), trajectories)

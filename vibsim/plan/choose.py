@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from vibsim.errors import Fault, InputError, VibsimError, nearest
+from vibsim.spec.collection import collection_of, find_checkout
 
 DEFAULT = ("pendulum_lab", "showcase")
-ADHOC = "adhoc"
-"""Collection of a file outside ``configs/``."""
-_PLAIN = re.compile(r"[a-z0-9_]+")
 
 
 @dataclass(frozen=True)
@@ -41,10 +38,10 @@ def checkout() -> Path:
     VibsimError
         When the package was installed without it.
     """
-    for folder in (Path(__file__).resolve().parents[2], Path.cwd()):
-        if (folder / "Snakefile").is_file() and (folder / "configs").is_dir():
-            return folder
-    raise VibsimError("no Snakefile beside the package nor here: vibsim runs from its checkout")
+    folder = find_checkout()
+    if folder is None:
+        raise VibsimError("no Snakefile beside the package nor here: vibsim runs from its checkout")
+    return folder
 
 
 def experiments(root: Path) -> list[Choice]:
@@ -108,10 +105,7 @@ def _find(
 
 
 def _choice(file: Path, root: Path) -> Choice:
-    file = file.absolute()
-    folder = file.resolve().parent
-    is_shipped = folder.parent == (root / "configs").resolve() and _PLAIN.fullmatch(folder.name)
-    return Choice(folder.name if is_shipped else ADHOC, file)
+    return Choice(collection_of(file, root / "configs"), file.absolute())
 
 
 def _clashes(choices: list[Choice]) -> Iterator[Fault]:

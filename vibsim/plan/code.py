@@ -1,7 +1,9 @@
 """Digests of the code that a job runs, so that a changed module reruns what it touches and no more.
 
 A job uses the modules it names and those they import, read from their source: nothing is executed.
-The lists of all models and schemes are not followed: a job uses its own model and its own schemes.
+The lists of all models and schemes are not followed: a job uses its own model and its own schemes. Nor is
+the reading of experiment files: what comes out of it is in the digest itself. What jobs work out from an
+experiment (members, samples, ends) is named by `vibsim.plan.build`.
 """
 
 from __future__ import annotations

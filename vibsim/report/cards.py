@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vibsim.plan.versions import DRAWING, versions
 from vibsim.record import Record
 from vibsim.report import assertions, contents, data, words
 from vibsim.report.tables import Cell, Column, Table
@@ -38,7 +39,7 @@ def context(
         "failures": contents.failures(summary, record),
         "unlisted": _unlisted(summary),
         "setup": list(setup(experiment, record)),
-        "provenance": list(flat({k: v for k, v in provenance.items() if k != "experiment"})),
+        "provenance": list(_provenance(provenance)),
         "used": json.dumps(provenance.get("experiment"), indent=1, ensure_ascii=False, default=str)
         if provenance.get("experiment")
         else "",
@@ -62,18 +63,18 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
     """Return what the page says of one check."""
     explained = words.reason(check["reason"], check["kind"])
     asserted = next((spec for spec in experiment.checks if spec.id == check["id"]), None)
-    heading = assertions.heading(asserted) if asserted else check["text"]
+    heading = assertions.heading(asserted) if asserted else words.told(check)
     return {
         "id": check["id"],
         "kind": check["kind"],
         "heading": heading,
         "background": assertions.background(asserted) if asserted else "",
-        "text": check["text"].removeprefix(heading).lstrip(". "),
+        "text": words.told(check).removeprefix(heading).lstrip(". "),
         "status": check["status"],
         "reason": check["reason"] or "–",
         "meaning": explained.meaning,
         "needs": explained.needs,
-        "advice": check.get("advice"),
+        "advice": words.told(check, "advice"),
         "expected": words.expectation(check.get("expected")),
         "factor": _factor(check),
         "results": _results(record, check),
@@ -224,6 +225,14 @@ def _range(values: Sequence[Any]) -> str:
     return (
         f"{_plain(values[0])}, {_plain(values[1])}, … {_plain(values[-1])} ({len(values)} values)"
     )
+
+
+def _provenance(provenance: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield the versions of all software in one line, then what else is known of where the results came from."""
+    found = {**provenance.get("versions", {}), **versions(DRAWING)}
+    named = {"python": "Python"}
+    yield "Versions", ", ".join(f"{named.get(name, name)} {found[name]}" for name in found)
+    yield from flat({k: v for k, v in provenance.items() if k not in {"experiment", "versions"}})
 
 
 def flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:

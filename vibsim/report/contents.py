@@ -11,13 +11,12 @@ import numpy as np
 from vibsim.record import Record
 from vibsim.report import words
 from vibsim.report.data import (
-    TYPICAL_NORM,
     Member,
     at,
     case_name,
+    exact_periods,
     flags,
     floor_norm,
-    names,
     norm_unit,
     pick,
     sound_pairs,
@@ -28,6 +27,7 @@ from vibsim.report.data import (
     whole,
 )
 from vibsim.report.tables import Cell, Column, Table
+from vibsim.vocabulary import TYPICAL_NORM
 
 LISTED = 10_000
 """Most members that a table lists one by one."""
@@ -86,7 +86,7 @@ def orders(
 def _order_rows(
     record: Record, quantity: str, member: Member, norm: str, sweep: bool
 ) -> Iterator[tuple[Cell, ...]]:
-    n = names(record, "norm").index(norm)
+    n = record.words("norm").index(norm)
     levels, dt = whole(record, "level"), steps_of(record, member.case)
     columns = [
         _padded(record, f"{quantity}_{name}", member, n, len(levels))
@@ -177,7 +177,7 @@ def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
     rows: list[tuple[Cell, ...]] = []
     for member in shown:
         period, amplitude = at(record, "period", member), at(record, "amplitude", member)
-        exact = float(at(record, "exact_period", member))
+        exact = float(exact_periods(record)[member.case])
         for i, level in enumerate(whole(record, "level")):
             error = float(period[i]) / exact - 1.0
             rows.append((member.title, level, float(period[i]), exact, error, float(amplitude[i])))
@@ -195,10 +195,10 @@ def member_list(record: Record, quantity: str) -> Table | None:
         Column("order, high", form="order"), Column("period", unit(record, "period"), "full"),
         Column("relative error", form="norm"),
     )  # fmt: skip
-    n = names(record, "norm").index(TYPICAL_NORM)
-    exact = np.asarray(record["exact_period"], dtype=np.float64)
+    n = record.words("norm").index(TYPICAL_NORM)
+    exact = exact_periods(record)
     rows: list[tuple[Cell, ...]] = []
-    for s, scheme in enumerate(names(record, "scheme")):
+    for s, scheme in enumerate(record.words("scheme")):
         orders = [
             pick(record, f"{quantity}_order{end}", scheme=s, norm=n)
             for end in ("", "_low", "_high")

@@ -12,15 +12,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.analysis.assemble import asked
+from vibsim.analysis.evidence import spacing_of
+from vibsim.analysis.floor import norm_of_floor
+from vibsim.models import MODELS
 from vibsim.record import Record
+from vibsim.report.style import RAISE
+from vibsim.vocabulary import SEVERITY, TOLERANCE, TYPICAL_NORM
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
 
 Floats = NDArray[np.float64]
-
-SEVERITY = {"PASS": 0, "INCONCLUSIVE": 1, "FAIL": 2}
-TYPICAL_NORM = "l2"
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,7 @@ def pick(record: Record, name: str, **index: int) -> NDArray[Any]:
     array
         The dimensions that were not named, in their order.
     """
-    variable = record.variables.get(name) or record.coords[name]
+    variable = record.variable(name)
     return np.asarray(variable.values[tuple(index.get(dim, slice(None)) for dim in variable.dims)])
 
 
@@ -74,19 +77,36 @@ def at(record: Record, name: str, member: Member, **index: int) -> Floats:
     return np.asarray(values, dtype=np.float64)
 
 
+def known(record: Record, name: str, dims: tuple[str, ...], **index: int) -> Floats:
+    """Return what `pick` gives, of shape `dims`; NaN throughout where the record has no such variable.
+
+    A model need not have an exact solution or an exact period.
+    """
+    if name in record:
+        return np.asarray(pick(record, name, **index), dtype=np.float64)
+    return np.full([record.sizes[dim] for dim in dims], np.nan)
+
+
+def exact_series(record: Record, quantity: str, member: Member) -> Floats:
+    """Return the exact solution of a member at the common times, shape (t,); NaN where there is none."""
+    return known(record, f"{quantity}_exact", ("t",), scheme=member.scheme, case=member.case)
+
+
+def exact_periods(record: Record) -> Floats:
+    """Return the exact period of every member, shape (case,); NaN where there is none."""
+    return known(record, "exact_period", ("case",))
+
+
 def unit(record: Record, name: str) -> str:
     """Return the unit of a variable, with Unicode exponents; empty where it has none."""
-    variable = record.variables.get(name) or record.coords.get(name)
-    text = "" if variable is None else str(variable.attrs.get("units", ""))
-    return pretty_unit(text)
+    return pretty_unit(str(record.variable(name).attrs.get("units", "")) if name in record else "")
 
 
 def pretty_unit(text: str) -> str:
     """Write a unit such as ``rad s-1`` with Unicode exponents."""
-    raised = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
     parts = (part.rstrip("-0123456789") for part in text.split())
     words = [
-        base + part[len(base) :].translate(raised)
+        base + part[len(base) :].translate(RAISE)
         for base, part in zip(parts, text.split(), strict=True)
     ]
     return "" if text in {"", "1"} else " ".join(words)
@@ -105,19 +125,10 @@ def steps_of(record: Record, case: int) -> Floats:
 
 def flags(record: Record, name: str) -> NDArray[Any]:
     """Return a flag variable as words, same shape."""
-    variable = record.variables[name]
-    meanings = str(variable.attrs["flag_meanings"]).split()
-    table = dict(zip(np.ravel(variable.attrs["flag_values"]).tolist(), meanings, strict=True))
-    found, place = np.unique(variable.values, return_inverse=True)
+    table, values = record.meanings(name), record[name]
+    found, place = np.unique(values, return_inverse=True)
     words = np.array([table[int(value)] for value in found], dtype=object)
-    return np.asarray(words[place].reshape(variable.values.shape))
-
-
-def names(record: Record, dim: str) -> list[str]:
-    """Return a coordinate of words (schemes, norms, checks) as strings."""
-    return [
-        value.decode() if isinstance(value, bytes) else str(value) for value in record[dim].tolist()
-    ]
+    return np.asarray(words[place].reshape(values.shape))
 
 
 def whole(record: Record, dim: str) -> list[int]:
@@ -149,61 +160,52 @@ def _value(value: Any) -> str:
     return f"{plain:.6g}" if isinstance(plain, float) else str(plain)
 
 
-def formal_order(experiment: Experiment, scheme: int, quantity: str) -> float:
-    """Return the order that a scheme promises for a quantity of the experiment's model."""
-    from vibsim.models import MODELS
-    from vibsim.schemes import SCHEMES
-
-    spec = experiment.schemes[scheme]
-    return float(
-        SCHEMES[spec.kind].formal_order(quantity, MODELS[experiment.model.kind], spec.options)
-    )
+def formal_order(record: Record, scheme: int, quantity: str) -> float:
+    """Return the order that a scheme promises for a quantity."""
+    return float(record[f"{quantity}_formal_order"][scheme])
 
 
-def target_ratio(order: float, levels: tuple[int, int, int]) -> float:
-    """Return the ratio of successive differences that an error ``C dt**order`` gives on three levels."""
-    first, second = levels[1] - levels[0], levels[2] - levels[1]
-    return float(
-        2.0 ** (order * first) * (1 - 2.0 ** (-order * first)) / (1 - 2.0 ** (-order * second))
-    )
+def promises(experiment: Experiment, record: Record, quantity: str) -> list[tuple[float, float]]:
+    """Return every order that a scheme promises for a quantity, with its tolerance, in ascending order.
+
+    The tolerance is the smallest that a check has which is about the quantity and the scheme.
+    """
+    inner = [check.that if check.kind == "claim" else check for check in experiment.checks]
+    found = set()
+    for s, scheme in enumerate(record.words("scheme")):
+        tolerances = [
+            check.tolerance
+            for check in inner
+            if check.kind == "converges"
+            and check.converges == quantity
+            and (check.schemes is None or scheme in check.schemes)
+        ]
+        found.add((formal_order(record, s, quantity), min(tolerances, default=TOLERANCE)))
+    return sorted(found)
 
 
 def position(experiment: Experiment) -> str:
     """Return the name of the model's position."""
-    from vibsim.models import MODELS
-
     return MODELS[experiment.model.kind].position
 
 
 def quantities(experiment: Experiment, record: Record) -> list[str]:
     """Return the quantities to show: the position, those that a check names, and the energy deviation."""
-    from vibsim.models import MODELS
-
     extra = ["energy_deviation"] if MODELS[experiment.model.kind].conservative else []
     wanted = dict.fromkeys([position(experiment), *asked(experiment), *extra])
     return [name for name in wanted if f"{name}_finest" in record]
 
 
-def asked(experiment: Experiment) -> list[str]:
-    """Return the quantities that the checks name."""
-    inner = [getattr(check, "that", check) for check in experiment.checks]
-    found = [
-        getattr(check, "converges", None) or getattr(check, "quantity", None) for check in inner
-    ]
-    return [str(name) for name in found if name]
-
-
-def members(experiment: Experiment, record: Record, quantity: str) -> list[Member]:
+def members(record: Record, quantity: str) -> list[Member]:
     """Return what the figures over time show of a quantity: of every scheme one member, or two of a sweep.
 
     These are the worst and a typical member, judged by the verdicts on `quantity` and then by the distance of the
     order from the promised one; of several schemes the worst decides.
     """
-    schemes = names(record, "scheme")
+    schemes = record.words("scheme")
     if not swept(record):
         return [Member(s, 0, name) for s, name in enumerate(schemes)]
-    promised = np.array([formal_order(experiment, s, quantity) for s in range(len(schemes))])
-    ranking = _ranking(record, quantity, promised)
+    ranking = _ranking(record, quantity)
     roles = {int(ranking[ranking.size // 2]): "typical", int(ranking[-1]): "worst"}
     return [
         Member(s, case, name, case_name(record, case), role)
@@ -212,14 +214,16 @@ def members(experiment: Experiment, record: Record, quantity: str) -> list[Membe
     ]
 
 
-def _ranking(record: Record, quantity: str, promised: Floats) -> NDArray[np.intp]:
+def _ranking(record: Record, quantity: str) -> NDArray[np.intp]:
     """Return the members from the best to the worst, shape (case,)."""
     status = flags(record, f"{quantity}_status")
     severity = np.max(
         [np.where(status == word, rank, 0) for word, rank in SEVERITY.items()], axis=(0, 1)
     )
-    norm = names(record, "norm").index(TYPICAL_NORM)
-    away = np.abs(pick(record, f"{quantity}_order", norm=norm) - promised[:, None])
+    norm = record.words("norm").index(TYPICAL_NORM)
+    away = np.abs(
+        pick(record, f"{quantity}_order", norm=norm) - record[f"{quantity}_formal_order"][:, None]
+    )
     return np.lexsort((np.max(np.where(np.isnan(away), np.inf, away), axis=0), severity))
 
 
@@ -254,11 +258,9 @@ def _floor(record: Record, quantity: str, member: Member) -> Floats:
 
 def floor_norm(record: Record, quantity: str, member: Member, norm: str) -> Floats:
     """Return the norm over time of noise as large as the predicted round-off, shape (level,)."""
-    from vibsim.analysis.floor import norm_of_floor
-
-    t = times(record, member.case)
-    spacing = t[1:2] - t[:1] if t.size > 1 else np.ones(1)
-    return norm_of_floor(at(record, f"{quantity}_floor", member), norm, t.size, spacing)
+    spacing = np.broadcast_to(spacing_of(record), len(record["case"]))[member.case]
+    floor = at(record, f"{quantity}_floor", member)
+    return norm_of_floor(floor, norm, len(record["t"]), spacing)
 
 
 def norm_unit(record: Record, quantity: str, norm: str) -> str:

@@ -13,21 +13,20 @@ import numpy as np
 from vibsim.record import Record
 from vibsim.report import style, words
 from vibsim.report.data import (
-    TYPICAL_NORM,
     Floats,
     Member,
     at,
     case_name,
     floor_norm,
-    formal_order,
-    names,
     norm_unit,
+    promises,
     sound_pairs,
     steps_of,
     unit,
     whole,
 )
 from vibsim.report.style import Picture
+from vibsim.vocabulary import TYPICAL_NORM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,13 +34,11 @@ if TYPE_CHECKING:
     from vibsim.spec import Experiment
 
 LEGEND_COLUMNS = 5
-DRAWN = 6
-"""Most schemes that a panel can tell apart."""
 
 
 def against_step(experiment: Experiment, record: Record, quantity: str, case: int) -> Picture:
     """Draw the norms of differences and errors against the step, and the local order against the level."""
-    schemes = names(record, "scheme")
+    schemes = record.words("scheme")
     height = 3.15 + 0.2 * math.ceil((len(schemes) + 4) / LEGEND_COLUMNS)
     figure = style.canvas(height)
     low, tall = 0.5 / height, 2.2 / height
@@ -68,8 +65,8 @@ def against_step(experiment: Experiment, record: Record, quantity: str, case: in
         name=f"order_{quantity}_{case}",
         title=f"How fast does the error shrink? {letter}{suffix}",
         caption="Left: size of the level differences (filled) and of the true error where known (hollow) against dt; "
-        "parallel to the dashed line means the promised order, and points on the dotted line are round-off. Right: the "
-        "order that three successive levels give, drawn at the coarsest of the three; it should settle inside the "
+        "parallel to a dashed line means that promised order, and points on the dotted line are round-off. Right: the "
+        "order that three successive levels give, drawn at the coarsest of the three; it should settle inside a "
         "grey band; beyond the frame is what round-off makes of it. The bar is the stated order with its "
         "interval, over the levels it rests on.",
         alt=f"Norm of the level differences of {words.name(quantity)} against the step, and local order against level",
@@ -80,39 +77,36 @@ def against_step(experiment: Experiment, record: Record, quantity: str, case: in
 def _draw_norms(
     ax: Axes, experiment: Experiment, record: Record, quantity: str, case: int, schemes: list[str]
 ) -> None:
-    dt, norm = steps_of(record, case), names(record, "norm").index(TYPICAL_NORM)
+    dt, norm = steps_of(record, case), record.words("norm").index(TYPICAL_NORM)
     measure = norm_unit(record, quantity, TYPICAL_NORM)
     seen: list[Floats] = []
     floors: list[Floats] = []
     for s, scheme in enumerate(schemes):
         member = Member(s, case, scheme)
-        colour, marker = style.COLOURS[s % 7], style.MARKERS[s % 7]
+        look = style.look(s)
         difference = style.no_zeros(at(record, f"{quantity}_difference_norm", member, norm=norm))
         true = style.no_zeros(at(record, f"{quantity}_error_norm", member, norm=norm))
         ax.plot(
             dt[: difference.size],
             difference,
-            color=colour,
-            marker=marker,
+            **look,
             markersize=5,
             linewidth=1.1,
-            linestyle=style.DASHES[s % 7],
             label=style.entry(scheme),
         )
         if np.isfinite(true).any():
             ax.plot(
                 dt,
                 true,
-                color=colour,
-                marker=marker,
+                **look | {"linestyle": "none"},
                 markersize=7,
-                linestyle="none",
                 markerfacecolor="none",
             )
         floors.append(style.no_zeros(floor_norm(record, quantity, member, TYPICAL_NORM)))
-        ax.plot(dt, floors[-1], color=colour, linestyle=":", linewidth=1.0)
+        ax.plot(dt, floors[-1], color=look["color"], linestyle=":", linewidth=1.0)
         seen += [difference, true]
-    _reference(ax, dt, seen, formal_order(experiment, 0, quantity))
+    for order in dict.fromkeys(order for order, _ in promises(experiment, record, quantity)):
+        _reference(ax, dt, seen, order)
     near = _step_limits(ax, dt, seen, floors)
     _explain(ax, known=any(np.isfinite(true).any() for true in seen[1::2]), floor=near)
     ax.set_xlabel(style.label("dt", unit(record, "dt") or "s"))
@@ -184,10 +178,11 @@ def _draw_orders(
 ) -> None:
     from matplotlib.ticker import MaxNLocator
 
-    triples, norm = whole(record, "triple"), names(record, "norm").index(TYPICAL_NORM)
-    promised = formal_order(experiment, 0, quantity)
-    ax.axhspan(promised - 0.1, promised + 0.1, color="#ececec", zorder=0)
-    ax.axhline(promised, color="black", linestyle=(0, (4, 3)), linewidth=1.0, zorder=1)
+    triples, norm = whole(record, "triple"), record.words("norm").index(TYPICAL_NORM)
+    promised = promises(experiment, record, quantity)
+    for order, tolerance in promised:
+        ax.axhspan(order - tolerance, order + tolerance, color="#ececec", zorder=0)
+        ax.axhline(order, color="black", linestyle=(0, (4, 3)), linewidth=1.0, zorder=1)
     sound: list[Floats] = []
     for s, scheme in enumerate(schemes):
         member = Member(s, case, scheme)
@@ -200,14 +195,12 @@ def _draw_orders(
         ax.plot(
             triples,
             local,
-            color=style.COLOURS[s % 7],
-            linestyle=style.DASHES[s % 7],
-            marker=style.MARKERS[s % 7],
+            **style.look(s),
             markersize=5,
             linewidth=1.1,
         )
         _draw_stated(ax, record, quantity, member, norm)
-    ax.set_ylim(*_order_limits(sound, promised))
+    ax.set_ylim(*_order_limits(sound, [order for order, _ in promised]))
     if len(schemes) == 1 and len(triples) <= 8:
         for level, order in zip(triples, local, strict=True):
             if np.isfinite(order):
@@ -238,7 +231,7 @@ def _draw_stated(ax: Axes, record: Record, quantity: str, member: Member, norm: 
     )
     if not np.isfinite([order, low, high, first, last]).all() or last <= first:
         return
-    colour = style.COLOURS[member.scheme % 7]
+    colour = style.look(member.scheme)["color"]
     ax.fill_between(
         [first, last], [low, low], [high, high], color=colour, alpha=0.18, linewidth=0, zorder=0.5
     )
@@ -253,10 +246,10 @@ def _draw_stated(ax: Axes, record: Record, quantity: str, member: Member, norm: 
     )
 
 
-def _order_limits(sound: list[Floats], promised: float) -> tuple[float, float]:
-    """Hold the target and the orders that count, within promised - 5 and promised + 2."""
-    values = np.concatenate([part[np.isfinite(part)] for part in sound] or [np.array([promised])])
-    low = min([promised - 0.3, *values.tolist()])
-    high = max([promised + 0.3, *values.tolist()])
+def _order_limits(sound: list[Floats], promised: list[float]) -> tuple[float, float]:
+    """Hold the promised orders and those that count, no further than 5 below the least and 2 above the largest."""
+    values = np.concatenate([part[np.isfinite(part)] for part in sound] or [np.array(promised)])
+    low = min([promised[0] - 0.3, *values.tolist()])
+    high = max([promised[-1] + 0.3, *values.tolist()])
     room = 0.08 * (high - low)
-    return max(low - room, promised - 5), min(high + room, promised + 2)
+    return max(low - room, promised[0] - 5), min(high + room, promised[-1] + 2)

@@ -11,7 +11,7 @@ import numpy as np
 
 from vibsim.record import Record
 from vibsim.report import style, words
-from vibsim.report.data import Floats, Member, at, times, unit, whole
+from vibsim.report.data import Floats, Member, at, exact_series, times, unit, whole
 from vibsim.report.panels import panels
 from vibsim.report.style import Picture
 
@@ -72,7 +72,7 @@ def _draw_band(ax: Axes, t: Floats, record: Record, quantity: str, member: Membe
 
 def _draw_solution(ax: Axes, t: Floats, record: Record, quantity: str, member: Member) -> bool:
     finest = whole(record, "level")[-1]
-    exact = at(record, f"{quantity}_exact", member) if f"{quantity}_exact" in record else t * np.nan
+    exact = exact_series(record, quantity, member)
     pale: dict[str, Any] = {"color": "#56B4E9", "linewidth": 4.5, "alpha": 0.7}
     solid: dict[str, Any] = {"color": "#0072B2", "linewidth": 1.4}
     dotted: dict[str, Any] = {"color": "black", "linewidth": 1.4, "linestyle": (0, (1, 3))}
@@ -108,11 +108,9 @@ def _draw_errors(ax: Axes, t: Floats, record: Record, quantity: str, member: Mem
     if np.isfinite(bound).all():
         drawn.append(style.no_zeros(bound))
         ax.plot(*style.thin(t, drawn[-1]), color=style.COLOURS[2], label="bound, extrapolated")
-        if f"{quantity}_exact" in record:
-            true = at(record, f"{quantity}_exact", member) - at(
-                record, f"{quantity}_richardson", member
-            )
-            drawn += _dots(ax, t, style.no_zeros(true), style.COLOURS[2], "true, extrapolated")
+        true = exact_series(record, quantity, member)
+        true = true - at(record, f"{quantity}_richardson", member)
+        drawn += _dots(ax, t, style.no_zeros(true), style.COLOURS[2], "true, extrapolated")
     _log_limits(ax, drawn)
     style.beside(ax)
 

@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 from vibsim.record import Record
 from vibsim.report import style, words
 from vibsim.report.data import (
-    SEVERITY,
-    TYPICAL_NORM,
     Floats,
+    exact_periods,
     flags,
-    formal_order,
-    names,
     pick,
+    promises,
     swept,
     swept_label,
     unit,
@@ -25,6 +23,7 @@ from vibsim.report.data import (
 )
 from vibsim.report.panels import panels
 from vibsim.report.style import Picture
+from vibsim.vocabulary import SEVERITY, TYPICAL_NORM
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -90,10 +89,10 @@ def period(record: Record) -> Picture | None:
     )
     if not np.isfinite(computed).any():
         return None
-    exact = np.asarray(record["exact_period"], dtype=np.float64)
+    exact = exact_periods(record)
     along, known = axis(record), bool(np.isfinite(exact).any())
     axes = panels([2.4, 2.4] if known else [2.6])
-    levels, schemes = whole(record, "level"), names(record, "scheme")
+    levels, schemes = whole(record, "level"), record.words("scheme")
     for k, (name, members) in enumerate(along.lines):
         x = along.x[members]
         if known:
@@ -141,10 +140,10 @@ def _draw_period_errors(
     for k, (name, members) in enumerate(along.lines):
         for s, scheme in enumerate(schemes):
             for m, i in enumerate(chosen):
-                colour = (k + s if several else m) % 7
+                colour = k + s if several else m
                 label = _text(scheme if len(schemes) > 1 else "", name, f"level {levels[i]}")
                 look = _mark(s, colour, len(schemes)) | {
-                    "linestyle": style.DASHES[colour],
+                    "linestyle": style.look(colour)["linestyle"],
                     "linewidth": 1.2,
                 }
                 _line(ax, along.x[members], error[s, members, i], label=label, **look)
@@ -164,8 +163,8 @@ def _text(*parts: str) -> str:
 def _mark(scheme: int, colour: int, count: int) -> dict[str, Any]:
     """Return a marker of a scheme; of several the first is large and hollow, so that all stay visible."""
     look: dict[str, Any] = {
-        "marker": style.MARKERS[scheme % 7],
-        "color": style.COLOURS[colour % 7],
+        "marker": style.look(scheme)["marker"],
+        "color": style.look(colour)["color"],
         "markersize": 4.5,
     }
     if count > 1 and scheme == 0:
@@ -182,19 +181,20 @@ def _line(ax: Axes, x: Floats, y: Floats, **look: Any) -> None:
 
 def orders(experiment: Experiment, record: Record, quantity: str) -> Picture:
     """Draw the stated order of every member with its interval, and the verdict on it as a strip below."""
-    along, schemes = axis(record), names(record, "scheme")
-    norm = names(record, "norm").index(TYPICAL_NORM)
+    along, schemes = axis(record), record.words("scheme")
+    norm = record.words("norm").index(TYPICAL_NORM)
     axes = panels([2.3, 0.3 * max(2, len(schemes))])
-    promised = formal_order(experiment, 0, quantity)
-    axes[0].axhspan(promised - 0.1, promised + 0.1, color="#ececec", zorder=0)
-    axes[0].axhline(
-        promised,
-        color="black",
-        linestyle=(0, (4, 3)),
-        linewidth=1.0,
-        zorder=1,
-        label="promised, ± 0.1",
-    )
+    promised = promises(experiment, record, quantity)
+    for order, tolerance in promised:
+        axes[0].axhspan(order - tolerance, order + tolerance, color="#ececec", zorder=0)
+        axes[0].axhline(
+            order,
+            color="black",
+            linestyle=(0, (4, 3)),
+            linewidth=1.0,
+            zorder=1,
+            label=f"promised, {order:g} ± {tolerance:g}",
+        )
     for s, scheme in enumerate(schemes):
         value, low, high = (
             pick(record, f"{quantity}_order{end}", scheme=s, norm=norm)
@@ -202,21 +202,20 @@ def orders(experiment: Experiment, record: Record, quantity: str) -> Picture:
         )
         for k, (_, members) in enumerate(along.lines):
             _draw_interval(
-                axes[0], along.x[members], low[members], high[members], style.COLOURS[s % 7]
+                axes[0], along.x[members], low[members], high[members], style.look(s)["color"]
             )
             _line(
                 axes[0],
                 along.x[members],
                 value[members],
-                color=style.COLOURS[s % 7],
-                marker=style.MARKERS[s % 7],
+                **style.look(s) | {"linestyle": "-"},
                 markersize=4,
                 linewidth=0.8,
                 label="" if k else style.entry(scheme),
             )
     values = np.asarray(record[f"{quantity}_order"])[..., norm]
-    bottom, top = style.limits(values, np.array([promised - 0.25, promised + 0.25]))
-    axes[0].set_ylim(max(bottom, promised - 3), min(top, promised + 2))
+    bottom, top = style.limits(values, np.array([promised[0][0] - 0.25, promised[-1][0] + 0.25]))
+    axes[0].set_ylim(max(bottom, promised[0][0] - 3), min(top, promised[-1][0] + 2))
     letter = words.symbol(quantity)
     axes[0].set_ylabel(f"order of {letter} ({TYPICAL_NORM})")
     axes[0].set_title("Stated order with its interval")
@@ -226,8 +225,8 @@ def orders(experiment: Experiment, record: Record, quantity: str) -> Picture:
     return Picture(
         name=f"sweep_order_{quantity}",
         title=f"Order of every member: {letter}",
-        caption="Top: the order that each member's levels state; the grey band is the promised order ± 0.1. Bottom: "
-        "what can be said of it. Members that fail or stay open are worth a look one by one.",
+        caption="Top: the order that each member's levels state; a grey band is a promised order with the tolerance of "
+        "its check. Bottom: what can be said of it. Members that fail or stay open are worth a look one by one.",
         alt=f"Stated order of {words.name(quantity)} and its verdict against the swept parameter",
         figure=axes[0].get_figure(),  # type: ignore[arg-type]
     )

@@ -5,11 +5,11 @@ Source: pendulum lecture, sections 2.5 and 2.6.
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vibsim.analysis.series import gap_ratio, rescaling, target_ratio
 from vibsim.record import Record
 from vibsim.report import style, words
 from vibsim.report.data import (
@@ -19,7 +19,6 @@ from vibsim.report.data import (
     formal_order,
     sound_levels,
     sound_pairs,
-    target_ratio,
     times,
     unit,
     whole,
@@ -30,18 +29,16 @@ from vibsim.report.style import Picture
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from vibsim.spec import Experiment
-
 CURVES = 6
 """Most curves in one panel; more cannot be told apart."""
 TARGET: dict[str, Any] = {"color": "black", "linestyle": (0, (4, 3)), "linewidth": 1.0}
 
 
-def overlay(experiment: Experiment, record: Record, quantity: str, member: Member) -> Picture:
+def overlay(record: Record, quantity: str, member: Member) -> Picture:
     """Draw the rescaled level differences of a quantity, their spread, and the ratio over time."""
-    t, order = times(record, member.case), formal_order(experiment, member.scheme, quantity)
+    t, order = times(record, member.case), formal_order(record, member.scheme, quantity)
     letter, measure = words.symbol(quantity), unit(record, f"{quantity}_difference")
-    curves = differences(experiment, record, quantity, member)
+    curves = differences(record, quantity, member)
     spread, ratios = comparable(curves), len(whole(record, "triple")) > 0
     axes = panels([2.4, *([1.3] if spread else []), *([1.5] if ratios else [])])
     draw_curves(axes[0], t, curves, f"rescaled difference of {letter}", measure)
@@ -55,8 +52,8 @@ def overlay(experiment: Experiment, record: Record, quantity: str, member: Membe
     low = words.lowered(first)
     parts = [
         f"{letter}{low} is {letter} on level {first}, and so on. Top: the differences between successive levels, "
-        f"multiplied by {2.0**order:g} from one to the next; if the error shrinks as dt{words.raised(order)}, the "
-        "curves fall on one another.",
+        f"{_multiplied(order, whole(record, 'level'))}; if the error shrinks as dt{words.raised(order)}, the curves "
+        "fall on one another.",
         "Then the spread: how far each curve is from the finest one above round-off."
         if spread
         else "",
@@ -75,15 +72,16 @@ def overlay(experiment: Experiment, record: Record, quantity: str, member: Membe
     )
 
 
-def energy(experiment: Experiment, record: Record, member: Member) -> Picture:
+def energy(record: Record, member: Member) -> Picture:
     """Draw the energy deviation of every level times ``(2**p)**k``: convergence to conservation."""
-    order = formal_order(experiment, member.scheme, "energy_deviation")
+    order = formal_order(record, member.scheme, "energy_deviation")
     measure, levels = unit(record, "energy_deviation_scaled"), whole(record, "level")
     above = sound_levels(record, "energy_deviation", member)
     curves = []
     for i, level in enumerate(levels):
         values = at(record, "energy_deviation_scaled", member, level=i)
-        text = f"{words.factor(order, level - levels[0])}dE{words.lowered(level)}"
+        factor = words.factor(float(gap_ratio(order, level - levels[0])), 2.0**order)
+        text = f"{factor}dE{words.lowered(level)}"
         curves.append(Curve(text, values, above[i]))
     curves = [curves[i] for i in _few([curve.sound for curve in curves])]
     spread = comparable(curves)
@@ -96,7 +94,7 @@ def energy(experiment: Experiment, record: Record, member: Member) -> Picture:
     axes[-1].set_xlabel(style.label("t", unit(record, "t") or "s"))
     caption = (
         f"dE{words.lowered(levels[0])} is dE on level {levels[0]}, and so on. The exact energy is constant, so dE "
-        f"itself is an error. Multiplied by {2.0**order:g} from level to level the curves should coincide; look at the "
+        f"itself is an error. Multiplied by {2.0**order:g} for each level the curves should coincide; look at the "
         "last point too, where the velocity comes from a formula of its own."
     )
     if spread:
@@ -110,24 +108,25 @@ def energy(experiment: Experiment, record: Record, member: Member) -> Picture:
     )
 
 
-def differences(
-    experiment: Experiment, record: Record, quantity: str, member: Member
-) -> list[Curve]:
+def differences(record: Record, quantity: str, member: Member) -> list[Curve]:
     """Return the level differences, rescaled so that an error ``C dt**p`` makes them coincide; at most `CURVES`."""
-    order = formal_order(experiment, member.scheme, quantity)
-    levels, pairs = whole(record, "level"), whole(record, "pair")
+    order, levels = formal_order(record, member.scheme, quantity), whole(record, "level")
     above, letter = sound_pairs(record, quantity, member), words.symbol(quantity)
-    share = [1 - 2.0 ** (-order * (b - a)) for a, b in pairwise(levels)]
     curves = []
     for i in _few(above):
-        coarse, fine = levels[i], levels[i + 1]
-        gap = f"{letter}{words.lowered(coarse)} − {letter}{words.lowered(fine)}"
-        uneven = share[0] / share[i]
-        factor = words.factor(order, coarse - pairs[0], uneven)
-        values = at(record, f"{quantity}_difference", member, pair=i)
-        scaled = values * 2.0 ** (order * (coarse - pairs[0])) * uneven
-        curves.append(Curve(f"{factor}({gap})" if factor else gap, scaled, above[i]))
+        gap = f"{letter}{words.lowered(levels[i])} − {letter}{words.lowered(levels[i + 1])}"
+        factor = words.factor(float(rescaling(order, levels[: i + 2])), 2.0**order)
+        values = at(record, f"{quantity}_rescaled", member, pair=i)
+        curves.append(Curve(f"{factor}({gap})" if factor else gap, values, above[i]))
     return curves
+
+
+def _multiplied(order: float, levels: list[int]) -> str:
+    """Say what the differences are multiplied by."""
+    targets = {float(target_ratio(order, levels[i : i + 3])) for i in range(len(levels) - 2)}
+    if len(targets) > 1:
+        return "each multiplied by the number before it"
+    return f"multiplied by {targets.pop() if targets else 2.0**order:.6g} from one to the next"
 
 
 def _few(sound: list[bool]) -> list[int]:
@@ -170,7 +169,7 @@ def _draw_ratios(
         note = "nothing to divide: every difference is within round-off, or zero"
         ax.text(0.5, 0.7, note, transform=ax.transAxes, ha="center", color=style.GREY)
     triples = [(levels[i], levels[i + 1], levels[i + 2]) for i in chosen]
-    targets = sorted({target_ratio(order, triple) for triple in triples})
+    targets = sorted({float(target_ratio(order, triple)) for triple in triples})
     for k, target in enumerate(targets):
         ax.axhline(target, zorder=1, label="" if k else "promised", **TARGET)
     ax.set_ylim(*_ratio_limits(drawn, targets))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from vibsim.analysis.assemble import asked
 from vibsim.record import Record
 from vibsim.report import (
     contents,
@@ -16,6 +17,7 @@ from vibsim.report import (
 )
 from vibsim.report.data import Member
 from vibsim.report.style import Picture
+from vibsim.vocabulary import SEVERITY
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
@@ -51,29 +53,25 @@ def _over_members(experiment: Experiment, record: Record, quantity: str) -> list
     order = (
         figures_sweep.orders(experiment, record, quantity) if data.whole(record, "triple") else None
     )
-    return [
-        p for p in (first, order, figures_grid.grid(experiment, record, quantity)) if p is not None
-    ]
+    return [p for p in (first, order, figures_grid.grid(record, quantity)) if p is not None]
 
 
 def _of_quantity(
     experiment: Experiment, record: Record, quantity: str, shown: list[Member], levels: bool
 ) -> list[Picture]:
     conserved = quantity == "energy_deviation" and "energy_deviation_scaled" in record
-    drawn = (
-        [figures_time.energy(experiment, record, member) for member in shown] if conserved else []
-    )
-    if levels and (not conserved or quantity in data.asked(experiment)):
-        drawn += [figures_time.overlay(experiment, record, quantity, member) for member in shown]
+    drawn = [figures_time.energy(record, member) for member in shown] if conserved else []
+    if levels and (not conserved or quantity in asked(experiment)):
+        drawn += [figures_time.overlay(record, quantity, member) for member in shown]
     return drawn
 
 
 def choose(experiment: Experiment, record: Record) -> tuple[list[Member], str]:
     """Return what gets figures of its own, and a sentence saying what was left out."""
     quantity = data.quantities(experiment, record)[0]
-    everyone = data.members(experiment, record, quantity)
+    everyone = data.members(record, quantity)
     status = data.flags(record, f"{quantity}_status")
-    severity = [data.SEVERITY.get(str(status[m.scheme, m.case]), 2) for m in everyone]
+    severity = [SEVERITY[status[m.scheme, m.case]] for m in everyone]
     ranked = sorted(range(len(everyone)), key=lambda i: (-severity[i], i))[:SHOWN]
     shown = [everyone[i] for i in sorted(ranked)]
     parts = []

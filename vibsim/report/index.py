@@ -14,9 +14,12 @@ from vibsim.errors import FileError
 from vibsim.report import words
 from vibsim.report.page import environment
 from vibsim.report.tables import Column, Table, to_csv
+from vibsim.vocabulary import SEVERITY, worst
 
-SEVERITY = ("FAIL", "DAMAGED", "MISSING", "INCONCLUSIVE", "PASS")
-"""The worst first."""
+UNREADABLE = ("DAMAGED", "MISSING")
+"""Words for an experiment whose verdict cannot be read: it counts as failed."""
+ORDER = ("FAIL", *UNREADABLE, "INCONCLUSIVE", "PASS")
+"""The order in which the sentence counts experiments."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +52,7 @@ def write_index(results: Path) -> None:
     """
     rows = [_row(results, folder) for folder in _folders(results)]
     grouped = [(key, list(group)) for key, group in groupby(rows, key=lambda row: row.collection)]
-    status = min((row.status for row in rows), key=SEVERITY.index, default="INCONCLUSIVE")
-    status = "FAIL" if status in {"DAMAGED", "MISSING"} else status
+    status = worst("FAIL" if row.status in UNREADABLE else row.status for row in rows)
     context = {"status": status, "sentence": _sentence(rows), "collections": grouped}
     store.write_text(
         results / "index.html", environment().get_template("index.html").render(context)
@@ -105,10 +107,10 @@ def _why(checks: Sequence[Mapping[str, Any]]) -> str:
     """Return the worst check and its reason."""
     if not checks:
         return "no checks"
-    worst = min(checks, key=lambda check: SEVERITY.index(check["status"]))
-    if worst["status"] == "PASS":
+    first = max(checks, key=lambda check: SEVERITY[check["status"]])
+    if first["status"] == "PASS":
         return ", ".join(dict.fromkeys(str(check["reason"]) for check in checks))
-    return f"{worst['reason']}: {worst['text']}"
+    return f"{first['reason']}: {words.told(first)}"
 
 
 def _counts(checks: Sequence[Mapping[str, Any]]) -> str:
@@ -120,7 +122,7 @@ def _sentence(rows: Sequence[Row]) -> str:
     if not rows:
         return "There is no experiment here yet."
     told = [
-        f"{count} {word}" for word in SEVERITY if (count := sum(row.status == word for row in rows))
+        f"{count} {word}" for word in ORDER if (count := sum(row.status == word for row in rows))
     ]
     whole = "experiment" if len(rows) == 1 else "experiments"
     return f"{len(rows)} {whole}: {', '.join(told)}."
@@ -143,12 +145,12 @@ def _lines(row: Row) -> Iterator[tuple[Any, ...]]:
         yield (*head, *[None] * 5, row.status, row.why, *[None] * 8, row.broken)
     for check in row.checks:
         results = check.get("results") or [{}]
-        worst = min(results, key=lambda r: SEVERITY.index(r.get("status") or "PASS"))
-        low, high = worst.get("interval") or (None, None)
-        window = worst.get("levels")
+        decides = max(results, key=lambda r: SEVERITY[r.get("status") or "PASS"])
+        low, high = decides.get("interval") or (None, None)
+        window = decides.get("levels")
         yield (
             *head, check["id"], check["kind"], check["text"], check.get("quantity"),
-            words.expectation(check.get("expected")), check["status"], check["reason"], worst.get("scheme"),
-            worst.get("case"), worst.get("order"), low, high, words.levels(window) if window else None,
-            worst.get("value"), check.get("advice"), row.broken,
+            words.expectation(check.get("expected")), check["status"], check["reason"], decides.get("scheme"),
+            decides.get("case"), decides.get("order"), low, high, words.levels(window) if window else None,
+            decides.get("value"), check.get("advice"), row.broken,
         )  # fmt: skip

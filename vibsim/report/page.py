@@ -15,6 +15,7 @@ from vibsim.report.data import Member
 from vibsim.report.panels import Curve
 from vibsim.report.style import Picture
 from vibsim.report.tables import Table, to_csv, to_latex
+from vibsim.vocabulary import TYPICAL_NORM
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -156,7 +157,7 @@ def _stamp(experiment: Experiment, record: Record, member: Member) -> str:
     quantity, t = data.position(experiment), data.times(record, member.case)
     if not data.whole(record, "pair"):
         return thumbnail.draw(t, [Curve("", data.at(record, f"{quantity}_finest", member))])
-    return thumbnail.draw(t, figures_time.differences(experiment, record, quantity, member))
+    return thumbnail.draw(t, figures_time.differences(record, quantity, member))
 
 
 def _tables(
@@ -164,8 +165,8 @@ def _tables(
 ) -> tuple[list[Table], list[tuple[str, list[Table]]]]:
     """Return the tables of the page, and those that it folds away under a heading."""
     found = data.quantities(experiment, record)
-    shown = data.members(experiment, record, found[0])
-    norms = [name for name in data.names(record, "norm") if name != data.TYPICAL_NORM]
+    shown = data.members(record, found[0])
+    norms = [name for name in record.words("norm") if name != TYPICAL_NORM]
     listed = [contents.orders(record, quantity, shown) for quantity in found]
     optional = [contents.maxima(record, shown), contents.scalars(record, shown)]
     listed += [table for table in optional if table is not None]

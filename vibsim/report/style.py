@@ -35,7 +35,6 @@ DASHES: tuple[Any, ...] = (
 )
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 GREY = "#707070"
-PALE = "#d9d9d9"
 STATUS_COLOURS = {"PASS": "#009E73", "INCONCLUSIVE": "#E69F00", "FAIL": "#D55E00"}
 WIDTH = 9.0
 """Width of a figure [inch]."""
@@ -72,7 +71,24 @@ _RC: dict[Any, Any] = {
 
 _PLACES = re.compile(r' (?:d|x|y)="[^"]*"')
 _DIGITS = re.compile(r"(\.\d\d)\d+")
-_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+SUPERSCRIPTS = "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"
+RAISE = str.maketrans("-0123456789", SUPERSCRIPTS)
+"""Translates digits to superscripts."""
+LOWER = str.maketrans(SUPERSCRIPTS, "-0123456789")
+"""Translates superscripts to digits."""
+
+
+def look(i: int) -> dict[str, Any]:
+    """Return colour, dashes and marker of the i-th of several lines.
+
+    Beyond as many as there are colours, the colours come again with other dashes and markers.
+    """
+    count, turn = len(COLOURS), i // len(COLOURS)
+    return {
+        "color": COLOURS[i % count],
+        "linestyle": DASHES[(i + turn) % count],
+        "marker": MARKERS[(i + 2 * turn) % count],
+    }
 
 
 @dataclass(frozen=True)
@@ -147,7 +163,7 @@ def no_zeros(values: Floats) -> Floats:
 
 def power(exponent: int) -> str:
     """Write a power of ten in Unicode."""
-    return "10" + str(exponent).translate(_SUPERSCRIPT)
+    return "10" + str(exponent).translate(RAISE)
 
 
 def scale(*series: Floats) -> int:

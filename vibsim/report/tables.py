@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from vibsim.report import words
+from vibsim.report.style import LOWER, SUPERSCRIPTS
 
 Cell = str | int | float | None
 
@@ -129,13 +130,12 @@ _SPECIAL = {
     "Δ": r"$\Delta$",
     "\N{NARROW NO-BREAK SPACE}": r"\,",
 }
-_RAISED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 
 def escape(text: str) -> str:
     """Return text that LaTeX prints as it stands."""
-    parts = re.split("([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)", text)
-    raised = [rf"$^{{{part.translate(_RAISED)}}}$" for part in parts[1::2]]
+    parts = re.split(f"([{SUPERSCRIPTS}]+)", text)
+    raised = [rf"$^{{{part.translate(LOWER)}}}$" for part in parts[1::2]]
     plain = [
         "".join(_SPECIAL.get(character, character) for character in part) for part in parts[::2]
     ]

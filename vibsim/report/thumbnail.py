@@ -27,7 +27,7 @@ def draw(t: Floats, curves: list[Curve]) -> str:
         points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(across, up, strict=True))
         stroke = 3.2 - 2.2 * i / max(1, len(sound) - 1)
         lines.append(
-            f'<polyline fill="none" stroke="{style.COLOURS[i % 7]}" stroke-width="{stroke:.1f}" points="{points}"/>'
+            f'<polyline fill="none" stroke="{style.look(i)["color"]}" stroke-width="{stroke:.1f}" points="{points}"/>'
         )
     head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}">'
     return "\n".join([head, *lines, "</svg>\n"])

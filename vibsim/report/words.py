@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -154,11 +155,26 @@ def broken(summary: Mapping[str, Any]) -> int:
     return int(summary.get("failure_count") or len(summary.get("failures") or []))
 
 
+def told(check: Mapping[str, Any], field: str = "text") -> str:
+    """Return a text of a check with the letter of its quantity; a claim's own words and code stay as they are."""
+    text, quantity = str(check[field] or ""), check.get("quantity")
+    if not quantity:
+        return text
+    claim, mark, measured = text.rpartition(_MEASURED)
+    parts = measured.split("`")
+    parts[::2] = [re.sub(rf"\b{re.escape(quantity)}\b", symbol(quantity), p) for p in parts[::2]]
+    return claim + mark + "`".join(parts)
+
+
+_MEASURED = " Measured: the statement "
+"""What separates a claim from what was measured of it."""
+
+
 def unsettled(summary: Mapping[str, Any]) -> list[str]:
     """Return the texts of the checks that did not pass, with status and reason, while there are several checks."""
     checks: Sequence[Mapping[str, Any]] = summary["checks"]
     open_ones = [check for check in checks if check["status"] != "PASS"] if len(checks) > 1 else []
-    return [f"{check['status']} ({check['reason']}): {check['text']}" for check in open_ones]
+    return [f"{check['status']} ({check['reason']}): {told(check)}" for check in open_ones]
 
 
 def number(value: Any, form: str = "norm") -> str:
@@ -209,14 +225,15 @@ def raised(exponent: float) -> str:
     return power(int(exponent))[2:] if exponent == int(exponent) else f"^{exponent:g}"
 
 
-def factor(order: float, finer: int, uneven: float = 1.0) -> str:
-    """Write the factor ``(2**order)**finer * uneven`` of a rescaled curve; empty for 1."""
-    value = 2.0 ** (order * finer) * uneven
+def factor(value: float, base: float) -> str:
+    """Write the factor of a rescaled curve, a large one as a power of `base` where it is one; empty for 1."""
     if value == 1.0:
         return ""
-    if value < 1e3 or uneven != 1.0 or 2.0**order != int(2.0**order):
-        return f"{number(value, 'step')} "
-    return f"{int(2.0**order)}{raised(finer)} "
+    exponent = round(math.log(value, base)) if base > 1.0 and value > 0.0 else 0
+    is_power = base == int(base) and math.isclose(value, base**exponent, rel_tol=1e-9)
+    if value < 1e3 or not is_power:
+        return f"{number(float(value), 'step')} "
+    return f"{int(base)}{raised(exponent)} "
 
 
 def interval(bounds: Sequence[float | None] | None) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from vibsim.errors import nearest
+from vibsim.expression import names_in, parse
 from vibsim.models import MODELS, Model, quantities
 from vibsim.schemes import SCHEMES
 from vibsim.spec import limits, sweep
@@ -47,7 +48,7 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
     model = _model(source)
     parameters = _parameters(part, model)
     levels = _levels(part, report)
-    schemes = _schemes(part, report)
+    schemes = _schemes(part, model, report)
     time = time_spec(part.time, model, parameters, report) if part.time else None
     initial = _initial(part, model, report)
     axes = sweep.axes(part.sweep, part.time, model, report) if part.sweep else ()
@@ -161,7 +162,7 @@ def _scheme(section: Any) -> SchemeSpec:
     return SchemeSpec(name=section.label or section.kind, kind=section.kind, options=options)
 
 
-def _schemes(part: Any, report: Report) -> list[SchemeSpec]:
+def _schemes(part: Any, model: Model | None, report: Report) -> list[SchemeSpec]:
     found: list[SchemeSpec] = []
     first: dict[str, int] = {}
     for i, section in enumerate(part.schemes):
@@ -171,10 +172,26 @@ def _schemes(part: Any, report: Report) -> list[SchemeSpec]:
         elif section is not None:
             spec = _scheme(section)
             found.append(spec)
+            _check_forces(spec, i, model, report)
             if first.setdefault(spec.name, i) != i:
                 rule = f"two schemes are named '{spec.name}'"
                 report.add(("schemes", i), rule, "give one of them a label")
     return found
+
+
+def _check_forces(spec: SchemeSpec, i: int, model: Model | None, report: Report) -> None:
+    """Refuse a scheme that cannot treat the forces of the model."""
+    if model is None or SCHEMES[spec.kind].velocity_forces or not _uses_velocity(model):
+        return
+    able = [kind for kind, scheme in SCHEMES.items() if scheme.velocity_forces]
+    rule = f"cannot treat {model.kind}, whose acceleration depends on {model.velocity}"
+    hint = "choose from " + ", ".join(able) if able else "no scheme can"
+    report.add(("schemes", i), rule, hint, spec.kind)
+
+
+def _uses_velocity(model: Model) -> bool:
+    known = (*(state.name for state in model.states), "t", *(p.name for p in model.parameters))
+    return model.velocity in names_in(parse(model.acceleration, known))
 
 
 def scheme_names(data: Any) -> Iterator[str]:

@@ -9,12 +9,13 @@ from typing import Any
 from vibsim.errors import nearest
 from vibsim.models import Model, quantities
 from vibsim.schemes import SCHEMES
-from vibsim.spec.checks import REASONS, At, ClaimCheck, ConvergesCheck, ValueCheck
+from vibsim.spec.checks import At, Check, ClaimCheck, ConvergesCheck, ValueCheck
 from vibsim.spec.experiment import TimeSpec
 from vibsim.spec.faults import Report
 from vibsim.spec.limits import Shape
 from vibsim.spec.source import Path_
 from vibsim.spec.values import VALUES, Value
+from vibsim.vocabulary import REASONS
 
 
 @dataclass(frozen=True)
@@ -64,16 +65,16 @@ def _ids(checks: list[Any], report: Report) -> list[str]:
     return ids
 
 
-def _check(check: Any, path: Path_, ladder: Ladder, report: Report) -> None:
-    match check:
-        case ConvergesCheck():
-            _converges(check, path, ladder, report)
-        case ValueCheck():
-            _value(check, path, ladder, report)
-        case ClaimCheck():
-            if check.that.id:
-                report.add((*path, "that", "id"), "the id belongs to the claim", at_key=True)
-            _check(check.that, (*path, "that"), ladder, report)
+def _check(check: Check, path: Path_, ladder: Ladder, report: Report) -> None:
+    if isinstance(check, ClaimCheck):
+        path = (*path, "that")
+        if check.that.id:
+            report.add((*path, "id"), "the id belongs to the claim", at_key=True)
+    measured = check.measured
+    if isinstance(measured, ConvergesCheck):
+        _converges(measured, path, ladder, report)
+    else:
+        _value(measured, path, ladder, report)
 
 
 def _converges(check: ConvergesCheck, path: Path_, ladder: Ladder, report: Report) -> None:
@@ -115,6 +116,7 @@ def _value(check: ValueCheck, path: Path_, ladder: Ladder, report: Report) -> No
         )
         return
     _of(check, row, path, ladder, report)
+    _exact(check, row, path, ladder, report)
     _at(check.at, row, (*path, "at"), ladder, report)
 
 
@@ -142,7 +144,24 @@ def _of(check: ValueCheck, row: Value, path: Path_, ladder: Ladder, report: Repo
     elif choices and check.quantity not in choices:
         known = ladder.model is not None and check.quantity in quantities(ladder.model)
         rule = f"{row.name} is not known of this quantity" if known else "unknown quantity"
-        report.add((*path, "quantity"), rule, nearest(check.quantity, choices), check.quantity)
+        hint = "choose from " + ", ".join(choices) if known else nearest(check.quantity, choices)
+        report.add((*path, "quantity"), rule, hint, check.quantity)
+
+
+def _exact(check: ValueCheck, row: Value, path: Path_, ladder: Ladder, report: Report) -> None:
+    """Check that the model knows exactly what the value is compared with."""
+    model = ladder.model
+    if model is None or row.needs_exact is None:
+        return
+    if row.needs_exact == "period" and model.exact_period is None:
+        report.add((*path, "value"), f"the exact period of {model.kind} is not known")
+    # the energy is known where it is conserved, and nowhere else
+    energies = ("energy", "energy_deviation")
+    known = model.conservative if check.quantity in energies else model.exact is not None
+    if row.needs_exact == "solution" and not known:
+        hint = f"{' and '.join(energies)} are" if model.conservative else ""
+        rule = f"the exact {check.quantity or 'solution'} of {model.kind} is not known"
+        report.add((*path, "value"), rule, hint)
 
 
 def allowed(row: Value, model: Model | None, best: bool = False) -> tuple[str, ...]:
@@ -150,6 +169,10 @@ def allowed(row: Value, model: Model | None, best: bool = False) -> tuple[str, .
     if model is None or row.of == "none":
         return ()
     states = tuple(state.name for state in model.states)
+    if row.of == "states":
+        return states
+    if row.of == "deviation":
+        return ("energy_deviation",)
     if row.of == "extremal":
         return (*states, "energy_deviation")
     if row.of == "convergent" or best:

@@ -30,28 +30,7 @@ from vibsim.spec.fields import (
     whole,
 )
 from vibsim.spec.values import VALUES
-
-Status = Literal["PASS", "FAIL", "INCONCLUSIVE"]
-Norm = Literal["l2", "l1", "linf", "linf_interior"]
-
-REASONS: dict[str, str] = {
-    **dict.fromkeys(("asymptotic", "exact", "match"), "PASS"),
-    **dict.fromkeys(
-        ("order_low", "order_high", "mismatch", "wrong_limit", "unstable", "non_finite"), "FAIL"
-    ),
-    **dict.fromkeys(
-        (
-            "pre_asymptotic",
-            "round_off",
-            "oscillating",
-            "non_smooth",
-            "too_few_levels",
-            "not_applicable",
-        ),
-        "INCONCLUSIVE",
-    ),
-}
-"""Every reason of a verdict, with the status that it belongs to."""
+from vibsim.vocabulary import REASONS, TOLERANCE, TYPICAL_NORM, Norm, Status
 
 
 class Expect(Section):
@@ -143,14 +122,19 @@ class ConvergesCheck(Section):
     """The quantity: a state, or energy, energy_deviation, kinetic_energy, potential_energy."""
     order: Order = "scheme"
     """The order: `scheme` for the order that the scheme promises, or a number."""
-    tolerance: Positive = 0.1
+    tolerance: Positive = TOLERANCE
     """How far the observed order may be from the expected one."""
-    norm: Norm = "l2"
+    norm: Norm = TYPICAL_NORM
     """The norm over time in which differences are measured."""
     schemes: Annotated[tuple[Text, ...], Field(min_length=1)] | None = None
     """Names of the schemes; every scheme when left out."""
     expect: Expect = Expect()
     """The verdict that passes; PASS when left out."""
+
+    @property
+    def measured(self) -> ConvergesCheck:
+        """The check that is measured: this one."""
+        return self
 
 
 class ValueCheck(Section):
@@ -175,6 +159,11 @@ class ValueCheck(Section):
     """Relative tolerance of `equals`."""
     atol: NonNegative | None = None
     """Absolute tolerance of `equals`."""
+
+    @property
+    def measured(self) -> ValueCheck:
+        """The check that is measured: this one."""
+        return self
 
 
 def _which(value: Any) -> str | None:
@@ -209,6 +198,11 @@ class ClaimCheck(Section):
     """The check that measures it."""
     holds: StrictBool = True
     """Whether the statement is expected to be true."""
+
+    @property
+    def measured(self) -> ConvergesCheck | ValueCheck:
+        """The check that is measured: the one that decides the claim."""
+        return self.that
 
 
 Check = Annotated[

@@ -157,10 +157,10 @@ class Linspace(Section):
 
 
 class Every(Section):
-    """Store every n-th step."""
+    """Store every n-th step of each level."""
 
     every: Count
-    """n; it must divide the number of steps of the coarsest level."""
+    """n; it must divide the number of steps of the coarsest level, whose stored times are those of the comparison."""
 
 
 def _shape(value: Any) -> str:

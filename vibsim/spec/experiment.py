@@ -9,9 +9,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, PrivateAttr
 
-from vibsim.models import MODELS
+from vibsim.models import MODELS, natural_end
 from vibsim.spec.checks import Check
 from vibsim.spec.fields import Count, FrozenDict, Identifier, Level, Positive, Section, Text
+from vibsim.spec.members import end_varies
 
 Numbers = Annotated[dict[str, float], AfterValidator(FrozenDict)]
 Words = Annotated[dict[str, str], AfterValidator(FrozenDict)]
@@ -53,10 +54,7 @@ class Sweep(Section):
     @property
     def count(self) -> int:
         """Number of members."""
-        product = 1
-        for _, values in self.axes:
-            product *= len(values)
-        return product
+        return math.prod(len(values) for _, values in self.axes)
 
 
 class Experiment(Section):
@@ -75,7 +73,7 @@ class Experiment(Section):
     schemes: tuple[SchemeSpec, ...]
     sweep: Sweep | None = None
     samples: Annotated[int, Field(ge=1)] | Literal["auto", "common", "all"] = "auto"
-    """Which steps are stored; a number n stands for every n-th."""
+    """Which steps are stored; a number n stands for every n-th of each level."""
     checks: tuple[Check, ...] = ()
     _file: Path | None = PrivateAttr(default=None)
 
@@ -91,25 +89,16 @@ class Experiment(Section):
 
     @property
     def end_varies(self) -> bool:
-        """Whether the end time differs between members, so that ``t`` is the fraction 0 to 1 of it.
-
-        Where the end is a number of natural periods, it counts as different as soon as a parameter
-        of the model is.
-        """
-        keys = (
-            [key for key, values in self.sweep.axes if min(values) < max(values)]
-            if self.sweep
-            else []
-        )
-        by_periods = self.time.periods is not None
-        return "time.end" in keys or (by_periods and any(key.startswith("model.") for key in keys))
+        """Whether the end time differs between members, so that ``t`` is the fraction 0 to 1 of it."""
+        axes = self.sweep.axes if self.sweep else ()
+        swept = ((key, min(values) < max(values)) for key, values in axes)
+        return end_varies(swept, self.time.periods is not None)
 
     def natural_end(self, parameters: Mapping[str, Any]) -> Any:
         """Return the end time of a member with these `parameters` (numbers or arrays), unless swept."""
         if self.time.periods is None:
             return self.time.end
-        model = MODELS[self.model.kind]
-        return self.time.periods * (2.0 * math.pi / model.natural_frequency(parameters))
+        return natural_end(MODELS[self.model.kind], self.time.periods, parameters)
 
     def steps(self, level: int) -> int:
         """Return the number of steps at `level`: ``base_steps * 2**level``."""
@@ -126,7 +115,7 @@ class Experiment(Section):
         path: str | Path, *, collection: str | None = None, configs: Path | None = None
     ) -> Experiment:
         """Read the experiment file at `path`; see `vibsim.spec.load`."""
-        from vibsim.spec.load import load
+        from vibsim.spec.reading import load
 
         return load(path, collection=collection, configs=configs)
 
@@ -135,7 +124,7 @@ class Experiment(Section):
         data: Mapping[str, Any], *, name: str = "experiment", collection: str = "adhoc"
     ) -> Experiment:
         """Build an experiment from the content of a file; see `vibsim.spec.from_dict`."""
-        from vibsim.spec.load import from_dict
+        from vibsim.spec.reading import from_dict
 
         return from_dict(data, name=name, collection=collection)
 

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import math
-
 SMALL = 200_000
 """Samples of one variable up to which ``samples: auto`` keeps every step of a level."""
 
 
 def stride(samples: int | str, coarsest: int, steps: int, trajectories: int) -> int:
-    """Return n where every n-th step of a level is stored; the times of the coarsest level always are.
+    """Return n where every n-th step of a level is stored.
+
+    ``auto``, ``common`` and ``all`` keep the times of the coarsest level. Every n-th step of each level is as it says:
+    what the levels then have in common is what is stored of the coarsest.
 
     Parameters
     ----------
     samples
-        What the file asks for: ``auto``, ``common``, ``all``, or n for every n-th step.
+        What the file asks for: ``auto``, ``common``, ``all``, or n, which divides `coarsest`, for every n-th step.
     coarsest
         Number of steps of the coarsest level.
     steps
@@ -22,10 +23,8 @@ def stride(samples: int | str, coarsest: int, steps: int, trajectories: int) -> 
     trajectories
         Number of schemes times number of members.
     """
-    common = steps // coarsest
-    if samples == "all":
+    if isinstance(samples, int):
+        return samples
+    if samples == "all" or (samples == "auto" and trajectories * (steps + 1) <= SMALL):
         return 1
-    if samples == "auto":
-        return 1 if trajectories * (steps + 1) <= SMALL else common
-    # every 3rd step of this level need not meet the coarsest level's times; their common divisor does
-    return math.gcd(samples, common) if isinstance(samples, int) else common
+    return steps // coarsest

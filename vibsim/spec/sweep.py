@@ -11,6 +11,7 @@ from vibsim.models import Model, Parameter
 from vibsim.spec.document import Linspace, TimeSection
 from vibsim.spec.experiment import TimeSpec
 from vibsim.spec.faults import Report
+from vibsim.spec.members import end_varies
 
 _FIXED = {
     "levels": "levels cannot be swept: they are what is compared",
@@ -30,6 +31,11 @@ class Axis:
 
     def __len__(self) -> int:
         return len(self.values) if isinstance(self.values, tuple) else self.values.linspace[2]
+
+    @property
+    def ends(self) -> tuple[float, ...]:
+        """Values that have the least and the largest among them."""
+        return self.values if isinstance(self.values, tuple) else self.values.linspace[:2]
 
 
 def axes(
@@ -88,17 +94,11 @@ def count(found: tuple[Axis, ...]) -> int:
 
 
 def fixed_end(found: tuple[Axis, ...], time: TimeSpec) -> float | None:
-    """Return the end that every member has, None where the end varies (see `Experiment.end_varies`)."""
-    for axis in found:
-        first, *others = (
-            axis.values.linspace[:2] if isinstance(axis.values, Linspace) else axis.values
-        )
-        is_same = all(value == first for value in others)
-        if axis.key == "time.end":
-            return first if is_same else None
-        if time.periods is not None and axis.key.startswith("model.") and not is_same:
-            return None
-    return time.end
+    """Return the end that every member has, None where the end varies."""
+    swept = ((axis.key, min(axis.ends) < max(axis.ends)) for axis in found)
+    if end_varies(swept, time.periods is not None):
+        return None
+    return next((axis.ends[0] for axis in found if axis.key == "time.end"), time.end)
 
 
 def expand(found: tuple[Axis, ...]) -> tuple[tuple[str, tuple[float, ...]], ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from vibsim.models import Model
+from vibsim.models import Model, natural_end
 from vibsim.spec.document import TimeSection
 from vibsim.spec.experiment import TimeSpec
 from vibsim.spec.faults import Report
@@ -69,8 +69,7 @@ def _by_periods(
         return None
     if model is None or not parameters:
         return None
-    frequency = float(model.natural_frequency(parameters))
-    end = section.periods * (2.0 * math.pi / frequency)
+    end = float(natural_end(model, section.periods, parameters))
     if not (math.isfinite(end) and end > 0.0):
         report.add(("time", "periods"), "the model has no natural period with these parameters")
         return None

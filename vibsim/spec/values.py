@@ -8,9 +8,11 @@ from types import MappingProxyType
 from typing import Literal
 
 AtPart = Literal["t", "step", "level", "scheme", "case"]
-Which = Literal["series", "convergent", "extremal", "none"]
-"""Which quantities a value is of: every one, those that are compared between levels, those with extrema over every
-step, or none because the value belongs to the motion as a whole."""
+Which = Literal["series", "convergent", "states", "extremal", "deviation", "none"]
+"""Which quantities a value is of: every one; those that are compared between levels; the states, of which least and
+largest value are gathered over every step; these and the energy deviation; the energy deviation alone, whose last point
+is gathered apart; or none because the value belongs to the motion as a whole."""
+Exact = Literal["solution", "period"]
 
 
 @dataclass(frozen=True)
@@ -29,8 +31,8 @@ class Value:
     """Whether it also exists for the Richardson-extrapolated solution, ``level: best``."""
     needs_time: bool = False
     """Whether ``t`` or ``step`` must be given."""
-    needs_exact: bool = False
-    """Whether the model must have an exact solution (or exact period)."""
+    needs_exact: Exact | None = None
+    """What the model must know exactly."""
 
 
 _ANYWHERE: tuple[AtPart, ...] = ("t", "step", "level", "scheme", "case")
@@ -46,41 +48,41 @@ _ROWS = (
         best=True,
         needs_time=True,
     ),
-    Value("min", "smallest value over every step", "extremal"),
-    Value("max", "largest value over every step", "extremal"),
+    Value("min", "smallest value over every step", "states"),
+    Value("max", "largest value over every step", "states"),
     Value("max_abs", "largest absolute value over every step", "extremal"),
-    Value("max_abs_interior", "the same without the last point", "extremal"),
+    Value("max_abs_interior", "the same without the last point", "deviation"),
     Value(
         "max_abs_ratio",
         "largest absolute value over every step, over that of the next finer level",
         "extremal",
         finer_levels=1,
     ),
-    Value("max_abs_interior_ratio", "the same without the last point", "extremal", finer_levels=1),
+    Value("max_abs_interior_ratio", "the same without the last point", "deviation", finer_levels=1),
     Value("period", "period, from interpolated peaks", "none"),
     Value("period_grid", "period, from peaks at grid points", "none"),
-    Value("exact_period", "period of the exact solution", "none", ("case",), needs_exact=True),
-    Value("period_error", "period over the exact period, less one", "none", needs_exact=True),
+    Value("exact_period", "period of the exact solution", "none", ("case",), needs_exact="period"),
+    Value("period_error", "period over the exact period, less one", "none", needs_exact="period"),
     Value("frequency", "angular frequency, 2 pi over the period", "none"),
     Value("amplitude", "half the height from the last trough to the last peak", "none"),
     Value("growth_factor", "last peak over the first peak", "none"),
     Value("relative_energy_error", "max |E(t) - E(0)| / |E(0)| over every step", "none"),
-    Value("error_l1", "L1 norm of the true error", "convergent", best=True, needs_exact=True),
-    Value("error_l2", "L2 norm of the true error", "convergent", best=True, needs_exact=True),
-    Value("error_linf", "largest true error", "convergent", best=True, needs_exact=True),
+    Value("error_l1", "L1 norm of the true error", "convergent", best=True, needs_exact="solution"),
+    Value("error_l2", "L2 norm of the true error", "convergent", best=True, needs_exact="solution"),
+    Value("error_linf", "largest true error", "convergent", best=True, needs_exact="solution"),
     Value(
         "error_linf_interior",
         "largest true error without the last point",
         "convergent",
         best=True,
-        needs_exact=True,
+        needs_exact="solution",
     ),
     Value(
         "error_estimate_defect",
         "max |estimate - true error| over max |true error|",
         "convergent",
         finer_levels=1,
-        needs_exact=True,
+        needs_exact="solution",
     ),
     Value("observed_order", "order of a triple of levels, L2 norm", "convergent", finer_levels=2),
     Value("ratio", "ratio of the differences of a triple, L2 norm", "convergent", finer_levels=2),

@@ -14,10 +14,9 @@ if TYPE_CHECKING:
     from vibsim.store.atomic import replacing, write_bytes, write_text
     from vibsim.store.netcdf import read, write
     from vibsim.store.shards import join
-    from vibsim.store.summary import FORMAT, read_json, write_json
+    from vibsim.store.summary import read_json, write_json
 
 _HOME = {
-    "FORMAT": "summary",
     "join": "shards",
     "read": "netcdf",
     "read_json": "summary",
@@ -29,7 +28,6 @@ _HOME = {
 }
 
 __all__ = [
-    "FORMAT",
     "join",
     "read",
     "read_json",

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim import __version__
-from vibsim.errors import DamagedFileError, StaleFileError
+from vibsim.errors import DamagedFileError
 from vibsim.record import Attribute, Record, Variable
-from vibsim.store import seal
+from vibsim.store import identity, seal
 from vibsim.store.atomic import replacing
-from vibsim.store.summary import FORMAT
+from vibsim.vocabulary import FORMAT
 
 CONVENTIONS = "CF-1.11"
 _OURS = (
@@ -88,7 +88,8 @@ def read(path: Path, *, digest: str | None = None) -> Record:
         with netCDF4.Dataset(path, "r") as dataset:
             dataset.set_auto_maskandscale(False)
             dataset.set_auto_chartostring(False)
-            _check_identity(path, dataset, digest)
+            form, job = (getattr(dataset, name, None) for name in ("vibsim_format", "digest"))
+            identity.check(path, form, str(job), digest)
             return _read_record(dataset)
     except (OSError, RuntimeError) as error:
         raise DamagedFileError(path, f"the netCDF library cannot read it: {error}") from error
@@ -183,15 +184,6 @@ def _plain(value: Attribute) -> Attribute:
     if array.dtype.kind == "i" and np.all(np.abs(array) < 2**31):
         return array.astype(np.int32)
     return value
-
-
-def _check_identity(path: Path, dataset: Any, digest: str | None) -> None:
-    if getattr(dataset, "vibsim_format", None) != FORMAT:
-        raise StaleFileError(path, f"it is not in vibsim format {FORMAT}")
-    if digest is not None and dataset.digest != digest:
-        raise StaleFileError(
-            path, f"it belongs to job {dataset.digest[:12]}, wanted is {digest[:12]}"
-        )
 
 
 def _read_record(dataset: Any) -> Record:

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from vibsim.errors import DamagedFileError, StaleFileError
+from vibsim.errors import DamagedFileError
+from vibsim.store import identity
 from vibsim.store.atomic import write_text
-
-FORMAT = 1
-"""Version of the file format, ``vibsim_format`` in every file."""
+from vibsim.vocabulary import FORMAT, jsonable
 
 
 def write_json(path: Path, content: Mapping[str, Any], *, digest: str) -> None:
@@ -30,7 +28,7 @@ def write_json(path: Path, content: Mapping[str, Any], *, digest: str) -> None:
     """
     whole = {"vibsim_format": FORMAT, **content, "digest": digest}
     whole.pop("integrity", None)
-    write_text(path, _sealed(_finite(whole)))
+    write_text(path, _sealed(jsonable(whole)))
 
 
 def read_json(path: Path, *, digest: str | None = None) -> dict[str, Any]:
@@ -59,11 +57,7 @@ def read_json(path: Path, *, digest: str | None = None) -> dict[str, Any]:
         raise DamagedFileError(path, "it is not JSON") from error
     if not isinstance(content, dict) or text != _sealed(content):
         raise DamagedFileError(path, "its bytes are not those that were written")
-    if content.get("vibsim_format") != FORMAT:
-        raise StaleFileError(path, f"it is not in vibsim format {FORMAT}")
-    if digest is not None and content.get("digest") != digest:
-        found = str(content.get("digest"))
-        raise StaleFileError(path, f"it belongs to job {found[:12]}, wanted is {digest[:12]}")
+    identity.check(path, content.get("vibsim_format"), str(content.get("digest")), digest)
     return content
 
 
@@ -75,15 +69,3 @@ def _sealed(content: Mapping[str, Any]) -> str:
 
 def _text(content: Mapping[str, Any]) -> str:
     return json.dumps(content, indent=1, ensure_ascii=False) + "\n"
-
-
-def _finite(value: Any) -> Any:
-    if hasattr(value, "tolist"):  # numbers and arrays of numpy, which quick readers do not import
-        value = value.tolist()
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return [_finite(item) for item in value]
-    return value

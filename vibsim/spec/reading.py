@@ -10,14 +10,12 @@ from typing import Any
 
 from vibsim.errors import Fault, InputError
 from vibsim.spec.build import Place, build
+from vibsim.spec.collection import ADHOC, collection_of
 from vibsim.spec.experiment import Experiment
 from vibsim.spec.faults import Report
+from vibsim.spec.fields import IDENTIFIER
 from vibsim.spec.source import MAX_DEPTH, Source, read
 
-ADHOC = "adhoc"
-"""Collection of the experiments that are in none."""
-
-_NAME = re.compile(r"[a-z0-9_]+")
 _NAME_RULE = "must consist of a to z, 0 to 9 and _"
 
 
@@ -31,9 +29,9 @@ def load(
     path
         A YAML file; its name without the ending is the experiment's.
     collection
-        Name of the collection; by default the folder of the file if that is below `configs`, else ``adhoc``.
+        Name of the collection; by default that of `collection_of`.
     configs
-        The folder of collections; by default any folder of that name above the file.
+        The folder of collections; by default that of the checkout.
 
     Raises
     ------
@@ -65,19 +63,9 @@ def from_dict(
     return build(source, place, report)
 
 
-def collection_of(path: Path, configs: Path | None = None) -> str:
-    """Name the collection of a file: its folder if that is below `configs`, else ``adhoc``."""
-    folder = path.absolute().parent
-    if configs is None:
-        configs = next((up for up in folder.parents if up.name == "configs"), None)
-    if configs is None or configs.absolute() not in folder.parents:
-        return ADHOC
-    return folder.name
-
-
 def _check_names(place: Place, report: Report) -> None:
     for what, text in (("experiment", place.name), ("collection", place.collection)):
-        if not _NAME.fullmatch(text):
+        if not re.fullmatch(IDENTIFIER, text):
             report.add((), f"the name of the {what}, '{text}', {_NAME_RULE}")
 
 

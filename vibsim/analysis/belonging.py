@@ -1,0 +1,84 @@
+"""Whether level data belong together, and to the experiment: a comparison of strangers would still give numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vibsim.errors import VibsimError
+from vibsim.models import MODELS
+from vibsim.record import Record
+
+if TYPE_CHECKING:
+    from vibsim.spec import Experiment
+
+SAME_START = 1e-9
+"""Levels start from the same values, to this part of their size: far above the rounding of an exact solution."""
+
+
+def check_belonging(experiment: Experiment, records: Mapping[int, Record]) -> None:
+    """Refuse level Records that are not those of `experiment`, or not of one and the same problem.
+
+    Raises
+    ------
+    VibsimError
+        With every fault: a level that the experiment does not have, another model, other schemes, members, numbers of
+        steps, end times or parameters than the other levels or the experiment, other values at t = 0.
+    """
+    faults = [
+        f"level {level}: {fault}"
+        for level, record in sorted(records.items())
+        for fault in _faults(experiment, level, record, records[max(records)])
+    ]
+    if faults:
+        raise VibsimError("levels that do not belong together:\n" + "\n".join(faults))
+
+
+def _faults(experiment: Experiment, level: int, record: Record, other: Record) -> Iterator[str]:
+    model = MODELS[experiment.model.kind]
+    if level not in experiment.levels:
+        yield f"the experiment has levels {list(experiment.levels)}"
+        return
+    steps = int(np.asarray(record.attrs["steps"]).item())
+    if steps != experiment.steps(level):
+        yield f"{steps} steps instead of {experiment.steps(level)}"
+    if str(record.attrs.get("model", model.kind)) != model.kind:
+        yield f"model {record.attrs['model']} instead of {model.kind}"
+    names = [scheme.name for scheme in experiment.schemes]
+    if record.words("scheme") != names:
+        yield f"schemes {record.words('scheme')} instead of {names}"
+        return
+    if not np.array_equal(record["case"], other["case"]):
+        yield "other members than the finest level"
+        return
+    for name in _of_members(record):
+        if name not in other or not _equal(record, other, name):
+            yield f"{name} differs from the finest level's"
+    if not np.isclose(record["t"][-1], other["t"][-1], rtol=1e-12, atol=0.0):
+        yield f"it ends at {record['t'][-1]:g}, the finest level at {other['t'][-1]:g}"
+    for state in model.states:
+        yield from _start(record, other, state.name)
+
+
+def _of_members(record: Record) -> list[str]:
+    """Name what belongs to a member and not to a level: parameters, period, end time."""
+    constants = [name for name, variable in record.coords.items() if variable.dims == ("case",)]
+    return [name for name in (*constants, "natural_frequency", "exact_period") if name in record]
+
+
+def _equal(record: Record, other: Record, name: str) -> bool:
+    a, b = (np.asarray(r[name], dtype=np.float64) for r in (record, other))
+    return bool(np.array_equal(a, b, equal_nan=True))
+
+
+def _start(record: Record, other: Record, name: str) -> Iterator[str]:
+    first, finest = (np.asarray(r[name][..., 0], dtype=np.float64) for r in (record, other))
+    size = SAME_START * (1.0 + np.abs(finest))
+    if np.any(np.abs(first - finest) > size):
+        yield f"{name} at t = 0 differs from the finest level's"
+    if f"{name}_exact" in record:
+        exact = np.asarray(record[f"{name}_exact"][..., 0], dtype=np.float64)
+        if np.any(np.abs(first - exact) > size):
+            yield f"{name} at t = 0 differs from the exact solution's"
