@@ -99,7 +99,7 @@ def compared(experiment: Experiment) -> tuple[str, ...]:
 
 def asked(experiment: Experiment) -> tuple[str, ...]:
     """Name the quantities that the checks are about."""
-    inner = [check.that if check.kind == "claim" else check for check in experiment.checks]
+    inner = [check.measured for check in experiment.checks]
     named = (check.converges if check.kind == "converges" else check.quantity for check in inner)
     return tuple(dict.fromkeys(name for name in named if name is not None))
 

@@ -106,7 +106,7 @@ def measured_numbers(
     shape = (len(record["scheme"]), len(record["case"]))
     numbers = np.full((len(experiment.checks), *shape), np.nan)
     for i, check in enumerate(experiment.checks):
-        inner = check.that if check.kind == "claim" else check
+        inner = check.measured
         if inner.kind == "converges":
             numbers[i] = judge_check(experiment, record, inner)[0].order
         else:

@@ -170,7 +170,7 @@ def promises(experiment: Experiment, record: Record, quantity: str) -> list[tupl
 
     The tolerance is the smallest that a check has which is about the quantity and the scheme.
     """
-    inner = [check.that if check.kind == "claim" else check for check in experiment.checks]
+    inner = [check.measured for check in experiment.checks]
     found = set()
     for s, scheme in enumerate(record.words("scheme")):
         tolerances = [

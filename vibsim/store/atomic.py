@@ -72,11 +72,12 @@ def _remove_stale(path: Path) -> None:
 
 
 def _started(pid: int) -> str:
-    """Return when process `pid` started, in ticks since boot; empty when there is no such process.
+    """Return when process `pid` started, in ticks since boot; empty when it is dead, even if nobody took notice.
 
     The number tells a living writer from a later process that was given the same id.
     """
     try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[19]
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     except OSError:
         return ""
+    return "" if fields[0] in {"X", "Z"} else fields[19]
