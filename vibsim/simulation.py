@@ -236,7 +236,7 @@ def _gathered(
     )
     add(
         "amplitude",
-        [0.5 * (run.last_peak - run.last_trough) for run in runs],
+        [0.5 * np.abs(run.last_peak - run.last_trough) for run in runs],
         "half the height between the last peak and the last trough, interpolated",
         position.unit,
     )

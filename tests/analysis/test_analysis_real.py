@@ -170,6 +170,12 @@ def test_amplitude_and_growth_need_what_they_are_made_of() -> None:
     assert found == [("INCONCLUSIVE", "not_applicable")] * 2
 
 
+def test_an_infinite_period_does_not_exist() -> None:
+    checks = [{"value": "exact_period", "above": 0}]
+    found, _ = outcome(problem(range(7, 10), theta=0.0, omega=2.0, checks=checks))
+    assert found == [("INCONCLUSIVE", "not_applicable")]
+
+
 @pytest.mark.parametrize("levels", [(6, 7, 8), (7, 8, 9, 10), (7, 8, 9, 10, 11, 12)])
 def test_the_first_order_start_is_found_out(levels: tuple[int, ...]) -> None:
     scheme = {"kind": "central", "start": "first_order"}

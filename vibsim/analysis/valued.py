@@ -20,6 +20,8 @@ Flags = NDArray[np.bool_]
 
 SURVIVES_FAILURE = frozenset({"at", "exact_period"})
 """Numbers that may be sound although the member broke down later."""
+MAY_BE_INFINITE = frozenset({"exact_period"})
+"""Numbers that are infinite for a sound member, on the separatrix: they do not exist there."""
 DEFAULT_RTOL, DEFAULT_ATOL = 1e-9, 1e-12
 """Tolerance of ``equals`` where a check gives none."""
 
@@ -35,7 +37,10 @@ def valued(record: Record, check: ValueCheck, measured: Floats) -> Outcome:
     lost = _failed(record, check) & ~(
         np.isfinite(measured) if check.value in SURVIVES_FAILURE else np.zeros_like(holds)
     )
-    masks = [lost | np.isinf(measured), np.isnan(measured), holds]
+    infinite = np.isinf(measured)
+    if check.value in MAY_BE_INFINITE:
+        infinite, measured = np.zeros_like(infinite), np.where(infinite, np.nan, measured)
+    masks = [lost | infinite, np.isnan(measured), holds]
     status = np.select(masks, [FAIL, INCONCLUSIVE, PASS], FAIL)
     codes = [REASON_NAMES.index(name) for name in ("non_finite", "not_applicable", "match")]
     reason = np.select(masks, codes, REASON_NAMES.index("mismatch"))
