@@ -30,6 +30,8 @@ rule all:
     input:
         "index.html",
         names.files,
+        # Of what a job writes, Snakemake misses only what is asked for.
+        expand("{name}/{part}", name=list(names.plans), part=["figures", "tables"]),
 
 
 onstart:

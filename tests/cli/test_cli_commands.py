@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from vibsim import schemes
-from vibsim.cli import main
+from vibsim.cli import deleted, main, workflow
+from vibsim.errors import FileError, VibsimError
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
 
@@ -84,8 +85,8 @@ def test_list_of_schemes_tells_work_and_limit(
     monkeypatch.setattr(schemes, "SCHEMES", {**SCHEMES, "free": free})
     assert main(["list", "schemes"]) == 0
     lines = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
-    assert "1 force evaluation(s) per step; stable while w dt < 2" in lines["central"]
-    assert "4 force evaluation(s) per step; stable for every step" in lines["free"]
+    assert "1 force evaluation per step; stable while w dt < 2" in lines["central"]
+    assert "4 force evaluations per step; stable for every step" in lines["free"]
 
 
 @pytest.mark.parametrize(
@@ -144,8 +145,14 @@ def test_results_that_cannot_be_written_are_named(
 ) -> None:
     blocked = tmp_path / "blocked"
     blocked.touch()
-    assert main(["run", str(file), "--results", str(blocked)]) == 1
-    assert str(blocked) in capsys.readouterr().err
+    for command in (
+        ["run"],
+        ["simulate", "--level", "5", "--out", "x.nc"],
+        ["analyse"],
+        ["report"],
+    ):
+        assert main([*command, str(file), "--results", str(blocked)]) == 2
+        assert str(blocked) in capsys.readouterr().err
 
 
 def test_a_closed_pipe_is_no_fault() -> None:
@@ -161,3 +168,54 @@ def test_the_command_starts_without_what_it_does_not_need() -> None:
         "assert not heavy & set(sys.modules), heavy & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", program], check=True)
+
+
+def test_unknown_formats_are_refused_first(file: Path, tmp_path: Path, capsys: Capture) -> None:
+    command = ["report", str(file), "--results", str(tmp_path / "none"), "--formats", "svg,gif"]
+    assert main(command) == 2
+    assert "gif: unknown format: choose from svg, png, pdf" in capsys.readouterr().err
+
+
+def test_the_formats_are_those_of_the_report() -> None:
+    from vibsim.cli.jobs import FORMATS
+    from vibsim.report import style
+
+    assert FORMATS == style.FORMATS
+
+
+def test_a_dry_run_makes_no_folder(file: Path, tmp_path: Path, capsys: Capture) -> None:
+    new = tmp_path / "new"
+    assert main(["run", str(file), "--results", str(new), "--dry-run", "--cores", "1"]) == 0
+    assert "simulate adhoc/tiny level_05.nc" in capsys.readouterr().out
+    assert not new.exists()
+
+
+def test_a_file_with_another_ending_is_told_so(file: Path, capsys: Capture) -> None:
+    for name in ("tiny.YAML", "tiny"):
+        other = file.with_name(name)
+        other.write_text(TEXT)
+        assert main(["check", str(other)]) == 2
+        assert capsys.readouterr().err.endswith("must end in .yaml or .yml\n")
+
+
+def test_a_folder_in_the_place_of_a_file_is_deleted_only_when_empty(tmp_path: Path) -> None:
+    folder = tmp_path / "level_08.nc"
+    (folder / "inner").mkdir(parents=True)
+    with pytest.raises(VibsimError, match=r"level_08\.nc: cannot be deleted"):
+        deleted.delete(FileError(folder, "bad"), tmp_path)
+    (folder / "inner").rmdir()
+    deleted.delete(FileError(folder, "bad"), tmp_path)
+    assert not folder.exists()
+    assert deleted.take(tmp_path) == [f"{folder}: bad"]
+
+
+def test_caches_move_to_the_results_where_home_cannot_be_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert workflow._caches(tmp_path) == {}
+    monkeypatch.setenv("HOME", "/proc/none")
+    found = workflow._caches(tmp_path)
+    assert Path(found["XDG_CACHE_HOME"]).is_dir()
+    assert Path(found["XDG_CACHE_HOME"]).is_relative_to(tmp_path / ".vibsim")

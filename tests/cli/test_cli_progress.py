@@ -1,6 +1,8 @@
 from __future__ import annotations
 
-from vibsim.cli.progress import describe
+import pytest
+
+from vibsim.cli.progress import Progress, describe
 from vibsim.cli.workflow import Job, _Reader
 
 TEXT = """\
@@ -42,3 +44,17 @@ def test_jobs_failures_and_steps_are_read_from_what_snakemake_writes() -> None:
     assert describe(failed) == "analyse a/x"
     assert failed.log == "a/x/logs/analyse.log"
     assert (1, 4, None) in seen
+
+
+def test_progress_counts_the_jobs_without_the_target_of_all(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    progress = Progress()
+    progress.is_terminal = False
+    reader = _Reader(progress)
+    for line in ["total           4", *TEXT.splitlines(), ""]:
+        reader.take(line)
+    assert capsys.readouterr().err.splitlines() == [
+        "1 of 3: simulate a/x level_07.nc",
+        "2 of 3: index",
+    ]

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from spec_files import GOOD, build, faults_of, file_faults, only_fault
+from spec_files import GOOD, build, content, faults_of, file_faults, only_fault
 
 from vibsim.analysis import analyse_records
 from vibsim.errors import InputError
 from vibsim.models import MODELS, quantities
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import simulate_record
-from vibsim.spec import VALUES
+from vibsim.spec import VALUES, Experiment
 from vibsim.spec import build as building
 
 LAPTOP = {"levels": [6, 7, 8, 9]}
@@ -257,10 +257,15 @@ CASES: list[tuple[dict[str, Any], str, str, str]] = [
     (
         value(value="error_estimate_defect", at={"level": 9}),
         "checks[0].at.level",
-        "needs 1 finer level(s)",
+        "needs 1 finer level beside",
         "",
     ),
-    (value(value="ratio", at={"level": 8}), "checks[0].at.level", "needs 2 finer level(s)", ""),
+    (
+        value(value="ratio", at={"level": 8}),
+        "checks[0].at.level",
+        "needs 2 finer levels beside",
+        "",
+    ),
     (value(value="richardson_error", at={"level": 6}), "checks[0].at.level", "takes no level", ""),
     (check(claim="x"), "checks[0].that", "required key is missing", ""),
     (check(claim="x", that={"claim": "y"}), "checks[0].that", "key converges or value", ""),
@@ -440,6 +445,7 @@ def test_all_faults_of_a_file_at_once_with_their_lines(tmp_path: Path) -> None:
         (2, "titel", "again"),
         (5, "model.g", "-1.0"),
         (7, "initial.theta", ".nan"),
+        (8, "initial.omga", "0"),
         (9, "time.base_steps", "0"),
         (11, "levels[2]", "55"),
         (13, "schemes[0]", "centrall"),
@@ -490,3 +496,73 @@ def test_a_broken_list_does_not_hide_other_checks() -> None:
         "checks[2]",
         "schemes[0]",
     ]
+
+
+CHECKED = {"value": "end", "quantity": "theta", "equals": 1}
+
+
+@pytest.mark.parametrize(
+    ("check", "keys"),
+    [
+        (
+            {**CHECKED, "quantity": "thet", "at": {"level": 77, "scheme": "foo", "case": 4}},
+            ["at.case", "at.level", "at.scheme", "quantity"],
+        ),
+        ({**CHECKED, "equals": [1], "rtol": 0.1, "quantity": "x"}, ["equals", "quantity"]),
+        ({**CHECKED, "value": 3, "at": {"scheme": "foo"}}, ["at.scheme", "value"]),
+        ({**CHECKED, "at": {"best": 1, "scheme": "foo"}}, ["at", "at.scheme"]),
+        ({**CHECKED, "value": "at", "at": {"t": "x", "case": 9}}, ["at.case", "at.t"]),
+        (
+            {"converges": 3, "schemes": [1, "foo"], "expect": {"status": "X", "reason": "match"}},
+            ["converges", "expect.status", "schemes[0]", "schemes[1]"],
+        ),
+        ({"claim": 1, "that": {**CHECKED, "quantity": "x"}}, ["claim", "that.quantity"]),
+    ],
+)
+def test_a_malformed_value_hides_no_fault_of_its_check(
+    check: dict[str, Any], keys: list[str]
+) -> None:
+    found = faults_of(checks=[check])
+    assert sorted(fault.key for fault in found) == [f"checks[0].{key}" for key in keys]
+
+
+def test_a_malformed_value_hides_no_fault_of_its_section() -> None:
+    found = faults_of(
+        sweep={"initial.theta": 3, "model.k": [1], "time.end": "x"},
+        initial={"theta": "x", "omga": 1},
+        checks=[{**CHECKED, "at": {"t": 77.7, "case": 5}}],
+    )
+    assert sorted(fault.key for fault in found) == [
+        "initial.omga",
+        "initial.theta",
+        "sweep.initial.theta",
+        "sweep.model.k",
+        "sweep.time.end",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"title": "a\x07b"}, "title"),
+        ({"source": "a\x1bb"}, "source"),
+        ({"schemes": [{"kind": "central", "label": "a\x00"}]}, "schemes[0].label"),
+        ({"schemes": [{"kind": "central", "label": "a\nb"}]}, "schemes[0].label"),
+        ({"checks": [{"claim": "a\x85b", "that": CHECKED}]}, "checks[0].claim"),
+        ({"checks": [{**CHECKED, "id": "a\x01"}]}, "checks[0].id"),
+        ({"checks": [{**CHECKED, "id": "a\n"}]}, "checks[0].id"),
+    ],
+)
+def test_control_characters_are_refused(changes: dict[str, Any], key: str) -> None:
+    fault = only_fault(**changes)
+    assert fault.key == key
+    assert str(fault).isprintable()
+
+
+@pytest.mark.parametrize(
+    "name", ["run_" + "0" * 25, "x" * 26, "ab" * 20, "a_" + "abc" * 20, "abcdefghijk" * 10]
+)
+def test_names_that_the_workflow_cannot_take_are_refused(name: str) -> None:
+    with pytest.raises(InputError, match="the name of the experiment"):
+        Experiment.from_dict(content(), name=name)
+    assert Experiment.from_dict(content(), name="x" * 19).name == "x" * 19

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 
 import pytest
@@ -10,8 +11,9 @@ from spec_files import GOOD, file_faults, write
 
 from vibsim.errors import InputError
 from vibsim.spec import Experiment
+from vibsim.spec.content import MAX_BYTES
 from vibsim.spec.scalars import resolve
-from vibsim.spec.source import MAX_BYTES, dotted, parse
+from vibsim.spec.source import dotted, parse
 
 
 @pytest.mark.parametrize(
@@ -143,6 +145,40 @@ def test_unreadable_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         raise PermissionError(13, "Permission denied")
 
     path = write(tmp_path, GOOD)
-    monkeypatch.setattr(Path, "open", refuse)
+    monkeypatch.setattr("os.open", refuse)
     with pytest.raises(InputError, match="Permission denied"):
         Experiment.from_yaml(path)
+
+
+def test_what_is_no_file_is_refused_without_reading_it(tmp_path: Path) -> None:
+    (tmp_path / "endless.yaml").symlink_to("/dev/zero")
+    (tmp_path / "circle.yaml").symlink_to("circle.yaml")
+    os.mkfifo(tmp_path / "pipe.yaml")
+    for name in ("endless", "pipe", "circle"):
+        with pytest.raises(InputError, match="cannot be read"):
+            Experiment.from_yaml(tmp_path / f"{name}.yaml")
+
+
+def test_duplicate_keys_and_tags_hide_no_other_fault(tmp_path: Path) -> None:
+    text = GOOD.replace("1.0}", "x}").replace("[central]", "[!!str central]")
+    faults = file_faults(tmp_path, text + "time: {end: -1}\nextra: 1\n")
+    assert [(f.line, f.key) for f in faults] == [
+        (3, "initial.theta"),
+        (6, "schemes[0]"),
+        (7, "time"),
+        (8, "extra"),
+    ]
+    faults = file_faults(tmp_path, GOOD + "title: again\nb: [1\n")
+    assert [f.rule for f in faults] == ["duplicate key, first on line 1", "is not valid YAML"]
+
+
+def test_endless_duplicates_are_not_listed_without_end(tmp_path: Path) -> None:
+    faults = file_faults(tmp_path, GOOD + "title: again\n" * 5000)
+    assert len(faults) == 1001
+    assert any("more faults" in fault.rule for fault in faults)
+
+
+def test_a_tab_is_named(tmp_path: Path) -> None:
+    (fault,) = file_faults(tmp_path, "a:\n\tb: 1\n")
+    assert (fault.line, fault.hint) == (2, "use spaces")
+    assert "tabs are not allowed for indentation" in fault.rule

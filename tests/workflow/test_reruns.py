@@ -69,6 +69,18 @@ def test_a_lost_file_comes_back_with_the_same_bytes(place: Place, name: str) -> 
     assert place.content() == before
 
 
+@pytest.mark.parametrize("name", ["figures", "tables"])
+def test_a_lost_folder_comes_back(place: Place, name: str) -> None:
+    folder = place.tiny / name
+    before = {path.name for path in folder.iterdir()}
+    for path in folder.iterdir():
+        path.unlink()
+    folder.rmdir()
+    assert place.run().returncode == 0
+    assert {path.name for path in folder.iterdir()} == before
+    assert place.jobs() == []
+
+
 def test_everything_again_gives_the_same_bytes(place: Place, finished: Place) -> None:
     for path in place.tiny.glob("level_*.nc"):
         path.unlink()

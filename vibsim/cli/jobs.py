@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -16,11 +16,14 @@ from typing import TYPE_CHECKING, Any
 
 import vibsim
 from vibsim.cli.deleted import delete
-from vibsim.errors import Fault, FileError, InputError, VibsimError
+from vibsim.errors import Fault, FileError, InputError, VibsimError, nearest
 from vibsim.plan import Plan, checkout, choose, load
 
 if TYPE_CHECKING:
     from vibsim.record import Record
+
+FORMATS = ("svg", "png", "pdf")
+"""Formats of figures, as in `vibsim.report.style`, which takes long to import."""
 
 
 def simulate(options: Namespace) -> int:
@@ -81,6 +84,7 @@ def report(options: Namespace) -> int:
     """Write the report of one experiment, or the index over all results."""
     if options.experiment is None:
         return _index(options)
+    formats = _formats(options)
     plan, results = _plan(options)
     _check(plan, options.digest, plan.report)
     from vibsim import store
@@ -96,7 +100,7 @@ def report(options: Namespace) -> int:
         found[plan.convergence],
         found[plan.summary],
         options.out or results / plan.key,
-        formats=(options.formats or "svg").split(","),
+        formats=formats,
         provenance=_provenance(plan, plan.content) | {"digest": plan.analysis},
     )
     return 0
@@ -118,7 +122,20 @@ def _index(options: Namespace) -> int:
 def results_folder(options: Namespace) -> Path:
     """Return the results folder that was asked for, else that of the checkout."""
     folder: Path = options.results or checkout() / "results"
+    if folder.exists() and not folder.is_dir():
+        raise _refusal("--results", folder, "must be a folder, this is a file")
     return folder.absolute()
+
+
+def _formats(options: Namespace) -> list[str]:
+    """Return the formats of the figures, each of them known."""
+    chosen = (options.formats or "svg").split(",")
+    unknown = [name for name in chosen if name not in FORMATS]
+    if unknown:
+        raise _refusal(
+            "--formats", ",".join(unknown), "unknown format", nearest(unknown[0], FORMATS)
+        )
+    return chosen
 
 
 def _plan(options: Namespace) -> tuple[Plan, Path]:
@@ -135,8 +152,8 @@ def _check(plan: Plan, wanted: str | None, found: str) -> None:
         raise InputError([Fault(plan.file, 0, "", "", rule)])
 
 
-def _refusal(key: str, value: Any, rule: str) -> InputError:
-    return InputError([Fault("command line", 0, key, str(value), rule)])
+def _refusal(key: str, value: Any, rule: str, hint: str = "") -> InputError:
+    return InputError([Fault("command line", 0, key, str(value), rule, hint)])
 
 
 def _read_all(
@@ -151,11 +168,20 @@ def _read_all(
         except FileError as error:
             errors.append(error)
     if errors:
-        if options.discard:
-            for bad in errors:
-                delete(bad, results)
-        raise VibsimError("\n".join(map(str, errors)))
+        kept = _discard(errors, results) if options.discard else []
+        raise VibsimError("\n".join([*map(str, errors), *kept]))
     return found
+
+
+def _discard(errors: Sequence[FileError], results: Path) -> list[str]:
+    """Delete every bad file; return why some could not be."""
+    kept: list[str] = []
+    for bad in errors:
+        try:
+            delete(bad, results)
+        except VibsimError as error:
+            kept.append(str(error))
+    return kept
 
 
 def _titled(record: Record, title: str) -> Record:

@@ -34,7 +34,8 @@ def _schemes() -> Iterable[tuple[str, str]]:
     from vibsim.schemes import SCHEMES
 
     for scheme in SCHEMES.values():
-        work = f"{scheme.force_evaluations} force evaluation(s) per step"
+        plural = "" if scheme.force_evaluations == 1 else "s"
+        work = f"{scheme.force_evaluations} force evaluation{plural} per step"
         limit = scheme.stability_limit
         stable = "stable for every step" if limit is None else f"stable while w dt < {limit:g}"
         yield scheme.kind, f"{scheme.title}; {work}; {stable}"

@@ -124,9 +124,13 @@ def as_text(
         yield from (f"  {line}" for line in failure.tail)
     checks = [check["status"] for f in findings if f.summary for check in f.summary["checks"]]
     yield (
-        f"\n{len(findings)} experiments, {checks.count('PASS')} of {len(checks)} checks passed: "
+        f"\n{_counted(findings)}, {checks.count('PASS')} of {len(checks)} checks passed: "
         + worst([finding.status for finding in findings] + ["FAIL"] * bool(failures))
     )
+
+
+def _counted(findings: Sequence[Finding]) -> str:
+    return "1 experiment" if len(findings) == 1 else f"{len(findings)} experiments"
 
 
 def _checks(checks: Sequence[Mapping[str, Any]], columns: int) -> Iterator[str]:

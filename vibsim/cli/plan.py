@@ -23,7 +23,9 @@ def plan(options: Namespace) -> int:
 
 
 def _lines(item: Plan) -> Iterator[str]:
-    yield f"{item.key}: {item.cases} members, schemes {', '.join(item.schemes)}"
+    members = "1 member" if item.cases == 1 else f"{item.cases} members"
+    schemes = "scheme" if len(item.schemes) == 1 else "schemes"
+    yield f"{item.key}: {members}, {schemes} {', '.join(item.schemes)}"
     yield f"{'level':>7}{'steps':>14}{'kept every':>12}{'jobs':>6}{'member-steps':>16}{'MB':>10}{'s':>8}"
     for level in item.levels:
         yield (

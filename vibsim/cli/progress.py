@@ -14,6 +14,7 @@ class Progress:
     def __init__(self) -> None:
         self.is_terminal = sys.stderr.isatty()
         self.done = 0
+        self.started = 0
         self.total = 0
         self.current = ""
 
@@ -21,12 +22,17 @@ class Progress:
         """Take what the workflow tells: steps done of all, or a job that has started."""
         if job is not None:
             self.current = describe(job)
+            self.started += 1
             if not self.is_terminal:
-                print(self.current, file=sys.stderr, flush=True)
+                count = f"{self.started} of {self.total}: " if self.total else ""
+                print(f"{count}{self.current}", file=sys.stderr, flush=True)
         else:
-            self.done, self.total = done, total
+            # the target of all is no job
+            self.total = total - 1
+            self.done = min(done, self.total)
+            self.started = self.started if done else 0
         if self.is_terminal:
-            count = f"{self.done}/{self.total} " if self.total else ""
+            count = f"{self.done} of {self.total}: " if self.total else ""
             self._rewrite(f"{count}{self.current}")
 
     def clear(self) -> None:

@@ -9,7 +9,9 @@ import subprocess
 import sys
 from argparse import Namespace
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from vibsim.cli import deleted, lock, outcome, workflow
 from vibsim.cli.jobs import results_folder
@@ -27,11 +29,11 @@ def run(options: Namespace) -> int:
     choices = choose(options.experiments, root)
     # Everything is validated before anything is written but the cache of plans.
     plans = list(load_all(choices, results if results.is_dir() else None).values())
-    _prepare(results)
-    held = lock.hold(results)
     arguments = ["--cores", str(options.cores or len(os.sched_getaffinity(0)))]
     if options.dry_run:
-        return _show_jobs(plans, results, root, held, [*arguments, "--dry-run"], options.json)
+        return _dry_run(plans, results, root, arguments, options.json)
+    _prepare(results)
+    held = lock.hold(results)
     progress = Progress()
     deleted.take(results)
     jobs: list[workflow.Job] = []
@@ -46,6 +48,18 @@ def run(options: Namespace) -> int:
         if not notes:
             break
     return _show(options, findings, ended, results, bool(jobs))
+
+
+def _dry_run(
+    plans: Sequence[Plan], results: Path, root: Path, arguments: list[str], as_json: bool
+) -> int:
+    """Show the jobs; a results folder that does not exist yet is not made for that."""
+    with ExitStack() as stack:
+        if not results.exists():
+            results = Path(stack.enter_context(TemporaryDirectory(prefix="vibsim-")))
+        _prepare(results)
+        held = lock.hold(results)
+        return _show_jobs(plans, results, root, held, [*arguments, "--dry-run"], as_json)
 
 
 def _prepare(results: Path) -> None:

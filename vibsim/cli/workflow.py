@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from vibsim.plan import Plan
 _BLOCK = re.compile(r"^(?:local)?(?:rule|checkpoint) (\w+):$")
 _FIELD = re.compile(r"^    (\w+): (.*)$")
 _DONE = re.compile(r"^(\d+) of (\d+) steps \(\d+%\) done$")
+_TOTAL = re.compile(r"^total +(\d+)$")
 _ERROR = re.compile(r"^Error in rule (\w+):$")
 
 
@@ -52,7 +53,7 @@ class Outcome:
 
 
 Watcher = Callable[[int, int, Job | None], None]
-"""Told how many steps are done, of how many, and which job has just started."""
+"""Told how many steps are done, of how many with the target of all, and which job has just started."""
 
 
 def run(
@@ -90,7 +91,7 @@ def run(
     process = subprocess.Popen(
         command,
         cwd=results,
-        env=os.environ | lock.inherited(held),
+        env=os.environ | lock.inherited(held) | _caches(results),
         pass_fds=(held,),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
@@ -100,6 +101,19 @@ def run(
     )
     with _passing_on(process):
         return _follow(process, watch)
+
+
+def _caches(results: Path) -> dict[str, str]:
+    """Return where Snakemake and the libraries keep their caches, if the usual place cannot be written."""
+    usual = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
+    # what cannot be made cannot be written either
+    with suppress(OSError):
+        usual.mkdir(parents=True, exist_ok=True)
+    if os.access(usual, os.W_OK | os.X_OK):
+        return {}
+    own = results / ".vibsim/cache"
+    own.mkdir(parents=True, exist_ok=True)
+    return {"XDG_CACHE_HOME": str(own), "MPLCONFIGDIR": str(own / "matplotlib")}
 
 
 def _clear_locks(results: Path) -> None:
@@ -128,8 +142,9 @@ def _passing_on(process: subprocess.Popen[str]) -> Iterator[None]:
 def _follow(process: subprocess.Popen[str], watch: Watcher) -> Outcome:
     reader = _Reader(watch)
     assert process.stdout is not None
-    for line in process.stdout:
-        reader.take(line.rstrip("\n"))
+    with process.stdout as lines:
+        for line in lines:
+            reader.take(line.rstrip("\n"))
     status = process.wait()
     reader.take("")
     return Outcome(status, tuple(reader.jobs), tuple(reader.failed), "\n".join(reader.lines[-40:]))
@@ -155,6 +170,8 @@ class _Reader:
         self.end_block()
         if done := _DONE.match(line):
             self.watch(int(done[1]), int(done[2]), None)
+        elif total := _TOTAL.match(line):
+            self.watch(0, int(total[1]), None)
         elif start := _BLOCK.match(line) or _ERROR.match(line):
             self.rule, self.is_error, self.fields = start[1], line.startswith("Error"), {}
 

@@ -17,6 +17,7 @@ from vibsim.plan import code
 from vibsim.plan.choose import Choice
 from vibsim.plan.jobs import Plan, from_json, to_json
 from vibsim.plan.versions import DRAWING, NUMERICAL, versions
+from vibsim.spec.content import read_bytes
 
 
 def load(choice: Choice, results: Path | None = None) -> Plan:
@@ -75,8 +76,8 @@ def load_all(choices: Iterable[Choice], results: Path | None = None) -> dict[str
 def _key(choice: Choice) -> str:
     """Return what an entry must be made from; empty when the file cannot be read."""
     try:
-        content = choice.file.read_bytes()
-    except (OSError, ValueError):
+        content = read_bytes(choice.file)
+    except InputError:
         return ""
     libraries = versions(NUMERICAL + DRAWING)
     parts = (choice.collection, choice.name, code.everything(), repr(libraries), content)

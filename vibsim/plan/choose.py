@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -98,6 +99,8 @@ def _find(
         return [], ("is the name of several experiments", "choose from " + _list(found))
     if found:
         return found, None
+    if os.path.lexists(word):
+        return [], ("a file of an experiment must end in .yaml or .yml", "")
     names = [*dict.fromkeys(c.collection for c in known), *(c.key for c in known)]
     names += [c.name for c in known]
     rule = "is no experiment, no collection and no YAML file"
@@ -112,7 +115,7 @@ def _clashes(choices: list[Choice]) -> Iterator[Fault]:
     first: dict[str, Choice] = {}
     for choice in choices:
         other = first.setdefault(choice.key, choice)
-        if other.file.resolve() != choice.file.resolve():
+        if os.path.realpath(other.file) != os.path.realpath(choice.file):
             rule = "two experiments of one collection cannot share a name"
             yield Fault(str(choice.file), 0, "", choice.name, rule, f"the other is {other.file}")
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from pydantic import ValidationError
 
@@ -19,7 +19,8 @@ from vibsim.spec.check_rules import Ladder, finish_checks
 from vibsim.spec.checks import ConvergesCheck
 from vibsim.spec.document import Document, Every, LevelRange, Partial
 from vibsim.spec.experiment import Experiment, ModelSpec, SchemeSpec, Sweep, TimeSpec
-from vibsim.spec.faults import Report
+from vibsim.spec.faults import Report, plain_path
+from vibsim.spec.mending import without
 from vibsim.spec.source import Path_, Source
 from vibsim.spec.timing import time_spec
 
@@ -94,7 +95,14 @@ def _sections(source: Source, report: Report) -> Any:
         faulty = report.add_invalid(error)
     else:
         return Partial.model_validate(data)
-    return Partial.model_validate(_without(data, faulty))
+    mended = without(data, faulty)
+    try:
+        return Partial.model_validate(mended)
+    except ValidationError as error:
+        # what cannot be read without its faulty values is left out whole
+        rows = error.errors(include_url=False, include_input=False)
+        places = [plain_path(row["loc"], keep_last=False) for row in rows]
+    return Partial.model_validate(_without(mended, places))
 
 
 def _without(data: Mapping[str, Any], faulty: list[Path_]) -> dict[str, Any]:
@@ -111,8 +119,9 @@ def _without(data: Mapping[str, Any], faulty: list[Path_]) -> dict[str, Any]:
 
 
 def _lacks(section: object, source: Source, key: str) -> bool:
-    """Tell whether the file has a section that is left out because of a fault."""
-    return section is None and source.data.get(key) is not None
+    """Tell whether the file has a section of which something is left out because of a fault."""
+    written = source.data.get(key)
+    return written is not None and (section is None or len(cast(Any, section)) < len(written))
 
 
 def _model(source: Source) -> Model | None:
@@ -213,7 +222,9 @@ def _checks(
 ) -> tuple[Any, ...]:
     names = tuple(dict.fromkeys(scheme_names(source.data.get("schemes"))))
     end = sweep.fixed_end(axes, time) if time else None
-    ladder = Ladder(model, names, shape, time, end)
+    # a faulty sweep may change the end: then nothing is said about times
+    known = None if _lacks(part.sweep, source, "sweep") else time
+    ladder = Ladder(model, names, shape, known, end)
     checks = list(part.checks)
     if not checks and model is not None:
         checks = [ConvergesCheck(converges=model.position)]

@@ -89,10 +89,17 @@ def _converges(check: ConvergesCheck, path: Path_, ladder: Ladder, report: Repor
     place = (*path, "expect", "reason")
     if reason not in REASONS:
         report.add(place, "unknown reason", nearest(reason, list(REASONS)), reason)
-    elif REASONS[reason] != check.expect.status:
+    elif REASONS[reason] != check.expect.status and not _is_faulty(
+        (*path, "expect", "status"), report
+    ):
         rule = f"reason of status {REASONS[reason]}, but the status is {check.expect.status}"
         choices = [name for name, status in REASONS.items() if status == check.expect.status]
         report.add(place, rule, "choose from " + ", ".join(choices), reason)
+
+
+def _is_faulty(path: Path_, report: Report) -> bool:
+    """Tell whether the value at `path` is malformed and was left out."""
+    return path in report.faulty
 
 
 def _quantity(name: str, path: Path_, ladder: Ladder, report: Report) -> None:
@@ -114,6 +121,7 @@ def _value(check: ValueCheck, path: Path_, ladder: Ladder, report: Report) -> No
         report.add(
             (*path, "value"), "unknown value", nearest(check.value, list(VALUES)), check.value
         )
+        _anywhere(check.at, (*path, "at"), ladder, report)
         return
     _of(check, row, path, ladder, report)
     _exact(check, row, path, ladder, report)
@@ -122,6 +130,8 @@ def _value(check: ValueCheck, path: Path_, ladder: Ladder, report: Report) -> No
 
 def _comparison(check: ValueCheck, path: Path_, report: Report) -> None:
     given = [name for name in ("equals", "below", "above") if getattr(check, name) is not None]
+    if any(_is_faulty((*path, name), report) for name in ("equals", "below", "above")):
+        return
     if len(given) != 1:
         found = " and ".join(given) or "none of them"
         report.add(path, f"must have exactly one of equals, below, above; has {found}")
@@ -181,7 +191,11 @@ def allowed(row: Value, model: Model | None, best: bool = False) -> tuple[str, .
 
 
 def _at(at: At, row: Value, path: Path_, ladder: Ladder, report: Report) -> None:
-    given = [name for name in At.model_fields if getattr(at, name) is not None]
+    given = [
+        name
+        for name in At.model_fields
+        if getattr(at, name) is not None or _is_faulty((*path, name), report)
+    ]
     for name in given:
         if name not in row.at:
             rule = f"{row.name} takes no {name}"
@@ -190,19 +204,27 @@ def _at(at: At, row: Value, path: Path_, ladder: Ladder, report: Report) -> None
         report.add(path, f"{row.name} needs t or step")
     if "t" in given and "step" in given:
         report.add((*path, "step"), "must not be given together with t", at_key=True)
-    if at.scheme is not None:
-        _scheme(at.scheme, (*path, "scheme"), ladder, report)
-    members = ladder.shape.members
-    if at.case is not None and members is not None and at.case >= members:
-        report.add((*path, "case"), f"must be at most {members - 1}", f"there are {members} cases")
+    _anywhere(at, path, ladder, report)
     level = _level(at, row, path, ladder, report)
     if level is not None and "t" in row.at:
         _sample(at, level, path, ladder, report)
 
 
+def _anywhere(at: At, path: Path_, ladder: Ladder, report: Report) -> None:
+    """Check what is the same for every value: the scheme and the case."""
+    if at.scheme is not None:
+        _scheme(at.scheme, (*path, "scheme"), ladder, report)
+    members = ladder.shape.members
+    if at.case is not None and members is not None and at.case >= members:
+        there = "there is 1 case" if members == 1 else f"there are {members} cases"
+        report.add((*path, "case"), f"must be at most {members - 1}", there)
+
+
 def _level(at: At, row: Value, path: Path_, ladder: Ladder, report: Report) -> int | None:
     """Check the level; return it where it is one of the ladder, the finest by default."""
     levels = ladder.shape.levels
+    if _is_faulty((*path, "level"), report) or _is_faulty(path, report):
+        return None
     if at.level is None or not levels or "level" not in row.at:
         return levels[-1] if levels else None
     place = (*path, "level")
@@ -218,7 +240,9 @@ def _level(at: At, row: Value, path: Path_, ladder: Ladder, report: Report) -> i
         return None
     finer = len(levels) - 1 - levels.index(at.level)
     if finer < row.finer_levels:
-        rule = f"{row.name} needs {row.finer_levels} finer level(s) beside it, there are {finer}"
+        word = "level" if row.finer_levels == 1 else "levels"
+        there = "there is 1" if finer == 1 else f"there are {finer or 'none'}"
+        rule = f"{row.name} needs {row.finer_levels} finer {word} beside it, {there}"
         report.add(place, rule, value=at.level)
     return at.level
 

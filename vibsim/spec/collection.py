@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 ADHOC = "adhoc"
@@ -31,5 +32,6 @@ def collection_of(file: Path, configs: Path | None = None) -> str:
         if checkout is None:
             return ADHOC
         configs = checkout / "configs"
-    folder = file.resolve().parent
+    # Path.resolve raises where links go in a circle
+    folder = Path(os.path.realpath(file)).parent
     return folder.name if folder.parent == configs.resolve() else ADHOC

@@ -24,6 +24,7 @@ from vibsim.spec.fields import (
     MAX_LEVEL,
     Count,
     Level,
+    Line,
     Number,
     Positive,
     Section,
@@ -57,7 +58,7 @@ def _scheme_section(scheme: Scheme) -> type[Section]:
     )
     fields: dict[str, Any] = {
         "kind": (Literal[scheme.kind], Field(description=scheme.title)),
-        "label": (Text | None, label),
+        "label": (Line | None, label),
     }
     for option in scheme.options:
         choices: Any = Literal[option.choices]

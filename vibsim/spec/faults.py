@@ -13,9 +13,8 @@ from vibsim.schemes import SCHEMES
 from vibsim.spec.checks import At, ClaimCheck, ConvergesCheck, Expect, ValueCheck
 from vibsim.spec.document import Document, Every, LevelRange, Linspace, TimeSection
 from vibsim.spec.fields import Section
-from vibsim.spec.source import Path_, Source, dotted
+from vibsim.spec.source import MAX_FAULTS, Path_, Source, dotted
 
-MAX_FAULTS = 1000
 MAX_VALUE = 60
 
 _RULES = {
@@ -45,7 +44,9 @@ class Report:
 
     def __init__(self, source: Source) -> None:
         self.source = source
-        self.faults: set[Fault] = set()
+        self.faults: set[Fault] = set(source.faults)
+        self.faulty: set[Path_] = set()
+        """Places of malformed values; nothing more is said about them."""
 
     def add(
         self, path: Path_, rule: str, hint: str = "", value: object = None, at_key: bool = False
@@ -57,6 +58,8 @@ class Report:
         InputError
             Where there are `MAX_FAULTS` already: nobody reads more of them.
         """
+        if path in self.faulty:
+            return
         place = self.source.place(path)
         nested = place is not None and not place.text
         line = (
@@ -78,7 +81,9 @@ class Report:
 
     def add_invalid(self, error: ValidationError) -> list[Path_]:
         """Note every fault that pydantic found; return their places."""
-        return [self._add_row(row) for row in error.errors(include_url=False)]
+        paths = [self._add_row(row) for row in error.errors(include_url=False)]
+        self.faulty.update(paths)
+        return paths
 
     def _add_row(self, row: Any) -> Path_:
         kind: str = row["type"]
@@ -142,8 +147,11 @@ def worded(message: str) -> str:
 
 
 def shorten(text: str) -> str:
-    """Return `text` on one line, cut to `MAX_VALUE` characters."""
-    line = " ".join(text[: 4 * MAX_VALUE].split())
+    """Return `text` on one line, cut to `MAX_VALUE` characters; control characters are spelled out."""
+    shown = (
+        c if c.isprintable() or c in "\t\r\n" else repr(c)[1:-1] for c in text[: 4 * MAX_VALUE]
+    )
+    line = " ".join("".join(shown).split())
     return line if len(line) <= MAX_VALUE else line[: MAX_VALUE - 3] + "..."
 
 

@@ -6,15 +6,24 @@ A rule is worded for the person who wrote the file.
 from __future__ import annotations
 
 import math
+import re
 from numbers import Integral, Real
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetJsonSchemaHandler
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    GetJsonSchemaHandler,
+)
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from vibsim.expression import ExpressionError, constant
 
 IDENTIFIER = r"^[a-z0-9_]+$"
+_CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 MAX_LEVEL = 40
 MAX_FORMULAS = 1000
 """Values of one list that are not plain numbers."""
@@ -112,6 +121,21 @@ def plain(values: Any) -> Any:
     return values
 
 
+def _printable(text: str) -> str:
+    """Refuse what no page and no figure can show: XML 1.0 (2008), section 2.2, and the controls."""
+    found = _CONTROL.search(text)
+    if found:
+        rule = f"must not hold control characters, holds U+{ord(found.group()):04X}"
+        raise PydanticCustomError("control", "{rule}", {"rule": rule})
+    return text
+
+
+def _one_line(text: str) -> str:
+    if len(text.splitlines()) > 1 or set("\t\r\n") & set(text):
+        raise PydanticCustomError("line", "must be on one line, without tabs")
+    return text
+
+
 class _Formula:
     """Marks a float that may be written as text; editors then accept both."""
 
@@ -136,4 +160,7 @@ Level = Annotated[int, Field(ge=0, le=MAX_LEVEL), BeforeValidator(whole)]
 Count = Annotated[int, Field(ge=1), BeforeValidator(whole)]
 Index = Annotated[int, Field(ge=0), BeforeValidator(whole)]
 Identifier = Annotated[str, Field(pattern=IDENTIFIER)]
-Text = Annotated[str, Field(min_length=1)]
+Text = Annotated[str, Field(min_length=1), AfterValidator(_printable)]
+"""Text that may have several lines."""
+Line = Annotated[Text, AfterValidator(_one_line)]
+"""Text on one line."""

@@ -12,10 +12,15 @@ from vibsim.errors import Fault, InputError
 from vibsim.spec.build import Place, build
 from vibsim.spec.collection import ADHOC, collection_of
 from vibsim.spec.experiment import Experiment
-from vibsim.spec.faults import Report
+from vibsim.spec.faults import Report, shorten
 from vibsim.spec.fields import IDENTIFIER
 from vibsim.spec.source import MAX_DEPTH, Source, read
 
+MAX_NAME = 100
+MAX_REPEATS = 20
+"""Snakemake takes a name that ends in so many repetitions for a rule that feeds itself."""
+
+_PERIODIC = re.compile(rf"(.+)\1{{{MAX_REPEATS - 1}}}$")
 _NAME_RULE = "must consist of a to z, 0 to 9 and _"
 
 
@@ -65,8 +70,13 @@ def from_dict(
 
 def _check_names(place: Place, report: Report) -> None:
     for what, text in (("experiment", place.name), ("collection", place.collection)):
+        named = f"the name of the {what}, '{shorten(text)}',"
         if not re.fullmatch(IDENTIFIER, text):
-            report.add((), f"the name of the {what}, '{text}', {_NAME_RULE}")
+            report.add((), f"{named} {_NAME_RULE}")
+        elif len(text) > MAX_NAME:
+            report.add((), f"{named} must not be longer than {MAX_NAME} characters")
+        elif _PERIODIC.search(text):
+            report.add((), f"{named} must not end with {MAX_REPEATS} times the same")
 
 
 def _plain(data: Any, name: str, depth: int = 0) -> Any:

@@ -15,9 +15,10 @@ from typing import Any
 import yaml
 
 from vibsim.errors import Fault, InputError
+from vibsim.spec.content import read_bytes
 from vibsim.spec.scalars import resolve
 
-MAX_BYTES = 2**20
+MAX_FAULTS = 1000
 MAX_ALIASES = 50
 MAX_NODES = 200_000
 """Nodes of a file when every alias is written out."""
@@ -29,6 +30,8 @@ Path_ = tuple[str | int, ...]
 _NOT_PRINTABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """What YAML 1.2.2, section 5.1, does not allow in a file."""
 
+_INVALID = "is not valid YAML"
+_TAB = re.compile(" *\t")
 _Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
@@ -69,6 +72,8 @@ class Source:
     """Name of the file as the user gave it."""
     data: Any
     top: Node | None = None
+    faults: tuple[Fault, ...] = ()
+    """What is wrong with the file although it could be read: duplicate keys and tags."""
 
     def place(self, path: Path_) -> Place | None:
         """Return where the value at `path` stands, None where nothing stands there."""
@@ -93,26 +98,13 @@ def read(path: Path) -> Source:
     return parse(read_bytes(path), str(path))
 
 
-def read_bytes(path: Path) -> bytes:
-    """Return the content of the file at `path`; refuse it when it is too large."""
-    try:
-        with path.open("rb") as stream:
-            content = stream.read(MAX_BYTES + 1)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise _refusal(str(path), 0, "", f"cannot be read ({reason})") from None
-    if len(content) > MAX_BYTES:
-        raise _refusal(str(path), 0, "", f"must not be larger than {MAX_BYTES} bytes")
-    return content
-
-
 def parse(content: bytes, file: str) -> Source:
     """Build the data of one YAML document; `file` is its name in messages.
 
     Raises
     ------
     InputError
-        At the first fault of syntax, or with every duplicate key of the file.
+        At the first fault of syntax, with the duplicate keys and the tags before it.
     """
     try:
         text = content.decode("utf-8-sig")
@@ -127,15 +119,25 @@ def parse(content: bytes, file: str) -> Source:
     try:
         for event in _events(text):
             builder.take(event)
+        return builder.source()
+    except InputError as error:
+        faults = error.faults
     except yaml.MarkedYAMLError as error:
-        mark: Any = error.problem_mark or error.context_mark
-        line = mark.line + 1 if mark else 0
-        rule = "is not valid YAML"
-        raise _refusal(file, line, "", rule, str(error.problem or error.context or "")) from None
+        faults = (_syntax(error, text, file),)
     except (yaml.YAMLError, ValueError) as error:
-        rule = "is not valid YAML"
-        raise _refusal(file, 0, "", rule, str(error).partition("\n")[0]) from None
-    return builder.source()
+        faults = (Fault(file, 0, "", "", _INVALID, str(error).partition("\n")[0]),)
+    raise InputError({*builder.faults, *faults})
+
+
+def _syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Fault:
+    mark: Any = error.problem_mark or error.context_mark
+    if mark is None:
+        return Fault(file, 0, "", "", _INVALID, str(error.problem or error.context or ""))
+    found = text.splitlines()[mark.line : mark.line + 1]
+    if found and _TAB.match(found[0]):
+        rule = "tabs are not allowed for indentation"
+        return Fault(file, mark.line + 1, "", "", f"{_INVALID}: {rule}", "use spaces")
+    return Fault(file, mark.line + 1, "", "", _INVALID, str(error.problem or error.context or ""))
 
 
 def _events(text: str) -> Iterator[Any]:
@@ -198,7 +200,14 @@ class _Builder:
 
     def check(self, event: Any) -> None:
         if event.tag is not None:
-            raise self.refuse(event, "YAML tags are not allowed", event.tag)
+            rule = "YAML tags are not allowed"
+            self.note(Fault(self.file, _line(event), self.where(), event.tag[:60], rule))
+
+    def note(self, fault: Fault) -> None:
+        """Keep a fault that does not hinder reading on; its node counts as if it were sound."""
+        self.faults.append(fault)
+        if len(self.faults) >= MAX_FAULTS:
+            raise _refusal(self.file, 0, "", "has more faults than are listed")
 
     def start(self, event: Any) -> None:
         self.check(event)
@@ -240,12 +249,13 @@ class _Builder:
             self.add_key(event, parent, node)
             return
         place = position(parent)
+        # of two values of one key the first counts
         if parent.children is not None:
-            parent.children[place] = node
+            parent.children.setdefault(place, node)
         if parent.keys is None:
             parent.value.append(node.value)
         else:
-            parent.value[place] = node.value
+            parent.value.setdefault(place, node.value)
             parent.is_due = False
 
     def add_key(self, event: Any, parent: Node, node: Node) -> None:
@@ -255,17 +265,15 @@ class _Builder:
         keys = parent.keys if parent.keys is not None else {}
         if parent.key in keys:
             rule = f"duplicate key, first on line {keys[parent.key]}"
-            self.faults.append(Fault(self.file, node.line, self.where(), "", rule))
+            self.note(Fault(self.file, node.line, self.where(), "", rule))
         else:
             keys[parent.key] = node.line
 
     def source(self) -> Source:
-        if self.faults:
-            raise InputError(self.faults)
         if self.top is None or not isinstance(self.top.value, dict):
             line = self.top.line if self.top else 0
             raise _refusal(self.file, line, "", "must be a mapping of keys to values")
-        return Source(self.file, self.top.value, self.top)
+        return Source(self.file, self.top.value, self.top, tuple(self.faults))
 
 
 def position(node: Node) -> str | int:

@@ -1,0 +1,67 @@
+"""Content without its malformed values, so that they hide no other fault of the same check or sweep."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from vibsim.spec.source import Path_
+
+_REQUIRED = ("claim", "converges", "value")
+_STAND_IN = "?"
+"""Takes the place of text that cannot be left out; nothing is said about it a second time."""
+
+
+def without(data: Mapping[str, Any], faulty: Iterable[Path_]) -> dict[str, Any]:
+    """Return `data` without the values at the places `faulty`.
+
+    Values of mappings (`initial`, `sweep`) are left out one by one, and so are the parts of checks; an entry
+    of `schemes` and a check that is no mapping become None; any other section goes as a whole.
+    """
+    kept = dict(data)
+    copied = {path[0] for path in faulty if path[0] in ("initial", "sweep", "schemes", "checks")}
+    kept.update((key, copy.deepcopy(kept[key])) for key in copied if key in kept)
+    for path in faulty:
+        _take_out(kept, path)
+    return {key: value for key, value in kept.items() if key != "sweep" or value}
+
+
+def _take_out(kept: dict[str, Any], path: Path_) -> None:
+    section = kept.get(str(path[0]))
+    if len(path) == 1 or path[0] not in ("initial", "sweep", "schemes", "checks"):
+        kept.pop(str(path[0]), None)
+    elif isinstance(section, dict):
+        section.pop(path[1], None)
+    elif isinstance(section, list) and isinstance(path[1], int):
+        if path[0] == "schemes" or len(path) == 2:
+            section[path[1]] = None
+        else:
+            _take_out_part(section[path[1]], path[2:])
+
+
+def _take_out_part(check: Any, path: Path_) -> None:
+    """Leave one value of a check out, or put the stand-in there where it is required."""
+    holder = check
+    for part in path[:-1]:
+        inner = _get(holder, part)
+        if inner is None:
+            return
+        holder = inner
+    last = path[-1]
+    listed = isinstance(holder, list) and isinstance(last, int)
+    if listed or (isinstance(holder, dict) and last in _REQUIRED and last in holder):
+        holder[last] = _STAND_IN
+    elif isinstance(holder, dict) and last == "at" and isinstance(holder.get("at"), dict):
+        # at itself is at fault where it has both best and level, or another value of best
+        holder["at"] = {k: v for k, v in holder["at"].items() if k not in ("best", "level")}
+    elif isinstance(holder, dict):
+        holder.pop(last, None)
+
+
+def _get(holder: Any, part: str | int) -> Any:
+    if isinstance(holder, dict):
+        return holder.get(part)
+    if isinstance(holder, list) and isinstance(part, int) and part < len(holder):
+        return holder[part]
+    return None
