@@ -48,6 +48,8 @@ def context(
     }
 
 
+SETTLED = ("asymptotic", "order_low", "order_high")
+"""Reasons of a result whose order is known: any other has at most an estimate that may be an accident."""
 BRIEF = 3
 """With more checks than this, the evidence of those that passed is folded away."""
 PYTHON = """\
@@ -83,11 +85,10 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
 
 
 def _factor(check: Mapping[str, Any]) -> str:
-    """Say by what factor halving the step shrinks the error, where the results agree on it."""
-    orders = [float(r["order"]) for r in check.get("results") or [] if r.get("order") is not None]
-    if not orders or max(orders) - min(orders) > 0.05:
-        return ""
-    return words.ratio(sum(orders) / len(orders))
+    """Say by what factor halving the step shrinks the error, where the result that decides has a settled order."""
+    decisive: Mapping[str, Any] = next(iter(check.get("results") or []), {})
+    settled = check["status"] != "INCONCLUSIVE" and decisive.get("reason") in SETTLED
+    return words.ratio(decisive.get("order")) if settled else ""
 
 
 def _results(record: Record, check: Mapping[str, Any]) -> Table | None:

@@ -80,6 +80,7 @@ def orders(
         "ratio and order from three levels starting here",
         columns,
         tuple(rows),
+        heads=2 if sweep else 0,
     )
 
 
@@ -155,7 +156,7 @@ def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
     caption = (
         "Largest energy deviation over every step; the last point has an end formula of its own"
     )
-    return Table("energy_maxima", caption, columns, tuple(rows))
+    return Table("energy_maxima", caption, columns, tuple(rows), int(bool(swept(record))))
 
 
 def _ratio(values: Any, i: int) -> float:
@@ -180,8 +181,11 @@ def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
         exact = float(exact_periods(record)[member.case])
         for i, level in enumerate(whole(record, "level")):
             error = float(period[i]) / exact - 1.0
-            rows.append((member.title, level, float(period[i]), exact, error, float(amplitude[i])))
-    return Table("scalars", "Period (interpolated) and amplitude", columns, tuple(rows))
+            # the peak of a run that grows without bound may have either sign
+            size = abs(float(amplitude[i]))
+            rows.append((member.title, level, float(period[i]), exact, error, size))
+    caption = "Period (interpolated) and amplitude"
+    return Table("scalars", caption, columns, tuple(rows), int(bool(swept(record))))
 
 
 def member_list(record: Record, quantity: str) -> Table | None:

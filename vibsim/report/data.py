@@ -199,14 +199,18 @@ def quantities(experiment: Experiment, record: Record) -> list[str]:
 def members(record: Record, quantity: str) -> list[Member]:
     """Return what the figures over time show of a quantity: of every scheme one member, or two of a sweep.
 
-    These are the worst and a typical member, judged by the verdicts on `quantity` and then by the distance of the
-    order from the promised one; of several schemes the worst decides.
+    These are the worst member, judged by the verdicts on `quantity` and then by the distance of the order from the
+    promised one (of several schemes the worst decides), and a typical one of those that pass, if any does.
     """
     schemes = record.words("scheme")
     if not swept(record):
         return [Member(s, 0, name) for s, name in enumerate(schemes)]
     ranking = _ranking(record, quantity)
-    roles = {int(ranking[ranking.size // 2]): "typical", int(ranking[-1]): "worst"}
+    status = flags(record, f"{quantity}_status")
+    # the healthiest: members that most schemes pass, and of the others those that fewest fail
+    score = np.sum(status == "PASS", axis=0) * (len(status) + 1) - np.sum(status == "FAIL", axis=0)
+    healthy = ranking[score[ranking] == score.max()]
+    roles = {int(healthy[healthy.size // 2]): "typical", int(ranking[-1]): "worst"}
     return [
         Member(s, case, name, case_name(record, case), role)
         for case, role in reversed(roles.items())
@@ -241,7 +245,7 @@ def sound_pairs(record: Record, quantity: str, member: Member) -> list[bool]:
         return [finer <= last for finer in levels[1:]]
     floor = _floor(record, quantity, member)
     differences = at(record, f"{quantity}_difference", member)
-    return [_largest(d) > ABOVE * max(floor[i], floor[i + 1]) for i, d in enumerate(differences)]
+    return [largest(d) > ABOVE * max(floor[i], floor[i + 1]) for i, d in enumerate(differences)]
 
 
 def sound_levels(record: Record, quantity: str, member: Member) -> list[bool]:
@@ -270,6 +274,7 @@ def norm_unit(record: Record, quantity: str, norm: str) -> str:
     return f"{unit(record, f'{quantity}_difference_norm')} {extra}".strip()
 
 
-def _largest(values: Floats) -> float:
+def largest(values: Floats) -> float:
+    """Return the largest absolute value that is finite; 0 where there is none."""
     finite = np.abs(values[np.isfinite(values)])
     return float(finite.max()) if finite.size else 0.0

@@ -19,6 +19,7 @@ from vibsim.report.data import (
     case_name,
     floor_norm,
     norm_unit,
+    pick,
     promises,
     sound_pairs,
     steps_of,
@@ -46,8 +47,8 @@ def against_step(experiment: Experiment, record: Record, quantity: str, case: in
         figure.add_axes((0.088, low, 0.365, tall)),
         figure.add_axes((0.555, low, 0.425, tall)),
     )
-    _draw_norms(left, experiment, record, quantity, case, schemes)
-    _draw_orders(right, experiment, record, quantity, case, schemes)
+    kinds = _draw_norms(left, experiment, record, quantity, case, schemes)
+    is_settled = _draw_orders(right, experiment, record, quantity, case, schemes)
     handles, texts = left.get_legend_handles_labels()
     figure.legend(
         handles,
@@ -64,19 +65,37 @@ def against_step(experiment: Experiment, record: Record, quantity: str, case: in
     return Picture(
         name=f"order_{quantity}_{case}",
         title=f"How fast does the error shrink? {letter}{suffix}",
-        caption="Left: size of the level differences (filled) and of the true error where known (hollow) against dt; "
-        "parallel to a dashed line means that promised order, and points on the dotted line are round-off. Right: the "
-        "order that three successive levels give, drawn at the coarsest of the three; it should settle inside a "
-        "grey band; beyond the frame is what round-off makes of it. The bar is the stated order with its "
-        "interval, over the levels it rests on.",
+        caption=_caption(kinds, is_settled),
         alt=f"Norm of the level differences of {words.name(quantity)} against the step, and local order against level",
         figure=figure,
     )
 
 
+def _caption(kinds: frozenset[str], is_settled: bool | None) -> str:
+    """Explain what is drawn, and nothing else (see `_draw_norms`, `_draw_orders`)."""
+    if not kinds:
+        return "Nothing is drawn: there is no error to measure here."
+    shown = "size of the level differences (filled)" if "difference" in kinds else ""
+    true = "size of the true error (hollow)" if "true" in kinds else ""
+    parts = [
+        f"Left: {' and '.join(filter(None, [shown, true]))} against dt.",
+        "Parallel to a dashed line means that promised order." if "slope" in kinds else "",
+        "Points on the dotted line are round-off." if "floor" in kinds else "",
+    ]
+    if is_settled is not None:
+        parts.append(
+            "Right: the order that three successive levels give, drawn at the coarsest of the three; it should "
+            "settle inside a grey band; beyond the frame is what round-off makes of it."
+        )
+    if is_settled:
+        parts.append("The bar is the stated order with its interval, over the levels it rests on.")
+    return " ".join(part for part in parts if part)
+
+
 def _draw_norms(
     ax: Axes, experiment: Experiment, record: Record, quantity: str, case: int, schemes: list[str]
-) -> None:
+) -> frozenset[str]:
+    """Draw the norms; return what is seen: ``difference``, ``true``, ``slope``, ``floor``."""
     dt, norm = steps_of(record, case), record.words("norm").index(TYPICAL_NORM)
     measure = norm_unit(record, quantity, TYPICAL_NORM)
     seen: list[Floats] = []
@@ -105,22 +124,37 @@ def _draw_norms(
         floors.append(style.no_zeros(floor_norm(record, quantity, member, TYPICAL_NORM)))
         ax.plot(dt, floors[-1], color=look["color"], linestyle=":", linewidth=1.0)
         seen += [difference, true]
-    for order in dict.fromkeys(order for order, _ in promises(experiment, record, quantity)):
-        _reference(ax, dt, seen, order)
+    if not any(np.isfinite(part).any() for part in seen):
+        for line in list(ax.lines):
+            line.remove()
+        ax.set(xticks=[], yticks=[])
+        style.remark(ax, "every difference and error is zero,\nor not finite: nothing to draw")
+        return frozenset()
+    orders = dict.fromkeys(order for order, _ in promises(experiment, record, quantity))
+    slopes = [_reference(ax, dt, seen, order) for order in orders]
     near = _step_limits(ax, dt, seen, floors)
-    _explain(ax, known=any(np.isfinite(true).any() for true in seen[1::2]), floor=near)
+    kinds = {
+        "difference": any(np.isfinite(part).any() for part in seen[::2]),
+        "true": any(np.isfinite(part).any() for part in seen[1::2]),
+        "slope": any(slopes),
+        "floor": near,
+    }
+    found = frozenset(kind for kind, is_seen in kinds.items() if is_seen)
+    _explain(ax, found)
     ax.set_xlabel(style.label("dt", unit(record, "dt") or "s"))
     ax.set_ylabel(style.label(f"{TYPICAL_NORM} norm, {words.symbol(quantity)}", measure))
     _level_axis(ax, dt, whole(record, "level"))
+    return found
 
 
-def _explain(ax: Axes, *, known: bool, floor: bool) -> None:
+def _explain(ax: Axes, kinds: frozenset[str]) -> None:
     """Add to the legend what filled, hollow and dotted mean, once for all schemes."""
     look: dict[str, Any] = {"color": style.GREY, "marker": "o", "linestyle": "none"}
-    ax.plot([], [], **look, markersize=5, label="level difference")
-    if known:
+    if "difference" in kinds:
+        ax.plot([], [], **look, markersize=5, label="level difference")
+    if "true" in kinds:
         ax.plot([], [], **look, markersize=7, markerfacecolor="none", label="true error")
-    if floor:
+    if "floor" in kinds:
         ax.plot([], [], color=style.GREY, linestyle=":", linewidth=1.0, label="predicted round-off")
 
 
@@ -129,12 +163,13 @@ def _positive(parts: list[Floats]) -> Floats:
     return joined if joined.size else np.array([1.0])
 
 
-def _reference(ax: Axes, dt: Floats, seen: list[Floats], order: float) -> None:
-    """Draw the promised slope a little above the largest value at the coarsest step."""
+def _reference(ax: Axes, dt: Floats, seen: list[Floats], order: float) -> bool:
+    """Draw the promised slope a little above the largest value at the coarsest step, and say whether there is room."""
     start = 2.5 * max((float(part[0]) for part in seen if np.isfinite(part[0])), default=1.0)
     lowest = _positive(seen).min()
     reach = dt[start * (dt / dt[0]) ** order >= lowest]
-    if reach.size > 1 and start > 0:
+    is_drawn = bool(reach.size > 1 and start > 0)
+    if is_drawn:
         ax.plot(
             reach,
             start * (reach / dt[0]) ** order,
@@ -143,12 +178,13 @@ def _reference(ax: Axes, dt: Floats, seen: list[Floats], order: float) -> None:
             linewidth=1.0,
             label=f"slope {order:g} (promised)",
         )
+    return is_drawn
 
 
 def _step_limits(ax: Axes, dt: Floats, seen: list[Floats], floors: list[Floats]) -> bool:
     """Set the ranges; show the floor, and say so, only where the data come within three decades of it."""
     values = _positive(seen)
-    low, high = float(values.min()), float(values.max())
+    low, high = float(values.min()), min(float(values.max()), style.LARGEST)
     floor = float(_positive(floors).max())
     near = floor > 1e-3 * low
     bottom = min(low, floor) if near else low
@@ -175,21 +211,32 @@ def _level_axis(ax: Axes, dt: Floats, levels: list[int]) -> None:
 
 def _draw_orders(
     ax: Axes, experiment: Experiment, record: Record, quantity: str, case: int, schemes: list[str]
-) -> None:
+) -> bool | None:
+    """Draw the local orders; return whether an order is stated, None where there is nothing to draw."""
     from matplotlib.ticker import MaxNLocator
 
+    name = f"{quantity}_observed_order"
+    if name not in record or not np.isfinite(pick(record, name, case=case)).any():
+        few = len(whole(record, "level")) < 3
+        ax.set(xticks=[], yticks=[])
+        style.remark(
+            ax,
+            "no order: it takes three levels"
+            if few
+            else "no order:\nno ratio of differences exists",
+        )
+        return None
     triples, norm = whole(record, "triple"), record.words("norm").index(TYPICAL_NORM)
     promised = promises(experiment, record, quantity)
     for order, tolerance in promised:
         ax.axhspan(order - tolerance, order + tolerance, color="#ececec", zorder=0)
         ax.axhline(order, color="black", linestyle=(0, (4, 3)), linewidth=1.0, zorder=1)
     sound: list[Floats] = []
+    stated = False
     for s, scheme in enumerate(schemes):
         member = Member(s, case, scheme)
         above = sound_pairs(record, quantity, member)
-        local = (
-            at(record, f"{quantity}_observed_order", member, norm=norm) if triples else np.empty(0)
-        )
+        local = at(record, name, member, norm=norm)
         good = [all(above[i : i + 2]) for i in range(local.size)]
         sound.append(local[good] if any(good) else local)
         ax.plot(
@@ -199,7 +246,7 @@ def _draw_orders(
             markersize=5,
             linewidth=1.1,
         )
-        _draw_stated(ax, record, quantity, member, norm)
+        stated |= _draw_stated(ax, record, quantity, member, norm)
     ax.set_ylim(*_order_limits(sound, [order for order, _ in promised]))
     if len(schemes) == 1 and len(triples) <= 8:
         for level, order in zip(triples, local, strict=True):
@@ -218,10 +265,11 @@ def _draw_orders(
     ax.xaxis.set_major_locator(MaxNLocator(nbins=10, integer=True))
     ax.set_xlabel("level (coarsest of three)")
     ax.set_ylabel(f"local order of {words.symbol(quantity)} ({TYPICAL_NORM})")
+    return stated
 
 
-def _draw_stated(ax: Axes, record: Record, quantity: str, member: Member, norm: int) -> None:
-    """Draw the stated order as a bar over the levels of its window, with its interval."""
+def _draw_stated(ax: Axes, record: Record, quantity: str, member: Member, norm: int) -> bool:
+    """Draw the stated order as a bar over the levels of its window, with its interval; say whether there is one."""
     order = float(at(record, f"{quantity}_order", member, norm=norm))
     low, high = (
         float(at(record, f"{quantity}_order_{end}", member, norm=norm)) for end in ("low", "high")
@@ -230,7 +278,7 @@ def _draw_stated(ax: Axes, record: Record, quantity: str, member: Member, norm: 
         float(at(record, f"{quantity}_window_{end}", member)) for end in ("first", "last")
     )
     if not np.isfinite([order, low, high, first, last]).all() or last <= first:
-        return
+        return False
     colour = style.look(member.scheme)["color"]
     ax.fill_between(
         [first, last], [low, low], [high, high], color=colour, alpha=0.18, linewidth=0, zorder=0.5
@@ -244,6 +292,7 @@ def _draw_stated(ax: Axes, record: Record, quantity: str, member: Member, norm: 
         solid_capstyle="butt",
         zorder=1.2,
     )
+    return True
 
 
 def _order_limits(sound: list[Floats], promised: list[float]) -> tuple[float, float]:

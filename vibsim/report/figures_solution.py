@@ -11,13 +11,15 @@ import numpy as np
 
 from vibsim.record import Record
 from vibsim.report import style, words
-from vibsim.report.data import Floats, Member, at, exact_series, times, unit, whole
-from vibsim.report.panels import panels
+from vibsim.report.data import Floats, Member, at, exact_series, largest, times, unit, whole
+from vibsim.report.panels import decades, explosive, panels, stop_at_breakdown
 from vibsim.report.style import Picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+CUT = 3.0
+"""A solution that grows beyond so many times the exact one is cut off there, and the panel says so."""
 TINY = 1e-18
 """Smallest relative size that a logarithmic panel shows: anything below is an accident of rounding."""
 
@@ -59,10 +61,10 @@ def _draw_band(ax: Axes, t: Floats, record: Record, quantity: str, member: Membe
     bound = at(record, f"{quantity}_richardson_error", member)
     if not np.isfinite(bound).all():
         return ""
-    largest = float(np.max(bound))
-    size = f"at most {words.number(largest)} {unit(record, f'{quantity}_finest')}".strip()
+    thickest = float(np.max(bound))
+    size = f"at most {words.number(thickest)} {unit(record, f'{quantity}_finest')}".strip()
     low, high = ax.get_ylim()
-    if largest < 0.005 * (high - low):
+    if thickest < 0.005 * (high - low):
         return f" ({size}: thinner than the line)"
     (x, bottom), (x_top, top) = style.thin(t, centre - bound), style.thin(t, centre + bound)
     ax.fill([*x, *x_top[::-1]], [*bottom, *top[::-1]], color="#56B4E9", alpha=0.35, linewidth=0)
@@ -84,10 +86,21 @@ def _draw_solution(ax: Axes, t: Floats, record: Record, quantity: str, member: M
     drawn = [(y, text, look) for y, text, look in rows if np.isfinite(y).any()]
     for y, text, look in drawn:
         ax.plot(*style.thin(t, y), label=text, **look)
-    ax.set_xlim(float(t[0]), float(t[-1]))
+    stop_at_breakdown(ax, t, [at(record, f"{quantity}_finest", member)])
     # a run that blew up would hide the others
     ranged = [y for y, _, _ in drawn if np.isfinite(y).all()] or [y for y, _, _ in drawn]
-    ax.set_ylim(*style.limits(*ranged))
+    size = largest(exact) if np.isfinite(exact).all() else 0.0
+    if 0.0 < size < max(largest(y) for y, _, _ in drawn) / CUT:
+        ax.set_ylim(-CUT * size, CUT * size)
+        note = f"cut off at {CUT:g} times the exact solution"
+        ax.text(0.99, 0.11, note, transform=ax.transAxes, ha="right", fontsize=8.5)
+    elif explosive(ranged):
+        for line in ax.lines:
+            line.set_ydata(style.no_zeros(np.asarray(line.get_ydata(), dtype=np.float64)))
+        style.log_axis(ax, "y", *decades(ranged))
+        ax.text(0.99, 0.11, "size, without the sign", transform=ax.transAxes, ha="right")
+    else:
+        ax.set_ylim(*style.limits(*ranged))
     style.beside(ax)
     return bool(np.isfinite(exact).any())
 
@@ -154,7 +167,8 @@ def _log_limits(ax: Axes, drawn: list[Floats]) -> None:
     parts = [values[np.isfinite(values) & (values > 0)] for values in drawn]
     parts = [part for part in parts if part.size]
     if not parts:
+        style.remark(ax, "no error to draw: it is zero, or not known")
         return
-    high = max(float(part.max()) for part in parts)
+    high = min(max(float(part.max()) for part in parts), style.LARGEST)
     low = min(float(np.quantile(part, 0.03)) for part in parts)
     style.log_axis(ax, "y", max(low / 3, TINY * high), 3 * high)

@@ -52,7 +52,7 @@ def write(
     directory
         Folder of the experiment's results.
     formats
-        Of ``svg``, ``png``, ``pdf``; the page itself always holds its figures as SVG.
+        Of ``svg``, ``png``, ``pdf``; SVG is always written, the others are written beside it.
     provenance
         What the results came from: digests, versions, the part of the experiment that the job used.
 
@@ -132,7 +132,7 @@ def _figure_files(
     drawn: Iterable[tuple[Picture, str]], formats: Sequence[str]
 ) -> Iterable[tuple[str, bytes]]:
     for picture, text in drawn:
-        for form in dict.fromkeys(formats):
+        for form in dict.fromkeys(["svg", *formats]):
             content = text.encode() if form == "svg" else style.binary(picture, form)
             yield f"{picture.name}.{form}", content
 

@@ -13,6 +13,8 @@ from vibsim.report.data import Floats
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+WILD = 1e6
+"""Curves whose largest value is so many times a usual one are drawn on a logarithmic scale."""
 APART = 8.0
 """Spreads that differ by more than this are drawn on a logarithmic scale."""
 
@@ -56,19 +58,53 @@ def draw_curves(ax: Axes, t: Floats, curves: list[Curve], text: str, measure: st
     """
     sound = [curve for curve in curves if curve.sound] or curves
     shown = [curve.values for curve in sound if curve.is_whole] or [curve.values for curve in sound]
-    exponent = style.scale(*shown)
+    wild = explosive(shown)
+    exponent = 0 if wild else style.scale(*shown)
     for i, curve in enumerate(curves):
-        x, y = style.thin(t, curve.values / 10.0**exponent)
+        values = style.no_zeros(curve.values) if wild else curve.values / 10.0**exponent
+        x, y = style.thin(t, values)
         note = "" if curve.sound else "\n(lost in round-off)"
         note += "" if curve.is_whole else "\n(broke down)"
         look = _look(i, len(curves), x.size)
         if not curve.sound and any(c.sound for c in curves):
             look = {"color": "#a0a0a0", "linewidth": 0.6, "zorder": 1.5}
         ax.plot(x, y, label=curve.label + note, **look)
-    ax.set_xlim(float(t[0]), float(t[-1]))
-    ax.set_ylim(*style.limits(*(values / 10.0**exponent for values in shown)))
-    ax.set_ylabel(style.label(text, measure, exponent))
+    stop_at_breakdown(ax, t, [curve.values for curve in curves])
+    if wild:
+        style.log_axis(ax, "y", *decades(shown))
+    else:
+        ax.set_ylim(*style.limits(*(values / 10.0**exponent for values in shown)))
+    ax.set_ylabel(style.label(f"|{text}|" if wild else text, measure, exponent))
     style.beside(ax)
+
+
+def stop_at_breakdown(ax: Axes, t: Floats, series: list[Floats]) -> None:
+    """Let the time end with the last finite value of all series, and say so where that is not the end."""
+    finite = np.flatnonzero(np.any([np.isfinite(values) for values in series], axis=0))
+    last = max(int(finite[-1]), 1) if finite.size else t.size - 1
+    ax.set_xlim(float(t[0]), float(t[last]))
+    if last < t.size - 1:
+        note = f"ends with the breakdown, of {t[-1]:g} in all"
+        ax.text(0.99, 0.03, note, transform=ax.transAxes, ha="right", fontsize=8.5)
+
+
+def explosive(series: list[Floats]) -> bool:
+    """Say whether values grow beyond all bounds, so that on a linear scale only the last of them would be seen."""
+    sizes = [part for values in series if (part := _sizes(values)).size]
+    return bool(sizes) and max(s.max() for s in sizes) > WILD * min(np.median(s) for s in sizes)
+
+
+def decades(series: list[Floats]) -> tuple[float, float]:
+    """Return limits of a logarithmic axis over values that grow, from what they begin with."""
+    sizes = [part for values in series if (part := _sizes(values)).size]
+    high = min(max(float(s.max()) for s in sizes), style.LARGEST)
+    low = min(float(s[:2].max()) for s in sizes)
+    return max(min(low, high) / 2, style.TINIEST), 2 * high
+
+
+def _sizes(values: Floats) -> Floats:
+    kept: Floats = np.abs(values[np.isfinite(values) & (values != 0.0)])
+    return kept
 
 
 def _look(i: int, count: int, points: int) -> dict[str, Any]:
@@ -109,8 +145,8 @@ def draw_spread(ax: Axes, t: Floats, curves: list[Curve], measure: str) -> None:
         look = _look(i, len(curves), x.size) | {"linewidth": 1.3, "alpha": 1.0, "markersize": 4.0}
         ax.plot(x, y, **look)
     if logarithmic:
-        highest = max(float(np.max(np.abs(gap))) for gap in shown)
-        style.log_axis(ax, "y", 0.02 * min(sizes), 2 * highest)
+        highest = min(max(float(np.max(np.abs(gap))) for gap in shown), style.LARGEST)
+        style.log_axis(ax, "y", max(0.02 * min(sizes), style.TINIEST), 2 * highest)
     else:
         ax.axhline(0.0, color=style.GREY, linewidth=0.7, zorder=1)
         ax.set_ylim(*style.limits(*(gap / 10.0**exponent for gap in shown)))

@@ -41,6 +41,8 @@ WIDTH = 9.0
 POINTS = 400
 """Horizontal resolution to which a long series is thinned."""
 FAMILY = "'DejaVu Sans', Verdana, Arial, Helvetica, sans-serif"
+LARGEST, TINIEST = 1e300, 1e-300
+"""Ends of logarithmic axes: beyond them a margin would overflow."""
 FORMATS = ("svg", "png", "pdf")
 
 _RC: dict[Any, Any] = {
@@ -227,6 +229,11 @@ def beside(ax: Axes, **options: Any) -> None:
         ax.text(0.5, 0.5, "no finite value", transform=ax.transAxes, ha="center", color=GREY)
         return
     ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.03), borderaxespad=0.0, **options)
+
+
+def remark(ax: Axes, text: str) -> None:
+    """Say within a panel why it is empty."""
+    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color=GREY)
 
 
 def svg(picture: Picture) -> str:

@@ -1,0 +1,200 @@
+"""What a page must not do: claim an order that is not known, hide a cell, a column or a curve, name what is absent."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+import samples
+
+from vibsim import report
+from vibsim.report import (
+    cards,
+    contents,
+    data,
+    figures_grid,
+    figures_order,
+    figures_solution,
+    figures_time,
+    style,
+)
+from vibsim.report.data import Member
+
+STIFF = {
+    "model": {"kind": "linear_pendulum"},
+    "time": {"end": 1000.0},
+    "levels": [9, 10, 11, 12],
+    "sweep": {"model.g": [1.0, 1000.0, 1e6]},
+    "checks": [{"converges": "theta", "order": "scheme"}],
+}
+GRID = {"initial.theta": [0.5, 1.0, 2.0], "model.g": [1.0, 4.0, 400.0]}
+REST = {"initial": {"theta": 0.0, "omega": 0.0}}
+
+
+def divisor(sentence):
+    return float(sentence.rpartition(" ")[2].rstrip("."))
+
+
+def factors(exp):
+    record = samples.record(exp)
+    checks = samples.summary(exp, record)["checks"]
+    return [(check, cards.card(exp, record, check)["factor"]) for check in checks]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        STIFF,
+        {
+            "initial": {"theta": 0.0, "omega": 2.0},
+            "levels": [7, 8, 9, 10, 11],
+            "checks": [{"converges": "theta"}, {"converges": "omega"}],
+        },
+        {"levels": [6, 7]},
+        REST,
+    ],
+)
+def test_no_factor_is_told_where_no_order_is_settled(changes):
+    for check, factor in factors(samples.experiment(**changes)):
+        assert check["results"][0]["reason"] not in cards.SETTLED
+        assert factor == ""
+
+
+def test_the_factor_is_that_of_the_result_that_decides():
+    ((check, factor),) = factors(samples.several())
+    assert [r["reason"] for r in check["results"]] == ["order_low", "asymptotic"]
+    assert abs(divisor(factor) - 2.0) < 0.1
+    ((check, factor),) = factors(samples.experiment(checks=[{"converges": "theta", "order": 1}]))
+    assert check["reason"] == "order_high"
+    assert abs(divisor(factor) - 4.0) < 0.1
+
+
+def test_svg_is_written_whatever_else_is_asked_for(tmp_path):
+    exp = samples.plain()
+    record = samples.record(exp)
+    summary = samples.summary(exp, record)
+    report.write(samples.plan(exp), record, summary, tmp_path, formats=("png",))
+    names = {path.name for path in (tmp_path / "figures").iterdir()}
+    stems = {name.rsplit(".", 1)[0] for name in names} - {"thumbnail"}
+    assert names == {f"{s}.{form}" for s in stems for form in ("svg", "png")} | {"thumbnail.svg"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "notes", "absent"),
+    [
+        ({"levels": [6, 7]}, ["it takes three levels"], ["three successive", "bar", "dotted"]),
+        (REST, ["nothing to draw", "no ratio of differences"], ["dotted", "hollow", "bar", "band"]),
+        ({}, [], ["dotted", "Nothing"]),
+    ],
+)
+def test_an_empty_panel_says_why_and_a_caption_names_only_what_is_drawn(changes, notes, absent):
+    exp = samples.experiment(**changes)
+    with style.applied():
+        picture = figures_order.against_step(exp, samples.record(exp), "theta", 0)
+        text = style.svg(picture)
+    assert all(note in text for note in notes)
+    assert not [word for word in absent if word in picture.caption]
+
+
+def test_a_caption_names_the_dotted_line_where_it_is_drawn():
+    scheme = {"kind": "central", "arithmetic": "three_term"}
+    exp = samples.experiment(schemes=[scheme], levels=[10, 12, 14, 16], samples="common")
+    with style.applied():
+        picture = figures_order.against_step(exp, samples.record(exp), "theta", 0)
+        text = style.svg(picture)
+    assert ("dotted" in picture.caption) == ("predicted round-off" in text)
+    assert "dotted" in picture.caption
+
+
+def test_missing_cells_of_a_map_are_hatched_and_cells_have_borders():
+    exp = samples.experiment(levels=[6, 7, 8, 9], sweep=GRID)
+    with style.applied():
+        picture = figures_grid.grid(samples.record(exp), "theta")
+        text = style.svg(picture)
+        full = figures_grid.grid(
+            samples.record(samples.experiment(sweep={**GRID, "model.g": [1.0, 4.0]})), "theta"
+        )
+    cells = picture.figure.axes[0].collections[0]
+    assert np.ma.getmaskarray(cells.get_array()).sum() == 3
+    assert len(cells.get_edgecolor())
+    assert picture.figure.axes[0].patch.get_hatch()
+    assert "no stated order" in text
+    assert "Hatched" in picture.caption
+    assert "Hatched" not in full.caption
+    assert not full.figure.legends
+
+
+def test_a_sweep_names_a_member_once_per_block_of_a_page_and_in_every_row_of_a_file(tmp_path):
+    exp = samples.experiment(levels=[6, 7, 8, 9], sweep=GRID)
+    record = samples.record(exp)
+    report.write(samples.plan(exp), record, samples.summary(exp, record), tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    start = page.index('<section id="numbers"')
+    table = page[start : page.index("</table>", start)]
+    assert re.findall(r'rowgroup" colspan="9">([^<]*)<', table) == [
+        f"central, {data.case_name(record, m.case)}" for m in data.members(record, "theta")
+    ]
+    assert table.count('<th scope="col"') == 9
+    rows = re.findall(r"<tr><td.*?</tr>", table, flags=re.DOTALL)
+    assert [row.count("<td") for row in rows] == [9] * 8
+    file = (tmp_path / "tables/orders_theta_l2.csv").read_text().splitlines()
+    assert file[0].startswith("scheme,member,level")
+    assert all(line.startswith('central,"initial.theta = ') for line in file[1:])
+
+
+@pytest.mark.parametrize("values", [[1.0, 4.0, 400.0, 500.0, 600.0], [1.0, 1000.0], [1000.0, 1.0]])
+def test_the_typical_member_passes_where_one_does(values):
+    exp = samples.experiment(sweep={"model.g": values}, levels=[6, 7, 8, 9])
+    record = samples.record(exp)
+    roles = {m.role: data.flags(record, "theta_status")[0, m.case] for m in
+             data.members(record, "theta")}  # fmt: skip
+    assert roles == {"typical": "PASS", "worst": "FAIL"}
+
+
+def test_a_run_that_grows_is_cut_off_or_drawn_by_its_size():
+    exp = samples.experiment(
+        model={"kind": "linear_pendulum"}, time={"end": 100.0}, levels=[4, 5, 6, 7, 8],
+        schemes=["central"],
+    )  # fmt: skip
+    record = samples.record(exp)
+    wild = samples.experiment(**(STIFF | {"levels": [4, 5], "time": {"end": 50.0}, "sweep": GRID}))
+    grown = samples.record(wild)
+    for rec, case in [(record, 0), (grown, 2), (grown, 8)]:
+        member = Member(0, case, "central", role="worst")
+        with style.applied():
+            top = figures_solution.solution(rec, "theta", member).figure.axes[0]
+            curves = figures_time.overlay(rec, "theta", member).figure.axes[0]
+        size = np.abs(rec["theta_exact"][case]).max()
+        assert max(np.abs(top.get_ylim())) <= 3.0 * size * (1 + 1e-12)
+        assert curves.get_yscale() == "log" or max(np.abs(curves.get_ylim())) < 1e6
+    assert any("cut off" in text.get_text() for text in top.texts)
+    assert curves.get_yscale() == "log"
+
+
+def test_time_ends_with_the_breakdown_and_the_panel_says_so():
+    exp = samples.experiment(**STIFF)
+    record = samples.record(exp)
+    t, member = data.times(record, 2), Member(0, 2, "central", role="worst")
+    with style.applied():
+        pages = [draw(record, "theta", member) for draw in
+                 (figures_solution.solution, figures_time.overlay)]  # fmt: skip
+    for page in pages:
+        top = page.figure.axes[0]
+        assert t[0] < top.get_xlim()[1] < t[-1] / 2
+        assert any("ends with the breakdown" in text.get_text() for text in top.texts)
+
+
+def test_without_a_member_that_passes_the_typical_one_is_the_least_bad():
+    record = samples.record(samples.experiment(**STIFF))
+    roles = {m.role: data.flags(record, "theta_status")[0, m.case] for m in
+             data.members(record, "theta")}  # fmt: skip
+    assert roles == {"typical": "INCONCLUSIVE", "worst": "FAIL"}
+
+
+def test_an_amplitude_is_never_negative():
+    exp = samples.experiment()
+    record = samples.record(exp)
+    record["amplitude"][...] = -8.7e88
+    table = contents.scalars(record, [Member(0, 0, "central")])
+    assert [row[-1] for row in table.rows] == [8.7e88] * 4
