@@ -5,8 +5,9 @@ The public names are imported on first use: a quick command must not pay for wha
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from vibsim.lazy import loader
 
 if TYPE_CHECKING:
     from vibsim.analysis import Verdict, analyse, verdicts
@@ -38,10 +39,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module 'vibsim' has no attribute {name!r}")
-    return getattr(import_module(_HOME[name]), name)
+__getattr__ = loader(__name__, _HOME)
 
 
 def __dir__() -> list[str]:

@@ -6,7 +6,7 @@ known, and what was gathered over every step. Shapes are (scheme, case, t), (cas
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vibsim import plan
 from vibsim.engine import Trajectories, integrate
-from vibsim.models import MODELS, Model
+from vibsim.models import MODELS, Model, State
 from vibsim.record import Attribute, Record, Variable, attributes
 from vibsim.schemes import SCHEMES
 
@@ -208,72 +208,98 @@ def _gathered(
     model: Model, runs: list[Trajectories], group: Members, steps: int
 ) -> dict[str, Variable]:
     """Return what was gathered over every step, shape (scheme, case)."""
-    table: dict[str, tuple[Any, dict[str, Any]]] = {}
-
-    def add(name: str, values: list[Any], long_name: str, units: str, **more: Any) -> None:
-        table[name] = (np.stack(values), attributes(long_name, units, **more))
-
-    for state, field in zip(model.states, ("position_range", "velocity_range"), strict=True):
-        for i, (name, word) in enumerate((("min", "least"), ("max", "largest"))):
-            add(
-                f"{state.name}_{name}",
-                [getattr(run, field)[:, i] for run in runs],
-                f"{word} {state.long_name} over every step",
-                state.unit,
-            )
-    position, energy = model.states[0], model.energy_unit
-    add(
-        "energy_deviation_max_abs",
-        [run.deviation for run in runs],
-        "largest absolute energy deviation over every step",
-        energy,
-    )
-    add(
-        "energy_deviation_max_abs_interior",
-        [run.deviation_interior for run in runs],
-        "largest absolute energy deviation over every step but the last point",
-        energy,
-    )
-    add(
-        "amplitude",
-        [0.5 * np.abs(run.last_peak - run.last_trough) for run in runs],
-        "half the height between the last peak and the last trough, interpolated",
-        position.unit,
-    )
-    for name, word in (("first_peak", "first"), ("last_peak", "last")):
-        add(
-            name,
-            [getattr(run, name) for run in runs],
-            f"height of the {word} peak, interpolated",
-            position.unit,
-        )
-    add(
-        "period",
-        [run.period for run in runs],
-        "mean period over every step, interpolated (time of a turn for a member that goes over the top)",
-        "s",
-    )
-    add(
-        "period_grid",
-        [run.period_grid for run in runs],
-        "mean period over every step, between peaks at grid points",
-        "s",
-    )
-    add("period_count", [run.period_count for run in runs], "number of periods in the mean", "1")
-    last = [run.last_step for run in runs]
-    add(
-        "status",
-        [(step < steps).astype(np.int8) for step in last],
-        "what became of the member",
-        "1",
-        flag_values=np.arange(len(STATUS), dtype=np.int8),
-        flag_meanings=" ".join(STATUS),
-    )
-    add("last_step", last, "last step with finite values", "1")
-    failed = [np.where(step < steps, (step + 1) * group.end / steps, np.nan) for step in last]
-    add("failure_time", failed, "time of the first value that is not finite or too large", "s")
+    rows = {**_extremes(model), **_peaks(model), **_outcomes(group.end, steps)}
     return {
-        name: Variable(("scheme", "case"), values, attrs) for name, (values, attrs) in table.items()
+        name: Variable(("scheme", "case"), np.stack([take(run) for run in runs]), attrs)
+        for name, (take, attrs) in rows.items()
+    }
+
+
+Rows = dict[str, tuple[Callable[[Trajectories], Any], dict[str, Any]]]
+"""Name of a variable to how it is taken from a run, shape (case,), and its attributes."""
+
+
+def _extremes(model: Model) -> Rows:
+    position, velocity, energy = *model.states, model.energy_unit
+    words = "largest absolute energy deviation over every step"
+    return {
+        f"{position.name}_min": (
+            lambda run: run.position_range[:, 0],
+            _over_steps("least", position),
+        ),
+        f"{position.name}_max": (
+            lambda run: run.position_range[:, 1],
+            _over_steps("largest", position),
+        ),
+        f"{velocity.name}_min": (
+            lambda run: run.velocity_range[:, 0],
+            _over_steps("least", velocity),
+        ),
+        f"{velocity.name}_max": (
+            lambda run: run.velocity_range[:, 1],
+            _over_steps("largest", velocity),
+        ),
+        "energy_deviation_max_abs": (lambda run: run.deviation, attributes(words, energy)),
+        "energy_deviation_max_abs_interior": (
+            lambda run: run.deviation_interior,
+            attributes(f"{words} but the last point", energy),
+        ),
+    }
+
+
+def _over_steps(word: str, state: State) -> dict[str, Any]:
+    return attributes(f"{word} {state.long_name} over every step", state.unit)
+
+
+def _peaks(model: Model) -> Rows:
+    unit = model.states[0].unit
+    height = "half the height between the last peak and the last trough, interpolated"
+    mean = "mean period over every step"
+    turn = "time of a turn for a member that goes over the top"
+    return {
+        "amplitude": (
+            lambda run: 0.5 * np.abs(run.last_peak - run.last_trough),
+            attributes(height, unit),
+        ),
+        "first_peak": (
+            lambda run: run.first_peak,
+            attributes("height of the first peak, interpolated", unit),
+        ),
+        "last_peak": (
+            lambda run: run.last_peak,
+            attributes("height of the last peak, interpolated", unit),
+        ),
+        "period": (lambda run: run.period, attributes(f"{mean}, interpolated ({turn})", "s")),
+        "period_grid": (
+            lambda run: run.period_grid,
+            attributes(f"{mean}, between peaks at grid points", "s"),
+        ),
+        "period_count": (
+            lambda run: run.period_count,
+            attributes("number of periods in the mean", "1"),
+        ),
+    }
+
+
+def _outcomes(end: Floats, steps: int) -> Rows:
+    flags = {
+        "flag_values": np.arange(len(STATUS), dtype=np.int8),
+        "flag_meanings": " ".join(STATUS),
+    }
+
+    def failure_time(run: Trajectories) -> Floats:
+        return np.where(run.last_step < steps, (run.last_step + 1) * end / steps, np.nan)
+
+    return {
+        "status": (
+            lambda run: (run.last_step < steps).astype(np.int8),
+            {**attributes("what became of the member", "1"), **flags},
+        ),
+        "last_step": (lambda run: run.last_step, attributes("last step with finite values", "1")),
+        "failure_time": (
+            failure_time,
+            attributes("time of the first value that is not finite or too large", "s"),
+        ),
     }
 
 

@@ -108,12 +108,13 @@ def _compile(path: Path, name: str) -> Kernel:
     specification.loader.exec_module(module)
     array, table, cube = float64[::1], float64[:, ::1], float64[:, :, ::1]
     whole = (int64, int64, int64, int64)
-    kernel: Any = module.kernel
+    dispatcher: Any = module.kernel
     try:
-        kernel.compile(void(table, table, array, *whole, float64, cube, table, int64[:, ::1]))
+        dispatcher.compile(void(table, table, array, *whole, float64, cube, table, int64[:, ::1]))
     except NumbaError as error:
         raise SimulationError(f"a kernel cannot be compiled ({path}): {error}") from error
-    return kernel  # type: ignore[no-any-return]
+    kernel: Kernel = dispatcher
+    return kernel
 
 
 @contextmanager

@@ -62,7 +62,8 @@ def kernel(model: Model, stepper: Stepper, lane: str) -> Kernel:
     if lane == "plain":
         namespace: dict[str, Any] = {}
         exec(compile(_PLAIN + body, f"<{model.kind} kernel>", "exec"), namespace)
-        return namespace["kernel"]  # type: ignore[no-any-return]
+        plain: Kernel = namespace["kernel"]
+        return plain
     return load(_COMPILED + body)
 
 

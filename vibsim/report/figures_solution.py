@@ -12,7 +12,7 @@ import numpy as np
 from vibsim.record import Record
 from vibsim.report import style, words
 from vibsim.report.data import Floats, Member, at, exact_series, largest, times, unit, whole
-from vibsim.report.panels import decades, explosive, panels, stop_at_breakdown
+from vibsim.report.panels import decades, explosive, figure_of, panels, stop_at_breakdown
 from vibsim.report.style import Picture
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def solution(record: Record, quantity: str, member: Member) -> Picture:
         title=f"Solution with its error: {letter}, {member.title}",
         caption=caption,
         alt=f"{words.name(quantity)} against time for {member.title}, and its estimated error on a logarithmic scale",
-        figure=axes[0].get_figure(),  # type: ignore[arg-type]
+        figure=figure_of(axes[0]),
     )
 
 

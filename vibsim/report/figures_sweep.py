@@ -21,7 +21,7 @@ from vibsim.report.data import (
     unit,
     whole,
 )
-from vibsim.report.panels import panels
+from vibsim.report.panels import figure_of, panels
 from vibsim.report.style import Picture
 from vibsim.vocabulary import SEVERITY, TYPICAL_NORM
 
@@ -125,7 +125,7 @@ def period(record: Record) -> Picture | None:
         title="Period over the swept parameter",
         caption=caption if known else "The measured period on the finest level.",
         alt="Period and its relative error against the swept parameter",
-        figure=axes[0].get_figure(),  # type: ignore[arg-type]
+        figure=figure_of(axes[0]),
     )
 
 
@@ -228,7 +228,7 @@ def orders(experiment: Experiment, record: Record, quantity: str) -> Picture:
         caption="Top: the order that each member's levels state; a grey band is a promised order with the tolerance of "
         "its check. Bottom: what can be said of it. Members that fail or stay open are worth a look one by one.",
         alt=f"Stated order of {words.name(quantity)} and its verdict against the swept parameter",
-        figure=axes[0].get_figure(),  # type: ignore[arg-type]
+        figure=figure_of(axes[0]),
     )
 
 

@@ -23,7 +23,7 @@ from vibsim.report.data import (
     unit,
     whole,
 )
-from vibsim.report.panels import Curve, comparable, draw_curves, draw_spread, panels
+from vibsim.report.panels import Curve, comparable, draw_curves, draw_spread, figure_of, panels
 from vibsim.report.style import Picture
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
         caption=" ".join(part for part in parts if part),
         alt=f"Rescaled level differences of {words.name(quantity)} against time for {member.title}"
         + (", with the ratio of successive differences" if ratios else ""),
-        figure=axes[0].get_figure(),  # type: ignore[arg-type]
+        figure=figure_of(axes[0]),
     )
 
 
@@ -104,7 +104,7 @@ def energy(record: Record, member: Member) -> Picture:
         title=f"Convergence to conservation: {member.title}",
         caption=caption,
         alt=f"Rescaled energy deviation against time on levels {words.levels(levels)} for {member.title}",
-        figure=axes[0].get_figure(),  # type: ignore[arg-type]
+        figure=figure_of(axes[0]),
     )
 
 

@@ -12,6 +12,7 @@ from vibsim.report.data import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 WILD = 1e6
 """Curves whose largest value is so many times a usual one are drawn on a logarithmic scale."""
@@ -32,6 +33,20 @@ class Curve:
     def is_whole(self) -> bool:
         """Whether the run behind it lasted to the end."""
         return bool(np.isfinite(self.values).all())
+
+
+def figure_of(axes: Axes) -> Figure:
+    """Return the figure that holds `axes`.
+
+    Raises
+    ------
+    ValueError
+        Where they were taken out of it.
+    """
+    figure = axes.get_figure(root=True)
+    if figure is None:
+        raise ValueError("these axes belong to no figure")
+    return figure
 
 
 def panels(heights: list[float]) -> list[Axes]:

@@ -5,8 +5,9 @@ The public names are imported on first use: a plan that is kept on disk needs ne
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from vibsim.lazy import loader
 
 if TYPE_CHECKING:
     from vibsim.spec.checks import (
@@ -79,10 +80,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module 'vibsim.spec' has no attribute {name!r}")
-    return getattr(import_module(_HOME[name]), name)
+__getattr__ = loader(__name__, _HOME)
 
 
 def __dir__() -> list[str]:

@@ -7,8 +7,9 @@ a summary imports not even numpy.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from vibsim.lazy import loader
 
 if TYPE_CHECKING:
     from vibsim.store.atomic import replacing, write_bytes, write_text
@@ -39,7 +40,4 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module 'vibsim.store' has no attribute {name!r}")
-    return getattr(import_module(f"vibsim.store.{_HOME[name]}"), name)
+__getattr__ = loader(__name__, {name: f"vibsim.store.{home}" for name, home in _HOME.items()})
