@@ -6,7 +6,7 @@ import os
 import sys
 from functools import cache
 
-NUMERICAL = ("numpy", "numba")
+NUMERICAL = ("numpy", "numba", "scipy")
 DRAWING = ("matplotlib", "jinja2")
 
 
