@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vibsim.elementary import ELEMENTARY
 from vibsim.expression import (
     MAX_DEPTH,
     Binary,
@@ -25,14 +26,7 @@ from vibsim.expression import (
 )
 from vibsim.models import MODELS, Model
 
-FUNCTIONS = {
-    "sin": math.sin,
-    "cos": math.cos,
-    "sqrt": math.sqrt,
-    "exp": math.exp,
-    "power": math.pow,
-    "where": lambda condition, yes, no: yes if condition else no,
-}
+FUNCTIONS = {name: function.full for name, function in ELEMENTARY.items()}
 
 
 def run(text: str, **values: float) -> float:

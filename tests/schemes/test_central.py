@@ -130,27 +130,34 @@ def test_the_scheme_runs_backwards_to_where_it_came_from():
 def test_what_the_end_point_does_to_the_energy(theta, end, with_end):
     """The extrapolated end velocity spoils the maximum of the energy deviation; the kick does not."""
     coarse, fine = (run("pendulum", level, theta=theta, end=end) for level in (7, 8))
-    assert coarse.deviation[0] / fine.deviation[0] == pytest.approx(with_end, abs=0.005)
-    assert coarse.deviation_interior[0] / fine.deviation_interior[0] == pytest.approx(
-        4.0, abs=0.005
+    assert coarse.gathered.deviation[0] / fine.gathered.deviation[0] == pytest.approx(
+        with_end, abs=0.005
     )
+    assert coarse.gathered.deviation_interior[0] / fine.gathered.deviation_interior[
+        0
+    ] == pytest.approx(4.0, abs=0.005)
     coarse, fine = (
         run("pendulum", level, theta=theta, end=end, end_velocity="kick") for level in (7, 8)
     )
-    assert coarse.deviation[0] / fine.deviation[0] == pytest.approx(4.0, abs=0.005)
+    assert coarse.gathered.deviation[0] / fine.gathered.deviation[0] == pytest.approx(
+        4.0, abs=0.005
+    )
 
 
 def test_backward_end_velocity_makes_the_largest_energy_deviation_first_order():
     """Errata, vibration text section 2.1."""
     sizes = [
-        run("pendulum", level, end_velocity="backward").deviation[0] for level in (8, 9, 10, 11)
+        run("pendulum", level, end_velocity="backward").gathered.deviation[0]
+        for level in (8, 9, 10, 11)
     ]
     np.testing.assert_allclose(sizes, [3.17e-3, 1.50e-3, 7.20e-4, 3.52e-4], rtol=4e-3)
 
 
 def test_period_converges_to_the_elliptic_integral():
     exact = 6.699975664370453  # 4 K(sin 1/2)
-    errors = [run("pendulum", level, end=50.0).period[0] - exact for level in (9, 10, 11, 12)]
+    errors = [
+        run("pendulum", level, end=50.0).gathered.period[0] - exact for level in (9, 10, 11, 12)
+    ]
     np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 4.0, rtol=0.02)
 
 
@@ -161,7 +168,7 @@ def test_time_of_a_turn_converges():
         )
     )
     errors = [
-        run("pendulum", level, theta=2.0, omega=-3.0, end=50.0).period[0] - exact
+        run("pendulum", level, theta=2.0, omega=-3.0, end=50.0).gathered.period[0] - exact
         for level in (10, 11, 12)
     ]
     np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 4.0, rtol=0.02)
@@ -181,12 +188,14 @@ def test_the_end_velocity_does_not_move_a_peak(rule):
     """The last peak lies in the last step: a one-sided velocity there would place it with an error of dt."""
     end = 2 * math.pi * 1.002
     errors = [
-        run("linear_pendulum", level, end=end, end_velocity=rule).period[0] - 2 * math.pi
+        run("linear_pendulum", level, end=end, end_velocity=rule).gathered.period[0] - 2 * math.pi
         for level in (7, 8, 9)
     ]
     np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 4.0, rtol=0.05)
 
 
 def test_there_is_no_amplitude_before_there_is_a_trough():
-    assert math.isnan(run("pendulum", 8, end=1.0).last_trough[0])
-    assert run("pendulum", 10, theta=-1.0, end=20.0).last_trough[0] == pytest.approx(-1.0, abs=1e-3)
+    assert math.isnan(run("pendulum", 8, end=1.0).gathered.last_trough[0])
+    assert run("pendulum", 10, theta=-1.0, end=20.0).gathered.last_trough[0] == pytest.approx(
+        -1.0, abs=1e-3
+    )

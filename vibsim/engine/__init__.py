@@ -1,5 +1,6 @@
 """The engine: from (model, scheme, numbers) to trajectories."""
 
-from vibsim.engine.trajectories import LANES, Trajectories, integrate, lane_for
+from vibsim.engine.kernel import LANES
+from vibsim.engine.trajectories import Gathered, Trajectories, energies, integrate, lane_for
 
-__all__ = ["LANES", "Trajectories", "integrate", "lane_for"]
+__all__ = ["LANES", "Gathered", "Trajectories", "energies", "integrate", "lane_for"]

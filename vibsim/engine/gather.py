@@ -1,6 +1,6 @@
-"""What is gathered from every step without storing the steps: extrema, peaks, turns, the largest energy deviation.
+"""What is gathered from every step without storing the steps: extrema, norms, peaks, turns, energy deviation.
 
-The functions work on one member at a time, in ``+ - * /`` and comparisons only (see `vibsim.engine.elementary`).
+The functions work on one member at a time, in ``+ - * /`` and comparisons only (see `vibsim.elementary`).
 What changes at every step is a tuple of floats, which stays in registers; what changes at a peak or a turn stays in
 the member's row of `stats` and `counts`.
 
@@ -11,10 +11,19 @@ scheme's own is dt^2. The time at grid points is the larger neighbour's, as in t
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
-Extrema = tuple[float, float, float, float, float]
-"""Least and largest position, least and largest velocity, largest absolute energy deviation."""
+from vibsim.engine.bound import called
+
+OVERFLOW = 1e150
+"""A member that grows beyond has failed: its energy could no longer be stored."""
+
+Extrema = tuple[float, float, float, float, float, float, float, float, float]
+"""Least and largest position, least and largest velocity, largest absolute energy deviation; sums of absolute values
+and of squares of position and velocity."""
+N_EXTREMA = 9
+LARGEST_DEVIATION = 4
 
 # Columns of `stats`.
 POSITION_MIN = 0
@@ -22,17 +31,21 @@ POSITION_MAX = 1
 VELOCITY_MIN = 2
 VELOCITY_MAX = 3
 DEVIATION = 4
-DEVIATION_INTERIOR = 5
-FIRST_PEAK_TIME = 6
-LAST_PEAK_TIME = 7
-FIRST_PEAK_TIME_GRID = 8
-LAST_PEAK_TIME_GRID = 9
-FIRST_PEAK = 10
-LAST_PEAK = 11
-LAST_TROUGH = 12
-FIRST_TURN_TIME = 13
-LAST_TURN_TIME = 14
-N_STATS = 15
+POSITION_L1 = 5
+POSITION_L2 = 6
+VELOCITY_L1 = 7
+VELOCITY_L2 = 8
+DEVIATION_INTERIOR = 9
+FIRST_PEAK_TIME = 10
+LAST_PEAK_TIME = 11
+FIRST_PEAK_TIME_GRID = 12
+LAST_PEAK_TIME_GRID = 13
+FIRST_PEAK = 14
+LAST_PEAK = 15
+LAST_TROUGH = 16
+FIRST_TURN_TIME = 17
+LAST_TURN_TIME = 18
+N_STATS = 19
 
 # Columns of `counts`.
 PEAKS = 0
@@ -45,9 +58,25 @@ _ROUND = (
 )
 
 
+def end_velocity(
+    end_rule: int, own: float, v_before: float, v_two_before: float, backward: float
+) -> float:
+    """Return the velocity at the last point by one of `vibsim.schemes.base.END_RULES`."""
+    if end_rule == 1:
+        return 2.0 * v_before - v_two_before
+    if end_rule == 2:
+        return backward
+    return own
+
+
+def first_extrema(u: float, v: float) -> Extrema:
+    """Return the extrema and sums of the first point."""
+    return u, u, v, v, 0.0, abs(u), u * u, abs(v), v * v
+
+
 def next_extrema(extrema: Extrema, u: float, v: float, deviation: float) -> Extrema:
-    """Return the extrema after one more point."""
-    u_min, u_max, v_min, v_max, largest = extrema
+    """Return the extrema and sums after one more point."""
+    u_min, u_max, v_min, v_max, largest, u_sum, u_squares, v_sum, v_squares = extrema
     size = abs(deviation)
     return (
         u if u < u_min else u_min,
@@ -55,18 +84,63 @@ def next_extrema(extrema: Extrema, u: float, v: float, deviation: float) -> Extr
         v if v < v_min else v_min,
         v if v > v_max else v_max,
         size if size > largest else largest,
+        u_sum + abs(u),
+        u_squares + u * u,
+        v_sum + abs(v),
+        v_squares + v * v,
     )
 
 
-def note_extrema(stats: Any, case: int, extrema: Extrema, interior: float) -> None:
-    """Write the extrema of a member that has arrived, and its largest energy deviation without the last point."""
-    u_min, u_max, v_min, v_max, largest = extrema
+def note_extrema(stats: Any, case: int, extrema: Extrema, interior: float, dt: float) -> None:
+    """Write the extrema and norms of a member that has arrived, and its largest deviation without the last point.
+
+    ``l1 = dt sum |u|``, ``l2 = sqrt(dt sum u^2)`` over every point from t = 0 on (B, section 4.4).
+    """
+    u_min, u_max, v_min, v_max, largest, u_sum, u_squares, v_sum, v_squares = extrema
     stats[case, POSITION_MIN] = u_min
     stats[case, POSITION_MAX] = u_max
     stats[case, VELOCITY_MIN] = v_min
     stats[case, VELOCITY_MAX] = v_max
     stats[case, DEVIATION] = largest
     stats[case, DEVIATION_INTERIOR] = interior
+    stats[case, POSITION_L1] = dt * u_sum
+    stats[case, POSITION_L2] = math.sqrt(dt * u_squares)
+    stats[case, VELOCITY_L1] = dt * v_sum
+    stats[case, VELOCITY_L2] = math.sqrt(dt * v_squares)
+
+
+def is_event(turn: float, bottom: float, v_before: float, u: float, v: float) -> bool:
+    """Say whether `note_events` has something to write, without a branch."""
+    falls = (v_before >= 0.0) & (v < 0.0)
+    rises = (v_before <= 0.0) & (v > 0.0)
+    turns = (turn > 0.0) & (abs(u - bottom) > 0.5 * turn)
+    return falls | rises | turns
+
+
+@called
+def note_events(
+    stats: Any,
+    counts: Any,
+    case: int,
+    t: float,
+    dt: float,
+    turn: float,
+    bottom: float,
+    u_before: float,
+    v_before: float,
+    u: float,
+    v: float,
+) -> float:
+    """Write the peak, the trough or the turn between ``t - dt`` and `t`, if there is one; return the bottom."""
+    if v_before >= 0.0 and v < 0.0:
+        note_peak(stats, counts, case, t, dt, u_before, v_before, u, v)
+    if v_before <= 0.0 and v > 0.0:
+        note_trough(stats, case, dt, u_before, v_before, v)
+    if turn > 0.0 and abs(u - bottom) > 0.5 * turn:
+        ahead = turn if u > bottom else -turn
+        note_turn(stats, counts, case, t, dt, ahead, bottom, u_before, u)
+        return bottom + ahead
+    return bottom
 
 
 def note_peak(
@@ -100,8 +174,8 @@ def note_trough(
 
 
 def bottom_of(u: float, turn: float) -> float:
-    """Return the multiple of `turn` nearest to `u`."""
-    return turn * ((u / turn + _ROUND) - _ROUND)
+    """Return the multiple of `turn` nearest to `u`; 0 where there is no turn."""
+    return turn * ((u / turn + _ROUND) - _ROUND) if turn > 0.0 else 0.0
 
 
 def note_turn(

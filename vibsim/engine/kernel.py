@@ -1,170 +1,221 @@
 """From (model, scheme) to one function that steps members: text first, then a lane.
 
 A kernel is written out as one Python module that holds everything it runs: the elementary functions, the gathering,
-the scheme's functions and the model's formulas. The *plain* lane runs that module as it stands, which needs no
-compiler; the *compiled* lane runs the same module through numba, strictly (no contraction, no reassociation), so that
-both give the same bits. The text is also the key of the cache: a changed formula, scheme or loop is another kernel.
+the scheme's functions, the model's formulas and a loop. The *plain* lane runs the loop over one member as it stands,
+which needs no compiler; the *scalar* lane compiles the same text; the *blocks* lane compiles the loop over blocks of
+members. numba compiles strictly (no contraction, no reassociation), so that all give the same bits. The text is also
+the key of the cache: a changed formula, scheme or loop is another kernel.
 """
 
 from __future__ import annotations
 
-import ast
-import inspect
-import math
-import types
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cache
+from types import FunctionType
 from typing import Any
 
 from vibsim import expression
-from vibsim.engine import elementary, loop
+from vibsim.elementary import ELEMENTARY, primitives
+from vibsim.engine import blocks, gather, loop, observe
 from vibsim.engine.cache import Kernel, load
+from vibsim.engine.text import Module, collect
 from vibsim.errors import SimulationError
+from vibsim.expression import Binary, Call, Compare, Expression
 from vibsim.models import Model
 from vibsim.schemes import Stepper
+
+LANES = ("plain", "scalar", "blocks")
 
 _PLAIN = """\
 def compiled(function):
     return function
 
-entry = compiled
+called = entry = compiled
 """
 
-_COMPILED = """\
-from numba import njit
+_COMPILED = (
+    """\
+from numba import carray, cfunc, njit
 
-compiled = njit(error_model="numpy", nogil=True, forceinline=True)
-entry = njit(error_model="numpy", nogil=True, cache=True)
+inner = {"error_model": "numpy", "nogil": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+compiled = njit(forceinline=True, **inner)
+called = entry = njit(**inner)
+
 """
+    + primitives.COMPILED
+)
 
-BOUND = ("start", "step", "backward", "acceleration", "energies", "parameters_of")
-"""Functions that a kernel knows by name instead of being handed them: numba does not cache what is handed functions."""
-
-ELEMENTARY: Mapping[str, Callable[..., float]] = {"sin": elementary.sin}
-"""The functions that a model's formulas may call."""
+_STEPPING = "f2 f2 f1 i i i i i i f f3 f2 i2 f1"
+"""Arguments of `vibsim.engine.loop.run`, as `vibsim.engine.entry` writes them."""
+_OBSERVING = "f2 f1 i i f3 f3"
+"""Arguments of `vibsim.engine.observe.run`."""
 
 
 @cache
-def kernel(model: Model, stepper: Stepper, lane: str) -> Kernel:
-    """Return the function that steps members of `model` by `stepper`.
+def kernel(model: Model, stepper: Stepper, lane: str, with_gathered: bool = True) -> Kernel:
+    """Return the function that steps members of `model` by `stepper` (`vibsim.engine.loop.run`).
 
     Parameters
     ----------
     lane
-        ``plain`` or ``compiled``: the same bits at different speeds.
+        One of `LANES`: the same bits at different speeds.
+    with_gathered
+        Whether energies, extrema, norms, peaks and turns are gathered.
 
     Raises
     ------
     SimulationError
         Where the kernel cannot be compiled.
     """
-    body = source(model, stepper)
+    return _in_lane(source(model, stepper, lane, with_gathered), lane, _STEPPING)
+
+
+@cache
+def observer(model: Model, lane: str) -> Kernel:
+    """Return the function that works out the energies of samples (`vibsim.engine.observe.run`)."""
+    module = _module(lane, {})
+    _put_formulas(module, model, "")
+    collect(module, observe.run, "kernel", {})
+    return _in_lane(module.text, lane, _OBSERVING)
+
+
+def source(model: Model, stepper: Stepper, lane: str = "scalar", with_gathered: bool = True) -> str:
+    """Return the text of the kernel of `model` and `stepper`, without the head that says what compiles it."""
+    states, parameters = carried(stepper, model), len(model.parameters)
+    settings = {
+        "GATHER": with_gathered,
+        "STATES": states,
+        "SET": blocks.set_of(states),
+        "PARAMETERS": parameters,
+        **blocks.row_numbers(states),
+    }
+    module = _module(lane, settings)
+    _put_formulas(module, model, "", is_rare=lane == "blocks")
+    for name in ("start", "step", "backward"):
+        collect(module, getattr(stepper, name), name, {})
+    if lane == "blocks":
+        _put_formulas(module, model, "_fast")
+        functions = (n for n, v in stepper.step.__globals__.items() if isinstance(v, FunctionType))
+        renamed = {name: f"{name}_fast" for name in ("acceleration", *functions)}
+        collect(module, stepper.step, "step_fast", renamed)
+        for name, text in _rows(states, parameters).items():
+            module.put(name, text)
+    collect(module, blocks.run if lane == "blocks" else loop.run, "kernel", {})
+    return module.text
+
+
+def carried(stepper: Stepper, model: Model) -> int:
+    """Return how many floats the state of a scheme has, by asking for one."""
+    p = (1.0,) * len(model.parameters)
+    return len(stepper.start(stepper.variant, 0.0, 0.0, 1.0, p, lambda u, v, t, p: 0.0))
+
+
+def _module(lane: str, settings: Mapping[str, object]) -> Module:
+    return Module("kernel", settings, () if lane == "plain" else primitives.NAMES)
+
+
+def _in_lane(text: str, lane: str, kinds: str) -> Kernel:
     if lane == "plain":
         namespace: dict[str, Any] = {}
-        exec(compile(_PLAIN + body, f"<{model.kind} kernel>", "exec"), namespace)
+        exec(compile(_PLAIN + text, "<kernel>", "exec"), namespace)
         plain: Kernel = namespace["kernel"]
         return plain
-    return load(_COMPILED + body)
+    return load(_COMPILED + text, kinds)
 
 
-def source(model: Model, stepper: Stepper) -> str:
-    """Return the text of the kernel of `model` and `stepper`, without the header that chooses its lane."""
-    functions: dict[str, str] = {}
-    for name, function in ELEMENTARY.items():
-        _collect(function, name, functions)
-    for name in ("start", "step", "backward"):
-        _collect(getattr(stepper, name), name, functions)
-    functions |= _formulas(model)
-    _collect(loop.run, "kernel", functions)
-    return "import math\n\n" + "\n\n".join(functions.values()) + "\n"
+def _put_formulas(module: Module, model: Model, suffix: str, *, is_rare: bool = False) -> None:
+    """Write the model's acceleration and energies as functions of ``(u, v, t, p)``, and what they call.
 
-
-def _collect(function: Callable[..., Any], name: str, functions: dict[str, str]) -> None:
-    """Write `function` under `name`, after whatever it uses of its own module.
-
-    Names that a module binds to numbers, or tuples of numbers, are written out; functions are collected in their turn;
-    ``math`` is imported by every kernel. Anything else is refused.
+    Parameters
+    ----------
+    suffix
+        ``_fast`` for formulas without branches.
+    is_rare
+        Whether they are seldom needed, so that elementary functions are not compiled into them.
     """
-    if not isinstance(function, types.FunctionType):
-        raise SimulationError(f"{name} is no plain Python function, so it cannot enter a kernel")
-    tree = ast.parse(inspect.cleandoc("\n" + inspect.getsource(function))).body[0]
-    if not isinstance(tree, ast.FunctionDef):
-        raise SimulationError(f"{name} is no function with a name, so it cannot enter a kernel")
-    _strip(tree, name)
-    local = set(function.__code__.co_varnames)
-    used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} - local
-    for other in sorted(used & function.__globals__.keys()):
-        value = function.__globals__[other]
-        if isinstance(value, types.FunctionType):
-            if other not in functions:
-                _collect(value, other, functions)
-        elif _is_constant(value):
-            _add(functions, other, f"{other} = {value!r}")
-        elif value is not math:
-            raise SimulationError(
-                f"{name} uses {other}, which is no number, tuple of numbers or plain function"
-            )
-    mark = "entry" if name == "kernel" else "compiled"
-    _add(functions, name, f"@{mark}\n{ast.unparse(tree)}")
-
-
-def _is_constant(value: object) -> bool:
-    if isinstance(value, tuple):
-        return all(_is_constant(entry) for entry in value)
-    return isinstance(value, int | float)
-
-
-def _add(functions: dict[str, str], name: str, text: str) -> None:
-    if functions.setdefault(name, text) != text:
-        raise SimulationError(f"{name} means two things in one kernel")
-
-
-def _strip(tree: ast.FunctionDef, name: str) -> None:
-    """Rename a function; drop its docstring, its annotations, and the functions it is handed."""
-    tree.name = name
-    tree.returns = None
-    tree.args.args = [argument for argument in tree.args.args if argument.arg not in BOUND]
-    for argument in tree.args.args:
-        argument.annotation = None
-    if ast.get_docstring(tree) is not None:
-        tree.body = tree.body[1:]
-    for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
-        call.args = [
-            argument for argument in call.args if getattr(argument, "id", None) not in BOUND
-        ]
-
-
-def _formulas(model: Model) -> dict[str, str]:
-    """Write the model's acceleration and energies as functions of ``(u, v, t, p)``."""
     names = [parameter.name for parameter in model.parameters]
-    unpack = [f"({', '.join(names)},) = p"] if names else []
     known = (model.position, model.velocity, "t", *names)
-    arguments = f"{model.position}, {model.velocity}, t, p"
-
-    def function(name: str, results: Mapping[str, str]) -> str:
+    unpack = [f"({', '.join(names)},) = p"] if names else []
+    formulas = {
+        "acceleration": {"_result": model.acceleration},
+        "energies": {"_kinetic": model.kinetic_energy, "_potential": model.potential_energy},
+    }
+    for function, results in formulas.items():
         lines = list(unpack)
         for result, formula in results.items():
-            lines += expression.to_statements(_parsed(formula, known), result)
+            tree = _with_functions(module, formula, known, suffix, is_rare)
+            lines += expression.to_statements(tree, result)
         lines.append(f"return {', '.join(results)}")
-        return f"@compiled\ndef {name}({arguments}):\n    " + "\n    ".join(lines)
-
+        head = f"@compiled\ndef {function}{suffix}({model.position}, {model.velocity}, t, p):\n    "
+        module.put(function + suffix, head + "\n    ".join(lines))
     values = ", ".join(f"float(parameters[case, {i}])" for i in range(len(names))) or "0.0"
+    text = f"@compiled\ndef parameters_of(parameters, case):\n    return ({values},)"
+    module.put("parameters_of", text)
+
+
+def _with_functions(
+    module: Module, formula: str, known: tuple[str, ...], suffix: str, is_rare: bool
+) -> Expression:
+    """Read a formula, collect the functions that it calls, and call them by their names in the kernel."""
+
+    def bind(node: Expression) -> Expression:
+        match node:
+            case Binary("**", base, exponent) if not _is_whole(exponent):
+                return bind(Call("power", (base, exponent)))
+            case Compare(_, left, right) if suffix:
+                # a comparison would hide the NaN of a fast function out of its range
+                return Binary("+", node, _nothing(Binary("+", _nothing(left), _nothing(right))))
+            case Call(function, arguments):
+                if function not in ELEMENTARY:
+                    raise SimulationError(
+                        f"{formula}: the engine has no function {function}; it has "
+                        + ", ".join(ELEMENTARY)
+                    )
+                texts = ELEMENTARY[function]
+                text = texts.fast if suffix else texts.full
+                collect(module, text, function + suffix, {}, is_called=is_rare)
+                return Call(function + suffix, arguments)
+            case _:
+                return node
+
+    return expression.rebuilt(expression.parse(formula, known), bind)
+
+
+def _is_whole(exponent: Expression) -> bool:
+    value = expression.literal(exponent)
+    return value is not None and value.is_integer()
+
+
+def _nothing(node: Expression) -> Expression:
+    """Return an expression that is 0, or NaN where `node` is not finite."""
+    return Binary("-", node, node)
+
+
+def _rows(states: int, parameters: int) -> dict[str, str]:
+    """Write the functions that move tuples into and out of the rows of `vibsim.engine.blocks`."""
+    rows = blocks.row_numbers(states)
+
+    def function(head: str, *lines: str) -> str:
+        return f"@compiled\ndef {head}:\n    " + "\n    ".join(lines)
+
+    def places(first: str | int, count: int) -> list[str]:
+        return [f"rows[({first} + {i}) * {blocks.LANES} + j]" for i in range(count)]
+
+    def get(name: str, argument: str, first: str | int, count: int) -> str:
+        return function(
+            f"{name}(rows, {argument}j)", f"return ({', '.join(places(first, count)) or '0.0'},)"
+        )
+
+    def put(name: str, argument: str, first: str | int, count: int) -> str:
+        lines = (f"{where} = values[{i}]" for i, where in enumerate(places(first, count)))
+        return function(f"{name}(rows, {argument}j, values)", *lines)
+
+    whole = " + ".join(f"state[{i}]" for i in range(states))
     return {
-        "acceleration": function("acceleration", {"_result": model.acceleration}),
-        "energies": function(
-            "energies", {"_kinetic": model.kinetic_energy, "_potential": model.potential_energy}
-        ),
-        "parameters_of": f"@compiled\ndef parameters_of(parameters, case):\n    return ({values},)",
+        "states_in": get("states_in", "first, ", "first", states),
+        "put_states": put("put_states", "first, ", "first", states),
+        "extrema_in": get("extrema_in", "", rows["EXTREMA"], gather.N_EXTREMA),
+        "put_extrema": put("put_extrema", "", rows["EXTREMA"], gather.N_EXTREMA),
+        "parameters_in": get("parameters_in", "", rows["FIRST_PARAMETER"], parameters),
+        "total": function("total(state)", f"return {whole}"),
     }
-
-
-def _parsed(formula: str, known: tuple[str, ...]) -> expression.Expression:
-    """Read a formula, and refuse functions that the engine does not have."""
-    tree = expression.parse(formula, known)
-    for node in expression.walk(tree):
-        if isinstance(node, expression.Call) and node.function not in ELEMENTARY:
-            raise SimulationError(
-                f"{formula}: the engine has no function {node.function}; it has "
-                + ", ".join(ELEMENTARY)
-            )
-    return tree

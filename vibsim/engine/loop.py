@@ -1,37 +1,34 @@
-"""The loop over members and steps, written once for every scheme, model and lane.
+"""The loop over members, then steps: one member at a time, its whole state in registers.
 
-`run` takes the functions of the scheme and the model as its first arguments; `vibsim.engine.kernel` binds them, and
-compiles the same text for the compiled lanes.
+`vibsim.engine.kernel` binds the functions of the scheme and the model, runs this text as it stands in the plain lane
+and compiles it for the scalar one. What happens in a step is written once, in the scheme, the model and
+`vibsim.engine.gather`; `vibsim.engine.blocks` does the same steps in another order.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
+from vibsim.engine.bound import GATHER, backward, energies, parameters_of, start, step
 from vibsim.engine.gather import (
     LAST_STEP,
+    OVERFLOW,
     bottom_of,
+    end_velocity,
+    first_extrema,
+    is_event,
     next_extrema,
+    note_events,
     note_extrema,
-    note_peak,
-    note_trough,
-    note_turn,
 )
-
-OVERFLOW = 1e150
-"""A member that grows beyond has failed: its energy could no longer be stored."""
 
 
 def run(
-    start: Any,
-    step: Any,
-    backward: Any,
-    acceleration: Any,
-    energies: Any,
-    parameters_of: Any,
     parameters: Any,
     initial: Any,
     dt: Any,
+    first: int,
+    stop: int,
     steps: int,
     every: int,
     variant: int,
@@ -40,16 +37,12 @@ def run(
     samples: Any,
     stats: Any,
     counts: Any,
+    rows: Any,
 ) -> None:
-    """Step every member of one scheme, and fill `samples`, `stats` and `counts`.
+    """Step members first..stop-1 of one scheme, and fill `samples`, `stats` and `counts`.
 
     Parameters
     ----------
-    start, step, backward
-        The scheme (see `vibsim.schemes.base.Stepper`).
-    acceleration, energies, parameters_of
-        The model: ``acceleration(u, v, t, p)``; ``energies(u, v, t, p)``, kinetic and potential;
-        ``parameters_of(parameters, case)``, the tuple p.
     parameters, initial, dt
         Shapes (case, n_parameters), (case, 2) with position and velocity, and (case,).
     steps, every
@@ -61,26 +54,28 @@ def run(
     turn
         Angle of a whole turn; 0 where the position is no angle.
     samples
-        Shape (4, case, n_samples), filled with NaN: position, velocity, kinetic and potential energy.
+        Shape (2, case, n_samples), filled with NaN: position and velocity.
     stats
         Shape (case, `N_STATS`), filled with NaN: columns of `vibsim.engine.gather`.
     counts
         Shape (case, `N_COUNTS`), filled with zeros: columns of `vibsim.engine.gather`.
+    rows
+        Scratch of `vibsim.engine.blocks`, which this loop does without.
     """
-    for case in range(len(dt)):
+    for case in range(first, stop):
         h = float(dt[case])
         p = parameters_of(parameters, case)
         u = float(initial[case, 0])
         v = float(initial[case, 1])
-        kinetic, potential = energies(u, v, 0.0, p)
-        energy_0 = kinetic + potential
+        energy_0 = 0.0
+        if GATHER:
+            kinetic, potential = energies(u, v, 0.0, p)
+            energy_0 = kinetic + potential
         samples[0, case, 0] = u
         samples[1, case, 0] = v
-        samples[2, case, 0] = kinetic
-        samples[3, case, 0] = potential
-        extrema = (u, u, v, v, 0.0)
-        bottom = bottom_of(u, turn) if turn > 0.0 else 0.0
-        state = start(variant, u, v, h, p, acceleration)
+        extrema = first_extrema(u, v)
+        bottom = bottom_of(u, turn)
+        state = start(variant, u, v, h, p)
         interior = 0.0
         good = 0
         sample = 1
@@ -90,36 +85,30 @@ def run(
             t = n * h
             u_before, v_two_before, v_before = u, v_before, v
             u = state[0]
-            following, own = step(state, t, h, p, acceleration)
+            following, own = step(state, t, h, p)
             v = own
             if n == steps:
-                if end_rule == 1:
-                    v = 2.0 * v_before - v_two_before
-                elif end_rule == 2:
-                    v = backward(state, h)
+                v = end_velocity(end_rule, own, v_before, v_two_before, backward(state, h))
             state = following
             # written so that NaN fails as well
             if not abs(u) + abs(v) < OVERFLOW:
                 break
             good = n
-            kinetic, potential = energies(u, v, t, p)
-            interior = extrema[4]
-            extrema = next_extrema(extrema, u, v, (kinetic + potential) - energy_0)
-            # the scheme's own velocity: an end formula would move a peak in the last step
-            if v_before >= 0.0 and own < 0.0:
-                note_peak(stats, counts, case, t, h, u_before, v_before, u, own)
-            if v_before <= 0.0 and own > 0.0:
-                note_trough(stats, case, h, u_before, v_before, own)
-            if turn > 0.0 and abs(u - bottom) > 0.5 * turn:
-                ahead = turn if u > bottom else -turn
-                note_turn(stats, counts, case, t, h, ahead, bottom, u_before, u)
-                bottom += ahead
+            if GATHER:
+                kinetic, potential = energies(u, v, t, p)
+                interior = extrema[4]
+                extrema = next_extrema(extrema, u, v, (kinetic + potential) - energy_0)
+                # the scheme's own velocity: an end formula would move a peak in the last step
+                if is_event(turn, bottom, v_before, u, own):
+                    bottom = note_events(
+                        stats, counts, case, t, h, turn, bottom, u_before, v_before, u, own
+                    )
             if n == due:
                 samples[0, case, sample] = u
                 samples[1, case, sample] = v
-                samples[2, case, sample] = kinetic
-                samples[3, case, sample] = potential
                 sample += 1
                 due += every
-        note_extrema(stats, case, extrema, interior)
+        if GATHER:
+            # of a member that failed, all points came before the last one
+            note_extrema(stats, case, extrema, interior if good == steps else extrema[4], h)
         counts[case, LAST_STEP] = good

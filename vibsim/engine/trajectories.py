@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.engine import gather
-from vibsim.engine.kernel import kernel
+from vibsim.engine import blocks, gather
+from vibsim.engine.kernel import carried, kernel, observer
 from vibsim.models import Model
 from vibsim.schemes import Scheme
 from vibsim.schemes.base import END_RULES, Options
@@ -18,23 +20,22 @@ Integers = NDArray[np.int64]
 
 PLAIN_STEPS = 40_000
 """Up to so many member-steps the plain lane takes less time than the compiler takes to be imported."""
-
-LANES = ("plain", "compiled")
+TASK = 16 * blocks.LANES
+"""Members that a thread takes at a time."""
 
 
 @dataclass(frozen=True)
-class Trajectories:
-    """What one scheme computed for every member; arrays of shape (case, n_samples) or (case,)."""
+class Gathered:
+    """What one scheme had at every step of every member; arrays of shape (case,) unless stated."""
 
-    position: Floats
-    velocity: Floats
-    kinetic_energy: Floats
-    potential_energy: Floats
     position_range: Floats
-    """Least and largest position over every step, shape (case, 2)."""
+    """Least and largest position, shape (case, 2)."""
     velocity_range: Floats
+    position_norms: Floats
+    """``dt sum |u|`` and ``sqrt(dt sum u^2)`` over every point, shape (case, 2)."""
+    velocity_norms: Floats
     deviation: Floats
-    """Largest absolute energy deviation over every step."""
+    """Largest absolute energy deviation."""
     deviation_interior: Floats
     """The same without the last point."""
     period: Floats
@@ -45,13 +46,26 @@ class Trajectories:
     first_peak: Floats
     last_peak: Floats
     last_trough: Floats
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """What one scheme computed for every member."""
+
+    position: Floats
+    """Shape (case, n_samples); NaN from where a member failed."""
+    velocity: Floats
     last_step: Integers
-    """Last step with finite values: the number of steps where nothing failed."""
+    """Last step with finite values, shape (case,): the number of steps where nothing failed."""
+    gathered: Gathered | None
+    """None where nothing was to be gathered."""
 
 
-def lane_for(member_steps: int) -> str:
+def lane_for(members: int, steps: int) -> str:
     """Choose the lane from the size of the work; the bits are the same in every lane."""
-    return "plain" if member_steps <= PLAIN_STEPS else "compiled"
+    if members * steps <= PLAIN_STEPS:
+        return "plain"
+    return "blocks" if members > 1 else "scalar"
 
 
 def integrate(
@@ -63,7 +77,10 @@ def integrate(
     dt: Floats,
     steps: int,
     every: int,
+    *,
     lane: str | None = None,
+    threads: int = 1,
+    with_gathered: bool = True,
 ) -> Trajectories:
     """Step every member from t = 0.
 
@@ -79,6 +96,10 @@ def integrate(
         Number of steps N, and the stride of the samples, a divisor of N.
     lane
         One of `LANES`; chosen by `lane_for` where None.
+    threads
+        How many threads share the members.
+    with_gathered
+        Whether extrema, norms, peaks, turns and energies are gathered at every step.
 
     Raises
     ------
@@ -86,19 +107,62 @@ def integrate(
         Where the kernel cannot be compiled.
     """
     members = len(dt)
-    samples = np.full((4, members, steps // every + 1), np.nan)
-    stats = np.full((members, gather.N_STATS), np.nan)
-    counts = np.zeros((members, gather.N_COUNTS), dtype=np.int64)
     stepper = scheme.stepper(options)
-    run = kernel(model, stepper, lane or lane_for(members * steps))
-    arrays = (np.ascontiguousarray(array, dtype=np.float64) for array in (parameters, initial, dt))
-    end_rule = END_RULES.index(stepper.end)
-    turn = model.turn or 0.0
-    run(*arrays, steps, every, stepper.variant, end_rule, turn, samples, stats, counts)
-    return _name(samples, stats, counts)
+    lane = lane or lane_for(members, steps)
+    run = kernel(model, stepper, lane, with_gathered)
+    samples = np.full((2, members, steps // every + 1), np.nan)
+    rows = gather.N_STATS if with_gathered else 0
+    stats = np.full((members, rows), np.nan)
+    counts = np.zeros((members, gather.N_COUNTS), dtype=np.int64)
+    numbers = [np.ascontiguousarray(array, dtype=float) for array in (parameters, initial, dt)]
+    scratch = blocks.n_rows(carried(stepper, model), len(model.parameters)) * blocks.LANES
+    end_rule, turn = END_RULES.index(stepper.end), model.turn or 0.0
+
+    def task(first: int) -> None:
+        stop = min(first + (TASK if threads > 1 else members), members)
+        run(*numbers, first, stop, steps, every, stepper.variant, end_rule, turn, samples, stats, counts, np.empty(scratch if lane == "blocks" else 0))  # fmt: skip # noqa: E501
+
+    _share(task, range(0, members, TASK) if threads > 1 else range(1), threads)
+    gathered = _name(stats, counts) if with_gathered else None
+    return Trajectories(samples[0], samples[1], counts[:, gather.LAST_STEP], gathered)
 
 
-def _name(samples: Floats, stats: Floats, counts: Integers) -> Trajectories:
+def _share(task: Callable[[int], None], firsts: Iterable[int], threads: int) -> None:
+    """Do every task, on several threads where that is asked for; kernels let go of the interpreter."""
+    if threads == 1:
+        for first in firsts:
+            task(first)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        for _ in pool.map(task, firsts):
+            pass
+
+
+def energies(
+    model: Model,
+    parameters: Floats,
+    dt: Floats,
+    every: int,
+    position: Floats,
+    velocity: Floats,
+    *,
+    lane: str,
+) -> tuple[Floats, Floats]:
+    """Return kinetic and potential energy at the samples of `integrate`, shape (case, n_samples).
+
+    Raises
+    ------
+    SimulationError
+        Where the kernel cannot be compiled.
+    """
+    samples = np.stack([position, velocity])
+    found = np.empty(samples.shape)
+    numbers = (np.ascontiguousarray(array, dtype=float) for array in (parameters, dt))
+    observer(model, "plain" if lane == "plain" else "scalar")(*numbers, every, 0, samples, found)
+    return found[0], found[1]
+
+
+def _name(stats: Floats, counts: Integers) -> Gathered:
     peaks, turns = counts[:, gather.PEAKS] - 1, counts[:, gather.TURNS] - 1
     spinning = turns > 0
     swinging = (peaks > 0) & ~spinning
@@ -110,13 +174,11 @@ def _name(samples: Floats, stats: Floats, counts: Integers) -> Trajectories:
     of_turn = mean_time(gather.FIRST_TURN_TIME, gather.LAST_TURN_TIME, turns)
     of_peak = mean_time(gather.FIRST_PEAK_TIME, gather.LAST_PEAK_TIME, peaks)
     on_grid = mean_time(gather.FIRST_PEAK_TIME_GRID, gather.LAST_PEAK_TIME_GRID, peaks)
-    return Trajectories(
-        position=samples[0],
-        velocity=samples[1],
-        kinetic_energy=samples[2],
-        potential_energy=samples[3],
+    return Gathered(
         position_range=stats[:, [gather.POSITION_MIN, gather.POSITION_MAX]],
         velocity_range=stats[:, [gather.VELOCITY_MIN, gather.VELOCITY_MAX]],
+        position_norms=stats[:, [gather.POSITION_L1, gather.POSITION_L2]],
+        velocity_norms=stats[:, [gather.VELOCITY_L1, gather.VELOCITY_L2]],
         deviation=stats[:, gather.DEVIATION],
         deviation_interior=stats[:, gather.DEVIATION_INTERIOR],
         period=np.where(spinning, of_turn, of_peak),
@@ -125,5 +187,4 @@ def _name(samples: Floats, stats: Floats, counts: Integers) -> Trajectories:
         first_peak=stats[:, gather.FIRST_PEAK],
         last_peak=stats[:, gather.LAST_PEAK],
         last_trough=stats[:, gather.LAST_TROUGH],
-        last_step=counts[:, gather.LAST_STEP],
     )

@@ -5,7 +5,14 @@ allow-list of what it may hold: numbers, declared names, ``+ - * / **``, compari
 a user is never compiled or evaluated as Python.
 """
 
-from vibsim.expression.parser import MAX_CHARACTERS, MAX_DEPTH, MAX_POWER, ExpressionError, parse
+from vibsim.expression.parser import (
+    MAX_CHARACTERS,
+    MAX_DEPTH,
+    MAX_POWER,
+    ExpressionError,
+    literal,
+    parse,
+)
 from vibsim.expression.render import constant, evaluate, to_python, to_statements
 from vibsim.expression.tree import (
     CONSTANTS,
@@ -18,6 +25,7 @@ from vibsim.expression.tree import (
     Negate,
     Number,
     names_in,
+    rebuilt,
     walk,
 )
 
@@ -37,8 +45,10 @@ __all__ = [
     "Number",
     "constant",
     "evaluate",
+    "literal",
     "names_in",
     "parse",
+    "rebuilt",
     "to_python",
     "to_statements",
     "walk",

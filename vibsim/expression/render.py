@@ -10,6 +10,7 @@ import math
 import operator
 from collections.abc import Callable, Mapping
 
+from vibsim.elementary import ELEMENTARY
 from vibsim.expression.parser import MAX_POWER, ExpressionError, literal, parse
 from vibsim.expression.tree import (
     FUNCTIONS,
@@ -85,12 +86,22 @@ def _value(node: Expression, values: Mapping[str, float]) -> float:
         case Binary(symbol, left, right) | Compare(symbol, left, right):
             return float(_OPERATORS[symbol](_value(left, values), _value(right, values)))
         case Call(function, arguments):
-            return FUNCTIONS[function][1](*(_value(argument, values) for argument in arguments))
+            found = [_value(argument, values) for argument in arguments]
+            return _existing(FUNCTIONS[function][1](*found))
+
+
+def _existing(value: float) -> float:
+    """Return what a function gave; raise where it does not exist, as the operators of Python do."""
+    if math.isnan(value):
+        raise ValueError
+    if math.isinf(value):
+        raise OverflowError
+    return value
 
 
 def _power(base: float, exponent: float) -> float:
     if not exponent.is_integer() or abs(exponent) > MAX_POWER:
-        return math.pow(base, exponent)
+        return _existing(ELEMENTARY["power"].full(base, exponent))
     if exponent == 0.0:
         return 1.0
     result = base

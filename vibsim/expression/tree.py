@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
+from vibsim.elementary import ELEMENTARY
+
 
 @dataclass(frozen=True)
 class Number:
@@ -60,33 +62,12 @@ CONSTANTS: Mapping[str, float] = {"pi": math.pi, "e": math.e}
 """Names that stand for a number wherever a formula does not declare them otherwise."""
 
 
-def _sign(x: float) -> float:
-    return float((x > 0.0) - (x < 0.0))
-
-
-def _where(condition: float, yes: float, no: float) -> float:
-    return yes if condition else no
-
+_ARGUMENTS = {"atan2": 2, "max": 2, "min": 2, "where": 3}
 
 FUNCTIONS: Mapping[str, tuple[int, Callable[..., float]]] = {
-    "abs": (1, abs),
-    "acos": (1, math.acos),
-    "asin": (1, math.asin),
-    "atan": (1, math.atan),
-    "atan2": (2, math.atan2),
-    "cos": (1, math.cos),
-    "cosh": (1, math.cosh),
-    "exp": (1, math.exp),
-    "log": (1, math.log),
-    "max": (2, max),
-    "min": (2, min),
-    "sign": (1, _sign),
-    "sin": (1, math.sin),
-    "sinh": (1, math.sinh),
-    "sqrt": (1, math.sqrt),
-    "tan": (1, math.tan),
-    "tanh": (1, math.tanh),
-    "where": (3, _where),
+    name: (_ARGUMENTS.get(name, 1), function.full)
+    for name, function in ELEMENTARY.items()
+    if name != "power"  # written ``**``
 }
 """Functions that a formula may call: number of arguments, and the value for constants."""
 
@@ -102,6 +83,21 @@ def children(node: Expression) -> tuple[Expression, ...]:
             return arguments
         case _:
             return ()
+
+
+def rebuilt(node: Expression, change: Callable[[Expression], Expression]) -> Expression:
+    """Return the tree with `change` applied to every node, operands before what uses them."""
+    match node:
+        case Negate(operand):
+            return change(Negate(rebuilt(operand, change)))
+        case Binary(symbol, left, right):
+            return change(Binary(symbol, rebuilt(left, change), rebuilt(right, change)))
+        case Compare(symbol, left, right):
+            return change(Compare(symbol, rebuilt(left, change), rebuilt(right, change)))
+        case Call(function, arguments):
+            return change(Call(function, tuple(rebuilt(entry, change) for entry in arguments)))
+        case _:
+            return change(node)
 
 
 def walk(node: Expression) -> Iterator[Expression]:

@@ -1,0 +1,114 @@
+"""The elementary functions against 50 digits, and their special values."""
+
+import inspect
+import itertools
+import math
+
+import numpy as np
+import pytest
+from elementary_arguments import EXACT, arguments, error, exact
+
+from vibsim import expression
+from vibsim.elementary import ELEMENTARY
+
+INF, NAN, PI, TINY = math.inf, math.nan, math.pi, math.ulp(0.0)
+CORNERS = (0.0, -0.0, 1.0, -1.0, INF, -INF, NAN)
+BOUND = 1.0
+"""In units in the last place; every docstring states it."""
+
+ODD = ("asin", "atan", "sign", "sin", "sinh", "tan", "tanh")
+EVEN = ("abs", "cos", "cosh")
+
+SPECIAL_VALUES = {
+    "abs": [(-0.0, 0.0), (-INF, INF), (NAN, NAN), (-3.0, 3.0)],
+    "acos": [(1.0, 0.0), (-1.0, PI), (0.0, PI / 2), (1.0 + 2**-52, NAN), (INF, NAN), (NAN, NAN)],
+    "asin": [(-0.0, -0.0), (1.0, PI / 2), (-1.1, NAN), (INF, NAN), (NAN, NAN)],
+    "atan": [(-0.0, -0.0), (INF, PI / 2), (-INF, -PI / 2), (NAN, NAN)],
+    "cos": [(0.0, 1.0), (-0.0, 1.0), (INF, NAN), (-INF, NAN), (NAN, NAN)],
+    "cosh": [(0.0, 1.0), (-0.0, 1.0), (INF, INF), (-INF, INF), (NAN, NAN)],
+    "exp": [(0.0, 1.0), (-0.0, 1.0), (INF, INF), (-INF, 0.0), (NAN, NAN)],
+    "log": [(0.0, -INF), (-0.0, -INF), (1.0, 0.0), (INF, INF), (-1.0, NAN), (NAN, NAN)],
+    "max": [(1.0, 2.0, 2.0), (-INF, 1.0, 1.0), (NAN, 1.0, NAN), (1.0, NAN, NAN)],
+    "min": [(1.0, 2.0, 1.0), (-INF, 1.0, -INF), (NAN, 1.0, NAN), (1.0, NAN, NAN)],
+    "sign": [(-2.0, -1.0), (-0.0, 0.0), (0.0, 0.0), (INF, 1.0), (NAN, NAN)],
+    "sin": [(0.0, 0.0), (-0.0, -0.0), (INF, NAN), (-INF, NAN), (NAN, NAN)],
+    "sinh": [(-0.0, -0.0), (INF, INF), (-INF, -INF), (NAN, NAN)],
+    "sqrt": [(-0.0, -0.0), (4.0, 2.0), (INF, INF), (-1.0, NAN), (-INF, NAN), (NAN, NAN)],
+    "tan": [(0.0, 0.0), (-0.0, -0.0), (INF, NAN), (-INF, NAN), (NAN, NAN)],
+    "tanh": [(-0.0, -0.0), (INF, 1.0), (-INF, -1.0), (NAN, NAN)],
+    "where": [
+        (1.0, 2.0, 3.0, 2.0),
+        (0.0, 2.0, 3.0, 3.0),
+        (-0.0, NAN, 3.0, 3.0),
+        (NAN, 1.0, 1.0, NAN),
+    ],
+    # the C library's, which is exact there
+    "atan2": [(y, x, math.atan2(y, x)) for y, x in itertools.product(CORNERS, CORNERS)],
+    "power": [
+        *((x, y, 1.0) for x in (0.0, -2.0, INF, NAN) for y in (0.0, -0.0)),
+        *((1.0, y, 1.0) for y in (3.5, -INF, INF, NAN)),
+        *((-1.0, y, 1.0) for y in (-INF, INF, 2.0**53, 4.0)),
+        *((-1.0, 3.0, -1.0), (-1.0, 0.5, NAN), (-2.0, TINY, NAN), (-8.0, 1.0 / 3.0, NAN)),
+        *((0.0, -3.0, INF), (-0.0, -3.0, -INF), (-0.0, -2.0, INF), (-0.0, -0.5, INF)),
+        *((0.0, 3.0, 0.0), (-0.0, 3.0, -0.0), (-0.0, 2.0, 0.0), (-0.0, 0.5, 0.0)),
+        *((0.0, INF, 0.0), (-0.0, -INF, INF), (INF, INF, INF), (-INF, -INF, 0.0)),
+        *((0.5, -INF, INF), (-0.5, INF, 0.0), (2.0, -INF, 0.0), (-2.0, INF, INF)),
+        *((-INF, -3.0, -0.0), (-INF, -2.5, 0.0), (-INF, 3.0, -INF), (-INF, 2.5, INF)),
+        *((INF, -0.5, 0.0), (INF, 0.5, INF), (NAN, 1.0, NAN), (2.0, NAN, NAN)),
+        *((-2.0, 1023.0, -(2.0**1023)), (-2.0, -1074.0, TINY), (4.0, 0.5, 2.0), (9.0, 2.5, 243.0)),
+        *((1.0 + 2.0**-52, 1e300, INF), (1.0 - 2.0**-53, 1e300, 0.0), (-2.0, 1e4, INF)),
+    ],
+}
+"""Arguments and value, those of C99, annex F, and of exact results."""
+
+
+def bits(value):
+    return "nan" if math.isnan(value) else value.hex()
+
+
+def test_every_function_of_a_formula_is_there():
+    assert set(ELEMENTARY) == {*expression.FUNCTIONS, "power"}
+    for name, (count, _) in expression.FUNCTIONS.items():
+        assert len(inspect.signature(ELEMENTARY[name].full).parameters) == count
+
+
+def worst(name, n):
+    """Return the largest error over about `n` finite arguments, and where it is."""
+    columns = arguments(name, n)
+    rows = zip(*map(np.ndarray.tolist, columns), strict=True)
+    rows = [row for row in rows if all(math.isfinite(x) and x != 0.0 for x in row)]
+    full = ELEMENTARY[name].full
+    return max((error(full(*row), exact(name, row)), row) for row in rows)
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_error_is_below_one_unit_in_the_last_place(name):
+    assert worst(name, 20_000) < (BOUND,)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", EXACT)
+def test_error_is_below_one_unit_in_the_last_place_at_ten_times_as_many(name):
+    assert worst(name, 200_000) < (BOUND,)
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_the_bound_is_stated(name):
+    text = inspect.getdoc(ELEMENTARY[name].full)
+    assert "error below 1 unit in the last place" in text or "correctly rounded" in text
+
+
+@pytest.mark.parametrize("name", ELEMENTARY)
+def test_special_values(name):
+    for *row, value in SPECIAL_VALUES[name]:
+        assert bits(ELEMENTARY[name].full(*row)) == bits(value), row
+
+
+@pytest.mark.parametrize("name", [*ODD, *EVEN])
+def test_symmetry_to_the_last_bit(name):
+    full = ELEMENTARY[name].full
+    (column,) = arguments(name, 2000)
+    for x in column.tolist():
+        expected = -full(x) if name in ODD else full(x)
+        # the sign of a zero is no sign
+        assert bits(full(-x)) == bits(0.0 if name == "sign" and x == 0.0 else expected)

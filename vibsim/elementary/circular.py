@@ -1,0 +1,151 @@
+r"""Sine and cosine.
+
+``r = x - k pi`` with pi in three parts (Cody and Waite; k times a part of 35 bits is exact for \|k\| < 2^17), then
+``r - r^3/6 + r^5 Q(r^2)`` on [-pi/2, pi/2], Q of degree 6 (Remez with rounded coefficients, relative error 4e-19),
+summed in Estrin's form because the length of the chain of dependent operations is what a step costs. The cubic term,
+up to 0.65, is split so that its larger part is exact; it is added with its rounding error. The part of r that rounding
+drops is carried in first order. The cosine is the same with a k that lies half way between whole numbers. Beyond 1e5,
+15 000 turns from home, the reduction is done in whole numbers (`reduction`).
+
+Source: W. J. Cody and W. Waite, Software Manual for the Elementary Functions (1980), chapter 8.
+"""
+
+from __future__ import annotations
+
+import math
+
+from vibsim.elementary.reduction import HALF_PI, HALF_PI_REST, quarter_turns
+from vibsim.elementary.rounding import nearest_whole
+
+LARGEST_ANGLE = 1.0e5
+_NO_HALF_TURN = 3.14  # a little below pi: the nearest multiple is found from a rounded quotient
+_ONE_HALF_TURN = 4.71  # a little below 3 pi/2
+PER_PI = float.fromhex("0x1.45f306dc9c883p-2")
+_PI_1 = float.fromhex("0x1.921fb54440000p+1")
+_PI_2 = float.fromhex("0x1.68c234c4c0000p-38")
+_PI_3 = float.fromhex("0x1.98a2e03707345p-76")
+_TWELFTH_BIT = 1649267441664.0  # 1.5 * 2^40: adding and subtracting it leaves multiples of 2^-12
+
+_S3 = -1.0 / 6.0
+_S3_1 = float.fromhex("-0x1.5554p-3")
+_S3_2 = float.fromhex("-0x1.5555555555555p-19")
+_S5 = 0.008333333333333283
+_S7 = -0.000198412698412353
+_S9 = 2.755731921493914e-06
+_S11 = -2.5052107177645754e-08
+_S13 = 1.6058953403234195e-10
+_S15 = -7.643314997525792e-13
+_S17 = 2.724302774578837e-15
+
+
+def sin(x: float) -> float:
+    """Return the sine of `x` [rad], error below 1 unit in the last place; NaN for NaN and infinities."""
+    if abs(x) <= HALF_PI:
+        # k = 0: the same result as below without its latency
+        return sine_of(x, 0.0) if x != 0.0 else x
+    if abs(x) <= _ONE_HALF_TURN:
+        # k = 1 or -1: likewise
+        r, rest = reduced(x, 1.0 if x > 0.0 else -1.0, -1.0)
+        return sine_of(r, rest)
+    if abs(x) <= LARGEST_ANGLE:
+        k = nearest_whole(x * PER_PI)
+        r, rest = reduced(x, k, parity_sign(k))
+        return sine_of(r, rest)
+    if abs(x) < math.inf:
+        value, behind = sine_far(abs(x), 0)
+        return value + behind if x > 0.0 else -(value + behind)
+    return math.nan
+
+
+def sin_fast(x: float) -> float:
+    r"""Return `sin` for \|x\| <= 1e5, else NaN."""
+    k = nearest_whole(x * PER_PI)
+    r, rest = reduced(x, k, parity_sign(k))
+    value = sine_of(r, rest)
+    value = x if x == 0.0 else value
+    return value if abs(x) <= LARGEST_ANGLE else math.nan
+
+
+def cos(x: float) -> float:
+    """Return the cosine of `x` [rad], error below 1 unit in the last place; NaN for NaN and infinities."""
+    y = abs(x)
+    if y <= _NO_HALF_TURN:
+        # k = 1/2: the same result as below without the latency of finding it
+        r, rest = reduced_half(y, 0.5, -1.0)
+        return sine_of(r, rest)
+    if y <= LARGEST_ANGLE:
+        whole = nearest_whole(y * PER_PI - 0.5)
+        r, rest = reduced_half(y, whole + 0.5, -parity_sign(whole))
+        return sine_of(r, rest)
+    if y < math.inf:
+        value, behind = sine_far(y, 1)
+        return value + behind
+    return math.nan
+
+
+def cos_fast(x: float) -> float:
+    r"""Return `cos` for \|x\| <= 1e5, else NaN."""
+    y = abs(x)
+    whole = nearest_whole(y * PER_PI - 0.5)
+    r, rest = reduced_half(y, whole + 0.5, -parity_sign(whole))
+    value = sine_of(r, rest)
+    return value if y <= LARGEST_ANGLE else math.nan
+
+
+def parity_sign(k: float) -> float:
+    """Return 1 for even and -1 for odd whole k."""
+    odd = k - 2.0 * nearest_whole(0.5 * k)
+    return 1.0 - 2.0 * (odd * odd)
+
+
+def reduced(x: float, k: float, sign: float) -> tuple[float, float]:
+    """Return r and a rest with ``x = k pi + sign (r + rest)``, where twice k is whole."""
+    coarse = x - k * _PI_1
+    fine = k * _PI_2
+    r = coarse - fine
+    return sign * r, sign * (((coarse - r) - fine) - k * _PI_3)
+
+
+def reduced_half(y: float, k: float, sign: float) -> tuple[float, float]:
+    """Return the same for ``y >= 0`` and k half way between whole numbers: at y < 1, ``y - pi/2`` is not exact."""
+    r, rest = reduced(y, k, sign)
+    far = k * _PI_1
+    return r, rest + sign * (y - ((y - far) + far))
+
+
+def sine_of(r: float, rest: float) -> float:
+    r"""Return the sine of ``r + rest``, \|r\| <= pi/2."""
+    value, behind = sine_parts(r, rest)
+    return value + behind
+
+
+def sine_parts(r: float, rest: float) -> tuple[float, float]:
+    r"""Return the sine of ``r + rest``, \|r\| <= pi/2, in two parts."""
+    # w^3 * _S3_1 is exact: w has 13 bits, the factor 15
+    w = (r + _TWELFTH_BIT) - _TWELFTH_BIT
+    z = r * r
+    cube = w * w * w
+    cubic = cube * _S3_1
+    s = r + cubic
+    small = cube * _S3_2 + _S3 * ((r - w) * (z + w * (r + w)))
+    # cos r to the few digits that the rest deserves
+    turned = rest * (1.0 - z * (0.5 - z * (1.0 / 24.0)))
+    z2 = z * z
+    low = (_S5 + z * _S7) + z2 * (_S9 + z * _S11)
+    high = (_S13 + z * _S15) + z2 * _S17
+    q = low + (z2 * z2) * high
+    return s, (((r - s) + cubic) + (small + turned)) + (r * z2) * q
+
+
+def sine_far(y: float, quarters: int) -> tuple[float, float]:
+    """Return the sine of ``y + quarters pi/2`` for finite y >= 1 in two parts, by the reduction in whole numbers."""
+    q, r, rest = quarter_turns(y)
+    q = (q + quarters) & 3
+    sign = 1.0 if q < 2 else -1.0
+    if q & 1 == 1:
+        # cos r = sin(pi/2 - |r|)
+        rest = rest if r < 0.0 else -rest
+        near = HALF_PI - abs(r)
+        rest += ((HALF_PI - near) - abs(r)) + HALF_PI_REST
+        r = near
+    return sine_parts(sign * r, sign * rest)

@@ -1,0 +1,47 @@
+"""Sums and products with their rounding errors, without a fused multiply-add.
+
+Source: T. J. Dekker, A floating-point technique for extending the available precision, Numerische Mathematik 18 (1971);
+J.-M. Muller et al., Handbook of Floating-Point Arithmetic, 2nd ed. (2018), sections 4.3 and 4.4.
+"""
+
+from __future__ import annotations
+
+_SPLIT = 134217729.0  # 2^27 + 1
+
+
+def two_product(a: float, b: float) -> tuple[float, float]:
+    """Return ``a b`` rounded, and its error; exact unless something over- or underflows (sizes up to 2^996)."""
+    c = _SPLIT * a
+    a_1 = c - (c - a)
+    a_2 = a - a_1
+    c = _SPLIT * b
+    b_1 = c - (c - b)
+    b_2 = b - b_1
+    p = a * b
+    return p, ((a_1 * b_1 - p) + a_1 * b_2 + a_2 * b_1) + a_2 * b_2
+
+
+def two_sum(a: float, b: float) -> tuple[float, float]:
+    """Return ``a + b`` rounded, and its error."""
+    s = a + b
+    part = s - a
+    return s, (a - (s - part)) + (b - part)
+
+
+def fast_two_sum(a: float, b: float) -> tuple[float, float]:
+    r"""Return ``a + b`` rounded, and its error, for \|a\| >= \|b\| or a = 0."""
+    s = a + b
+    return s, b - (s - a)
+
+
+def quotient(a: float, a_behind: float, b: float, b_behind: float) -> float:
+    r"""Return ``(a + a_behind)/(b + b_behind)`` with an error below 0.51 units in the last place.
+
+    The larger part first; b not zero; the quotient's size between 2^-960 and 2^990.
+    """
+    a, a_behind = fast_two_sum(a, a_behind)
+    b, b_behind = fast_two_sum(b, b_behind)
+    inverse = 1.0 / b
+    q = a * inverse
+    p, error = two_product(q, b)
+    return q + (((a - p) - error) + (a_behind - q * b_behind)) * inverse

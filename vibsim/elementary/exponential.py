@@ -1,0 +1,62 @@
+r"""Exponential function.
+
+``e^x = 2^k e^r`` with ``k = round(x/ln 2)``, so that \|r\| <= 0.3466, and ``e^r = 1 + r + r^2/2 + r^3 P(r)``, P of
+degree 8 (Remez with rounded coefficients, relative error 6e-18). ln 2 is in two parts, the first of 40 bits, so that
+its product with k is exact.
+
+Source: W. J. Cody and W. Waite, Software Manual for the Elementary Functions (1980), chapter 6; J.-M. Muller,
+Elementary Functions, 3rd ed. (2016), section 11.3.
+"""
+
+from __future__ import annotations
+
+from vibsim.elementary.doubled import fast_two_sum, two_sum
+from vibsim.elementary.primitives import two_to
+from vibsim.elementary.rounding import nearest_whole
+
+_PER_LN_2 = float.fromhex("0x1.71547652b82fep+0")
+LN_2_1 = float.fromhex("0x1.62e42fefa2000p-1")
+LN_2_2 = float.fromhex("0x1.9ef35793c7673p-41")
+LN_2_3 = float.fromhex("0x1.f97b57a079a19p-103")
+"""ln 2 in three parts, the first of 40 bits."""
+
+_E3 = 0.16666666666666685
+_E4 = 0.0416666666666028
+_E5 = 0.008333333333314527
+_E6 = 0.0013888888927278214
+_E7 = 0.00019841269903775335
+_E8 = 2.480150806978095e-05
+_E9 = 2.755722712364467e-06
+_E10 = 2.762543121504282e-07
+_E11 = 2.5114707468091334e-08
+
+
+def exp(x: float) -> float:
+    """Return ``e^x`` for every double, error below 1 unit in the last place; a subnormal result is rounded twice."""
+    k, value, behind = exp_parts(within(x), 0.0)
+    return scaled(value + behind, k)
+
+
+def within(x: float) -> float:
+    """Return `x` or the nearest number whose exponential has a value of its own; NaN for NaN."""
+    x = 710.0 if x > 710.0 else x
+    return -746.0 if x < -746.0 else x
+
+
+def scaled(x: float, k: float) -> float:
+    """Return ``x 2^k`` for whole k in -2044 ... 2046, rounded once where it is subnormal."""
+    half = nearest_whole(0.5 * k)
+    return x * two_to(half) * two_to(k - half)
+
+
+def exp_parts(x: float, rest: float) -> tuple[float, float, float]:
+    r"""Return k, a and b with ``e^(x + rest) = 2^k (a + b)``, \|x\| <= 746."""
+    k = nearest_whole(x * _PER_LN_2)
+    coarse = x - k * LN_2_1
+    r, behind = two_sum(coarse, rest - k * LN_2_2)
+    z = r * r
+    low = (_E3 + r * _E4) + z * (_E5 + r * _E6)
+    high = (_E7 + r * _E8) + z * (_E9 + r * _E10)
+    p = low + (z * z) * (high + (z * z) * _E11)
+    value, cut = fast_two_sum(1.0, r)
+    return k, value, (cut + (behind + behind * r)) + z * (0.5 + r * p)

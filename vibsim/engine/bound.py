@@ -1,0 +1,109 @@
+"""The names that a kernel binds: what the loops call without knowing the model or the scheme.
+
+Each kernel has functions and numbers of its own under these names (`vibsim.engine.kernel`); here they only say what
+the loops may rely on. numba does not keep compiled code of functions that are handed other functions, so the loops
+know them by name. The ``_fast`` ones are the same text with elementary functions that have no branch.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NoReturn, TypeVar
+
+F = TypeVar("F")
+
+State = tuple[float, ...]
+"""The state of a scheme, as many floats as it carries."""
+P = tuple[float, ...]
+"""The parameters of a member."""
+
+GATHER = True
+"""Whether energies, extrema, norms, peaks and turns are gathered."""
+STATES = 1
+"""Entries of the scheme's state."""
+SET = 3
+"""Rows of one set (`vibsim.engine.blocks`): the state, the position, the scheme's own velocity."""
+PARAMETERS = 1
+"""Number of parameters."""
+DT, ENERGY, BOTTOM, VELOCITY, TWO_BEFORE, INTERIOR, ALIVE, EVENT, EXTREMA = range(6, 15)
+FIRST_PARAMETER = 24
+"""Rows behind the two sets: step, initial energy, multiple of a turn below, velocity at this point, velocity two points
+before, largest deviation before this point, 1 for a lane that goes on, 1 for a lane with something to note, what is
+gathered at every step, and the parameters."""
+
+
+def called(function: F) -> F:
+    """Mark a function that a kernel compiles for itself instead of into its callers.
+
+    A loop over lanes then becomes vector instructions whatever stands around its call, and what is long and seldom
+    needed does not crowd what is needed at every step.
+    """
+    return function
+
+
+def _unbound() -> NoReturn:
+    raise RuntimeError("only a kernel binds this name")
+
+
+def start(variant: int, u: float, v: float, dt: float, p: P) -> State:
+    """Return the state at the first step (`vibsim.schemes.base.Stepper.start`)."""
+    _unbound()
+
+
+def step(state: State, t: float, dt: float, p: P) -> tuple[State, float]:
+    """Return the next state, and the velocity at the present time (`vibsim.schemes.base.Stepper.step`)."""
+    _unbound()
+
+
+def step_fast(state: State, t: float, dt: float, p: P) -> tuple[State, float]:
+    """Return what `step` does, or NaN where a fast function is out of its range."""
+    _unbound()
+
+
+def backward(state: State, dt: float) -> float:
+    """Return the one-sided velocity at the present time (`vibsim.schemes.base.Stepper.backward`)."""
+    _unbound()
+
+
+def energies(u: float, v: float, t: float, p: P) -> tuple[float, float]:
+    """Return kinetic and potential energy."""
+    _unbound()
+
+
+def energies_fast(u: float, v: float, t: float, p: P) -> tuple[float, float]:
+    """Return what `energies` does, or NaN where a fast function is out of its range."""
+    _unbound()
+
+
+def parameters_of(parameters: Any, case: int) -> P:
+    """Return the parameters of a member from the array of shape (case, n_parameters)."""
+    _unbound()
+
+
+def parameters_in(rows: Any, j: int) -> P:
+    """Return the parameters of a lane (`vibsim.engine.blocks`)."""
+    _unbound()
+
+
+def states_in(rows: Any, first: int, j: int) -> State:
+    """Return the state of a lane from the set of rows that begins at `first` (`vibsim.engine.blocks`)."""
+    _unbound()
+
+
+def put_states(rows: Any, first: int, j: int, state: State) -> None:
+    """Write the state of a lane to the set of rows that begins at `first`."""
+    _unbound()
+
+
+def extrema_in(rows: Any, j: int) -> Any:
+    """Return what a lane has gathered at every step (`vibsim.engine.gather.Extrema`)."""
+    _unbound()
+
+
+def put_extrema(rows: Any, j: int, extrema: Any) -> None:
+    """Write what a lane has gathered at every step."""
+    _unbound()
+
+
+def total(state: State) -> float:
+    """Return the sum of the entries of a state, which is NaN where one of them is."""
+    _unbound()

@@ -1,0 +1,141 @@
+"""The source text of functions, collected into one flat module.
+
+A function is taken with whatever it uses of its own module: numbers and tuples of numbers are written out, plain
+functions are collected in their turn. Anything else is refused.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import math
+import types
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from vibsim.errors import SimulationError
+
+HANDED = ("acceleration",)
+"""Functions that a scheme is handed as arguments; in a kernel it knows them by name."""
+
+
+@dataclass
+class Module:
+    """A flat module that is being written."""
+
+    entry: str
+    """The function that is called from outside."""
+    settings: Mapping[str, object] = field(default_factory=dict)
+    """Numbers that take the place of those in the modules that functions come from."""
+    given: Collection[str] = ()
+    """Names that the head of the module defines."""
+    parts: dict[str, str] = field(default_factory=dict)
+    """Text by name, each after what it uses."""
+
+    @property
+    def text(self) -> str:
+        """The whole text, without a head that says what ``compiled``, ``called`` and ``entry`` are."""
+        return "import math\n\n" + "\n\n".join(self.parts.values()) + "\n"
+
+    def put(self, name: str, text: str) -> None:
+        """Add a part.
+
+        Raises
+        ------
+        SimulationError
+            Where the name stands for something else already.
+        """
+        if self.parts.setdefault(name, text) != text:
+            raise SimulationError(f"{name} means two things in one kernel")
+
+
+def collect(
+    module: Module,
+    function: Callable[..., Any],
+    name: str,
+    renamed: Mapping[str, str],
+    *,
+    is_called: bool = False,
+) -> None:
+    """Write `function` under `name`, after whatever it uses.
+
+    Parameters
+    ----------
+    renamed
+        Names of the text that stand for others here.
+    is_called
+        Whether it is compiled for itself (`vibsim.engine.bound.called`).
+
+    Raises
+    ------
+    SimulationError
+        Where it uses something that cannot enter a kernel.
+    """
+    if not isinstance(function, types.FunctionType):
+        raise SimulationError(f"{name} is no plain Python function, so it cannot enter a kernel")
+    tree = ast.parse(inspect.cleandoc("\n" + inspect.getsource(function))).body[0]
+    if not isinstance(tree, ast.FunctionDef):
+        raise SimulationError(f"{name} is no function with a name, so it cannot enter a kernel")
+    _strip(tree, name)
+    local = set(function.__code__.co_varnames) - set(HANDED)
+    mark = _mark(module, function, tree, is_called)
+    names = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id not in local]
+    for other in sorted({node.id for node in names} & function.__globals__.keys()):
+        _collect_used(module, name, other, function.__globals__[other], renamed)
+    for node in names:
+        node.id = renamed.get(node.id, node.id)
+    module.put(name, f"@{mark}\n{ast.unparse(tree)}")
+
+
+def _mark(
+    module: Module, function: Callable[..., Any], tree: ast.FunctionDef, is_called: bool
+) -> str:
+    """Say how a function is compiled: into its callers, or for itself."""
+    if tree.name == module.entry:
+        return "entry"
+    is_marked = is_called or bool(tree.decorator_list)
+    tree.decorator_list = []
+    has_loop = any(isinstance(node, ast.For | ast.While) for node in ast.walk(tree))
+    is_elementary = function.__module__.startswith("vibsim.elementary")
+    return "called" if is_marked or (has_loop and is_elementary) else "compiled"
+
+
+def _collect_used(
+    module: Module, user: str, name: str, value: object, renamed: Mapping[str, str]
+) -> None:
+    """Write what a function uses under `name`, unless it is there, or bound by whoever makes the kernel."""
+    if name in module.given:
+        return
+    if name in module.settings:
+        module.put(name, f"{name} = {module.settings[name]!r}")
+    elif isinstance(value, types.FunctionType):
+        if renamed.get(name, name) not in module.parts:
+            collect(module, value, renamed.get(name, name), renamed)
+    elif _is_constant(value):
+        module.put(name, f"{name} = {value!r}")
+    elif value is not math:
+        raise SimulationError(
+            f"{user} uses {name}, which is no number, tuple of numbers or plain function"
+        )
+
+
+def _is_constant(value: object) -> bool:
+    if isinstance(value, tuple):
+        return all(_is_constant(entry) for entry in value)
+    return isinstance(value, int | float)
+
+
+def _strip(tree: ast.FunctionDef, name: str) -> None:
+    """Rename a function; drop its docstring, its annotations, and the functions it is handed."""
+    tree.name = name
+    tree.returns = None
+    tree.args.args = [argument for argument in tree.args.args if argument.arg not in HANDED]
+    for argument in tree.args.args:
+        argument.annotation = None
+    if ast.get_docstring(tree) is not None:
+        tree.body = tree.body[1:]
+    for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
+        call.args = [
+            argument for argument in call.args if getattr(argument, "id", None) not in HANDED
+        ]
