@@ -64,3 +64,58 @@ def test_a_file_within_a_folder_named_configs_elsewhere_is_ad_hoc(
     root: Path, tmp_path: Path
 ) -> None:
     assert keys([str(tmp_path / "elsewhere/configs/lab/x.yaml")], root) == ["adhoc/x"]
+
+
+def cases(words: list[str], root: Path) -> list[tuple[str, int | None]]:
+    return [(choice.key, choice.case) for choice in choose(words, root)]
+
+
+def test_a_member_is_named_after_the_at_sign(root: Path, tmp_path: Path) -> None:
+    file = str(tmp_path / "x.yaml")
+    words = ["one@3", "scale/big@0", f"{file}@12", "one", "one@3", "one@03"]
+    assert cases(words, root) == [
+        ("pendulum_lab/one_case_3", 3),
+        ("scale/big_case_0", 0),
+        ("adhoc/x_case_12", 12),
+        ("pendulum_lab/one", None),
+    ]
+    assert choose([f"{file}@12"], root)[0].file == Path(file)
+
+
+def test_a_file_may_have_an_at_sign(root: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "a@b"
+    words = [str(folder / "x.yaml"), str(folder / "x.yaml@2"), str(tmp_path / "y@4.yaml")]
+    found = choose(words, root)
+    assert [(choice.name, choice.case) for choice in found] == [
+        ("x", None),
+        ("x_case_2", 2),
+        ("y@4", None),
+    ]
+    assert found[0].file == found[1].file == folder / "x.yaml"
+
+
+@pytest.mark.parametrize(
+    ("word", "told"),
+    [
+        ("one@", "a member is named by @ and its number, from 0: e.g. one@0"),
+        ("one@two", "a member is named by @ and its number"),
+        ("one@-1", "a member is named by @ and its number"),
+        ("one@\u0663", "a member is named by @ and its number"),
+        ("one@" + "9" * 5000, "a member is named by @ and its number"),
+        ("onne@3", "did you mean 'one'"),
+        ("two@3", "choose from pendulum_lab/two, showcase/two"),
+        ("pendulum_lab@3", "a collection has no members: choose from pendulum_lab/one"),
+        ("scale@3", "a collection has no members: choose from scale/big"),
+    ],
+)
+def test_what_is_no_member_is_refused(root: Path, word: str, told: str) -> None:
+    with pytest.raises(InputError) as caught:
+        choose([word], root)
+    assert told in str(caught.value)
+
+
+def test_a_member_and_an_experiment_of_its_name_are_refused(root: Path) -> None:
+    (root / "configs/scale/big_case_1.yaml").touch()
+    with pytest.raises(InputError, match="cannot share a name"):
+        choose(["scale/big@1", "scale/big_case_1"], root)
+    assert keys(["scale/big@1", "scale/big@2"], root) == ["scale/big_case_1", "scale/big_case_2"]

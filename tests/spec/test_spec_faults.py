@@ -33,6 +33,21 @@ def at(**fields: Any) -> dict[str, Any]:
     return value(value="end", at=fields)
 
 
+def swept(**rule: Any) -> dict[str, Any]:
+    return {"sweep": {"model.g": rule}}
+
+
+def sample(**fields: Any) -> dict[str, Any]:
+    section = {"method": "sobol", "n": 4, "seed": 1, "over": {"model.g": [1, 2]}} | fields
+    return {"sweep": {"sample": {k: v for k, v in section.items() if v is not None}}}
+
+
+def by_tolerance(tolerance: object, **changes: Any) -> dict[str, Any]:
+    return {"levels": None, "tolerance": tolerance, **changes}
+
+
+G, OVER, START = "sweep.model.g", "sweep.sample.over.model", "schemes.central.start"
+
 CASES: list[tuple[dict[str, Any], str, str, str]] = [
     # sections
     ({"title": None}, "title", "required key is missing", ""),
@@ -159,6 +174,115 @@ CASES: list[tuple[dict[str, Any], str, str, str]] = [
     ({"sweep": {"model.g": {"linspace": [1, 2, 3, 4]}}}, "sweep.model.g.linspace", "[first,", ""),
     ({"sweep": {"model.g": {"linspace": 3}}}, "sweep.model.g.linspace", "[first, last,", ""),
     ({"sweep": {"model.g": {"linspace": [1, 2, 2.5]}}}, "sweep.model.g.linspace[2]", "whole", ""),
+    (swept(linspce=[1, 2, 3]), f"{G}.linspce", "unknown key", "did you mean 'linspace'?"),
+    (swept(linspace=[1, 2, 3], foo=1), f"{G}.foo", "unknown key", "linspace, logspace, range"),
+    (swept(linspace=[1, 2, 3], range=[1, 2, 1]), f"{G}.range", "has one rule", ""),
+    ({"sweep": {"model.g": {}}}, G, "must be a list, or a mapping with one of linspace", ""),
+    ({"sweep": {"model.g": "pi"}}, G, "must be a list, or a mapping", ""),
+    ({"sweep": {"model.g": ["2*q"]}}, f"{G}[0]", "unknown name 'q'", "e, pi"),
+    ({"sweep": {"model.g": [1, float("nan")]}}, f"{G}[1]", "must be a finite number", ""),
+    ({"sweep": {"initial.theta": [10**400]}}, "sweep.initial.theta[0]", "finite number", ""),
+    (
+        {"sweep": {"initial.theta": {"linspace": [-1e308, 1e308, 3]}}},
+        "sweep.initial.theta.linspace[1]",
+        "the difference has no finite value",
+        "",
+    ),
+    (swept(logspace=[1, 2]), f"{G}.logspace", "must be [first, last, count]", ""),
+    (swept(logspace=[0, 2, 3]), f"{G}.logspace[0]", "greater than 0", "not exponents"),
+    (swept(logspace=[1, -2, 3]), f"{G}.logspace[1]", "greater than 0", "not exponents"),
+    (swept(logspace=[1, 2, 1]), f"{G}.logspace[2]", "at least 2 values", "as a list"),
+    (swept(logspace=[1, float("inf"), 3]), f"{G}.logspace[1]", "finite number", ""),
+    (swept(range=[1, 2]), f"{G}.range", "must be [first, end, step]", ""),
+    (swept(range=[1, 2, 0]), f"{G}.range[2]", "the step must not be 0", ""),
+    (swept(range=[1, 2, -0.1]), f"{G}.range[2]", "the step must lead from 1 to 2", "0.1"),
+    (swept(range=[2, 1, 0.1]), f"{G}.range[2]", "the step must lead from 2 to 1", "-0.1"),
+    (swept(range=[1, 2, 1e-300]), f"{G}.range[2]", "more than 9", ""),
+    (swept(range=[1, 0, -0.5]), f"{G}.range[1]", "must be greater than 0", ""),
+    # several keys that move together
+    ({"sweep": {"zip": [1]}}, "sweep.zip", "must be a mapping", ""),
+    ({"sweep": {"zip": {}}}, "sweep.zip", "must not be empty", ""),
+    ({"sweep": {"zip": None}}, "sweep", "must not be empty", ""),
+    ({"sweep": {"zip": {"model.g": 3}}}, "sweep.zip.model.g", "must be a list, or", ""),
+    ({"sweep": {"zip": {"model.g": [0]}}}, "sweep.zip.model.g[0]", "greater than 0", ""),
+    ({"sweep": {"zip": {"model.G": [1]}}}, "sweep.zip.model.G", "cannot be swept", "'model.g'"),
+    ({"sweep": {"zip": {"zip": [1]}}}, "sweep.zip.zip", "cannot be swept", "choose from"),
+    (
+        {"sweep": {"zip": {"model.g": [1, 2], "model.L": {"linspace": [1, 2, 3]}}}},
+        "sweep.zip.model.L",
+        "must have as many values as model.g, 2, has 3",
+        "",
+    ),
+    (
+        {"sweep": {"model.g": [1], "zip": {"model.g": [1]}}},
+        "sweep.zip.model.g",
+        "is swept twice, first on its own",
+        "",
+    ),
+    (
+        {"sweep": {"zip": {"model.g": [1]}, **sample(over={"model.g": [1, 2]})["sweep"]}},
+        "sweep.sample.over.model.g",
+        "is swept twice, first in zip",
+        "",
+    ),
+    # points scattered over several keys
+    ({"sweep": {"sample": 3}}, "sweep.sample", "must be a mapping", ""),
+    (sample(method="sobl"), "sweep.sample.method", "unknown choice", "did you mean 'sobol'?"),
+    (sample(n=0), "sweep.sample.n", "must be at least 1", ""),
+    (sample(n=2.5), "sweep.sample.n", "must be a whole number", ""),
+    (sample(method="latin_hypercube", n=10**6 + 1), "sweep.sample.n", "at most 1000000", "sobol"),
+    (sample(seed=None), "sweep.sample.seed", "required key is missing", ""),
+    (sample(seed=-1), "sweep.sample.seed", "must be at least 0", ""),
+    (sample(seed=1.5), "sweep.sample.seed", "must be a whole number", ""),
+    (sample(seed=2**63), "sweep.sample.seed", "must be at most", ""),
+    (sample(over=None), "sweep.sample.over", "required key is missing", ""),
+    (sample(over={}), "sweep.sample.over", "must not be empty", ""),
+    (sample(sed=1), "sweep.sample.sed", "unknown key", "did you mean 'seed'?"),
+    (sample(over={"model.l": [1, 2]}), f"{OVER}.l", "cannot be swept", "model.L"),
+    (sample(over={"model.g": [1]}), f"{OVER}.g", "must be [least, largest]", ""),
+    (sample(over={"model.g": 3}), f"{OVER}.g", "must be [least, largest]", ""),
+    (sample(over={"model.g": [1, "x"]}), f"{OVER}.g[1]", "unknown name 'x'", ""),
+    (sample(over={"model.g": [2, 2]}), f"{OVER}.g[1]", "greater than the least value, 2", ""),
+    (sample(over={"model.g": [0, 2]}), f"{OVER}.g[0]", "must be greater than 0", ""),
+    (
+        sample(over={"schemes.central.start": [0, 1]}),
+        "sweep.sample.over.schemes.central.start",
+        "takes words",
+        "by a list",
+    ),
+    # options of schemes
+    (
+        {"sweep": {"schemes.centrl.start": ["centred"]}},
+        "sweep.schemes.centrl.start",
+        "cannot be swept",
+        "did you mean 'schemes.central.start'?",
+    ),
+    (
+        {"sweep": {"schemes.central.strt": ["centred"]}},
+        "sweep.schemes.central.strt",
+        "cannot be swept",
+        "did you mean 'schemes.central.start'?",
+    ),
+    ({"sweep": {START: ["centered"]}}, f"sweep.{START}[0]", "unknown choice", "'centred'"),
+    ({"sweep": {START: ["centred", 1]}}, f"sweep.{START}[1]", "unknown choice", "choose from"),
+    ({"sweep": {START: {"linspace": [1, 2, 3]}}}, f"sweep.{START}", "must be a list of", "centred"),
+    # output and tolerance
+    ({"output": "bst"}, "output", "unknown choice", "did you mean 'best'?"),
+    ({"output": "best", "levels": [6]}, "output", "at least 2 levels, there is 1", ""),
+    ({"levels": None}, "levels", "required key is missing", "or tolerance"),
+    ({"tolerance": 1e-10}, "tolerance", "must not be given together with levels", ""),
+    (by_tolerance(0), "tolerance", "must be greater than 0", ""),
+    (by_tolerance(1), "tolerance", "must be less than 1", ""),
+    (by_tolerance("1e-10x"), "tolerance", "must be a number", ""),
+    (
+        by_tolerance(1e-10, **value(at={"level": 6})),
+        "checks[0].at.level",
+        "cannot be named",
+        "best",
+    ),
+    (by_tolerance(1e-10, **at(step=0)), "checks[0].at.step", "cannot be named", "t can"),
+    (by_tolerance(1e-10, **at(t=21)), "checks[0].at.t", "must be between 0 and the end 20", ""),
+    (by_tolerance(1e-10, **value(at={"best": True})), "checks[0].at.level", "extrapolated", ""),
     # samples
     ({"samples": "some"}, "samples", "unknown choice", "choose from auto, common, all"),
     ({"samples": {"every": 0}}, "samples.every", "must be at least 1", ""),
@@ -356,14 +480,6 @@ def test_a_scheme_that_cannot_treat_the_model_is_refused(
     build()
 
 
-@pytest.mark.parametrize("name", ["logspace", "range", "zip", "sample"])
-def test_later_kinds_of_sweep_are_unknown_keys(name: str) -> None:
-    rules = [(f.key, f.rule) for f in faults_of(sweep={"model.g": {name: [1, 2, 3]}})]
-    assert (f"sweep.model.g.{name}", "unknown key") in rules
-    (fault,) = faults_of(sweep={name: [1, 2]})
-    assert fault.rule == "cannot be swept"
-
-
 def test_two_checks_with_one_id() -> None:
     two = [{"id": "a", "converges": "theta"}, {"id": "a", "converges": "omega"}]
     assert only_fault(checks=two).key == "checks[1].id"
@@ -524,6 +640,54 @@ def test_a_malformed_value_hides_no_fault_of_its_check(
 ) -> None:
     found = faults_of(checks=[check])
     assert sorted(fault.key for fault in found) == [f"checks[0].{key}" for key in keys]
+
+
+def test_a_malformed_value_hides_no_fault_of_its_sweep() -> None:
+    found = faults_of(
+        sweep={
+            "zip": {"model.g": 3, "model.k": [1], "initial.theta": ["x"]},
+            "model.L": {"rnge": [1, 2, 3]},
+            "sample": {
+                "method": "sobl",
+                "n": 0,
+                "over": {"time.end": [1], "model.m": [0, 1], "omega": [1, 2], "model.g": [1, 2]},
+            },
+            "schemes.central.start": ["late"],
+        },
+        checks=[{**CHECKED, "at": {"t": 77.7, "case": 5}}],
+    )
+    assert sorted(fault.key for fault in found) == [
+        "sweep.model.L.rnge",
+        "sweep.sample.method",
+        "sweep.sample.n",
+        "sweep.sample.over.model.m[0]",
+        "sweep.sample.over.omega",
+        "sweep.sample.over.time.end",
+        "sweep.sample.seed",
+        "sweep.schemes.central.start[0]",
+        "sweep.zip.initial.theta[0]",
+        "sweep.zip.model.g",
+        "sweep.zip.model.k",
+    ]
+
+
+def test_of_a_malformed_sweep_no_case_is_out_of_range() -> None:
+    check = {**CHECKED, "at": {"t": 77.7, "case": 5}}
+    sweep = {"model.g": [1, 2], "time.end": [1, [2]]}
+    assert only_fault(sweep=sweep, checks=[check]).key == "sweep.time.end[1]"
+    del sweep["time.end"]
+    assert len(faults_of(sweep=sweep, checks=[check])) == 2
+
+
+def test_the_step_of_no_member_may_vanish() -> None:
+    build(sweep={"time.end": [1, 1e-97]})
+    assert "time step" in only_fault(sweep={"time.end": [1, 1e-98]}).rule
+
+
+def test_an_option_of_a_faulty_scheme_is_not_called_unknown() -> None:
+    found = faults_of(schemes=["centrl"], sweep={START: ["centred"], "schemes.foo": [1]})
+    assert [fault.key for fault in found] == ["schemes[0]"]
+    assert only_fault(model={"kind": "x"}, sweep={"model.foo": [1]}).key == "model.kind"
 
 
 def test_a_malformed_value_hides_no_fault_of_its_section() -> None:

@@ -6,10 +6,12 @@ import json
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from spec_files import content
 
+from vibsim import plan
 from vibsim.errors import InputError
 from vibsim.spec import Experiment, canonical, restore
 from vibsim.spec.build import Place, build
@@ -31,8 +33,23 @@ def attempt(make: Callable[[], Experiment]) -> None:
         refused = None
         content = json.loads(json.dumps(canonical(experiment), allow_nan=False))
         assert restore(content) == experiment
+        members(experiment)
     assert refused is None or all(fault.rule for fault in refused.faults)
     assert refused is None or refused.faults
+
+
+def members(experiment: Experiment) -> None:
+    """Require that members are what the plan says, at both ends, and that the last one stands alone."""
+    last = experiment.members - 1
+    for found in (plan.columns(experiment, 0, 1), plan.columns(experiment, last, last + 1)):
+        assert all(len(values) == 1 for values in found.values())
+        assert all(
+            values.dtype.kind == "U" or np.isfinite(values).all() for values in found.values()
+        )
+    alone = experiment.alone(last)
+    assert restore(canonical(alone)) == alone
+    if not experiment.levels:
+        attempt(lambda: experiment.with_levels([6, 7]))
 
 
 def read(data: bytes) -> None:
@@ -62,6 +79,8 @@ WORDS = [
     *("initial.theta", "time.end", "linspace", "samples", "auto", "every", "checks", "converges"),
     *("order", "scheme", "tolerance", "norm", "expect", "status", "reason", "FAIL", "order_low"),
     *("value", "quantity", "at", "t", "step", "level", "best", "case", "equals", "below", "rtol"),
+    *("logspace", "range", "zip", "sample", "method", "n", "seed", "over", "sobol", "random"),
+    *("latin_hypercube", "schemes.central.start", "centred", "output", "tolerance", "1e-9"),
     *("claim", "that", "holds", "max", "error_l2", "period", "energy", "id", "2*pi", "1/0", "\0x"),
 ]
 SCALARS = st.one_of(
@@ -81,7 +100,10 @@ VALUES = st.recursive(
     ),
     max_leaves=12,
 )
-SECTIONS = ("title", "source", "model", "initial", "time", "levels", "schemes", "sweep", "samples")
+SECTIONS = (
+    *("title", "source", "model", "initial", "time", "levels", "schemes", "sweep", "samples"),
+    *("output", "tolerance"),
+)
 AT = st.dictionaries(st.sampled_from(["t", "step", "level", "best", "scheme", "case"]), SCALARS)
 CHECK = st.dictionaries(
     st.sampled_from(
@@ -90,13 +112,119 @@ CHECK = st.dictionaries(
     st.one_of(VALUES, AT, st.sampled_from(WORDS)),
     max_size=5,
 )
+KEYS = st.one_of(
+    st.sampled_from(["model.g", "model.L", "initial.theta", "time.end", "schemes.central.start"]),
+    st.sampled_from(["levels", "time.base_dt", "schemes.a.start", "schemes.", "model", "."]),
+)
+NUMBERS = st.one_of(
+    st.floats(0.1, 5.0),
+    st.integers(-2, 9),
+    st.floats(),
+    st.sampled_from(["pi/2", "1/0", "1e400", "centred", "first_order", 0.0, -0.0, 5e-324, 1e308]),
+    SCALARS,
+)
+COUNTS = st.one_of(st.integers(1, 9), st.sampled_from([0, 10**12, 1e12, "3"]), SCALARS)
+RULE = st.one_of(
+    st.lists(NUMBERS, max_size=4),
+    st.fixed_dictionaries({"linspace": st.tuples(NUMBERS, NUMBERS, COUNTS)}),
+    st.fixed_dictionaries({"logspace": st.tuples(NUMBERS, NUMBERS, COUNTS)}),
+    st.fixed_dictionaries({"range": st.tuples(NUMBERS, NUMBERS, NUMBERS)}),
+    st.dictionaries(st.sampled_from(["linspace", "logspace", "range", "n"]), VALUES, max_size=2),
+    VALUES,
+)
+INTERVAL = st.one_of(st.tuples(NUMBERS, NUMBERS), VALUES)
+SAMPLE = st.one_of(
+    st.fixed_dictionaries(
+        {
+            "method": st.sampled_from(["sobol", "random", "latin_hypercube"]),
+            "n": COUNTS,
+            "over": st.dictionaries(KEYS, INTERVAL, max_size=3),
+        },
+        optional={"seed": COUNTS, "sed": SCALARS},
+    ),
+    VALUES,
+)
+SWEEP = st.builds(
+    lambda single, more: {**single, **more},
+    st.dictionaries(KEYS, RULE, max_size=3),
+    st.fixed_dictionaries(
+        {},
+        optional={
+            "zip": st.one_of(st.dictionaries(KEYS, RULE, max_size=3), VALUES),
+            "sample": SAMPLE,
+        },
+    ),
+)
+POSITIVE = st.floats(0.1, 5.0)
+FEW = st.integers(2, 9)
+ANY_KEY = st.permutations(["model.g", "model.L", "initial.theta", "initial.omega", "time.end"])
+
+
+def sound_rule(n: int) -> st.SearchStrategy[Any]:
+    """Give n values above 0."""
+    line, step = st.tuples(POSITIVE, POSITIVE, st.just(n)), st.tuples(POSITIVE, POSITIVE)
+    return st.one_of(
+        st.lists(POSITIVE, min_size=n, max_size=n),
+        st.fixed_dictionaries({"linspace": line}),
+        st.fixed_dictionaries({"logspace": line}),
+        step.map(lambda s: {"range": [s[0], s[0] + (n - 1) * s[1], s[1]]}),
+    )
+
+
+@st.composite
+def sound_sweeps(draw: st.DrawFn) -> dict[str, Any]:
+    """Draw a sweep without fault: some keys alone, some together, some scattered."""
+    keys = draw(ANY_KEY)
+    first, second = sorted(draw(st.tuples(st.integers(0, 5), st.integers(1, 5))))
+    sweep: dict[str, Any] = {key: draw(sound_rule(draw(FEW))) for key in keys[:first]}
+    n = draw(FEW)
+    if together := {key: draw(sound_rule(n)) for key in keys[first:second]}:
+        sweep["zip"] = together
+    if over := {key: (1, 1 + draw(POSITIVE)) for key in keys[second:]}:
+        method = draw(st.sampled_from(["sobol", "random", "latin_hypercube"]))
+        sweep["sample"] = {"method": method, "n": n, "seed": draw(st.integers(0, 99)), "over": over}
+    if draw(st.booleans()):
+        sweep["schemes.central.start"] = ["first_order", "centred"]
+    return {key: sweep[key] for key in draw(st.permutations([*sweep]))}
+
+
 CHANGES = st.one_of(
     st.dictionaries(st.sampled_from([*SECTIONS, "checks"]), VALUES, max_size=3),
     st.fixed_dictionaries({"checks": st.lists(CHECK, max_size=3)}),
+    st.fixed_dictionaries({"sweep": SWEEP}, optional={"checks": st.lists(CHECK, max_size=1)}),
     st.fixed_dictionaries(
-        {"sweep": st.dictionaries(st.sampled_from(["model.g", "time.end", "levels"]), VALUES)}
+        {"tolerance": st.one_of(st.just(1e-6), SCALARS), "levels": st.one_of(st.none(), SCALARS)},
+        optional={"checks": st.lists(CHECK, max_size=3), "output": SCALARS},
     ),
 )
+
+
+@given(sound_sweeps())
+@QUIET
+def test_sound_sweeps(sweep: dict[str, Any]) -> None:
+    """They are accepted, and every member alone is the member of the grid."""
+    experiment = Experiment.from_dict(content(sweep=sweep, levels=[1, 2]))
+    attempt(lambda: experiment)
+    columns = plan.columns(experiment, 0, experiment.members)
+    case = experiment.members // 2
+    alone = experiment.alone(case)
+    values = {f"model.{name}": value for name, value in alone.model.parameters.items()}
+    values |= {f"initial.{name}": value for name, value in alone.initial.items()}
+    values |= {"time.end": alone.time.end}
+    values |= {f"schemes.central.{name}": word for name, word in alone.schemes[0].options.items()}
+    assert {key: values[key] for key in columns} == {k: c[case] for k, c in columns.items()}
+
+
+@given(sound_sweeps(), st.data())
+@QUIET
+def test_sweeps_with_one_fault(sweep: dict[str, Any], data: st.DataObject) -> None:
+    """One part of the sweep, however deep, is replaced by something else."""
+    holder, key = sweep, data.draw(st.sampled_from([*sweep]))
+    while isinstance(holder[key], dict) and data.draw(st.booleans()):
+        holder = holder[key]
+        key = data.draw(st.sampled_from([*holder]))
+    holder[key] = data.draw(st.one_of(RULE, SAMPLE, NUMBERS))
+    attempt(lambda: Experiment.from_dict(content(sweep=sweep, levels=[1, 2])))
 
 
 @given(CHANGES)

@@ -5,14 +5,19 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from spec_files import build, faults_of, only_fault
 
-from vibsim.spec.sweep import line
+from vibsim.spec.columns import line
+from vibsim.spec.cost import Load
 
+ALL = Load(schemes=1, steps=2**28, samples=2**28 + 1, series=6, exact=2)
+MEMORY = ALL.memory(1)
+DISK = replace(ALL, steps=2**12, samples=2**12 + 1).disk(10**7)
 HUGE = {"linspace": [1, 2, 10**6]}
 
 
@@ -34,7 +39,17 @@ HUGE = {"linspace": [1, 2, 10**6]}
             "levels",
             "bytes",
         ),
-        ({"levels": [28]}, "levels", str(64 * (2**28 + 1))),
+        ({"levels": [28], "samples": "all"}, "levels", str(MEMORY)),
+        (
+            {"levels": [12], "samples": "all", "sweep": {"model.g": {"linspace": [1, 2, 10**7]}}},
+            "levels",
+            str(DISK),
+        ),
+        (
+            {"levels": [12], "samples": "all", "sweep": {"model.g": {"linspace": [1, 2, 3000000]}}},
+            "levels",
+            "they have 5860",
+        ),
     ],
 )
 def test_message_carries_the_number(changes: dict[str, Any], key: str, number: str) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from jsonschema import Draft202012Validator
-from spec_files import content
+from spec_files import build, content, faults_of
 from test_spec_experiment import DESIGN
 from test_spec_faults import CASES
 
@@ -45,12 +45,34 @@ def test_schema_is_a_schema() -> None:
         {"time": {"periods": 3, "steps_per_period": 8}},
         {"time": {"end": "2*pi", "base_dt": "pi"}},
         {"sweep": {"model.g": [1, "2*pi"], "model.L": {"linspace": [1, 2, 3]}}},
+        {"sweep": {"model.g": {"logspace": ["pi/2", 2, 3]}, "model.L": {"range": [1, 2, 0.1]}}},
+        {"sweep": {"zip": {"model.g": [1, 2], "schemes.central.start": ["centred", "centred"]}}},
+        {"sweep": {"schemes.central.start": ["first_order", "centred"]}},
+        {"sweep": {"sample": {"method": "sobol", "n": 4, "seed": 1, "over": {"model.g": [1, 2]}}}},
+        {"levels": None, "tolerance": "1e-10"},
+        {"output": "best"},
         {"samples": {"every": 2}},
         {"checks": [{"value": "error_l2", "quantity": "theta", "below": 1, "at": {"best": True}}]},
     ],
 )
 def test_accepts_what_the_loader_accepts(changes: dict[str, Any]) -> None:
     VALIDATOR.validate(content(**changes))
+    build(**changes)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"levels": None},
+        {"tolerance": 1e-10},
+        {"sweep": {"schemes.central.start": ["late"]}},
+        {"sweep": {"sample": {"method": "sobol", "n": 4, "over": {"model.g": [1, 2]}}}},
+        {"sweep": {"sample": {"method": "sobol", "n": 4, "seed": -1, "over": {"model.g": [1, 2]}}}},
+    ],
+)
+def test_refuses_what_the_loader_refuses(changes: dict[str, Any]) -> None:
+    assert not VALIDATOR.is_valid(content(**changes))
+    faults_of(**changes)
 
 
 def test_accepts_the_designs_example() -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -16,31 +18,27 @@ def count(experiment: Experiment) -> int:
     return experiment.members
 
 
-def columns(experiment: Experiment, start: int, stop: int) -> dict[str, NDArray[np.float64]]:
+def columns(experiment: Experiment, start: int, stop: int) -> dict[str, NDArray[Any]]:
     """Return the swept values of the members from `start` up to, not including, `stop`.
 
     Parameters
     ----------
     experiment
-        Its sweep is a grid in the order written, last key fastest.
+        Its sweep is a grid of its axes in the order written, last axis fastest.
     start, stop
         Range of the global member index.
 
     Returns
     -------
     dict
-        Dotted key to values, shape (stop - start,), in the unit of the key; empty without a sweep.
+        Dotted key to values, shape (stop - start,): float64 in the unit of the key, or text where the options of a
+        scheme are swept. Empty without a sweep.
     """
-    import numpy as np
-
     if experiment.sweep is None:
         return {}
-    axes = experiment.sweep.axes
-    index = np.unravel_index(np.arange(start, stop), [len(values) for _, values in axes])
-    return {
-        key: np.asarray(values, dtype=np.float64)[position]
-        for (key, values), position in zip(axes, index, strict=True)
-    }
+    from vibsim.spec.columns import columns as values_of
+
+    return values_of(experiment.sweep.axes, start, stop)
 
 
 def sampling(experiment: Experiment, level: int) -> int:
@@ -54,3 +52,42 @@ def sampling(experiment: Experiment, level: int) -> int:
     coarsest = experiment.steps(experiment.levels[0])
     trajectories = len(experiment.schemes) * experiment.members
     return stride(experiment.samples, coarsest, experiment.steps(level), trajectories)
+
+
+def option_groups(
+    experiment: Experiment, scheme: int, columns: Mapping[str, NDArray[Any]]
+) -> list[tuple[Mapping[str, str], NDArray[np.int64]]]:
+    """Return the options that members have of one scheme.
+
+    Parameters
+    ----------
+    experiment
+        The experiment.
+    scheme
+        Number of the scheme.
+    columns
+        Swept values of some members, as `columns` returns them.
+
+    Returns
+    -------
+    list
+        Every distinct set of options, in the order in which members first have it, with the positions of those
+        members in `columns`, increasing. Without a sweep, the one set of the one member.
+    """
+    import numpy as np
+
+    base = experiment.scheme_options(scheme)
+    size = len(next(iter(columns.values()))) if columns else 1
+    prefix = f"schemes.{experiment.schemes[scheme].name}."
+    swept = {name: columns[key] for name in base if (key := prefix + name) in columns}
+    if not swept:
+        return [(base, np.arange(size))]
+    groups: list[tuple[Mapping[str, str], NDArray[np.int64]]] = []
+    left = np.ones(size, dtype=bool)
+    while left.any():
+        place = left.argmax()
+        options = {**base, **{name: str(column[place]) for name, column in swept.items()}}
+        same = np.all([column == column[place] for column in swept.values()], axis=0)
+        groups.append((options, np.flatnonzero(same)))
+        left &= ~same
+    return groups

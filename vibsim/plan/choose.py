@@ -1,16 +1,18 @@
-"""Find the experiments that a user names: by file, by name, or by collection."""
+"""Find the experiments that a user names: by file, by name, or by collection; with ``@CASE``, one member alone."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from vibsim.errors import Fault, InputError, VibsimError, nearest
 from vibsim.spec.collection import collection_of, find_checkout
 
 DEFAULT = ("pendulum_lab", "showcase")
+MAX_DIGITS = 18
+"""Of the number of a member."""
 
 
 @dataclass(frozen=True)
@@ -19,11 +21,13 @@ class Choice:
 
     collection: str
     file: Path
+    case: int | None = None
+    """The member of its sweep that is meant, alone; None for all of them."""
 
     @property
     def name(self) -> str:
-        """Name of the experiment."""
-        return self.file.stem
+        """Name of the experiment: that of `vibsim.spec.Experiment.alone` for one member."""
+        return self.file.stem if self.case is None else f"{self.file.stem}_case_{self.case}"
 
     @property
     def key(self) -> str:
@@ -57,7 +61,8 @@ def choose(words: Sequence[str], root: Path) -> list[Choice]:
     ----------
     words
         Files, names of experiments (``name`` or ``collection/name``) or collections; none of them
-        means the default collections.
+        means the default collections. A file or a name followed by ``@`` and a number means that
+        member of the sweep alone.
     root
         The checkout.
 
@@ -74,23 +79,42 @@ def choose(words: Sequence[str], root: Path) -> list[Choice]:
     known = experiments(root)
     if not words:
         words = [c for c in DEFAULT if any(k.collection == c for k in known)]
-    chosen: dict[Path, Choice] = {}
+    chosen: dict[tuple[Path, int | None], Choice] = {}
     faults: list[Fault] = []
     for word in words:
-        found, rule = _find(word, known, root)
+        found, rule = _find_member(word, known, root)
         if rule:
             faults.append(Fault(word, 0, "", "", *rule))
-        chosen.update((choice.file, choice) for choice in found)
+        chosen.update(((choice.file, choice.case), choice) for choice in found)
     faults.extend(_clashes(list(chosen.values())))
     if faults:
         raise InputError(faults)
     return list(chosen.values())
 
 
-def _find(
-    word: str, known: list[Choice], root: Path
-) -> tuple[list[Choice], tuple[str, str] | None]:
-    if word.endswith((".yaml", ".yml")):
+Found = tuple[list[Choice], tuple[str, str] | None]
+"""The experiments of a word, or the rule that it breaks and a hint."""
+
+
+def _find_member(word: str, known: list[Choice], root: Path) -> Found:
+    """Find what `word` names, which may be one member of a sweep."""
+    name, at, case = word.rpartition("@")
+    if not at or _is_file(word):
+        return _find(word, known, root)
+    if not (case.isascii() and case.isdigit() and len(case) <= MAX_DIGITS):
+        return [], ("a member is named by @ and its number, from 0", f"e.g. {name}@0")
+    if found := [c for c in known if c.collection == name]:
+        return [], ("a collection has no members", "choose from " + _list(found))
+    found, rule = _find(name, known, root)
+    return [replace(choice, case=int(case)) for choice in found], rule
+
+
+def _is_file(word: str) -> bool:
+    return word.endswith((".yaml", ".yml"))
+
+
+def _find(word: str, known: list[Choice], root: Path) -> Found:
+    if _is_file(word):
         return [_choice(Path(word), root)], None
     if found := [c for c in known if c.collection == word]:
         return found, None

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from vibsim.lazy import loader
 
 if TYPE_CHECKING:
+    from vibsim.spec.axes import Axis, Draw, Linspace, Logspace, Range
     from vibsim.spec.checks import (
         At,
         Check,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from vibsim.spec.values import VALUES, Value
 
 _HOMES = {
+    "axes": ("Axis", "Draw", "Linspace", "Logspace", "Range"),
     "checks": (
         "At",
         "Check",
@@ -60,12 +62,17 @@ _HOME = {name: f"vibsim.spec.{module}" for module, names in _HOMES.items() for n
 __all__ = [
     "VALUES",
     "At",
+    "Axis",
     "Check",
     "ClaimCheck",
     "ConvergesCheck",
+    "Draw",
     "Expect",
     "Experiment",
+    "Linspace",
+    "Logspace",
     "ModelSpec",
+    "Range",
     "SchemeSpec",
     "Sweep",
     "TimeSpec",

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -15,13 +15,15 @@ from vibsim.expression import names_in, parse
 from vibsim.models import MODELS, Model, quantities
 from vibsim.schemes import SCHEMES
 from vibsim.spec import limits, sweep
-from vibsim.spec.check_rules import Ladder, finish_checks
+from vibsim.spec.check_places import Ladder
+from vibsim.spec.check_rules import finish_checks
 from vibsim.spec.checks import ConvergesCheck
 from vibsim.spec.document import Document, Every, LevelRange, Partial
 from vibsim.spec.experiment import Experiment, ModelSpec, SchemeSpec, Sweep, TimeSpec
 from vibsim.spec.faults import Report, plain_path
 from vibsim.spec.mending import without
 from vibsim.spec.source import Path_, Source
+from vibsim.spec.sweep_keys import Keys, targets
 from vibsim.spec.timing import time_spec
 
 _LISTS = ("schemes", "checks")
@@ -48,23 +50,24 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
     part = _sections(source, report)
     model = _model(source)
     parameters = _parameters(part, model)
-    levels = _levels(part, report)
+    levels = _levels(part, source, report)
     schemes = _schemes(part, model, report)
     time = time_spec(part.time, model, parameters, report) if part.time else None
     initial = _initial(part, model, report)
-    axes = sweep.axes(part.sweep, part.time, model, report) if part.sweep else ()
+    varied = _swept(part, source, model, schemes, report)
     samples = part.samples.every if isinstance(part.samples, Every) else part.samples
     shape = limits.Shape(
         base_steps=time.base_steps if time else None,
         levels=levels,
         schemes=len(part.schemes),
-        members=None if _lacks(part.sweep, source, "sweep") else sweep.count(axes),
+        members=varied.members,
         samples=samples,
         variables=len(quantities(model)) if model else 0,
-        end=time.end if time else None,
+        end=varied.least_end(time) if time else None,
     )
     limits.check(shape, report)
-    checks = _checks(part, source, model, shape, time, axes, report)
+    _check_output(part.output, levels, report)
+    checks = _checks(part, source, model, shape, time, varied, report)
     report.raise_any()
     assert model is not None
     assert time is not None
@@ -78,8 +81,10 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
         time=time,
         levels=levels,
         schemes=tuple(schemes),
-        sweep=Sweep(axes=sweep.expand(axes)) if axes else None,
+        sweep=Sweep(axes=varied.axes) if varied.axes else None,
         samples=samples,
+        output=part.output,
+        tolerance=part.tolerance,
         checks=checks,
     )
     experiment._file = place.file
@@ -118,12 +123,6 @@ def _without(data: Mapping[str, Any], faulty: list[Path_]) -> dict[str, Any]:
     return kept
 
 
-def _lacks(section: object, source: Source, key: str) -> bool:
-    """Tell whether the file has a section of which something is left out because of a fault."""
-    written = source.data.get(key)
-    return written is not None and (section is None or len(cast(Any, section)) < len(written))
-
-
 def _model(source: Source) -> Model | None:
     """Return the model; a model section with a fault elsewhere still names it."""
     section = source.data.get("model")
@@ -147,8 +146,13 @@ def _initial(part: Any, model: Model | None, report: Report) -> dict[str, float]
     return {name: (part.initial or {}).get(name, 0.0) for name in states}
 
 
-def _levels(part: Any, report: Report) -> tuple[int, ...]:
-    """Return the levels; none where the section is missing or faulty."""
+def _levels(part: Any, source: Source, report: Report) -> tuple[int, ...]:
+    """Return the levels; none where the section is missing or faulty, or a tolerance stands for it."""
+    given = [key for key in ("levels", "tolerance") if source.data.get(key) is not None]
+    if not given:
+        report.add(("levels",), "required key is missing", "or tolerance")
+    elif len(given) > 1:
+        report.add(("tolerance",), "must not be given together with levels", at_key=True)
     section = part.levels
     if isinstance(section, LevelRange):
         if section.from_ > section.to:
@@ -211,20 +215,46 @@ def scheme_names(data: Any) -> Iterator[str]:
             yield name
 
 
+def _swept(
+    part: Any,
+    source: Source,
+    model: Model | None,
+    schemes: list[SchemeSpec],
+    report: Report,
+) -> sweep.Swept:
+    """Return the sweep; not whole where something of it is malformed and was left out."""
+    is_whole = not any(path[:1] == ("sweep",) for path in report.faulty)
+    if part.sweep is None:
+        return sweep.Swept(is_whole=is_whole)
+    lacks_scheme = len(schemes) < len(part.schemes)
+    keys = Keys(targets(model, schemes), model, part.time, lacks_scheme, report)
+    found = sweep.read(part.sweep, list(source.data["sweep"]), keys)
+    if is_whole and found.is_whole and not found.axes:
+        report.add(("sweep",), "must not be empty")
+    return found if is_whole else replace(found, is_whole=False)
+
+
+def _check_output(output: str, levels: tuple[int, ...], report: Report) -> None:
+    if output == "best" and len(levels) == 1:
+        rule = "the best solution is extrapolated over at least 2 levels, there is 1"
+        report.add(("output",), rule)
+
+
 def _checks(
     part: Any,
     source: Source,
     model: Model | None,
     shape: limits.Shape,
     time: TimeSpec | None,
-    axes: tuple[sweep.Axis, ...],
+    varied: sweep.Swept,
     report: Report,
 ) -> tuple[Any, ...]:
     names = tuple(dict.fromkeys(scheme_names(source.data.get("schemes"))))
-    end = sweep.fixed_end(axes, time) if time else None
+    end = varied.fixed_end(time) if time else None
     # a faulty sweep may change the end: then nothing is said about times
-    known = None if _lacks(part.sweep, source, "sweep") else time
-    ladder = Ladder(model, names, shape, known, end)
+    known = time if varied.is_whole else None
+    by_tolerance = source.data.get("tolerance") is not None
+    ladder = Ladder(model, names, shape, known, end, by_tolerance)
     checks = list(part.checks)
     if not checks and model is not None:
         checks = [ConvergesCheck(converges=model.position)]

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Union
 
 from pydantic import (
-    BeforeValidator,
     ConfigDict,
     Discriminator,
     Field,
@@ -23,16 +22,18 @@ from vibsim.spec.fields import (
     MAX_ENTRIES,
     MAX_LEVEL,
     Count,
+    Fraction,
     Level,
     Line,
     Number,
+    Output,
     Positive,
     Section,
     Text,
-    plain,
     short,
     tag,
 )
+from vibsim.spec.sweep_section import SweepSection
 
 
 def _class_name(kind: str) -> str:
@@ -150,13 +151,6 @@ class LevelRange(Section):
     """The finest level."""
 
 
-class Linspace(Section):
-    """Equally spaced values."""
-
-    linspace: Annotated[tuple[Number, Number, Count], Field()]
-    """First value, last value (both included), and how many: a + (b - a)*i/(n - 1)."""
-
-
 class Every(Section):
     """Store every n-th step of each level."""
 
@@ -171,11 +165,6 @@ def _shape(value: Any) -> str:
 Levels = Annotated[
     Annotated[LevelRange, Tag(tag("mapping"))]
     | Annotated[tuple[Level, ...], Field(min_length=1), short(MAX_LEVEL + 1), Tag(tag("other"))],
-    Discriminator(_shape),
-]
-SweepValues = Annotated[
-    Annotated[Linspace, Tag(tag("mapping"))]
-    | Annotated[tuple[Number, ...], Field(min_length=1), BeforeValidator(plain), Tag(tag("other"))],
     Discriminator(_shape),
 ]
 Samples = Annotated[
@@ -202,6 +191,10 @@ def _initial_schema() -> dict[str, Any]:
 class Document(Section):
     """An experiment of vibsim: what is simulated, and what is claimed about the outcome."""
 
+    model_config = ConfigDict(
+        json_schema_extra={"oneOf": [{"required": ["levels"]}, {"required": ["tolerance"]}]}
+    )
+
     title: Text
     """What the experiment shows, in a line."""
     source: Text | None = None
@@ -212,14 +205,18 @@ class Document(Section):
     """Initial values of the states; 0 for those left out."""
     time: TimeSection
     """The time interval and the number of steps."""
-    levels: Levels
+    levels: Levels | None = None
     """The levels of refinement: each halves the time step of the one before."""
+    tolerance: Fraction | None = None
+    """Error bound that the extrapolated solution must reach, instead of `levels`: they are then chosen."""
     schemes: Annotated[tuple[AnyScheme, ...], Field(min_length=1), short(MAX_ENTRIES)]
     """The schemes, each a kind or a mapping with its options."""
-    sweep: Annotated[dict[str, SweepValues], Field(min_length=1)] | None = None
+    sweep: SweepSection | None = None
     """Parameters that vary, by dotted path; several make a grid, the last one fastest."""
     samples: Samples = "auto"
     """Which steps are stored."""
+    output: Output = "verdict"
+    """What the experiment is for: a verdict, or beside it the best solution, extrapolated over the levels."""
     checks: Annotated[tuple[Check, ...], short(MAX_ENTRIES)] = ()
     """What must come out; when left out, that the position converges as the scheme promises."""
 

@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, PrivateAttr
 
 from vibsim.models import MODELS, natural_end
+from vibsim.spec.axes import Axis
 from vibsim.spec.checks import Check
-from vibsim.spec.fields import Count, FrozenDict, Identifier, Level, Positive, Section, Text
+from vibsim.spec.fields import (
+    Count,
+    FrozenDict,
+    Identifier,
+    Level,
+    Output,
+    Positive,
+    Section,
+    Text,
+)
 from vibsim.spec.members import end_varies
 
 Numbers = Annotated[dict[str, float], AfterValidator(FrozenDict)]
@@ -48,13 +58,18 @@ class SchemeSpec(Section):
 class Sweep(Section):
     """Parameters that vary: a grid, the last axis fastest."""
 
-    axes: tuple[tuple[str, tuple[float, ...]], ...]
-    """Dotted key and values, in the order written."""
+    axes: tuple[Axis, ...]
+    """In the order written."""
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Dotted keys of everything that varies, in the order written."""
+        return tuple(key for axis in self.axes for key in axis.keys)
 
     @property
     def count(self) -> int:
         """Number of members."""
-        return math.prod(len(values) for _, values in self.axes)
+        return math.prod(axis.count for axis in self.axes)
 
 
 class Experiment(Section):
@@ -69,11 +84,15 @@ class Experiment(Section):
     """Initial value of every state."""
     time: TimeSpec
     levels: tuple[Level, ...]
-    """Strictly increasing."""
+    """Strictly increasing; none where `tolerance` is still to choose them."""
     schemes: tuple[SchemeSpec, ...]
     sweep: Sweep | None = None
     samples: Annotated[int, Field(ge=1)] | Literal["auto", "common", "all"] = "auto"
     """Which steps are stored; a number n stands for every n-th of each level."""
+    output: Output = "verdict"
+    """``best`` where the extrapolated solution is wanted beside the verdict."""
+    tolerance: float | None = None
+    """Error bound that chooses the levels; None where the file gives them."""
     checks: tuple[Check, ...] = ()
     _file: Path | None = PrivateAttr(default=None)
 
@@ -91,8 +110,27 @@ class Experiment(Section):
     def end_varies(self) -> bool:
         """Whether the end time differs between members, so that ``t`` is the fraction 0 to 1 of it."""
         axes = self.sweep.axes if self.sweep else ()
-        swept = ((key, min(values) < max(values)) for key, values in axes)
+        swept = (pair for axis in axes for pair in zip(axis.keys, axis.varies, strict=True))
         return end_varies(swept, self.time.periods is not None)
+
+    def scheme_options(self, scheme: int) -> Mapping[str, str]:
+        """Return the options of scheme number `scheme`, apart from those that are swept.
+
+        `vibsim.plan.option_groups` gives the options of each member.
+        """
+        return self.schemes[scheme].options
+
+    def alone(self, case: int) -> Experiment:
+        """Return the experiment of one member, without a sweep; see `vibsim.spec.alone`."""
+        from vibsim.spec.alone import alone
+
+        return alone(self, case)
+
+    def with_levels(self, levels: Sequence[int]) -> Experiment:
+        """Return the experiment with the `levels` chosen by its tolerance; see `vibsim.spec.laddered`."""
+        from vibsim.spec.laddered import with_levels
+
+        return with_levels(self, levels)
 
     def natural_end(self, parameters: Mapping[str, Any]) -> Any:
         """Return the end time of a member with these `parameters` (numbers or arrays), unless swept."""
@@ -133,7 +171,8 @@ def canonical(experiment: Experiment) -> dict[str, Any]:
     """Return `experiment` as JSON-able data: the same for files that mean the same.
 
     The sections stand apart, so that a digest can take those that a job uses: ``collection``, ``name``, ``title``,
-    ``source``, ``model``, ``initial``, ``time``, ``levels``, ``schemes``, ``sweep``, ``samples``, ``checks``.
+    ``source``, ``model``, ``initial``, ``time``, ``levels``, ``schemes``, ``sweep``, ``samples``, ``output``,
+    ``tolerance``, ``checks``.
     """
     data = experiment.model_dump(mode="json", exclude={"checks"})
     data["sweep"] = data["sweep"] and data["sweep"]["axes"]

@@ -11,9 +11,10 @@ from vibsim.errors import Fault, InputError, nearest
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
 from vibsim.spec.checks import At, ClaimCheck, ConvergesCheck, Expect, ValueCheck
-from vibsim.spec.document import Document, Every, LevelRange, Linspace, TimeSection
+from vibsim.spec.document import Document, Every, LevelRange, TimeSection
 from vibsim.spec.fields import Section
 from vibsim.spec.source import MAX_FAULTS, Path_, Source, dotted
+from vibsim.spec.sweep_section import Sample
 
 MAX_VALUE = 60
 
@@ -22,6 +23,7 @@ _RULES = {
     "extra_forbidden": "unknown key",
     "greater_than": "must be greater than {gt:g}",
     "greater_than_equal": "must be at least {ge:g}",
+    "less_than": "must be less than {lt:g}",
     "less_than_equal": "must be at most {le:g}",
     "literal_error": "unknown choice",
     "string_type": "must be text",
@@ -36,7 +38,13 @@ _RULES = {
     "union_tag_invalid": "unknown kind",
     "union_tag_not_found": "must be a mapping with the key kind",
 }
-_LINSPACE = "must be [first, last, count]"
+_FORMS = {
+    "linspace": "must be [first, last, count]",
+    "logspace": "must be [first, last, count]",
+    "range": "must be [first, end, step]",
+}
+"""How each rule for the values of a sweep is written."""
+_INTERVAL = "must be [least, largest]"
 
 
 class Report:
@@ -95,16 +103,28 @@ class Report:
         match kind:
             case "extra_forbidden":
                 hint = nearest(path[-1], known_keys(path[:-1], self.source.data))
+                if path[-1] in _FORMS:
+                    rule, hint = "a key of the sweep has one rule for its values", ""
+            case "values":
+                return self._add_values(path, rule, value)
             case "literal_error":
                 hint = nearest(value, re.findall(r"'([^']*)'", context["expected"]))
             case "union_tag_invalid" | "union_tag_not_found":
                 return self._add_kind(path, value)
-        if "linspace" in path and kind in ("missing", "too_long", "tuple_type"):
-            rule = _LINSPACE
-            path = path[: path.index("linspace") + 1]
+        if kind in ("missing", "too_long", "tuple_type"):
+            path, rule = _whole_list(path, rule)
         # a list with wrong items is too short only for pydantic, which counts the right ones
         if kind != "too_short" or not value:
             self.add(path, rule, hint, value, at_key=kind == "extra_forbidden")
+        return path
+
+    def _add_values(self, path: Path_, rule: str, value: object) -> Path_:
+        """Note that the values of a key of the sweep are no list and follow no rule."""
+        names = [str(name) for name in value] if isinstance(value, dict) else []
+        for name in names:
+            self.add((*path, name), "unknown key", nearest(name, list(_FORMS)), at_key=True)
+        if not names:
+            self.add(path, rule, value=value)
         return path
 
     def _add_kind(self, path: Path_, value: object) -> Path_:
@@ -141,6 +161,16 @@ def plain_path(loc: tuple[str | int, ...], keep_last: bool) -> Path_:
     return tuple(named)
 
 
+def _whole_list(path: Path_, rule: str) -> tuple[Path_, str]:
+    """Return where a list of fixed length stands of which too little or too much is there, and how it is written."""
+    for name, form in _FORMS.items():
+        if name in path:
+            return path[: path.index(name) + 1], form
+    if path[:3] == ("sweep", "sample", "over") and len(path) > 3:
+        return path[:4], _INTERVAL
+    return path, rule
+
+
 def worded(message: str) -> str:
     """Return one of pydantic's messages in the imperative of the others."""
     return message.replace("Input should", "must", 1)
@@ -171,8 +201,10 @@ def known_keys(path: Path_, data: Any) -> list[str]:
             return [str(field.alias or name) for name, field in LevelRange.model_fields.items()]
         case ("samples",):
             return list(Every.model_fields)
-        case ("sweep", _):
-            return list(Linspace.model_fields)
+        case ("sweep", "sample"):
+            return list(Sample.model_fields)
+        case ("sweep", *_):
+            return list(_FORMS)
         case ("schemes", _):
             options = (row.name for row in SCHEMES[value["kind"]].options)
             return ["kind", "label", *options]

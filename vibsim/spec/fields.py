@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 from numbers import Integral, Real
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
@@ -154,6 +154,7 @@ class _Formula:
 FORMULA = _Formula()
 Number = Annotated[float, FORMULA]
 Positive = Annotated[float, Field(gt=0), FORMULA]
+Fraction = Annotated[float, Field(gt=0, lt=1), FORMULA]
 NonNegative = Annotated[float, Field(ge=0), FORMULA]
 Whole = Annotated[int, BeforeValidator(whole)]
 Level = Annotated[int, Field(ge=0, le=MAX_LEVEL), BeforeValidator(whole)]
@@ -164,3 +165,4 @@ Text = Annotated[str, Field(min_length=1), AfterValidator(_printable)]
 """Text that may have several lines."""
 Line = Annotated[Text, AfterValidator(_one_line)]
 """Text on one line."""
+Output = Literal["verdict", "best"]

@@ -4,16 +4,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from vibsim.spec.cost import Load
 from vibsim.spec.faults import Report
-from vibsim.spec.sampling import stride
+from vibsim.spec.sampling import is_lean, stride
 
 MAX_MEMBERS = 10**7
 MAX_MEMBER_STEPS = 2**40
 """Steps of every scheme, member and level together: about a day of one core."""
-MAX_BYTES = 8 * 2**30
-"""Samples of one level in memory."""
+MAX_MEMORY = 8 * 2**30
+"""Bytes that a job may hold: at least all samples of one member, every scheme, at one level."""
+MAX_DISK = 2**40
+"""Bytes of the files of all levels."""
+MAX_FILES = 5_000
+"""Files of all levels: with more of them the workflow is busy with itself."""
 
-
+_FEWEST = 6
+"""Series of the smallest model: two states and the energies."""
+_ENERGIES = 4
+_LEFT_OUT = 3
+"""Energies that a lean experiment does not keep, unless a check is about them."""
 MIN_DT = 1e-100
 """Smallest time step: its square and what is divided by that must not leave the range of floats."""
 
@@ -28,17 +37,31 @@ class Shape:
     members: int | None
     samples: int | str
     variables: int
+    """Quantities of the model that are kept as series; 0 where the model is unknown."""
     end: float | None
 
     def steps(self, level: int) -> int | None:
         """Return the number of steps at `level`."""
         return None if self.base_steps is None else self.base_steps * 2**level
 
+    @property
+    def trajectories(self) -> int:
+        """Number of schemes times number of members, where they are known."""
+        return max(self.schemes, 1) * (self.members or 1)
+
     def stride(self, level: int) -> int:
         """Return n where every n-th step of `level` is stored; levels and steps must be known."""
-        steps = self.steps(level) or 1
         coarsest = self.steps(self.levels[0]) or 1
-        return stride(self.samples, coarsest, steps, self.schemes * (self.members or 1))
+        return stride(self.samples, coarsest, self.steps(level) or 1, self.trajectories)
+
+    def load(self, level: int) -> Load:
+        """Return what `level` asks of a job; levels and steps must be known."""
+        steps, coarsest = self.steps(level) or 1, self.steps(self.levels[0]) or 1
+        kept = steps // self.stride(level) + 1
+        series = max(self.variables, _FEWEST)
+        if is_lean(self.samples, coarsest, self.trajectories):
+            return Load(max(self.schemes, 1), steps, kept, series - _LEFT_OUT)
+        return Load(max(self.schemes, 1), steps, kept, series, exact=series - _ENERGIES)
 
 
 def check(shape: Shape, report: Report) -> None:
@@ -59,24 +82,33 @@ def check(shape: Shape, report: Report) -> None:
     finest = shape.base_steps << shape.levels[-1]
     if shape.end is not None and shape.end / min(finest, MAX_MEMBER_STEPS) < MIN_DT:
         report.add(("time",), f"the time step must not be less than {MIN_DT:g}", at_key=True)
-    _check_steps(shape, shape.base_steps, members, report)
-    _check_memory(shape, coarsest, members, report)
+    if _check_steps(shape, shape.base_steps, members, report):
+        _check_storage(shape, members, report)
 
 
-def _check_steps(shape: Shape, base_steps: int, members: int, report: Report) -> None:
-    steps = base_steps * sum(2**level for level in shape.levels)
+def _check_steps(shape: Shape, base_steps: int, members: int, report: Report) -> bool:
+    """Tell whether the steps are not too many; numbers beyond are too large to go on with."""
+    steps = base_steps * sum(1 << level for level in shape.levels)
     total = steps * members * max(shape.schemes, 1)
     if total > MAX_MEMBER_STEPS:
         rule = f"the experiment must not take more than {MAX_MEMBER_STEPS} steps, it takes {total}"
         report.add(("levels",), rule, "steps of every level, scheme and member together")
+    return total <= MAX_MEMBER_STEPS
 
 
-def _check_memory(shape: Shape, coarsest: int, members: int, report: Report) -> None:
-    """Refuse samples that cannot be held; a scheme and member counts as at least 8 series."""
-    trajectories = max(shape.schemes, 1) * members
-    finest = coarsest * 2 ** (shape.levels[-1] - shape.levels[0])
-    every = stride(shape.samples, coarsest, finest, trajectories)
-    size = 8 * trajectories * (finest // every + 1) * max(shape.variables, 8)
-    if size > MAX_BYTES:
-        rule = f"the samples of a level must not take more than {MAX_BYTES} bytes, they take {size}"
-        report.add(("levels",), rule, "store fewer samples, or begin at a lower level", at_key=True)
+def _check_storage(shape: Shape, members: int, report: Report) -> None:
+    """Refuse what cannot be held, kept or named; one member is the least that a job can make."""
+    loads = [shape.load(level) for level in shape.levels]
+    hint = "store fewer samples, or begin at a lower level"
+    memory = max(load.memory(1) for load in loads)
+    if memory > MAX_MEMORY:
+        rule = f"one member at one level must not take more than {MAX_MEMORY} bytes of memory, it takes {memory}"
+        report.add(("levels",), rule, hint, at_key=True)
+    disk = sum(load.disk(members) for load in loads)
+    if disk > MAX_DISK:
+        rule = f"the files must not take more than {MAX_DISK} bytes, they take {disk}"
+        report.add(("levels",), rule, hint, at_key=True)
+    files = sum(load.shards(members) for load in loads)
+    if files > MAX_FILES:
+        rule = f"the levels must not have more than {MAX_FILES} files, they have {files}"
+        report.add(("levels",), rule, hint, at_key=True)

@@ -11,13 +11,16 @@ from vibsim.spec.source import Path_
 _REQUIRED = ("claim", "converges", "value")
 _STAND_IN = "?"
 """Takes the place of text that cannot be left out; nothing is said about it a second time."""
+_SAMPLE: dict[str | int, Any] = {"method": "random", "n": 1, "seed": 0}
+"""Take the place of what a sample cannot be without."""
 
 
 def without(data: Mapping[str, Any], faulty: Iterable[Path_]) -> dict[str, Any]:
     """Return `data` without the values at the places `faulty`.
 
-    Values of mappings (`initial`, `sweep`) are left out one by one, and so are the parts of checks; an entry
-    of `schemes` and a check that is no mapping become None; any other section goes as a whole.
+    Values of mappings (`initial`, `sweep`) are left out one by one, and so are the parts of checks and those of a
+    sweep's `zip` and `sample`; an entry of `schemes` and a check that is no mapping become None; any other section
+    goes as a whole.
     """
     kept = dict(data)
     copied = {path[0] for path in faulty if path[0] in ("initial", "sweep", "schemes", "checks")}
@@ -31,6 +34,8 @@ def _take_out(kept: dict[str, Any], path: Path_) -> None:
     section = kept.get(str(path[0]))
     if len(path) == 1 or path[0] not in ("initial", "sweep", "schemes", "checks"):
         kept.pop(str(path[0]), None)
+    elif path[0] == "sweep" and path[1] in ("zip", "sample") and len(path) > 2:
+        _take_out_axis(section, path[1:])
     elif isinstance(section, dict):
         section.pop(path[1], None)
     elif isinstance(section, list) and isinstance(path[1], int):
@@ -38,6 +43,22 @@ def _take_out(kept: dict[str, Any], path: Path_) -> None:
             section[path[1]] = None
         else:
             _take_out_part(section[path[1]], path[2:])
+
+
+def _take_out_axis(sweep: Any, path: Path_) -> None:
+    """Leave one value of `zip` or `sample` out; what is without keys then goes as a whole."""
+    name, part, *deeper = path
+    axis = sweep.get(name)
+    if not isinstance(axis, dict):
+        return
+    if name == "sample" and part in _SAMPLE:
+        axis[part] = _SAMPLE[part]
+    elif deeper and part == "over":
+        axis["over"].pop(deeper[0], None)
+    else:
+        axis.pop(part, None)
+    if not axis or (name == "sample" and not axis.get("over")):
+        sweep.pop(name)
 
 
 def _take_out_part(check: Any, path: Path_) -> None:

@@ -1,115 +1,132 @@
-"""The sweep section: parameters that vary, counted before they are written out."""
+"""The sweep section: counted and compared with its bounds before anything is written out."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import prod
-from typing import Any
 
-from vibsim.errors import nearest
-from vibsim.models import Model, Parameter
-from vibsim.spec.document import Linspace, TimeSection
+from vibsim.spec.axes import Axis, Draw, Values, count_of
 from vibsim.spec.experiment import TimeSpec
-from vibsim.spec.faults import Report
 from vibsim.spec.members import end_varies
+from vibsim.spec.source import Path_
+from vibsim.spec.sweep_keys import Keys
+from vibsim.spec.sweep_section import Sample, SweepSection, Written
+from vibsim.spec.sweep_values import bounded, numbers, ruled, spans, words
 
-_FIXED = {
-    "levels": "levels cannot be swept: they are what is compared",
-    "time.base_steps": "step counts cannot be swept: every member has the same steps",
-    "time.base_dt": "step counts cannot be swept: every member has the same steps",
-    "time.steps_per_period": "step counts cannot be swept: every member has the same steps",
-    "time.periods": "step counts cannot be swept: every member has the same steps",
-}
+MAX_HYPERCUBE = 10**6
+"""Points of a latin hypercube: none of them is known before all are drawn."""
 
 
 @dataclass(frozen=True)
-class Axis:
-    """One swept parameter, as written."""
+class Swept:
+    """The sweep of an experiment, or what of it is sound."""
 
-    key: str
-    values: tuple[float, ...] | Linspace
-
-    def __len__(self) -> int:
-        return len(self.values) if isinstance(self.values, tuple) else self.values.linspace[2]
+    axes: tuple[Axis, ...] = ()
+    is_whole: bool = True
+    """Whether nothing is left out because of a fault."""
 
     @property
-    def ends(self) -> tuple[float, ...]:
-        """Values that have the least and the largest among them."""
-        return self.values if isinstance(self.values, tuple) else self.values.linspace[:2]
+    def members(self) -> int | None:
+        """Number of members, 1 without a sweep; None where it cannot be told."""
+        return math.prod(axis.count for axis in self.axes) if self.is_whole else None
+
+    def least_end(self, time: TimeSpec) -> float:
+        """Return the earliest end of a member, as far as the sweep gives it."""
+        return min(
+            (float(low) for key, low, _ in self._spans() if key == "time.end"), default=time.end
+        )
+
+    def fixed_end(self, time: TimeSpec) -> float | None:
+        """Return the end that every member has, None where the end varies."""
+        swept = ((key, low != high) for key, low, high in self._spans())
+        return None if end_varies(swept, time.periods is not None) else self.least_end(time)
+
+    def _spans(self) -> Iterator[tuple[str, float | str, float | str]]:
+        for axis in self.axes:
+            yield from ((key, *span) for key, span in zip(axis.keys, axis.spans, strict=True))
 
 
-def axes(
-    section: dict[str, Any], time: TimeSection | None, model: Model | None, report: Report
-) -> tuple[Axis, ...]:
-    """Check the sweep's keys and the bounds of its values; nothing is written out."""
-    known = known_keys(model)
-    for key, values in section.items():
-        path = ("sweep", key)
-        if key in _FIXED or key.split(".")[0] == "levels":
-            report.add(path, _FIXED.get(key, _FIXED["levels"]), at_key=True)
-        elif model is not None and key not in known:
-            report.add(path, "cannot be swept", nearest(key, known), at_key=True)
-        elif key == "time.end" and time is not None and (time.end is None or time.base_dt):
-            rule = "the end can be swept only where time has an end, and base_steps if anything"
-            report.add(path, rule, at_key=True)
-        if isinstance(values, Linspace) and values.linspace[2] < 2:
-            rule = "linspace needs at least 2 values"
-            report.add((*path, "linspace", 2), rule, "give a single value as a list")
-        _check_bounds(path, values, _bound(key, model), report)
-    return tuple(Axis(key, values) for key, values in section.items())
+def read(section: SweepSection, order: Sequence[str], keys: Keys) -> Swept:
+    """Check a sweep; `order` names its keys as the file has them."""
+    found: list[Axis | None] = []
+    for key in order:
+        if key == "zip" and section.zip is not None:
+            found.append(_zip(section.zip, keys))
+        elif key == "sample" and section.sample is not None:
+            found.append(_sample(section.sample, keys))
+        elif key in section.single:
+            values = _values(key, section.single[key], ("sweep", key), keys)
+            found.append(None if values is None else _axis((key,), (values,)))
+    sound = tuple(axis for axis in found if axis is not None)
+    return Swept(sound, len(sound) == len(found))
 
 
-def known_keys(model: Model | None) -> list[str]:
-    """Name everything that can be swept."""
-    if model is None:
-        return ["time.end"]
-    states = (f"initial.{state.name}" for state in model.states)
-    return [*states, *(f"model.{row.name}" for row in model.parameters), "time.end"]
+def _axis(keys: tuple[str, ...], values: tuple[Values, ...] | Draw) -> Axis:
+    # every number is checked already, and there may be many
+    return Axis.model_construct(keys=keys, values=values)
 
 
-def _bound(key: str, model: Model | None) -> Parameter | None:
-    if key == "time.end":
-        return Parameter("end", 1.0, "s", "", minimum=0.0, exclusive=True)
-    rows = {f"model.{row.name}": row for row in model.parameters} if model else {}
-    return rows.get(key)
-
-
-def _check_bounds(
-    path: tuple[str, str], values: Any, row: Parameter | None, report: Report
-) -> None:
-    if row is None or row.minimum is None:
-        return
-    # a line is as far down as its lower end
-    ends = values.linspace[:2] if isinstance(values, Linspace) else values
-    inner = (*path, "linspace") if isinstance(values, Linspace) else path
-    for i, value in enumerate(ends):
-        if value < row.minimum or (row.exclusive and value == row.minimum):
-            word = "greater than" if row.exclusive else "at least"
-            report.add((*inner, i), f"must be {word} {row.minimum:g}", value=value)
-
-
-def count(found: tuple[Axis, ...]) -> int:
-    """Return the number of members, 1 without a sweep."""
-    return prod(len(axis) for axis in found)
-
-
-def fixed_end(found: tuple[Axis, ...], time: TimeSpec) -> float | None:
-    """Return the end that every member has, None where the end varies."""
-    swept = ((axis.key, min(axis.ends) < max(axis.ends)) for axis in found)
-    if end_varies(swept, time.periods is not None):
+def _zip(section: Mapping[str, Written], keys: Keys) -> Axis | None:
+    rows = {key: _values(key, value, ("sweep", "zip", key), keys) for key, value in section.items()}
+    values = {key: value for key, value in rows.items() if value is not None}
+    if not values:
         return None
-    return next((axis.ends[0] for axis in found if axis.key == "time.end"), time.end)
+    counts = {key: count_of(value) for key, value in values.items()}
+    first = next(iter(counts))
+    for key, count in counts.items():
+        if count != counts[first]:
+            rule = f"must have as many values as {first}, {counts[first]}, has {count}"
+            keys.report.add(("sweep", "zip", key), rule, at_key=True)
+    if len(values) < len(rows) or len(set(counts.values())) > 1:
+        return None
+    return _axis(tuple(values), tuple(values.values()))
 
 
-def expand(found: tuple[Axis, ...]) -> tuple[tuple[str, tuple[float, ...]], ...]:
-    """Write every axis out."""
-    return tuple(
-        (axis.key, axis.values if isinstance(axis.values, tuple) else line(*axis.values.linspace))
-        for axis in found
+def _sample(section: Sample, keys: Keys) -> Axis | None:
+    sound = [_interval(key, interval, keys) for key, interval in section.over.items()]
+    if section.method == "latin_hypercube" and section.n > MAX_HYPERCUBE:
+        rule = f"must be at most {MAX_HYPERCUBE} for a latin hypercube, which is drawn as a whole"
+        hint = "sobol and random have no such limit"
+        keys.report.add(("sweep", "sample", "n"), rule, hint, section.n)
+        return None
+    if not all(sound):
+        return None
+    bounds = tuple(section.over.values())
+    draw = Draw(method=section.method, n=section.n, seed=section.seed, over=bounds)
+    return _axis(tuple(section.over), draw)
+
+
+def _interval(key: str, interval: tuple[float, float], keys: Keys) -> bool:
+    path: Path_ = ("sweep", "sample", "over", key)
+    target = keys.find(key, path)
+    if target is None:
+        return False
+    if target.choices:
+        rule = "takes words, which cannot be drawn"
+        keys.report.add(path, rule, "sweep it by a list outside sample", at_key=True)
+        return False
+    low, high = interval
+    if low >= high:
+        keys.report.add((*path, 1), f"must be greater than the least value, {low:g}", value=high)
+        return False
+    return spans(low, high, path, keys.report) and bounded(
+        interval, target.bound, path, keys.report
     )
 
 
-def line(first: float, last: float, n: int) -> tuple[float, ...]:
-    """Return n equally spaced values, ``first + (last - first)*i/(n - 1)``, with exact ends."""
-    span, parts = last - first, n - 1
-    return (*(first + span * i / parts for i in range(parts)), last)
+def _values(key: str, written: Written, path: Path_, keys: Keys) -> Values | None:
+    """Return the values of one key; None where something is wrong with them or the key."""
+    target = keys.find(key, path)
+    if target is None:
+        return None
+    if target.choices:
+        return words(written, target.choices, path, keys.report)
+    if isinstance(written, tuple):
+        listed = numbers(written, path, keys.report)
+        sound = listed is not None and bounded(listed, target.bound, path, keys.report)
+        return listed if sound else None
+    place = (*path, next(iter(type(written).model_fields)))
+    rule = ruled(written, place, keys.report)
+    sound = rule is not None and bounded(rule.ends, target.bound, place, keys.report)
+    return rule if sound else None

@@ -1,0 +1,153 @@
+"""What a level costs: bytes on disk and in memory, seconds; found from counts alone, without allocating anything.
+
+The constants are measured (`docs/benchmarks.md`). The size of a shard depends on the cost of one member at its level
+and on nothing else, so that neither more members nor another machine move the border between two shards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+PLAIN_MEMBER_STEPS = 40_000
+"""Member-steps of one scheme up to which the compiler is not used."""
+PLAIN_SECONDS = 1.2e-6
+"""Of one member-step in plain Python."""
+ONE_SECONDS = 12e-9
+"""Of one compiled step of a member that is alone: a chain in which each operation waits for the one before."""
+MANY_SECONDS = 3e-9
+"""Of one compiled member-step among many members."""
+WRITTEN_SECONDS = 4e-9
+"""Of one byte that is made, written, sealed and flushed."""
+JOB_SECONDS = 0.5
+"""Of a job before and after its steps: start, imports, kernels from the disk."""
+
+GATHERED = 160
+"""Bytes that are kept of a scheme and member beside its series: extrema, peaks, periods, status."""
+CONSTANT = 48
+"""Bytes that are kept of a member whatever the schemes: index, frequency, swept values."""
+FILE = 33_000
+"""Bytes of a file beside its data."""
+
+PLAIN_MEMORY = 68 * 10**6
+"""Bytes of a simulate job without its arrays, in plain Python."""
+COMPILED_MEMORY = 192 * 10**6
+"""Bytes of a simulate job without its arrays, with the compiler loaded."""
+SCRATCH = 780
+"""Bytes that a job holds of a scheme and member beside its series: what is gathered, as it is and as it is kept."""
+EXACT_SCRATCH = 5
+"""Arrays that a job holds for each series of the exact solution while it works it out."""
+
+SHARD_SECONDS = 4.0
+"""Work of one core that a shard is meant to hold."""
+SHARD_BYTES = 320 * 10**6
+"""Arrays that a shard may hold."""
+LARGEST_SHARD = 2**20
+"""Members of a shard at most."""
+
+ANALYSIS_MEMORY = 85 * 10**6
+"""Bytes of an analysis without its arrays."""
+ANALYSED = 3.2
+"""Bytes that an analysis holds at its peak for each byte that it reads of the members at hand."""
+PART_SAMPLES = 2**17
+"""Samples of one variable that an analysis takes at a time (`vibsim.analysis`)."""
+PARTS = 3
+"""Ranges of members that an analysis holds at a time: one for each of two threads, and one that is written."""
+RESULT = 100
+"""Bytes that an analysis keeps of each scheme and member until its end."""
+
+COMPARED = (80, 190)
+"""Bytes that an analysis writes of a scheme and member: once, and for each level; two norms, and no series."""
+COMPARED_SERIES = (-80, 176)
+"""Bytes beside these of a scheme, member and sample, where an analysis writes series."""
+COMPARED_FILE = 130_000
+"""Bytes of the file of an analysis beside its data."""
+
+
+@dataclass(frozen=True)
+class Load:
+    """What one level asks of a job, apart from the number of members."""
+
+    schemes: int
+    steps: int
+    samples: int
+    """Samples that are kept of each series of a member."""
+    series: int
+    """Series that are kept of a scheme and member."""
+    exact: int = 0
+    """Series that are kept of a member whatever the schemes: the states of the exact solution."""
+
+    @property
+    def stored(self) -> int:
+        """Bytes on disk of one member."""
+        series = self.schemes * self.series + self.exact
+        return 8 * self.samples * series + GATHERED * self.schemes + CONSTANT
+
+    @property
+    def held(self) -> int:
+        """Bytes in memory of one member at the peak of a job."""
+        series = self.schemes * self.series + EXACT_SCRATCH * self.exact
+        return 8 * self.samples * series + SCRATCH * self.schemes
+
+    @property
+    def shard(self) -> int:
+        """Members of a shard: a power of two, so that another measured constant seldom changes it."""
+        by_time = SHARD_SECONDS / (self.schemes * self.steps * MANY_SECONDS)
+        most = max(1, min(int(by_time), SHARD_BYTES // self.held, LARGEST_SHARD))
+        return 1 << (most.bit_length() - 1)
+
+    def shards(self, members: int) -> int:
+        """Return the number of shards that `members` fill."""
+        return -(-members // self.shard)
+
+    def disk(self, members: int) -> int:
+        """Return the bytes of the files of `members`."""
+        return members * self.stored + self.shards(members) * FILE
+
+    def memory(self, members: int) -> int:
+        """Return the bytes that a job with `members` holds at its peak."""
+        base = PLAIN_MEMORY if self._is_plain(members) else COMPILED_MEMORY
+        return base + members * self.held
+
+    def seconds(self, members: int) -> float:
+        """Return the seconds of one core that the steps and the files of `members` take."""
+        compiled = MANY_SECONDS + (ONE_SECONDS - MANY_SECONDS) / members
+        step = PLAIN_SECONDS if self._is_plain(members) else compiled
+        return members * (self.schemes * self.steps * step + self.stored * WRITTEN_SECONDS)
+
+    def _is_plain(self, members: int) -> bool:
+        return members * self.steps <= PLAIN_MEMBER_STEPS
+
+
+def analysis_memory(loads: Sequence[Load], members: int) -> int:
+    """Return the bytes that an analysis of `members` holds at its peak.
+
+    Parameters
+    ----------
+    loads
+        Of every level.
+    """
+    part = max(1, PART_SAMPLES // (loads[0].samples * loads[0].schemes))
+    at_hand = min(members, PARTS * part)
+    read = at_hand * sum(load.stored for load in loads)
+    return ANALYSIS_MEMORY + round(ANALYSED * read) + RESULT * loads[0].schemes * members
+
+
+def analysis_disk(loads: Sequence[Load], members: int, is_lean: bool) -> int:
+    """Return the bytes that an analysis of `members` writes.
+
+    Parameters
+    ----------
+    loads
+        Of every level.
+    members
+        Their number.
+    is_lean
+        Whether series are left out.
+    """
+    once, each = COMPARED
+    size = once + each * len(loads)
+    if not is_lean:
+        once, each = COMPARED_SERIES
+        size += loads[0].samples * (once + each * len(loads))
+    return loads[0].schemes * members * size + COMPARED_FILE

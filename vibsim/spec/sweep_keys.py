@@ -1,0 +1,80 @@
+"""What may be swept, by dotted key, each key once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from vibsim.errors import nearest
+from vibsim.models import Model, Parameter
+from vibsim.schemes import SCHEMES
+from vibsim.spec.document import TimeSection
+from vibsim.spec.experiment import SchemeSpec
+from vibsim.spec.faults import Report
+from vibsim.spec.source import Path_
+
+_STEPS = "step counts cannot be swept: every member has the same steps"
+_LEVELS = "levels cannot be swept: they are what is compared"
+_FIXED = {
+    f"time.{name}": _STEPS for name in ("base_steps", "base_dt", "steps_per_period", "periods")
+}
+_END = Parameter("end", 1.0, "s", "", minimum=0.0, exclusive=True)
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a key of the sweep stands for."""
+
+    bound: Parameter | None = None
+    """Whose least value its numbers must keep to."""
+    choices: tuple[str, ...] = ()
+    """The words of an option; empty where it takes numbers."""
+
+
+@dataclass(frozen=True)
+class Keys:
+    """The keys that can be swept, and those that are."""
+
+    targets: Mapping[str, Target]
+    model: Model | None
+    time: TimeSection | None
+    lacks_scheme: bool
+    """Whether a scheme is at fault, so that nothing is said about options of unknown schemes."""
+    report: Report
+    seen: dict[str, Path_] = field(default_factory=dict)
+
+    def find(self, key: str, path: Path_) -> Target | None:
+        """Return what `key` at `path` stands for; None, and a fault, where it cannot be swept."""
+        first = self.seen.setdefault(key, path)
+        if first != path:
+            where = f"in {first[1]}" if len(first) > 2 else "on its own"
+            self.report.add(path, f"is swept twice, first {where}", at_key=True)
+            return None
+        if key in _FIXED or key.split(".")[0] == "levels":
+            self.report.add(path, _FIXED.get(key, _LEVELS), at_key=True)
+            return None
+        time = self.time
+        if key == "time.end" and time is not None and (time.end is None or time.base_dt):
+            rule = "the end can be swept only where time has an end, and base_steps if anything"
+            self.report.add(path, rule, at_key=True)
+            return None
+        target = self.targets.get(key)
+        broken = self.model is None or (self.lacks_scheme and key.startswith("schemes."))
+        if target is None and not broken:
+            alike = [name for name in self.targets if name.lower() == key.lower()]
+            hint = nearest(key, alike or list(self.targets))
+            self.report.add(path, "cannot be swept", hint, at_key=True)
+        return target
+
+
+def targets(model: Model | None, schemes: Sequence[SchemeSpec]) -> dict[str, Target]:
+    """Return everything that can be swept, by dotted key."""
+    found: dict[str, Target] = {}
+    if model is not None:
+        found.update((f"initial.{state.name}", Target()) for state in model.states)
+        found.update((f"model.{row.name}", Target(row)) for row in model.parameters)
+    found["time.end"] = Target(_END)
+    for scheme in schemes:
+        for option in SCHEMES[scheme.kind].options:
+            found[f"schemes.{scheme.name}.{option.name}"] = Target(choices=option.choices)
+    return found
