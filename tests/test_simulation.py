@@ -1,5 +1,7 @@
 """A level as a record: names, shapes, what every member gets, and what does not apply."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -137,3 +139,82 @@ def test_a_member_that_overflows_is_reported_and_the_others_stand():
 def test_a_level_that_the_experiment_does_not_have_is_refused():
     with pytest.raises(ValueError, match=r"level 5 is none of \[6, 7, 8\]"):
         simulate(experiment(), 5)
+
+
+def lean_experiment(**changes):
+    """4200 members of 65 samples are just too many for every series to be stored."""
+    sweep = {"initial.theta": {"linspace": [-3.0, 9.0, 4200]}}
+    return experiment(sweep=sweep, schemes=["central"], **changes)
+
+
+def test_a_large_sweep_stores_states_and_the_energys_deviation_only():
+    record = simulate_record(lean_experiment(), 6)
+    assert record.attrs["storage"] == "lean"
+    series = {name for name, variable in record.variables.items() if "t" in variable.dims}
+    assert series == {"theta", "omega", "energy_deviation"}
+    assert "theta_exact" not in record
+    assert simulate_record(experiment(), 6).attrs["storage"] == "series"
+
+
+def test_a_large_sweep_stores_what_its_checks_ask_for():
+    checks = [{"converges": "potential_energy", "order": 2}]
+    assert "potential_energy" in simulate_record(lean_experiment(checks=checks), 6)
+
+
+def test_the_energy_of_samples_is_that_of_every_step():
+    record = simulate_record(lean_experiment(samples="common"), 6)
+    largest = np.max(np.abs(record["energy_deviation"]), axis=-1)
+    np.testing.assert_array_equal(largest, record["energy_deviation_max_abs"])
+
+
+@pytest.mark.parametrize("make", [lean_experiment, experiment])
+@pytest.mark.parametrize("shards", [1, 2, 7])
+@pytest.mark.parametrize("threads", [1, 2])
+def test_shards_and_threads_change_no_bit(make, shards, threads):
+    whole = make() if make is lean_experiment else make(sweep={"model.L": {"range": [0.5, 2, 0.1]}})
+    together = simulate_record(whole, 7)
+    edges = np.linspace(0, whole.members, shards + 1).astype(int)
+    for start, stop in itertools.pairwise(edges):
+        part = simulate_record(whole, 7, int(start), int(stop), threads=threads)
+        for name, variable in {**together.variables, **together.coords}.items():
+            axis = variable.dims.index("case") if "case" in variable.dims else None
+            wanted = variable.values
+            if axis is not None:
+                wanted = np.take(wanted, np.arange(start, stop), axis=axis)
+            assert part[name].tobytes() == np.ascontiguousarray(wanted).tobytes(), name
+
+
+def test_a_member_alone_has_the_bits_it_has_in_the_sweep():
+    whole = experiment(sweep={"initial.theta": [0.5, 1.0, 3.0], "model.L": [0.5, 2.0]})
+    together = simulate_record(whole, 8)
+    for case in range(whole.members):
+        alone = simulate_record(whole.alone(case), 8)
+        for name, variable in alone.variables.items():
+            if "case" not in variable.dims:
+                continue
+            axis = variable.dims.index("case")
+            wanted = np.take(together[name], [case], axis=axis)
+            assert variable.values.tobytes() == np.ascontiguousarray(wanted).tobytes(), name
+
+
+def test_a_swept_option_of_a_scheme_is_the_options_of_the_members():
+    starts = ["first_order", "centred", "first_order"]
+    swept = experiment(
+        schemes=["central", {"kind": "central", "label": "other"}],
+        sweep={"zip": {"schemes.other.start": starts, "initial.theta": [1.0, 1.0, 2.0]}},
+    )
+    together = simulate_record(swept, 6)
+    assert together.words("schemes_other_start") == starts
+    for case, start in enumerate(starts):
+        theta = [1.0, 1.0, 2.0][case]
+        alone = simulate_record(
+            experiment(
+                initial={"theta": theta, "omega": 0.25},
+                schemes=["central", {"kind": "central", "label": "other", "start": start}],
+            ),
+            6,
+        )
+        for name in ("theta", "omega", "energy_deviation", "period", "status"):
+            assert (
+                alone[name].tobytes() == np.ascontiguousarray(together[name][:, [case]]).tobytes()
+            )

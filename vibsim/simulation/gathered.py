@@ -1,0 +1,109 @@
+"""What was gathered over every step, as variables of shape (scheme, case)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.engine import Gathered
+from vibsim.models import Model, State
+from vibsim.record import Variable, attributes
+from vibsim.simulation.members import Members
+
+Floats = NDArray[np.float64]
+Rows = dict[str, tuple[NDArray[Any], dict[str, Any]]]
+"""Name of a variable to its values and attributes."""
+
+STATUS = ("ok", "non_finite")
+"""Meaning of the variable ``status``."""
+
+
+def gathered(
+    model: Model, run: Gathered, last_step: NDArray[np.int64], group: Members, steps: int
+) -> dict[str, Variable]:
+    """Return what was gathered over every step.
+
+    Parameters
+    ----------
+    run, last_step
+        Arrays of shape (scheme, case) or (scheme, case, 2).
+    """
+    rows = _extremes(model, run) | _peaks(model, run) | _outcomes(last_step, group.end, steps)
+    return {
+        name: Variable(("scheme", "case"), values, attrs) for name, (values, attrs) in rows.items()
+    }
+
+
+def _extremes(model: Model, run: Gathered) -> Rows:
+    energy = model.energy_unit
+    words = "largest absolute energy deviation over every step"
+    ranges = (run.position_range, run.velocity_range)
+    norms = (run.position_norms, run.velocity_norms)
+    rows: Rows = {}
+    for state, low_high, sums in zip(model.states, ranges, norms, strict=True):
+        rows[f"{state.name}_min"] = low_high[..., 0], _over_steps("least", state)
+        rows[f"{state.name}_max"] = low_high[..., 1], _over_steps("largest", state)
+        for i, name in enumerate(("l1", "l2")):
+            rows[f"{state.name}_{name}"] = sums[..., i], _norm_of(name, state)
+    rows["energy_deviation_max_abs"] = run.deviation, attributes(words, energy)
+    rows["energy_deviation_max_abs_interior"] = (
+        run.deviation_interior,
+        attributes(f"{words} but the last point", energy),
+    )
+    return rows
+
+
+def _over_steps(word: str, state: State) -> dict[str, Any]:
+    return attributes(f"{word} {state.long_name} over every step", state.unit)
+
+
+def _norm_of(name: str, state: State) -> dict[str, Any]:
+    # units of half a second are none that udunits knows
+    time = {"l1": "s", "l2": "the square root of s"}[name]
+    words = f"{name} norm of the {state.long_name} over every step (times {time})"
+    return attributes(words, state.unit)
+
+
+def _peaks(model: Model, run: Gathered) -> Rows:
+    unit = model.states[0].unit
+    height = "half the height between the last peak and the last trough, interpolated"
+    mean = "mean period over every step"
+    turn = "time of a turn for a member that goes over the top"
+    return {
+        "amplitude": (
+            0.5 * np.abs(run.last_peak - run.last_trough),
+            attributes(height, unit),
+        ),
+        "first_peak": (
+            run.first_peak,
+            attributes("height of the first peak, interpolated", unit),
+        ),
+        "last_peak": (run.last_peak, attributes("height of the last peak, interpolated", unit)),
+        "period": (run.period, attributes(f"{mean}, interpolated ({turn})", "s")),
+        "period_grid": (
+            run.period_grid,
+            attributes(f"{mean}, between peaks at grid points", "s"),
+        ),
+        "period_count": (run.period_count, attributes("number of periods in the mean", "1")),
+    }
+
+
+def _outcomes(last_step: NDArray[np.int64], end: Floats, steps: int) -> Rows:
+    flags = {
+        "flag_values": np.arange(len(STATUS), dtype=np.int8),
+        "flag_meanings": " ".join(STATUS),
+    }
+    failed = last_step < steps
+    return {
+        "status": (
+            failed.astype(np.int8),
+            {**attributes("what became of the member", "1"), **flags},
+        ),
+        "last_step": (last_step, attributes("last step with finite values", "1")),
+        "failure_time": (
+            np.where(failed, (last_step + 1) * end / steps, np.nan),
+            attributes("time of the first value that is not finite or too large", "s"),
+        ),
+    }

@@ -1,0 +1,200 @@
+"""One level as a record: what is stored of it, under which names."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterable
+from itertools import chain, count
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim import plan
+from vibsim.models import ENERGIES, MODELS, Model
+from vibsim.record import Attribute, Record, Variable, attributes
+from vibsim.simulation.gathered import gathered
+from vibsim.simulation.members import Members, members
+from vibsim.simulation.solution import Solution, energies_of, solve
+from vibsim.spec.sampling import is_lean
+from vibsim.spec.series import lean_series
+
+if TYPE_CHECKING:
+    import xarray
+
+    from vibsim.spec import Experiment
+
+SERIES = ("scheme", "case", "t")
+
+_ENERGY_WORDS = {
+    "kinetic_energy": "kinetic energy",
+    "potential_energy": "potential energy",
+    "energy": "total mechanical energy",
+    "energy_deviation": "deviation of the total energy from its initial value",
+}
+
+
+def simulate(experiment: Experiment, level: int, *, threads: int = 1) -> xarray.Dataset:
+    """Run every scheme and member of `experiment` at `level`.
+
+    Parameters
+    ----------
+    threads
+        How many threads share the members; no number depends on it.
+
+    Returns
+    -------
+    xarray.Dataset
+        What the file ``level_LL.nc`` holds (design, section 4.4).
+
+    Raises
+    ------
+    ValueError
+        Where the experiment does not have the level.
+    SimulationError
+        Where a kernel cannot be compiled.
+    """
+    return simulate_record(experiment, level, threads=threads).to_xarray()
+
+
+def simulate_record(
+    experiment: Experiment,
+    level: int,
+    start: int = 0,
+    stop: int | None = None,
+    *,
+    threads: int = 1,
+) -> Record:
+    """Run members start..stop-1 (default: all) and return plain arrays; see `simulate`."""
+    if level not in experiment.levels:
+        raise ValueError(f"level {level} is none of {list(experiment.levels)}")
+    model = MODELS[experiment.model.kind]
+    group = members(experiment, start, plan.count(experiment) if stop is None else stop)
+    steps, every = experiment.steps(level), plan.sampling(experiment, level)
+    solution = solve(experiment, group, steps, every, threads)
+    is_bounded = stores_little(experiment)
+    wanted = lean_series(experiment) if is_bounded else (*_states(model), *ENERGIES)
+    names = [scheme.name for scheme in experiment.schemes]
+    variables = {
+        **_series(model, group, solution, steps, every, wanted),
+        **({} if is_bounded else _exact(model, group, steps, every)),
+        **gathered(model, solution.gathered, solution.last_step, group, steps),
+        **_constants(model, group, steps),
+    }
+    attrs: dict[str, Attribute] = {
+        "model": model.kind,
+        "level": level,
+        "steps": steps,
+        "every": every,
+        "storage": "lean" if is_bounded else "series",
+    }
+    coords = _coords(model, names, group, steps, every, same_end=not experiment.end_varies)
+    return Record(coords, variables, attrs)
+
+
+def stores_little(experiment: Experiment) -> bool:
+    """Tell whether `experiment` has so many members that storage is bounded."""
+    trajectories = len(experiment.schemes) * experiment.members
+    return is_lean(experiment.samples, experiment.steps(experiment.levels[0]), trajectories)
+
+
+def _states(model: Model) -> list[str]:
+    return [state.name for state in model.states]
+
+
+def _units(model: Model) -> dict[str, str]:
+    """Return the unit of every number that can be swept, by dotted key."""
+    states = {f"initial.{state.name}": state.unit for state in model.states}
+    return states | {f"model.{p.name}": p.unit for p in model.parameters} | {"time.end": "s"}
+
+
+def _numbers(steps: int, every: int) -> NDArray[np.int64]:
+    return np.arange(0, steps + 1, every, dtype=np.int64)
+
+
+def _coords(
+    model: Model, schemes: list[str], group: Members, steps: int, every: int, same_end: bool
+) -> dict[str, Variable]:
+    number = _numbers(steps, every)
+    t = number * (group.end[0] / steps) if same_end else number / steps
+    words = "time" if same_end else "time as a fraction of the end time"
+    coords = {
+        "scheme": Variable(("scheme",), np.array(schemes), attributes("name of the scheme", "1")),
+        "case": Variable(
+            ("case",), group.index, attributes("index of the member of the sweep", "1")
+        ),
+        "t": Variable(
+            ("t",), np.asarray(t, dtype=float), attributes(words, "s" if same_end else "1")
+        ),
+    }
+    if not same_end:
+        coords["end"] = Variable(("case",), group.end, attributes("end time of the member", "s"))
+    units = _units(model)
+    for key, values in group.columns.items():
+        attrs = attributes(f"swept value of {key}", units.get(key, "1"), sweep_key=key)
+        coords[_plain_name(key, coords)] = Variable(("case",), values, attrs)
+    return coords
+
+
+def _plain_name(key: str, taken: Container[str]) -> str:
+    """Return a name for a swept key that netCDF programs can work with; labels of schemes may hold anything."""
+    name = "".join(c if c.isascii() and c.isalnum() else "_" for c in key)
+    return next(n for n in chain([name], (f"{name}_{i}" for i in count(2))) if n not in taken)
+
+
+def _series(
+    model: Model,
+    group: Members,
+    solution: Solution,
+    steps: int,
+    every: int,
+    wanted: Iterable[str],
+) -> dict[str, Variable]:
+    names = list(wanted)
+    arrays = zip(model.states, (solution.position, solution.velocity), strict=True)
+    table = {
+        state.name: Variable(SERIES, values, attributes(state.long_name, state.unit))
+        for state, values in arrays
+    }
+    of_energy = [name for name in ENERGIES if name in names]
+    found = energies_of(model, group, solution, steps, every, of_energy)
+    for name in of_energy:
+        attrs = attributes(_ENERGY_WORDS[name], model.energy_unit)
+        table[name] = Variable(SERIES, found[name], attrs)
+    words = attributes("total mechanical energy at t = 0", model.energy_unit)
+    table["energy_initial"] = Variable(("scheme", "case"), found["energy_initial"], words)
+    return table
+
+
+def _exact(model: Model, group: Members, steps: int, every: int) -> dict[str, Variable]:
+    if model.exact is None:
+        return {}
+    t = _numbers(steps, every) * (group.end / steps)[:, None]
+    exact = model.exact(
+        t,
+        {name: values[:, None] for name, values in group.initial.items()},
+        {name: values[:, None] for name, values in group.parameters.items()},
+    )
+    return {
+        f"{state.name}_exact": Variable(
+            ("case", "t"), exact[state.name], attributes(f"exact {state.long_name}", state.unit)
+        )
+        for state in model.states
+    }
+
+
+def _constants(model: Model, group: Members, steps: int) -> dict[str, Variable]:
+    frequency = np.broadcast_to(model.natural_frequency(group.parameters), group.end.shape)
+    table = {
+        "natural_frequency": (
+            frequency,
+            attributes("angular frequency of small oscillations", "rad s-1"),
+        ),
+        "omega_dt": (
+            frequency * (group.end / steps),
+            attributes("angular frequency of small oscillations times the time step", "1"),
+        ),
+    }
+    if model.exact_period is not None:
+        period = model.exact_period(group.initial, group.parameters)
+        table["exact_period"] = (np.asarray(period, dtype=float), attributes("exact period", "s"))
+    return {name: Variable(("case",), values, attrs) for name, (values, attrs) in table.items()}
