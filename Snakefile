@@ -4,12 +4,12 @@ from pathlib import Path
 from shlex import quote
 
 from vibsim.cli.lock import hold
+from vibsim.cli.plans import resolve
 from vibsim.plan import Names
 
 root = Path(workflow.basedir)
-names = Names.of(
-    config.get("experiments", []), config.get("results", root / "results"), root
-)
+results = config.get("results", root / "results")
+names = Names.of(config.get("experiments", []), results, root, resolve)
 
 
 # Jobs run the vibsim that stands beside this Python, whatever else is installed.
@@ -22,7 +22,6 @@ workdir: str(names.results)
 
 wildcard_constraints:
     experiment=names.experiment_pattern,
-    level=r"\d\d+",
     shard=r"\d\d\d\d+",
 
 
@@ -40,4 +39,5 @@ onstart:
 
 include: "workflow/rules/report.smk"
 include: "workflow/rules/analyse.smk"
+include: "workflow/rules/extrapolate.smk"
 include: "workflow/rules/simulate.smk"

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from vibsim import schemes
-from vibsim.cli import deleted, main, workflow
+from vibsim.cli import deleted, jobs, main, room, workflow
 from vibsim.errors import FileError, VibsimError
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
@@ -55,10 +55,122 @@ def test_check_tells_all_faults_of_all_files_without_a_traceback(
 
 def test_plan_shows_what_a_run_costs(file: Path, capsys: Capture) -> None:
     assert main(["plan", str(file)]) == 0
-    assert "adhoc/tiny" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "adhoc/tiny: 1 member, scheme central" in shown
+    assert "all: 1 simulate job, 224 member-steps" in shown
     assert main(["plan", "--json", str(file)]) == 0
     (plan,) = json.loads(capsys.readouterr().out)
     assert [level["steps"] for level in plan["levels"]] == [32, 64, 128]
+    assert plan["total"]["jobs"] == 3
+    for name in ("bytes", "memory", "seconds", "member_steps"):
+        assert plan["total"][name] > 0
+
+
+def test_several_plans_are_added_up(file: Path, tmp_path: Path, capsys: Capture) -> None:
+    other = file.with_name("other.yaml")
+    other.write_text(TEXT)
+    assert main(["plan", str(file), str(other), "--results", str(tmp_path)]) == 0
+    assert "2 experiments: 448 member-steps" in capsys.readouterr().out
+
+
+SWEPT = TEXT + "sweep: {initial.theta: {linspace: [0.1, 3, 300]}}\n"
+
+
+@pytest.mark.parametrize("command", ["plan", "run"])
+@pytest.mark.parametrize(
+    ("function", "told"),
+    [("free_bytes", "of disk, 1.5 kB are free"), ("_memory", "of memory, the machine has 1.5 kB")],
+)
+def test_what_does_not_fit_is_refused_with_both_numbers(
+    file: Path,
+    tmp_path: Path,
+    capsys: Capture,
+    monkeypatch: pytest.MonkeyPatch,
+    command: str,
+    function: str,
+    told: str,
+) -> None:
+    monkeypatch.setattr(room, function, lambda _: 1500)
+    results = tmp_path / "results"
+    assert main([command, str(file), "--results", str(results)]) == 2
+    assert told in capsys.readouterr().err
+    assert not results.exists()
+
+
+def test_a_member_alone_is_planned_and_checked(file: Path, capsys: Capture) -> None:
+    file.write_text(SWEPT)
+    assert main(["plan", f"{file}@7"]) == 0
+    assert "adhoc/tiny_case_7: 1 member" in capsys.readouterr().out
+    assert main(["check", f"{file}@300"]) == 2
+    assert "from 0 to 299" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("threads", ["1", "2"])
+def test_several_levels_are_made_in_one_go_at_the_places_of_the_plan(
+    file: Path, tmp_path: Path, capsys: Capture, threads: str
+) -> None:
+    file.write_text(SWEPT)
+    common = [str(file), "--results", str(tmp_path)]
+    assert main(["simulate", *common, "--level", "5", "6", "7", "--threads", threads]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        f"adhoc/tiny, level {level}, members 0 to 299" for level in (5, 6, 7)
+    ]
+    for level in (5, 6, 7):
+        made = tmp_path / f"adhoc/tiny/level_0{level}/shard_0000.nc"
+        alone = tmp_path / "alone.nc"
+        assert main(["simulate", *common, "--level", str(level), "--out", str(alone)]) == 0
+        assert made.read_bytes() == alone.read_bytes()
+    capsys.readouterr()
+    assert main(["simulate", *common, "--level", "5", "6", "7"]) == 0
+    assert "level_05/shard_0000.nc: is up to date" in capsys.readouterr().out
+    assert main(["simulate", *common, "--level", "5", "6", "--out", str(alone)]) == 2
+
+
+def test_a_failing_shard_names_its_members_and_the_other_levels_are_made(
+    file: Path, tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from vibsim import simulation
+
+    file.write_text(SWEPT)
+    right = simulation.simulate_record
+    errors = {5: MemoryError(), 6: ZeroDivisionError("a fault in the code")}
+
+    def fail(experiment: object, level: int, *range_: object, **options: object) -> object:
+        if level in errors:
+            raise errors[level]
+        return right(experiment, level, *range_, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(simulation, "simulate_record", fail)
+    common = [str(file), "--results", str(tmp_path)]
+    assert main(["simulate", *common, "--level", "5", "6", "7"]) == 1
+    told = capsys.readouterr().err
+    assert "adhoc/tiny, level 5, members 0 to 299: MemoryError" in told
+    assert "adhoc/tiny, level 6, members 0 to 299: ZeroDivisionError: a fault in the code" in told
+    assert "Traceback" in told, "a fault in the code is shown with its place"
+    assert (tmp_path / "adhoc/tiny/level_07/shard_0000.nc").is_file()
+    out = ["--out", str(tmp_path / "x.nc")]
+    assert main(["simulate", *common, "--level", "5", *out]) == 1
+    assert "level 5, members 0 to 299: MemoryError" in capsys.readouterr().err
+
+
+def test_an_extrapolation_is_made_only_where_it_is_asked_for(
+    file: Path, tmp_path: Path, capsys: Capture
+) -> None:
+    from vibsim import store
+
+    assert main(["extrapolate", str(file), "--results", str(tmp_path)]) == 2
+    assert "output: best" in capsys.readouterr().err
+    file.write_text(SWEPT + "output: best\n")
+    common = [str(file), "--results", str(tmp_path)]
+    assert main(["simulate", *common, "--level", "5", "6", "7"]) == 0
+    assert main(["extrapolate", *common]) == 0
+    whole = (tmp_path / "adhoc/tiny/best.nc").read_bytes()
+    record = store.read(tmp_path / "adhoc/tiny/best.nc")
+    assert record["theta"].shape[:2] == (1, 300)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(jobs, "PART_BYTES", 100_000)
+        assert main(["extrapolate", *common]) == 0
+    assert (tmp_path / "adhoc/tiny/best.nc").read_bytes() == whole
 
 
 @pytest.mark.parametrize(
@@ -178,15 +290,15 @@ def test_unknown_formats_are_refused_first(file: Path, tmp_path: Path, capsys: C
 
 def test_the_formats_are_those_of_the_report() -> None:
     from vibsim.cli.jobs import FORMATS
-    from vibsim.report import style
+    from vibsim.report import drawing
 
-    assert FORMATS == style.FORMATS
+    assert FORMATS == drawing.FORMATS
 
 
 def test_a_dry_run_makes_no_folder(file: Path, tmp_path: Path, capsys: Capture) -> None:
     new = tmp_path / "new"
     assert main(["run", str(file), "--results", str(new), "--dry-run", "--cores", "1"]) == 0
-    assert "simulate adhoc/tiny level_05.nc" in capsys.readouterr().out
+    assert "simulate adhoc/tiny level_05.nc: " in capsys.readouterr().out
     assert not new.exists()
 
 

@@ -3,6 +3,7 @@ from __future__ import annotations
 import pytest
 
 from vibsim.cli.progress import Progress, describe
+from vibsim.cli.units import amount, duration, size
 from vibsim.cli.workflow import Job, _Reader
 
 TEXT = """\
@@ -44,6 +45,37 @@ def test_jobs_failures_and_steps_are_read_from_what_snakemake_writes() -> None:
     assert describe(failed) == "analyse a/x"
     assert failed.log == "a/x/logs/analyse.log"
     assert (1, 4, None) in seen
+
+
+def test_a_job_with_several_files_is_told_by_its_first_and_last() -> None:
+    output = "a/x/level_06.nc (update), a/x/level_07.nc (update), a/x/level_09.nc (update)"
+    job = Job("simulate_3", output, "", "")
+    assert describe(job) == "simulate a/x level_06.nc to level_09.nc"
+    assert job.outputs == [f"a/x/level_0{n}.nc" for n in (6, 7, 9)]
+    shard = Job("simulate_4", "a/x/level_06/shard_0001.nc (update)", "", "")
+    assert describe(shard) == "simulate a/x level_06/shard_0001.nc"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (size(0), "0 B"),
+        (size(999), "999 B"),
+        (size(999.9), "1 kB"),
+        (size(123_456), "123 kB"),
+        (size(2.46e9), "2.46 GB"),
+        (size(1e16), "1e+04 TB"),
+        (amount(960), "960"),
+        (amount(1.3e9), "1.3e+09"),
+        (duration(0.04), "0.0 s"),
+        (duration(99.94), "99.9 s"),
+        (duration(186), "3.1 min"),
+        (duration(9000), "2.5 h"),
+        (duration(864_000), "10.0 d"),
+    ],
+)
+def test_numbers_for_people(text: str, expected: str) -> None:
+    assert text == expected
 
 
 def test_progress_counts_the_jobs_without_the_target_of_all(

@@ -129,7 +129,7 @@ def test_paths_follow_the_contract(plan_of: Plans) -> None:
 def test_a_plan_survives_json(plan_of: Plans) -> None:
     plan = plan_of(("schemes:", "sweep: {initial.theta: [0.5, 1.0]}\nschemes:"))
     text = to_json(plan)
-    assert from_json(text, Path(plan.file)) == plan
+    assert from_json(text, plan.file) == plan
     assert json.loads(text)["file"] == ""
 
 

@@ -111,7 +111,7 @@ def wait_for_end(group: int) -> None:
 
 MADE = {
     "before any job": "../../.vibsim/run.json",
-    "first job": "logs/level_06.log",
+    "first job": "logs/level_06_to_09.log",
     "first level": "level_06.nc",
     "last level": "level_09.nc",
     "analysis": "convergence.nc",
@@ -171,28 +171,48 @@ def test_a_job_refuses_when_its_file_changed_after_it_was_planned(
 
 
 TRAP = """
-import os, sys
-if "simulate" in sys.orig_argv and "07" in sys.orig_argv and "other.yaml" in str(sys.orig_argv):
-    print("out of luck", flush=True)
-    os._exit(1)
+import sys
+def full(event, arguments):
+    if event == "open" and "/other/.level_07.nc." in str(arguments[0]):
+        raise OSError(28, "No space left on device")
+sys.addaudithook(full)
 """
 
 
-def test_a_failing_job_is_named_with_its_log_and_the_others_go_on(
-    place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def trap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Make level 7 of an experiment with the name `other` fail."""
+    path = tmp_path / "trap/sitecustomize.py"
+    path.parent.mkdir()
+    path.write_text(TRAP)
+    paths = [str(path.parent), *filter(None, [os.environ.get("PYTHONPATH")])]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(paths))
+    return path
+
+
+def test_a_failing_job_is_named_with_its_log_and_the_others_go_on(place: Place, trap: Path) -> None:
     other = place.file.with_name("other.yaml")
     other.write_text(TEXT)
-    trap = tmp_path / "trap"
-    trap.mkdir()
-    (trap / "sitecustomize.py").write_text(TRAP)
-    paths = [str(trap), *filter(None, [os.environ.get("PYTHONPATH")])]
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(paths))
     place.change("A tiny", "Another")
     ended = place.run(files=[place.file, other])
     assert ended.returncode == 1
-    assert "failed: simulate adhoc/other level_07.nc" in ended.stdout
-    assert "level_07.log" in ended.stdout
-    assert "out of luck" in ended.stdout
+    assert "failed: simulate adhoc/other level_06.nc to level_09.nc" in ended.stdout
+    assert "level_06_to_09.log" in ended.stdout
+    assert "adhoc/other, level 7, member 0: [Errno 28] No space left on device" in ended.stdout
     assert "Another" in (place.tiny / "report.html").read_text()
     assert "other" in (place.results / "index.html").read_text()
+
+
+def test_a_failing_level_does_not_cost_those_that_share_its_job(place: Place, trap: Path) -> None:
+    other = place.file.with_name("other.yaml")
+    other.write_text(TEXT)
+    assert place.run(files=[other]).returncode == 1
+    folder = place.results / "adhoc/other"
+    kept = {path: path.stat().st_ino for path in folder.glob("level_*.nc")}
+    assert [path.name for path in sorted(kept)] == ["level_06.nc", "level_08.nc", "level_09.nc"]
+    trap.unlink()
+    assert place.jobs(files=[other]) == ["level_07", "analyse", "report", "index"]
+    assert place.run(files=[other]).returncode == 0
+    # What is written anew is another file, put in the place of the old one.
+    assert {path: path.stat().st_ino for path in kept} == kept
+    assert (folder / "level_07.nc").is_file()

@@ -42,6 +42,17 @@ def test_exactly_what_uses_a_change_runs_again(
     assert len(found) == len(expected)
 
 
+def test_one_more_level_leaves_the_files_of_the_others_untouched(place: Place) -> None:
+    # What is written anew is another file, put in the place of the old one.
+    before = {path: path.stat().st_ino for path in place.tiny.glob("level_*.nc")}
+    assert len(before) == 4
+    place.change("8, 9]", "8, 9, 10]")
+    assert place.run().returncode == 0
+    assert {path: path.stat().st_ino for path in before} == before
+    assert (place.tiny / "level_10.nc").is_file()
+    assert place.jobs() == []
+
+
 def test_touching_the_file_runs_nothing(place: Place) -> None:
     os.utime(place.file)
     assert place.jobs() == []

@@ -78,8 +78,8 @@ def test_a_sweep_goes_through_its_shard_and_refusals_run_nothing(tmp_path: Path)
     assert not place.results.exists()
     assert place.run().returncode == 0
     assert (place.tiny / "level_06/shard_0000.nc").is_file()
-    assert (place.tiny / "logs/level_06_shard_0000.log").is_file()
-    assert (place.tiny / "benchmarks/level_06_shard_0000.tsv").is_file()
+    assert (place.tiny / "logs/level_06_to_09.log").is_file()
+    assert (place.tiny / "benchmarks/level_06_to_09.tsv").is_file()
 
 
 def test_a_check_that_does_not_pass_gives_status_1(place: Place) -> None:

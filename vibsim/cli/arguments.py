@@ -10,7 +10,7 @@ from pathlib import Path
 import vibsim
 
 Command = Callable[[argparse.Namespace], int]
-_NAMES = "experiment (name or collection/name), collection, or FILE.yaml"
+_NAMES = "experiment (name or collection/name), one member of its sweep (NAME@CASE), collection, or FILE.yaml"
 LISTS = ("models", "schemes", "checks", "experiments")
 
 
@@ -67,27 +67,28 @@ def _add_run(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> N
 def _add_plain(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     sub = _command(commands, "check", "check", "Validate experiment files, without running them.")
     sub.add_argument("experiments", nargs="+", metavar="FILE", help=_NAMES)
-    sub = _command(
-        commands, "plan", "plan", "Show jobs, steps, disk space and time of experiments."
-    )
+    text = "Show members, jobs, steps, memory, disk space and time of experiments before they run."
+    sub = _command(commands, "plan", "plan", text)
     sub.add_argument("experiments", nargs="+", metavar="FILE", help=_NAMES)
+    _results(sub)
     sub.add_argument("--json", action="store_true", help="print the plans as JSON")
     sub = _command(commands, "list", "listing", "List what there is to choose from.")
     sub.add_argument("what", choices=LISTS)
 
 
 def _add_jobs(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    sub = _command(commands, "simulate", "jobs", "Simulate one level of an experiment.")
-    sub.add_argument("experiment", metavar="EXPERIMENT", help="experiment or FILE.yaml")
-    sub.add_argument("--level", type=int, required=True, metavar="L")
-    sub.add_argument("--shard", type=int, default=0, metavar="K", help="range of members (from 0)")
-    sub.add_argument("--out", type=Path, required=True, metavar="FILE", help="netCDF file to write")
-    _results(sub)
-    _digest(sub)
+    _add_simulate(commands)
     text = "Compare the levels of an experiment: convergence.nc and summary.json."
     sub = _command(commands, "analyse", "jobs", text)
     sub.add_argument("experiment", metavar="EXPERIMENT", help="experiment or FILE.yaml")
     sub.add_argument("--out", type=Path, metavar="DIR", help="folder to write to")
+    _threads(sub)
+    _results(sub)
+    _digest(sub)
+    text = "Extrapolate the solution of an experiment over all its levels: best.nc."
+    sub = _command(commands, "extrapolate", "jobs", text)
+    sub.add_argument("experiment", metavar="EXPERIMENT", help="experiment or FILE.yaml")
+    sub.add_argument("--out", type=Path, metavar="FILE", help="netCDF file to write")
     _results(sub)
     _digest(sub)
     text = "Write the report of an experiment; without one, the index over all results."
@@ -98,6 +99,24 @@ def _add_jobs(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> 
     sub.add_argument("--formats", metavar="LIST", help=text)
     _results(sub)
     _digest(sub)
+
+
+def _add_simulate(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    sub = _command(commands, "simulate", "simulate", "Simulate levels of an experiment.")
+    sub.add_argument("experiment", metavar="EXPERIMENT", help="experiment or FILE.yaml")
+    text = "one level, or several to the places of the plan"
+    sub.add_argument("--level", type=int, nargs="+", required=True, metavar="L", help=text)
+    sub.add_argument("--shard", type=int, default=0, metavar="K", help="range of members (from 0)")
+    text = "netCDF file to write (default: the place of the plan, unless it is made already)"
+    sub.add_argument("--out", type=Path, metavar="FILE", help=text)
+    _threads(sub)
+    _results(sub)
+    _digest(sub)
+
+
+def _threads(sub: argparse.ArgumentParser) -> None:
+    text = "threads to use (default: 1); no number depends on it"
+    sub.add_argument("--threads", type=_positive, default=1, metavar="N", help=text)
 
 
 def _positive(text: str) -> int:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from vibsim.plan import checkout, choose, load_all
+from vibsim.cli.plans import plans_of
 
 
 def check(options: Namespace) -> int:
     """Validate experiment files and say that they are sound."""
-    plans = load_all(choose(options.experiments, checkout()))
-    for plan in plans.values():
+    for plan in plans_of(options.experiments):
         levels = ", ".join(str(level.level) for level in plan.levels)
         members = "1 member" if plan.cases == 1 else f"{plan.cases} members"
         print(f"{plan.file}: sound ({members}, levels {levels})")

@@ -3,39 +3,79 @@
 from __future__ import annotations
 
 import json
+import sys
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
+from pathlib import Path
+from typing import Any
 
-from vibsim.plan import Plan, checkout, choose, load_all
+from vibsim.cli import room
+from vibsim.cli.common import results_folder
+from vibsim.cli.plans import plans_of
+from vibsim.cli.units import amount, duration, size
+from vibsim.plan import Plan
+
+_WIDTHS = (7, 12, 12, 7, 14, 10, 10, 10)
+_HEAD = ("level", "steps", "kept every", "files", "member-steps", "disk", "memory", "time")
 
 
 def plan(options: Namespace) -> int:
-    """Show members, jobs, steps, disk space and time."""
-    plans = load_all(choose(options.experiments, checkout())).values()
+    """Show members, jobs, steps, memory, disk space and time; refuse what does not fit on this machine."""
+    results = results_folder(options)
+    plans = plans_of(options.experiments)
     if options.json:
-        print(json.dumps([asdict(item) for item in plans], indent=1))
-        return 0
-    for item in plans:
-        for line in _lines(item):
-            print(line)
+        print(json.dumps([_entry(item) for item in plans], indent=1))
+    else:
+        for item in plans:
+            print(*_lines(item), "", sep="\n")
+        if len(plans) > 1:
+            print(_sum(plans, results))
+    sys.stdout.flush()
+    room.check(plans, results)
     return 0
+
+
+def _entry(item: Plan) -> dict[str, Any]:
+    totals = {
+        "jobs": len(item.batches) + 2 + bool(item.best),
+        "member_steps": _steps(item),
+        "bytes": item.bytes,
+        "memory": item.memory,
+        "seconds": item.seconds,
+    }
+    return {**asdict(item), "total": totals}
+
+
+def _steps(item: Plan) -> int:
+    return sum(level.member_steps for level in item.levels)
 
 
 def _lines(item: Plan) -> Iterator[str]:
     members = "1 member" if item.cases == 1 else f"{item.cases} members"
     schemes = "scheme" if len(item.schemes) == 1 else "schemes"
     yield f"{item.key}: {members}, {schemes} {', '.join(item.schemes)}"
-    yield f"{'level':>7}{'steps':>14}{'kept every':>12}{'jobs':>6}{'member-steps':>16}{'MB':>10}{'s':>8}"
+    yield _row(_HEAD)
     for level in item.levels:
-        yield (
-            f"{level.level:>7}{level.steps:>14}{level.every:>12}{len(level.shards):>6}"
-            f"{level.member_steps:>16}{level.bytes / 1e6:>10.2f}{level.seconds:>8.1f}"
-        )
-    total = (
-        sum(level.member_steps for level in item.levels),
-        sum(level.bytes for level in item.levels) / 1e6,
-        sum(level.seconds for level in item.levels),
+        numbers = map(str, (level.level, level.steps, level.every, len(level.shards)))
+        costs = amount(level.member_steps), size(level.bytes), size(level.memory)
+        yield _row((*numbers, *costs, duration(level.seconds)))
+    yield f"    analysis: {size(item.analysis_bytes)} of disk, {size(item.analysis_memory)} of memory"
+    simulate = "1 simulate job" if len(item.batches) == 1 else f"{len(item.batches)} simulate jobs"
+    yield (
+        f"    all: {simulate}, {amount(_steps(item))} member-steps, {size(item.bytes)} of disk, "
+        f"at most {size(item.memory)} of memory in a job, {duration(item.seconds)} of one core"
     )
-    yield f"{'all':>7}{'':>32}{total[0]:>16}{total[1]:>10.2f}{total[2]:>8.1f}"
-    yield ""
+
+
+def _row(cells: Sequence[str]) -> str:
+    return "".join(cell.rjust(width) for cell, width in zip(cells, _WIDTHS, strict=True))
+
+
+def _sum(plans: Sequence[Plan], results: Path) -> str:
+    steps, files = sum(map(_steps, plans)), sum(item.bytes for item in plans)
+    seconds = sum(item.seconds for item in plans)
+    return (
+        f"{len(plans)} experiments: {amount(steps)} member-steps, {size(files)} of disk "
+        f"({size(room.free_bytes(results))} free), {duration(seconds)} of one core"
+    )

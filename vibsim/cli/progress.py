@@ -47,12 +47,10 @@ class Progress:
 
 
 def describe(job: Job) -> str:
-    """Say what a job does: ``simulate pendulum_lab/convergence level_06.nc``."""
+    """Say what a job does: ``simulate pendulum_lab/convergence level_06.nc to level_09.nc``."""
     if not job.folder:
         return job.rule
-    name = job.output.split(", ")[0].removeprefix(job.folder + "/")
-    return (
-        f"{job.rule} {job.folder} {name}"
-        if job.rule.startswith("sim")
-        else f"{job.rule} {job.folder}"
-    )
+    if not job.simulates:
+        return f"{job.rule} {job.folder}"
+    names = [path.removeprefix(f"{job.folder}/") for path in job.outputs]
+    return f"simulate {job.folder} " + " to ".join(dict.fromkeys((names[0], names[-1])))

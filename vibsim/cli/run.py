@@ -8,16 +8,19 @@ import shutil
 import subprocess
 import sys
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from vibsim.cli import deleted, lock, outcome, workflow
-from vibsim.cli.jobs import results_folder
+from vibsim.cli import deleted, lock, outcome, room, workflow
+from vibsim.cli.common import results_folder
+from vibsim.cli.plans import plans_of
 from vibsim.cli.progress import Progress, describe
+from vibsim.cli.simulate import is_made
 from vibsim.errors import VibsimError
-from vibsim.plan import Plan, checkout, choose, load_all
+from vibsim.plan import Plan, checkout
 
 _STAGES = 4
 """How often the workflow is started at most: once, and once for each kind of file found bad."""
@@ -26,10 +29,11 @@ _STAGES = 4
 def run(options: Namespace) -> int:
     """Run the chosen experiments and show every verdict."""
     root, results = checkout(), results_folder(options)
-    choices = choose(options.experiments, root)
     # Everything is validated before anything is written but the cache of plans.
-    plans = list(load_all(choices, results if results.is_dir() else None).values())
+    plans = plans_of(options.experiments, results if results.is_dir() else None)
+    room.check(plans, results)
     arguments = ["--cores", str(options.cores or len(os.sched_getaffinity(0)))]
+    arguments += ["--resources", f"mem_mb={room.megabytes(plans)}"]
     if options.dry_run:
         return _dry_run(plans, results, root, arguments, options.json)
     _prepare(results)
@@ -74,17 +78,30 @@ def _show_jobs(
 ) -> int:
     ended = workflow.run(plans, results, root, held, arguments, lambda *_: None)
     _check(ended)
+    jobs = list(_one_by_one(ended.jobs, plans, results))
     if as_json:
-        jobs = [
-            {"job": describe(job), "rule": job.rule, "reason": job.reason} for job in ended.jobs
-        ]
-        print(json.dumps({"jobs": jobs}, indent=1))
+        entries = [{"job": describe(job), "rule": job.rule, "reason": job.reason} for job in jobs]
+        print(json.dumps({"jobs": entries}, indent=1))
         return 0
-    for job in ended.jobs:
+    for job in jobs:
         print(f"{describe(job)}: {job.reason}")
-    if not ended.jobs:
+    if not jobs:
         print("nothing to do")
     return 0
+
+
+def _one_by_one(
+    jobs: Sequence[workflow.Job], plans: Sequence[Plan], results: Path
+) -> Iterator[workflow.Job]:
+    """Yield what a run would make, file by file: a job keeps those of its files that are up to date."""
+    shards = {shard.path: shard for plan in plans for shard in plan.shards}
+    for job in jobs:
+        if not job.simulates:
+            yield job
+            continue
+        for path in job.outputs:
+            if not is_made(results / path, shards[path]):
+                yield replace(job, rule="simulate", output=path)
 
 
 def _check(ended: workflow.Outcome) -> None:

@@ -34,9 +34,19 @@ class Job:
     reason: str
 
     @property
+    def outputs(self) -> list[str]:
+        """The files that it makes."""
+        return [path.removesuffix(" (update)") for path in self.output.split(", ")]
+
+    @property
+    def simulates(self) -> bool:
+        """Whether it makes level files."""
+        return self.rule.startswith("simulate")
+
+    @property
     def folder(self) -> str:
         """Folder of the experiment, empty for the index."""
-        parts = self.output.split(", ")[0].split("/")
+        parts = self.outputs[0].split("/")
         return "/".join(parts[:2]) if len(parts) > 2 else ""
 
 

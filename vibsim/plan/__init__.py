@@ -5,12 +5,13 @@ plans of all experiments each time it starts.
 """
 
 from vibsim.plan.cache import load, load_all
-from vibsim.plan.cases import columns, count, sampling
+from vibsim.plan.cases import columns, count, option_groups, sampling
 from vibsim.plan.choose import Choice, checkout, choose, experiments
-from vibsim.plan.jobs import LevelJob, Plan, ShardJob
+from vibsim.plan.jobs import Batch, LevelJob, Plan, ShardJob
 from vibsim.plan.names import Names
 
 __all__ = [
+    "Batch",
     "Choice",
     "LevelJob",
     "Names",
@@ -23,5 +24,6 @@ __all__ = [
     "experiments",
     "load",
     "load_all",
+    "option_groups",
     "sampling",
 ]

@@ -8,27 +8,37 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from vibsim.errors import Fault, InputError
+from vibsim.errors import Fault, InputError, VibsimError
 from vibsim.plan import code
 from vibsim.plan.choose import Choice
 from vibsim.plan.jobs import Plan, from_json, to_json
 from vibsim.plan.versions import DRAWING, NUMERICAL, versions
 from vibsim.spec.content import read_bytes
 
+if TYPE_CHECKING:
+    from vibsim.spec import Experiment
 
-def load(choice: Choice, results: Path | None = None) -> Plan:
-    """Return the plan of an experiment file.
+Resolver = Callable[["Experiment"], "Experiment"]
+"""Fills in the levels of an experiment that names a tolerance instead; it runs a pilot, which a plan cannot."""
+
+
+def load(choice: Choice, results: Path | None = None, resolve: Resolver | None = None) -> Plan:
+    """Return the plan of an experiment file, or of one member of its sweep.
 
     Parameters
     ----------
     choice
-        The file and its collection.
+        The file and its collection, and the member where one alone is wanted.
     results
         The results folder, which keeps the cache; None does without.
+    resolve
+        What chooses the levels of an experiment with a tolerance.
 
     Raises
     ------
@@ -36,22 +46,34 @@ def load(choice: Choice, results: Path | None = None) -> Plan:
         When the file is refused.
     """
     key = _key(choice)
-    entry = (
-        results / ".vibsim/plans" / f"{choice.collection}.{choice.name}.json" if results else None
-    )
+    entry = _entry(choice, results) if results else None
     if entry and key and (text := _read(entry, key)):
-        return from_json(text, choice.file)
-    from vibsim import spec
+        return from_json(text, _word(choice))
     from vibsim.plan.build import build
 
-    plan = build(spec.load(choice.file, collection=choice.collection))
+    plan = replace(build(_experiment(choice, resolve)), file=_word(choice))
     # A file that changed while it was read is not kept under the digest of the old bytes.
     if entry and key and key == _key(choice):
         _write(entry, key, to_json(plan))
     return plan
 
 
-def load_all(choices: Iterable[Choice], results: Path | None = None) -> dict[str, Plan]:
+def _experiment(choice: Choice, resolve: Resolver | None) -> Experiment:
+    from vibsim import spec
+
+    experiment = spec.load(choice.file, collection=choice.collection)
+    if choice.case is not None:
+        experiment = experiment.alone(choice.case)
+    if experiment.levels:
+        return experiment
+    if resolve is None:
+        raise VibsimError(f"{choice.file}: nothing is there to choose levels for a tolerance")
+    return resolve(experiment)
+
+
+def load_all(
+    choices: Iterable[Choice], results: Path | None = None, resolve: Resolver | None = None
+) -> dict[str, Plan]:
     """Return the plans of several experiment files by their keys.
 
     Raises
@@ -63,7 +85,7 @@ def load_all(choices: Iterable[Choice], results: Path | None = None) -> dict[str
     faults: list[Fault] = []
     for choice in choices:
         try:
-            plan = load(choice, results)
+            plan = load(choice, results, resolve)
         except InputError as error:
             faults.extend(error.faults)
         else:
@@ -80,8 +102,25 @@ def _key(choice: Choice) -> str:
     except InputError:
         return ""
     libraries = versions(NUMERICAL + DRAWING)
-    parts = (choice.collection, choice.name, code.everything(), repr(libraries), content)
+    parts = (
+        choice.collection,
+        choice.name,
+        str(choice.case),
+        code.everything(),
+        repr(libraries),
+        content,
+    )
     return _sha256(b"\0".join(p if isinstance(p, bytes) else p.encode() for p in parts))
+
+
+def _word(choice: Choice) -> str:
+    """Return how the experiment is named on the command line of a job."""
+    return str(choice.file) if choice.case is None else f"{choice.file}@{choice.case}"
+
+
+def _entry(choice: Choice, results: Path) -> Path:
+    member = "" if choice.case is None else f"@{choice.case}"
+    return results / ".vibsim/plans" / f"{choice.collection}.{choice.name}{member}.json"
 
 
 def _sha256(content: bytes) -> str:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ShardJob:
-    """One simulate job: a range of members at one level, with every scheme."""
+    """A range of members at one level, with every scheme: one file."""
 
     index: int
     start: int
@@ -29,7 +28,7 @@ class ShardJob:
 
 @dataclass(frozen=True)
 class LevelJob:
-    """The jobs of one level and what they cost together."""
+    """The files of one level and what they cost together."""
 
     level: int
     steps: int
@@ -40,8 +39,25 @@ class LevelJob:
     bytes: int
     """Size of the files, estimated."""
     seconds: float
-    """Processor time, estimated."""
+    """Seconds of one core that the steps and the files take, estimated."""
+    memory: int
+    """Bytes that the largest job of the level holds at its peak, estimated."""
     shards: tuple[ShardJob, ...]
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What one simulate job makes: one shard, or the same members at several cheap levels."""
+
+    levels: tuple[int, ...]
+    shard: int
+    digest: str
+    seconds: float
+    """Seconds of one core that the job takes, estimated, its start included."""
+    memory: int
+    """Bytes that the job holds at its peak, estimated."""
+    is_divisible: bool
+    """Whether more threads than one are worth having."""
 
 
 @dataclass(frozen=True)
@@ -55,8 +71,16 @@ class Plan:
     cases: int
     schemes: tuple[str, ...]
     levels: tuple[LevelJob, ...]
+    batches: tuple[Batch, ...]
+    """The simulate jobs."""
     analysis: str
     """Digest of the analysis."""
+    analysis_memory: int
+    """Bytes that the analysis holds at its peak, estimated."""
+    analysis_bytes: int
+    """Size of what the analysis writes, estimated."""
+    extrapolation: str
+    """Digest of the extrapolation over all levels; empty where the experiment does not ask for one."""
     report: str
     """Digest of the report."""
     content: dict[str, Any]
@@ -64,7 +88,7 @@ class Plan:
     versions: dict[str, str]
     """Versions of the libraries that the numbers depend on."""
     file: str = ""
-    """Where the experiment was read; no digest depends on it."""
+    """Where the experiment was read, as a command line names it; no digest depends on it."""
 
     @cached_property
     def experiment(self) -> Experiment:
@@ -89,6 +113,11 @@ class Plan:
         return f"{self.key}/summary.json"
 
     @property
+    def best(self) -> str | None:
+        """Path of the solution extrapolated over all levels; None where the experiment does not ask for it."""
+        return f"{self.key}/best.nc" if self.extrapolation else None
+
+    @property
     def page(self) -> str:
         """Path of the report."""
         return f"{self.key}/report.html"
@@ -97,11 +126,12 @@ class Plan:
     def files(self) -> tuple[str, ...]:
         """Paths of everything that the jobs exchange, and of the report."""
         shards = (shard.path for shard in self.shards)
-        return (*shards, self.convergence, self.summary, self.page)
+        best = (self.best,) if self.best else ()
+        return (*shards, *best, self.convergence, self.summary, self.page)
 
     @property
     def shards(self) -> tuple[ShardJob, ...]:
-        """The simulate jobs of every level."""
+        """The files of every level."""
         return tuple(shard for level in self.levels for shard in level.shards)
 
     def level(self, level: int) -> LevelJob:
@@ -110,6 +140,25 @@ class Plan:
             if job.level == level:
                 return job
         raise KeyError(level)
+
+    def made_by(self, batch: Batch) -> tuple[ShardJob, ...]:
+        """Return the files that a job makes, one for each of its levels."""
+        return tuple(self.level(level).shards[batch.shard] for level in batch.levels)
+
+    @property
+    def seconds(self) -> float:
+        """Seconds of one core that all simulate jobs take, estimated."""
+        return sum(batch.seconds for batch in self.batches)
+
+    @property
+    def bytes(self) -> int:
+        """Size of all files, estimated."""
+        return sum(level.bytes for level in self.levels) + self.analysis_bytes
+
+    @property
+    def memory(self) -> int:
+        """Bytes that the largest job holds at its peak, estimated."""
+        return max(self.analysis_memory, *(batch.memory for batch in self.batches))
 
 
 def shard_path(key: str, level: int, shard: int | None) -> str:
@@ -124,12 +173,16 @@ def to_json(plan: Plan) -> str:
     return json.dumps(asdict(replace(plan, file="")), allow_nan=False)
 
 
-def from_json(text: str, file: Path) -> Plan:
+def from_json(text: str, file: str) -> Plan:
     """Read what `to_json` wrote."""
     data = json.loads(text)
     levels = tuple(
         LevelJob(**{**level, "shards": tuple(ShardJob(**shard) for shard in level["shards"])})
         for level in data["levels"]
     )
+    batches = tuple(
+        Batch(**{**batch, "levels": tuple(batch["levels"])}) for batch in data["batches"]
+    )
     schemes = tuple(data["schemes"])
-    return Plan(**{**data, "levels": levels, "schemes": schemes, "file": str(file)})
+    whole = {**data, "levels": levels, "batches": batches, "schemes": schemes, "file": file}
+    return Plan(**whole)

@@ -2,16 +2,87 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from vibsim.plan.build import digest_of, report_code
-from vibsim.plan.cache import load_all
+from vibsim.plan.build import report_code
+from vibsim.plan.cache import Resolver, load_all
 from vibsim.plan.choose import choose
-from vibsim.plan.jobs import Plan
+from vibsim.plan.jobs import Batch, Plan
+from vibsim.plan.shards import digest_of
+
+_LARGE = 32 * 10**6
+"""Bytes of level files from which an analysis has work for more threads than one."""
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A rule: some levels; where they have several shards, a job for each, told apart by the wildcard ``shard``."""
+
+    plan: Plan
+    batches: tuple[Batch, ...]
+    number: int
+
+    @property
+    def rule(self) -> str:
+        """Name of the rule."""
+        return f"simulate_{self.number}"
+
+    @property
+    def levels(self) -> str:
+        """The levels, as the command takes them."""
+        return " ".join(map(str, self.batches[0].levels))
+
+    @property
+    def paths(self) -> list[str]:
+        """The files of one job."""
+        shards = self.plan.made_by(self.batches[0])
+        if len(self.batches) == 1:
+            return [shard.path for shard in shards]
+        folders = [Path(shard.path).parent.as_posix() for shard in shards]
+        return [f"{folder}/shard_{{shard}}.nc" for folder in folders]
+
+    @property
+    def log(self) -> str:
+        """Path of the log."""
+        return f"{self.plan.key}/logs/{self._stem}.log"
+
+    @property
+    def benchmark(self) -> str:
+        """Path of the measured time and memory."""
+        return f"{self.plan.key}/benchmarks/{self._stem}.tsv"
+
+    @property
+    def _stem(self) -> str:
+        levels = self.batches[0].levels
+        stem = f"level_{levels[0]:02d}" + (f"_to_{levels[-1]:02d}" if len(levels) > 1 else "")
+        return stem + ("_shard_{shard}" if len(self.batches) > 1 else "")
+
+    @property
+    def threads(self) -> int:
+        """Threads of a job."""
+        return _cores() if self.batches[0].is_divisible else 1
+
+    @property
+    def memory(self) -> int:
+        """Megabytes of a job."""
+        return -(-max(batch.memory for batch in self.batches) // 10**6)
+
+    def shard(self, wildcards: Any) -> int:
+        """Return the number of the shard."""
+        return int(getattr(wildcards, "shard", 0))
+
+    def digest(self, wildcards: Any) -> str:
+        """Return the digest of a job."""
+        return self.batches[self.shard(wildcards)].digest
+
+    def file(self, wildcards: Any, input: Any) -> str:  # noqa: A002
+        """Return the experiment file; see `Names.file`."""
+        return self.plan.file
 
 
 @dataclass(frozen=True)
@@ -22,10 +93,12 @@ class Names:
     results: Path
 
     @staticmethod
-    def of(experiments: Sequence[str], results: str, root: Path) -> Names:
+    def of(
+        experiments: Sequence[str], results: str, root: Path, resolve: Resolver | None = None
+    ) -> Names:
         """Load the plans of `experiments` (files, names, collections; none means the default)."""
         folder = Path(results).absolute()
-        return Names(load_all(choose(experiments, root), folder), folder)
+        return Names(load_all(choose(experiments, root), folder, resolve), folder)
 
     @property
     def experiment_pattern(self) -> str:
@@ -40,14 +113,38 @@ class Names:
         """
         return self.plans[wildcards.experiment].file
 
-    def shard_digest(self, wildcards: Any) -> str:
-        """Return the digest of a simulate job."""
-        shards = self.plans[wildcards.experiment].level(int(wildcards.level)).shards
-        return shards[int(getattr(wildcards, "shard", 0))].digest
+    @property
+    def simulations(self) -> list[Simulation]:
+        """The rules that make the level files."""
+        groups: dict[tuple[str, tuple[int, ...]], list[Batch]] = {}
+        for key, plan in self.plans.items():
+            for batch in plan.batches:
+                groups.setdefault((key, batch.levels), []).append(batch)
+        return [
+            Simulation(self.plans[key], tuple(found), number)
+            for number, ((key, _), found) in enumerate(groups.items())
+        ]
 
     def shards(self, wildcards: Any) -> list[str]:
         """Return the level files of an experiment."""
         return [shard.path for shard in self.plans[wildcards.experiment].shards]
+
+    @property
+    def best_pattern(self) -> str:
+        """Regular expression for the experiments with an extrapolated solution; it may match nothing."""
+        return "|".join(re.escape(key) for key, plan in self.plans.items() if plan.best) or "(?!)"
+
+    def extrapolation_digest(self, wildcards: Any) -> str:
+        """Return the digest of an extrapolation."""
+        return self.plans[wildcards.experiment].extrapolation
+
+    def analysis_threads(self, wildcards: Any) -> int:
+        """Return the threads of an analysis."""
+        return _cores() if self.plans[wildcards.experiment].bytes > _LARGE else 1
+
+    def analysis_memory(self, wildcards: Any) -> int:
+        """Return the megabytes of an analysis."""
+        return -(-self.plans[wildcards.experiment].analysis_memory // 10**6)
 
     def analysis_digest(self, wildcards: Any) -> str:
         """Return the digest of an analysis."""
@@ -74,3 +171,8 @@ class Names:
     def index_digest(self) -> str:
         """Digest of the page over all experiments."""
         return digest_of({"job": "index", "code": report_code()})
+
+
+def _cores() -> int:
+    """Return how many cores there are; the workflow gives a job no more than it may use itself."""
+    return len(os.sched_getaffinity(0))

@@ -13,29 +13,39 @@ from vibsim.lazy import loader
 
 if TYPE_CHECKING:
     from vibsim.store.atomic import replacing, write_bytes, write_text
-    from vibsim.store.netcdf import read, write
+    from vibsim.store.level import Level, open_level
+    from vibsim.store.reading import check, read
     from vibsim.store.shards import join
     from vibsim.store.summary import read_json, write_json
+    from vibsim.store.writing import write, write_parts
 
 _HOME = {
+    "Level": "level",
+    "check": "reading",
     "join": "shards",
-    "read": "netcdf",
+    "open_level": "level",
+    "read": "reading",
     "read_json": "summary",
     "replacing": "atomic",
-    "write": "netcdf",
+    "write": "writing",
     "write_bytes": "atomic",
     "write_json": "summary",
+    "write_parts": "writing",
     "write_text": "atomic",
 }
 
 __all__ = [
+    "Level",
+    "check",
     "join",
+    "open_level",
     "read",
     "read_json",
     "replacing",
     "write",
     "write_bytes",
     "write_json",
+    "write_parts",
     "write_text",
 ]
 

@@ -9,8 +9,11 @@ rule analyse:
         "{experiment}/logs/analyse.log",
     benchmark:
         "{experiment}/benchmarks/analyse.tsv"
+    threads: names.analysis_threads
+    resources:
+        mem_mb=names.analysis_memory,
     params:
         digest=names.analysis_digest,
         file=names.file,
     shell:
-        "vibsim analyse {params.file:q} --results . --discard --digest {params.digest} > {log:q} 2>&1"
+        "vibsim analyse {params.file:q} --results . --discard --threads {threads} --digest {params.digest} > {log:q} 2>&1"

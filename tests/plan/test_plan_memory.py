@@ -1,0 +1,91 @@
+"""What a plan says of memory and disk against what jobs really take."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from vibsim.plan import Choice, LevelJob, Plan, load
+
+HEAD = "title: x\nmodel: {kind: pendulum}\ninitial: {theta: 1.0}\ntime: {end: 20.0}\n"
+GRID = "sweep: {initial.theta: {linspace: [0.1, 3.0, %d]}}\n"
+CASES = {
+    "one member": "levels: [5, 6]\nschemes: [central]\n",
+    "one compiled": "levels: [6, 20]\nschemes: [central]\n",
+    "lean": "levels: [6, 7]\nschemes: [central]\n" + GRID % 200_000,
+    "every step, two schemes": "levels: [6, 10]\nsamples: all\n"
+    "schemes: [central, {kind: central, label: other, end_velocity: kick}]\n" + GRID % 2000,
+}
+PROBE = r"""
+import re, sys
+from pathlib import Path
+from vibsim.cli import main
+assert main(sys.argv[1:]) == 0
+print("peak", re.search(r"VmHWM:\s*(\d+) kB", Path("/proc/self/status").read_text())[1])
+"""
+
+
+def peak(*arguments: object) -> int:
+    command = [sys.executable, "-c", PROBE, *map(str, arguments)]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    found = re.search(r"peak (\d+)", ended.stdout)
+    assert found
+    return 1024 * int(found[1])
+
+
+def planned(folder: Path, text: str) -> Plan:
+    file = folder / "x.yaml"
+    file.write_text(HEAD + text)
+    return load(Choice("adhoc", file), folder)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CASES)
+def test_memory_and_disk_are_as_planned(tmp_path: Path, name: str) -> None:
+    plan = planned(tmp_path, CASES[name])
+    level = plan.levels[-1]
+    made = tmp_path / level.shards[0].path
+    command = ["simulate", plan.file, "--results", tmp_path, "--level", level.level]
+    # The first time compiles the kernel, which takes memory of its own.
+    peak(*command)
+    made.unlink()
+    measured = peak(*command)
+    assert level.memory == pytest.approx(measured, rel=0.2)
+    assert made.stat().st_size == pytest.approx(share(plan, level), rel=0.1)
+
+
+def share(plan: Plan, level: LevelJob) -> float:
+    """Return the planned size of the first file of a level."""
+    return level.bytes * level.shards[0].stop / plan.cases
+
+
+def test_the_size_of_a_comparison_with_series_is_as_planned(tmp_path: Path) -> None:
+    text = "levels: [6, 7, 8, 9]\nschemes: [central]\n" + GRID % 30
+    plan = planned(tmp_path, text)
+    common = ["--results", tmp_path]
+    peak("simulate", plan.file, *common, "--level", 6, 7, 8, 9)
+    peak("analyse", plan.file, *common)
+    size = (tmp_path / plan.convergence).stat().st_size
+    assert plan.analysis_bytes == pytest.approx(size, rel=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("threads", [1, 2])
+def test_an_analysis_takes_no_more_than_planned(tmp_path: Path, threads: int) -> None:
+    plan = planned(tmp_path, CASES["lean"])
+    for batch in plan.batches:
+        peak(
+            *("simulate", plan.file, "--results", tmp_path, "--shard", batch.shard),
+            *("--level", *batch.levels),
+        )
+    measured = peak("analyse", plan.file, "--results", tmp_path, "--threads", threads)
+    size = (tmp_path / plan.convergence).stat().st_size
+    assert plan.analysis_bytes == pytest.approx(size, rel=0.1)
+    assert measured < 1.1 * plan.analysis_memory
+    if threads == 2:
+        assert plan.analysis_memory == pytest.approx(measured, rel=0.3)

@@ -1,0 +1,135 @@
+"""Sweeps through the workflow: shards, members added at the end, one member alone."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from vibsim import store
+from vibsim.analysis import analyse_records
+from vibsim.simulation import simulate_record
+from vibsim.spec import Experiment
+
+from .conftest import TEXT, Place, vibsim
+
+# One member at level 23 is 25 ms of work, so that a shard has 128 of them: with a stride that keeps 17 samples.
+LARGE = TEXT.replace("levels: [6, 7, 8, 9]", "levels: [4, 5, 23]\nsamples: common")
+
+
+def write(place: Place, sweep: str, text: str = TEXT) -> None:
+    place.file.parent.mkdir(exist_ok=True)
+    place.file.write_text(text.replace("time:", f"sweep: {{{sweep}}}\ntime:"))
+
+
+@pytest.fixture
+def empty(tmp_path: Path) -> Place:
+    return Place(tmp_path)
+
+
+def test_shards_of_a_level_are_jobs_of_their_own(empty: Place) -> None:
+    write(empty, "model.L: {linspace: [1, 2, 300]}", LARGE)
+    shards = [f"level_23/shard_000{n}" for n in range(3)]
+    cheap = ["level_04/shard_0000", "level_05/shard_0000"]
+    assert sorted(empty.jobs()) == sorted([*cheap, *shards, "analyse", "report", "index"])
+
+
+@pytest.fixture
+def small_shards(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make shards of at most four members in every process."""
+    path = tmp_path / "small/sitecustomize.py"
+    path.parent.mkdir()
+    path.write_text("from vibsim.spec import cost\ncost.LARGEST_SHARD = 4\n")
+    paths = [str(path.parent), *filter(None, [os.environ.get("PYTHONPATH")])]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(paths))
+
+
+def shards(*numbers: int) -> set[str]:
+    return {f"level_0{level}/shard_000{n}" for level in (6, 7, 8, 9) for n in numbers}
+
+
+def test_shards_are_made_by_jobs_of_several_levels_and_give_the_same_numbers(
+    empty: Place, small_shards: None
+) -> None:
+    write(empty, "model.L: {range: [1, 6, 1]}")
+    ended = empty.run()
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert "simulate adhoc/tiny level_06/shard_0001.nc to level_09/shard_0001.nc" in ended.stderr
+    assert (empty.tiny / "logs/level_06_to_09_shard_0001.log").is_file()
+    experiment = Experiment.from_yaml(empty.file)
+    records = {level: simulate_record(experiment, level) for level in (6, 7, 8, 9)}
+    for level, record in records.items():
+        files = [(empty.tiny / f"level_0{level}/shard_000{n}.nc", None) for n in (0, 1)]
+        with store.open_level(files) as found:
+            assert found.cases == 6
+            for name in record.variables:
+                assert found.read()[name].tobytes() == record[name].tobytes(), name
+    compared = analyse_records(experiment, records)
+    stored = store.read(empty.tiny / "convergence.nc")
+    for name, variable in compared.variables.items():
+        if variable.values.dtype.kind == "f":
+            assert stored[name].tobytes() == variable.values.tobytes(), name
+
+
+def test_only_the_shard_that_was_not_full_and_the_new_ones_are_made(
+    empty: Place, small_shards: None
+) -> None:
+    write(empty, "model.L: {range: [1, 6, 1]}")
+    assert empty.run().returncode == 0
+    write(empty, "model.L: {range: [1, 9, 1]}")
+    rest = {"analyse", "report", "index"}
+    assert set(empty.jobs()) == shards(1, 2) | rest
+    write(empty, "model.L: {range: [1, 6, 1]}", TEXT.replace("8, 9]", "8, 9, 10]"))
+    finer = {f"level_10/shard_000{n}" for n in (0, 1)}
+    assert set(empty.jobs()) == finer | rest
+
+
+def test_members_added_at_the_end_are_what_is_new(empty: Place) -> None:
+    write(empty, "initial.theta: [0.5, 1.0]")
+    assert empty.run().returncode == 0
+    before = empty.content()
+    write(empty, "initial.theta: {range: [0.5, 1.0, 0.5]}")
+    assert set(empty.jobs()) <= {"analyse", "report", "index"}, "no level file has other values"
+    write(empty, "initial.theta: [0.5, 1.0, 1.5]")
+    levels = {f"level_0{n}/shard_0000" for n in (6, 7, 8, 9)}
+    assert set(empty.jobs()) == levels | {"analyse", "report", "index"}
+    write(empty, "initial.theta: [0.5, 1.0]")
+    assert empty.run().returncode == 0
+    assert empty.content() == before
+
+
+def test_one_member_alone_is_an_experiment_of_its_own(empty: Place) -> None:
+    write(empty, "initial.theta: [0.5, 1.0]")
+    alone = Path(f"{empty.file}@1")
+    ended = empty.run(files=[alone])
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert (empty.results / "adhoc/tiny_case_1/level_06.nc").is_file()
+    assert "adhoc/tiny_case_1  PASS" in ended.stdout
+    assert empty.jobs(files=[alone]) == []
+    ended = empty.run(files=[Path(f"{empty.file}@2")])
+    assert ended.returncode == 2
+    assert "from 0 to 1" in ended.stderr
+    ended = vibsim("plan", "--json", alone)
+    (plan,) = json.loads(ended.stdout)
+    assert (plan["name"], plan["cases"]) == ("tiny_case_1", 1)
+
+
+def test_a_member_that_fails_costs_no_other(empty: Place) -> None:
+    """A member that overflows is a result with a status; the others are as without it."""
+    write(empty, "initial.omega: [0.1, 1.0e+200, 0.2]")
+    ended = empty.run()
+    assert "did not come to its end" not in ended.stdout
+    record = store.read(empty.tiny / "level_06/shard_0000.nc")
+    assert record["status"][0].tolist() == [0, 1, 0]
+    write(empty, "initial.omega: [0.1, 0.2]")
+    assert (
+        vibsim(
+            *("simulate", empty.file, "--level", 6, "--out", empty.folder / "x.nc"),
+            *("--results", empty.results),
+        ).returncode
+        == 0
+    )
+    other = store.read(empty.folder / "x.nc")
+    assert record["theta"][:, [0, 2]].tobytes() == other["theta"].tobytes()

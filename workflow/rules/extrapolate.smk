@@ -1,0 +1,19 @@
+# The solution of one experiment extrapolated over all its levels, where it is asked for.
+rule extrapolate:
+    input:
+        names.shards,
+    output:
+        "{experiment}/best.nc",
+    log:
+        "{experiment}/logs/extrapolate.log",
+    benchmark:
+        "{experiment}/benchmarks/extrapolate.tsv"
+    wildcard_constraints:
+        experiment=names.best_pattern,
+    resources:
+        mem_mb=names.analysis_memory,
+    params:
+        digest=names.extrapolation_digest,
+        file=names.file,
+    shell:
+        "vibsim extrapolate {params.file:q} --results . --discard --digest {params.digest} > {log:q} 2>&1"
