@@ -11,12 +11,15 @@ import samples
 from vibsim import report
 from vibsim.report import (
     cards,
+    choice,
     contents,
     data,
-    figures_grid,
+    drawing,
+    figures_map,
     figures_order,
     figures_solution,
     figures_time,
+    layout,
     style,
 )
 from vibsim.report.data import Member
@@ -92,7 +95,7 @@ def test_an_empty_panel_says_why_and_a_caption_names_only_what_is_drawn(changes,
     exp = samples.experiment(**changes)
     with style.applied():
         picture = figures_order.against_step(exp, samples.record(exp), "theta", 0)
-        text = style.svg(picture)
+        text = drawing.svg(picture)
     assert all(note in text for note in notes)
     assert not [word for word in absent if word in picture.caption]
 
@@ -102,27 +105,28 @@ def test_a_caption_names_the_dotted_line_where_it_is_drawn():
     exp = samples.experiment(schemes=[scheme], levels=[10, 12, 14, 16], samples="common")
     with style.applied():
         picture = figures_order.against_step(exp, samples.record(exp), "theta", 0)
-        text = style.svg(picture)
+        text = drawing.svg(picture)
     assert ("dotted" in picture.caption) == ("predicted round-off" in text)
     assert "dotted" in picture.caption
 
 
 def test_missing_cells_of_a_map_are_hatched_and_cells_have_borders():
-    exp = samples.experiment(levels=[6, 7, 8, 9], sweep=GRID)
-    with style.applied():
-        picture = figures_grid.grid(samples.record(exp), "theta")
-        text = style.svg(picture)
-        full = figures_grid.grid(
-            samples.record(samples.experiment(sweep={**GRID, "model.g": [1.0, 4.0]})), "theta"
-        )
-    cells = picture.figure.axes[0].collections[0]
-    assert np.ma.getmaskarray(cells.get_array()).sum() == 3
-    assert len(cells.get_edgecolor())
-    assert picture.figure.axes[0].patch.get_hatch()
-    assert "no stated order" in text
-    assert "Hatched" in picture.caption
-    assert "Hatched" not in full.caption
-    assert not full.figure.legends
+    def draw(sweep):
+        exp = samples.experiment(levels=[6, 7, 8, 9], sweep=sweep)
+        record = samples.record(exp)
+        with style.applied():
+            return figures_map.verdicts(
+                exp, record, layout.grid_of(layout.keys(record)), "theta", 0
+            )
+
+    picture, full = draw(GRID), draw({**GRID, "model.g": [1.0, 4.0]})
+    orders = picture.figure.axes[1]
+    assert orders.get_title(loc="left") == "Order against the promised one"
+    assert np.ma.getmaskarray(orders.collections[0].get_array()).sum() == 3
+    assert len(orders.collections[0].get_edgecolor())
+    assert orders.patch.get_hatch()
+    assert "Grey hatched" in picture.caption
+    assert "Grey" not in full.caption
 
 
 def test_a_sweep_names_a_member_once_per_block_of_a_page_and_in_every_row_of_a_file(tmp_path):
@@ -133,7 +137,7 @@ def test_a_sweep_names_a_member_once_per_block_of_a_page_and_in_every_row_of_a_f
     start = page.index('<section id="numbers"')
     table = page[start : page.index("</table>", start)]
     assert re.findall(r'rowgroup" colspan="9">([^<]*)<', table) == [
-        f"central, {data.case_name(record, m.case)}" for m in data.members(record, "theta")
+        f"central, {data.case_name(record, m.case)}" for m in choice.members(record, "theta")
     ]
     assert table.count('<th scope="col"') == 9
     rows = re.findall(r"<tr><td.*?</tr>", table, flags=re.DOTALL)
@@ -148,7 +152,7 @@ def test_the_typical_member_passes_where_one_does(values):
     exp = samples.experiment(sweep={"model.g": values}, levels=[6, 7, 8, 9])
     record = samples.record(exp)
     roles = {m.role: data.flags(record, "theta_status")[0, m.case] for m in
-             data.members(record, "theta")}  # fmt: skip
+             choice.members(record, "theta")}  # fmt: skip
     assert roles == {"typical": "PASS", "worst": "FAIL"}
 
 
@@ -188,7 +192,7 @@ def test_time_ends_with_the_breakdown_and_the_panel_says_so():
 def test_without_a_member_that_passes_the_typical_one_is_the_least_bad():
     record = samples.record(samples.experiment(**STIFF))
     roles = {m.role: data.flags(record, "theta_status")[0, m.case] for m in
-             data.members(record, "theta")}  # fmt: skip
+             choice.members(record, "theta")}  # fmt: skip
     assert roles == {"typical": "INCONCLUSIVE", "worst": "FAIL"}
 
 

@@ -18,13 +18,15 @@ from vibsim.errors import VibsimError
 from vibsim.models import MODELS
 from vibsim.record import Record, Variable
 from vibsim.report import (
-    data,
-    figures_grid,
+    choice,
+    drawing,
+    figures_map,
     figures_order,
     figures_sweep,
     figures_time,
+    layout,
+    reasons,
     style,
-    words,
 )
 from vibsim.report.data import Member
 from vibsim.vocabulary import REASONS
@@ -135,7 +137,7 @@ def test_the_verdict_comes_before_the_numbers_and_the_figures(plain):
 def test_the_page_says_what_was_found(plain):
     text = " ".join(read(plain / "report.html").text)
     for part in (
-        "PASS", "pendulum lecture, section 2.5", "asymptotic", words.REASONS["asymptotic"].needs, "4.026", "6 to 9",
+        "PASS", "pendulum lecture, section 2.5", "asymptotic", reasons.REASONS["asymptotic"].needs, "4.026", "6 to 9",
         "θ converges with the order of its scheme ± 0.1 (l2 norm)", "divides the error by about 4",
         ".venv/bin/vibsim run pendulum_lab/theta", "vibsim 1.2, Python 3.99, numpy 9.9, matplotlib ", ", jinja2 ",
         "arithmetic: compensated",
@@ -244,7 +246,7 @@ def test_a_sweep_shows_period_orders_and_the_worst_member(swept):
     assert any(name.endswith("_typical") for name in names)
     rows = (swept / "tables/members.csv").read_text().splitlines()
     assert len(rows) == 17
-    assert rows[0].startswith("scheme,case,initial.theta [rad],status,reason,order")
+    assert rows[0].startswith("case,initial.theta [rad],scheme,status,reason,order of θ,")
 
 
 def test_a_large_sweep_stays_a_small_page(tmp_path):
@@ -325,9 +327,9 @@ TOLERANT = [
 def test_every_promised_order_has_its_reference_and_its_tolerance():
     exp = samples.several(checks=TOLERANT)
     record = promising(samples.record(exp), 2, 1)
-    assert data.promises(exp, record, "theta") == [(1.0, 0.1), (2.0, 0.3)]
+    assert choice.promises(exp, record, "theta") == [(1.0, 0.1), (2.0, 0.3)]
     with style.applied():
-        text = style.svg(figures_order.against_step(exp, record, "theta", 0))
+        text = drawing.svg(figures_order.against_step(exp, record, "theta", 0))
     assert "slope 1 (promised)" in text
     assert "slope 2 (promised)" in text
 
@@ -335,9 +337,9 @@ def test_every_promised_order_has_its_reference_and_its_tolerance():
 def test_one_promise_of_several_schemes_is_drawn_once():
     exp = samples.several()
     record = samples.record(exp)
-    assert data.promises(exp, record, "theta") == [(2.0, 0.1)]
+    assert choice.promises(exp, record, "theta") == [(2.0, 0.1)]
     with style.applied():
-        text = style.svg(figures_order.against_step(exp, record, "theta", 0))
+        text = drawing.svg(figures_order.against_step(exp, record, "theta", 0))
     assert text.count("slope 2 (promised)") == 1
 
 
@@ -346,14 +348,16 @@ def test_a_sweep_shows_every_promise_and_the_map_is_relative_to_it():
     exp = samples.several(checks=TOLERANT, sweep=sweep)
     record = promising(samples.record(exp), 2, 1)
     with style.applied():
-        text = style.svg(figures_sweep.orders(exp, record, "theta"))
-        picture = figures_grid.grid(record, "theta")
+        keys = layout.keys(record)
+        along, grid = layout.along_of(keys), layout.grid_of(keys)
+        text = drawing.svg(figures_sweep.orders(exp, record, along, "theta"))
+        maps = [figures_map.verdicts(exp, record, grid, "theta", s) for s in (0, 1)]
     assert "promised, 1 ± 0.1" in text
     assert "promised, 2 ± 0.3" in text
-    titles = [ax.get_title(loc="left") for ax in picture.figure.axes[:2]]
-    assert titles == ["central: 2 promised", "trap: 1 promised"]
-    for ax in picture.figure.axes[:2]:
-        assert np.abs(ax.collections[0].get_array()).max() < 0.2
+    for picture, label in zip(maps, ("order of θ − 2", "order of θ − 1"), strict=True):
+        panel, bar = picture.figure.axes[1:3]
+        assert bar.get_xlabel() == label
+        assert np.abs(panel.collections[0].get_array()).max() < 0.2
 
 
 def test_the_rescaled_curves_are_those_that_are_stored():
@@ -409,8 +413,8 @@ def test_a_quantity_has_one_name_on_the_page(tmp_path):
 
 
 def test_every_reason_has_words():
-    assert set(words.REASONS) == set(REASONS)
-    assert all(r.meaning and r.needs for r in words.REASONS.values())
+    assert set(reasons.REASONS) == set(REASONS)
+    assert all(r.meaning and r.needs for r in reasons.REASONS.values())
 
 
 def test_an_unknown_format_is_refused_before_anything_is_written(tmp_path):

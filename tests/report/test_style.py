@@ -11,7 +11,7 @@ import samples
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vibsim.report import figures_time, style
+from vibsim.report import drawing, figures_time, style
 from vibsim.report.data import Member
 
 VALUES = st.lists(
@@ -84,7 +84,7 @@ def documents():
     record = samples.record(exp)
     with style.applied():
         return [
-            style.svg(figures_time.overlay(record, "theta", Member(0, 0, "central")))
+            drawing.svg(figures_time.overlay(record, "theta", Member(0, 0, "central")))
             for _ in range(2)
         ]
 
@@ -108,7 +108,7 @@ def test_ids_of_a_figure_are_unique_and_references_resolve(documents):
 
 
 def test_an_inline_figure_has_an_escaped_name_and_scales(documents):
-    element = style.inline(documents[0], 'a "quoted" <name>')
+    element = drawing.inline(documents[0], 'a "quoted" <name>')
     assert element.startswith("<svg ")
     assert 'aria-label="a &#34;quoted&#34; &lt;name&gt;"' in element
     assert "xmlns" not in element
@@ -123,6 +123,6 @@ def test_a_name_with_markup_stays_text_in_a_figure():
     with style.applied():
         from vibsim.report import figures_order
 
-        text = style.svg(figures_order.against_step(exp, record, "theta", 0))
+        text = drawing.svg(figures_order.against_step(exp, record, "theta", 0))
     assert "<script" not in text
     ElementTree.fromstring(text)

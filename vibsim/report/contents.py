@@ -15,22 +15,17 @@ from vibsim.report.data import (
     at,
     case_name,
     exact_periods,
-    flags,
     floor_norm,
     norm_unit,
-    pick,
+    place_of,
     sound_pairs,
     steps_of,
     swept,
-    swept_label,
     unit,
     whole,
 )
 from vibsim.report.tables import Cell, Column, Table
 from vibsim.vocabulary import TYPICAL_NORM
-
-LISTED = 10_000
-"""Most members that a table lists one by one."""
 
 
 def checks(summary: Mapping[str, Any]) -> Table:
@@ -136,27 +131,38 @@ def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
     if "energy_deviation_max_abs" not in record:
         return None
     measure = unit(record, "energy_deviation_max_abs")
-    columns = (
-        Column("scheme"), Column("level", form="integer"), Column("max |dE|", measure, "norm"),
-        Column("ratio", form="order"), Column("max |dE| without the last point", measure, "norm"),
-        Column("ratio, without", form="order"),
-    )  # fmt: skip
+    # lean records leave the second out
+    known = {
+        name: text
+        for name, text in (
+            ("energy_deviation_max_abs", ""),
+            ("energy_deviation_max_abs_interior", "without the last point"),
+        )
+        if name in record
+    }
+    columns = [Column("scheme"), Column("level", form="integer")]
+    for text in known.values():
+        ratio = f"ratio, {text.split()[0]}" if text else "ratio"
+        columns += [
+            Column(f"max |dE| {text}".strip(), measure, "norm"),
+            Column(ratio, form="order"),
+        ]
     rows: list[tuple[Cell, ...]] = []
     for member in shown:
-        both = [at(record, f"energy_deviation_max_abs{end}", member) for end in ("", "_interior")]
+        found = [at(record, name, member) for name in known]
         whole_runs = at(record, "status", member) == 0
         for i, level in enumerate(whole(record, "level")):
             sound = whole_runs[i : i + 2].all()
             cells = [
                 cell
-                for values in both
+                for values in found
                 for cell in (float(values[i]), _ratio(values, i) if sound else math.nan)
             ]
             rows.append((member.title, level, *cells))
     caption = (
         "Largest energy deviation over every step; the last point has an end formula of its own"
     )
-    return Table("energy_maxima", caption, columns, tuple(rows), int(bool(swept(record))))
+    return Table("energy_maxima", caption, tuple(columns), tuple(rows), int(bool(swept(record))))
 
 
 def _ratio(values: Any, i: int) -> float:
@@ -188,49 +194,6 @@ def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
     return Table("scalars", caption, columns, tuple(rows), int(bool(swept(record))))
 
 
-def member_list(record: Record, quantity: str) -> Table | None:
-    """Return one row per scheme and member of a sweep; None without one or beyond `LISTED` members."""
-    found, count = swept(record), len(record["case"])
-    if not found or count > LISTED:
-        return None
-    columns = (
-        Column("scheme"), Column("case", form="integer"), *(_swept_column(record, name) for name in found),
-        Column("status"), Column("reason"), Column("order", form="order"), Column("order, low", form="order"),
-        Column("order, high", form="order"), Column("period", unit(record, "period"), "full"),
-        Column("relative error", form="norm"),
-    )  # fmt: skip
-    n = record.words("norm").index(TYPICAL_NORM)
-    exact = exact_periods(record)
-    rows: list[tuple[Cell, ...]] = []
-    for s, scheme in enumerate(record.words("scheme")):
-        orders = [
-            pick(record, f"{quantity}_order{end}", scheme=s, norm=n)
-            for end in ("", "_low", "_high")
-        ]
-        words_of = [flags(record, f"{quantity}_{name}")[s] for name in ("status", "reason")]
-        period = np.asarray(record["period"], dtype=np.float64)[s, :, -1]
-        values = [
-            record["case"],
-            *(record[name] for name in found),
-            *words_of,
-            *orders,
-            period,
-            period / exact - 1.0,
-        ]
-        rows += zip(
-            [scheme] * count, *(np.asarray(column).tolist() for column in values), strict=True
-        )
-    caption = (
-        f"Members: order of {words.symbol(quantity)} ({TYPICAL_NORM}), period on the finest level"
-    )
-    return Table("members", caption, columns, tuple(rows))
-
-
-def _swept_column(record: Record, name: str) -> Column:
-    key, measure = swept_label(record, name)
-    return Column(key, measure, "step")
-
-
 def failures(summary: Mapping[str, Any], record: Record) -> Table | None:
     """Return the runs that broke down; None where there is none."""
     found = summary.get("failures") or []
@@ -240,15 +203,26 @@ def failures(summary: Mapping[str, Any], record: Record) -> Table | None:
         Column("scheme"), Column("level", form="integer"), Column("case", form="integer"), Column("member"),
         Column("t", "s", "step"), Column("step", form="integer"), Column("error"),
     )  # fmt: skip
-    cases = {int(case): i for i, case in enumerate(record["case"])}
     rows = tuple(
-        (f["scheme"], f["level"], f["case"], case_name(record, cases[f["case"]]) if f["case"] in cases else "",
-         f["t"], f["step"], f["error"])
+        (
+            f["scheme"],
+            f["level"],
+            f["case"],
+            _member(record, f["case"]),
+            f["t"],
+            f["step"],
+            f["error"],
+        )
         for f in found
-    )  # fmt: skip
+    )
     return Table(
         "failures",
         "Runs that broke down: the first moment at which the solution was not finite",
         columns,
         rows,
     )
+
+
+def _member(record: Record, case: int) -> str:
+    place = place_of(record, case)
+    return "" if place is None else case_name(record, place)

@@ -7,21 +7,15 @@ scheme) is read by the same call.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis.assemble import asked
-from vibsim.analysis.evidence import spacing_of
 from vibsim.analysis.floor import norm_of_floor
-from vibsim.models import MODELS
 from vibsim.record import Record
 from vibsim.report.style import RAISE
-from vibsim.vocabulary import SEVERITY, TOLERANCE, TYPICAL_NORM
-
-if TYPE_CHECKING:
-    from vibsim.spec import Experiment
+from vibsim.vocabulary import TYPICAL_NORM
 
 Floats = NDArray[np.float64]
 
@@ -160,75 +154,39 @@ def _value(value: Any) -> str:
     return f"{plain:.6g}" if isinstance(plain, float) else str(plain)
 
 
-def formal_order(record: Record, scheme: int, quantity: str) -> float:
-    """Return the order that a scheme promises for a quantity."""
-    return float(record[f"{quantity}_formal_order"][scheme])
+def formal_order(record: Record, member: Member, quantity: str) -> float:
+    """Return the order that the scheme of a member promises for a quantity."""
+    return float(at(record, f"{quantity}_formal_order", member))
 
 
-def promises(experiment: Experiment, record: Record, quantity: str) -> list[tuple[float, float]]:
-    """Return every order that a scheme promises for a quantity, with its tolerance, in ascending order.
-
-    The tolerance is the smallest that a check has which is about the quantity and the scheme.
-    """
-    inner = [check.measured for check in experiment.checks]
-    found = set()
-    for s, scheme in enumerate(record.words("scheme")):
-        tolerances = [
-            check.tolerance
-            for check in inner
-            if check.kind == "converges"
-            and check.converges == quantity
-            and (check.schemes is None or scheme in check.schemes)
-        ]
-        found.add((formal_order(record, s, quantity), min(tolerances, default=TOLERANCE)))
-    return sorted(found)
+def formal_orders(record: Record, quantity: str) -> Floats:
+    """Return the promised order of every scheme and member, shape (scheme, case): options may be swept."""
+    variable = record.variable(f"{quantity}_formal_order")
+    orders = np.asarray(variable.values, dtype=np.float64)
+    by_case = orders if "case" in variable.dims else orders[:, None]
+    return np.broadcast_to(by_case, (len(record["scheme"]), len(record["case"])))
 
 
-def position(experiment: Experiment) -> str:
-    """Return the name of the model's position."""
-    return MODELS[experiment.model.kind].position
+def promised_text(record: Record, quantity: str, scheme: int) -> str:
+    """Write the order that a scheme promises: a number, or that it depends on the member."""
+    found = np.unique(formal_orders(record, quantity)[scheme])
+    return f"{found[0]:g}" if found.size == 1 else "promised"
 
 
-def quantities(experiment: Experiment, record: Record) -> list[str]:
-    """Return the quantities to show: the position, those that a check names, and the energy deviation."""
-    extra = ["energy_deviation"] if MODELS[experiment.model.kind].conservative else []
-    wanted = dict.fromkeys([position(experiment), *asked(experiment), *extra])
-    return [name for name in wanted if f"{name}_finest" in record]
+def is_lean(record: Record) -> bool:
+    """Say whether no series over time are stored (see `vibsim.spec.sampling`)."""
+    return record.attrs.get("storage") == "lean"
 
 
-def members(record: Record, quantity: str) -> list[Member]:
-    """Return what the figures over time show of a quantity: of every scheme one member, or two of a sweep.
-
-    These are the worst member, judged by the verdicts on `quantity` and then by the distance of the order from the
-    promised one (of several schemes the worst decides), and a typical one of those that pass, if any does.
-    """
-    schemes = record.words("scheme")
-    if not swept(record):
-        return [Member(s, 0, name) for s, name in enumerate(schemes)]
-    ranking = _ranking(record, quantity)
-    status = flags(record, f"{quantity}_status")
-    # the healthiest: members that most schemes pass, and of the others those that fewest fail
-    score = np.sum(status == "PASS", axis=0) * (len(status) + 1) - np.sum(status == "FAIL", axis=0)
-    healthy = ranking[score[ranking] == score.max()]
-    roles = {int(healthy[healthy.size // 2]): "typical", int(ranking[-1]): "worst"}
-    return [
-        Member(s, case, name, case_name(record, case), role)
-        for case, role in reversed(roles.items())
-        for s, name in enumerate(schemes)
-    ]
+def place_of(record: Record, case: int) -> int | None:
+    """Return the position of a member by its global index; None where the record does not have it."""
+    found = np.flatnonzero(record["case"] == case)
+    return int(found[0]) if found.size else None
 
 
-def _ranking(record: Record, quantity: str) -> NDArray[np.intp]:
-    """Return the members from the best to the worst, shape (case,)."""
-    status = flags(record, f"{quantity}_status")
-    severity = np.max(
-        [np.where(status == word, rank, 0) for word, rank in SEVERITY.items()], axis=(0, 1)
-    )
-    norm = record.words("norm").index(TYPICAL_NORM)
-    away = np.abs(
-        pick(record, f"{quantity}_order", norm=norm) - record[f"{quantity}_formal_order"][:, None]
-    )
-    return np.lexsort((np.max(np.where(np.isnan(away), np.inf, away), axis=0), severity))
+def ends_of(record: Record) -> Floats:
+    """Return the end time of every member, shape (case,) or (1,)."""
+    return np.atleast_1d(pick(record, "dt", level=0) * float(record["steps"][0]))
 
 
 ABOVE = 3.0
@@ -243,9 +201,10 @@ def sound_pairs(record: Record, quantity: str, member: Member) -> list[bool]:
     levels, last = whole(record, "level"), int(at(record, f"{quantity}_window_last", member))
     if last >= 0:
         return [finer <= last for finer in levels[1:]]
-    floor = _floor(record, quantity, member)
-    differences = at(record, f"{quantity}_difference", member)
-    return [largest(d) > ABOVE * max(floor[i], floor[i + 1]) for i, d in enumerate(differences)]
+    floor = floor_norm(record, quantity, member, TYPICAL_NORM)
+    norm = record.words("norm").index(TYPICAL_NORM)
+    differences = at(record, f"{quantity}_difference_norm", member, norm=norm)
+    return [bool(d > ABOVE * max(floor[i], floor[i + 1])) for i, d in enumerate(differences)]
 
 
 def sound_levels(record: Record, quantity: str, member: Member) -> list[bool]:
@@ -256,15 +215,15 @@ def sound_levels(record: Record, quantity: str, member: Member) -> list[bool]:
     return [*pairs, pairs[-1]]
 
 
-def _floor(record: Record, quantity: str, member: Member) -> Floats:
-    return np.nan_to_num(at(record, f"{quantity}_floor", member))
-
-
 def floor_norm(record: Record, quantity: str, member: Member, norm: str) -> Floats:
     """Return the norm over time of noise as large as the predicted round-off, shape (level,)."""
-    spacing = np.broadcast_to(spacing_of(record), len(record["case"]))[member.case]
     floor = at(record, f"{quantity}_floor", member)
-    return norm_of_floor(floor, norm, len(record["t"]), spacing)
+    if "t" in record:
+        t = times(record, member.case)
+        return norm_of_floor(floor, norm, t.size, np.diff(t[:2]))
+    return norm_of_floor(
+        floor, norm, int(record["steps"][0]) + 1, steps_of(record, member.case)[:1]
+    )
 
 
 def norm_unit(record: Record, quantity: str, norm: str) -> str:

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.record import Record
-from vibsim.report import style, words
+from vibsim.report import figures_local_order, style, words
+from vibsim.report.choice import promises
 from vibsim.report.data import (
     Floats,
     Member,
@@ -19,9 +20,6 @@ from vibsim.report.data import (
     case_name,
     floor_norm,
     norm_unit,
-    pick,
-    promises,
-    sound_pairs,
     steps_of,
     unit,
     whole,
@@ -48,7 +46,7 @@ def against_step(experiment: Experiment, record: Record, quantity: str, case: in
         figure.add_axes((0.555, low, 0.425, tall)),
     )
     kinds = _draw_norms(left, experiment, record, quantity, case, schemes)
-    is_settled = _draw_orders(right, experiment, record, quantity, case, schemes)
+    is_settled = figures_local_order.draw(right, experiment, record, quantity, case, schemes)
     handles, texts = left.get_legend_handles_labels()
     figure.legend(
         handles,
@@ -207,98 +205,3 @@ def _level_axis(ax: Axes, dt: Floats, levels: list[int]) -> None:
         FuncFormatter(lambda x, _: str(chosen[min(chosen, key=lambda d: abs(d - x))]))
     )
     ax.text(-0.02, 1.03, "level", transform=ax.transAxes, ha="right", va="bottom", fontsize=8.5)
-
-
-def _draw_orders(
-    ax: Axes, experiment: Experiment, record: Record, quantity: str, case: int, schemes: list[str]
-) -> bool | None:
-    """Draw the local orders; return whether an order is stated, None where there is nothing to draw."""
-    from matplotlib.ticker import MaxNLocator
-
-    name = f"{quantity}_observed_order"
-    if name not in record or not np.isfinite(pick(record, name, case=case)).any():
-        few = len(whole(record, "level")) < 3
-        ax.set(xticks=[], yticks=[])
-        style.remark(
-            ax,
-            "no order: it takes three levels"
-            if few
-            else "no order:\nno ratio of differences exists",
-        )
-        return None
-    triples, norm = whole(record, "triple"), record.words("norm").index(TYPICAL_NORM)
-    promised = promises(experiment, record, quantity)
-    for order, tolerance in promised:
-        ax.axhspan(order - tolerance, order + tolerance, color="#ececec", zorder=0)
-        ax.axhline(order, color="black", linestyle=(0, (4, 3)), linewidth=1.0, zorder=1)
-    sound: list[Floats] = []
-    stated = False
-    for s, scheme in enumerate(schemes):
-        member = Member(s, case, scheme)
-        above = sound_pairs(record, quantity, member)
-        local = at(record, name, member, norm=norm)
-        good = [all(above[i : i + 2]) for i in range(local.size)]
-        sound.append(local[good] if any(good) else local)
-        ax.plot(
-            triples,
-            local,
-            **style.look(s),
-            markersize=5,
-            linewidth=1.1,
-        )
-        stated |= _draw_stated(ax, record, quantity, member, norm)
-    ax.set_ylim(*_order_limits(sound, [order for order, _ in promised]))
-    if len(schemes) == 1 and len(triples) <= 8:
-        for level, order in zip(triples, local, strict=True):
-            if np.isfinite(order):
-                ax.annotate(
-                    words.number(float(order), "order"),
-                    (level, order),
-                    xytext=(0, 7),
-                    textcoords="offset points",
-                    ha="center",
-                    fontsize=8,
-                    annotation_clip=True,
-                )
-    levels = whole(record, "level")
-    ax.set_xlim(levels[0] - 0.5, levels[-1] + 0.5)
-    ax.xaxis.set_major_locator(MaxNLocator(nbins=10, integer=True))
-    ax.set_xlabel("level (coarsest of three)")
-    ax.set_ylabel(f"local order of {words.symbol(quantity)} ({TYPICAL_NORM})")
-    return stated
-
-
-def _draw_stated(ax: Axes, record: Record, quantity: str, member: Member, norm: int) -> bool:
-    """Draw the stated order as a bar over the levels of its window, with its interval; say whether there is one."""
-    order = float(at(record, f"{quantity}_order", member, norm=norm))
-    low, high = (
-        float(at(record, f"{quantity}_order_{end}", member, norm=norm)) for end in ("low", "high")
-    )
-    first, last = (
-        float(at(record, f"{quantity}_window_{end}", member)) for end in ("first", "last")
-    )
-    if not np.isfinite([order, low, high, first, last]).all() or last <= first:
-        return False
-    colour = style.look(member.scheme)["color"]
-    ax.fill_between(
-        [first, last], [low, low], [high, high], color=colour, alpha=0.18, linewidth=0, zorder=0.5
-    )
-    ax.plot(
-        [first, last],
-        [order, order],
-        color=colour,
-        linewidth=4,
-        alpha=0.35,
-        solid_capstyle="butt",
-        zorder=1.2,
-    )
-    return True
-
-
-def _order_limits(sound: list[Floats], promised: list[float]) -> tuple[float, float]:
-    """Hold the promised orders and those that count, no further than 5 below the least and 2 above the largest."""
-    values = np.concatenate([part[np.isfinite(part)] for part in sound] or [np.array(promised)])
-    low = min([promised[0] - 0.3, *values.tolist()])
-    high = max([promised[-1] + 0.3, *values.tolist()])
-    room = 0.08 * (high - low)
-    return max(low - room, promised[0] - 5), min(high + room, promised[-1] + 2)

@@ -1,26 +1,17 @@
-"""Figures over a swept parameter: the period, the order of every member, and the map of verdicts."""
+"""Order, error and verdict of every member along one swept parameter, each with its error bar."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.record import Record
-from vibsim.report import style, words
-from vibsim.report.data import (
-    Floats,
-    exact_periods,
-    flags,
-    pick,
-    promises,
-    swept,
-    swept_label,
-    unit,
-    whole,
-)
+from vibsim.report import finest, ridge, style, words
+from vibsim.report.choice import promises
+from vibsim.report.data import Floats, flags, norm_unit, whole
+from vibsim.report.layout import Along
 from vibsim.report.panels import figure_of, panels
 from vibsim.report.style import Picture
 from vibsim.vocabulary import SEVERITY, TYPICAL_NORM
@@ -30,164 +21,60 @@ if TYPE_CHECKING:
 
     from vibsim.spec import Experiment
 
-LINES = 6
-"""Most lines that the other parameters of a sweep may make."""
 MARKED = 60
 """Most members that get a marker each; above, a line says it better."""
 
 
-@dataclass(frozen=True)
-class Axis:
-    """How members are laid out along an axis."""
-
-    label: str
-    x: Floats
-    """Abscissa of every member, shape (case,)."""
-    lines: tuple[tuple[str, NDArray[np.intp]], ...]
-    """Members that belong to one line, in the order of `x`, with a name; one line without a name is usual."""
-
-
-def axis(record: Record) -> Axis:
-    """Lay members out along the swept parameter with most values, one line per value of the others.
-
-    Where the sweep is no numbers, or there would be too many lines, members are laid out by their number.
-    """
-    found = swept(record)
-    numeric = all(np.issubdtype(record[name].dtype, np.number) for name in found)
-    values = [np.asarray(record[name]) for name in found]
-    longest = max(range(len(found)), key=lambda i: np.unique(values[i]).size)
-    others = [i for i in range(len(found)) if i != longest]
-    combined = (
-        np.stack([values[i] for i in others], axis=1)
-        if others and numeric
-        else np.empty((len(values[0]), 0))
-    )
-    groups, belongs = (
-        np.unique(combined, axis=0, return_inverse=True) if others and numeric else ([()], None)
-    )
-    if not numeric or len(groups) > LINES:
-        case = np.asarray(record["case"], dtype=np.float64)
-        return Axis("number of the member", case, (("", np.arange(case.size)),))
-    x = values[longest].astype(np.float64)
-    order = np.argsort(x, kind="stable")
-    lines = []
-    for g, group in enumerate(groups):
-        names_ = [
-            f"{swept_label(record, found[i])[0]} = {v:.4g}"
-            for i, v in zip(others, group, strict=True)
-        ]
-        lines.append(
-            (", ".join(names_), order if belongs is None else order[belongs.ravel()[order] == g])
-        )
-    return Axis(style.label(*swept_label(record, found[longest])), x, tuple(lines))
-
-
-def period(record: Record) -> Picture | None:
-    """Draw the period of every member and its relative error; None where no member has a period."""
-    computed = (
-        np.asarray(record["period"], dtype=np.float64) if "period" in record else np.array([np.nan])
-    )
-    if not np.isfinite(computed).any():
-        return None
-    exact = exact_periods(record)
-    along, known = axis(record), bool(np.isfinite(exact).any())
-    axes = panels([2.4, 2.4] if known else [2.6])
-    levels, schemes = whole(record, "level"), record.words("scheme")
-    for k, (name, members) in enumerate(along.lines):
-        x = along.x[members]
-        if known:
-            label = "" if k else "exact"
-            _line(axes[0], x, exact[members], color="black", linewidth=1.0, label=label, zorder=1)
-        for s, scheme in enumerate(schemes):
-            label = _text(scheme if len(schemes) > 1 else "", name, f"level {levels[-1]}")
-            _line(
-                axes[0],
-                x,
-                computed[s, members, -1],
-                linestyle="none",
-                label=label,
-                **_mark(s, s + k, len(schemes)),
-            )
-    if known:
-        error = np.abs(computed / exact[None, :, None] - 1.0)
-        _draw_period_errors(axes[1], along, error, levels, schemes)
-    axes[0].set_ylabel(style.label("period", unit(record, "period")))
-    axes[0].set_title("Period")
-    axes[-1].set_xlabel(along.label)
-    style.beside(axes[0], fontsize=8)
-    caption = (
-        "Top: the measured period and the exact one. Bottom: its relative error; from level to level it should fall "
-        "by the same factor, so lines of successive levels are evenly spaced, and where they are not the coarse "
-        "levels are too coarse."
+def orders(experiment: Experiment, record: Record, along: Along, quantity: str) -> Picture:
+    """Draw the stated order of every member and its error, with their intervals, and the verdict as a strip below."""
+    schemes, letter = record.words("scheme"), words.symbol(quantity)
+    axes = panels([2.3, 1.9, 0.3 * max(2, len(schemes))])
+    _draw_orders(axes[0], experiment, record, along, quantity)
+    is_known = _draw_errors(axes[1], record, along, quantity)
+    _draw_verdicts(axes[2], along, flags(record, f"{quantity}_status"), schemes)
+    marked = finish(axes, experiment, along)
+    error = (
+        "Then the error of the finest level: the true one (dots), and what two levels alone say of it (lines, "
+        "with the interval of the order)."
+        if is_known
+        else "Then the error of the finest level, estimated from two levels, with the interval of the order."
     )
     return Picture(
-        name="period",
-        title="Period over the swept parameter",
-        caption=caption if known else "The measured period on the finest level.",
-        alt="Period and its relative error against the swept parameter",
+        name=f"sweep_order_{quantity}",
+        title=f"Order and error of every member: {letter}",
+        caption="Top: the order that each member's levels state; a grey band is a promised order with the tolerance of "
+        f"its check. {error} Bottom: what can be said of it. Members that fail or stay open are worth a look one by "
+        f"one.{marked}",
+        alt=f"Stated order of {words.name(quantity)}, its error and its verdict against the swept parameter",
         figure=figure_of(axes[0]),
     )
 
 
-def _draw_period_errors(
-    ax: Axes, along: Axis, error: Floats, levels: list[int], schemes: list[str]
+def finish(axes: list[Axes], experiment: Experiment, along: Along) -> str:
+    """Give the common axis its scale, label and separatrix; return the sentence on the latter."""
+    key = along.key
+    if key.is_log:
+        room = (key.distinct[-1] / key.distinct[0]) ** 0.03
+        low, high = float(key.distinct[0] / room), float(key.distinct[-1] * room)
+        style.log_axis(axes[-1], "x", low, high)
+    if key.words:
+        axes[-1].set_xticks(key.distinct, key.words)
+    axes[-1].set_xlabel(key.label)
+    is_alone = len(along.lines) == 1 and not along.follows
+    found = ridge.on_line(experiment, key).tolist() if is_alone else []
+    for ax in axes:
+        for x in found:
+            ax.axvline(x, color="black", linestyle=(0, (1, 2)), linewidth=1.0, zorder=1)
+    return " Dotted: the separatrix, where the exact period is infinite." if found else ""
+
+
+def _draw_orders(
+    ax: Axes, experiment: Experiment, record: Record, along: Along, quantity: str
 ) -> None:
-    several = len(along.lines) > 1
-    count = 1 if several else 6 if len(schemes) == 1 else 3
-    chosen = np.unique(
-        np.linspace(len(levels) - 1, 0, min(len(levels), count)).round().astype(int)
-    )[::-1]
-    for k, (name, members) in enumerate(along.lines):
-        for s, scheme in enumerate(schemes):
-            for m, i in enumerate(chosen):
-                colour = k + s if several else m
-                label = _text(scheme if len(schemes) > 1 else "", name, f"level {levels[i]}")
-                look = _mark(s, colour, len(schemes)) | {
-                    "linestyle": style.look(colour)["linestyle"],
-                    "linewidth": 1.2,
-                }
-                _line(ax, along.x[members], error[s, members, i], label=label, **look)
-    shown = error[:, :, chosen]
-    positive = shown[np.isfinite(shown) & (shown > 0)]
-    if positive.size:
-        style.log_axis(ax, "y", float(positive.min()) / 2, float(positive.max()) * 2)
-    ax.set_ylabel("|period / exact − 1|")
-    ax.set_title("Relative error of the period")
-    style.beside(ax, fontsize=8)
-
-
-def _text(*parts: str) -> str:
-    return style.entry(", ".join(part for part in parts if part))
-
-
-def _mark(scheme: int, colour: int, count: int) -> dict[str, Any]:
-    """Return a marker of a scheme; of several the first is large and hollow, so that all stay visible."""
-    look: dict[str, Any] = {
-        "marker": style.look(scheme)["marker"],
-        "color": style.look(colour)["color"],
-        "markersize": 4.5,
-    }
-    if count > 1 and scheme == 0:
-        look |= {"markerfacecolor": "none", "markersize": 8}
-    return look
-
-
-def _line(ax: Axes, x: Floats, y: Floats, **look: Any) -> None:
-    """Draw a quantity over members in the order of `x`, thinned; markers only while they are few."""
-    if x.size > MARKED:
-        look["marker"] = "," if look.get("linestyle") == "none" else ""
-    ax.plot(*style.thin(x, y), **look)
-
-
-def orders(experiment: Experiment, record: Record, quantity: str) -> Picture:
-    """Draw the stated order of every member with its interval, and the verdict on it as a strip below."""
-    along, schemes = axis(record), record.words("scheme")
-    norm = record.words("norm").index(TYPICAL_NORM)
-    axes = panels([2.3, 0.3 * max(2, len(schemes))])
     promised = promises(experiment, record, quantity)
     for order, tolerance in promised:
-        axes[0].axhspan(order - tolerance, order + tolerance, color="#ececec", zorder=0)
-        axes[0].axhline(
+        ax.axhspan(order - tolerance, order + tolerance, color="#ececec", zorder=0)
+        ax.axhline(
             order,
             color="black",
             linestyle=(0, (4, 3)),
@@ -195,44 +82,61 @@ def orders(experiment: Experiment, record: Record, quantity: str) -> Picture:
             zorder=1,
             label=f"promised, {order:g} ± {tolerance:g}",
         )
-    for s, scheme in enumerate(schemes):
-        value, low, high = (
-            pick(record, f"{quantity}_order{end}", scheme=s, norm=norm)
-            for end in ("", "_low", "_high")
-        )
+    value, low, high = finest.orders(record, quantity)
+    for s, scheme in enumerate(record.words("scheme")):
+        look = style.look(s) | {"linestyle": "-", "markersize": 4, "linewidth": 0.8}
         for k, (_, members) in enumerate(along.lines):
-            _draw_interval(
-                axes[0], along.x[members], low[members], high[members], style.look(s)["color"]
-            )
-            _line(
-                axes[0],
-                along.x[members],
-                value[members],
-                **style.look(s) | {"linestyle": "-"},
-                markersize=4,
-                linewidth=0.8,
-                label="" if k else style.entry(scheme),
-            )
-    values = np.asarray(record[f"{quantity}_order"])[..., norm]
-    bottom, top = style.limits(values, np.array([promised[0][0] - 0.25, promised[-1][0] + 0.25]))
-    axes[0].set_ylim(max(bottom, promised[0][0] - 3), min(top, promised[-1][0] + 2))
-    letter = words.symbol(quantity)
-    axes[0].set_ylabel(f"order of {letter} ({TYPICAL_NORM})")
-    axes[0].set_title("Stated order with its interval")
-    style.beside(axes[0])
-    _draw_verdicts(axes[1], along, flags(record, f"{quantity}_status"), schemes)
-    axes[1].set_xlabel(along.label)
-    return Picture(
-        name=f"sweep_order_{quantity}",
-        title=f"Order of every member: {letter}",
-        caption="Top: the order that each member's levels state; a grey band is a promised order with the tolerance of "
-        "its check. Bottom: what can be said of it. Members that fail or stay open are worth a look one by one.",
-        alt=f"Stated order of {words.name(quantity)} and its verdict against the swept parameter",
-        figure=figure_of(axes[0]),
+            x = along.key.values[members]
+            interval(ax, x, low[s, members], high[s, members], look["color"])
+            line(ax, x, value[s, members], label="" if k else style.entry(scheme), **look)
+    bottom, top = style.limits(value, np.array([promised[0][0] - 0.25, promised[-1][0] + 0.25]))
+    ax.set_ylim(max(bottom, promised[0][0] - 3), min(top, promised[-1][0] + 2))
+    ax.set_ylabel(f"order of {words.symbol(quantity)} ({TYPICAL_NORM})")
+    ax.set_title("Stated order with its interval")
+    style.beside(ax)
+
+
+def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> bool:
+    """Draw the error of the finest level; return whether the true one is known."""
+    found, schemes = finest.error(record, quantity), record.words("scheme")
+    for s, scheme in enumerate(schemes):
+        look = style.look(s)
+        several = f", {scheme}" if len(schemes) > 1 else ""
+        for k, (_, members) in enumerate(along.lines):
+            x = along.key.values[members]
+            low, high = (style.no_zeros(part[s, members]) for part in (found.low, found.high))
+            interval(ax, x, low, high, look["color"])
+            estimate = style.no_zeros(found.estimate[s, members])
+            text = "" if k else f"estimated{several}"
+            line(ax, x, estimate, color=look["color"], linewidth=1.0, label=text)
+            true = style.no_zeros(found.true[s, members])
+            if np.isfinite(true).any():
+                text = "" if k else f"true{several}"
+                dots = look | {"linestyle": "none", "markersize": 4, "markerfacecolor": "white"}
+                line(ax, x, true, label=text, **dots)
+    values = np.concatenate([found.true.ravel(), found.estimate.ravel()])
+    positive = values[np.isfinite(values) & (values > 0)]
+    if positive.size:
+        most = min(float(positive.max()), style.LARGEST)
+        least = max(float(np.quantile(positive, 0.005)), most * 1e-16, style.TINIEST)
+        style.log_axis(ax, "y", least / 3, most * 3)
+    ax.set_ylabel(
+        style.label(f"error of {words.symbol(quantity)}", norm_unit(record, quantity, TYPICAL_NORM))
     )
+    ax.set_title(f"Error on level {whole(record, 'level')[-1]} ({TYPICAL_NORM} norm)")
+    style.beside(ax)
+    return found.is_known
 
 
-def _draw_interval(ax: Axes, x: Floats, low: Floats, high: Floats, colour: str) -> None:
+def line(ax: Axes, x: Floats, y: Floats, **look: Any) -> None:
+    """Draw a quantity over members in the order of `x`, thinned; markers only while they are few."""
+    if x.size > MARKED:
+        look["marker"] = "," if look.get("linestyle") == "none" else ""
+    ax.plot(*style.thin(x, y), **look)
+
+
+def interval(ax: Axes, x: Floats, low: Floats, high: Floats, colour: str) -> None:
+    """Draw error bars: one for each of few members, else a band between two lines."""
     if x.size <= MARKED:
         ax.vlines(x, low, high, color=colour, linewidth=2.4, alpha=0.4)
         return
@@ -240,13 +144,13 @@ def _draw_interval(ax: Axes, x: Floats, low: Floats, high: Floats, colour: str) 
         ax.plot(*style.thin(x, bound), color=colour, linewidth=0.6, alpha=0.6)
 
 
-def _draw_verdicts(ax: Axes, along: Axis, status: NDArray[Any], schemes: list[str]) -> None:
+def _draw_verdicts(ax: Axes, along: Along, status: NDArray[Any], schemes: list[str]) -> None:
     """Draw one row per scheme; every verdict has a colour, a marker and a height of its own."""
     lift = {"PASS": 0.0, "INCONCLUSIVE": 0.17, "FAIL": 0.34}
-    marks = {"PASS": "o", "INCONCLUSIVE": "s", "FAIL": "X"}
-    order = np.argsort(along.x, kind="stable")
+    order = np.argsort(along.key.values, kind="stable")
+    x = along.key.values[order]
     for word in SEVERITY:
-        found = [(s, along.x[order][status[s][order] == word]) for s in range(len(schemes))]
+        found = [(s, x[status[s][order] == word]) for s in range(len(schemes))]
         points = [style.thin(x, np.full(x.size, s + lift[word])) for s, x in found if x.size]
         xs = np.concatenate([x for x, _ in points] or [np.empty(0)])
         ys = np.concatenate([y for _, y in points] or [np.empty(0)])
@@ -254,7 +158,7 @@ def _draw_verdicts(ax: Axes, along: Axis, status: NDArray[Any], schemes: list[st
             xs,
             ys,
             linestyle="none",
-            marker=marks[word],
+            marker=style.STATUS_MARKERS[word],
             markersize=5,
             color=style.STATUS_COLOURS[word],
             markeredgecolor="black",

@@ -36,7 +36,7 @@ TARGET: dict[str, Any] = {"color": "black", "linestyle": (0, (4, 3)), "linewidth
 
 def overlay(record: Record, quantity: str, member: Member) -> Picture:
     """Draw the rescaled level differences of a quantity, their spread, and the ratio over time."""
-    t, order = times(record, member.case), formal_order(record, member.scheme, quantity)
+    t, order = times(record, member.case), formal_order(record, member, quantity)
     letter, measure = words.symbol(quantity), unit(record, f"{quantity}_difference")
     curves = differences(record, quantity, member)
     spread, ratios = comparable(curves), len(whole(record, "triple")) > 0
@@ -74,7 +74,7 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
 
 def energy(record: Record, member: Member) -> Picture:
     """Draw the energy deviation of every level times ``(2**p)**k``: convergence to conservation."""
-    order = formal_order(record, member.scheme, "energy_deviation")
+    order = formal_order(record, member, "energy_deviation")
     measure, levels = unit(record, "energy_deviation_scaled"), whole(record, "level")
     above = sound_levels(record, "energy_deviation", member)
     curves = []
@@ -110,7 +110,7 @@ def energy(record: Record, member: Member) -> Picture:
 
 def differences(record: Record, quantity: str, member: Member) -> list[Curve]:
     """Return the level differences, rescaled so that an error ``C dt**p`` makes them coincide; at most `CURVES`."""
-    order, levels = formal_order(record, member.scheme, quantity), whole(record, "level")
+    order, levels = formal_order(record, member, quantity), whole(record, "level")
     above, letter = sound_pairs(record, quantity, member), words.symbol(quantity)
     curves = []
     for i in _few(above):

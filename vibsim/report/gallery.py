@@ -4,19 +4,24 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vibsim.analysis.assemble import asked
 from vibsim.record import Record
 from vibsim.report import (
-    contents,
+    choice,
     data,
-    figures_grid,
+    figures_cloud,
+    figures_map,
     figures_order,
+    figures_period,
     figures_solution,
+    figures_spread,
     figures_sweep,
     figures_time,
+    layout,
+    words,
 )
 from vibsim.report.data import Member
 from vibsim.report.style import Picture
+from vibsim.spec.series import asked
 from vibsim.vocabulary import SEVERITY
 
 if TYPE_CHECKING:
@@ -28,32 +33,50 @@ SHOWN = 6
 
 def pictures(experiment: Experiment, record: Record, shown: list[Member]) -> list[Picture]:
     """Return the figures of a report in the order of the page."""
-    found = data.quantities(experiment, record)
+    found = choice.quantities(experiment, record)
     levels = bool(data.whole(record, "pair"))
-    over = [p for quantity in found for p in _over_members(experiment, record, quantity)]
+    over = over_members(experiment, record, found)
     cases = sorted({member.case for member in shown})
+    series = [] if data.is_lean(record) else shown
     drawn = list(over)
     for quantity in found:
-        drawn += _of_quantity(experiment, record, quantity, shown, levels)
+        drawn += _of_quantity(experiment, record, quantity, series, levels)
         drawn += [
             figures_order.against_step(experiment, record, quantity, case)
             for case in cases
             if levels
         ]
     drawn += [
-        figures_solution.solution(record, data.position(experiment), member) for member in shown
+        figures_solution.solution(record, choice.position(experiment), member) for member in series
     ]
     return drawn
 
 
-def _over_members(experiment: Experiment, record: Record, quantity: str) -> list[Picture]:
-    if not data.swept(record):
+def over_members(experiment: Experiment, record: Record, found: list[str]) -> list[Picture]:
+    """Return the figures over the swept parameters: along a line, on a map, or against each key."""
+    keys = layout.keys(record)
+    if not keys:
         return []
-    first = figures_sweep.period(record) if quantity == data.position(experiment) else None
-    order = (
-        figures_sweep.orders(experiment, record, quantity) if data.whole(record, "triple") else None
-    )
-    return [p for p in (first, order, figures_grid.grid(record, quantity)) if p is not None]
+    along, grid = layout.along_of(keys), layout.grid_of(keys)
+    schemes = range(min(len(record["scheme"]), SHOWN))
+    drawn: list[Picture | None] = []
+    if along is not None:
+        drawn.append(figures_period.period(experiment, record, along))
+        drawn.append(figures_period.amplitude(experiment, record, along))
+    elif grid is not None:
+        drawn += [figures_map.motion(experiment, record, grid, scheme) for scheme in schemes]
+    for quantity in found:
+        if along is not None and data.whole(record, "triple"):
+            drawn.append(figures_sweep.orders(experiment, record, along, quantity))
+        for scheme in schemes:
+            if grid is not None:
+                drawn.append(figures_map.verdicts(experiment, record, grid, quantity, scheme))
+            elif along is None:
+                drawn.append(figures_cloud.projections(experiment, record, keys, quantity, scheme))
+        drawn.append(figures_spread.histograms(experiment, record, quantity))
+    if grid is not None:
+        drawn += [figures_map.numbers(experiment, record, grid, scheme) for scheme in schemes]
+    return [picture for picture in drawn if picture is not None]
 
 
 def _of_quantity(
@@ -68,21 +91,24 @@ def _of_quantity(
 
 def choose(experiment: Experiment, record: Record) -> tuple[list[Member], str]:
     """Return what gets figures of its own, and a sentence saying what was left out."""
-    quantity = data.quantities(experiment, record)[0]
-    everyone = data.members(record, quantity)
+    quantity = choice.quantities(experiment, record)[0]
+    everyone = choice.members(record, quantity)
     status = data.flags(record, f"{quantity}_status")
     severity = [SEVERITY[status[m.scheme, m.case]] for m in everyone]
     ranked = sorted(range(len(everyone)), key=lambda i: (-severity[i], i))[:SHOWN]
     shown = [everyone[i] for i in sorted(ranked)]
     parts = []
-    if data.swept(record):
+    if data.is_lean(record):
+        case = int(record["case"][shown[0].case])
+        command = f".venv/bin/vibsim run {words.target(experiment)}@{case}"
+        parts.append(
+            "The sweep is large, so no series over time are stored, and there are no figures over time. To see the "
+            f"series of one member, here the worst, run it alone: `{command}`."
+        )
+    elif data.swept(record):
         parts.append("The worst and a typical member are shown over time, for every scheme.")
     if len(everyone) > SHOWN:
         parts.append(
             f"{len(everyone) - SHOWN} more have no figures over time; the tables hold their numbers."
-        )
-    if len(record["case"]) > contents.LISTED:
-        parts.append(
-            "The members are too many to be listed one by one: `convergence.nc` holds their numbers."
         )
     return shown, " ".join(parts)

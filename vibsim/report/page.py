@@ -7,10 +7,24 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from vibsim import store
 from vibsim.errors import VibsimError, nearest
 from vibsim.record import Record
-from vibsim.report import cards, contents, data, figures_time, gallery, style, thumbnail
+from vibsim.report import (
+    cards,
+    choice,
+    contents,
+    data,
+    drawing,
+    figures_time,
+    finest,
+    gallery,
+    members,
+    style,
+    thumbnail,
+)
 from vibsim.report.data import Member
 from vibsim.report.panels import Curve
 from vibsim.report.style import Picture
@@ -61,29 +75,37 @@ def write(
     VibsimError
         For a format that does not exist.
     """
-    unknown = [form for form in formats if form not in style.FORMATS]
+    unknown = [form for form in formats if form not in drawing.FORMATS]
     if unknown:
-        raise VibsimError(f"figure format '{unknown[0]}': {nearest(unknown[0], style.FORMATS)}")
+        raise VibsimError(f"figure format '{unknown[0]}': {nearest(unknown[0], drawing.FORMATS)}")
     experiment = plan.experiment
     shown, left_out = gallery.choose(experiment, convergence)
+    position = choice.position(experiment)
     with style.applied():
         pictures = gallery.pictures(experiment, convergence, shown)
-        drawn = [(picture, style.svg(picture)) for picture in pictures]
+        drawn = [(picture, drawing.svg(picture)) for picture in pictures]
         figures = dict(_figure_files(drawn, formats))
     figures["thumbnail.svg"] = _stamp(experiment, convergence, shown[0]).encode()
     listed, folded = _tables(experiment, convergence, summary)
     beside = [contents.checks(summary), contents.failures(summary, convergence)]
-    beside.append(contents.member_list(convergence, data.position(experiment)))
+    beside.append(members.table(convergence, position))
     everything = [*listed, *(table for _, group in folded for table in group)]
     everything += [table for table in beside if table is not None and table not in everything]
     _replace(directory / "figures", figures)
-    _replace(directory / "tables", dict(_table_files(everything)))
+    tables = dict(_table_files(everything))
+    if data.swept(convergence):
+        members.write_csv(directory / "tables/members.csv", convergence, position)
+        tables.pop("members.csv", None)
+        _replace(directory / "tables", tables, ("members.csv",))
+    else:
+        _replace(directory / "tables", tables)
     context = cards.context(experiment, convergence, summary, provenance) | {
         "tables": listed,
         "folded": folded,
         "shown": left_out,
+        "digits": members.digits(convergence),
         "pictures": [
-            (picture, _markup(style.inline(text, picture.alt))) for picture, text in drawn
+            (picture, _markup(drawing.inline(text, picture.alt))) for picture, text in drawn
         ],
     }
     store.write_text(
@@ -133,7 +155,7 @@ def _figure_files(
 ) -> Iterable[tuple[str, bytes]]:
     for picture, text in drawn:
         for form in dict.fromkeys(["svg", *formats]):
-            content = text.encode() if form == "svg" else style.binary(picture, form)
+            content = text.encode() if form == "svg" else drawing.binary(picture, form)
             yield f"{picture.name}.{form}", content
 
 
@@ -143,18 +165,26 @@ def _table_files(tables: Iterable[Table]) -> Iterable[tuple[str, bytes]]:
         yield f"{table.name}.tex", to_latex(table).encode()
 
 
-def _replace(directory: Path, files: Mapping[str, bytes]) -> None:
-    """Write files, and remove those of an earlier report that this one does not have."""
+def _replace(directory: Path, files: Mapping[str, bytes], others: Sequence[str] = ()) -> None:
+    """Write files, and remove those of an earlier report that are neither among them nor among the `others`."""
     for name, content in files.items():
         store.write_bytes(directory / name, content)
     for path in directory.iterdir() if directory.is_dir() else ():
-        if path.is_file() and path.name not in files:
+        if path.is_file() and path.name not in {*files, *others}:
             path.unlink()
 
 
 def _stamp(experiment: Experiment, record: Record, member: Member) -> str:
-    """Return the small figure of the index: the rescaled differences; with a single level the solution."""
-    quantity, t = data.position(experiment), data.times(record, member.case)
+    """Return the small figure of the index: the rescaled differences; with a single level the solution.
+
+    Without series it is the error, or what two levels say of it, against the level.
+    """
+    quantity = choice.position(experiment)
+    if data.is_lean(record):
+        levels = np.array(data.whole(record, "level"), dtype=np.float64)
+        size = finest.norms(record, quantity, member)
+        return thumbnail.draw(levels, [Curve("", np.log10(size))])
+    t = data.times(record, member.case)
     if not data.whole(record, "pair"):
         return thumbnail.draw(t, [Curve("", data.at(record, f"{quantity}_finest", member))])
     return thumbnail.draw(t, figures_time.differences(record, quantity, member))
@@ -164,8 +194,8 @@ def _tables(
     experiment: Experiment, record: Record, summary: Mapping[str, Any]
 ) -> tuple[list[Table], list[tuple[str, list[Table]]]]:
     """Return the tables of the page, and those that it folds away under a heading."""
-    found = data.quantities(experiment, record)
-    shown = data.members(record, found[0])
+    found = choice.quantities(experiment, record)
+    shown = choice.members(record, found[0])
     norms = [name for name in record.words("norm") if name != TYPICAL_NORM]
     listed = [contents.orders(record, quantity, shown) for quantity in found]
     optional = [contents.maxima(record, shown), contents.scalars(record, shown)]
@@ -175,8 +205,9 @@ def _tables(
     listed = [table for table in listed if table not in long]
     folded = [(table.caption, [table]) for table in long]
     other = [contents.orders(record, quantity, shown, norm) for quantity in found for norm in norms]
-    folded.append(("Norms and orders in the other norms", other))
-    members = contents.member_list(record, found[0])
-    if members is not None and len(members.rows) <= FOLDED:
-        folded.append((f"All {len(record['case'])} members", [members]))
+    if other:
+        folded.append(("Norms and orders in the other norms", other))
+    listed_members = members.table(record, found[0])
+    if listed_members is not None and len(listed_members.rows) <= FOLDED:
+        folded.append((f"All {len(record['case'])} members", [listed_members]))
     return listed, folded

@@ -6,9 +6,7 @@ can search and copy it); it is laid out with a wide font, so that a narrower sub
 
 from __future__ import annotations
 
-import io
 import math
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -35,15 +33,34 @@ DASHES: tuple[Any, ...] = (
 )
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 GREY = "#707070"
+STATUS_MARKERS = {"PASS": "o", "INCONCLUSIVE": "s", "FAIL": "X"}
 STATUS_COLOURS = {"PASS": "#009E73", "INCONCLUSIVE": "#E69F00", "FAIL": "#D55E00"}
+REASON_COLOURS = {
+    "asymptotic": "#009E73",
+    "exact": "#8FD3BD",
+    "match": "#00553E",
+    "pre_asymptotic": "#E69F00",
+    "round_off": "#F0E442",
+    "oscillating": "#B8860B",
+    "non_smooth": "#7A5C00",
+    "too_few_levels": "#F7D9A0",
+    "not_applicable": "#CFC79A",
+    "order_low": "#D55E00",
+    "order_high": "#AA2288",
+    "mismatch": "#CC79A7",
+    "wrong_limit": "#5E3C99",
+    "unstable": "#7F1D00",
+    "non_finite": "#000000",
+}
+"""Greens, yellows and reds by status, dark to light within each: the reason of a verdict on a map."""
+MISSING = "#d4d4d4"
+"""Colour of what has no value."""
 WIDTH = 9.0
 """Width of a figure [inch]."""
 POINTS = 400
 """Horizontal resolution to which a long series is thinned."""
-FAMILY = "'DejaVu Sans', Verdana, Arial, Helvetica, sans-serif"
 LARGEST, TINIEST = 1e300, 1e-300
 """Ends of logarithmic axes: beyond them a margin would overflow."""
-FORMATS = ("svg", "png", "pdf")
 
 _RC: dict[Any, Any] = {
     "axes.edgecolor": "#404040",
@@ -71,8 +88,6 @@ _RC: dict[Any, Any] = {
     "ytick.labelsize": 8.5,
 }
 
-_PLACES = re.compile(r' (?:d|x|y)="[^"]*"')
-_DIGITS = re.compile(r"(\.\d\d)\d+")
 SUPERSCRIPTS = "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"
 RAISE = str.maketrans("-0123456789", SUPERSCRIPTS)
 """Translates digits to superscripts."""
@@ -187,16 +202,20 @@ def label(text: str, unit: str, exponent: int = 0) -> str:
 
 def log_axis(ax: Axes, which: str, low: float, high: float) -> None:
     """Make an axis logarithmic from `low` to `high`, with at most about eight labelled ticks in Unicode."""
+    getattr(ax, f"set_{which}scale")("log")
+    getattr(ax, f"set_{which}lim")(low, high)
+    log_ticks(getattr(ax, f"{which}axis"), low, high)
+
+
+def log_ticks(axis: Any, low: float, high: float, most: int = 7) -> None:
+    """Put ticks from `low` to `high` on a logarithmic axis (or colour bar): powers of ten, or 1, 2, 5 of each."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
     bottom, top = math.floor(math.log10(low)), math.ceil(math.log10(high))
-    getattr(ax, f"set_{which}scale")("log")
-    getattr(ax, f"set_{which}lim")(low, high)
-    step = max(1, math.ceil((top - bottom) / 7))
+    step = max(1, math.ceil((top - bottom) / most))
     ticks = [10.0**e for e in range(bottom, top + 1, step)]
-    if math.log10(high / low) < 2.2:
+    if math.log10(high / low) < 2.2 * most / 7:
         ticks = [m * 10.0**e for e in range(bottom, top + 1) for m in (1, 2, 5)]
-    axis = getattr(ax, f"{which}axis")
     axis.set_major_locator(FixedLocator([x for x in ticks if low <= x <= high]))
     axis.set_minor_locator(NullLocator())
     plain = low >= 0.005 and high <= 2000
@@ -234,50 +253,3 @@ def beside(ax: Axes, **options: Any) -> None:
 def remark(ax: Axes, text: str) -> None:
     """Say within a panel why it is empty."""
     ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color=GREY)
-
-
-def svg(picture: Picture) -> str:
-    """Return the SVG document of a picture: no date, and the same bytes every time."""
-    import matplotlib
-
-    stream = io.StringIO()
-    nothing = {"Date": None, "Creator": None, "Format": None, "Type": None}
-    with matplotlib.rc_context({"svg.hashsalt": picture.name}):
-        picture.figure.savefig(stream, format="svg", metadata=nothing)
-    return _tidy(stream.getvalue(), picture.name)
-
-
-def _tidy(text: str, name: str) -> str:
-    """Make ids unique among the figures of one page, drop unused ones, and let the reader's fonts serve."""
-    used = set(re.findall(r'(?:url\(#|href="#)([^)"]+)', text))
-    text = re.sub(r' id="([^"]*)"', lambda m: f' id="{name}-{m[1]}"' if m[1] in used else "", text)
-    text = re.sub(r'(url\(#|href="#)', rf"\g<1>{name}-", text)
-    # hundredths of a point are more than anyone sees
-    text = _PLACES.sub(lambda match: _DIGITS.sub(r"\1", match[0]), text)
-    text = re.sub(
-        r"<!--.*?-->\s*|<metadata>.*?</metadata>\s*|<!DOCTYPE.*?>\s*", "", text, flags=re.DOTALL
-    )
-    return text.replace("'DejaVu Sans'", FAMILY)
-
-
-def inline(document: str, alt: str) -> str:
-    """Return the ``<svg>`` element of an SVG document for use within HTML, with `alt` as its accessible name."""
-    from markupsafe import escape
-
-    element = document[document.index("<svg") :]
-    element = re.sub(r' xmlns(:xlink)?="[^"]*"', "", element).replace("xlink:href", "href")
-    element = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", element, count=1)
-    element = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", element, count=1)
-    # a style sheet within the page would hold for all of it; the page has the same rule for its figures
-    element = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>\s*", "", element, flags=re.DOTALL)
-    return element.replace("<svg", f'<svg role="img" aria-label="{escape(alt)}"', 1)
-
-
-def binary(picture: Picture, form: str) -> bytes:
-    """Return a picture as PNG or PDF, free of dates."""
-    stream = io.BytesIO()
-    metadata = {"pdf": {"CreationDate": None, "Creator": None, "Producer": None}}.get(
-        form, {"Software": None}
-    )
-    picture.figure.savefig(stream, format=form, metadata=metadata)
-    return stream.getvalue()

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from vibsim.report.style import power
+
+if TYPE_CHECKING:
+    from vibsim.spec import Experiment
 
 SYMBOLS = {
     "theta": "θ",
@@ -28,6 +30,12 @@ NAMES = {
 }
 
 
+def target(experiment: Experiment) -> str:
+    """Return what names an experiment on the command line."""
+    is_ours = experiment.collection != "adhoc"
+    return f"{experiment.collection}/{experiment.name}" if is_ours else f"{experiment.name}.yaml"
+
+
 def symbol(quantity: str) -> str:
     """Return the letter of a quantity; its name where it has none."""
     return SYMBOLS.get(quantity, quantity)
@@ -38,101 +46,11 @@ def name(quantity: str) -> str:
     return NAMES.get(quantity, quantity)
 
 
-@dataclass(frozen=True)
-class Reason:
-    """What a reason means and what would settle the question."""
-
-    meaning: str
-    needs: str
-
-
 STATUS = {
     "PASS": "Every check came out as it should.",
     "INCONCLUSIVE": "No check failed, but at least one could not be decided: treat its number as unproven.",
     "FAIL": "At least one check came out wrong.",
 }
-
-REASONS = {
-    "asymptotic": Reason(
-        "The error shrinks from level to level as the scheme promises: the rescaled differences fall on top of each "
-        "other, and more closely so on finer levels.",
-        "Three levels at least, curves that coincide, ratios that settle, and differences well above round-off: all "
-        "four are met on the levels named.",
-    ),
-    "exact": Reason(
-        "The levels differ by round-off only: the scheme makes no truncation error here to measure.",
-        "Nothing more, if exactness is expected here; otherwise a problem on which the scheme does make an error.",
-    ),
-    "match": Reason(
-        "The outcome is the expected one. Expected was something other than plain convergence, for instance a trap "
-        "that the check is meant to notice.",
-        "The measured verdict and the expected one agree; look at the measured reason to see what was noticed.",
-    ),
-    "order_low": Reason(
-        "The error does shrink, but more slowly than the scheme promises. A first-order start, a one-sided formula at "
-        "the end, or a mistake in the code does this.",
-        "The ratios have settled, at the wrong number; more levels will not change it. Look for a step of lower order.",
-    ),
-    "order_high": Reason(
-        "The error shrinks faster than promised. Either the leading error term vanishes for this problem, or the order "
-        "was stated too low.",
-        "A problem without special symmetry, or the higher order stated as the expected one.",
-    ),
-    "mismatch": Reason(
-        "The measured outcome is not the expected one.",
-        "Compare the expected with the measured value below: one of the two is wrong.",
-    ),
-    "wrong_limit": Reason(
-        "The levels approach each other, but not the exact solution: the scheme converges to something else.",
-        "The differences alone cannot show this; the exact solution does. Check the equation that is being solved.",
-    ),
-    "unstable": Reason(
-        "The numerical solution grows where the exact one does not, and the finer of these levels do not cure it.",
-        "A smaller step (w dt below the stability limit), or a scheme without such a limit.",
-    ),
-    "non_finite": Reason(
-        "The calculation overflowed or met an undefined number; nothing after that moment means anything.",
-        "A smaller step, or a look at the member, level and time listed under Failures.",
-    ),
-    "pre_asymptotic": Reason(
-        "The step is still too coarse: the ratios have not settled, so the order read from them is an accident.",
-        "Finer levels, until the ratios settle and the rescaled curves coincide.",
-    ),
-    "round_off": Reason(
-        "The differences have reached the floor of the arithmetic: what is left is rounding noise, which says nothing "
-        "about the scheme.",
-        "Coarser levels, or an arithmetic with a lower floor (increment or compensated).",
-    ),
-    "oscillating": Reason(
-        "The ratios swing from level to level instead of settling.",
-        "More levels, another norm, or a comparison at times where the error does not change its sign.",
-    ),
-    "non_smooth": Reason(
-        "The problem is not smooth, so its error has no regular expansion in powers of dt.",
-        "Location of the events, or an expected order that takes the kink into account.",
-    ),
-    "too_few_levels": Reason(
-        "An order cannot be judged from two levels: one difference has nothing to be compared with.",
-        "Three levels at least; four or more let the trend of the ratios be seen.",
-    ),
-    "not_applicable": Reason(
-        "The measured number does not exist here, so there is nothing to judge.",
-        "A quantity, scheme or time for which the number exists.",
-    ),
-}
-
-_UNKNOWN = Reason("", "")
-_NUMBER = Reason(
-    "The measured number is what the check says.",
-    "A number that finer levels do not change, and that is not just inside its bound: the tables show both.",
-)
-
-
-def reason(word: str | None, kind: str) -> Reason:
-    """Return the explanation of a reason for a kind of check; empty words for one that has none."""
-    if word == "match" and kind != "converges":
-        return _NUMBER
-    return REASONS.get(word or "", _UNKNOWN)
 
 
 def overall(summary: Mapping[str, Any]) -> str:

@@ -1,0 +1,77 @@
+"""Pages of experiments that keep no series: the maps and tables are there, and the page says how to see a series."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import samples
+
+from vibsim import report
+from vibsim.record import Record, Variable
+
+ACROSS = {
+    "initial.theta": {"linspace": [-2.9, 2.9, 10]},
+    "initial.omega": {"linspace": [0.1, 2.9, 9]},
+}
+
+
+def lean(record, times):
+    """Return what a lean analysis keeps: no series, one norm."""
+    norm = record.words("norm").index("l2")
+
+    def cut(variable):
+        if "norm" not in variable.dims:
+            return variable
+        values = np.take(variable.values, [norm], axis=variable.dims.index("norm"))
+        return Variable(variable.dims, values, variable.attrs)
+
+    kept = {name: cut(v) for name, v in record.variables.items() if "t" not in v.dims}
+    coords = {name: cut(v) for name, v in record.coords.items() if times or name != "t"}
+    return Record(coords, kept, {**record.attrs, "storage": "lean"})
+
+
+@pytest.mark.parametrize("times", [True, False])
+@pytest.mark.parametrize(
+    ("sweep", "figures"),
+    [
+        (ACROSS, {"map_theta_0", "map_period_0", "spread_theta"}),
+        ({"initial.theta": {"linspace": [0.1, 3.1, 12]}}, {"period", "amplitude", "sweep_order_theta"}),
+        ({"initial.theta": [0.5, 3.0], "model.g": [1.0, 400.0, 1e6]}, {"map_theta_0", "period"}),
+    ],
+)  # fmt: skip
+def test_a_lean_record_makes_a_page_without_series(tmp_path, sweep, figures, times):
+    exp = samples.experiment(sweep=sweep)
+    whole = samples.record(exp)
+    summary = samples.summary(exp, whole)
+    plan = SimpleNamespace(experiment=exp)
+    report.write(plan, lean(whole, times), summary, tmp_path)
+    names = {path.stem for path in (tmp_path / "figures").iterdir()}
+    assert figures < names
+    assert not [name for name in names if name.startswith(("differences", "solution", "conserv"))]
+    assert any(name.startswith("order_theta_") for name in names)
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "no series over time are stored" in text
+    assert ".venv/bin/vibsim run pendulum_lab/theta@" in text
+    assert len((tmp_path / "tables/members.csv").read_text().splitlines()) == exp.members + 1
+    whole_page = tmp_path / "whole"
+    report.write(plan, whole, summary, whole_page)
+    same = "tables/members.csv"
+    assert (whole_page / same).read_bytes() == (tmp_path / same).read_bytes()
+
+
+def test_the_worst_members_are_listed_with_their_command(tmp_path):
+    exp = samples.experiment(sweep={"model.g": {"logspace": [1.0, 1e6, 20]}})
+    record = samples.record(exp)
+    summary = samples.summary(exp, record)
+    (check,) = summary["checks"]
+    check["where"] = {"FAIL": {"text": "FAIL in 9 of 20 results, all with model.g of 300 or more"}}
+    for result in check["results"]:
+        result["command"] = f"vibsim run pendulum_lab/theta@{result['case']}"
+    report.write(SimpleNamespace(experiment=exp), record, summary, tmp_path)
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert len(check["results"]) == 10
+    for result in check["results"]:
+        assert f".venv/bin/vibsim run pendulum_lab/theta@{result['case']} " in text
+    assert "all with model.g of 300 or more." in text

@@ -1,0 +1,89 @@
+"""What a report shows: which quantities, and which members of a sweep."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.models import MODELS
+from vibsim.record import Record
+from vibsim.report.data import Member, case_name, flags, formal_orders, pick, swept
+from vibsim.spec.series import asked
+from vibsim.vocabulary import SEVERITY, TOLERANCE, TYPICAL_NORM
+
+if TYPE_CHECKING:
+    from vibsim.spec import Experiment
+
+
+def promises(experiment: Experiment, record: Record, quantity: str) -> list[tuple[float, float]]:
+    """Return every order that a scheme promises for a quantity, with its tolerance, in ascending order.
+
+    The tolerance is the smallest that a check has which is about the quantity and the scheme.
+    """
+    promised = formal_orders(record, quantity)
+    found = {
+        (float(order), tolerance(experiment, quantity, scheme))
+        for s, scheme in enumerate(record.words("scheme"))
+        for order in np.unique(promised[s])
+    }
+    return sorted(found)
+
+
+def tolerance(experiment: Experiment, quantity: str, scheme: str) -> float:
+    """Return the smallest tolerance of a check that is about the order of a quantity by a scheme."""
+    inner = [check.measured for check in experiment.checks]
+    found = [
+        check.tolerance
+        for check in inner
+        if check.kind == "converges"
+        and check.converges == quantity
+        and (check.schemes is None or scheme in check.schemes)
+    ]
+    return min(found, default=TOLERANCE)
+
+
+def position(experiment: Experiment) -> str:
+    """Return the name of the model's position."""
+    return MODELS[experiment.model.kind].position
+
+
+def quantities(experiment: Experiment, record: Record) -> list[str]:
+    """Return the quantities to show: the position, those that a check names, and the energy deviation."""
+    extra = ["energy_deviation"] if MODELS[experiment.model.kind].conservative else []
+    wanted = dict.fromkeys([position(experiment), *asked(experiment), *extra])
+    return [name for name in wanted if f"{name}_order" in record]
+
+
+def members(record: Record, quantity: str) -> list[Member]:
+    """Return what the figures over time show of a quantity: of every scheme one member, or two of a sweep.
+
+    These are the worst member, judged by the verdicts on `quantity` and then by the distance of the order from the
+    promised one (of several schemes the worst decides), and a typical one of those that pass, if any does.
+    """
+    schemes = record.words("scheme")
+    if not swept(record):
+        return [Member(s, 0, name) for s, name in enumerate(schemes)]
+    ranking = _ranking(record, quantity)
+    status = flags(record, f"{quantity}_status")
+    # the healthiest: members that most schemes pass, and of the others those that fewest fail
+    score = np.sum(status == "PASS", axis=0) * (len(status) + 1) - np.sum(status == "FAIL", axis=0)
+    healthy = ranking[score[ranking] == score.max()]
+    roles = {int(healthy[healthy.size // 2]): "typical", int(ranking[-1]): "worst"}
+    return [
+        Member(s, case, name, case_name(record, case), role)
+        for case, role in reversed(roles.items())
+        for s, name in enumerate(schemes)
+    ]
+
+
+def _ranking(record: Record, quantity: str) -> NDArray[np.intp]:
+    """Return the members from the best to the worst, shape (case,)."""
+    status = flags(record, f"{quantity}_status")
+    severity = np.max(
+        [np.where(status == word, rank, 0) for word, rank in SEVERITY.items()], axis=(0, 1)
+    )
+    norm = record.words("norm").index(TYPICAL_NORM)
+    away = np.abs(pick(record, f"{quantity}_order", norm=norm) - formal_orders(record, quantity))
+    return np.lexsort((np.max(np.where(np.isnan(away), np.inf, away), axis=0), severity))
