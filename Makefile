@@ -3,7 +3,7 @@ SHELL := /bin/sh
 BIN := .venv/bin
 
 .DEFAULT_GOAL := run
-.PHONY: run test test-slow lint bench clean help set-up-run set-up-dev
+.PHONY: run test test-slow lint bench scale clean help set-up-run set-up-dev
 
 run: set-up-run  ## run the default experiments and write results/index.html (this is what plain `make` does)
 	@$(BIN)/vibsim run
@@ -23,8 +23,11 @@ lint: set-up-dev  ## check style, types, layers, workflow and generated files
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/python workflow/lint.py
 
-bench: set-up-run  ## measure the engine, against C where gcc is there
-	$(BIN)/python bench/run.py
+bench: set-up-run  ## measure everything against C and other solvers, 10 minutes (PARTS="jobs storage" for some of it)
+	$(BIN)/python bench/run.py $(PARTS)
+
+scale: set-up-run  ## run what is too large for the default: 10^6 members, 10^9 steps
+	$(BIN)/vibsim run scale
 
 clean:  ## remove what runs and tools made; .venv stays
 	find results -mindepth 1 -maxdepth 1 ! -name README.md -exec rm -rf {} +

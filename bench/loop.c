@@ -3,37 +3,11 @@
    step_only   positions and increments alone
    everything  with the energies, extrema, peaks and turns of every step, as the kernel gathers them
 
+   bench/traced.py writes sine.h; beyond 1e5 it calls libm, where no benchmark goes.
+
    Build: gcc -O3 -march=native -ffp-contract=off -shared -fPIC. */
 
-#include <math.h>
-
-static inline double sine(double x)
-{
-    const double inverse_pi = 0x1.45f306dc9c883p-2, round = 0x1.8p52;
-    double r, rest;
-    if (fabs(x) <= 0x1.921fb54442d18p+0) {
-        r = x;
-        rest = 0.0;
-    } else if (fabs(x) <= 1e5) {
-        double k = (x * inverse_pi + round) - round;
-        double odd = k - 2.0 * ((0.5 * k + round) - round);
-        double sign = 1.0 - 2.0 * (odd * odd);
-        double coarse = x - k * 0x1.921fb54440000p+1;
-        double fine = k * 0x1.68c234c4c0000p-38;
-        r = coarse - fine;
-        rest = sign * (((coarse - r) - fine) - k * 0x1.98a2e03707345p-76);
-        r = sign * r;
-    } else {
-        return sin(x);
-    }
-    double z = r * r, z2 = z * z;
-    double low = (-0.16666666666666666 + z * 0.008333333333333196)
-        + z2 * (-0.00019841269841207676 + z * 2.7557319210712077e-06);
-    double high = (-2.5052106827436554e-08 + z * 1.6058937294379453e-10)
-        + z2 * (-7.64292780231204e-13 + z * 2.720508082623873e-15);
-    double p = low + (z2 * z2) * high;
-    return r + ((r * z) * p + rest * (1.0 - z * (0.5 - z * (1.0 / 24.0))));
-}
+#include "sine.h"
 
 typedef struct { double u, d, u_rest, d_rest; } state;
 

@@ -1,102 +1,100 @@
-"""One member of the pendulum: the engine's kernel against the same loop in C -O3."""
+"""One member of the pendulum: the engine's kernel against the same loop in C."""
 
 from __future__ import annotations
 
-import ctypes
 import math
-import shutil
-import subprocess
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
+from bench import native, ours
+from bench.page import Section, table
 from bench.timing import interleave, seconds
-from vibsim.engine import integrate
-from vibsim.models import MODELS
-from vibsim.schemes import SCHEMES
 
-LEVEL = 22
-STEPS = 2**LEVEL
+TITLE = "One member"
 END = 20.0
 THETA = 1.0
-ROUNDS = 11
+
+BASE = "C, compensated, same sine, gathering the same"
+BARE = "C, compensated, same sine, stepping alone"
+LIBM = "C, three-term, libm's sine, stepping alone"
+FAST = "C with -ffast-math, three-term, libm's sine, stepping alone"
 
 
-def engine(arithmetic: str) -> float:
-    """Run the kernel, with everything that it gathers, and return theta at the end."""
-    scheme = SCHEMES["central"]
-    runs = integrate(
-        MODELS["pendulum"],
-        scheme,
-        {**scheme.defaults(), "arithmetic": arithmetic, "end_velocity": "kick"},
-        np.ones((1, 3)),
-        np.array([[THETA, 0.0]]),
-        np.array([END / STEPS]),
-        STEPS,
-        STEPS // 64,
-        "compiled",
+def run(small: bool) -> Section:
+    """Time all of them in turn."""
+    level, rounds = (16, 3) if small else (22, 11)
+    steps = 2**level
+    runs = engine_runs(steps)
+    reason = ""
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            runs |= c_runs(Path(folder), steps)
+        except native.NotHereError as error:
+            reason = str(error)
+        else:
+            check(runs)
+        times = interleave({name: seconds(run) for name, run in runs.items()}, rounds)
+    base = times.get(BASE, math.nan)
+    rows: list[list[object]] = [
+        [name, time / steps * 1e9, time / base] for name, time in times.items()
+    ]
+    if reason:
+        rows.append(["C", f"not measured: {reason}", None])
+    caption = (
+        f"One pendulum, theta_0 = {THETA:g}, level {level} ({steps} steps), {rounds} rounds. Gathering means energies, "
+        "extrema, peaks and turns at every step. C is built with `-O3 -march=native -ffp-contract=off`; neither side "
+        "contracts products and sums. Position at the end: the same bits in the engine and in C with the same "
+        "arithmetic. `-ffast-math` is for information: it would undo the compensation."
     )
-    return float(runs.position[0, -1])
-
-
-def build(folder: Path) -> ctypes.CDLL | None:
-    """Compile the loop in C; None where there is no gcc."""
-    if shutil.which("gcc") is None:
-        return None
-    library = folder / "loop.so"
-    source = Path(__file__).with_name("loop.c")
-    flags = ["-O3", "-march=native", "-ffp-contract=off", "-shared", "-fPIC"]
-    subprocess.run(["gcc", *flags, str(source), "-o", str(library), "-lm"], check=True)
-    return ctypes.CDLL(str(library))
-
-
-def contestants(library: ctypes.CDLL) -> dict[str, Callable[[], float]]:
-    """Return the loops in C, each as a function that returns theta at the end."""
-    number = ctypes.c_double
-    out = (number * 15)()
-    for name in ("step_only", "everything", "three_term_libm"):
-        getattr(library, name).restype = number
-    motion = [number(THETA), number(0.0), number(1.0), number(1.0)]
-    steps = ctypes.c_long(STEPS)
-    return {
-        "C, compensated, same sine, stepping alone": lambda: library.step_only(
-            *motion, number(END), steps
-        ),
-        "C, compensated, same sine, gathering the same": lambda: library.everything(
-            *motion, number(1.0), number(END), steps, out
-        ),
-        "C, three-term, the library's sine, stepping alone": lambda: library.three_term_libm(
-            *motion, number(END), steps
-        ),
+    header = ["loop", "ns per step", "ratio to C gathering the same"]
+    figures = {
+        "one_member.ratio": times["engine, compensated"] / base,
+        "one_member.bare_ratio": times["engine, compensated, stepping alone"]
+        / times.get(BARE, math.nan),
+        "one_member.three_term_ratio": times["engine, three_term, stepping alone"]
+        / times.get(LIBM, math.nan),
+        "one_member.three_term_gathering_ratio": times["engine, three_term"]
+        / times.get(LIBM, math.nan),
+        "one_member.ns": times["engine, compensated"] / steps * 1e9,
     }
+    return Section(tuple(table(caption, header, rows)), figures)
 
 
-def run() -> list[str]:
-    """Time all of them in turn and return the rows of the table."""
-    runs: dict[str, Callable[[], float]] = {
-        f"engine, {name}": lambda name=name: engine(name)  # type: ignore[misc]
+def engine_runs(steps: int) -> dict[str, Callable[[], float]]:
+    """Return the kernel in each arithmetic, with everything that it gathers and without."""
+
+    def go(arithmetic: str, gather: bool) -> float:
+        theta = np.array([THETA])
+        runs = ours.step(theta, END, steps, arithmetic=arithmetic, samples=64, gather=gather)
+        return float(runs.position[0, -1])
+
+    return {
+        f"engine, {name}{'' if gather else ', stepping alone'}": lambda n=name, g=gather: go(n, g)  # type: ignore[misc]
+        for gather in (True, False)
         for name in ("compensated", "increment", "three_term")
     }
-    with tempfile.TemporaryDirectory() as folder:
-        library = build(Path(folder))
-        if library is not None:
-            runs |= contestants(library)
-            ours = runs["engine, compensated"]()
-            theirs = runs["C, compensated, same sine, gathering the same"]()
-            if ours != theirs:
-                raise RuntimeError(f"not the same arithmetic: {ours!r} and {theirs!r}")
-        times = interleave({name: seconds(run) for name, run in runs.items()}, ROUNDS)
-    base = times.get("C, compensated, same sine, gathering the same", math.nan)
-    return [
-        f"One member, pendulum, theta_0 = {THETA:g}, level {LEVEL}, {ROUNDS} rounds, ns per step. The engine "
-        "gathers energies, extrema, peaks and turns at every step.",
-        "",
-        "| loop | ns per step | ratio to C gathering the same |",
-        "|---|---:|---:|",
-        *(
-            f"| {name} | {time / STEPS * 1e9:.2f} | {time / base:.3f} |"
-            for name, time in times.items()
-        ),
-    ]
+
+
+def c_runs(folder: Path, steps: int) -> dict[str, Callable[[], float]]:
+    """Return the loops in C, each as a function that returns theta at the end."""
+    strict = native.build("loop", folder, native.STRICT)
+    fast = native.build("loop", folder, native.FAST_MATH)
+    out = np.empty(15)
+    motion = (THETA, 0.0, 1.0, 1.0)
+    return {
+        BARE: lambda: float(native.call(strict, "step_only", *motion, END, steps)),
+        BASE: lambda: float(native.call(strict, "everything", *motion, 1.0, END, steps, out)),
+        LIBM: lambda: float(native.call(strict, "three_term_libm", *motion, END, steps)),
+        FAST: lambda: float(native.call(fast, "three_term_libm", *motion, END, steps)),
+    }
+
+
+def check(runs: dict[str, Callable[[], float]]) -> None:
+    """Refuse to compare different arithmetic."""
+    names = ("engine, compensated", "engine, compensated, stepping alone", BASE, BARE)
+    ends = {name: runs[name]() for name in names}
+    if len(set(ends.values())) != 1:
+        raise RuntimeError(f"not the same arithmetic: {ends}")

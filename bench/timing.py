@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,9 @@ def seconds(function: Callable[[], object]) -> Callable[[], float]:
     return timed
 
 
-def process(command: Sequence[str], **environment: str) -> Process:
+def process(
+    command: Sequence[str], cwd: Path | None = None, environment: Mapping[str, str] | None = None
+) -> Process:
     """Run `command` to its end and return what it cost, itself and its children.
 
     Raises
@@ -63,10 +66,12 @@ def process(command: Sequence[str], **environment: str) -> Process:
         [sys.executable, "-c", program, *command],
         capture_output=True,
         text=True,
-        env={**os.environ, **environment},
+        env={**os.environ, **(environment or {})},
+        cwd=cwd,
         check=True,
     )
     wall, cpu, peak, status = map(float, done.stdout.split())
     if status:
-        raise RuntimeError(f"{' '.join(command)} exited with {status:.0f}: {done.stderr}")
+        end = " ".join(done.stderr.split())[-400:]
+        raise RuntimeError(f"{' '.join(command[:6])} ... exited with {status:.0f}: ... {end}")
     return Process(wall, cpu, peak)

@@ -2,6 +2,7 @@
 # Make .venv hold what requirements/<set>.txt pins, and vibsim itself; with nothing to do this costs milliseconds.
 #
 #   sh requirements/install.sh run|dev        (`dev` holds everything that `run` holds)
+#   sh requirements/install.sh peers          (.venv-peers: other solvers, without vibsim, for bench/run.py alone)
 #
 # .venv/vibsim-<set> is written last and holds what that environment was made of: the place of the checkout (the scripts
 # of an environment carry absolute paths, so a moved checkout needs a new one), pyproject.toml and the pinned versions. Where it
@@ -10,6 +11,8 @@ set -eu
 cd "$(dirname "$0")/.."
 chosen=$1
 [ -f "requirements/$chosen.txt" ] || { echo "no such set of requirements: $chosen" >&2; exit 2; }
+environment=.venv
+[ "$chosen" != peers ] || environment=.venv-peers
 
 wanted() {
     pwd -P
@@ -17,7 +20,7 @@ wanted() {
 }
 
 is_ready() {
-    [ -x .venv/bin/python ] && [ -f ".venv/vibsim-$1" ] && [ "$(cat ".venv/vibsim-$1")" = "$(wanted "$1")" ]
+    [ -x $environment/bin/python ] && [ -f "$environment/vibsim-$1" ] && [ "$(cat "$environment/vibsim-$1")" = "$(wanted "$1")" ]
 }
 
 find_python() {
@@ -41,7 +44,7 @@ if command -v flock >/dev/null; then
 fi
 
 install() {
-    .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-input --no-deps "$@"
+    $environment/bin/python -m pip install --quiet --disable-pip-version-check --no-input --no-deps "$@"
 }
 
 # One pinned package comes as source only; it is built with the pinned setuptools, not with what a build of its own fetches.
@@ -50,15 +53,46 @@ install_pinned() {
 }
 
 mark_ready() {
-    wanted "$1" >".venv/vibsim-$1.new"
-    mv ".venv/vibsim-$1.new" ".venv/vibsim-$1"
+    wanted "$1" >"$environment/vibsim-$1.new"
+    mv "$environment/vibsim-$1.new" "$environment/vibsim-$1"
 }
 
-if ! is_ready run; then
+make_environment() {
     base=$(find_python)
-    echo "set-up: making .venv with $("$base" --version)"
-    rm -rf .venv
-    "$base" -m venv .venv
+    echo "set-up: making $environment with $("$base" --version)"
+    rm -rf $environment
+    "$base" -m venv $environment
+}
+
+# numbalsoda has no wheel for CPython 3.11 and wants a Fortran compiler for solvers that are not compared. Its LSODA is two
+# files of C++ and one module of Python, taken from the pinned source.
+install_numbalsoda() {
+    source=$environment/source
+    target=$($environment/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/numbalsoda
+    mkdir -p $source "$target" &&
+        sed -n '/^numbalsoda==/,/[^\\]$/p' requirements/peers.txt >$source/pinned.txt &&
+        $environment/bin/python -m pip download --quiet --disable-pip-version-check --no-input --no-deps --require-hashes \
+            --no-build-isolation --no-binary :all: --dest $source --requirement $source/pinned.txt &&
+        tar -xzf $source/numbalsoda-*.tar.gz -C $source --strip-components 1 &&
+        c++ -O3 -DNDEBUG -std=c++11 -fPIC -shared $source/src/LSODA.cpp $source/src/wrapper.cpp -o "$target/liblsoda.so" &&
+        cp $source/numbalsoda/driver.py "$target/driver.py" &&
+        echo "from .driver import address_as_void_pointer, lsoda, lsoda_sig" >"$target/__init__.py"
+}
+
+if [ "$chosen" = peers ]; then
+    make_environment
+    echo "set-up: installing what requirements/peers.txt pins"
+    sed '/^numbalsoda==/,/[^\\]$/d' requirements/peers.txt >$environment/wheels.txt
+    install --require-hashes --only-binary :all: -r $environment/wheels.txt
+    # the other solvers are measured without it
+    install_numbalsoda || echo "numbalsoda could not be built from its source" >&2
+    mark_ready peers
+    echo "set-up: done"
+    exit
+fi
+
+if ! is_ready run; then
+    make_environment
     echo "set-up: installing what requirements/run.txt pins (about half a minute; longer on a slow line)"
     install --require-hashes --only-binary :all: -r requirements/build.txt
     install_pinned run

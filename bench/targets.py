@@ -1,0 +1,150 @@
+"""The figures to reach, beside what was measured; what limits a figure is written here by hand."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from bench.page import table
+
+
+@dataclass(frozen=True)
+class Target:
+    """A figure to reach: at most, or at least, a limit."""
+
+    what: str
+    figure: str
+    """Name under which a part hands the figure back."""
+    limit: float
+    unit: str = ""
+    at_least: bool = False
+    note: str = ""
+    """What limits the figure, or where it comes from."""
+
+
+TARGETS = (
+    Target(
+        "one member: time over C -O3, same arithmetic, sine and gathering", "one_member.ratio", 1.05
+    ),
+    Target("one member: the same, both stepping alone", "one_member.bare_ratio", 1.05),
+    Target(
+        "one member, three-term: time over C with libm's sine, both stepping alone",
+        "one_member.three_term_ratio",
+        1.0,
+    ),
+    Target(
+        "many members: time over C, same arithmetic, sine and gathering",
+        "many.ratio_gathering",
+        1.2,
+    ),
+    Target(
+        "many members: time over C, same arithmetic and sine, stepping alone",
+        "many.ratio_stepping",
+        1.2,
+    ),
+    Target(
+        "many members, increment: time over C, same arithmetic and sine, stepping alone",
+        "many.ratio_increment",
+        1.2,
+    ),
+    Target(
+        "many members: times faster than numpy, same arithmetic",
+        "many.over_numpy",
+        10.0,
+        at_least=True,
+    ),
+    Target(
+        "one trajectory at 1e-10: increment ladder, times faster than DOP853",
+        "single.increment_faster_than_dop853",
+        100.0,
+        at_least=True,
+    ),
+    Target("the same: time over heyoka's", "single.increment_over_heyoka", 2.5),
+    Target(
+        "one trajectory at 1e-10: compensated ladder, times faster than DOP853",
+        "single.compensated_faster_than_dop853",
+        80.0,
+        at_least=True,
+    ),
+    Target("the same: time over heyoka's", "single.compensated_over_heyoka", 5.0),
+    Target(
+        "10^4 members at 1e-10: increment ladder, times faster than a solve_ivp loop",
+        "many_error.increment_faster_than_solve_ivp",
+        2000.0,
+        at_least=True,
+    ),
+    Target(
+        "the same: times faster than a numbalsoda loop",
+        "many_error.increment_faster_than_numbalsoda",
+        30.0,
+        at_least=True,
+        note="numbalsoda's time is that of its most exact setting where none reaches 1e-10",
+    ),
+    Target(
+        "the same: times faster than heyoka in batches",
+        "many_error.increment_faster_than_heyoka",
+        1.5,
+        at_least=True,
+    ),
+    Target("simulate job: CPU beyond its stepping", "jobs.beyond_stepping", 0.6, "s"),
+    Target(
+        "the same: wall time, all told, of a job of 64 steps",
+        "jobs.small_wall",
+        0.59,
+        "s",
+        note="what one job per case cost in the design's prototype",
+    ),
+    Target(
+        "10^5 members x 4 levels: pipeline over the scalar script",
+        "pipeline.100000.scalar_ratio",
+        1.3,
+    ),
+    Target(
+        "10^6 members x 4 levels: pipeline over the SIMD script on one core",
+        "pipeline.1000000.simd_ratio",
+        1.5,
+    ),
+    Target(
+        "the same, the script on all cores as the pipeline is",
+        "pipeline.1000000.both_ratio",
+        1.5,
+        note="stricter than what was asked for",
+    ),
+    Target("nothing to do: `vibsim run` over bare Snakemake", "runs.nothing_ratio", 1.2),
+    Target("default run after installation, cold", "runs.cold", 120.0, "s"),
+    Target("one member at level 30, compensated", "deep.wall", 45.0, "s"),
+    Target("the same: peak memory", "deep.peak_mib", 300.0, "MiB"),
+    Target("10^6 members x 4 levels", "million.wall", 60.0, "s"),
+    Target("the same: peak memory of the largest process", "million.peak_mib", 2048.0, "MiB"),
+    Target(
+        "contiguous writing, times faster than the best compression",
+        "storage.contiguous_over_compressed",
+        1.0,
+        at_least=True,
+        note="why files are not compressed by default",
+    ),
+    Target("round-off at level 24: increment over three-term", "round_off.ratio", 1e-4),
+)
+
+
+def lines(figures: Mapping[str, float]) -> list[str]:
+    """Return the table of targets."""
+    caption = (
+        "The design's figures (section 6), with what was measured above. No catalogue of all experiments is measured: "
+        "there is none yet."
+    )
+    header = ["what", "to reach", "measured", "reached", "what limits it"]
+    return ["## Targets", "", *table(caption, header, [_row(one, figures) for one in TARGETS])]
+
+
+def _row(target: Target, figures: Mapping[str, float]) -> list[object]:
+    unit = f" {target.unit}" if target.unit else ""
+    words = "at least" if target.at_least else "at most"
+    wanted = f"{words} {target.limit:g}{unit}"
+    value = figures.get(target.figure)
+    if value is None:
+        return [target.what, wanted, "not measured", "", target.note]
+    compare: Callable[[float, float], bool] = operator.ge if target.at_least else operator.le
+    reached = "yes" if compare(value, target.limit) else "**no**"
+    return [target.what, wanted, f"{value:.3g}{unit}", reached, target.note]
