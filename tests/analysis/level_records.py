@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from vibsim import plan
 from vibsim.record import Record, Variable
 from vibsim.spec import Experiment
 
@@ -97,6 +98,7 @@ def _record(
         "omega_max": np.nanmax(omega, axis=-1),
         "energy_deviation_max_abs": np.nanmax(np.abs(deviation), axis=-1),
         "energy_deviation_max_abs_interior": np.nanmax(np.abs(deviation[..., :-1]), axis=-1),
+        "energy_initial": energy[..., 0],
         "amplitude": np.nanmax(np.abs(theta), axis=-1),
         "period_count": np.full(status.shape, 2),
         "first_peak": np.full(status.shape, 1.0),
@@ -128,8 +130,8 @@ def _record(
     }
     if ends is not None:
         coords["end"] = Variable(("case",), end, {"units": "s"})
-    for key, values in exp.sweep.axes if exp.sweep else ():
-        coords[key.replace(".", "_")] = Variable(("case",), np.array(values), {"sweep_key": key})
+    for key, values in plan.columns(exp, 0, members).items():
+        coords[key.replace(".", "_")] = Variable(("case",), values, {"sweep_key": key})
     return Record(coords, variables, {"level": level, "steps": steps, "every": every})
 
 

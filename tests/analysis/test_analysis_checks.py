@@ -10,7 +10,9 @@ import pytest
 from level_records import experiment, level_records, standard_error
 
 from vibsim.analysis import Verdict, analyse_records, summarise, values, verdicts
+from vibsim.analysis.compare import comparisons
 from vibsim.analysis.evidence import evidence
+from vibsim.analysis.part import part_of
 from vibsim.analysis.valued import sees_several_levels
 from vibsim.spec import VALUES
 
@@ -154,10 +156,9 @@ def test_extrema_and_energies_over_every_step() -> None:
 
 def test_what_was_not_gathered_over_every_step_is_not_made_up_from_samples() -> None:
     exp = experiment()
-    records = level_records(exp)
-    record = analyse_records(exp, records)
+    part = part_of(exp, level_records(exp))
     for name in ("min", "max", "max_abs", "max_abs_interior"):
-        place = values.Place(record, records, "energy", None, None, None)
+        place = values.Place(part, {}, "energy", None, None, None)
         assert np.isnan(values.value(name, place)).all(), name
 
 
@@ -357,12 +358,12 @@ def test_the_summary_has_null_and_never_nan() -> None:
 
 def test_the_floor_is_measured_in_the_norm_of_the_check() -> None:
     exp = experiment()
-    record = analyse_records(exp, level_records(exp))
-    at_a_point = record["theta_floor"][0, 0]
+    (theta,) = comparisons(part_of(exp, level_records(exp)), ("theta",)).values()
+    at_a_point = theta.floor[0, 0]
     assert np.all(at_a_point >= 2.2e-16)
     factor = {"linf": 1.0, "linf_interior": 1.0, "l2": np.sqrt(0.5 * 17), "l1": 0.5 * 17}
     for norm, expected in factor.items():
-        found = evidence(exp, record, "theta", norm, np.array([2.0]), 0.1)
+        found = evidence(theta, norm, np.array([[2.0]]), 0.1)
         assert found.floor[0, 0] == pytest.approx(expected * at_a_point, rel=1e-12, abs=0)
 
 

@@ -116,7 +116,7 @@ def test_dimensions_and_sizes_agree() -> None:
         assert isinstance(variable.attrs.get("long_name"), str), name
 
 
-def test_what_differs_between_levels_has_a_level_whatever_its_name() -> None:
+def test_what_is_of_a_member_has_a_level_whatever_its_values() -> None:
     exp = experiment()
     records = level_records(exp)
     attrs = {"long_name": "made up", "units": "1"}
@@ -127,7 +127,9 @@ def test_what_differs_between_levels_has_a_level_whatever_its_name() -> None:
     found = analyse_records(exp, records).variables
     assert found["of_level"].dims == ("case", "level")
     np.testing.assert_array_equal(found["of_level"].values, [[4.0, 5.0, 6.0, 7.0]])
-    assert found["of_all"].dims == found["unknown"].dims == ("case",)
+    # dimensions that depended on the values would differ between the parts of a sweep
+    assert found["of_all"].dims == found["unknown"].dims == ("case", "level")
+    assert found["natural_frequency"].dims == found["exact_period"].dims == ("case",)
 
 
 def test_each_member_has_its_own_step_where_ends_differ() -> None:
@@ -191,6 +193,8 @@ def test_a_member_that_failed_never_passes_and_warns_of_nothing() -> None:
         "t": 4.0,
         "step": 16,
         "error": "non_finite",
+        "values": {"initial.theta": 0.2},
+        "command": "vibsim run adhoc/experiment@1",
     }
     json.dumps(summary, allow_nan=False)
 

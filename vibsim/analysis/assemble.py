@@ -9,26 +9,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis import series
-from vibsim.analysis.belonging import check_belonging
-from vibsim.analysis.checks import measured_numbers
-from vibsim.analysis.compare import SERIES, Ladder, Table, differences, extrapolated
-from vibsim.analysis.evidence import evidence, formal_orders, relative_floors
-from vibsim.analysis.floor import solution_size
-from vibsim.analysis.grid import Grid, common_grid, take
-from vibsim.analysis.sensitivity import sensitivity
-from vibsim.analysis.verdict import judge
+from vibsim.analysis.belonging import SAME_AT_EVERY_LEVEL
+from vibsim.analysis.compare import Comparison, comparisons
+from vibsim.analysis.evidence import judgement
+from vibsim.analysis.measured import definition, flags, measured
+from vibsim.analysis.part import Part, part_of
+from vibsim.analysis.tables import SERIES, Table, numbers, over_time, precision_of
 from vibsim.errors import VibsimError
 from vibsim.models import MODELS
-from vibsim.models.base import ENERGIES
 from vibsim.record import Record, Variable, attributes
-from vibsim.vocabulary import NORMS, REASON_NAMES, STATUSES, TOLERANCE, TYPICAL_NORM
+from vibsim.schemes import SCHEMES
+from vibsim.spec.series import asked, lean_series
+from vibsim.vocabulary import REASON_NAMES, STATUSES, TYPICAL_NORM
 
 if TYPE_CHECKING:
     import xarray
 
     from vibsim.spec import Experiment
 
+__all__ = ["analyse", "analyse_records", "asked", "compared"]
+
 Floats = NDArray[np.float64]
+
+ONCE = SAME_AT_EVERY_LEVEL | {"energy_initial"}
+"""What is taken from the finest level alone; the first energy differs between levels by its rounding only."""
 
 
 def analyse(
@@ -62,53 +66,44 @@ def analyse(
 
 
 def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Record:
-    """Compare the levels of an experiment, given and returned as plain arrays; see `analyse`."""
-    grid = common_grid(records)
-    check_belonging(experiment, records)
-    finest = records[grid.levels[-1]]
-    magnified = sensitivity(experiment, grid, finest)
-    coords = _coords(experiment, grid, finest)
+    """Compare the levels of some members, or all, given and returned as plain arrays; see `analyse`.
+
+    What is found of a member does not depend on the members beside it.
+    """
+    part = part_of(experiment, records)
+    found = comparisons(part, compared(experiment, part.lean))
     table: Table = {}
-    names = compared(experiment)
-    for name in names:
-        ladder = _ladder(experiment, grid, records, name, magnified)
-        table |= differences(grid, ladder) | extrapolated(experiment, grid, ladder)
-    table |= _scaled_deviation(experiment, grid, records) | _scalars(grid, records)
+    for q in found.values():
+        table |= numbers(q) | _verdict(q)
+        if not part.lean:
+            table |= over_time(q)
+    table |= _scalars(part) | measured(part, found)
+    if not part.lean:
+        table |= _scaled_deviation(found["energy_deviation"])
     attrs: dict[str, Any] = {
         "title": experiment.title,
         "model": experiment.model.kind,
-        "end_included": int(grid.end_included),
+        "end_included": int(part.grid.end_included),
+        "storage": "lean" if part.lean else "series",
+        "checks": definition(experiment),
     }
-    plain = Record(coords, table, attrs)
-    for name in names:
-        table |= _verdict(experiment, plain, name)
-    numbers = measured_numbers(experiment, Record(coords, table, attrs), records)
-    if len(numbers):
-        words = "number that each check measured"
-        table["check_value"] = Variable(
-            ("check", "scheme", "case"), numbers, attributes(words, "1")
-        )
-    return Record(coords, table, attrs)
+    return Record(_coords(part), table, attrs)
 
 
-def compared(experiment: Experiment) -> tuple[str, ...]:
-    """Name the quantities that are compared between levels: states, total energy, and what a check asks for."""
+def compared(experiment: Experiment, lean: bool = False) -> tuple[str, ...]:
+    """Name the quantities that are compared between levels: states, energy, and what a check asks for."""
+    if lean:
+        return lean_series(experiment)
     states = (state.name for state in MODELS[experiment.model.kind].states)
     return tuple(dict.fromkeys([*states, "energy", "energy_deviation", *asked(experiment)]))
 
 
-def asked(experiment: Experiment) -> tuple[str, ...]:
-    """Name the quantities that the checks are about."""
-    inner = [check.measured for check in experiment.checks]
-    named = (check.converges if check.kind == "converges" else check.quantity for check in inner)
-    return tuple(dict.fromkeys(name for name in named if name is not None))
-
-
-def _coords(experiment: Experiment, grid: Grid, finest: Record) -> Table:
+def _coords(part: Part) -> Table:
+    grid = part.grid
     levels = np.array(grid.levels, dtype=np.int64)
     kept = ("scheme",), ("case",)
-    coords = {name: v for name, v in finest.coords.items() if v.dims in kept}
-    coords["t"] = Variable(("t",), grid.t, finest.coords["t"].attrs)
+    coords = {n: _widened(part, v) for n, v in part.finest.coords.items() if v.dims in kept}
+    coords["t"] = Variable(("t",), grid.t, part.finest.coords["t"].attrs)
     coords["level"] = Variable(("level",), levels, attributes("level", "1"))
     if len(levels) > 1:
         words = "coarser level of two successive ones"
@@ -116,136 +111,96 @@ def _coords(experiment: Experiment, grid: Grid, finest: Record) -> Table:
     if len(levels) > 2:
         words = "coarsest level of three successive ones"
         coords["triple"] = Variable(("triple",), levels[:-2], attributes(words, "1"))
-    coords["norm"] = Variable(("norm",), np.array(NORMS), attributes("norm over time", "1"))
-    ids = [check.id for check in experiment.checks]
+    coords["norm"] = Variable(("norm",), np.array(part.norms), attributes("norm over time", "1"))
+    ids = [check.id for check in part.experiment.checks]
     if ids:
         coords["check"] = Variable(("check",), np.array(ids), attributes("name of the check", "1"))
     steps = np.array(grid.steps, dtype=np.int64)
     coords["steps"] = Variable(("level",), steps, attributes("number of time steps", "1"))
-    dims = ("level", "case") if "end" in finest else ("level",)
-    dt = grid.dt if "end" in finest else grid.dt[:, 0]
+    dims = ("level", "case") if "end" in part.finest else ("level",)
+    dt = grid.dt if "end" in part.finest else grid.dt[:, 0]
     coords["dt"] = Variable(dims, dt, attributes("time step", "s"))
     return coords
 
 
-def _ladder(
-    experiment: Experiment,
-    grid: Grid,
-    records: Mapping[int, Record],
-    name: str,
-    magnified: Floats,
-) -> Ladder:
-    values = [take(grid, records[level], name) for level in grid.levels]
-    finest = records[grid.levels[-1]]
-    sizes = _size(experiment, grid, records, name) * magnified
-    attrs = finest.variables[name].attrs
-    return Ladder(
-        name=name,
-        long_name=str(attrs.get("long_name", name)),
-        units=str(attrs.get("units", "1")),
-        values=values,
-        exact=_exact(experiment, grid, finest, name),
-        order=formal_orders(experiment, name),
-        floor=relative_floors(experiment, grid.steps) * sizes[..., None],
-    )
+def _widened(part: Part, variable: Variable) -> Variable:
+    """Give swept words the same width in every part of a sweep."""
+    if variable.values.dtype.kind != "U" or "sweep_key" not in variable.attrs:
+        return variable
+    schemes = (SCHEMES[scheme.kind] for scheme in part.experiment.schemes)
+    words = [choice for scheme in schemes for option in scheme.options for choice in option.choices]
+    width = max(map(len, words))
+    return Variable(variable.dims, variable.values.astype(f"U{width}"), variable.attrs)
 
 
-def _size(experiment: Experiment, grid: Grid, records: Mapping[int, Record], name: str) -> Floats:
-    """Return the size that round-off is relative to, shape (scheme, case).
-
-    What is left of an energy is known no better than the energy itself; a velocity is known no better than what the
-    rounding of the position leaves of it over the run, or over a swing.
-    """
-    model = MODELS[experiment.model.kind]
-
-    def largest(of: str) -> Floats:
-        return solution_size([take(grid, records[level], of) for level in grid.levels])
-
-    if name in ENERGIES:
-        return largest("energy")
-    if name != model.velocity:
-        return largest(name)
-    finest = records[grid.levels[-1]]
-    duration = grid.dt[0] * grid.steps[0]
-    rate = np.maximum(finest["natural_frequency"], 1.0 / duration)
-    return np.asarray(np.maximum(largest(name), largest(model.position) * rate))
-
-
-def _exact(experiment: Experiment, grid: Grid, finest: Record, name: str) -> Floats | None:
-    if f"{name}_exact" in finest:
-        return take(grid, finest, f"{name}_exact")[None]
-    if not MODELS[experiment.model.kind].conservative:
-        return None
-    shape = finest[name].shape[:2]
-    if name == "energy":
-        start = np.asarray(finest[name][..., :1], dtype=np.float64)
-        return np.broadcast_to(start, (*shape, len(grid.t)))
-    return np.zeros((*shape, len(grid.t))) if name == "energy_deviation" else None
-
-
-def _scaled_deviation(experiment: Experiment, grid: Grid, records: Mapping[int, Record]) -> Table:
+def _scaled_deviation(q: Comparison) -> Table:
     """Return dE_l (2^p)^k, which coincide where the energy converges to conservation (A, section 2.6)."""
-    name = "energy_deviation"
-    p = formal_orders(experiment, name)[:, None, None]
+    levels, p = q.part.grid.levels, q.order[..., None]
     scaled = [
-        take(grid, records[level], name) * series.gap_ratio(p, level - grid.levels[0])
-        for level in grid.levels
+        u * series.gap_ratio(p, level - levels[0])
+        for u, level in zip(q.values, levels, strict=True)
     ]
-    attrs = records[grid.levels[-1]].variables[name].attrs
-    long_name = f"{attrs.get('long_name', name)}, rescaled"
     dims = ("scheme", "case", "level", "t")
-    units = str(attrs.get("units", "1"))
-    return {f"{name}_scaled": Variable(dims, np.stack(scaled, 2), attributes(long_name, units))}
+    attrs = attributes(f"{q.long_name}, rescaled", q.units)
+    return {f"{q.name}_scaled": Variable(dims, np.stack(scaled, 2), attrs)}
 
 
-def _scalars(grid: Grid, records: Mapping[int, Record]) -> Table:
+def _scalars(part: Part) -> Table:
     """Gather what the levels hold once per member, and the last value of every series."""
-    rows = [records[level] for level in grid.levels]
+    rows = [part.records[level] for level in part.grid.levels]
     table: Table = {}
-    dims: tuple[str, ...]
     for name, variable in rows[-1].variables.items():
-        values = [row[name] for row in rows]
-        if variable.dims == ("scheme", "case"):
-            dims = ("scheme", "case", "level")
-            table[name] = Variable(dims, np.stack(values, -1), variable.attrs)
-        elif variable.dims == ("case",):
-            same = all(np.array_equal(value, values[-1], equal_nan=True) for value in values)
-            dims = ("case",) if same else ("case", "level")
-            stacked = values[-1] if same else np.stack(values, -1)
-            table[name] = Variable(dims, stacked, variable.attrs)
-        elif variable.dims == SERIES:
-            attrs = dict(variable.attrs)
+        attrs, dims = dict(variable.attrs), variable.dims
+        if dims == SERIES:
             attrs["long_name"] = f"{attrs.get('long_name', name)} at the last stored time"
-            last = np.stack([value[..., -1] for value in values], -1)
+            last = np.stack([row[name][..., -1] for row in rows], -1)
             table[f"{name}_end"] = Variable(("scheme", "case", "level"), last, attrs)
+        elif dims not in (("scheme", "case"), ("case",)) or (part.lean and not _kept(part, name)):
+            continue
+        elif name in ONCE:
+            table[name] = variable
+        else:
+            stacked = np.stack([row[name] for row in rows], -1)
+            table[name] = Variable((*dims, "level"), stacked, attrs)
     return table
 
 
-def _flags(names: Sequence[str]) -> dict[str, Any]:
-    return {"flag_values": np.arange(len(names), dtype=np.int8), "flag_meanings": " ".join(names)}
+def _kept(part: Part, name: str) -> bool:
+    """Tell whether a number that the levels hold of every member is kept where storage is bounded."""
+    largest = {f"{state.name}_max" for state in part.model.states}
+    return name in _LEAN | ONCE | largest
 
 
-def _verdict(experiment: Experiment, record: Record, name: str) -> Table:
-    """Judge a quantity by the formal order; the order in every norm, status and window in the typical norm."""
-    order = formal_orders(experiment, name)
-    by_norm = {
-        kind: judge(evidence(experiment, record, name, kind, order, TOLERANCE)) for kind in NORMS
+_LEAN = frozenset(
+    {
+        "status",
+        "failure_time",
+        "omega_dt",
+        "period",
+        "amplitude",
+        "energy_deviation_max_abs",
     }
-    typical = by_norm[TYPICAL_NORM]
+)
+
+
+def _verdict(q: Comparison) -> Table:
+    """Judge a quantity by the formal order; the order in every norm, status and window in the typical norm."""
+    name, norms, typical = q.name, q.part.norms, judgement(q, TYPICAL_NORM)
     member = ("scheme", "case")
     table: Table = {}
     words = {"order": "stated order", "order_low": "its lower end", "order_high": "its upper end"}
     for key, field in (("order", "order"), ("order_low", "low"), ("order_high", "high")):
-        values = np.stack([getattr(by_norm[kind], field) for kind in NORMS], axis=-1)
+        values = np.stack([getattr(judgement(q, kind), field) for kind in norms], axis=-1)
         attrs = attributes(f"{name}: {words[key]}", "1")
-        table[f"{name}_{key}"] = Variable((*member, "norm"), values, attrs)
+        table[f"{name}_{key}"] = Variable((*member, "norm"), values.astype(precision_of(q)), attrs)
     for key, levels in (("first", typical.first), ("last", typical.last)):
         words_ = f"{name}: {key} level that the order rests on, -1 for none"
-        table[f"{name}_window_{key}"] = Variable(member, levels, attributes(words_, "1"))
+        kept = levels.astype(np.int16)
+        table[f"{name}_window_{key}"] = Variable(member, kept, attributes(words_, "1"))
     for key, codes, names in (
         ("status", typical.status, STATUSES),
         ("reason", typical.reason, REASON_NAMES),
     ):
-        attrs = attributes(f"{name}: {key} of the verdict on its order", "1", **_flags(names))
+        attrs = attributes(f"{name}: {key} of the verdict on its order", "1", **flags(names))
         table[f"{name}_{key}"] = Variable(member, codes, attrs)
     return table

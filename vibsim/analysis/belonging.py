@@ -18,6 +18,10 @@ SAME_START = 1e-9
 """Levels start from the same values, to this part of their size: far above the rounding of an exact solution."""
 
 
+SAME_AT_EVERY_LEVEL = frozenset({"natural_frequency", "exact_period"})
+"""What the levels hold of every member and does not depend on the step."""
+
+
 def check_belonging(experiment: Experiment, records: Mapping[int, Record]) -> None:
     """Refuse level Records that are not those of `experiment`, or not of one and the same problem.
 
@@ -65,12 +69,12 @@ def _faults(experiment: Experiment, level: int, record: Record, other: Record) -
 def _of_members(record: Record) -> list[str]:
     """Name what belongs to a member and not to a level: parameters, period, end time."""
     constants = [name for name, variable in record.coords.items() if variable.dims == ("case",)]
-    return [name for name in (*constants, "natural_frequency", "exact_period") if name in record]
+    return [name for name in (*constants, *sorted(SAME_AT_EVERY_LEVEL)) if name in record]
 
 
 def _equal(record: Record, other: Record, name: str) -> bool:
-    a, b = (np.asarray(r[name], dtype=np.float64) for r in (record, other))
-    return bool(np.array_equal(a, b, equal_nan=True))
+    a, b = record[name], other[name]
+    return bool(np.array_equal(a, b, equal_nan=a.dtype.kind == b.dtype.kind == "f"))
 
 
 def _start(record: Record, other: Record, name: str) -> Iterator[str]:

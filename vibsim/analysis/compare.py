@@ -1,136 +1,163 @@
-"""One quantity compared between levels, as variables of the convergence Record."""
+"""One quantity compared between levels: its series, and the numbers that are made of them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis import series
-from vibsim.analysis.grid import Grid
+from vibsim.analysis.floor import solution_size
+from vibsim.analysis.part import Part, by_level, energy_at_start
+from vibsim.analysis.promise import even_powers, formal_orders
 from vibsim.analysis.richardson import extrapolate
-from vibsim.models import ENERGIES, MODELS
-from vibsim.record import Variable, attributes
-from vibsim.schemes import SCHEMES
-from vibsim.vocabulary import NORMS
-
-if TYPE_CHECKING:
-    from vibsim.spec import Experiment
+from vibsim.analysis.verdict import Judgement
 
 Floats = NDArray[np.float64]
-Table = dict[str, Variable]
-
-SERIES = ("scheme", "case", "t")
-
-
-@dataclass(frozen=True)
-class Ladder:
-    """One quantity at every level, on the common grid."""
-
-    name: str
-    long_name: str
-    units: str
-    values: list[Floats]
-    """Per level, coarse to fine, each of shape (scheme, case, t)."""
-    exact: Floats | None
-    """Broadcasts against (scheme, case, t)."""
-    order: Floats
-    """Formal order, shape (scheme,)."""
-    floor: Floats
-    """Predicted round-off at one point, shape (scheme, case, level)."""
-
 
 ROUND_OFF_SAFETY = 10.0
 """Factor on the predicted round-off in an error bound: the prediction is an order of magnitude."""
 
 
-def differences(grid: Grid, q: Ladder) -> Table:
-    """Compare successive levels: series, norms, orders."""
-    pairs = list(zip(q.values[:-1], q.values[1:], strict=True))
-    levels = grid.levels
-    p = q.order[:, None, None]
-    error = [q.exact - u if q.exact is not None else np.full_like(u, np.nan) for u in q.values]
-    errors = np.stack([_norms(grid, e) for e in error], axis=2)
-    table: Table = {}
+@dataclass(frozen=True)
+class InNorm:
+    """A quantity in a norm over time."""
 
-    def add(name: str, dims: tuple[str, ...], values: Floats, words: str, units: str) -> None:
-        long_name = f"{q.long_name}: {words}"
-        table[f"{q.name}_{name}"] = Variable(dims, values, attributes(long_name, units))
-
-    of_level = ("scheme", "case", "level")
-    add("error_norm", (*of_level, "norm"), errors, _IN_NORM.format("true error"), q.units)
-    add("floor", of_level, q.floor, "predicted round-off", q.units)
-    add("formal_order", ("scheme",), q.order, "order that the scheme promises", "1")
-    if not pairs:
-        return table
-    d = [coarse - fine for coarse, fine in pairs]
-    over_time, of_pair = ("scheme", "case", "pair", "t"), ("scheme", "case", "pair", "norm")
-    rescaled = [x * series.rescaling(p, levels[: i + 2]) for i, x in enumerate(d)]
-    estimate = [x * series.error_factor(p, levels[i + 1] - levels[i]) for i, x in enumerate(d)]
-    norms = np.stack([_norms(grid, x) for x in d], axis=2)
-    add("difference", over_time, np.stack(d, 2), "level minus next level", q.units)
-    add("rescaled", over_time, np.stack(rescaled, 2), "difference, rescaled", q.units)
-    add("error_estimate", over_time, np.stack(estimate, 2), "estimated error", q.units)
-    add("error", over_time, np.stack(error[:-1], 2), "true error", q.units)
-    add("difference_norm", of_pair, norms, _IN_NORM.format("difference"), q.units)
-    if len(d) > 1:
-        _add_triples(grid, q, d, norms, add)
-    return table
+    difference: Floats
+    """Of successive levels, shape (scheme, case, pair)."""
+    scatter: Floats
+    """Of successive differences (`series.scatters`), shape (scheme, case, triple)."""
+    error: Floats
+    """Exact less computed, shape (scheme, case, level); NaN where the exact solution is not known."""
+    extrapolation: Floats
+    """Exact less extrapolated, shape (scheme, case)."""
 
 
-_IN_NORM = "{} in a norm over time (times s for l1, times the square root of s for l2)"
+@dataclass(frozen=True)
+class Comparison:
+    """One quantity at every level, on the common grid; series have the shape (scheme, case, t)."""
+
+    part: Part
+    name: str
+    long_name: str
+    units: str
+    values: list[Floats]
+    """Per level, coarse to fine."""
+    exact: Floats | None
+    """Broadcasts against a series."""
+    order: Floats
+    """Formal order, shape (scheme, 1 or case)."""
+    floor: Floats
+    """Predicted round-off at one point, shape (scheme, case, level)."""
+    judged: dict[tuple[str, str, float], Judgement] = field(default_factory=dict, repr=False)
+    """Judgements made so far, by norm, order and tolerance."""
+    _norms: dict[str, InNorm] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def differences(self) -> list[Floats]:
+        """Level minus next level."""
+        return [coarse - fine for coarse, fine in pairwise(self.values)]
+
+    @cached_property
+    def errors(self) -> list[Floats] | None:
+        """Exact minus level; None where the exact solution is not known."""
+        return None if self.exact is None else [self.exact - u for u in self.values]
+
+    @cached_property
+    def extrapolation(self) -> tuple[Floats, Floats]:
+        """Extrapolation to a vanishing step, and the bound of its error; for a lean part its largest value only."""
+        part = self.part
+        even = even_powers(part.experiment, self.name, part.columns)
+        value, bound = extrapolate(
+            self.values, part.grid.levels, self.order, even, largest=part.lean
+        )
+        return value, bound + ROUND_OFF_SAFETY * self.floor[..., -1:]
+
+    @property
+    def largest_bound(self) -> Floats:
+        """The largest bound over time, shape (scheme, case)."""
+        # a bound never falls with time
+        return self.extrapolation[1][..., -1]
+
+    def in_norm(self, kind: str) -> InNorm:
+        """Measure the quantity in a norm."""
+        if kind not in self._norms:
+            self._norms[kind] = self._measured(kind)
+        return self._norms[kind]
+
+    def _measured(self, kind: str) -> InNorm:
+        grid, shape = self.part.grid, self.part.shape
+        none = np.empty((*shape, 0))
+
+        def size(of: Floats) -> Floats:
+            return series.norm(of, kind, grid.spacing, grid.end_included)
+
+        levels, d = len(grid.levels), self.differences
+        unknown = np.full((*shape, levels), np.nan)
+        scatters = series.scatters(d, kind, grid.end_included) if len(d) > 1 else []
+        return InNorm(
+            difference=by_level([size(x) for x in d]) if d else none,
+            scatter=by_level(scatters) if scatters else none,
+            error=unknown if self.errors is None else by_level([size(e) for e in self.errors]),
+            extrapolation=(
+                unknown[..., 0] if self.exact is None else size(self.exact - self.extrapolation[0])
+            ),
+        )
+
+    @cached_property
+    def coincidence(self) -> Floats:
+        """Relative distance of the rescaled differences, shape (scheme, case, triple)."""
+        levels = self.part.grid.levels
+        return by_level(
+            [
+                series.coincidence(a, b, series.target_ratio(self.order, levels[i : i + 3]))
+                for i, (a, b) in enumerate(pairwise(self.differences))
+            ]
+        )
+
+    def ratios(self, kind: str) -> Floats:
+        """Return the ratio of successive differences in a norm, shape (scheme, case, triple)."""
+        norms = self.in_norm(kind).difference
+        return series.safe_ratio(norms[..., :-1], norms[..., 1:])
+
+    def observed_orders(self, kind: str) -> Floats:
+        """Return the order of every triple in a norm, shape (scheme, case, triple)."""
+        levels, ratio = self.part.grid.levels, self.ratios(kind)
+        return by_level(
+            [
+                series.order_of_ratio(ratio[..., i], levels[i : i + 3])
+                for i in range(ratio.shape[-1])
+            ]
+        )
 
 
-def _add_triples(grid: Grid, q: Ladder, d: list[Floats], norms: Floats, add: Any) -> None:
-    triples = [grid.levels[i : i + 3] for i in range(len(d) - 1)]
-    of_triple = ("scheme", "case", "triple")
-    ratio, order, together, factor = [], [], [], []
-    norm_ratio = series.safe_ratio(norms[:, :, :-1], norms[:, :, 1:])
-    for i, levels in enumerate(triples):
-        floor = (q.floor[..., i + 1] + q.floor[..., i + 2])[..., None]
-        ratio.append(series.masked_ratio(d[i], d[i + 1], floor))
-        order.append(series.order_of_ratio(norm_ratio[:, :, i], levels))
-        target = series.target_ratio(q.order, levels)[:, None]
-        together.append(series.coincidence(d[i], d[i + 1], target))
-        factor.append(series.proportionality(d[i], d[i + 1]))
-    words = "ratio of successive differences"
-    add("ratio", (*of_triple, "t"), np.stack(ratio, 2), words, "1")
-    add("ratio_norm", (*of_triple, "norm"), norm_ratio, f"{words} in a norm over time", "1")
-    add("observed_order", (*of_triple, "norm"), np.stack(order, 2), "observed order", "1")
-    words = "relative distance of the rescaled differences"
-    add("coincidence", of_triple, np.stack(together, 2), words, "1")
-    words = "least-squares factor between successive differences"
-    add("proportionality", of_triple, np.stack(factor, 2), words, "1")
+def comparisons(part: Part, names: tuple[str, ...]) -> Mapping[str, Comparison]:
+    """Compare quantities between the levels of a part."""
+    position = part.model.position
+    values = {name: part.series(name) for name in dict.fromkeys((position, *names))}
+    sizes = {"energy": _energy_size(part)}
+    sizes[position] = part.size(position, values[position], sizes)
+    found = {}
+    for name in names:
+        size = part.size(name, values[name], sizes) * part.magnified
+        attrs = part.finest.variables[name].attrs
+        found[name] = Comparison(
+            part=part,
+            name=name,
+            long_name=str(attrs.get("long_name", name)),
+            units=str(attrs.get("units", "1")),
+            values=values[name],
+            exact=part.exact_of(name),
+            order=formal_orders(part.experiment, name, part.columns),
+            floor=part.relative_floor * size[..., None],
+        )
+    return found
 
 
-def _norms(grid: Grid, values: Floats) -> Floats:
-    """Return every norm, shape (scheme, case, norm)."""
-    rows = [series.norm(values, kind, grid.spacing, grid.end_included) for kind in NORMS]
-    return np.stack(rows, axis=-1)
-
-
-def extrapolated(experiment: Experiment, grid: Grid, q: Ladder) -> Table:
-    """Extrapolate to a vanishing step, with bound and true error; the finest and the exact series."""
-    model = MODELS[experiment.model.kind]
-    even = [SCHEMES[s.kind].even_powers(q.name, model, s.options) for s in experiment.schemes]
-    value, bound = extrapolate(q.values, grid.levels, q.order, np.array(even))
-    bound = bound + ROUND_OFF_SAFETY * q.floor[..., -1:]
-    table: dict[str, tuple[tuple[str, ...], Floats, str]] = {
-        f"{q.name}_richardson": (SERIES, value, "Richardson extrapolation"),
-        f"{q.name}_richardson_error": (SERIES, bound, "error bound of the extrapolation"),
-        f"{q.name}_finest": (SERIES, q.values[-1], "finest level"),
-    }
-    error = np.full_like(value, np.nan) if q.exact is None else q.exact - value
-    words = _IN_NORM.format("true error of the extrapolation")
-    dims: tuple[str, ...] = ("scheme", "case", "norm")
-    table[f"{q.name}_richardson_error_norm"] = (dims, _norms(grid, error), words)
-    if q.exact is not None:
-        dims = SERIES if q.exact.shape[0] == value.shape[0] and q.name in ENERGIES else SERIES[1:]
-        exact = q.exact if dims == SERIES else q.exact[0]
-        table[f"{q.name}_exact"] = (dims, np.array(exact), "exact")
-    return {
-        name: Variable(dims, values, attributes(f"{q.long_name}: {words}", q.units))
-        for name, (dims, values, words) in table.items()
-    }
+def _energy_size(part: Part) -> Floats:
+    """Return the size of the energy, shape (scheme, case): what it was plus what became of it."""
+    return np.abs(energy_at_start(part.finest)) + solution_size(part.series("energy_deviation"))

@@ -1,4 +1,4 @@
-"""From the convergence Record to the numbers that a verdict rests on, for one quantity and one norm."""
+"""From a comparison of levels to the numbers that a verdict rests on, and the verdict, for one norm."""
 
 from __future__ import annotations
 
@@ -7,32 +7,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis.floor import norm_of_floor, relative_floor
+from vibsim.analysis.compare import Comparison
+from vibsim.analysis.floor import norm_of_floor
+from vibsim.analysis.promise import stability_limits
 from vibsim.analysis.rules import Evidence
-from vibsim.analysis.series import scatter
-from vibsim.models import MODELS
+from vibsim.analysis.series import largest
+from vibsim.analysis.verdict import Judgement, judge
 from vibsim.record import Record
-from vibsim.schemes import SCHEMES
+from vibsim.vocabulary import TOLERANCE
 
 if TYPE_CHECKING:
-    from vibsim.spec import Experiment
+    from vibsim.spec.checks import ConvergesCheck
 
 Floats = NDArray[np.float64]
-
-
-def formal_orders(experiment: Experiment, quantity: str) -> Floats:
-    """Return the order that every scheme promises for a quantity, shape (scheme,)."""
-    model = MODELS[experiment.model.kind]
-    return np.array(
-        [SCHEMES[s.kind].formal_order(quantity, model, s.options) for s in experiment.schemes],
-        dtype=np.float64,
-    )
-
-
-def relative_floors(experiment: Experiment, steps: tuple[int, ...]) -> Floats:
-    """Return the predicted round-off relative to the solution, shape (scheme, 1, level)."""
-    floors = [relative_floor(SCHEMES[s.kind], s.options, steps) for s in experiment.schemes]
-    return np.stack(floors)[:, None, :]
 
 
 def spacing_of(record: Record) -> Floats:
@@ -42,92 +29,75 @@ def spacing_of(record: Record) -> Floats:
 
 
 def omega_dt(record: Record) -> Floats:
-    """Return w dt of a convergence Record, shape (case, level); stored without levels where all have the same."""
-    values = np.asarray(record["omega_dt"], dtype=np.float64)
-    by_level = values if values.ndim == 2 else values[:, None]
-    return np.broadcast_to(by_level, (len(values), len(record["level"])))
+    """Return w dt of a convergence Record, shape (case, level)."""
+    return np.asarray(record["omega_dt"], dtype=np.float64)
 
 
-def ends_at_the_end(record: Record) -> bool:
-    """Say whether the last common point is the end of the time interval."""
-    return bool(np.asarray(record.attrs["end_included"]).item())
+def judgement(q: Comparison, norm: str) -> Judgement:
+    """Judge a quantity by the order that its scheme promises."""
+    key = norm, "scheme", TOLERANCE
+    if key not in q.judged:
+        q.judged[key] = judge(evidence(q, norm, q.order, TOLERANCE))
+    return q.judged[key]
 
 
-def evidence(
-    experiment: Experiment,
-    record: Record,
-    quantity: str,
-    norm: str,
-    order: Floats,
-    tolerance: float,
-) -> Evidence:
+def judge_check(q: Comparison, check: ConvergesCheck) -> Judgement:
+    """Judge a quantity as a check asks for it."""
+    if check.order == "scheme" and check.tolerance == TOLERANCE:
+        return judgement(q, check.norm)
+    order = q.order if check.order == "scheme" else np.full((1, 1), float(check.order))
+    return judge(evidence(q, check.norm, order, check.tolerance))
+
+
+def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evidence:
     """Collect the evidence on a quantity in a norm.
 
     Parameters
     ----------
-    record
-        Convergence Record; its verdict variables are not needed.
+    q
+        The quantity, compared between levels.
+    norm
+        One of `vocabulary.NORMS`.
     order
-        The order that is expected of every scheme, shape (scheme,).
+        The order that is expected, shape (scheme, 1 or case).
+    tolerance
+        How far from it an order may be.
 
     Returns
     -------
     Evidence
         Arrays of shape (scheme, case, ...).
     """
-    levels = tuple(int(level) for level in record["level"])
-    spacing, end_included = spacing_of(record), ends_at_the_end(record)
-    finest = record[f"{quantity}_finest"]
-    shape = finest.shape[:2]
-    kind = record.words("norm").index(norm)
-    pairs = len(levels) - 1
-    difference = (
-        record[f"{quantity}_difference"] if pairs else np.empty((*shape, 0, finest.shape[2]))
-    )
-    points = len(record["t"])
-    floor = np.moveaxis(record[f"{quantity}_floor"], -1, 0)
-    relative = relative_floors(experiment, tuple(int(n) for n in record["steps"]))
-    size = np.max(np.abs(np.nan_to_num(finest)), axis=-1)
-    failed = record["status"] != 0
-    scatters = [
-        scatter(difference[:, :, i], difference[:, :, i + 1], norm, end_included)
-        for i in range(pairs - 1)
-    ]
-    limits = [SCHEMES[s.kind].stability_limit for s in experiment.schemes]
+    part, measured = q.part, q.in_norm(norm)
+    grid, shape = part.grid, part.shape
+    points = len(grid.t)
+    size, exists = _size(q.values[-1])
+
+    def in_norm(noise: Floats) -> Floats:
+        return norm_of_floor(noise, norm, points, grid.spacing)
+
     return Evidence(
-        levels=levels,
-        difference=(
-            record[f"{quantity}_difference_norm"][..., kind] if pairs else np.empty((*shape, 0))
-        ),
-        scatter=np.stack(scatters, axis=-1) if scatters else np.empty((*shape, 0)),
-        floor=np.moveaxis(norm_of_floor(floor, norm, points, spacing), 0, -1),
-        order=np.broadcast_to(order[:, None], shape),
+        levels=grid.levels,
+        difference=measured.difference,
+        scatter=measured.scatter,
+        floor=np.moveaxis(in_norm(np.moveaxis(q.floor, -1, 0)), 0, -1),
+        order=np.broadcast_to(order, shape),
         tolerance=tolerance,
-        error=record[f"{quantity}_error_norm"][..., kind],
-        size=norm_of_floor(size, norm, points, spacing),
-        failed=failed,
-        applicable=np.any(np.isfinite(finest), axis=-1) | np.any(failed, axis=-1),
-        omega_dt=np.broadcast_to(omega_dt(record), (*shape, len(levels))),
-        stability_limit=np.broadcast_to(
-            np.array([np.inf if limit is None else limit for limit in limits])[:, None], shape
-        ),
-        growth=growth(experiment, record),
-        span=np.broadcast_to(omega_dt(record)[:, 0] * float(record["steps"][0]), shape),
-        relative_floor=np.broadcast_to(relative[..., 0], shape),
+        error=measured.error,
+        size=in_norm(size),
+        failed=part.failed,
+        applicable=exists | np.any(part.failed, axis=-1),
+        omega_dt=np.broadcast_to(part.omega_dt, (*shape, len(grid.levels))),
+        stability_limit=np.broadcast_to(stability_limits(part.experiment), shape),
+        growth=part.growth,
+        span=np.broadcast_to(part.omega_dt[:, 0] * float(grid.steps[0]), shape),
+        relative_floor=np.broadcast_to(part.relative_floor[..., 0], shape),
     )
 
 
-def growth(experiment: Experiment, record: Record) -> Floats:
-    """Return the largest position of every level over the largest exact one, shape (scheme, case, level).
-
-    Without an exact solution the coarsest level takes its place. NaN where the reference vanishes.
-    """
-    position = MODELS[experiment.model.kind].position
-    low, high = (record[f"{position}_{name}"] for name in ("min", "max"))
-    largest = np.maximum(np.abs(low), np.abs(high))
-    if f"{position}_exact" in record:
-        reference = np.max(np.abs(record[f"{position}_exact"]), axis=-1)[..., None]
-    else:
-        reference = largest[..., :1]
-    usable = np.isfinite(largest) & (reference > 0)
-    return np.where(usable, largest, np.nan) / np.where(usable, reference, 1.0)
+def _size(finest: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Return the largest value of the finest level, and whether it has a finite one, shape (scheme, case)."""
+    size = largest(finest)
+    if np.all(np.isfinite(size)):
+        return size, np.ones(size.shape, dtype=bool)
+    return largest(np.nan_to_num(finest)), np.any(np.isfinite(finest), axis=-1)

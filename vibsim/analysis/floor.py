@@ -11,6 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.analysis.series import largest
 from vibsim.schemes import Scheme
 
 Floats = NDArray[np.float64]
@@ -35,11 +36,14 @@ def solution_size(series: list[Floats]) -> Floats:
     series
         The solution at every level from coarse to fine, each of shape (scheme, case, t).
     """
+    size = largest(series[-1])
+    if np.all(np.isfinite(size)):
+        return size
     size = np.zeros(series[0].shape[:-1])
     for values in series:
         finite = np.isfinite(values)
-        largest = np.max(np.abs(np.where(finite, values, 0.0)), axis=-1)
-        size = np.where(np.any(finite, axis=-1), largest, size)
+        most = np.max(np.abs(np.where(finite, values, 0.0)), axis=-1)
+        size = np.where(np.any(finite, axis=-1), most, size)
     return size
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.analysis.series import laid_out
 from vibsim.errors import VibsimError
 from vibsim.record import Record
 
@@ -42,6 +43,11 @@ class Grid:
     def spacing(self) -> Floats:
         """Distance between common points in time, shape (case,) or (1,)."""
         return np.asarray(self.dt[0] * self.apart, dtype=np.float64)
+
+    def times(self, end: Floats) -> Floats:
+        """Return the common times of members that end at `end`, shape (case, t): the bits of those in level files."""
+        number = self.apart * np.arange(len(self.t), dtype=np.int64)
+        return number * (end / self.steps[0])[:, None]
 
 
 def common_grid(records: Mapping[int, Record]) -> Grid:
@@ -81,10 +87,10 @@ def common_grid(records: Mapping[int, Record]) -> Grid:
 
 
 def take(grid: Grid, record: Record, name: str) -> Floats:
-    """Return variable `name` of a level Record on the common grid, shape (..., t)."""
+    """Return variable `name` of a level Record on the common grid, shape (..., t), time outermost in memory."""
     stride = grid.strides[grid.levels.index(_whole(record, "level"))]
     values = record[name][..., : (len(grid.t) - 1) * stride + 1 : stride]
-    return np.asarray(values, dtype=np.float64)
+    return laid_out(values)
 
 
 def _whole(record: Record, name: str) -> int:

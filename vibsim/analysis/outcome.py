@@ -4,18 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis.verdict import Judgement
 from vibsim.vocabulary import SEVERITY, STATUSES
 
 Floats = NDArray[np.float64]
 
 PASS, FAIL, INCONCLUSIVE = map(STATUSES.index, ("PASS", "FAIL", "INCONCLUSIVE"))
 """Index into `STATUSES`."""
+
+
+@dataclass(frozen=True)
+class Orders:
+    """The orders that a ``converges`` check found, each of shape (scheme, case)."""
+
+    order: Floats
+    low: Floats
+    high: Floats
+    first: NDArray[Any]
+    last: NDArray[Any]
+    culprit: NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -28,7 +40,7 @@ class Outcome:
     """Their positions."""
     cases: NDArray[Any]
     """Global index of every member, shape (case,)."""
-    case_index: list[int]
+    case_index: NDArray[np.int64]
     """Positions of the members that the check is about."""
     status: NDArray[Any]
     """Measured, index into `STATUSES`."""
@@ -45,30 +57,59 @@ class Outcome:
     """Sentence on a scheme and a member."""
     advise: Callable[[int, int], str]
     """Advice on a scheme and a member."""
-    judged: Judgement | None = None
+    orders: Orders | None = None
     """Of a ``converges`` check."""
     value: Floats | None = None
     """Of a ``value`` check."""
 
-    def ranking(self) -> list[tuple[int, int]]:
-        """Return the positions of all results that count, worst first; equals in their order."""
-        chosen = np.ix_(self.scheme_index, self.case_index)
-        severity = np.array([SEVERITY[name] for name in STATUSES])[self.compared[chosen]].ravel()
-        away = np.where(np.isnan(self.away[chosen]), np.inf, self.away[chosen]).ravel()
-        order = np.lexsort((-away, -severity))
-        width = len(self.case_index)
-        return [
-            (self.scheme_index[int(i) // width], self.case_index[int(i) % width]) for i in order
-        ]
+    @property
+    def total(self) -> int:
+        """Number of results."""
+        return len(self.scheme_index) * len(self.case_index)
 
-    def worst(self) -> tuple[int, int]:
-        """Return the position of the result that decides."""
-        return self.ranking()[0]
+    @property
+    def _at(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        return np.array(self.scheme_index, dtype=np.int64)[:, None], self.case_index[None]
+
+    @cached_property
+    def chosen(self) -> NDArray[Any]:
+        """Compared status of the results that count, shape (scheme, case) of the check."""
+        return self.compared[self._at]
+
+    @cached_property
+    def _keys(self) -> tuple[NDArray[np.int64], Floats]:
+        """Severity and distance of every result that counts, flat."""
+        away = self.away[self._at]
+        severity = np.array([SEVERITY[name] for name in STATUSES])[self.chosen]
+        return severity.ravel(), np.where(np.isnan(away), np.inf, away).ravel()
+
+    @cached_property
+    def ranking(self) -> NDArray[np.int64]:
+        """Numbers of all results, worst first; equals in their order."""
+        severity, away = self._keys
+        return np.lexsort((-away, -severity))
+
+    def worst(self, most: int) -> NDArray[np.int64]:
+        """Return the beginning of `ranking`, without sorting all of it."""
+        severity, away = self._keys
+        found: list[NDArray[np.int64]] = []
+        for value in sorted(set(SEVERITY.values()), reverse=True):
+            left = most - sum(map(len, found))
+            rows = np.flatnonzero(severity == value) if left > 0 else np.empty(0, dtype=np.int64)
+            if len(rows) > left:
+                least = np.partition(away[rows], len(rows) - left)[len(rows) - left]
+                rows = rows[away[rows] >= least]
+            found.append(rows[np.argsort(-away[rows], kind="stable")][: max(left, 0)])
+        return np.concatenate(found)
+
+    def position(self, number: int) -> tuple[int, int]:
+        """Return scheme and case of a result."""
+        scheme, case = divmod(int(number), len(self.case_index))
+        return self.scheme_index[scheme], int(self.case_index[case])
 
     def counts(self) -> dict[str, int]:
         """Return the number of results by compared status."""
-        chosen = self.compared[np.ix_(self.scheme_index, self.case_index)]
-        return {name: int(np.sum(chosen == i)) for i, name in enumerate(STATUSES)}
+        return {name: int(np.sum(self.chosen == i)) for i, name in enumerate(STATUSES)}
 
 
 def number_at(values: NDArray[Any] | None, scheme: int, case: int) -> float | None:

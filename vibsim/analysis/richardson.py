@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis.series import gap_ratio, norm, safe_ratio
+from vibsim.analysis.series import largest as absolute
 
 Floats = NDArray[np.float64]
 
@@ -22,7 +23,11 @@ SAFETY = 1.25
 
 
 def extrapolate(
-    series: Sequence[Floats], levels: Sequence[int], order: Floats, even: NDArray[np.bool_]
+    series: Sequence[Floats],
+    levels: Sequence[int],
+    order: Floats,
+    even: NDArray[np.bool_],
+    largest: bool = False,
 ) -> tuple[Floats, Floats]:
     """Extrapolate a ladder of solutions.
 
@@ -33,46 +38,56 @@ def extrapolate(
     levels
         Their levels, strictly increasing.
     order
-        Formal order p of every scheme, shape (scheme,).
+        Formal order p, shape (scheme, case or 1).
     even
-        Whether the next power is p + 2 rather than p + 1, shape (scheme,); from four levels on the data decide.
+        Whether the next power is p + 2 rather than p + 1, shape (scheme, case or 1); from four levels on the data
+        decide.
+    largest
+        Whether the largest bound is enough.
 
     Returns
     -------
     value
         Extrapolated solution, shape (scheme, case, t): of the finest three levels, or of as many as there are.
     bound
-        Bound of its error without round-off. With three levels and more it is the change between the last two first
+        Bound of its error without round-off, which never falls with time; of shape (scheme, case, 1) where the largest
+        is enough. With three levels and more it is the change between the last two first
         extrapolations, as large as it has been so far; `SAFETY` times that over K - 1 where four levels show that the
         change falls by the factor K, taken for no more than the next power gives. It is honest for a solution of a
         lower order than p, too. With two levels it is the estimated error of the finer one; with one level NaN.
     """
-    p = order[:, None, None]
+    p, so_far = order[..., None], _at_most if largest else _so_far
     if len(series) == 1:
-        return series[0], np.full_like(series[0], np.nan)
+        return series[0], so_far(np.full_like(series[0], np.nan))
     with np.errstate(over="ignore", invalid="ignore"):
         first = [
             fine + (fine - coarse) / (gap_ratio(p, levels[i + 1] - levels[i]) - 1)
-            for i, (coarse, fine) in enumerate(pairwise(series))
+            for i, (coarse, fine) in list(enumerate(pairwise(series)))[-3:]
         ]
         if len(series) == 2:
-            return first[-1], _so_far(first[-1] - series[-1])
+            return first[-1], so_far(first[-1] - series[-1])
         change = first[-1] - first[-2]
         if len(series) == 3:
-            return _second(first[-1], change, levels[-3:], p, even[:, None, None]), _so_far(change)
-        seen = _seen_fall(first[-2] - first[-3], change)
-        quick = _fall(levels[-4:], p, p + 2)[..., 0]
-        slow = _fall(levels[-4:], p, p + 1)[..., 0]
+            return _second(first[-1], change, levels[-3:], p, even[..., None]), so_far(change)
+        before = first[-2] - first[-3]
+        seen = _seen_fall(before, change)
+        quick = _fall(levels[-4:], order, order + 2)
+        slow = _fall(levels[-4:], order, order + 1)
         is_even = np.nan_to_num(seen, nan=2.0) > np.sqrt(quick * slow)
         value = _second(first[-1], change, levels[-3:], p, is_even[..., None])
-        most = np.where(even[:, None], quick, slow)
+        most = np.where(even, quick, slow)
         factor = np.clip(np.nan_to_num(seen, nan=2.0), 2.0, np.maximum(most, 2.0))
         # a change that fell faster than any term falls is one that happens to vanish here: trust the one before it
-        expected = _so_far(first[-2] - first[-3]) / np.maximum(slow, 2.0)[..., None]
-        vanishing = (seen > most * SAFETY)[..., None]
-        largest = np.maximum(_so_far(change), np.where(vanishing, expected, 0.0))
-        factor = np.where(vanishing[..., 0], np.minimum(factor, np.maximum(slow, 2.0)), factor)
-        return value, SAFETY * largest / (factor[..., None] - 1)
+        expected = so_far(before) / np.maximum(slow, 2.0)[..., None]
+        vanishing = seen > most * SAFETY
+        size = np.maximum(so_far(change), np.where(vanishing[..., None], expected, 0.0))
+        factor = np.where(vanishing, np.minimum(factor, np.maximum(slow, 2.0)), factor)
+        return value, SAFETY * size / (factor[..., None] - 1)
+
+
+def _at_most(change: Floats) -> Floats:
+    """Return the largest absolute value, shape (scheme, case, 1)."""
+    return absolute(change)[..., None]
 
 
 def _so_far(change: Floats) -> Floats:

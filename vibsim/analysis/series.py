@@ -10,6 +10,7 @@ Source: pendulum lecture, section 2.5. Series have the shape (..., t); time is t
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,35 @@ NEAR_ZERO = 0.1
 """A denominator below this part of its surroundings is taken for a zero crossing."""
 ABOVE_FLOOR = 10.0
 """A denominator must exceed the round-off floor so many times for a ratio to mean something."""
+
+
+SAFE_SQUARES = 1e140
+"""Numbers between this and its inverse have squares whose sums neither overflow nor vanish."""
+
+
+def laid_out(values: Floats) -> Floats:
+    """Return the same array with time outermost in memory: operations over time then run over all members at once."""
+    return np.moveaxis(np.ascontiguousarray(np.moveaxis(values, -1, 0), dtype=np.float64), 0, -1)
+
+
+def total(values: Floats) -> Floats:
+    """Return the sum over time, shape (...).
+
+    The order of the additions depends on the number of points alone, so that a member has the same bits alone and
+    among others: halves are added to halves.
+    """
+    while (n := values.shape[-1]) > 1:
+        half = n // 2
+        folded = values[..., :half] + values[..., half : 2 * half]
+        if n % 2:
+            folded[..., 0] += values[..., -1]
+        values = folded
+    return values[..., 0]
+
+
+def largest(values: Floats) -> Floats:
+    """Return the largest absolute value over time, shape (...); NaN where there is a NaN."""
+    return np.asarray(np.maximum(np.max(values, axis=-1), -np.min(values, axis=-1)))
 
 
 def norm(error: Floats, kind: str, spacing: Floats, end_included: bool = True) -> Floats:
@@ -43,19 +73,28 @@ def norm(error: Floats, kind: str, spacing: Floats, end_included: bool = True) -
     array
         Shape (..., case). NaN where the series has a NaN.
     """
-    size = np.abs(error)
     if kind == "linf_interior" and end_included:
-        size = size[..., :-1]
-    largest = np.max(size, axis=-1)
+        error = error[..., :-1]
     if kind in {"linf", "linf_interior"}:
-        return np.asarray(largest)
-    # scaled by the largest entry, so that squares neither overflow nor vanish
-    scale = np.where((largest > 0) & np.isfinite(largest), largest, 1.0)
+        return largest(error)
     with np.errstate(over="ignore", invalid="ignore"):
-        scaled = size / scale[..., None]
         if kind == "l1":
-            return np.asarray(scale * spacing * np.sum(scaled, axis=-1))
-        return np.asarray(scale * np.sqrt(spacing * np.sum(scaled * scaled, axis=-1)))
+            return np.asarray(spacing * total(np.abs(error)))
+        return _root_of_squares(error, spacing)
+
+
+def _root_of_squares(error: Floats, spacing: Floats) -> Floats:
+    """Return ``sqrt(dt sum e^2)``, scaled where squares would overflow or vanish.
+
+    The scale is a power of two and changes no bit: so it may be left out where no member needs it.
+    """
+    size = largest(error)
+    usual = (size == 0) | ~np.isfinite(size)
+    if np.all(usual | ((size < SAFE_SQUARES) & (size > 1 / SAFE_SQUARES))):
+        return np.asarray(np.sqrt(spacing * total(error * error)))
+    scale = np.ldexp(1.0, np.frexp(np.where(usual, 1.0, size))[1] - 1)
+    scaled = error / scale[..., None]
+    return np.asarray(scale * np.sqrt(spacing * total(scaled * scaled)))
 
 
 def gap_ratio(order: Floats | float, gap: int) -> Floats:
@@ -167,24 +206,23 @@ def masked_ratio(first: Floats, second: Floats, floor: Floats | float = 0.0) -> 
     return np.where(keep, safe_ratio(first, second), np.nan)
 
 
+def unit(series: Floats, length: Floats) -> Floats:
+    """Return a series over its length; NaN throughout where that is zero or not finite."""
+    usable = np.isfinite(length) & (length != 0)
+    return np.asarray(series / np.where(usable, length, np.nan)[..., None])
+
+
 def inner(first: Floats, second: Floats) -> Floats:
     """Return the cosine of the angle between two series, shape (...); NaN where one of them vanishes."""
-    unit = []
-    for series in (first, second):
-        largest = np.max(np.abs(series), axis=-1, keepdims=True)
-        scaled = safe_ratio(series, np.broadcast_to(largest, series.shape))
-        unit.append(scaled / np.sqrt(np.sum(scaled * scaled, axis=-1, keepdims=True)))
-    return np.asarray(np.sum(unit[0] * unit[1], axis=-1))
+    units = [unit(series, norm(series, "l2", np.ones(1))) for series in (first, second)]
+    return total(units[0] * units[1])
 
 
 def proportionality(first: Floats, second: Floats) -> Floats:
     """Return the least-squares factor ``r = <d, d'>/<d', d'>`` of ``d = r d'``, shape (...)."""
-    sizes = [np.max(np.abs(series), axis=-1) for series in (first, second)]
-    lengths = [
-        norm(safe_ratio(series, np.broadcast_to(size[..., None], series.shape)), "l2", np.ones(1))
-        for series, size in zip((first, second), sizes, strict=True)
-    ]
-    return inner(first, second) * safe_ratio(sizes[0], sizes[1]) * safe_ratio(*lengths)
+    one = np.ones(1)
+    lengths = (norm(series, "l2", one) for series in (first, second))
+    return inner(first, second) * safe_ratio(*lengths)
 
 
 def coincidence(first: Floats, second: Floats, ratio: Floats) -> Floats:
@@ -209,8 +247,8 @@ def coincidence(first: Floats, second: Floats, ratio: Floats) -> Floats:
     return np.where((whole == 0) & (rest == 0), 0.0, safe_ratio(rest, whole))
 
 
-def scatter(first: Floats, second: Floats, kind: str, end_included: bool = True) -> Floats:
-    """Return how far two successive differences are from being proportional, in a norm.
+def scatters(differences: Sequence[Floats], kind: str, end_included: bool = True) -> list[Floats]:
+    """Return how far successive differences are from being proportional, in a norm, for every two of them.
 
     ``||d/||d|| - s d'/||d'||||`` with s the sign of their inner product: 0 for proportional series, 1 and more for
     unrelated ones. Each norm sees its own part of the series: one bad point matters to linf as much as it weighs
@@ -218,15 +256,20 @@ def scatter(first: Floats, second: Floats, kind: str, end_included: bool = True)
 
     Returns
     -------
-    array
-        Shape (...); negative where s is negative; NaN where a difference vanishes.
+    list
+        Arrays of shape (...); negative where s is negative; NaN where a difference vanishes.
     """
     one = np.ones(1)
-    unit = []
-    for series in (first, second):
-        length = norm(series, kind, one, end_included)
-        unit.append(safe_ratio(series, np.broadcast_to(length[..., None], series.shape)))
     if kind == "linf_interior" and end_included:
-        first, second = first[..., :-1], second[..., :-1]
-    sign = np.where(inner(first, second) < 0, -1.0, 1.0)
-    return sign * norm(unit[0] - sign[..., None] * unit[1], kind, one, end_included)
+        differences = [series[..., :-1] for series in differences]
+    units = [unit(series, norm(series, kind, one, False)) for series in differences]
+    found = []
+    for first, second in pairwise(units):
+        sign = np.where(total(first * second) < 0, -1.0, 1.0)
+        found.append(sign * norm(first - sign[..., None] * second, kind, one, False))
+    return found
+
+
+def scatter(first: Floats, second: Floats, kind: str, end_included: bool = True) -> Floats:
+    """Return the scatter of two successive differences; see `scatters`."""
+    return scatters([first, second], kind, end_included)[0]

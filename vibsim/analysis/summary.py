@@ -7,8 +7,10 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vibsim.analysis.checks import Verdict
+from vibsim.analysis.promise import Columns, columns_of
 from vibsim.record import Record
 from vibsim.vocabulary import FORMAT, jsonable, worst
 
@@ -35,11 +37,11 @@ def summarise(
     -------
     dict
         Ready for JSON: no NaN, no infinity, no numpy type. With a sweep the `WORST` results of each check and the
-        first `WORST` failures are listed; ``counts`` and ``failure_count`` count all of them.
+        first `WORST` failures are listed, each with the swept ``values`` and the ``command`` that runs its member
+        alone; ``counts`` and ``failure_count`` count all of them, and ``where`` tells where they are.
     """
     record = convergence if isinstance(convergence, Record) else Record.from_xarray(convergence)
     most = None if experiment.sweep is None else WORST
-    failures = _failures(record)
     plain: dict[str, Any] = jsonable(
         {
             "vibsim_format": FORMAT,
@@ -47,33 +49,72 @@ def summarise(
             "experiment": experiment.name,
             "title": experiment.title,
             "status": worst(verdict.status for verdict in verdicts),
-            "checks": [_check(verdict, most) for verdict in verdicts],
-            "failures": failures[:most],
-            "failure_count": len(failures),
+            "checks": [_check(experiment, record, verdict, most) for verdict in verdicts],
+            "failures": [
+                row | _member(experiment, record, row["case"]) for row in _failures(record, most)
+            ],
+            "failure_count": int(np.count_nonzero(record["status"])),
         }
     )
     return plain
 
 
-def _check(verdict: Verdict, most: int | None) -> dict[str, Any]:
-    results = [asdict(result) for result in verdict.results[:most]]
+def _check(
+    experiment: Experiment, record: Record, verdict: Verdict, most: int | None
+) -> dict[str, Any]:
+    results = verdict.results if most is None else verdict.results.worst(most)
+    rows = [asdict(row) | _member(experiment, record, row.case) for row in results]
     return {name: getattr(verdict, name) for name in verdict.__dataclass_fields__} | {
-        "results": results
+        "results": rows
     }
 
 
-def _failures(record: Record) -> list[dict[str, Any]]:
+def _member(experiment: Experiment, record: Record, case: int) -> dict[str, Any]:
+    """Return the swept values of a member of a sweep, and what runs it alone."""
+    columns: Columns = columns_of(record)
+    if experiment.sweep is None:
+        return {}
+    at = int(np.flatnonzero(np.asarray(record["case"]) == case)[0])
+    return {
+        "values": {key: values[at] for key, values in columns.items()},
+        "command": f"vibsim run {experiment.collection}/{experiment.name}@{case}",
+    }
+
+
+def _failures(record: Record, most: int | None) -> list[dict[str, Any]]:
     """List the members that broke down, the earliest first."""
     names, schemes = record.meanings("status"), record.words("scheme")
+    at = _earliest(record, most)
     rows = [
         {
             "scheme": schemes[s],
             "level": int(record["level"][lv]),
             "case": int(record["case"][c]),
             "t": float(record["failure_time"][s, c, lv]),
-            "step": int(record["last_step"][s, c, lv]) + 1,
+            "step": _step(record, s, c, lv),
             "error": names[int(record["status"][s, c, lv])],
         }
-        for s, c, lv in np.argwhere(record["status"] != 0)
+        for s, c, lv in at
     ]
-    return sorted(rows, key=lambda row: (row["t"], row["scheme"], row["case"], row["level"]))
+    rows.sort(key=lambda row: (row["t"], row["scheme"], row["case"], row["level"]))
+    return rows[:most]
+
+
+def _earliest(record: Record, most: int | None) -> NDArray[np.int64]:
+    """Return the positions of failures: all, or those not later than the `most` earliest."""
+    failed = record["status"] != 0
+    count = np.count_nonzero(failed)
+    if most is not None and count > most:
+        times = np.where(failed, np.nan_to_num(record["failure_time"], nan=np.inf), np.nan)
+        least = np.partition(times[failed], most - 1)[most - 1]
+        failed &= times <= least
+    return np.argwhere(failed)
+
+
+def _step(record: Record, scheme: int, case: int, level: int) -> int:
+    """Return the step at which a member failed."""
+    if "last_step" in record:
+        return int(record["last_step"][scheme, case, level]) + 1
+    dt = record.variable("dt")
+    step = dt.values[level, case] if "case" in dt.dims else dt.values[level]
+    return round(float(record["failure_time"][scheme, case, level] / step))

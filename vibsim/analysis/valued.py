@@ -31,8 +31,8 @@ def valued(record: Record, check: ValueCheck, measured: Floats) -> Outcome:
     names = record.words("scheme")
     at = check.at
     schemes = [i for i, name in enumerate(names) if at.scheme is None or name == at.scheme]
-    every = [int(case) for case in record["case"]]
-    cases = [i for i, case in enumerate(every) if at.case is None or case == at.case]
+    every = np.asarray(record["case"])
+    cases = np.flatnonzero(every == at.case) if at.case is not None else np.arange(len(every))
     holds, away, rule = _compare(check, measured)
     lost = _failed(record, check) & ~(
         np.isfinite(measured) if check.value in SURVIVES_FAILURE else np.zeros_like(holds)
@@ -41,7 +41,7 @@ def valued(record: Record, check: ValueCheck, measured: Floats) -> Outcome:
     if check.value in MAY_BE_INFINITE:
         infinite, measured = np.zeros_like(infinite), np.where(infinite, np.nan, measured)
     masks = [lost | infinite, np.isnan(measured), holds]
-    status = np.select(masks, [FAIL, INCONCLUSIVE, PASS], FAIL)
+    status = np.select(masks, [FAIL, INCONCLUSIVE, PASS], FAIL).astype(np.int8)
     codes = [REASON_NAMES.index(name) for name in ("non_finite", "not_applicable", "match")]
     reason = np.select(masks, codes, REASON_NAMES.index("mismatch"))
     what = f"{check.value} of {check.quantity}" if check.quantity else check.value
@@ -53,7 +53,7 @@ def valued(record: Record, check: ValueCheck, measured: Floats) -> Outcome:
     return Outcome(
         schemes=[names[i] for i in schemes],
         scheme_index=schemes,
-        cases=np.asarray(record["case"]),
+        cases=every,
         case_index=cases,
         status=status,
         reason=reason,

@@ -12,7 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis.series import safe_ratio
+from vibsim.analysis.compare import Comparison
+from vibsim.analysis.part import Part, energy_at_start
+from vibsim.analysis.series import largest, safe_ratio
+from vibsim.analysis.tables import estimates
 from vibsim.record import Record
 
 Floats = NDArray[np.float64]
@@ -22,10 +25,10 @@ Floats = NDArray[np.float64]
 class Place:
     """Where a value is taken, and what it may be taken from."""
 
-    record: Record
-    """Convergence Record, without its verdicts."""
-    levels: Mapping[int, Record]
-    """Level Records."""
+    part: Part
+    """The members."""
+    compared: Mapping[str, Comparison]
+    """Quantities that were compared between levels."""
     quantity: str
     """Empty where the value is of none."""
     level: int | str | None
@@ -35,12 +38,21 @@ class Place:
     @property
     def missing(self) -> Floats:
         """NaN for every scheme and member, shape (scheme, case)."""
-        return np.full((len(self.record["scheme"]), len(self.record["case"])), np.nan)
+        return np.full(self.part.shape, np.nan)
+
+    @property
+    def levels(self) -> tuple[int, ...]:
+        """The levels."""
+        return self.part.grid.levels
 
     def data(self) -> Record | None:
         """Return the level Record that is asked for, by default the finest."""
-        level = max(self.levels) if self.level is None else self.level
-        return self.levels.get(level) if isinstance(level, int) else None
+        level = self.levels[-1] if self.level is None else self.level
+        return self.part.records.get(level) if isinstance(level, int) else None
+
+    def comparison(self) -> Comparison | None:
+        """Return the quantity as it was compared between levels."""
+        return self.compared.get(self.quantity)
 
 
 def value(name: str, place: Place) -> Floats:
@@ -52,23 +64,14 @@ def value(name: str, place: Place) -> Floats:
 def _sample(p: Place) -> Floats:
     """Return the value of a series at a time, by default the last one."""
     if p.level == "best":
-        name = f"{p.quantity}_richardson"
-        coarsest = p.levels[min(p.levels)]
-        return _at_index(
-            p, p.record, name, _index(p, p.record["t"], _step_unit(p.record, coarsest))
-        )
+        q, grid = p.comparison(), p.part.grid
+        index = _index(p, grid.t, grid.apart)
+        return p.missing if q is None or index is None else q.extrapolation[0][..., index]
     data = p.data()
-    if data is None:
+    if data is None or p.quantity not in data:
         return p.missing
-    every = int(np.asarray(data.attrs["every"]).item())
-    return _at_index(p, data, p.quantity, _index(p, data["t"], every))
-
-
-def _step_unit(record: Record, coarsest: Record) -> int:
-    """Return the distance between common points in steps of the coarsest level."""
-    whole = int(np.asarray(coarsest.attrs["steps"]).item())
-    last = float(record["t"][-1] / coarsest["t"][-1])
-    return round(whole * last / (len(record["t"]) - 1))
+    index = _index(p, data["t"], int(np.asarray(data.attrs["every"]).item()))
+    return p.missing if index is None else np.asarray(data[p.quantity][..., index], dtype=float)
 
 
 def _index(p: Place, t: Floats, every: int) -> int | None:
@@ -80,12 +83,6 @@ def _index(p: Place, t: Floats, every: int) -> int | None:
         return len(t) - 1
     index = int(np.argmin(np.abs(t - p.t)))
     return index if abs(float(t[index]) - p.t) <= 1e-9 * float(t[-1]) else None
-
-
-def _at_index(p: Place, record: Record, name: str, index: int | None) -> Floats:
-    if index is None or name not in record:
-        return p.missing
-    return np.asarray(record[name][..., index], dtype=np.float64)
 
 
 def _gathered(name: str) -> Callable[[Place], Floats]:
@@ -120,7 +117,7 @@ def _fall(of: Callable[[Place], Floats]) -> Callable[[Place], Floats]:
     """Return how many times smaller a number is at the next finer level; by default the last two are compared."""
 
     def take(p: Place) -> Floats:
-        levels = sorted(p.levels)
+        levels = p.levels
         level = levels[max(len(levels) - 2, 0)] if p.level is None else p.level
         if level not in levels[:-1]:
             return p.missing
@@ -157,56 +154,50 @@ def _relative_energy_error(p: Place) -> Floats:
     data = p.data()
     if data is None:
         return p.missing
-    return safe_ratio(data["energy_deviation_max_abs"], np.abs(data["energy"][..., 0]))
+    return safe_ratio(data["energy_deviation_max_abs"], np.abs(energy_at_start(data)))
 
 
 def _error(norm: str) -> Callable[[Place], Floats]:
     def take(p: Place) -> Floats:
-        which = p.record.words("norm").index(norm)
+        q = p.comparison()
+        if q is None:
+            return p.missing
         if p.level == "best":
-            name = f"{p.quantity}_richardson_error_norm"
-            return p.record[name][..., which] if name in p.record else p.missing
-        return _along(p, "error_norm", "level", which)
+            return q.in_norm(norm).extrapolation
+        return _along(p, q.in_norm(norm).error)
 
     return take
 
 
-def _along(p: Place, name: str, dim: str, norm: int | None = None) -> Floats:
-    """Return a variable of the convergence Record at the level that is asked for, by default the last one."""
-    full = f"{p.quantity}_{name}"
-    if full not in p.record or dim not in p.record:
-        return p.missing
-    values = p.record[full] if norm is None else p.record[full][..., norm]
-    levels = [int(level) for level in p.record[dim]]
-    level = levels[-1] if p.level is None else p.level
-    return values[..., levels.index(level)] if level in levels else p.missing
+def _along(p: Place, found: Floats) -> Floats:
+    """Return the entry at the level that is asked for, by default the last one; entries begin at the coarsest level."""
+    levels = p.levels[: found.shape[-1]]
+    level = levels[-1] if p.level is None and levels else p.level
+    return found[..., levels.index(level)] if level in levels else p.missing
 
 
-def _of_triple(name: str, norm: str | None) -> Callable[[Place], Floats]:
+def _of_triple(of: Callable[[Comparison], Floats]) -> Callable[[Place], Floats]:
     def take(p: Place) -> Floats:
-        which = None if norm is None else p.record.words("norm").index(norm)
-        return _along(p, name, "triple", which)
+        q = p.comparison()
+        return p.missing if q is None or len(p.levels) < 3 else _along(p, of(q))
 
     return take
 
 
 def _estimate_defect(p: Place) -> Floats:
     """Return ``max |estimate - true error| / max |true error|``."""
-    names = [f"{p.quantity}_{name}" for name in ("error_estimate", "error")]
-    if "pair" not in p.record or any(name not in p.record for name in names):
+    q, coarser = p.comparison(), p.levels[:-1]
+    level = coarser[-1] if p.level is None and coarser else p.level
+    if q is None or q.errors is None or level not in coarser:
         return p.missing
-    pairs = [int(level) for level in p.record["pair"]]
-    level = pairs[-1] if p.level is None else p.level
-    if level not in pairs:
-        return p.missing
-    estimate, error = (p.record[name][:, :, pairs.index(level)] for name in names)
-    largest = np.max(np.abs(error), axis=-1)
-    return safe_ratio(np.max(np.abs(estimate - error), axis=-1), largest)
+    index = coarser.index(level)
+    estimate, error = estimates(q)[index], q.errors[index]
+    return safe_ratio(largest(estimate - error), largest(error))
 
 
 def _richardson_error(p: Place) -> Floats:
-    name = f"{p.quantity}_richardson_error"
-    return np.max(p.record[name], axis=-1) if name in p.record else p.missing
+    q = p.comparison()
+    return p.missing if q is None else q.largest_bound
 
 
 KNOWN: Mapping[str, Callable[[Place], Any]] = {
@@ -231,9 +222,9 @@ KNOWN: Mapping[str, Callable[[Place], Any]] = {
     "error_linf": _error("linf"),
     "error_linf_interior": _error("linf_interior"),
     "error_estimate_defect": _estimate_defect,
-    "observed_order": _of_triple("observed_order", "l2"),
-    "ratio": _of_triple("ratio_norm", "l2"),
-    "coincidence": _of_triple("coincidence", None),
+    "observed_order": _of_triple(lambda q: q.observed_orders("l2")),
+    "ratio": _of_triple(lambda q: q.ratios("l2")),
+    "coincidence": _of_triple(lambda q: q.coincidence),
     "richardson_error": _richardson_error,
 }
 """How every value name is worked out."""

@@ -17,13 +17,34 @@ B. C. Carlson, Numerical Algorithms 10 (1995) 13-26 (R_F).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vibsim.models.base import Floats, Numbers
 
-_ITERATIONS = 24  # the mean of 1 and 1e-160 needs 16; each further step squares the defect
+_MEANS = ((0.1, 5), (1e-5, 6), (1e-11, 7), (1e-30, 8), (0.0, 12))
+"""Steps of the arithmetic-geometric mean that bring 1 and sqrt(x) together to the last digit, for x from each bound on.
+
+Each step squares the defect, so a few steps serve nearly all; the number for a member is its own, whatever is computed
+beside it.
+"""
+_DUPLICATIONS = 12
+"""They bring the arguments of R_F together to 1 %, for a ratio of 1e-300 between them; the sixth power is left out."""
+
+
+def _classes(complement: Floats) -> Iterator[tuple[NDArray[np.bool_] | slice, int]]:
+    """Yield which entries need how many steps of the mean; entries that are 0 belong to none."""
+    below = np.inf
+    for bound, steps in _MEANS:
+        mask = (complement >= bound) & (complement < below) & (complement > 0.0)
+        below = bound
+        if mask.all():
+            yield slice(None), steps
+        elif mask.any():
+            yield mask, steps
 
 
 def agm_quarter_period(complement: Floats) -> Floats:
@@ -34,20 +55,32 @@ def agm_quarter_period(complement: Floats) -> Floats:
     complement
         ``1 - m``, from 0 to 1, any shape; K is infinite at 0.
     """
-    a, b = np.ones_like(complement), np.sqrt(complement)
-    for _ in range(_ITERATIONS):
-        a, b = 0.5 * (a + b), np.sqrt(a * b)
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.where(complement > 0, 0.5 * np.pi / a, np.inf))
+    flat = np.ravel(complement)
+    quarter = np.where(np.isnan(flat), np.nan, np.inf)
+    for chosen, steps in _classes(flat):
+        b = np.sqrt(flat[chosen])
+        a = np.ones_like(b)
+        for _ in range(steps):
+            a, b = 0.5 * (a + b), np.sqrt(a * b)
+        quarter[chosen] = 0.5 * np.pi / a
+    return quarter.reshape(np.shape(complement))
 
 
 def carlson_rf(x: Floats, y: Floats, z: Floats) -> Floats:
-    """Return Carlson's symmetric integral R_F(x, y, z) of arguments >= 0, at most one of them 0."""
-    for _ in range(_ITERATIONS):
+    """Return Carlson's symmetric integral R_F(x, y, z) of arguments >= 0, at most one of them 0.
+
+    Duplication, then the series to the fifth power of what is left of the differences.
+    """
+    for _ in range(_DUPLICATIONS):
         rx, ry, rz = np.sqrt(x), np.sqrt(y), np.sqrt(z)
         step = rx * ry + ry * rz + rz * rx
         x, y, z = 0.25 * (x + step), 0.25 * (y + step), 0.25 * (z + step)
-    return np.asarray(1.0 / np.sqrt((x + y + z) / 3.0))
+    mean = (x + y + z) / 3.0
+    dx, dy = 1.0 - x / mean, 1.0 - y / mean
+    dz = -(dx + dy)
+    e2, e3 = dx * dy - dz * dz, dx * dy * dz
+    series = 1.0 - e2 / 10.0 + e3 / 14.0 + e2 * e2 / 24.0 - 3.0 * e2 * e3 / 44.0
+    return np.asarray(series / np.sqrt(mean))
 
 
 def _incomplete(sin: Floats, cos: Floats, complement: Floats) -> Floats:
@@ -69,39 +102,75 @@ def jacobi(u: Floats, complement: Floats) -> tuple[Floats, Floats, Floats, Float
     complement
         ``1 - m``, from 0 to 1, of a shape that broadcasts against `u`.
     """
-    complement = np.broadcast_to(complement, np.shape(u))
-    quarter = agm_quarter_period(complement)
-    finite = np.isfinite(quarter)
-    half_turns = np.rint(u / np.where(finite, 2.0 * quarter, np.inf))
-    reduced = u - np.where(finite, 2.0 * quarter, 0.0) * half_turns
-    sn, cn, dn = _bulirsch(reduced, np.where(finite, complement, 1.0))
-    sech = 1.0 / np.cosh(np.clip(reduced, -700.0, 700.0))
-    sn, cn, dn = (
-        np.where(finite, general, limit)
-        for general, limit in ((sn, np.tanh(reduced)), (cn, sech), (dn, sech))
-    )
-    amplitude = np.arctan2(sn, cn) + np.pi * half_turns
-    sign = 1.0 - 2.0 * np.abs(np.fmod(half_turns, 2.0))
-    return sign * sn, sign * cn, dn, amplitude
+    u = np.asarray(u, dtype=float)
+    each = np.broadcast_to(complement, u.shape)
+    sn, cn, dn, turns = (x.reshape(u.shape) for x in _reduced(u.reshape(-1, 1), each.reshape(-1)))
+    sign = _sign(turns)
+    return sign * sn, sign * cn, dn, np.arctan2(sn, cn) + np.pi * turns
 
 
-def _bulirsch(u: Floats, complement: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return sn, cn, dn for -K <= u <= K by descending Landen transformations (Bulirsch 1965)."""
-    a, emc, means = np.ones_like(u), complement, []
-    for _ in range(_ITERATIONS):
+def _sign(half_turns: Floats) -> Floats:
+    """Return 1 for an even number and -1 for an odd one."""
+    return np.asarray(1.0 - 2.0 * (half_turns - 2.0 * np.floor(0.5 * half_turns)))
+
+
+def _reduced(u: Floats, complement: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return sn, cn, dn of `u` less whole half periods 2 K, and their number.
+
+    Parameters
+    ----------
+    u
+        Shape (rows, n).
+    complement
+        Shape (rows,): what depends on it alone is computed once for a row.
+    """
+    sn, cn, dn, turns = (np.full_like(u, np.nan) for _ in range(4))
+    parts = [
+        (chosen, _general(u[chosen], complement[chosen], n)) for chosen, n in _classes(complement)
+    ]
+    separatrix = complement == 0.0
+    if separatrix.any():
+        parts.append((separatrix, _limit(u[separatrix])))
+    for chosen, values in parts:
+        for target, value in zip((sn, cn, dn, turns), values, strict=True):
+            target[chosen] = value
+    return sn, cn, dn, turns
+
+
+def _limit(u: Floats) -> tuple[Floats, ...]:
+    """Return sn, cn, dn on the separatrix, where K is infinite, and no half period."""
+    sech = 1.0 / np.cosh(np.clip(u, -700.0, 700.0))
+    return np.tanh(u), sech, sech, np.zeros_like(u)
+
+
+def _general(u: Floats, complement: Floats, steps: int) -> tuple[Floats, ...]:
+    """Return sn, cn, dn by descending Landen transformations (Bulirsch 1965), and the half periods."""
+    a, emc, means = np.ones_like(complement), complement, []
+    for _ in range(steps):
         root = np.sqrt(emc)
-        means.append((a, root))
+        means.append((a[:, None], root[:, None]))
         a, emc = 0.5 * (a + root), a * root
-    sin, cos = np.sin(u * a), np.cos(u * a)
+    period = (np.pi / a)[:, None]
+    half_turns = np.rint(u / period)
+    u = u - period * half_turns
+    angle = u * a[:, None]
+    sin, cos = np.sin(angle), np.cos(angle)
     small = np.abs(sin) < 1e-100  # sn u = u to the last digit, and 1/u would soon overflow
     ratio = cos / np.where(small, 1.0, sin)
-    c, dn = a * ratio, np.ones_like(u)
+    c, dn = a[:, None] * ratio, np.ones_like(u)
     for mean, root in reversed(means):
         ratio, c = ratio * c, c * dn
         dn = (root + ratio) / (mean + ratio)
         ratio = c / mean
-    sn = np.copysign(1.0 / np.hypot(c, 1.0), sin)
-    return np.where(small, u, sn), np.where(small, 1.0, c * sn), np.where(small, 1.0, dn)
+    sn = np.copysign(1.0 / np.sqrt(c * c + 1.0), sin)
+    if small.any():
+        return (
+            np.where(small, u, sn),
+            np.where(small, 1.0, c * sn),
+            np.where(small, 1.0, dn),
+            half_turns,
+        )
+    return sn, c * sn, dn, half_turns
 
 
 def _energy(initial: Numbers, parameters: Numbers) -> tuple[Floats, ...]:
@@ -132,26 +201,39 @@ def pendulum_motion(t: Floats, initial: Numbers, parameters: Numbers) -> dict[st
     -----
     The rounding error is about ``(1 + w t)`` units in the last place, times the sensitivity to the initial values.
     """
-    w, turns, sine, cosine, speed, complement = _energy(initial, parameters)
+    start = _energy(initial, parameters)
     t = np.asarray(t, dtype=float)
+    shape = np.broadcast_shapes(t.shape, start[0].shape)
+    rows = (*shape[:-1], 1)
+    w, turns, sine, cosine, speed, complement = (np.broadcast_to(x, rows).ravel() for x in start)
+    t = np.broadcast_to(t, shape).reshape(-1, shape[-1])
     k = np.hypot(sine, speed)
+    theta, omega = np.empty_like(t, order="C"), np.empty_like(t, order="C")
     swings = complement >= 0.0
-    swing = _libration(t, w, k, sine, speed, np.where(swings, complement, 1.0))
-    spin = _rotation(
-        t, w, np.where(swings, 1.0, k), sine, cosine, speed, np.where(swings, 0.0, complement)
-    )
-    theta, omega = (np.where(swings, a, b) for a, b in zip(swing, spin, strict=True))
-    return {"theta": theta + 2.0 * np.pi * turns, "omega": omega}
+    for move, mask in ((_libration, swings), (_rotation, ~swings)):
+        if mask.any():
+            chosen = slice(None) if mask.all() else mask
+            own = (x[chosen] for x in (w, k, sine, cosine, speed, complement))
+            theta[chosen], omega[chosen] = move(t[chosen], *own)
+    theta += (2.0 * np.pi * turns)[:, None]
+    return {"theta": theta.reshape(shape), "omega": omega.reshape(shape)}
 
 
 def _libration(
-    t: Floats, w: Floats, k: Floats, sine: Floats, speed: Floats, complement: Floats
+    t: Floats,
+    w: Floats,
+    k: Floats,
+    sine: Floats,
+    cosine: Floats,
+    speed: Floats,
+    complement: Floats,
 ) -> tuple[Floats, Floats]:
-    at_rest = k == 0.0
-    size = np.where(at_rest, 1.0, k)
+    """Return theta and omega, shape (rows, n), of rows that swing."""
+    size = np.where(k == 0.0, 1.0, k)
     start = _incomplete(sine / size, speed / size, complement)
-    sn, cn, dn, _ = jacobi(w * t + start, complement)
-    return 2.0 * np.arctan2(k * sn, dn), 2.0 * w * k * cn
+    sn, cn, dn, half = _reduced(w[:, None] * t + start[:, None], complement)
+    sign = _sign(half)
+    return 2.0 * np.arctan2(k[:, None] * (sign * sn), dn), (2.0 * w * k)[:, None] * (sign * cn)
 
 
 def _rotation(
@@ -163,11 +245,13 @@ def _rotation(
     speed: Floats,
     complement: Floats,
 ) -> tuple[Floats, Floats]:
+    """Return theta and omega, shape (rows, n), of rows that go over the top."""
     sign = np.copysign(1.0, speed)
     inverse = -complement / (k * k)  # 1 - 1/k^2
     start = _incomplete(sign * sine, cosine, inverse)
-    _, _, dn, amplitude = jacobi(w * k * t + start, inverse)
-    return 2.0 * sign * amplitude, 2.0 * sign * w * k * dn
+    sn, cn, dn, half = _reduced((w * k)[:, None] * t + start[:, None], inverse)
+    amplitude = np.arctan2(sn, cn) + np.pi * half
+    return (2.0 * sign)[:, None] * amplitude, (2.0 * sign * w * k)[:, None] * dn
 
 
 def pendulum_period(initial: Numbers, parameters: Numbers) -> Any:

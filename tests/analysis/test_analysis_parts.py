@@ -1,0 +1,232 @@
+"""A sweep in parts: the same bytes whatever is analysed together, lean or not, and a member alone."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+
+import numpy as np
+import pytest
+from sweeps import CHECKS, SWEEPS, analysed, assert_same_bytes, cut, of, simulated
+
+from vibsim import Experiment, analyse
+from vibsim.analysis import analyse_records, kept, summarise, verdicts
+from vibsim.analysis.values import KNOWN
+from vibsim.errors import VibsimError
+from vibsim.models import MODELS
+from vibsim.record import Record, Variable
+from vibsim.spec import VALUES
+from vibsim.spec.series import lean_series
+
+
+@pytest.fixture(params=["series", "lean"])
+def storage(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    if request.param == "lean":
+        monkeypatch.setattr("vibsim.spec.sampling.LEAN", 0)
+    return str(request.param)
+
+
+@pytest.mark.parametrize("name", SWEEPS)
+def test_parts_and_threads_change_no_bit(name: str, storage: str) -> None:
+    experiment = SWEEPS[name]
+    records = simulated(experiment)
+    whole = analyse_records(experiment, records)
+    assert whole.attrs["storage"] == storage
+    for size, threads in ((1, 1), (1, 3), (3, 2), (5, 1)):
+        assert_same_bytes(analysed(experiment, records, size, threads), whole)
+
+
+@pytest.mark.parametrize("name", SWEEPS)
+def test_a_member_alone_has_the_numbers_and_verdicts_that_it_has_in_the_sweep(
+    name: str, storage: str
+) -> None:
+    experiment = SWEEPS[name]
+    whole = analyse_records(experiment, simulated(experiment))
+    for case in range(experiment.members):
+        alone = experiment.alone(case)
+        found = analyse_records(alone, simulated(alone))
+        same = cut(whole, case, case + 1)
+        for key, variable in same.variables.items():
+            one = found.variables[key].values
+            assert np.array_equal(one.ravel(), variable.values.ravel(), equal_nan=True), key
+        for verdict, check in zip(verdicts(alone, found), verdicts(experiment, whole), strict=True):
+            own = {r.scheme: r for r in check.results if r.case == case}
+            for result in verdict.results:
+                assert result.reason == own[result.scheme].reason
+                assert result.order == own[result.scheme].order
+                assert result.value == own[result.scheme].value
+
+
+@pytest.mark.parametrize("name", SWEEPS)
+def test_bounded_storage_changes_no_number(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    experiment = SWEEPS[name]
+    full = analyse_records(experiment, simulated(experiment))
+    monkeypatch.setattr("vibsim.spec.sampling.LEAN", 0)
+    lean = analyse_records(experiment, simulated(experiment))
+    assert not any("t" in variable.dims for variable in lean.variables.values())
+    assert lean.words("norm") == ["l1", "l2", "linf"]
+    kinds = [full.words("norm").index(norm) for norm in lean.words("norm")]
+    for key, variable in lean.variables.items():
+        of_series = key.endswith("richardson_error_max")
+        expected = full[key.removesuffix("_max")].max(axis=-1) if of_series else full[key]
+        if "norm" in variable.dims:
+            expected = expected[..., kinds]
+        if variable.values.dtype == np.float32:
+            np.testing.assert_allclose(variable.values, expected, rtol=1e-6, err_msg=key)
+        else:
+            assert np.array_equal(variable.values, expected, equal_nan=True), key
+    for a, b in zip(verdicts(experiment, lean), verdicts(experiment, full), strict=True):
+        assert (a.status, a.reason, a.counts, a.where) == (b.status, b.reason, b.counts, b.where)
+
+
+def every_value() -> Experiment:
+    checks = []
+    for name, row in VALUES.items():
+        check = {"value": name, "below": 1.0}
+        if row.of != "none":
+            check["quantity"] = "energy_deviation" if row.of == "deviation" else "omega"
+        if row.needs_time:
+            check["at"] = {"step": 4, "level": 5}
+        checks.append(check)
+        if row.best:
+            best = {"level": "best"} | ({"step": 4} if row.needs_time else {})
+            checks.append({**check, "at": best})
+    checks.append({"converges": "potential_energy", "norm": "linf_interior"})
+    return of({"initial.theta": [0.5, 1.0, 2.0], "time.end": [10.0, 20.0]}, checks=checks)
+
+
+def test_every_value_can_be_asked_for_where_storage_is_bounded(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    experiment = every_value()
+    full = analyse_records(experiment, simulated(experiment))["check_value"]
+    monkeypatch.setattr("vibsim.spec.sampling.LEAN", 0)
+    records = simulated(experiment)
+    names = {n for n, v in records[7].variables.items() if "t" in v.dims}
+    assert names == {"theta", "omega", "energy_deviation", "potential_energy"}
+    assert names == set(lean_series(experiment))
+    lean = analyse_records(experiment, records)["check_value"]
+    asked = {check.value for check in experiment.checks if check.kind == "value"}
+    assert asked == set(KNOWN)
+    assert np.isfinite(full).any(axis=(1, 2)).mean() > 0.9
+    assert np.array_equal(lean, full, equal_nan=True)
+
+
+def test_what_bounded_storage_keeps_of_a_member(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vibsim.spec.sampling.LEAN", 0)
+    experiment = of({"initial.theta": [0.5, 1.0]}, checks=CHECKS[:1], schemes=["central"])
+    record = analyse_records(experiment, simulated(experiment))
+    everything = (*record.coords.values(), *record.variables.values())
+    size = sum(v.values.nbytes for v in everything if "case" in v.dims) / experiment.members
+    assert size < 900
+
+
+def test_verdicts_need_only_what_is_kept_of_parts() -> None:
+    experiment = SWEEPS["ends"]
+    records = simulated(experiment)
+    whole = analyse_records(experiment, records)
+    thin: list[Record] = []
+    (part,) = kept([whole], thin)
+    assert part is whole
+    assert not any("t" in variable.dims for variable in thin[0].variables.values())
+    expected = summarise(experiment, verdicts(experiment, whole), whole)
+    assert summarise(experiment, verdicts(experiment, thin[0]), thin[0]) == expected
+    assert expected["failure_count"] > 0
+
+
+def test_a_failure_has_its_step_where_storage_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    experiment = SWEEPS["ends"]
+    full = analyse_records(experiment, simulated(experiment))
+    monkeypatch.setattr("vibsim.spec.sampling.LEAN", 0)
+    lean = analyse_records(experiment, simulated(experiment))
+    assert "last_step" in full
+    assert "last_step" not in lean
+    of_full, of_lean = (
+        summarise(experiment, verdicts(experiment, r), r)["failures"] for r in (full, lean)
+    )
+    assert of_full
+    assert of_lean == of_full
+
+
+def test_options_that_are_swept_give_each_member_the_promises_of_its_own_scheme() -> None:
+    experiment = SWEEPS["options"]
+    record = analyse_records(experiment, simulated(experiment))
+    assert record.variables["theta_formal_order"].dims == ("scheme", "case")
+    arithmetic = record["schemes_central_arithmetic"]
+    floor = record["theta_floor"][0, :, -1]
+    # 2^-53 N^(3/2) against the distance 2^-52 between numbers, at N = 128
+    ratio = floor[arithmetic == "three_term"] / floor[arithmetic == "compensated"]
+    assert ratio == pytest.approx(np.full(6, 0.5 * 128**1.5))
+    # the other scheme has no option that is swept
+    assert np.ptp(record["theta_floor"][1, ::2, -1]) == 0.0
+    (omega,) = (v for v in verdicts(experiment, record) if v.id == "check_2")
+    assert omega.where
+    for found in omega.where.values():
+        shares = found["keys"]["schemes.central.end_velocity"]["shares"]
+        assert set(shares) == {"kick", "extrapolate", "backward"}
+
+
+def test_swept_words_are_as_wide_in_every_part() -> None:
+    experiment = SWEEPS["options"]
+    records = simulated(experiment)
+    found = set()
+    for case in range(experiment.members):
+        one = {level: cut(record, case, case + 1) for level, record in records.items()}
+        for record in one.values():  # as a file gives them: no wider than they need to be here
+            for name in ("schemes_central_arithmetic", "schemes_central_end_velocity"):
+                word = record.coords[name]
+                narrow = np.array(word.values.tolist())
+                record.coords[name] = Variable(word.dims, narrow, word.attrs)  # type: ignore[index]
+        part = analyse_records(experiment, one)
+        found.add(tuple(v.values.dtype for v in part.coords.values()))
+    assert len(found) == 1
+
+
+def test_verdicts_are_refused_where_the_checks_changed() -> None:
+    experiment = SWEEPS["grid"]
+    record = analyse_records(experiment, simulated(experiment))
+    other = [dict(check, id=f"check_{i + 1}") for i, check in enumerate(CHECKS)]
+    other[0]["tolerance"] = 0.2
+    changed = of({"initial.theta": [1.0]}, checks=other)
+    with pytest.raises(VibsimError, match="analyse the levels again"):
+        verdicts(changed, record)
+
+
+@pytest.mark.filterwarnings("ignore:.*:FutureWarning")
+def test_a_grid_unstacks_with_one_call(storage: str) -> None:
+    experiment = SWEEPS["grid"]
+    records = simulated(experiment)
+    data = analyse(experiment, [record.to_xarray() for record in records.values()])
+    grid = data.set_index(case=["initial_theta", "initial_omega"]).unstack("case")
+    assert grid.theta_order.dims == ("scheme", "norm", "initial_theta", "initial_omega")
+    assert grid.sizes["initial_theta"] == 7
+    assert grid.sizes["initial_omega"] == 4
+    one = grid.period.sel(initial_theta=2.5, initial_omega=0.3, scheme="central", level=7)
+    case = 3 * 4 + 1
+    assert one.item() == records[7]["period"][0, case]
+    if storage == "series":
+        assert {"initial_theta", "initial_omega"} < set(grid.theta_ratio.dims)
+
+
+def test_without_an_exact_solution_only_errors_are_unknown(
+    storage: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    experiment = of({"initial.theta": [0.5, 1.0]}, checks=CHECKS[:3])
+    records = simulated(experiment)
+    known = analyse_records(experiment, records)
+    for record in records.values():
+        for name in ("theta_exact", "omega_exact", "exact_period"):
+            record.variables.pop(name, None)  # type: ignore[attr-defined]
+    bare = dataclasses.replace(MODELS["pendulum"], exact=None, exact_period=None)
+    for name, module in list(sys.modules.items()):
+        if name.startswith("vibsim.analysis") and hasattr(module, "MODELS"):
+            monkeypatch.setattr(module, "MODELS", {"pendulum": bare})
+    found = analyse_records(experiment, records)
+    assert np.isnan(found["theta_error_norm"]).all()
+    assert np.isfinite(found["energy_deviation_error_norm"]).all()
+    assert "exact_period" not in found
+    assert ("theta_exact" in known) == (storage == "series")
+    assert np.array_equal(found["theta_difference_norm"], known["theta_difference_norm"])
+    assert np.all(found["theta_floor"] <= known["theta_floor"])
+    assert_same_bytes(analysed(experiment, records, 1), found)
+    assert [v.status for v in verdicts(experiment, found)]

@@ -1,0 +1,78 @@
+"""What the checks of an experiment measured of every scheme and member, as variables of the convergence Record."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.analysis import values
+from vibsim.analysis.compare import Comparison
+from vibsim.analysis.evidence import judge_check
+from vibsim.analysis.part import Part
+from vibsim.record import Variable, attributes
+from vibsim.vocabulary import REASON_NAMES, STATUSES
+
+if TYPE_CHECKING:
+    from vibsim.spec import Experiment
+
+Codes = NDArray[Any]
+
+FIELDS: Mapping[str, tuple[str, type[np.generic], float, str]] = {
+    "value": ("order", np.float64, np.nan, "number that each check measured"),
+    "low": ("low", np.float64, np.nan, "lower end of the order of each check"),
+    "high": ("high", np.float64, np.nan, "upper end of the order of each check"),
+    "first": ("first", np.int16, -1, "first level that the order rests on, -1 for none"),
+    "last": ("last", np.int16, -1, "last level that the order rests on, -1 for none"),
+    "culprit": ("culprit", np.int16, -1, "coarsest level that broke down, -1 for none"),
+    "status": ("status", np.int8, 0, "status of each check on an order"),
+    "reason": ("reason", np.int8, 0, "reason of each check on an order"),
+}
+"""Variable ``check_<name>``: the field of a judgement, its type, its value for a number, and its meaning."""
+
+
+def flags(names: tuple[str, ...]) -> dict[str, Any]:
+    """Return the attributes of a variable that holds positions in a list of words."""
+    return {"flag_values": np.arange(len(names), dtype=np.int8), "flag_meanings": " ".join(names)}
+
+
+_WORDS = {"status": STATUSES, "reason": REASON_NAMES}
+
+
+def measured(part: Part, compared: Mapping[str, Comparison]) -> dict[str, Variable]:
+    """Return what every check measured, shape (check, scheme, case)."""
+    checks = part.experiment.checks
+    table: dict[str, NDArray[Any]] = {
+        name: np.full((len(checks), *part.shape), empty, dtype=kind)
+        for name, (_, kind, empty, _) in FIELDS.items()
+    }
+    for i, check in enumerate(checks):
+        inner = check.measured
+        if inner.kind == "converges":
+            found = judge_check(compared[inner.converges], inner)
+            for name, (of, *_) in FIELDS.items():
+                table[name][i] = getattr(found, of)
+        else:
+            at = inner.at
+            place = values.Place(part, compared, inner.quantity or "", at.level, at.t, at.step)
+            table["value"][i] = values.value(inner.value, place)
+    dims = ("check", "scheme", "case")
+    if not checks:
+        return {}
+    return {
+        f"check_{name}": Variable(dims, array, attributes(FIELDS[name][3], "1") | _flags_of(name))
+        for name, array in table.items()
+    }
+
+
+def _flags_of(name: str) -> dict[str, Any]:
+    return flags(_WORDS[name]) if name in _WORDS else {}
+
+
+def definition(experiment: Experiment) -> str:
+    """Return what the checks measure, as text: a verdict belongs to the checks that were measured."""
+    rows = [check.measured.model_dump(mode="json") for check in experiment.checks]
+    return json.dumps(rows, sort_keys=True)

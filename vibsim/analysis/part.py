@@ -1,0 +1,193 @@
+"""The level data of some members on their common grid, and what all quantities of these members have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.analysis.belonging import check_belonging
+from vibsim.analysis.floor import solution_size
+from vibsim.analysis.grid import Grid, common_grid, take
+from vibsim.analysis.promise import Columns, columns_of, relative_floors
+from vibsim.analysis.sensitivity import sensitivity
+from vibsim.analysis.series import laid_out, largest
+from vibsim.models import ENERGIES, MODELS, Model
+from vibsim.record import Record
+from vibsim.simulation import Members, members
+from vibsim.vocabulary import NORMS, TYPICAL_NORM
+
+if TYPE_CHECKING:
+    from vibsim.spec import Experiment
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Part:
+    """Some members of an experiment, or all; s, c and l stand for schemes, cases and levels."""
+
+    experiment: Experiment
+    records: Mapping[int, Record]
+    """Level Records."""
+    grid: Grid
+    lean: bool
+    """Whether no series are kept."""
+    norms: tuple[str, ...]
+    """The norms that are kept."""
+    columns: Columns
+    exact: Mapping[str, Floats]
+    """Exact states on the common grid, shape (c, t); empty where they are not known."""
+    magnified: Floats
+    """Factor by which disturbances grow, shape (c,)."""
+    relative_floor: Floats
+    """Predicted round-off relative to the solution, shape (s, 1 or c, l)."""
+    omega_dt: Floats
+    """w dt, shape (c, l)."""
+    failed: Flags
+    """Whether a level broke down, shape (s, c, l)."""
+    growth: Floats
+    """Largest position over the largest exact position, shape (s, c, l); NaN where not known."""
+
+    @property
+    def model(self) -> Model:
+        """The model."""
+        return MODELS[self.experiment.model.kind]
+
+    @property
+    def finest(self) -> Record:
+        """The Record of the finest level."""
+        return self.records[self.grid.levels[-1]]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of schemes and of members."""
+        schemes, cases, _ = self.failed.shape
+        return schemes, cases
+
+    def series(self, name: str) -> list[Floats]:
+        """Return a quantity at every level, coarse to fine, each of shape (s, c, t)."""
+        return [take(self.grid, self.records[level], name) for level in self.grid.levels]
+
+    def exact_of(self, name: str) -> Floats | None:
+        """Return a quantity's exact values, which broadcast against (s, c, t); None where they are not known."""
+        if name in self.exact:
+            return self.exact[name][None]
+        if not self.model.conservative:
+            return None
+        if name == "energy":
+            return energy_at_start(self.finest)[..., None]
+        return np.zeros((1, 1, 1)) if name == "energy_deviation" else None
+
+    def size(self, name: str, values: list[Floats], sizes: Mapping[str, Floats]) -> Floats:
+        """Return the size that round-off is relative to, shape (s, c).
+
+        What is left of an energy is known no better than the energy itself; a velocity is known no better than what
+        the rounding of the position leaves of it over the run, or over a swing.
+
+        Parameters
+        ----------
+        name, values
+            A quantity at every level.
+        sizes
+            Sizes of the solutions that are known already.
+        """
+        if name in ENERGIES:
+            return sizes["energy"]
+        own = solution_size(values)
+        if name != self.model.velocity:
+            return own
+        duration = self.grid.dt[0] * self.grid.steps[0]
+        rate = np.maximum(self.finest["natural_frequency"], 1.0 / duration)
+        return np.asarray(np.maximum(own, sizes[self.model.position] * rate))
+
+
+def part_of(experiment: Experiment, records: Mapping[int, Record]) -> Part:
+    """Bring the level Records of some members together.
+
+    Raises
+    ------
+    VibsimError
+        Where there is no level, the levels have no times in common, or they do not belong together.
+    """
+    grid = common_grid(records)
+    check_belonging(experiment, records)
+    finest = records[grid.levels[-1]]
+    lean = any(record.attrs.get("storage") == "lean" for record in records.values())
+    columns = columns_of(finest)
+    case = np.asarray(finest["case"], dtype=np.int64)
+    group = members(experiment, int(case[0]), int(case[-1]) + 1)
+    t = grid.times(group.end)
+    exact = _exact(experiment, t, group) if lean else _stored(experiment, grid, finest)
+    return Part(
+        experiment=experiment,
+        records=records,
+        grid=grid,
+        lean=lean,
+        norms=_norms(experiment) if lean else NORMS,
+        columns=columns,
+        exact=exact,
+        magnified=sensitivity(experiment, t, group, exact if lean else None),
+        relative_floor=relative_floors(experiment, grid.steps, columns),
+        omega_dt=by_level([records[level]["omega_dt"] for level in grid.levels]),
+        failed=by_level([records[level]["status"] for level in grid.levels]) != 0,
+        growth=_growth(experiment, grid, records, exact),
+    )
+
+
+def by_level(values: list[Floats]) -> Floats:
+    """Return arrays side by side along a new last dimension, which is the outermost one in memory."""
+    return np.moveaxis(np.stack([np.asarray(row, dtype=np.float64) for row in values]), 0, -1)
+
+
+def energy_at_start(record: Record) -> Floats:
+    """Return the energy that members of a level start with, shape (scheme, case)."""
+    return np.asarray(record["energy_initial"], dtype=np.float64)
+
+
+def _norms(experiment: Experiment) -> tuple[str, ...]:
+    """Name the norms that a lean analysis keeps: the typical one, and those that checks ask for."""
+    named: set[str] = {TYPICAL_NORM}
+    for check in experiment.checks:
+        inner = check.measured
+        named.add(inner.norm if inner.kind == "converges" else inner.value.removeprefix("error_"))
+    return tuple(norm for norm in NORMS if norm in named)
+
+
+def _stored(experiment: Experiment, grid: Grid, finest: Record) -> dict[str, Floats]:
+    names = (state.name for state in MODELS[experiment.model.kind].states)
+    return {n: take(grid, finest, f"{n}_exact") for n in names if f"{n}_exact" in finest}
+
+
+def _exact(experiment: Experiment, t: Floats, group: Members) -> dict[str, Floats]:
+    """Work the exact states out at times t, shape (c, t), once for all levels."""
+    model = MODELS[experiment.model.kind]
+    if model.exact is None:
+        return {}
+    initial, parameters = (
+        {name: values[:, None] for name, values in table.items()}
+        for table in (group.initial, group.parameters)
+    )
+    return {n: laid_out(values) for n, values in model.exact(t, initial, parameters).items()}
+
+
+def _growth(
+    experiment: Experiment, grid: Grid, records: Mapping[int, Record], exact: Mapping[str, Floats]
+) -> Floats:
+    """Compare the largest position of every level with the largest exact one.
+
+    Without an exact solution the coarsest level takes its place. NaN where the reference vanishes.
+    """
+    position = MODELS[experiment.model.kind].position
+    low, high = (
+        by_level([records[level][f"{position}_{name}"] for level in grid.levels])
+        for name in ("min", "max")
+    )
+    most = np.maximum(np.abs(low), np.abs(high))
+    reference = largest(exact[position])[:, None] if position in exact else most[..., :1]
+    usable = np.isfinite(most) & (reference > 0)
+    return np.where(usable, most, np.nan) / np.where(usable, reference, 1.0)

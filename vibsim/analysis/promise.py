@@ -1,0 +1,90 @@
+"""What schemes promise to members: order, powers, round-off, stability. It depends on options, which may be swept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vibsim import plan
+from vibsim.analysis.floor import relative_floor
+from vibsim.models import MODELS
+from vibsim.record import Record
+from vibsim.schemes import SCHEMES, Scheme
+
+if TYPE_CHECKING:
+    from vibsim.spec import Experiment
+
+Floats = NDArray[np.float64]
+Columns = Mapping[str, NDArray[Any]]
+"""Swept values by dotted key, each of shape (case,)."""
+
+
+def columns_of(record: Record) -> Columns:
+    """Return the swept values that a Record holds as coordinates."""
+    return {
+        str(variable.attrs["sweep_key"]): variable.values
+        for variable in record.coords.values()
+        if "sweep_key" in variable.attrs
+    }
+
+
+def options_swept(experiment: Experiment) -> bool:
+    """Tell whether an option of a scheme differs between members."""
+    keys = experiment.sweep.keys if experiment.sweep else ()
+    return any(key.startswith("schemes.") for key in keys)
+
+
+def options_of(
+    experiment: Experiment, columns: Columns, scheme: int, case: int
+) -> Mapping[str, str]:
+    """Return the options that one member has of one scheme, by their positions."""
+    own = {key: values[case : case + 1] for key, values in columns.items()}
+    return plan.option_groups(experiment, scheme, own)[0][0]
+
+
+def formal_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floats:
+    """Return the order that every scheme promises for a quantity, shape (scheme, case).
+
+    Where no option is swept there is one case for all, here and below.
+    """
+    model = MODELS[experiment.model.kind]
+    return _each(experiment, columns, lambda s, o: float(s.formal_order(quantity, model, o)))
+
+
+def even_powers(experiment: Experiment, quantity: str, columns: Columns) -> NDArray[np.bool_]:
+    """Tell whether the error of a quantity has every second power only, shape (scheme, case)."""
+    model = MODELS[experiment.model.kind]
+    even = _each(experiment, columns, lambda s, o: float(s.even_powers(quantity, model, o)))
+    return np.asarray(even != 0)
+
+
+def relative_floors(experiment: Experiment, steps: tuple[int, ...], columns: Columns) -> Floats:
+    """Return the predicted round-off relative to the solution, shape (scheme, case, level)."""
+    return _each(experiment, columns, lambda s, o: relative_floor(s, o, steps))
+
+
+def stability_limits(experiment: Experiment) -> Floats:
+    """Return the largest stable w dt of every scheme, infinite for none, shape (scheme, 1)."""
+    limits = (SCHEMES[scheme.kind].stability_limit for scheme in experiment.schemes)
+    return np.array([[np.inf if limit is None else limit] for limit in limits])
+
+
+def _each(
+    experiment: Experiment,
+    columns: Columns,
+    promise: Callable[[Scheme, Mapping[str, str]], ArrayLike],
+) -> Floats:
+    """Return what every scheme promises with the options that each member has of it."""
+    rows = []
+    for i, scheme in enumerate(experiment.schemes):
+        groups = plan.option_groups(experiment, i, columns)
+        values = [np.asarray(promise(SCHEMES[scheme.kind], o), dtype=float) for o, _ in groups]
+        count = sum(len(cases) for _, cases in groups) if len(groups) > 1 else 1
+        row = np.empty((count, *values[0].shape))
+        for value, (_, cases) in zip(values, groups, strict=True):
+            row[cases if count > 1 else slice(None)] = value
+        rows.append(row)
+    return np.stack(np.broadcast_arrays(*rows))

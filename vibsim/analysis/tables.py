@@ -1,0 +1,148 @@
+"""What is kept of a comparison, as variables of the convergence Record."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.analysis import series
+from vibsim.analysis.compare import Comparison
+from vibsim.analysis.part import by_level
+from vibsim.analysis.promise import options_swept
+from vibsim.models import ENERGIES
+from vibsim.record import Variable, attributes
+
+Floats = NDArray[np.float64]
+Table = dict[str, Variable]
+Add = Callable[..., None]
+
+SERIES = ("scheme", "case", "t")
+_IN_NORM = "{} in a norm over time (times s for l1, times the square root of s for l2)"
+
+
+def _adder(table: Table, q: Comparison) -> Add:
+    """Return the function that puts values into a table under the quantity's name."""
+
+    def add(name: str, dims: tuple[str, ...], values: Floats, words: str, units: str) -> None:
+        attrs = attributes(f"{q.long_name}: {words}", units)
+        table[f"{q.name}_{name}"] = Variable(dims, np.ascontiguousarray(values), attrs)
+
+    return add
+
+
+def numbers(q: Comparison) -> Table:
+    """Return the numbers that a quantity is compared by: norms, orders, bounds."""
+    table: Table = {}
+    add = _adder(table, q)
+    part, levels = q.part, len(q.part.grid.levels)
+    of_level = ("scheme", "case", "level")
+
+    def stacked(kind: str) -> Floats:
+        return np.stack([getattr(q.in_norm(norm), kind) for norm in part.norms], axis=-1)
+
+    add("error_norm", (*of_level, "norm"), stacked("error"), _IN_NORM.format("true error"), q.units)
+    words = _IN_NORM.format("true error of the extrapolation")
+    add(
+        "richardson_error_norm",
+        ("scheme", "case", "norm"),
+        stacked("extrapolation"),
+        words,
+        q.units,
+    )
+    if part.lean:
+        words = "largest error bound of the extrapolation"
+        add("richardson_error_max", ("scheme", "case"), q.largest_bound, words, q.units)
+    add("floor", of_level, q.floor, "predicted round-off", q.units)
+    words = "order that the scheme promises"
+    if options_swept(part.experiment):
+        add("formal_order", ("scheme", "case"), np.broadcast_to(q.order, part.shape), words, "1")
+    else:
+        add("formal_order", ("scheme",), q.order[:, 0], words, "1")
+    if levels > 1:
+        words = _IN_NORM.format("difference")
+        add(
+            "difference_norm",
+            ("scheme", "case", "pair", "norm"),
+            stacked("difference"),
+            words,
+            q.units,
+        )
+    if levels > 2:
+        _triples(q, add)
+    return table
+
+
+def _triples(q: Comparison, add: Add) -> None:
+    """Add the numbers of triples of levels; in single precision where storage is bounded."""
+    precision = precision_of(q)
+    dims = ("scheme", "case", "triple", "norm")
+
+    def stacked(of: Callable[[str], Floats]) -> Floats:
+        return np.stack([of(norm) for norm in q.part.norms], axis=-1).astype(precision)
+
+    words = "ratio of successive differences in a norm over time"
+    add("ratio_norm", dims, stacked(q.ratios), words, "1")
+    add("observed_order", dims, stacked(q.observed_orders), "observed order", "1")
+    words = "relative distance of the rescaled differences"
+    add("coincidence", dims[:-1], q.coincidence.astype(precision), words, "1")
+
+
+def precision_of(q: Comparison) -> type[np.floating]:
+    """Return the type in which ratios and orders are kept: seven digits are more than they have."""
+    return np.float32 if q.part.lean else np.float64
+
+
+def over_time(q: Comparison) -> Table:
+    """Return the series of a quantity: differences, errors, estimates, ratios, extrapolation."""
+    table: Table = {}
+    add = _adder(table, q)
+    value, bound = q.extrapolation
+    add("richardson", SERIES, value, "Richardson extrapolation", q.units)
+    add("richardson_error", SERIES, bound, "error bound of the extrapolation", q.units)
+    add("finest", SERIES, q.values[-1], "finest level", q.units)
+    if q.exact is not None:
+        if q.name in ENERGIES:
+            add("exact", SERIES, np.broadcast_to(q.exact, value.shape), "exact", q.units)
+        else:
+            add("exact", SERIES[1:], q.exact[0], "exact", q.units)
+    if q.differences:
+        _pairs(q, add)
+    if len(q.differences) > 1:
+        _ratios(q, add)
+    return table
+
+
+def _pairs(q: Comparison, add: Add) -> None:
+    dims = ("scheme", "case", "pair", "t")
+    levels, d, p = q.part.grid.levels, q.differences, q.order[..., None]
+    unknown = [np.full_like(x, np.nan) for x in d]
+    rescaled = [x * series.rescaling(p, levels[: i + 2]) for i, x in enumerate(d)]
+    errors = unknown if q.errors is None else q.errors[:-1]
+    add("difference", dims, np.stack(d, 2), "level minus next level", q.units)
+    add("rescaled", dims, np.stack(rescaled, 2), "difference, rescaled", q.units)
+    add("error_estimate", dims, np.stack(estimates(q), 2), "estimated error", q.units)
+    add("error", dims, np.stack(errors, 2), "true error", q.units)
+
+
+def estimates(q: Comparison) -> list[Floats]:
+    """Return the estimated error of every level but the finest, each of shape (scheme, case, t)."""
+    levels, p = q.part.grid.levels, q.order[..., None]
+    return [
+        x * series.error_factor(p, levels[i + 1] - levels[i]) for i, x in enumerate(q.differences)
+    ]
+
+
+def _ratios(q: Comparison, add: Add) -> None:
+    of_triple = ("scheme", "case", "triple")
+    ratio, factor = [], []
+    for i, (first, second) in enumerate(pairwise(q.differences)):
+        floor = (q.floor[..., i + 1] + q.floor[..., i + 2])[..., None]
+        ratio.append(series.masked_ratio(first, second, floor))
+        factor.append(series.proportionality(first, second))
+    words = "ratio of successive differences"
+    add("ratio", (*of_triple, "t"), np.stack(ratio, 2), words, "1")
+    words = "least-squares factor between successive differences"
+    add("proportionality", of_triple, by_level(factor), words, "1")
