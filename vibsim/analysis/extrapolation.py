@@ -1,0 +1,171 @@
+"""``best.nc``: the best solution that a ladder holds, extrapolated over all its levels, with a bound of its error."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim import plan
+from vibsim.analysis.belonging import check_belonging
+from vibsim.analysis.climb import Extrapolated, extrapolate_members, joined, noise_of
+from vibsim.analysis.grid import Grid, common_grid, take
+from vibsim.analysis.method import Method, Start
+from vibsim.analysis.tableau import Pair
+from vibsim.models import MODELS, Model
+from vibsim.record import Attribute, Record, Variable, attributes
+from vibsim.schemes import SCHEMES
+from vibsim.simulation import Members, members
+
+if TYPE_CHECKING:
+    from vibsim.spec import Experiment
+
+Floats = NDArray[np.float64]
+
+SERIES = ("scheme", "case", "t")
+REACHED = ("no", "yes")
+"""Meaning of the variable ``reached``."""
+
+
+def best_record(experiment: Experiment, records: Mapping[int, Record]) -> Record:
+    """Extrapolate the solution of every scheme and member over all levels.
+
+    Parameters
+    ----------
+    records
+        Level Records of the same members by level.
+
+    Returns
+    -------
+    Record
+        What ``best.nc`` holds: dims scheme, case, t; every state, and ``<state>_error``, the bound of its error;
+        ``level_first`` and ``level_last``, between which the levels lie that were used; where the experiment has a
+        tolerance, ``reached(scheme, case)``: whether no bound exceeds it. The numbers of a member do not depend on the
+        others in the Records.
+
+    Raises
+    ------
+    VibsimError
+        Where the Records do not belong together, or have no times in common.
+    """
+    grid = common_grid(records)
+    check_belonging(experiment, records)
+    finest = records[grid.levels[-1]]
+    group = members(experiment, int(finest["case"][0]), int(finest["case"][-1]) + 1)
+    states = [state.name for state in MODELS[experiment.model.kind].states]
+    levels = [tuple(take(grid, records[level], name) for name in states) for level in grid.levels]
+    rows = []
+    for i in range(len(experiment.schemes)):
+        parts = [
+            (_extrapolated(method, start_of(method, group, where), grid, levels, i, where), where)
+            for method, where in methods(experiment, i, group)
+        ]
+        rows.append(in_order(parts))
+    t = Variable(("t",), grid.t, finest.coords["t"].attrs)
+    return record_of(experiment, grid.levels, {**finest.coords, "t": t}, rows)
+
+
+def methods(
+    experiment: Experiment, scheme: int, group: Members
+) -> list[tuple[Method, NDArray[np.int64]]]:
+    """Return the methods of one scheme, which differ where options are swept, and the members that have each."""
+    model, kind = MODELS[experiment.model.kind], experiment.schemes[scheme].kind
+    return [
+        (Method(model, SCHEMES[kind], options), where)
+        for options, where in plan.option_groups(experiment, scheme, group.columns)
+    ]
+
+
+def start_of(method: Method, group: Members, where: NDArray[np.int64]) -> Start:
+    """Return the numbers of the members at the places `where` of `group`."""
+    model = method.model
+    end = group.end[where]
+    parameters = {name: values[where] for name, values in group.parameters.items()}
+    table = np.empty((len(end), len(model.parameters)))
+    for i, parameter in enumerate(model.parameters):
+        table[:, i] = parameters[parameter.name]
+    initial = np.stack([group.initial[state.name][where] for state in model.states], axis=-1)
+    frequency = np.broadcast_to(np.asarray(model.natural_frequency(parameters)), end.shape)
+    return Start(table, initial, end, frequency)
+
+
+def _extrapolated(
+    method: Method,
+    start: Start,
+    grid: Grid,
+    levels: Sequence[tuple[Floats, ...]],
+    scheme: int,
+    where: NDArray[np.int64],
+) -> Extrapolated:
+    # in memory time comes first, and all members are taken without a copy
+    some = slice(None) if len(where) == levels[0][0].shape[1] else where
+    pairs: list[Pair] = [
+        (position[scheme].T[:, some], velocity[scheme].T[:, some]) for position, velocity in levels
+    ]
+    t = (np.arange(len(grid.t)) * grid.apart / grid.steps[0])[:, None]
+    every = [grid.apart * n // grid.steps[0] for n in grid.steps]
+    noise = noise_of(method, start, grid.steps, every, pairs)
+    return extrapolate_members(method, start, grid.steps, t, pairs, noise)
+
+
+def in_order(parts: Sequence[tuple[Extrapolated, NDArray[np.int64]]]) -> Extrapolated:
+    """Put members that were stepped with different options where they belong."""
+    if len(parts) == 1:
+        return parts[0][0]
+    order = np.argsort(np.concatenate([where for _, where in parts]))
+    return joined([part for part, _ in parts], order)
+
+
+def record_of(
+    experiment: Experiment,
+    levels: tuple[int, ...],
+    coords: Mapping[str, Variable],
+    rows: Sequence[Extrapolated],
+) -> Record:
+    """Name what was extrapolated, one row for each scheme."""
+    model = MODELS[experiment.model.kind]
+    kept = {name: v for name, v in coords.items() if v.dims in (("scheme",), ("case",), ("t",))}
+    variables: dict[str, Variable] = {}
+
+    def add(name: str, values: Sequence[NDArray[Any]], words: str, units: str, **more: Any) -> None:
+        stacked = np.stack([np.ascontiguousarray(row.T) for row in values])
+        variables[name] = Variable(SERIES, stacked, attributes(words, units, **more))
+
+    fields = ("position", "velocity")
+    for state, field in zip(model.states, fields, strict=True):
+        words = f"{state.long_name}, extrapolated over the levels"
+        add(state.name, [getattr(row, field) for row in rows], words, state.unit)
+    for state, field in zip(model.states, fields, strict=True):
+        words = f"{state.long_name}: bound of the error of the extrapolation"
+        add(
+            f"{state.name}_error",
+            [getattr(row, f"{field}_error") for row in rows],
+            words,
+            state.unit,
+        )
+    for name, words in (("first", "coarsest"), ("last", "finest")):
+        places = [np.array([*levels, -1], dtype=np.int8)[getattr(row, name)] for row in rows]
+        words = f"{words} level used for the {model.states[0].long_name}, -1 for none"
+        add(f"level_{name}", places, words, "1")
+    if experiment.tolerance is not None:
+        variables["reached"] = _reached(model, variables, experiment.tolerance)
+    attrs: dict[str, Attribute] = {
+        "title": experiment.title,
+        "model": model.kind,
+        "levels": list(levels),
+    }
+    return Record(kept, variables, attrs)
+
+
+def _reached(model: Model, variables: Mapping[str, Variable], tolerance: float) -> Variable:
+    errors = [variables[f"{state.name}_error"].values for state in model.states]
+    reached = np.all([np.all(error <= tolerance, axis=-1) for error in errors], axis=0)
+    words = f"whether every bound of the member is at most {tolerance:g} in the unit of its state"
+    flags = {
+        "flag_values": np.arange(len(REACHED), dtype=np.int8),
+        "flag_meanings": " ".join(REACHED),
+    }
+    attrs = {**attributes(words, "1"), **flags}
+    return Variable(("scheme", "case"), reached.astype(np.int8), attrs)

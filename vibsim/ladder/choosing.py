@@ -1,0 +1,274 @@
+"""The cheapest ladder for a tolerance, found by running a few members.
+
+The pilot runs levels one after the other. With each new one it tries the ladders that end there, from two levels on:
+the first that reaches the tolerance for every member of the pilot is the cheapest, because one level more at the coarse
+end costs less than any at the fine end. The levels are successive. What the pilot cannot know of the other members,
+``best.nc`` says for each of them: its bound, and whether it reaches the tolerance.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim import plan
+from vibsim.analysis.climb import Extrapolated, extrapolate_members, noise_of
+from vibsim.analysis.extrapolation import methods, start_of
+from vibsim.analysis.method import Method, Start
+from vibsim.analysis.tableau import Pair
+from vibsim.errors import Fault, InputError, VibsimError
+from vibsim.ladder.solving import climb, level_at
+from vibsim.simulation import Members, members
+from vibsim.spec.fields import MAX_LEVEL
+
+if TYPE_CHECKING:
+    from vibsim.spec import Experiment
+
+Floats = NDArray[np.float64]
+
+PILOT = 16
+"""Members that are run."""
+SEARCHED = 2**16
+"""Up to so many members their extreme values are looked for."""
+LEAST_STEPS = 16
+"""Steps of the coarsest level that is tried."""
+TIMES = 32
+"""At so many times at most the pilot looks."""
+LONGEST = 12
+"""Levels of a ladder at most; more of them only add round-off."""
+MOST_STEPS = 2**27
+"""Steps that the pilot may take, all its members and levels together."""
+NOT_SMOOTH = "the solutions of its levels do not approach each other as smooth ones would"
+PATIENCE = 2
+"""After so many levels that do not halve the bound no finer one will."""
+PLAIN_STEPS = 2**18
+"""Up to so many steps of a level the plain lane takes less time than the compiler and the kernel take to be loaded."""
+
+
+@dataclass(frozen=True)
+class _Run:
+    """One method, the members of the pilot that have it, and what was run of them."""
+
+    method: Method
+    scheme: int
+    start: Start
+    case: NDArray[np.int64]
+    levels: list[Pair]
+    noise: list[Floats | None]
+    """Measured at each level, for the ladders that begin there."""
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """A ladder that was tried."""
+
+    levels: tuple[int, ...]
+    error: float
+    """The largest bound of every state, time and member of the pilot."""
+    run: _Run
+    case: int
+    """Where it is the largest."""
+
+
+def resolve(experiment: Experiment) -> Experiment:
+    """Choose the levels of an experiment that names a tolerance.
+
+    Parameters
+    ----------
+    experiment
+        With a tolerance and without levels; one that has levels is returned as it is.
+
+    Returns
+    -------
+    Experiment
+        With successive levels: those of the fewest steps whose bound reaches the tolerance at every stored time of
+        every member of a pilot.
+
+    Raises
+    ------
+    InputError
+        Where none do. It names the least bound, with its levels, scheme and member, and what forbids less.
+    """
+    if experiment.levels:
+        return experiment
+    if experiment.tolerance is None:
+        raise VibsimError(f"{experiment.name} has neither levels nor a tolerance to choose them by")
+    runs = _runs(experiment)
+    lowest, points = _sampling(experiment)
+    least: _Trial | None = None
+    mark, since, blamed = math.inf, 0, ""
+    for level in range(lowest, MAX_LEVEL + 1):
+        if _cost(experiment, runs, lowest, level) > MOST_STEPS:
+            raise _refused(experiment, least, blamed or "finer levels take too many steps")
+        for run in runs:
+            _add_level(run, experiment.steps(level), points)
+        here = math.inf
+        for count in range(2, min(level - lowest + 1, LONGEST) + 1):
+            trial = _trial(experiment, runs, tuple(range(level - count + 1, level + 1)), points)
+            if trial.error <= experiment.tolerance and _is_enough(experiment, runs, trial.levels):
+                return experiment.with_levels(trial.levels)
+            here = min(here, trial.error)
+            if least is None or trial.error < least.error:
+                least = trial
+        if here < math.inf:
+            blamed = blamed or _round_off(experiment, runs, level, points)
+            mark, since = (here, 0) if here < 0.5 * mark else (mark, since + 1)
+        if since == PATIENCE:
+            raise _refused(experiment, least, blamed or NOT_SMOOTH)
+    raise _refused(experiment, least, blamed or "there are no finer levels")
+
+
+def _runs(experiment: Experiment) -> list[_Run]:
+    cases = pilot(experiment)
+    group = _gathered(experiment, cases)
+    return [
+        _Run(method, i, start_of(method, group, where), cases[where], [], [])
+        for i in range(len(experiment.schemes))
+        for method, where in methods(experiment, i, group)
+    ]
+
+
+def pilot(experiment: Experiment) -> NDArray[np.int64]:
+    """Return the members to try: the corners of the sweep, the extreme values of each key, and a spread between."""
+    count = experiment.members
+    if count <= PILOT or experiment.sweep is None:
+        return np.arange(count)
+    shape = [axis.count for axis in experiment.sweep.axes]
+    ends = [(0, n - 1) for n in shape]
+    corners = itertools.islice(itertools.product(*ends), PILOT // 2)
+    found = [0, count - 1, *(int(np.ravel_multi_index(corner, shape)) for corner in corners)]
+    if count <= SEARCHED:
+        columns = plan.columns(experiment, 0, count)
+        numbers = [c for c in columns.values() if c.dtype.kind == "f"]
+        found += [int(place) for c in numbers for place in (np.argmin(c), np.argmax(c))]
+    # multiples of the golden ratio leave no large gap, however many there are
+    golden = 0.5 * (math.sqrt(5.0) - 1.0)
+    spread = (int(math.fmod(0.5 + i * golden, 1.0) * count) for i in range(4 * PILOT))
+    return np.array(sorted(list(dict.fromkeys([*found[:PILOT], *spread]))[:PILOT]))
+
+
+def _gathered(experiment: Experiment, cases: NDArray[np.int64]) -> Members:
+    """Return the numbers of some members, wherever they stand in the sweep."""
+    each = [members(experiment, case, case + 1) for case in cases.tolist()]
+
+    def together(field: str) -> dict[str, NDArray[Any]]:
+        return {
+            n: np.concatenate([getattr(m, field)[n] for m in each]) for n in getattr(each[0], field)
+        }
+
+    return Members(
+        index=cases,
+        columns=together("columns"),
+        parameters=together("parameters"),
+        initial=together("initial"),
+        end=np.concatenate([one.end for one in each]),
+    )
+
+
+def _sampling(experiment: Experiment) -> tuple[int, int]:
+    """Return the coarsest level that is tried, and at how many times the pilot looks."""
+    lowest = next(lv for lv in itertools.count() if experiment.steps(lv) >= LEAST_STEPS)
+    steps = experiment.steps(lowest)
+    return lowest, max(n for n in range(1, TIMES + 1) if steps % n == 0)
+
+
+def _cost(experiment: Experiment, runs: Sequence[_Run], first: int, last: int) -> int:
+    """Return the steps of the pilot; each level is run twice."""
+    count = sum(len(run.case) for run in runs)
+    return 2 * count * (experiment.steps(last + 1) - experiment.steps(first))
+
+
+def _add_level(run: _Run, steps: int, points: int) -> None:
+    lane = "plain" if steps * len(run.case) <= PLAIN_STEPS else None
+    level = level_at(run.method, run.start, steps, steps // points, lane=lane)
+    noise = noise_of(run.method, run.start, [steps], [steps // points], [level], lane=lane)
+    run.levels.append(level)
+    run.noise.append(noise)
+
+
+def _trial(
+    experiment: Experiment, runs: Sequence[_Run], levels: tuple[int, ...], points: int
+) -> _Trial:
+    steps = tuple(experiment.steps(level) for level in levels)
+    t = (np.arange(points + 1) / points)[:, None]
+    trials = []
+    for run in runs:
+        pairs = run.levels[-len(levels) :]
+        noise = _first_known(run.noise[-len(levels) :])
+        found = extrapolate_members(run.method, run.start, steps, t, pairs, noise)
+        errors = _largest(found)
+        worst = int(np.argmax(errors))
+        trials.append(_Trial(levels, float(errors[worst]), run, int(run.case[worst])))
+    return max(trials, key=lambda trial: trial.error)
+
+
+def _first_known(noise: Sequence[Floats | None]) -> Floats | None:
+    """Return what was measured at the coarsest level that resolves the motion of each member."""
+    found = noise[0]
+    for finer in noise[1:]:
+        if found is not None and finer is not None:
+            found = np.where(np.isnan(found), finer, found)
+    return found
+
+
+def _largest(found: Extrapolated) -> Floats:
+    """Return the largest bound of each member, infinite where it has none."""
+    errors = np.fmax(found.position_error, found.velocity_error)
+    is_known = np.isfinite(found.position) & np.isfinite(found.velocity)
+    return np.asarray(np.max(np.where(is_known, errors, np.inf), axis=0))
+
+
+def _is_enough(experiment: Experiment, runs: Sequence[_Run], levels: tuple[int, ...]) -> bool:
+    """Tell whether a ladder reaches the tolerance at every time that would be stored."""
+    assert experiment.tolerance is not None
+    chosen = experiment.with_levels(levels)
+    steps = tuple(chosen.steps(level) for level in levels)
+    points = steps[0] // plan.sampling(chosen, levels[0])
+    found = (climb(run.method, run.start, steps, points) for run in runs)
+    return all(bool(np.all(_largest(one) <= experiment.tolerance)) for one in found)
+
+
+def _round_off(experiment: Experiment, runs: Sequence[_Run], level: int, points: int) -> str:
+    """Tell whether round-off alone is too much for every ladder that ends here or later; empty where it is not."""
+    assert experiment.tolerance is not None
+    steps = experiment.steps(level - 1), experiment.steps(level)
+    t = (np.arange(points + 1) / points)[:, None]
+    for run in runs:
+        # levels without any difference leave round-off alone
+        same, noise = [run.levels[-1]] * 2, _first_known(run.noise[-2:])
+        floor = _largest(extrapolate_members(run.method, run.start, steps, t, same, noise))
+        if np.max(floor) > experiment.tolerance:
+            return "round-off" + _remedy(run.method, steps[-1])
+    return ""
+
+
+def _remedy(method: Method, steps: int) -> str:
+    """Name the choice of an option that would leave less round-off."""
+    rows = [
+        (method.scheme.round_off({**method.options, option.name: choice}, steps), option, choice)
+        for option in method.scheme.options
+        for choice in option.choices
+    ]
+    own = method.scheme.round_off(method.options, steps)
+    least = min(rows, key=lambda row: row[0], default=None)
+    if least is None or not least[0] < own:
+        return ""
+    return f", of which {least[1].name}: {least[2]} would leave less"
+
+
+def _refused(experiment: Experiment, least: _Trial | None, reason: str) -> InputError:
+    found = "no ladder has a bound at all"
+    if least is not None and least.error < math.inf:
+        found = (
+            f"the least bound is {least.error:.2g}, with levels {least.levels[0]} to {least.levels[-1]} "
+            f"(scheme {experiment.schemes[least.run.scheme].name}, member {least.case})"
+        )
+    rule = f"no ladder reaches it: {reason}"
+    name = str(experiment.file or experiment.name)
+    return InputError([Fault(name, 0, "tolerance", f"{experiment.tolerance:g}", rule, found)])

@@ -1,0 +1,86 @@
+"""The solution of an experiment, extrapolated over its levels, in memory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from vibsim import plan
+from vibsim.analysis.climb import Extrapolated, joined
+from vibsim.analysis.extrapolation import in_order, methods, record_of, start_of
+from vibsim.ladder.choosing import resolve
+from vibsim.ladder.solving import climb
+from vibsim.models import MODELS
+from vibsim.simulation import Members, members
+from vibsim.simulation.level import _coords
+
+if TYPE_CHECKING:
+    import xarray
+
+    from vibsim.spec import Experiment
+
+PART = 2**18
+"""Points of one level that are held at a time."""
+
+
+def best(
+    experiment: Experiment, levels: Sequence[int] | None = None, *, threads: int = 1
+) -> xarray.Dataset:
+    """Extrapolate the solution of every scheme and member over the levels of a ladder.
+
+    Parameters
+    ----------
+    levels
+        Other levels than those of the experiment. An experiment with a tolerance and no levels gets the cheapest that
+        reach it.
+    threads
+        How many threads share the members; no number depends on it.
+
+    Returns
+    -------
+    xarray.Dataset
+        What ``best.nc`` holds: every state over (scheme, case, t), ``<state>_error``, the bound of its error,
+        ``level_first`` and ``level_last``, between which the levels lie that were used, and ``reached``.
+
+    Raises
+    ------
+    VibsimError
+        Where no ladder reaches the tolerance: an `InputError` that names the least bound and what forbids less.
+    """
+    if levels is not None:
+        experiment = experiment.with_levels(levels)
+    elif not experiment.levels:
+        experiment = resolve(experiment)
+    steps = tuple(experiment.steps(level) for level in experiment.levels)
+    every = plan.sampling(experiment, experiment.levels[0])
+    points = steps[0] // every
+    size = max(PART // (points + 1), 1)
+    schemes = range(len(experiment.schemes))
+    parts = []
+    for first in range(0, experiment.members, size):
+        group = members(experiment, first, min(first + size, experiment.members))
+        parts.append([climbed(experiment, i, group, steps, points, threads) for i in schemes])
+    rows = [joined([part[i] for part in parts]) for i in schemes]
+    group = members(experiment, 0, experiment.members)
+    names = [scheme.name for scheme in experiment.schemes]
+    same_end = not experiment.end_varies
+    coords = _coords(
+        MODELS[experiment.model.kind], names, group, steps[0], every, same_end=same_end
+    )
+    return record_of(experiment, experiment.levels, coords, rows).to_xarray()
+
+
+def climbed(
+    experiment: Experiment,
+    scheme: int,
+    group: Members,
+    steps: tuple[int, ...],
+    points: int,
+    threads: int = 1,
+) -> Extrapolated:
+    """Run and extrapolate one scheme of an experiment at `points` equal times and t = 0, for some of its members."""
+    parts = []
+    for method, where in methods(experiment, scheme, group):
+        start = start_of(method, group, where)
+        parts.append((climb(method, start, steps, points, threads=threads), where))
+    return in_order(parts)
