@@ -13,6 +13,8 @@ import fcntl
 import hashlib
 import os
 import platform
+import subprocess
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -20,6 +22,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from vibsim.engine import compiler
 from vibsim.engine.entry import ENTRY, bind, entry_text
 from vibsim.errors import SimulationError
 from vibsim.plan.versions import versions
@@ -64,8 +67,9 @@ def load(text: str, kinds: str) -> Kernel:
         with _lock(path.with_suffix(".lock")):
             code = _whole(path)
             if code is None:
-                code = _compile(text + entry_text(kinds), str(path.with_suffix(".py")))
-                _write(path.with_suffix(".py"), text.encode())
+                module = path.with_suffix(".py")
+                _write(module, (text + entry_text(kinds)).encode())
+                code = _compile(module)
                 _write(path, code + hashlib.sha256(code).digest())
             return bind(_link(code), kinds)
     except OSError as error:
@@ -99,19 +103,14 @@ def _write(path: Path, content: bytes) -> None:
     Path(file.name).replace(path)
 
 
-def _compile(text: str, name: str) -> bytes:
-    """Compile a module; return the name of its entry in the object file, a line feed, and the object file."""
-    from numba.core.errors import NumbaError
-
-    namespace: dict[str, Any] = {}
-    try:
-        exec(compile(text, name, "exec"), namespace)
-    except NumbaError as error:
-        raise SimulationError(f"a kernel cannot be compiled: {error}") from error
-    entry = namespace[ENTRY]
-    library = entry._library
-    code: bytes = library._codegen._tm.emit_object(library._final_module)
-    return f"{entry.native_name}\n".encode() + code
+def _compile(path: Path) -> bytes:
+    """Compile the module at `path`; return what `vibsim.engine.compiler` writes."""
+    command = [sys.executable, "-I", str(Path(compiler.__file__)), str(path), ENTRY]
+    done = subprocess.run(command, capture_output=True, check=False)
+    if done.returncode:
+        said = done.stderr.decode(errors="replace").strip()
+        raise SimulationError(f"a kernel cannot be compiled ({path}):\n{said}")
+    return done.stdout
 
 
 _KEPT: list[Any] = []
