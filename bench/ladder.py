@@ -67,12 +67,13 @@ def _product(arithmetic: str, theta: Floats, end: float, ladder: str) -> Solve:
     one = np.ones(members)
     start = Start(np.ones((members, 3)), initial, end * one, one)
     steps = _steps(ladder)
-    return lambda: np.asarray(solve(method, start, steps).position[-1])
+    # compiled, as the other solvers are: left alone, so little work would run uncompiled
+    lane = "scalar" if members == 1 else "blocks"
+    return lambda: np.asarray(solve(method, start, steps, lane=lane).position[-1])
 
 
 def _by_hand(arithmetic: str, theta: Floats, end: float, ladder: str) -> Solve:
     levels = _steps(ladder)
-    # the kernel is compiled, as the other solvers are: left alone, little work would run uncompiled
     lane = "scalar" if len(theta) == 1 else "blocks"
 
     def solve() -> Floats:

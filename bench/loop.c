@@ -1,7 +1,7 @@
 /* The loop of vibsim's pendulum kernel in C: the same arithmetic, the same sine, the same order of operations.
 
    step_only   positions and increments alone
-   everything  with the energies, extrema, peaks and turns of every step, as the kernel gathers them
+   everything  with the energies, extrema, norms, peaks and turns of every step, as the kernel gathers them
 
    bench/traced.py writes sine.h; beyond 1e5 it calls libm, where no benchmark goes.
 
@@ -54,7 +54,7 @@ double three_term_libm(double theta, double omega, double g, double l, double en
 }
 
 /* out: position, extrema (4), largest deviation, first and last peak (time, at grid points, height), trough,
-   first and last pass over the top */
+   first and last pass over the top, norms of position and velocity */
 double everything(double theta, double omega, double g, double l, double m, double end, long steps,
                   double *out)
 {
@@ -63,6 +63,7 @@ double everything(double theta, double omega, double g, double l, double m, doub
     double half = sine(0.5 * u), lv = l * v;
     double energy_0 = 0.5 * m * (lv * lv) + 2.0 * m * g * l * (half * half);
     double u_min = u, u_max = u, v_min = v, v_max = v, largest = 0.0, trough = NAN;
+    double u_sum = fabs(u), u_squares = u * u, v_sum = fabs(v), v_squares = v * v;
     double peaks[7] = {0.0, NAN, NAN, NAN, NAN, NAN, NAN}, turns[3] = {0.0, NAN, NAN}, bottom = 0.0;
     state s = start(theta, omega, h, g / l);
     for (long n = 1; n < steps; n++) {
@@ -79,6 +80,10 @@ double everything(double theta, double omega, double g, double l, double m, doub
         v_min = v < v_min ? v : v_min;
         v_max = v > v_max ? v : v_max;
         largest = size > largest ? size : largest;
+        u_sum += fabs(u);
+        u_squares += u * u;
+        v_sum += fabs(v);
+        v_squares += v * v;
         if (v_before >= 0.0 && v < 0.0) {
             double share = v_before / (v_before - v);
             peaks[2] = t + (share - 1.0) * h;
@@ -103,8 +108,9 @@ double everything(double theta, double omega, double g, double l, double m, doub
         }
     }
     double values[] = {s.u, u_min, u_max, v_min, v_max, largest, peaks[1], peaks[2], peaks[3], peaks[4],
-                       peaks[5], peaks[6], trough, turns[1], turns[2]};
-    for (int i = 0; i < 15; i++)
+                       peaks[5], peaks[6], trough, turns[1], turns[2], h * u_sum, sqrt(h * u_squares),
+                       h * v_sum, sqrt(h * v_squares)};
+    for (int i = 0; i < 19; i++)
         out[i] = values[i];
     return s.u;
 }

@@ -2,7 +2,7 @@
 
    compensated  positions alone, the same arithmetic and the same sine as the engine
    increment    the same without the compensation
-   everything   compensated, with the energies, extrema, peaks and turns of every step
+   everything   compensated, with the energies, extrema, norms, peaks and turns of every step
    three_term_libm, three_term_libmvec  what one writes with the library's sine
 
    Build: gcc -O3 -march=native -ffp-contract=off -shared -fPIC. */
@@ -113,6 +113,7 @@ typedef struct {
     LINE double u[BLOCK];
     double v[BLOCK], u_before[BLOCK], v_before[BLOCK], energy_0[BLOCK], bottom[BLOCK];
     double u_min[BLOCK], u_max[BLOCK], v_min[BLOCK], v_max[BLOCK], largest[BLOCK], good[BLOCK];
+    double u_sum[BLOCK], u_squares[BLOCK], v_sum[BLOCK], v_squares[BLOCK];
     double peak[7][BLOCK], trough[BLOCK], turns[3][BLOCK];
 } gathered;
 
@@ -164,6 +165,10 @@ static inline long gather(gathered *a, int i, double u, double v, double g, doub
     a->v_min[i] = v < a->v_min[i] ? v : a->v_min[i];
     a->v_max[i] = v > a->v_max[i] ? v : a->v_max[i];
     a->largest[i] = size > a->largest[i] ? size : a->largest[i];
+    a->u_sum[i] += fabs(u);
+    a->u_squares[i] += u * u;
+    a->v_sum[i] += fabs(v);
+    a->v_squares[i] += v * v;
     return ((v_before >= 0.0) & (v < 0.0)) | ((v_before <= 0.0) & (v > 0.0))
         | (fabs(u - a->bottom[i]) > HALF_TURN) | !(fabs(u) + fabs(v) < 1e150);
 }
@@ -171,6 +176,9 @@ static inline long gather(gathered *a, int i, double u, double v, double g, doub
 static void begin(gathered *a, int i, double u, double g, double l, double m)
 {
     a->u[i] = a->u_min[i] = a->u_max[i] = u;
+    a->u_sum[i] = fabs(u);
+    a->u_squares[i] = u * u;
+    a->v_sum[i] = a->v_squares[i] = 0.0;
     a->v[i] = a->v_min[i] = a->v_max[i] = a->largest[i] = a->bottom[i] = a->good[i] = 0.0;
     a->energy_0[i] = energy(u, 0.0, g, l, m, 1);
     a->peak[0][i] = a->turns[0][i] = 0.0;
@@ -179,8 +187,9 @@ static void begin(gathered *a, int i, double u, double g, double l, double m)
         a->peak[k][i] = NAN;
 }
 
-/* out: 16 rows of `members` values: position; its least and largest value; the same of the velocity; largest deviation;
-   first and last peak (time, at grid points, height); trough; first and last pass over the top; last good time */
+/* out: 20 rows of `members` values: position; its least and largest value; the same of the velocity; largest deviation;
+   first and last peak (time, at grid points, height); trough; first and last pass over the top; last good time;
+   norms of position and velocity */
 void everything(long members, const double *theta, double g, double l, double m, double h, long steps,
                 double *out)
 {
@@ -214,8 +223,9 @@ void everything(long members, const double *theta, double g, double l, double m,
         for (int i = 0; i < BLOCK; i++) {
             double row[] = {s.u[i], a.u_min[i], a.u_max[i], a.v_min[i], a.v_max[i], a.largest[i],
                             a.peak[1][i], a.peak[2][i], a.peak[3][i], a.peak[4][i], a.peak[5][i],
-                            a.peak[6][i], a.trough[i], a.turns[1][i], a.turns[2][i], a.good[i]};
-            for (int k = 0; k < 16; k++)
+                            a.peak[6][i], a.trough[i], a.turns[1][i], a.turns[2][i], a.good[i],
+                            h * a.u_sum[i], sqrt(h * a.u_squares[i]), h * a.v_sum[i], sqrt(h * a.v_squares[i])};
+            for (int k = 0; k < 20; k++)
                 out[k * members + first + i] = row[k];
         }
     }

@@ -103,7 +103,7 @@ def hand_runs(theta: native.Floats, steps: int) -> Runs:
 
 def c_runs(folder: Path, theta: native.Floats, steps: int) -> tuple[Runs, Runs, list[str]]:
     """Return the strict loops in C, those with another sine or contraction, and what is to be said of them."""
-    out, many = np.empty_like(theta), np.empty((16, len(theta)))
+    out, many = np.empty_like(theta), np.empty((20, len(theta)))
     h, members = END / steps, len(theta)
 
     def loop(library: ctypes.CDLL, name: str) -> Callable[[], native.Floats]:

@@ -82,7 +82,7 @@ def c_runs(folder: Path, steps: int) -> dict[str, Callable[[], float]]:
     """Return the loops in C, each as a function that returns theta at the end."""
     strict = native.build("loop", folder, native.STRICT)
     fast = native.build("loop", folder, native.FAST_MATH)
-    out = np.empty(15)
+    out = np.empty(19)
     motion = (THETA, 0.0, 1.0, 1.0)
     return {
         BARE: lambda: float(native.call(strict, "step_only", *motion, END, steps)),

@@ -50,10 +50,13 @@ _SHORT_17 = 2.720508082623873e-15
 
 
 def sin(x: float) -> float:
-    """Return the sine of `x` [rad], error below 2.5 units in the last place; NaN for NaN and infinities."""
+    """Return the sine of `x` [rad], error below 2.5 units in the last place; NaN for NaN and infinities.
+
+    The sine of -0 is 0: its sign would cost a twentieth of a step.
+    """
     if abs(x) <= HALF_PI:
         # k = 0: the same result as below without its latency
-        return sine_of(x, 0.0) if x != 0.0 else x
+        return sine_of(x, 0.0)
     if abs(x) <= _ONE_HALF_TURN:
         # k = 1 or -1: likewise
         r, rest = reduced(x, 1.0 if x > 0.0 else -1.0, -1.0)
@@ -73,7 +76,6 @@ def sin_fast(x: float) -> float:
     k = nearest_whole(x * PER_PI)
     r, rest = reduced(x, k, parity_sign(k))
     value = sine_of(r, rest)
-    value = x if x == 0.0 else value
     return value if abs(x) <= LARGEST_ANGLE else math.nan
 
 

@@ -43,13 +43,20 @@ def bind(address: int, kinds: str) -> Callable[..., None]:
         flat: list[Any] = []
         for word, value in zip(words, values, strict=True):
             if len(word) > 1:
-                flat.append(value.__array_interface__["data"][0])
-                flat += value.shape
+                flat += (_address(value), *value.shape)
             else:
                 flat.append(value)
         code(*flat)
 
     return call
+
+
+def _address(array: Any) -> int:
+    """Return where the data of an array stand, the quick way where it is open."""
+    try:
+        return ctypes.addressof(ctypes.c_char.from_buffer(array))
+    except (TypeError, ValueError):  # read-only, or empty
+        return int(array.__array_interface__["data"][0])
 
 
 def _types(kind: str) -> Iterator[Any]:

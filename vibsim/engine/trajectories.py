@@ -128,8 +128,13 @@ def integrate(
     return Trajectories(samples[0], samples[1], counts[:, gather.LAST_STEP], gathered)
 
 
+_NOTHING = np.empty(0)
+
+
 def _aligned(size: int) -> Floats:
     """Return an array that begins with a cache line: a vector that lies across two of them costs twice."""
+    if size == 0:
+        return _NOTHING
     room = np.empty(size + 8)
     first = -room.__array_interface__["data"][0] % 64 // 8
     return room[first : first + size]

@@ -31,9 +31,9 @@ FILE = 33_000
 
 PLAIN_MEMORY = 68 * 10**6
 """Bytes of a simulate job without its arrays, in plain Python."""
-COMPILED_MEMORY = 192 * 10**6
-"""Bytes of a simulate job without its arrays, with the compiler loaded."""
-SCRATCH = 780
+COMPILED_MEMORY = 120 * 10**6
+"""Bytes of a simulate job without its arrays, with a compiled kernel."""
+SCRATCH = 520
 """Bytes that a job holds of a scheme and member beside its series: what is gathered, as it is and as it is kept."""
 EXACT_SCRATCH = 5
 """Arrays that a job holds for each series of the exact solution while it works it out."""
