@@ -12,6 +12,7 @@ from vibsim.lazy import loader
 if TYPE_CHECKING:
     from vibsim.analysis import Verdict, analyse, verdicts
     from vibsim.errors import InputError, VibsimError
+    from vibsim.ladder import best
     from vibsim.simulation import simulate
     from vibsim.spec import Experiment
 
@@ -23,6 +24,7 @@ _HOME = {
     "Verdict": "vibsim.analysis",
     "VibsimError": "vibsim.errors",
     "analyse": "vibsim.analysis",
+    "best": "vibsim.ladder",
     "simulate": "vibsim.simulation",
     "verdicts": "vibsim.analysis",
 }
@@ -34,6 +36,7 @@ __all__ = [
     "VibsimError",
     "__version__",
     "analyse",
+    "best",
     "simulate",
     "verdicts",
 ]

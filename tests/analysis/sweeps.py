@@ -60,6 +60,14 @@ SWEEPS = {
             "initial.theta": [0.5, 2.0],
         },
     ),
+    "tolerance": of(
+        {
+            "initial.theta": [0.0, 1.0, 3.1415926],
+            "schemes.central.end_velocity": ["kick", "extrapolate"],
+        },
+        levels=None,
+        tolerance=1e-5,
+    ).with_levels((4, 5, 6, 7)),
 }
 
 

@@ -194,7 +194,7 @@ def test_a_member_that_failed_never_passes_and_warns_of_nothing() -> None:
         "step": 16,
         "error": "non_finite",
         "values": {"initial.theta": 0.2},
-        "command": "vibsim run adhoc/experiment@1",
+        "command": "vibsim run experiment.yaml@1",
     }
     json.dumps(summary, allow_nan=False)
 

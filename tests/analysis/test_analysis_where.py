@@ -150,7 +150,7 @@ def test_the_summary_of_a_sweep_tells_where_and_how_to_run_a_member_alone() -> N
     assert first["where"]["FAIL"]["text"] in first["text"]
     assert first["where"]["FAIL"]["count"] == first["counts"]["FAIL"]
     row = first["results"][0]
-    assert row["command"] == f"vibsim run adhoc/experiment@{row['case']}"
+    assert row["command"] == f"vibsim run experiment.yaml@{row['case']}"
     expected = {"time.end": [1.6, 16.0, 40.0, 2000.0], "model.L": [0.5, 1.0]}
     case = row["case"]
     assert row["values"] == {

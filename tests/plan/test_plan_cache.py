@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from vibsim.errors import InputError
+from vibsim.errors import InputError, VibsimError
 from vibsim.plan import Choice, code, load, load_all
+from vibsim.spec import Experiment
 
 from .conftest import TEXT
 
@@ -75,6 +76,27 @@ def test_faults_of_all_files_are_told_at_once(tmp_path: Path, file: Path) -> Non
     told = str(caught.value)
     assert all(str(path) in told for path in (*bad, missing))
     assert not [p for p in (tmp_path / ".vibsim/plans").iterdir() if p.name != "adhoc.tiny.json"]
+
+
+def test_a_member_alone_has_the_ladder_of_the_whole_sweep(tmp_path: Path, file: Path) -> None:
+    sweep = "sweep: {initial.theta: [0.5, 1.0, 3.0]}\nschemes:"
+    text = TEXT.replace("levels: [5, 6, 7]", "tolerance: 1e-5").replace("schemes:", sweep)
+    file.write_text(text)
+    seen = []
+
+    def resolve(experiment: Experiment) -> Experiment:
+        seen.append(experiment.members)
+        return experiment.with_levels((6, 7, 8))
+
+    plan = load(Choice("adhoc", file, 1), tmp_path, resolve)
+    assert plan.experiment.levels == (6, 7, 8)
+    assert plan.experiment.initial["theta"] == 1.0
+    assert seen == [3]
+    with pytest.raises(InputError, match="from 0 to 2"):
+        load(Choice("adhoc", file, 3), tmp_path, resolve)
+    assert seen == [3], "no pilot for a member that does not exist"
+    with pytest.raises(VibsimError, match="nothing is there to choose levels"):
+        load(Choice("adhoc", file, 2), tmp_path)
 
 
 def test_results_that_cannot_be_written_do_without_a_cache(tmp_path: Path, file: Path) -> None:

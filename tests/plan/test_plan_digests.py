@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from vibsim.plan import Plan
+from vibsim.plan import Choice, Plan, load
 from vibsim.plan.jobs import from_json, to_json
+
+from .conftest import TEXT
 
 Plans = Callable[..., Plan]
 
@@ -131,6 +133,46 @@ def test_a_plan_survives_json(plan_of: Plans) -> None:
     text = to_json(plan)
     assert from_json(text, plan.file) == plan
     assert json.loads(text)["file"] == ""
+
+
+def test_a_tolerance_changes_what_depends_on_it(tmp_path: Path) -> None:
+    def plan(*changes: tuple[str, str]) -> Plan:
+        text = TEXT.replace("levels: [5, 6, 7]", "tolerance: 1e-5\noutput: best")
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new)
+        file = tmp_path / "tiny.yaml"
+        file.write_text(text)
+        return load(Choice("adhoc", file), resolve=lambda e: e.with_levels((5, 6, 7)))
+
+    first = plan()
+    other = plan(("1e-5", "1e-6"))
+    assert digests(other)[0] == digests(first)[0]
+    assert other.extrapolation != first.extrapolation
+    assert other.analysis != first.analysis
+    for told in (
+        ("A tiny", "Another"),
+        ("source: nowhere", "source: b"),
+        ("order: scheme", "order: 2"),
+    ):
+        assert plan(told).extrapolation == first.extrapolation
+    assert plan(("theta: 1.0", "theta: 1.1")).extrapolation != first.extrapolation
+
+
+def test_the_experiment_of_a_plan_knows_its_file_and_its_word(
+    plan_of: Plans, tmp_path: Path
+) -> None:
+    plan = plan_of(("schemes:", "sweep: {initial.theta: [0.5, 1.0]}\nschemes:"))
+    assert plan.experiment.word == "tiny.yaml", "no path of a machine"
+    alone = load(Choice("adhoc", Path(plan.file), 1))
+    assert alone.experiment.file == Path(plan.file)
+    assert alone.experiment.word == "tiny.yaml@1"
+    other = Path(plan.file).rename(tmp_path / "tiny.yml")
+    assert load(Choice("adhoc", other)).experiment.word == "tiny.yml"
+    other.rename(plan.file)
+    assert load(Choice("lab", Path(plan.file))).experiment.word == "lab/tiny"
+    assert load(Choice("lab", Path(plan.file), 1)).experiment.word == "lab/tiny@1"
+    assert replace(plan, file="").experiment.word == "tiny.yaml"
 
 
 def test_the_experiment_comes_back_without_its_file(plan_of: Plans) -> None:

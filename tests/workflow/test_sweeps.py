@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import os
 from pathlib import Path
@@ -114,6 +115,37 @@ def test_one_member_alone_is_an_experiment_of_its_own(empty: Place) -> None:
     ended = vibsim("plan", "--json", alone)
     (plan,) = json.loads(ended.stdout)
     assert (plan["name"], plan["cases"]) == ("tiny_case_1", 1)
+
+
+def test_a_tolerance_that_a_member_does_not_reach_is_told(empty: Place) -> None:
+    tolerance = "tolerance: 1e-4\noutput: best"
+    text = TEXT.replace("levels: [6, 7, 8, 9]", tolerance)
+    text = text.replace("schemes: [central]", "schemes: [{kind: central, end_velocity: kick}]")
+    write(empty, "initial.omega: {linspace: [1.2, 2.2, 40]}", text)
+    ended = empty.run()
+    assert ended.returncode == 1, ended.stdout + ended.stderr
+    assert "FAIL  mismatch    tolerance" in ended.stdout
+    assert "FAIL in 1 of 40 results" in ended.stdout
+    summary = json.loads((empty.tiny / "summary.json").read_text())
+    verdict = summary["checks"][-1]
+    assert verdict["kind"] == "tolerance"
+    worst = verdict["results"][0]
+    assert worst["command"] == "vibsim run tiny.yaml@22"
+    page = (empty.tiny / "report.html").read_text()
+    assert "The error of the extrapolated solution is at most 0.0001" in page
+    assert f".venv/bin/{worst['command']}" in html.unescape(page)
+    best = store.read(empty.tiny / "best.nc")
+    assert best["reached"][0].tolist() == [int(case != 22) for case in range(40)]
+    # alone, with the ladder of the sweep, it has the same numbers
+    word = worst["command"].removeprefix("vibsim run ")
+    ended = vibsim("run", word, "--results", empty.results, cwd=empty.file.parent)
+    assert ended.returncode == 1, ended.stderr
+    alone = store.read(empty.results / "adhoc/tiny_case_22/best.nc")
+    for name in ("theta", "omega", "theta_error", "omega_error", "reached"):
+        assert alone[name][:, 0].tobytes() == best[name][:, 22].tobytes(), name
+    one = store.read(empty.results / "adhoc/tiny_case_22/convergence.nc")
+    of_sweep = store.read(empty.tiny / "convergence.nc")
+    assert one["omega_best_error"][0, 0] == of_sweep["omega_best_error"][0, 22] == worst["value"]
 
 
 def test_a_member_that_fails_costs_no_other(empty: Place) -> None:

@@ -14,6 +14,7 @@ from vibsim.analysis.compare import Comparison, comparisons
 from vibsim.analysis.evidence import judgement
 from vibsim.analysis.measured import definition, flags, measured
 from vibsim.analysis.part import Part, part_of
+from vibsim.analysis.reached import bounds
 from vibsim.analysis.tables import SERIES, Table, numbers, over_time, precision_of
 from vibsim.errors import VibsimError
 from vibsim.models import MODELS
@@ -78,6 +79,8 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
         if not part.lean:
             table |= over_time(q)
     table |= _scalars(part) | measured(part, found)
+    if experiment.tolerance is not None:
+        table |= bounds(part)
     if not part.lean:
         table |= _scaled_deviation(found["energy_deviation"])
     attrs: dict[str, Any] = {

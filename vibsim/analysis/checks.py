@@ -1,5 +1,6 @@
 """The checks of an experiment: what was measured, what was expected, and whether they agree.
 
+An experiment with a tolerance has one verdict more than it names checks: whether the tolerance was reached.
 A check is decided by its worst result: FAIL before INCONCLUSIVE before PASS. A number that is not finite never passes.
 """
 
@@ -12,12 +13,13 @@ from typing import TYPE_CHECKING, Any
 from vibsim.analysis.converges import converges
 from vibsim.analysis.measured import definition
 from vibsim.analysis.outcome import FAIL, PASS, Outcome
+from vibsim.analysis.reached import reached
 from vibsim.analysis.results import Results
 from vibsim.analysis.valued import valued
 from vibsim.analysis.where import where
 from vibsim.errors import VibsimError
 from vibsim.record import Record
-from vibsim.vocabulary import REASON_NAMES, STATUSES
+from vibsim.vocabulary import BY_TOLERANCE, REASON_NAMES, STATUSES
 
 if TYPE_CHECKING:
     import xarray
@@ -48,7 +50,7 @@ class Verdict:
 
 
 def verdicts(experiment: Experiment, convergence: xarray.Dataset | Record) -> list[Verdict]:
-    """Decide every check of an experiment.
+    """Decide every check of an experiment, and last whether it reached its tolerance, where it has one.
 
     Parameters
     ----------
@@ -67,12 +69,15 @@ def verdicts(experiment: Experiment, convergence: xarray.Dataset | Record) -> li
         raise VibsimError(f"the analysis knows {known}, not {missing}: analyse the levels again")
     if record.attrs["checks"] != definition(experiment):
         raise VibsimError("the checks are not those of the analysis: analyse the levels again")
-    return [
+    found = [
         _claim(experiment, record, check, index)
         if check.kind == "claim"
-        else _verdict(record, check, _measure(experiment, record, check, index))
+        else _verdict(record, check.id, check.kind, _measure(experiment, record, check, index))
         for index, check in enumerate(experiment.checks)
     ]
+    if experiment.tolerance is not None:
+        found.append(_verdict(record, BY_TOLERANCE, BY_TOLERANCE, reached(experiment, record)))
+    return found
 
 
 def _measure(
@@ -83,19 +88,17 @@ def _measure(
     return valued(record, check, record["check_value"][index])
 
 
-def _verdict(record: Record, check: ConvergesCheck | ValueCheck, outcome: Outcome) -> Verdict:
+def _verdict(record: Record, id_: str, kind: str, outcome: Outcome) -> Verdict:
     """Decide a check by its worst result."""
     if not outcome.total:
-        raise VibsimError(
-            f"check {check.id}: it applies to no scheme or no member of the experiment"
-        )
+        raise VibsimError(f"check {id_}: it applies to no scheme or no member of the experiment")
     scheme, case = outcome.position(outcome.worst(1)[0])
     found = where(record, outcome)
     status = int(outcome.compared[scheme, case])
     reason = _compared_reason(outcome, scheme, case)
     return Verdict(
-        id=check.id,
-        kind=check.kind,
+        id=id_,
+        kind=kind,
         text=_told(outcome, scheme, case, reason, found),
         quantity=outcome.quantity,
         expected=outcome.expected,
@@ -144,7 +147,8 @@ def _told(outcome: Outcome, scheme: int, case: int, reason: str, found: Mapping[
 
 def _claim(experiment: Experiment, record: Record, check: ClaimCheck, index: int) -> Verdict:
     """Compare the measured truth of a statement with what is held of it."""
-    inner = _verdict(record, check.that, _measure(experiment, record, check.that, index))
+    outcome = _measure(experiment, record, check.that, index)
+    inner = _verdict(record, check.id, check.that.kind, outcome)
     truth = "true" if inner.status == "PASS" else "false"
     status, reason, advice = inner.status, inner.reason, inner.advice
     # a number that broke down shows neither a statement nor its opposite

@@ -42,6 +42,18 @@ class Extrapolated:
     """Place in the ladder of the coarsest level used for the position; -1 for none."""
     last: NDArray[np.intp]
 
+    def largest_bounds(self) -> tuple[Floats, Floats]:
+        """Return the largest bounds of position and velocity over all times, shape (case,); infinite without one."""
+        return (
+            _largest(self.position, self.position_error),
+            _largest(self.velocity, self.velocity_error),
+        )
+
+
+def _largest(values: Floats, errors: Floats) -> Floats:
+    is_known = np.isfinite(values) & ~np.isnan(errors)
+    return np.asarray(np.max(np.where(is_known, errors, np.inf), axis=0))
+
 
 def noise_of(
     method: Method,

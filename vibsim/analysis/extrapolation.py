@@ -14,7 +14,7 @@ from vibsim.analysis.climb import Extrapolated, extrapolate_members, joined, noi
 from vibsim.analysis.grid import Grid, common_grid, take
 from vibsim.analysis.method import Method, Start
 from vibsim.analysis.tableau import Pair
-from vibsim.models import MODELS, Model
+from vibsim.models import MODELS
 from vibsim.record import Attribute, Record, Variable, attributes
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import Members, members
@@ -53,18 +53,27 @@ def best_record(experiment: Experiment, records: Mapping[int, Record]) -> Record
     grid = common_grid(records)
     check_belonging(experiment, records)
     finest = records[grid.levels[-1]]
+    t = Variable(("t",), grid.t, finest.coords["t"].attrs)
+    rows = extrapolated(experiment, records, grid)
+    return record_of(experiment, grid.levels, {**finest.coords, "t": t}, rows)
+
+
+def extrapolated(
+    experiment: Experiment, records: Mapping[int, Record], grid: Grid
+) -> list[Extrapolated]:
+    """Extrapolate level Records over all levels, at their common times: one row for each scheme."""
+    finest = records[grid.levels[-1]]
     group = members(experiment, int(finest["case"][0]), int(finest["case"][-1]) + 1)
     states = [state.name for state in MODELS[experiment.model.kind].states]
     levels = [tuple(take(grid, records[level], name) for name in states) for level in grid.levels]
     rows = []
     for i in range(len(experiment.schemes)):
         parts = [
-            (_extrapolated(method, start_of(method, group, where), grid, levels, i, where), where)
+            (_of_method(method, start_of(method, group, where), grid, levels, i, where), where)
             for method, where in methods(experiment, i, group)
         ]
         rows.append(in_order(parts))
-    t = Variable(("t",), grid.t, finest.coords["t"].attrs)
-    return record_of(experiment, grid.levels, {**finest.coords, "t": t}, rows)
+    return rows
 
 
 def methods(
@@ -91,7 +100,7 @@ def start_of(method: Method, group: Members, where: NDArray[np.int64]) -> Start:
     return Start(table, initial, end, frequency)
 
 
-def _extrapolated(
+def _of_method(
     method: Method,
     start: Start,
     grid: Grid,
@@ -150,7 +159,7 @@ def record_of(
         words = f"{words} level used for the {model.states[0].long_name}, -1 for none"
         add(f"level_{name}", places, words, "1")
     if experiment.tolerance is not None:
-        variables["reached"] = _reached(model, variables, experiment.tolerance)
+        variables["reached"] = _reached(rows, experiment.tolerance)
     attrs: dict[str, Attribute] = {
         "title": experiment.title,
         "model": model.kind,
@@ -159,9 +168,8 @@ def record_of(
     return Record(kept, variables, attrs)
 
 
-def _reached(model: Model, variables: Mapping[str, Variable], tolerance: float) -> Variable:
-    errors = [variables[f"{state.name}_error"].values for state in model.states]
-    reached = np.all([np.all(error <= tolerance, axis=-1) for error in errors], axis=0)
+def _reached(rows: Sequence[Extrapolated], tolerance: float) -> Variable:
+    reached = np.stack([np.maximum(*row.largest_bounds()) <= tolerance for row in rows])
     words = f"whether every bound of the member is at most {tolerance:g} in the unit of its state"
     flags = {
         "flag_values": np.arange(len(REACHED), dtype=np.int8),

@@ -15,6 +15,7 @@ import numpy as np
 
 from vibsim import plan
 from vibsim.analysis.assemble import analyse_records
+from vibsim.analysis.reached import is_bound
 from vibsim.record import Record, Variable
 
 if TYPE_CHECKING:
@@ -92,7 +93,9 @@ _DECISIVE = ("status", "failure_time", "last_step", "omega_dt")
 def kept(parts: Iterable[Record], thin: list[Record]) -> Iterator[Record]:
     """Pass parts on, and keep of each in `thin` what `verdicts` and `summarise` need of it."""
     for part in parts:
-        names = [n for n in part.variables if n in _DECISIVE or n.startswith("check_")]
+        names = [
+            n for n in part.variables if n in _DECISIVE or n.startswith("check_") or is_bound(n)
+        ]
         thin.append(Record(part.coords, {n: part.variables[n] for n in names}, part.attrs))
         yield part
 

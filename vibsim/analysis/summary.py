@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -77,7 +78,7 @@ def _member(experiment: Experiment, record: Record, case: int) -> dict[str, Any]
     at = int(np.flatnonzero(np.asarray(record["case"]) == case)[0])
     return {
         "values": {key: values[at] for key, values in columns.items()},
-        "command": f"vibsim run {experiment.collection}/{experiment.name}@{case}",
+        "command": f"vibsim run {quote(f'{experiment.word}@{case}')}",
     }
 
 

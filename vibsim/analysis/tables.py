@@ -76,15 +76,15 @@ def numbers(q: Comparison) -> Table:
 
 
 def _triples(q: Comparison, add: Add) -> None:
-    """Add the numbers of triples of levels; in single precision where storage is bounded."""
+    """Add the numbers of triples of levels; where storage is bounded, all but the order in single precision."""
     precision = precision_of(q)
     dims = ("scheme", "case", "triple", "norm")
 
     def stacked(of: Callable[[str], Floats]) -> Floats:
-        return np.stack([of(norm) for norm in q.part.norms], axis=-1).astype(precision)
+        return np.stack([of(norm) for norm in q.part.norms], axis=-1)
 
     words = "ratio of successive differences in a norm over time"
-    add("ratio_norm", dims, stacked(q.ratios), words, "1")
+    add("ratio_norm", dims, stacked(q.ratios).astype(precision), words, "1")
     add("observed_order", dims, stacked(q.observed_orders), "observed order", "1")
     words = "relative distance of the rescaled differences"
     add("coincidence", dims[:-1], q.coincidence.astype(precision), words, "1")

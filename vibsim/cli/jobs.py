@@ -20,6 +20,7 @@ from vibsim.cli.common import (
 )
 from vibsim.errors import nearest
 from vibsim.plan import Plan
+from vibsim.plan.build import extrapolated
 
 if TYPE_CHECKING:
     from vibsim.record import Record
@@ -81,7 +82,7 @@ def extrapolate(options: Namespace) -> int:
             (titled(part, f"{plan.key}: extrapolated over all levels") for part in parts),
             cases=plan.cases,
             digest=plan.extrapolation,
-            provenance=provenance(plan, plan.content),
+            provenance=provenance(plan, extrapolated(plan.content)),
         )
     return 0
 

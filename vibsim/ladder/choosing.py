@@ -219,9 +219,7 @@ def _first_known(noise: Sequence[Floats | None]) -> Floats | None:
 
 def _largest(found: Extrapolated) -> Floats:
     """Return the largest bound of each member, infinite where it has none."""
-    errors = np.fmax(found.position_error, found.velocity_error)
-    is_known = np.isfinite(found.position) & np.isfinite(found.velocity)
-    return np.asarray(np.max(np.where(is_known, errors, np.inf), axis=0))
+    return np.maximum(*found.largest_bounds())
 
 
 def _is_enough(experiment: Experiment, runs: Sequence[_Run], levels: tuple[int, ...]) -> bool:

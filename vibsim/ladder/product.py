@@ -12,7 +12,7 @@ from vibsim.ladder.choosing import resolve
 from vibsim.ladder.solving import climb
 from vibsim.models import MODELS
 from vibsim.simulation import Members, members
-from vibsim.simulation.level import _coords
+from vibsim.simulation.level import coordinates
 
 if TYPE_CHECKING:
     import xarray
@@ -64,7 +64,7 @@ def best(
     group = members(experiment, 0, experiment.members)
     names = [scheme.name for scheme in experiment.schemes]
     same_end = not experiment.end_varies
-    coords = _coords(
+    coords = coordinates(
         MODELS[experiment.model.kind], names, group, steps[0], every, same_end=same_end
     )
     return record_of(experiment, experiment.levels, coords, rows).to_xarray()

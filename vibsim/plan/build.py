@@ -61,6 +61,7 @@ def _analysis(
             "checks": content.get("checks"),
             # How the members lie in the space of parameters is no number of theirs.
             "sweep": content.get("sweep"),
+            "tolerance": content.get("tolerance"),
             "code": _analysis_code(),
             "versions": versions(NUMERICAL),
         }
@@ -82,6 +83,21 @@ def _analysis_code() -> str:
     )
 
 
+def extrapolated(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the part of an experiment in normal form that an extrapolation depends on and tells of."""
+    return {key: value for key, value in content.items() if key not in _NOT_EXTRAPOLATED}
+
+
+_NOT_EXTRAPOLATED = ("title", "source", "checks")
+
+
+@cache
+def _extrapolation_code() -> str:
+    return code.used_by(
+        "vibsim.analysis.extrapolation", "vibsim.store.writing", "vibsim.store.level"
+    )
+
+
 def _extrapolation(content: Mapping[str, Any], levels: tuple[LevelJob, ...]) -> str:
     if content.get("output") != "best":
         return ""
@@ -89,8 +105,8 @@ def _extrapolation(content: Mapping[str, Any], levels: tuple[LevelJob, ...]) -> 
         {
             "job": "extrapolate",
             "levels": _digests(levels),
-            "tolerance": content.get("tolerance"),
-            "code": code.used_by("vibsim.analysis.extrapolation", "vibsim.store.writing"),
+            "experiment": extrapolated(content),
+            "code": _extrapolation_code(),
             "versions": versions(NUMERICAL),
         }
     )

@@ -62,13 +62,13 @@ def _experiment(choice: Choice, resolve: Resolver | None) -> Experiment:
     from vibsim import spec
 
     experiment = spec.load(choice.file, collection=choice.collection)
-    if choice.case is not None:
-        experiment = experiment.alone(choice.case)
+    wanted = experiment if choice.case is None else experiment.alone(choice.case)
     if experiment.levels:
-        return experiment
+        return wanted
     if resolve is None:
         raise VibsimError(f"{choice.file}: nothing is there to choose levels for a tolerance")
-    return resolve(experiment)
+    # The ladder is that of the whole sweep, so that a member alone has the numbers that it has there.
+    return wanted.with_levels(resolve(experiment).levels)
 
 
 def load_all(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from vibsim.errors import Fault, InputError, VibsimError, nearest
-from vibsim.spec.collection import collection_of, find_checkout
+from vibsim.spec.collection import ENDINGS, collection_of, find_checkout
 
 DEFAULT = ("pendulum_lab", "showcase")
 MAX_DIGITS = 18
@@ -110,7 +110,7 @@ def _find_member(word: str, known: list[Choice], root: Path) -> Found:
 
 
 def _is_file(word: str) -> bool:
-    return word.endswith((".yaml", ".yml"))
+    return word.endswith(ENDINGS)
 
 
 def _find(word: str, known: list[Choice], root: Path) -> Found:

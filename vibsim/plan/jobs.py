@@ -8,7 +8,10 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from vibsim.spec.collection import ENDINGS
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
@@ -95,7 +98,9 @@ class Plan:
         """The experiment that the digests were made of, also when its file has changed since."""
         from vibsim.spec import restore
 
-        return restore(self.content)
+        # one member alone is named by the file and its number
+        named = self.file if self.file.endswith(ENDINGS) else self.file.rpartition("@")[0]
+        return restore(self.content, Path(named) if named else None)
 
     @property
     def key(self) -> str:

@@ -17,6 +17,11 @@ def heading(check: Check) -> str:
     return _converges(check) if check.kind == "converges" else _value(check)
 
 
+def of_tolerance(bound: str) -> str:
+    """Return in one line what an experiment with a tolerance asserts; `bound` is what its verdict expects."""
+    return f"The error of the extrapolated solution is {bound}, in the unit of each state, at every stored time"
+
+
 def background(check: Check) -> str:
     """Return where a claim stands and what measures it; empty for the other kinds."""
     if check.kind != "claim":

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 from vibsim.plan.versions import DRAWING, versions
 from vibsim.record import Record
 from vibsim.report import assertions, contents, data, reasons, setting, words
 from vibsim.report.tables import Cell, Column, Table
+from vibsim.spec.collection import ADHOC, ENDINGS
+from vibsim.vocabulary import BY_TOLERANCE
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
@@ -22,8 +25,6 @@ def context(
     provenance: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Return the words of a page by the names that its template uses."""
-    is_ours = experiment.collection != "adhoc"
-    named = words.target(experiment)
     return {
         "collection": experiment.collection,
         "name": experiment.name,
@@ -41,8 +42,8 @@ def context(
         "used": json.dumps(provenance.get("experiment"), indent=1, ensure_ascii=False, default=str)
         if provenance.get("experiment")
         else "",
-        "target": named,
-        "python": PYTHON.format(file=f"configs/{named}.yaml" if is_ours else named),
+        "target": quote(experiment.word),
+        "python": _python(experiment),
     }
 
 
@@ -53,17 +54,32 @@ BRIEF = 3
 PYTHON = """\
 from vibsim import Experiment, analyse, simulate, verdicts
 
-experiment = Experiment.from_yaml("{file}")
+experiment = Experiment.from_yaml("{file}"){alone}
 convergence = analyse(experiment, {{level: simulate(experiment, level) for level in experiment.levels}})
 for verdict in verdicts(experiment, convergence):
     print(verdict.id, verdict.status, verdict.reason)"""
+
+
+def _python(experiment: Experiment) -> str:
+    """Return the lines of Python that do the same as the command."""
+    word, is_ours = experiment.word, experiment.collection != ADHOC
+    file, at, case = word.rpartition("@")
+    if not at or word.endswith(ENDINGS):
+        file, case = word, ""
+    named = f"configs/{file}.yaml" if is_ours else file
+    return PYTHON.format(file=named, alone=f".alone({case})" if case else "")
 
 
 def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the page says of one check."""
     explained = reasons.reason(check["reason"], check["kind"])
     asserted = next((spec for spec in experiment.checks if spec.id == check["id"]), None)
-    heading = assertions.heading(asserted) if asserted else words.told(check)
+    if asserted:
+        heading = assertions.heading(asserted)
+    elif check["kind"] == BY_TOLERANCE:
+        heading = assertions.of_tolerance(check["expected"])
+    else:
+        heading = words.told(check)
     return {
         "id": check["id"],
         "kind": check["kind"],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from vibsim.record import Record
@@ -17,7 +18,6 @@ from vibsim.report import (
     figures_sweep,
     figures_time,
     layout,
-    words,
 )
 from vibsim.report.data import Member
 from vibsim.report.style import Picture
@@ -100,7 +100,7 @@ def choose(experiment: Experiment, record: Record) -> tuple[list[Member], str]:
     parts = []
     if data.is_lean(record):
         case = int(record["case"][shown[0].case])
-        command = f".venv/bin/vibsim run {words.target(experiment)}@{case}"
+        command = f".venv/bin/vibsim run {quote(f'{experiment.word}@{case}')}"
         parts.append(
             "The sweep is large, so no series over time are stored, and there are no figures over time. To see the "
             f"series of one member, here the worst, run it alone: `{command}`."

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from vibsim.vocabulary import BY_TOLERANCE
+
 
 @dataclass(frozen=True)
 class Reason:
@@ -89,8 +91,23 @@ _NUMBER = Reason(
 )
 
 
+_OF_TOLERANCE = {
+    "match": Reason(
+        "The levels, extrapolated, bound the error of every scheme and member at every stored time by the tolerance.",
+        "The bound is an estimate that has been tested, no proof: best.nc has it for every time (output: best).",
+    ),
+    "mismatch": Reason(
+        "The levels were chosen by a pilot of a few members. Another member is harder, and its error is not known to "
+        "be within the tolerance.",
+        "Finer levels, or a pilot that tries such members; those listed below are the worst.",
+    ),
+}
+
+
 def reason(word: str | None, kind: str) -> Reason:
     """Return the explanation of a reason for a kind of check; empty words for one that has none."""
+    if kind == BY_TOLERANCE and word in _OF_TOLERANCE:
+        return _OF_TOLERANCE[word]
     if word == "match" and kind != "converges":
         return _NUMBER
     return REASONS.get(word or "", _UNKNOWN)

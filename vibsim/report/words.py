@@ -5,12 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from vibsim.report.style import power
-
-if TYPE_CHECKING:
-    from vibsim.spec import Experiment
 
 SYMBOLS = {
     "theta": "θ",
@@ -28,12 +25,6 @@ NAMES = {
     "potential_energy": "the potential energy V",
     "energy_deviation": "the energy deviation dE = E(t) − E(0)",
 }
-
-
-def target(experiment: Experiment) -> str:
-    """Return what names an experiment on the command line."""
-    is_ours = experiment.collection != "adhoc"
-    return f"{experiment.collection}/{experiment.name}" if is_ours else f"{experiment.name}.yaml"
 
 
 def symbol(quantity: str) -> str:

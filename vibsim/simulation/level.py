@@ -87,7 +87,7 @@ def simulate_record(
         "every": every,
         "storage": "lean" if is_bounded else "series",
     }
-    coords = _coords(model, names, group, steps, every, same_end=not experiment.end_varies)
+    coords = coordinates(model, names, group, steps, every, same_end=not experiment.end_varies)
     return Record(coords, variables, attrs)
 
 
@@ -111,9 +111,22 @@ def _numbers(steps: int, every: int) -> NDArray[np.int64]:
     return np.arange(0, steps + 1, every, dtype=np.int64)
 
 
-def _coords(
-    model: Model, schemes: list[str], group: Members, steps: int, every: int, same_end: bool
+def coordinates(
+    model: Model, schemes: list[str], group: Members, steps: int, every: int, *, same_end: bool
 ) -> dict[str, Variable]:
+    """Return the coordinates of some members at every `every`-th of `steps` steps.
+
+    Parameters
+    ----------
+    schemes
+        Names of the schemes.
+    group
+        The members; each swept key becomes a coordinate of them.
+    steps, every
+        Number of steps, and the stride of the samples.
+    same_end
+        Whether all members of the experiment end at the same time, so that ``t`` is a time and no fraction of the end.
+    """
     number = _numbers(steps, every)
     t = number * (group.end[0] / steps) if same_end else number / steps
     words = "time" if same_end else "time as a fraction of the end time"

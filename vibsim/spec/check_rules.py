@@ -18,13 +18,15 @@ from vibsim.spec.checks import Check, ClaimCheck, ConvergesCheck, ValueCheck
 from vibsim.spec.faults import Report
 from vibsim.spec.source import Path_
 from vibsim.spec.values import VALUES, Value
-from vibsim.vocabulary import REASONS
+from vibsim.vocabulary import BY_TOLERANCE, REASONS
 
 
 def finish_checks(checks: Iterable[Any], ladder: Ladder, report: Report) -> tuple[Any, ...]:
     """Note every fault of the checks (None stands for a malformed one); give an id to those without."""
     listed = list(checks)
     ids = _ids(listed, report)
+    if ladder.by_tolerance:
+        _check_own(listed, report)
     finished = []
     for i, check in enumerate(listed):
         if check is None:
@@ -54,6 +56,14 @@ def _ids(checks: list[Any], report: Report) -> list[str]:
             number += len(checks)
         ids.append(name)
     return ids
+
+
+def _check_own(checks: list[Any], report: Report) -> None:
+    """Refuse the name of the verdict that every experiment with a tolerance has."""
+    for i, check in enumerate(checks):
+        if check is not None and check.id == BY_TOLERANCE:
+            rule = "is the id of the verdict on the tolerance itself"
+            report.add(("checks", i, "id"), rule, value=check.id)
 
 
 def _check(check: Check, path: Path_, ladder: Ladder, report: Report) -> None:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 ADHOC = "adhoc"
 """Collection of a file outside the ``configs/`` of the checkout."""
+ENDINGS = (".yaml", ".yml")
+"""Of the name of an experiment file."""
 
 
 def find_checkout() -> Path | None:

@@ -12,6 +12,7 @@ from pydantic import AfterValidator, Field, PrivateAttr
 from vibsim.models import MODELS, natural_end
 from vibsim.spec.axes import Axis
 from vibsim.spec.checks import Check
+from vibsim.spec.collection import ADHOC
 from vibsim.spec.fields import (
     Count,
     FrozenDict,
@@ -102,6 +103,19 @@ class Experiment(Section):
         return self._file
 
     @property
+    def word(self) -> str:
+        """How a command line names the experiment.
+
+        One that comes with vibsim is named by its collection, any other by its file, in the folder of that file:
+        results hold no path of a machine, and are the same wherever they are made.
+        """
+        stem = self._file.stem if self._file else self.name
+        word = f"{self.collection}/{stem}"
+        if self.collection == ADHOC:
+            word = self._file.name if self._file else f"{self.name}.yaml"
+        return word if self.name == stem else f"{word}@{self.name.removeprefix(f'{stem}_case_')}"
+
+    @property
     def members(self) -> int:
         """Number of members of the sweep, 1 without one."""
         return self.sweep.count if self.sweep else 1
@@ -180,12 +194,14 @@ def canonical(experiment: Experiment) -> dict[str, Any]:
     return data
 
 
-def restore(content: Mapping[str, Any]) -> Experiment:
-    """Return the experiment that `content`, made by `canonical`, describes."""
+def restore(content: Mapping[str, Any], file: Path | None = None) -> Experiment:
+    """Return the experiment that `content`, made by `canonical`, describes; `file` is where it was read, if known."""
     data = dict(content)
     data["sweep"] = data["sweep"] and {"axes": data["sweep"]}
     data["checks"] = [_without_kind(check) for check in data["checks"]]
-    return Experiment.model_validate(data)
+    experiment = Experiment.model_validate(data)
+    experiment._file = file
+    return experiment
 
 
 def _without_kind(check: Mapping[str, Any]) -> dict[str, Any]:
