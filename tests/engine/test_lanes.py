@@ -231,3 +231,24 @@ def test_the_lane_follows_from_the_size_of_the_work():
     assert lane_for(8, 2**9) == "plain"
     assert lane_for(1, 2**22) == "scalar"
     assert lane_for(2**10, 2**9) == "blocks"
+
+
+@pytest.mark.parametrize("model", MODEL_CASES)
+def test_values_beyond_all_sense_have_the_same_bits_and_raise_nothing(model):
+    """Angles that do not resolve a turn, speeds that overflow, infinite forces."""
+    initial = np.array([[1e16, 0.0], [1e308, 1e5], [-1e12, 1e13], [1.0, 1e200], [1e-310, 0.0]])
+    parameters = np.ones((5, len(model.parameters)))
+    numbers = (parameters, initial, np.full(5, 0.1))
+    plain, *others = (run(model, numbers, lane, steps=64) for lane in LANES)
+    for other in others:
+        assert_same_bits(plain, other)
+    assert not (plain.gathered.period <= 0.0).any()
+
+
+def test_division_by_zero_is_no_error_in_any_lane():
+    model = dataclasses.replace(MODELS["pendulum"], acceleration="-1/theta + L/(theta - theta)")
+    numbers = members(model, 5)
+    plain, *others = (run(model, numbers, lane, steps=64) for lane in LANES)
+    assert (plain.last_step < 64).all()
+    for other in others:
+        assert_same_bits(plain, other)

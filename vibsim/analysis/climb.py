@@ -260,7 +260,10 @@ def circumstances(
     return Circumstances(
         rate=rate,
         size=size,
-        limit=KNOWN_DIGIT * np.fmin(size, 0.25 * (model.turn or np.inf)),
+        # at rest there is no error that one could not believe
+        limit=np.where(
+            size > 0, KNOWN_DIGIT * np.fmin(size, 0.25 * (model.turn or np.inf)), np.inf
+        ),
         phase=phase,
         response=np.zeros(1)
         if model.linear

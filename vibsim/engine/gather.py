@@ -19,6 +19,9 @@ from vibsim.engine.bound import called
 OVERFLOW = 1e150
 """A member that grows beyond has failed: its energy could no longer be stored."""
 
+FARTHEST = 1e12
+"""An angle beyond does not resolve a turn to four digits; passes over the top are not noted there."""
+
 Extrema = tuple[float, float, float, float, float, float, float, float, float]
 """Least and largest position, least and largest velocity, largest absolute energy deviation; sums of absolute values
 and of squares of position and velocity."""
@@ -113,7 +116,7 @@ def is_event(turn: float, bottom: float, v_before: float, u: float, v: float) ->
     """Say whether `note_events` has something to write, without a branch."""
     falls = (v_before >= 0.0) & (v < 0.0)
     rises = (v_before <= 0.0) & (v > 0.0)
-    turns = (turn > 0.0) & (abs(u - bottom) > 0.5 * turn)
+    turns = (turn > 0.0) & (abs(u - bottom) > 0.5 * turn) & (abs(u) < FARTHEST)
     return falls | rises | turns
 
 
@@ -136,7 +139,7 @@ def note_events(
         note_peak(stats, counts, case, t, dt, u_before, v_before, u, v)
     if v_before <= 0.0 and v > 0.0:
         note_trough(stats, case, dt, u_before, v_before, v)
-    if turn > 0.0 and abs(u - bottom) > 0.5 * turn:
+    if turn > 0.0 and abs(u - bottom) > 0.5 * turn and abs(u) < FARTHEST:
         ahead = turn if u > bottom else -turn
         note_turn(stats, counts, case, t, dt, ahead, bottom, u_before, u)
         return bottom + ahead

@@ -18,7 +18,7 @@ from vibsim import expression
 from vibsim.elementary import ELEMENTARY, primitives
 from vibsim.engine import blocks, gather, loop, observe
 from vibsim.engine.cache import Kernel, load
-from vibsim.engine.text import Module, collect
+from vibsim.engine.text import Module, collect, divided, with_quotients
 from vibsim.errors import SimulationError
 from vibsim.expression import Binary, Call, Compare, Expression
 from vibsim.models import Model
@@ -116,8 +116,8 @@ def _module(lane: str, settings: Mapping[str, object]) -> Module:
 
 def _in_lane(text: str, lane: str, kinds: str) -> Kernel:
     if lane == "plain":
-        namespace: dict[str, Any] = {}
-        exec(compile(_PLAIN + text, "<kernel>", "exec"), namespace)
+        namespace: dict[str, Any] = {"divided": divided}
+        exec(compile(with_quotients(_PLAIN + text), "<kernel>", "exec"), namespace)
         plain: Kernel = namespace["kernel"]
         return plain
     return load(_COMPILED + text, kinds)

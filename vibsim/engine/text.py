@@ -139,3 +139,33 @@ def _strip(tree: ast.FunctionDef, name: str) -> None:
         call.args = [
             argument for argument in call.args if getattr(argument, "id", None) not in HANDED
         ]
+
+
+def divided(a: float, b: float) -> float:
+    """Return a/b as IEEE 754 has it, where Python raises at b = 0."""
+    if b != 0.0:
+        return a / b
+    return (
+        math.nan
+        if a == 0.0 or math.isnan(a)
+        else math.copysign(math.inf, a) * math.copysign(1.0, b)
+    )
+
+
+class _Quotients(ast.NodeTransformer):
+    """Writes ``divided(a, b)`` for ``a / b``."""
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        self.generic_visit(node)
+        if not isinstance(node.op, ast.Div) or (
+            isinstance(node.right, ast.Constant) and node.right.value
+        ):
+            return node
+        name = ast.Name(id=divided.__name__, ctx=ast.Load())
+        return ast.Call(func=name, args=[node.left, node.right], keywords=[])
+
+
+def with_quotients(text: str) -> ast.Module:
+    """Return a module for plain Python in which division by zero is no error, as in compiled code."""
+    tree: ast.Module = _Quotients().visit(ast.parse(text))
+    return ast.fix_missing_locations(tree)

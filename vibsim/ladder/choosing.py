@@ -114,7 +114,7 @@ def resolve(experiment: Experiment) -> Experiment:
             if trial.error <= experiment.tolerance and _is_enough(experiment, runs, trial.levels):
                 return experiment.with_levels(trial.levels)
             here = min(here, trial.error)
-            if least is None or trial.error < least.error:
+            if least is None or trial.error < least.error or least.error == math.inf:
                 least = trial
         if here < math.inf:
             blamed = blamed or _round_off(experiment, runs, level, points)
@@ -262,11 +262,17 @@ def _remedy(method: Method, steps: int) -> str:
 
 def _refused(experiment: Experiment, least: _Trial | None, reason: str) -> InputError:
     found = "no ladder has a bound at all"
-    if least is not None and least.error < math.inf:
+    if least is not None:
+        scheme = experiment.schemes[least.run.scheme].name
         found = (
             f"the least bound is {least.error:.2g}, with levels {least.levels[0]} to {least.levels[-1]} "
-            f"(scheme {experiment.schemes[least.run.scheme].name}, member {least.case})"
+            f"(scheme {scheme}, member {least.case})"
         )
+        if least.error == math.inf:
+            found = (
+                f"no ladder has a bound for member {least.case} with scheme {scheme}: see it alone "
+                f"(@{least.case} and levels in place of the tolerance), or leave it out"
+            )
     rule = f"no ladder reaches it: {reason}"
     name = str(experiment.file or experiment.name)
     return InputError([Fault(name, 0, "tolerance", f"{experiment.tolerance:g}", rule, found)])

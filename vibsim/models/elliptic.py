@@ -262,7 +262,7 @@ def pendulum_period(initial: Numbers, parameters: Numbers) -> Any:
     w, _, sine, _, speed, complement = _energy(initial, parameters)
     k = np.hypot(sine, speed)
     swings = complement >= 0.0
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):
         quarter = agm_quarter_period(
             np.where(swings, complement, -complement / np.where(swings, 1.0, k * k))
         )

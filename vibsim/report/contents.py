@@ -186,7 +186,7 @@ def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
         period, amplitude = at(record, "period", member), at(record, "amplitude", member)
         exact = float(exact_periods(record)[member.case])
         for i, level in enumerate(whole(record, "level")):
-            error = float(period[i]) / exact - 1.0
+            error = float(period[i]) / exact - 1.0 if math.isfinite(exact) else math.nan
             # the peak of a run that grows without bound may have either sign
             size = abs(float(amplitude[i]))
             rows.append((member.title, level, float(period[i]), exact, error, size))

@@ -130,6 +130,7 @@ def _measured(record: Record, name: str, position: str) -> Measured:
 
 def period_error(record: Record, level: int) -> Floats:
     """Return the relative error of the period at a position of `level`, shape (scheme, case); NaN where not known."""
-    measured = known(record, "period", MEMBER, level=level)
+    measured, exact = known(record, "period", MEMBER, level=level), exact_periods(record)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(np.abs(measured / exact_periods(record) - 1.0))
+        # on the separatrix there is no period to be wrong about
+        return np.asarray(np.where(np.isinf(exact), np.nan, np.abs(measured / exact - 1.0)))

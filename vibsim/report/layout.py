@@ -16,6 +16,8 @@ from vibsim.record import Record
 from vibsim.report.data import Floats, swept, swept_label
 from vibsim.report.style import label
 
+FARTHEST = 1e100
+"""Swept values from here on are not drawn to scale."""
 WIDE = 30.0
 """Positive values are drawn on a logarithmic axis only where the largest is so many times the least."""
 
@@ -60,7 +62,18 @@ def _key(record: Record, name: str) -> Key:
     values = np.asarray(record[name])
     if np.issubdtype(values.dtype, np.number):
         numbers = np.asarray(values, dtype=np.float64)
-        return Key(key, unit, numbers, np.unique(numbers))
+        distinct, place = np.unique(numbers, return_inverse=True)
+        if np.max(np.abs(distinct)) < FARTHEST:
+            return Key(key, unit, numbers, distinct)
+        # no axis reaches so far: the values are numbered like words
+        names = tuple(f"{value:.6g}" for value in distinct.tolist())
+        return Key(
+            key,
+            unit,
+            place.ravel().astype(np.float64),
+            np.arange(distinct.size, dtype=np.float64),
+            names,
+        )
     known, place = np.unique(values.astype(str), return_inverse=True)
     numbers = place.ravel().astype(np.float64)
     return Key(key, unit, numbers, np.arange(known.size, dtype=np.float64), tuple(known.tolist()))

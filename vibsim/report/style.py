@@ -200,8 +200,13 @@ def label(text: str, unit: str, exponent: int = 0) -> str:
     return f"{text} [{' '.join(scaled + units)}]" if scaled or units else text
 
 
+LEAST, MOST = 1e-290, 1e290
+"""What lies beyond is drawn at the edge: no axis has room for more decades of a float."""
+
+
 def log_axis(ax: Axes, which: str, low: float, high: float) -> None:
     """Make an axis logarithmic from `low` to `high`, with at most about eight labelled ticks in Unicode."""
+    low, high = _within(low, high)
     getattr(ax, f"set_{which}scale")("log")
     getattr(ax, f"set_{which}lim")(low, high)
     log_ticks(getattr(ax, f"{which}axis"), low, high)
@@ -211,6 +216,7 @@ def log_ticks(axis: Any, low: float, high: float, most: int = 7) -> None:
     """Put ticks from `low` to `high` on a logarithmic axis (or colour bar): powers of ten, or 1, 2, 5 of each."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
+    low, high = _within(low, high)
     bottom, top = math.floor(math.log10(low)), math.ceil(math.log10(high))
     step = max(1, math.ceil((top - bottom) / most))
     ticks = [10.0**e for e in range(bottom, top + 1, step)]
@@ -220,6 +226,12 @@ def log_ticks(axis: Any, low: float, high: float, most: int = 7) -> None:
     axis.set_minor_locator(NullLocator())
     plain = low >= 0.005 and high <= 2000
     axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}" if plain else log_tick(x)))
+
+
+def _within(low: float, high: float) -> tuple[float, float]:
+    """Return the ends of a logarithmic axis as a float can show them."""
+    low = min(max(low, LEAST), MOST / 10.0)
+    return low, min(max(high, 10.0 * low if high <= low else high), MOST)
 
 
 def log_tick(value: float) -> str:
