@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from bench import by_hand, many_members, native, ours, page, peers, run, targets, traced  # noqa: E402
+from bench import by_hand, many_members, ours, page, peers, run, targets, traced  # noqa: E402
 
 
 def pins(name: str) -> dict[str, str]:
@@ -62,10 +62,7 @@ def test_loops_in_c_and_by_hand_give_the_bits_of_the_engine(tmp_path: Path) -> N
     out = np.empty_like(theta)
     by_hand.simd(contract=False)(theta, 1.0, 20.0 / steps, steps, out)
     assert np.array_equal(out, expected)
-    try:
-        strict, _, _ = many_members.c_runs(tmp_path, theta, steps)
-    except native.NotHereError as error:
-        pytest.skip(str(error))
+    strict, _, _ = many_members.c_runs(tmp_path, theta, steps)
     for name in (many_members.STEPPING, many_members.GATHERING):
         assert np.array_equal(strict[name](), expected), name
 

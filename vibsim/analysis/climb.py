@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from vibsim.analysis.method import Method, Start, rate_of
 from vibsim.analysis.tableau import KNOWN_DIGIT, Best, Circumstances, Pair, best_entry
 from vibsim.engine import integrate
+from vibsim.schemes.base import Options
 
 Floats = NDArray[np.float64]
 
@@ -53,6 +54,39 @@ class Extrapolated:
 def _largest(values: Floats, errors: Floats) -> Floats:
     is_known = np.isfinite(values) & ~np.isnan(errors)
     return np.asarray(np.max(np.where(is_known, errors, np.inf), axis=0))
+
+
+def level_at(
+    method: Method,
+    start: Start,
+    steps: int,
+    every: int,
+    options: Options | None = None,
+    *,
+    threads: int = 1,
+    lane: str | None = None,
+) -> Pair:
+    """Run one level; return position and velocity at every `every`-th step, each of shape (t, case).
+
+    Parameters
+    ----------
+    options
+        Of the scheme; those of the method where None.
+    """
+    run = integrate(
+        method.model,
+        method.scheme,
+        method.options if options is None else options,
+        start.parameters,
+        start.initial,
+        start.end / steps,
+        steps,
+        every,
+        lane=lane,
+        threads=threads,
+        with_gathered=False,
+    )
+    return run.position.T, run.velocity.T
 
 
 def noise_of(
@@ -118,21 +152,9 @@ def _apart(
 ) -> Floats:
     """Return how far apart a level and its twin have been so far, over the predicted round-off, shape (t, case)."""
     assert method.twin is not None
-    twin = integrate(
-        method.model,
-        method.scheme,
-        method.twin,
-        start.parameters,
-        start.initial,
-        start.end / steps,
-        steps,
-        every,
-        lane=lane,
-        threads=threads,
-        with_gathered=False,
-    )
+    twin = level_at(method, start, steps, every, method.twin, threads=threads, lane=lane)
     u, v = level
-    du, dv = twin.position.T[: len(u)] - u, twin.velocity.T[: len(u)] - v
+    du, dv = twin[0][: len(u)] - u, twin[1][: len(u)] - v
     apart = np.fmax(np.abs(du), np.abs(dv) / rate_of(start))
     predicted = (method.scheme.round_off(o, steps) for o in (method.options, method.twin))
     return np.asarray(np.fmax.accumulate(apart, axis=0) / max(predicted))

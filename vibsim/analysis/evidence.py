@@ -22,12 +22,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-def spacing_of(record: Record) -> Floats:
-    """Return the distance between common points of a convergence Record, shape (case,) or (1,)."""
-    apart = float(record["t"][1] - record["t"][0])
-    return np.asarray(apart * (record["end"] if "end" in record else np.ones(1)), dtype=np.float64)
-
-
 def omega_dt(record: Record) -> Floats:
     """Return w dt of a convergence Record, shape (case, level)."""
     return np.asarray(record["omega_dt"], dtype=np.float64)

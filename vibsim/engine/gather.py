@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from vibsim.elementary.rounding import nearest_whole
 from vibsim.engine.bound import called
 
 OVERFLOW = 1e150
@@ -55,10 +56,6 @@ PEAKS = 0
 TURNS = 1
 LAST_STEP = 2
 N_COUNTS = 3
-
-_ROUND = (
-    6755399441055744.0  # 1.5 * 2^52: adding and subtracting it rounds to the nearest whole number
-)
 
 
 def end_velocity(
@@ -178,7 +175,7 @@ def note_trough(
 
 def bottom_of(u: float, turn: float) -> float:
     """Return the multiple of `turn` nearest to `u`; 0 where there is no turn."""
-    return turn * ((u / turn + _ROUND) - _ROUND) if turn > 0.0 else 0.0
+    return turn * nearest_whole(u / turn) if turn > 0.0 else 0.0
 
 
 def note_turn(

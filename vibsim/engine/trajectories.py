@@ -14,12 +14,11 @@ from vibsim.engine.kernel import carried, kernel, observer
 from vibsim.models import Model
 from vibsim.schemes import Scheme
 from vibsim.schemes.base import END_RULES, Options
+from vibsim.spec.cost import PLAIN_MEMBER_STEPS
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-PLAIN_STEPS = 40_000
-"""Up to so many member-steps the plain lane takes less time than the compiler takes to be imported."""
 TASK = 16 * blocks.LANES
 """Members that a thread takes at a time."""
 
@@ -63,7 +62,7 @@ class Trajectories:
 
 def lane_for(members: int, steps: int) -> str:
     """Choose the lane from the size of the work; the bits are the same in every lane."""
-    if members * steps <= PLAIN_STEPS:
+    if members * steps <= PLAIN_MEMBER_STEPS:
         return "plain"
     return "blocks" if members > 1 else "scalar"
 

@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim import plan
-from vibsim.analysis.climb import Extrapolated, extrapolate_members, noise_of
+from vibsim.analysis.climb import Extrapolated, extrapolate_members, level_at, noise_of
 from vibsim.analysis.extrapolation import methods, start_of
 from vibsim.analysis.method import Method, Start
 from vibsim.analysis.tableau import Pair
 from vibsim.errors import Fault, InputError, VibsimError
-from vibsim.ladder.solving import climb, level_at
+from vibsim.ladder.solving import climb
 from vibsim.simulation import Members, members
 from vibsim.spec.fields import MAX_LEVEL
 
@@ -48,7 +48,7 @@ NOT_SMOOTH = "the solutions of its levels do not approach each other as smooth o
 PATIENCE = 2
 """After so many levels that do not halve the bound no finer one will."""
 PLAIN_STEPS = 2**18
-"""Up to so many steps of a level the plain lane takes less time than the compiler and the kernel take to be loaded."""
+"""Up to so many steps of a level the pilot takes less time in plain Python than a new kernel takes to be compiled."""
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,11 @@ from vibsim.analysis.climb import (
     Extrapolated,
     extrapolate_members,
     inverse_power,
+    level_at,
     noise_of,
 )
 from vibsim.analysis.method import Method, Start, rate_of
 from vibsim.analysis.tableau import FLOATS, KNOWN_DIGIT, Circumstances, Pair, best_entry
-from vibsim.engine import integrate
 
 Floats = NDArray[np.float64]
 
@@ -105,32 +105,6 @@ def _levels(
     u, v = levels[0]
     levels[0] = u[::finer], v[::finer]
     return levels, noise
-
-
-def level_at(
-    method: Method,
-    start: Start,
-    steps: int,
-    every: int,
-    *,
-    threads: int = 1,
-    lane: str | None = None,
-) -> Pair:
-    """Run one level; return position and velocity at every `every`-th step, each of shape (t, case)."""
-    run = integrate(
-        method.model,
-        method.scheme,
-        method.options,
-        start.parameters,
-        start.initial,
-        start.end / steps,
-        steps,
-        every,
-        lane=lane,
-        threads=threads,
-        with_gathered=False,
-    )
-    return run.position.T, run.velocity.T
 
 
 def _end_of_one(

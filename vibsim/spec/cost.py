@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 PLAIN_MEMBER_STEPS = 40_000
-"""Member-steps of one scheme up to which the compiler is not used."""
+"""Member-steps of one scheme up to which plain Python takes less time than a compiled kernel takes to be loaded."""
 PLAIN_SECONDS = 1.2e-6
 """Of one member-step in plain Python."""
 ONE_SECONDS = 12e-9
