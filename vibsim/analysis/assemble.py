@@ -131,7 +131,7 @@ def _widened(part: Part, variable: Variable) -> Variable:
     if variable.values.dtype.kind != "U" or "sweep_key" not in variable.attrs:
         return variable
     schemes = (SCHEMES[scheme.kind] for scheme in part.experiment.schemes)
-    words = [choice for scheme in schemes for option in scheme.options for choice in option.choices]
+    words = [choice for scheme in schemes for option in scheme.words for choice in option.choices]
     width = max(map(len, words))
     return Variable(variable.dims, variable.values.astype(f"U{width}"), variable.attrs)
 

@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 
 from vibsim.analysis.evidence import omega_dt
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Orders, Outcome
-from vibsim.analysis.promise import columns_of, formal_orders, options_of
+from vibsim.analysis.promise import columns_of, formal_orders, options_of, stability_limits
 from vibsim.analysis.wording import Story, advise, tell
 from vibsim.models import MODELS
 from vibsim.record import Record
-from vibsim.schemes import SCHEMES
 from vibsim.vocabulary import REASON_NAMES, STATUSES
 
 if TYPE_CHECKING:
@@ -96,7 +95,8 @@ def _story(
     levels = tuple(int(level) for level in record["level"])
     culprit = int(found.culprit[scheme, case])
     spec = experiment.schemes[scheme]
-    limit = SCHEMES[spec.kind].stability_limit
+    columns = columns_of(record)
+    limits = stability_limits(experiment, columns)[scheme]
     at = levels.index(culprit) if culprit >= 0 else None
     return Story(
         quantity=check.converges,
@@ -112,8 +112,8 @@ def _story(
         levels=levels,
         culprit=culprit,
         omega_dt=float("nan") if at is None else float(omega_dt(record)[case, at]),
-        limit=float("inf") if limit is None else limit,
-        options=options_of(experiment, columns_of(record), scheme, case),
+        limit=float(limits[case if len(limits) > 1 else 0]),
+        options=options_of(experiment, columns, scheme, case),
         is_position=check.converges == MODELS[experiment.model.kind].position,
         scheme=spec.name,
     )

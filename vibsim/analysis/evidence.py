@@ -82,7 +82,7 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
         failed=part.failed,
         applicable=exists | np.any(part.failed, axis=-1),
         omega_dt=np.broadcast_to(part.omega_dt, (*shape, len(grid.levels))),
-        stability_limit=np.broadcast_to(stability_limits(part.experiment), shape),
+        stability_limit=np.broadcast_to(stability_limits(part.experiment, part.columns), shape),
         growth=part.growth,
         span=np.broadcast_to(part.omega_dt[:, 0] * float(grid.steps[0]), shape),
         relative_floor=np.broadcast_to(part.relative_floor[..., 0], shape),

@@ -6,13 +6,11 @@ steps. It is an order of magnitude; the verdict blames it only where the data sh
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis.series import largest
-from vibsim.schemes import Scheme
+from vibsim.schemes import Options, Scheme
 
 Floats = NDArray[np.float64]
 
@@ -23,7 +21,7 @@ No stored number is known better than this, relative to its size.
 """
 
 
-def relative_floor(scheme: Scheme, options: Mapping[str, str], steps: tuple[int, ...]) -> Floats:
+def relative_floor(scheme: Scheme, options: Options, steps: tuple[int, ...]) -> Floats:
     """Return the predicted round-off at every level relative to the solution's size, shape (level,)."""
     return np.array([max(scheme.round_off(options, n), SPACING_AT_ONE) for n in steps])
 

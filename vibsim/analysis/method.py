@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vibsim.analysis.weights import Tableau, tableau
 from vibsim.models import Model
-from vibsim.schemes import Scheme
+from vibsim.schemes import Options, Scheme
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ class Method:
 
     model: Model
     scheme: Scheme
-    options: Mapping[str, str]
+    options: Options
 
     @cached_property
     def position_powers(self) -> tuple[int, int]:
@@ -48,9 +48,9 @@ class Method:
         return self.position_powers == self.velocity_powers == self.end_powers
 
     @cached_property
-    def twin(self) -> Mapping[str, str] | None:
+    def twin(self) -> Options | None:
         """Options of the same method with other rounding errors; None where there are none."""
-        for option in self.scheme.options:
+        for option in self.scheme.words:
             for choice in option.choices:
                 other = {**self.options, option.name: choice}
                 if self.scheme.round_off(other, LONG) != self.scheme.round_off(self.options, LONG):
@@ -73,20 +73,20 @@ class Method:
     def _tableaux(self) -> dict[tuple[tuple[int, ...], tuple[int, int]], Tableau]:
         return {}
 
-    def _powers(self, quantity: str, options: Mapping[str, str]) -> tuple[int, int]:
-        p = self.scheme.formal_order(quantity, self.model, options)
+    def _powers(self, quantity: str, options: Options) -> tuple[int, int]:
+        p = int(self.scheme.formal_order(quantity, self.model, options))
         return p, 2 if self.scheme.even_powers(quantity, self.model, options) else 1
 
-    def _own_end(self) -> Mapping[str, str]:
+    def _own_end(self) -> Options:
         """Return the options with which the last velocity is the scheme's own, as all others are."""
-        for option in self.scheme.options:
+        for option in self.scheme.words:
             for choice in option.choices:
                 other = {**self.options, option.name: choice}
                 if self.scheme.stepper(other).end == "own" and self._same_start(other):
                     return other
         return self.options
 
-    def _same_start(self, other: Mapping[str, str]) -> bool:
+    def _same_start(self, other: Options) -> bool:
         mine, its = self.scheme.stepper(self.options), self.scheme.stepper(other)
         return (mine.start, mine.step, mine.variant) == (its.start, its.step, its.variant)
 

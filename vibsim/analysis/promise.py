@@ -12,7 +12,8 @@ from vibsim import plan
 from vibsim.analysis.floor import relative_floor
 from vibsim.models import MODELS
 from vibsim.record import Record
-from vibsim.schemes import SCHEMES, Scheme
+from vibsim.schemes import SCHEMES, Options, Scheme
+from vibsim.theory import stability_limit
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
@@ -37,9 +38,7 @@ def options_swept(experiment: Experiment) -> bool:
     return any(key.startswith("schemes.") for key in keys)
 
 
-def options_of(
-    experiment: Experiment, columns: Columns, scheme: int, case: int
-) -> Mapping[str, str]:
+def options_of(experiment: Experiment, columns: Columns, scheme: int, case: int) -> Options:
     """Return the options that one member has of one scheme, by their positions."""
     own = {key: values[case : case + 1] for key, values in columns.items()}
     return plan.option_groups(experiment, scheme, own)[0][0]
@@ -66,16 +65,22 @@ def relative_floors(experiment: Experiment, steps: tuple[int, ...], columns: Col
     return _each(experiment, columns, lambda s, o: relative_floor(s, o, steps))
 
 
-def stability_limits(experiment: Experiment) -> Floats:
-    """Return the largest stable w dt of every scheme, infinite for none, shape (scheme, 1)."""
-    limits = (SCHEMES[scheme.kind].stability_limit for scheme in experiment.schemes)
-    return np.array([[np.inf if limit is None else limit] for limit in limits])
+def stability_limits(experiment: Experiment, columns: Columns) -> Floats:
+    """Return the largest stable w dt of every scheme, infinite for none, shape (scheme, case).
+
+    It is infinite too for a scheme that grows at every step: its growth vanishes with dt, and is no instability.
+    """
+
+    def limit(scheme: Scheme, options: Options) -> float:
+        return stability_limit(scheme, options) or np.inf
+
+    return _each(experiment, columns, limit)
 
 
 def _each(
     experiment: Experiment,
     columns: Columns,
-    promise: Callable[[Scheme, Mapping[str, str]], ArrayLike],
+    promise: Callable[[Scheme, Options], ArrayLike],
 ) -> Floats:
     """Return what every scheme promises with the options that each member has of it."""
     rows = []

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
+
+from vibsim.schemes import Options
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Story:
     """w dt at the culprit; NaN for none."""
     limit: float
     """Stability limit of the scheme; infinite for none."""
-    options: Mapping[str, str]
+    options: Options
     """Options of the scheme."""
     is_position: bool
     scheme: str

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from argparse import Namespace
 from collections.abc import Iterable
 
@@ -31,16 +32,18 @@ def _models() -> Iterable[tuple[str, str]]:
 
 
 def _schemes() -> Iterable[tuple[str, str]]:
-    from vibsim.schemes import SCHEMES
+    from vibsim.schemes import SCHEMES, Option
+    from vibsim.theory import stability_limit
 
     for scheme in SCHEMES.values():
         plural = "" if scheme.force_evaluations == 1 else "s"
         work = f"{scheme.force_evaluations} force evaluation{plural} per step"
-        limit = scheme.stability_limit
-        stable = "stable for every step" if limit is None else f"stable while w dt < {limit:g}"
+        limit = stability_limit(scheme, scheme.defaults())
+        stable = "stable for every step" if limit == math.inf else f"stable while w dt < {limit:g}"
         yield scheme.kind, f"{scheme.title}; {work}; {stable}"
         for option in scheme.options:
-            yield f"  {option.name}", f"{' | '.join(option.choices)}: {option.description}"
+            choices = " | ".join(option.choices) if isinstance(option, Option) else ""
+            yield f"  {option.name}", f"{choices}: {option.description}"
 
 
 def _checks() -> Iterable[tuple[str, str]]:

@@ -22,7 +22,7 @@ from vibsim.engine.text import Module, collect, divided, with_quotients
 from vibsim.errors import SimulationError
 from vibsim.expression import Binary, Call, Compare, Expression
 from vibsim.models import Model
-from vibsim.schemes import Stepper
+from vibsim.schemes.base import HANDED, Stepper, handed
 
 LANES = ("plain", "scalar", "blocks")
 
@@ -81,7 +81,7 @@ def observer(model: Model, lane: str) -> Kernel:
 
 def source(model: Model, stepper: Stepper, lane: str = "scalar", with_gathered: bool = True) -> str:
     """Return the text of the kernel of `model` and `stepper`, without the head that says what compiles it."""
-    states, parameters = carried(stepper, model), len(model.parameters)
+    states, parameters = carried(stepper, model), n_parameters(stepper, model)
     settings = {
         "GATHER": with_gathered,
         "STATES": states,
@@ -90,13 +90,14 @@ def source(model: Model, stepper: Stepper, lane: str = "scalar", with_gathered: 
         **blocks.row_numbers(states),
     }
     module = _module(lane, settings)
-    _put_formulas(module, model, "", is_rare=lane == "blocks")
-    for name in ("start", "step", "backward"):
+    _put_formulas(module, model, "", stepper, is_rare=lane == "blocks")
+    _put_start(module, stepper)
+    for name in ("step", "backward"):
         collect(module, getattr(stepper, name), name, {})
     if lane == "blocks":
-        _put_formulas(module, model, "_fast")
+        _put_formulas(module, model, "_fast", stepper)
         functions = (n for n, v in stepper.step.__globals__.items() if isinstance(v, FunctionType))
-        renamed = {name: f"{name}_fast" for name in ("acceleration", *functions)}
+        renamed = {name: f"{name}_fast" for name in (*HANDED, *functions)}
         collect(module, stepper.step, "step_fast", renamed)
         for name, text in _rows(states, parameters).items():
             module.put(name, text)
@@ -106,8 +107,27 @@ def source(model: Model, stepper: Stepper, lane: str = "scalar", with_gathered: 
 
 def carried(stepper: Stepper, model: Model) -> int:
     """Return how many floats the state of a scheme has, by asking for one."""
-    p = (1.0,) * len(model.parameters)
-    return len(stepper.start(stepper.variant, 0.0, 0.0, 1.0, p, lambda u, v, t, p: 0.0))
+    p = (1.0,) * n_parameters(stepper, model)
+    start = handed(stepper.start, lambda u, v, t, p: 0.0, lambda u, v, t, p: (0.0, 0.0))
+    return len(start(stepper.variant, 0.0, 0.0, 1.0, p))
+
+
+def n_parameters(stepper: Stepper, model: Model) -> int:
+    """Return how many parameters a member has: those of the model, and the factors of `Stepper.scaling` behind them."""
+    return len(model.parameters) + (2 if stepper.scaling else 0)
+
+
+def _put_start(module: Module, stepper: Stepper) -> None:
+    """Write the start, for which `Stepper.scaling` multiplies the initial velocity."""
+    if stepper.scaling is None:
+        collect(module, stepper.start, "start", {})
+        return
+    collect(module, stepper.start, "start_unscaled", {})
+    module.put(
+        "start",
+        "@compiled\ndef start(variant, u, v, dt, p):\n"
+        "    return start_unscaled(variant, u, v * p[-1], dt, p)",
+    )
 
 
 def _module(lane: str, settings: Mapping[str, object]) -> Module:
@@ -123,7 +143,14 @@ def _in_lane(text: str, lane: str, kinds: str) -> Kernel:
     return load(_COMPILED + text, kinds)
 
 
-def _put_formulas(module: Module, model: Model, suffix: str, *, is_rare: bool = False) -> None:
+def _put_formulas(
+    module: Module,
+    model: Model,
+    suffix: str,
+    stepper: Stepper | None = None,
+    *,
+    is_rare: bool = False,
+) -> None:
     """Write the model's acceleration and energies as functions of ``(u, v, t, p)``, and what they call.
 
     Parameters
@@ -132,31 +159,44 @@ def _put_formulas(module: Module, model: Model, suffix: str, *, is_rare: bool = 
         ``_fast`` for formulas without branches.
     is_rare
         Whether they are seldom needed, so that elementary functions are not compiled into them.
+    stepper
+        For whom: an implicit one needs derivatives too, one with `Stepper.scaling` a factor.
     """
     names = [parameter.name for parameter in model.parameters]
     known = (model.position, model.velocity, "t", *names)
-    unpack = [f"({', '.join(names)},) = p"] if names else []
+    unpack = [f"{name} = p[{i}]" for i, name in enumerate(names)]
+    acceleration = expression.parse(model.acceleration, known)
     formulas = {
-        "acceleration": {"_result": model.acceleration},
-        "energies": {"_kinetic": model.kinetic_energy, "_potential": model.potential_energy},
+        "acceleration": {"_result": acceleration},
+        "energies": {
+            "_kinetic": expression.parse(model.kinetic_energy, known),
+            "_potential": expression.parse(model.potential_energy, known),
+        },
     }
+    if stepper is not None and stepper.implicit:
+        formulas["slopes"] = {
+            "_by_position": expression.derivative(acceleration, model.position),
+            "_by_velocity": expression.derivative(acceleration, model.velocity),
+        }
+    is_scaled = stepper is not None and stepper.scaling is not None
     for function, results in formulas.items():
         lines = list(unpack)
         for result, formula in results.items():
-            tree = _with_functions(module, formula, known, suffix, is_rare)
+            tree = _with_functions(module, formula, suffix, is_rare)
             lines += expression.to_statements(tree, result)
+            if is_scaled and function != "energies":
+                lines.append(f"{result} = {result} * p[{len(names)}]")
         lines.append(f"return {', '.join(results)}")
         head = f"@compiled\ndef {function}{suffix}({model.position}, {model.velocity}, t, p):\n    "
         module.put(function + suffix, head + "\n    ".join(lines))
-    values = ", ".join(f"float(parameters[case, {i}])" for i in range(len(names))) or "0.0"
+    count = len(names) + (2 if is_scaled else 0)
+    values = ", ".join(f"float(parameters[case, {i}])" for i in range(count)) or "0.0"
     text = f"@compiled\ndef parameters_of(parameters, case):\n    return ({values},)"
     module.put("parameters_of", text)
 
 
-def _with_functions(
-    module: Module, formula: str, known: tuple[str, ...], suffix: str, is_rare: bool
-) -> Expression:
-    """Read a formula, collect the functions that it calls, and call them by their names in the kernel."""
+def _with_functions(module: Module, formula: Expression, suffix: str, is_rare: bool) -> Expression:
+    """Collect the functions that a formula calls, and call them by their names in the kernel."""
 
     def bind(node: Expression) -> Expression:
         match node:
@@ -168,8 +208,7 @@ def _with_functions(
             case Call(function, arguments):
                 if function not in ELEMENTARY:
                     raise SimulationError(
-                        f"{formula}: the engine has no function {function}; it has "
-                        + ", ".join(ELEMENTARY)
+                        f"the engine has no function {function}; it has " + ", ".join(ELEMENTARY)
                     )
                 texts = ELEMENTARY[function]
                 text = texts.fast if suffix else texts.full
@@ -178,7 +217,7 @@ def _with_functions(
             case _:
                 return node
 
-    return expression.rebuilt(expression.parse(formula, known), bind)
+    return expression.rebuilt(formula, bind)
 
 
 def _is_whole(exponent: Expression) -> bool:

@@ -15,9 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from vibsim.errors import SimulationError
-
-HANDED = ("acceleration",)
-"""Functions that a scheme is handed as arguments; in a kernel it knows them by name."""
+from vibsim.schemes.base import HANDED
 
 
 @dataclass

@@ -13,7 +13,7 @@ from vibsim.engine import blocks, gather
 from vibsim.engine.kernel import carried, kernel, observer
 from vibsim.models import Model
 from vibsim.schemes import Scheme
-from vibsim.schemes.base import END_RULES, Options
+from vibsim.schemes.base import END_RULES, Options, Stepper
 from vibsim.spec.cost import PLAIN_MEMBER_STEPS
 
 Floats = NDArray[np.float64]
@@ -113,8 +113,9 @@ def integrate(
     rows = gather.N_STATS if with_gathered else 0
     stats = np.full((members, rows), np.nan)
     counts = np.zeros((members, gather.N_COUNTS), dtype=np.int64)
+    parameters = _scaled(model, stepper, parameters, dt)
     numbers = [np.ascontiguousarray(array, dtype=float) for array in (parameters, initial, dt)]
-    scratch = blocks.n_rows(carried(stepper, model), len(model.parameters)) * blocks.LANES
+    scratch = blocks.n_rows(carried(stepper, model), parameters.shape[1]) * blocks.LANES
     scratch = scratch if lane == "blocks" else 0
     end_rule, turn = END_RULES.index(stepper.end), model.turn or 0.0
 
@@ -125,6 +126,15 @@ def integrate(
     _share(task, range(0, members, TASK) if threads > 1 else range(1), threads)
     gathered = _name(stats, counts) if with_gathered else None
     return Trajectories(samples[0], samples[1], counts[:, gather.LAST_STEP], gathered)
+
+
+def _scaled(model: Model, stepper: Stepper, parameters: Floats, dt: Floats) -> Floats:
+    """Put the factors of `Stepper.scaling` behind the parameters of every member."""
+    if stepper.scaling is None:
+        return parameters
+    named = {row.name: parameters[:, i] for i, row in enumerate(model.parameters)}
+    factors = stepper.scaling(np.broadcast_to(model.natural_frequency(named), dt.shape) * dt)
+    return np.column_stack([parameters, *factors])
 
 
 _NOTHING = np.empty(0)

@@ -5,6 +5,7 @@ allow-list of what it may hold: numbers, declared names, ``+ - * / **``, compari
 a user is never compiled or evaluated as Python.
 """
 
+from vibsim.expression.derivative import derivative
 from vibsim.expression.parser import (
     MAX_CHARACTERS,
     MAX_DEPTH,
@@ -44,6 +45,7 @@ __all__ = [
     "Negate",
     "Number",
     "constant",
+    "derivative",
     "evaluate",
     "literal",
     "names_in",

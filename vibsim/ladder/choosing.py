@@ -250,7 +250,7 @@ def _remedy(method: Method, steps: int) -> str:
     """Name the choice of an option that would leave less round-off."""
     rows = [
         (method.scheme.round_off({**method.options, option.name: choice}, steps), option, choice)
-        for option in method.scheme.options
+        for option in method.scheme.words
         for choice in option.choices
     ]
     own = method.scheme.round_off(method.options, steps)

@@ -8,9 +8,10 @@ from types import MappingProxyType
 from vibsim.models.base import ENERGIES, Model, Parameter, State, natural_end, quantities
 from vibsim.models.linear_pendulum import LINEAR_PENDULUM
 from vibsim.models.pendulum import PENDULUM
+from vibsim.models.spring import SPRING
 
 MODELS: Mapping[str, Model] = MappingProxyType(
-    {model.kind: model for model in (PENDULUM, LINEAR_PENDULUM)}
+    {model.kind: model for model in (PENDULUM, LINEAR_PENDULUM, SPRING)}
 )
 
 __all__ = ["ENERGIES", "MODELS", "Model", "Parameter", "State", "natural_end", "quantities"]

@@ -9,24 +9,21 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from vibsim.models.base import Floats, Model, Numbers
+from vibsim.models.harmonic import motion, period
 from vibsim.models.pendulum import PARAMETERS, STATES, natural_frequency
 
 
 def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
     """Return theta and omega of the harmonic oscillation at times `t` (A, section 1.3)."""
     w = natural_frequency(parameters)
-    theta_0, omega_0 = initial["theta"], initial["omega"]
-    cos, sin = np.cos(w * t), np.sin(w * t)
-    return {"theta": theta_0 * cos + omega_0 / w * sin, "omega": omega_0 * cos - theta_0 * w * sin}
+    theta, omega = motion(t, w, initial["theta"], initial["omega"])
+    return {"theta": theta, "omega": omega}
 
 
 def exact_period(initial: Numbers, parameters: Numbers) -> Any:
     """Return ``2 pi sqrt(L/g)``, whatever the amplitude; NaN at rest."""
-    rest = (np.asarray(initial["theta"]) == 0) & (np.asarray(initial["omega"]) == 0)
-    return np.where(rest, np.nan, 2 * np.pi / natural_frequency(parameters))
+    return period(natural_frequency(parameters), initial["theta"], initial["omega"])
 
 
 LINEAR_PENDULUM = Model(

@@ -5,9 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from vibsim.schemes.base import Option, Scheme, Stepper
+from vibsim.schemes.base import AnyOption, Flag, NumberOption, Option, Options, Scheme, Stepper
 from vibsim.schemes.central import CENTRAL
+from vibsim.schemes.runge_kutta import RUNGE_KUTTA
 
-SCHEMES: Mapping[str, Scheme] = MappingProxyType({scheme.kind: scheme for scheme in (CENTRAL,)})
+SCHEMES: Mapping[str, Scheme] = MappingProxyType(
+    {scheme.kind: scheme for scheme in (CENTRAL, *RUNGE_KUTTA)}
+)
 
-__all__ = ["SCHEMES", "Option", "Scheme", "Stepper"]
+FIXED_STEP: Mapping[str, Scheme] = MappingProxyType(
+    {kind: scheme for kind, scheme in SCHEMES.items() if not scheme.adaptive}
+)
+"""Schemes that take equal steps, and so have levels and orders."""
+
+__all__ = [
+    "FIXED_STEP",
+    "SCHEMES",
+    "AnyOption",
+    "Flag",
+    "NumberOption",
+    "Option",
+    "Options",
+    "Scheme",
+    "Stepper",
+]

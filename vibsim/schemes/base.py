@@ -1,24 +1,35 @@
 """What a scheme is: data about a time-stepping method, and the small functions that step it.
 
 The functions are plain Python on floats, one member at a time. The engine compiles them for a lane, or runs the same
-text uncompiled where the work is small; they use ``+ - * /`` and comparisons only, so that every lane gives the same
-bits.
+text uncompiled where the work is small; the theory runs them on exact numbers. They use ``+ - * /`` and comparisons
+only, so that every lane gives the same bits.
 """
 
 from __future__ import annotations
 
+import inspect
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from vibsim.models.base import Model
 
-Options = Mapping[str, str]
+OptionValue = str | float | bool
+Options = Mapping[str, OptionValue]
 
 CarriedState = tuple[float, ...]
 """What a scheme carries from step to step; the first entry is the position."""
 Acceleration = Callable[[float, float, float, Any], float]
 """``acceleration(u, v, t, p)`` with the parameters p of the member."""
+Slopes = Callable[[float, float, float, Any], tuple[float, float]]
+"""``slopes(u, v, t, p)``: derivatives of the acceleration by position and by velocity."""
+
+UNIT_ROUND_OFF = 2.0**-53
 
 
 @dataclass(frozen=True)
@@ -36,23 +47,128 @@ class Option:
 
 
 @dataclass(frozen=True)
+class NumberOption:
+    """A number that a user may give a scheme, from `least` to `most`, both included."""
+
+    name: str
+    default: float
+    least: float
+    most: float
+    description: str
+
+
+@dataclass(frozen=True)
+class Flag:
+    """Something that a user may switch on; off by default."""
+
+    name: str
+    description: str
+    default: bool = False
+
+
+AnyOption = Option | NumberOption | Flag
+
+
+def no_backward(state: CarriedState, dt: float) -> float:
+    """Return NaN: a scheme that carries its velocity has no use for a one-sided one."""
+    return math.nan * dt
+
+
+@dataclass(frozen=True)
 class Stepper:
-    """The arithmetic of a scheme: three functions on the carried state of one member, and how it starts and ends."""
+    """The arithmetic of a scheme: functions on the carried state of one member, and how it starts and ends.
+
+    A function may ask for `slopes` behind `acceleration`, by these names.
+    """
 
     start: Callable[..., CarriedState]
     """``start(variant, u, v, dt, p, acceleration)``: the state at the first step."""
     step: Callable[..., tuple[CarriedState, float]]
     """``step(state, t, dt, p, acceleration)``: the next state, and the velocity at the present time t."""
-    backward: Callable[..., float]
+    backward: Callable[..., float] = no_backward
     """``backward(state, dt)``: the one-sided velocity ``(u^n - u^(n-1))/dt`` at the present time."""
     variant: int = 0
     """Which of its starts `start` is to take."""
     end: str = "own"
     """Velocity at the last point: `END_RULES`."""
+    own_velocity: bool = True
+    """Whether the velocity is another one than the centred difference ``[D_2t u]``."""
+    implicit: bool = False
+    """Whether a step solves an equation, for which it may ask for `slopes`."""
+    scaling: Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], ...]] | None = None
+    """Factors of the acceleration and of the initial velocity that enters the start, from ``w dt``; None for 1."""
 
 
 END_RULES = ("own", "extrapolate", "backward")
 """The scheme's own velocity, the linear extrapolation of the last two, or `Stepper.backward`."""
+
+HANDED = ("acceleration", "slopes")
+"""Functions of the model that a function of a scheme is handed, by these names."""
+
+
+def handed(
+    function: Callable[..., Any], acceleration: Acceleration, slopes: Slopes
+) -> Callable[..., Any]:
+    """Return `function`, a `Stepper`'s start or step, with those functions of the model that it asks for."""
+    known = {"acceleration": acceleration, "slopes": slopes}
+    asked = inspect.signature(function).parameters
+    return partial(function, **{name: known[name] for name in HANDED if name in asked})
+
+
+@dataclass(frozen=True)
+class Orders:
+    """Powers of dt with which the errors of a scheme vanish, infinite where a quantity is exact.
+
+    Those of the energy differ between a linear, conservative model and any other one.
+    """
+
+    position: float
+    velocity: float
+    energy: float
+    energy_linear: float
+    velocity_d2t: float | None = None
+    """Of the centred difference ``[D_2t u]``; None: that of the position, 2 at most."""
+    energy_d2t: float | None = None
+    """Of the energy with that velocity; None: that of the energy, 2 at most."""
+    energy_d2t_linear: float | None = None
+
+    def of(self, quantity: str, model: Model) -> float:
+        """Return the order of a quantity of a model.
+
+        Parameters
+        ----------
+        quantity
+            A state, an energy (`vibsim.models.ENERGIES`), or either with ``_d2t`` behind it.
+        """
+        is_simple = model.linear and model.conservative
+        energy = self.energy_linear if is_simple else self.energy
+        given = self.energy_d2t_linear if is_simple else self.energy_d2t
+        energy_d2t = min(energy, 2.0) if given is None else given
+        velocity_d2t = min(self.position, 2.0) if self.velocity_d2t is None else self.velocity_d2t
+        return {
+            model.position: self.position,
+            model.velocity: self.velocity,
+            "kinetic_energy": self.velocity,
+            "potential_energy": self.position,
+            f"{model.velocity}_d2t": velocity_d2t,
+            "energy_d2t": energy_d2t,
+            "energy_deviation_d2t": energy_d2t,
+        }.get(quantity, energy)
+
+
+def never(quantity: str, model: Model, options: Options) -> bool:
+    """Say that no error has every second power only."""
+    return False
+
+
+def always(quantity: str, model: Model, options: Options) -> bool:
+    """Say that every error has every second power only: of a symmetric scheme with a symmetric start and velocity."""
+    return True
+
+
+def round_off(options: Options, steps: int) -> float:
+    """Return the predicted round-off of a scheme that adds a small increment at each step: eps N^(1/2)."""
+    return float(UNIT_ROUND_OFF * steps**0.5)
 
 
 @dataclass(frozen=True)
@@ -62,22 +178,39 @@ class Scheme:
     kind: str
     title: str
     source: str
-    options: tuple[Option, ...]
+    family: str
+    """Such as ``Runge-Kutta``, ``multistep``, ``symplectic``."""
     stepper: Callable[[Options], Stepper]
-    """The arithmetic that the options ask for."""
-    formal_order: Callable[[str, Model, Options], int]
-    """Order that the scheme promises for a quantity of a model when its options are sound."""
-    round_off: Callable[[Options, int], float]
-    """Predicted round-off after a number of steps, relative to the solution (order of magnitude)."""
-    even_powers: Callable[[str, Model, Options], bool]
-    """Whether the error of a quantity expands in h^p, h^(p+2), ... rather than h^p, h^(p+1), ..."""
-    stability_limit: float | None
-    """Largest stable ``w dt`` on ``u'' + w^2 u = 0``; None where there is no limit."""
+    """The arithmetic that the options ask for; the same functions for the same options."""
+    orders: Callable[[Options], Orders]
+    """Orders that the scheme promises with these options."""
     force_evaluations: int
-    """Evaluations of the acceleration per step."""
-    velocity_forces: bool
+    """Evaluations of the acceleration per step; of an implicit scheme, per iteration."""
+    start: str
+    """What is needed for the first step, in words."""
+    explicit: bool = True
+    symplectic: bool = False
+    symmetric: bool = False
+    """Whether a step with -dt takes a step back, up to round-off."""
+    velocity_forces: bool = True
     """Whether the acceleration may depend on the velocity."""
+    options: tuple[AnyOption, ...] = ()
+    even_powers: Callable[[str, Model, Options], bool] = never
+    """Whether the error of a quantity expands in h^p, h^(p+2), ... rather than h^p, h^(p+1), ..."""
+    round_off: Callable[[Options, int], float] = round_off
+    """Predicted round-off after a number of steps, relative to the solution (order of magnitude)."""
+    adaptive: bool = False
+    """Whether it chooses its own steps, outside the ladder (`vibsim.schemes.adaptive`)."""
 
-    def defaults(self) -> dict[str, str]:
+    def defaults(self) -> dict[str, OptionValue]:
         """Return every option with its default."""
         return {option.name: option.default for option in self.options}
+
+    @property
+    def words(self) -> tuple[Option, ...]:
+        """The options that are a choice of words."""
+        return tuple(option for option in self.options if isinstance(option, Option))
+
+    def formal_order(self, quantity: str, model: Model, options: Options) -> float:
+        """Return the order that is promised for a quantity of a model; infinite for what is exact."""
+        return self.orders(options).of(quantity, model)

@@ -20,9 +20,15 @@ from __future__ import annotations
 from typing import Any
 
 from vibsim.models.base import Model
-from vibsim.schemes.base import Acceleration, Option, Options, Scheme, Stepper
-
-UNIT_ROUND_OFF = 2.0**-53
+from vibsim.schemes.base import (
+    UNIT_ROUND_OFF,
+    Acceleration,
+    Option,
+    Options,
+    Orders,
+    Scheme,
+    Stepper,
+)
 
 
 def start_three_term(
@@ -130,20 +136,23 @@ def stepper(options: Options) -> Stepper:
     The velocity at n is known once u^(n+1) is. At the last point that is one more step, whose velocity is the kick:
     ``(u^(N+1) - u^(N-1))/(2 dt) = (u^N - u^(N-1))/dt + dt a^N/2``.
     """
-    functions = _FUNCTIONS[options["arithmetic"]]
+    functions = _FUNCTIONS[str(options["arithmetic"])]
     return Stepper(
-        *functions, variant=_STARTS.index(options["start"]), end=_ENDS[options["end_velocity"]]
+        *functions,
+        variant=_STARTS.index(str(options["start"])),
+        end=_ENDS[str(options["end_velocity"])],
+        own_velocity=False,
     )
 
 
-def formal_order(quantity: str, model: Model, options: Options) -> int:
-    """Return 2: the scheme, its start and its velocity are centred, for every quantity of every model."""
-    return 2
+def orders(options: Options) -> Orders:
+    """Return 2 throughout: the scheme, its start and its velocity are centred."""
+    return Orders(position=2, velocity=2, energy=2, energy_linear=2)
 
 
 def round_off(options: Options, steps: int) -> float:
     """Return the predicted round-off after `steps` steps, relative to the solution."""
-    return float(UNIT_ROUND_OFF * steps ** _GROWTH[options["arithmetic"]])
+    return float(UNIT_ROUND_OFF * steps ** _GROWTH[str(options["arithmetic"])])
 
 
 def even_powers(quantity: str, model: Model, options: Options) -> bool:
@@ -159,6 +168,7 @@ CENTRAL = Scheme(
     kind="central",
     title="Centred differences (Stoermer-Verlet)",
     source="pendulum lecture, sections 2.2-2.3; vibration text, section 1.2",
+    family="two-step",
     options=(
         Option(
             "start",
@@ -178,10 +188,12 @@ CENTRAL = Scheme(
         ),
     ),
     stepper=stepper,
-    formal_order=formal_order,
+    orders=orders,
     round_off=round_off,
     even_powers=even_powers,
-    stability_limit=2.0,
     force_evaluations=1,
+    start="u^1, by one of the formulas of the option `start`",
+    symplectic=True,
+    symmetric=True,
     velocity_forces=False,
 )

@@ -61,7 +61,7 @@ def _scheme_section(scheme: Scheme) -> type[Section]:
         "kind": (Literal[scheme.kind], Field(description=scheme.title)),
         "label": (Line | None, label),
     }
-    for option in scheme.options:
+    for option in scheme.words:
         choices: Any = Literal[option.choices]
         fields[option.name] = (
             choices,

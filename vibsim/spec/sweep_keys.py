@@ -75,6 +75,6 @@ def targets(model: Model | None, schemes: Sequence[SchemeSpec]) -> dict[str, Tar
         found.update((f"model.{row.name}", Target(row)) for row in model.parameters)
     found["time.end"] = Target(_END)
     for scheme in schemes:
-        for option in SCHEMES[scheme.kind].options:
+        for option in SCHEMES[scheme.kind].words:
             found[f"schemes.{scheme.name}.{option.name}"] = Target(choices=option.choices)
     return found

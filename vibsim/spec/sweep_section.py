@@ -58,7 +58,7 @@ class Sample(Section):
 def _option_words() -> dict[str, Any]:
     """Describe the options of every scheme, for editors."""
     words: dict[str, list[str]] = {}
-    for option in (option for scheme in SCHEMES.values() for option in scheme.options):
+    for option in (option for scheme in SCHEMES.values() for option in scheme.words):
         words.setdefault(option.name, []).extend(option.choices)
     return {
         rf"^schemes\..+\.{name}$": {

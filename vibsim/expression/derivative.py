@@ -1,0 +1,142 @@
+"""Derivatives of formulas, as formulas: what Newton's method needs of a force."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from vibsim.expression.parser import literal
+from vibsim.expression.tree import (
+    Binary,
+    Call,
+    Compare,
+    Expression,
+    Name,
+    Negate,
+    Number,
+)
+
+ZERO, ONE, TWO = Number(0.0), Number(1.0), Number(2.0)
+
+
+def derivative(node: Expression, name: str) -> Expression:
+    """Return the derivative of a formula by one of its names.
+
+    Where a formula has a corner (``abs``, ``min``, ``max``, ``sign``, ``where``, a comparison) the derivative is that
+    of the branch taken; jumps count as flat.
+    """
+    match node:
+        case Name(own):
+            return ONE if own == name else ZERO
+        case Negate(operand):
+            return _negate(derivative(operand, name))
+        case Binary("+" | "-" as symbol, left, right):
+            return _sum(symbol, derivative(left, name), derivative(right, name))
+        case Binary("*", left, right):
+            return _sum(
+                "+",
+                _times(derivative(left, name), right),
+                _times(left, derivative(right, name)),
+            )
+        case Binary("/", left, right):
+            return _sum(
+                "-",
+                _over(derivative(left, name), right),
+                _over(_times(left, derivative(right, name)), Binary("**", right, TWO)),
+            )
+        case Binary("**", base, exponent):
+            return _of_power(node, base, exponent, name)
+        case Call(function, arguments):
+            return _of_call(node, function, arguments, name)
+        case _:
+            return ZERO
+
+
+def _of_power(node: Expression, base: Expression, exponent: Expression, name: str) -> Expression:
+    by_base, by_exponent = derivative(base, name), derivative(exponent, name)
+    value = literal(exponent)
+    if value is not None:
+        factor = Number(abs(value)) if value >= 0 else Negate(Number(-value))
+        less = _number(value - 1.0)
+        power = base if value == 2.0 else ONE if value == 1.0 else Binary("**", base, less)
+        return _times(_times(factor, power), by_base)
+    lowered = Binary("**", base, Binary("-", exponent, ONE))
+    return _sum(
+        "+",
+        _times(_times(exponent, lowered), by_base),
+        _times(_times(node, Call("log", (base,))), by_exponent),
+    )
+
+
+def _number(value: float) -> Expression:
+    return Number(value) if value >= 0.0 else Negate(Number(-value))
+
+
+def _call(function: str, *arguments: Expression) -> Expression:
+    return Call(function, arguments)
+
+
+def _square(node: Expression) -> Expression:
+    return Binary("**", node, TWO)
+
+
+_OUTER: Mapping[str, Callable[[Expression, Expression], Expression]] = {
+    "sin": lambda x, f: _call("cos", x),
+    "cos": lambda x, f: Negate(_call("sin", x)),
+    "tan": lambda x, f: Binary("+", ONE, _square(f)),
+    "exp": lambda x, f: f,
+    "log": lambda x, f: Binary("/", ONE, x),
+    "sinh": lambda x, f: _call("cosh", x),
+    "cosh": lambda x, f: _call("sinh", x),
+    "tanh": lambda x, f: Binary("-", ONE, _square(f)),
+    "asin": lambda x, f: Binary("/", ONE, _call("sqrt", Binary("-", ONE, _square(x)))),
+    "acos": lambda x, f: Negate(Binary("/", ONE, _call("sqrt", Binary("-", ONE, _square(x))))),
+    "atan": lambda x, f: Binary("/", ONE, Binary("+", ONE, _square(x))),
+    "sqrt": lambda x, f: Binary("/", Number(0.5), f),
+    "abs": lambda x, f: _call("sign", x),
+}
+"""Derivative of a function of one argument, from its argument and its value."""
+
+
+def _of_call(
+    node: Expression, function: str, arguments: tuple[Expression, ...], name: str
+) -> Expression:
+    inner = [derivative(argument, name) for argument in arguments]
+    if all(entry == ZERO for entry in inner) or function == "sign":
+        return ZERO
+    if function in _OUTER:
+        return _times(_OUTER[function](arguments[0], node), inner[0])
+    if function == "where":
+        return _call("where", arguments[0], inner[1], inner[2])
+    first, second = arguments
+    if function in ("min", "max"):
+        symbol = "<=" if function == "min" else ">="
+        return _call("where", Compare(symbol, first, second), inner[0], inner[1])
+    if function == "atan2":
+        length = Binary("+", _square(first), _square(second))
+        turned = _sum("-", _times(second, inner[0]), _times(first, inner[1]))
+        return _over(turned, length)
+    raise NotImplementedError(f"{function} has no derivative here")
+
+
+def _negate(node: Expression) -> Expression:
+    return ZERO if node == ZERO else Negate(node)
+
+
+def _sum(symbol: str, left: Expression, right: Expression) -> Expression:
+    if right == ZERO:
+        return left
+    if left == ZERO:
+        return right if symbol == "+" else Negate(right)
+    return Binary(symbol, left, right)
+
+
+def _times(left: Expression, right: Expression) -> Expression:
+    if ZERO in (left, right):
+        return ZERO
+    if left == ONE:
+        return right
+    return left if right == ONE else Binary("*", left, right)
+
+
+def _over(left: Expression, right: Expression) -> Expression:
+    return ZERO if left == ZERO else Binary("/", left, right)

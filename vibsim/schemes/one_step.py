@@ -1,0 +1,23 @@
+"""One-step methods: the state is (u, v), the velocity is the scheme's own, and it needs no other first step."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+from vibsim.schemes.base import HANDED, Stepper
+from vibsim.schemes.written import written
+
+
+def self_starting(step: Callable[..., Any], *, implicit: bool = False) -> Stepper:
+    """Return the arithmetic of a one-step method on the state (u, v) from its step (`Stepper.step`)."""
+    asked = [name for name in HANDED if name in inspect.signature(step).parameters]
+    rest = ", ".join(["dt", "p", *asked])
+    start = written(
+        f"def start_one_step(variant, u, v, {rest}):\n"
+        f"    following, velocity = {step.__name__}((u, v), 0.0, {rest})\n"
+        "    return following\n",
+        functions={step.__name__: step},
+    )
+    return Stepper(start, step, implicit=implicit)
