@@ -85,12 +85,12 @@ def test_increment_beats_three_term_by_four_orders_at_level_20():
     assert defects["increment"] <= 1e-3 * defects["three_term"]
 
 
-@pytest.mark.parametrize("start", ["centred", "first_order"])
+@pytest.mark.parametrize("start", ["centred", "taylor", "first_order"])
 @pytest.mark.parametrize(("kind", "force"), [("pendulum", math.sin(0.7)), ("linear_pendulum", 0.7)])
 def test_first_step(kind, force, start):
     runs = run(kind, 6, theta=0.7, omega=0.4, start=start)
     dt = 20.0 / 64
-    expected = 0.7 + dt * 0.4 - (0.5 * dt**2 * force if start == "centred" else 0.0)
+    expected = 0.7 + dt * 0.4 - (0.0 if start == "first_order" else 0.5 * dt**2 * force)
     assert runs.position[0, 1] == pytest.approx(expected, rel=1e-15)
 
 
@@ -199,3 +199,36 @@ def test_there_is_no_amplitude_before_there_is_a_trough():
     assert run("pendulum", 10, theta=-1.0, end=20.0).gathered.last_trough[0] == pytest.approx(
         -1.0, abs=1e-3
     )
+
+
+def test_a_taylor_polynomial_starts_as_the_centred_difference_does():
+    """Vibration text, exercise 5, for any initial velocity."""
+    centred, taylor = (
+        run("pendulum", 6, theta=0.7, omega=0.4, start=s) for s in ("centred", "taylor")
+    )
+    np.testing.assert_array_equal(taylor.position, centred.position)
+    np.testing.assert_array_equal(taylor.velocity, centred.velocity)
+
+
+@pytest.mark.parametrize(("g", "omega"), [(1.0, 0.0), (4.0, -1.5), (0.25, 0.7)])
+def test_the_corrected_frequency_is_right_to_fourth_order(g, omega):
+    """Exercise 3, for any initial velocity; twice on a ladder: the position falls by 16, without it by 4."""
+    w = math.sqrt(g)
+    for is_corrected, ratio in ((True, 16.0), (False, 4.0)):
+        errors = []
+        for level in (9, 10):
+            t = np.linspace(0.0, 20.0, 2**level + 1)
+            exact = 1.0 * np.cos(w * t) + omega / w * np.sin(w * t)
+            found = run(
+                "linear_pendulum", level, omega=omega, g=g, frequency_correction=is_corrected
+            )
+            errors.append(np.max(np.abs(found.position[0] - exact)))
+        # the next term is smaller by p^2 with p = w dt <= 2 20/512
+        assert errors[0] / errors[1] == pytest.approx(ratio, rel=2e-2)
+
+
+def test_a_start_without_its_second_order_term_breaks_the_promise():
+    """The trap of A, section 2.3: order 1 where the scheme promises 2."""
+    fine = run("pendulum", 14).position[0, -1]
+    errors = [run("pendulum", n, start="first_order").position[0, -1] - fine for n in (9, 10, 11)]
+    np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 2.0, rtol=0.1)

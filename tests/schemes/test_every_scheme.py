@@ -1,111 +1,188 @@
-"""What holds for every scheme of the registry on every model: its promised order, its limit, its expansion."""
+"""What holds for every scheme of the registry on every model: its promised orders, its expansion, its symmetry."""
 
 import itertools
+import math
 
 import numpy as np
 import pytest
+import scheme_runs as runs_of
 
 from vibsim import Experiment, analyse, simulate, verdicts
-from vibsim.engine import integrate
+from vibsim.engine import LANES
 from vibsim.models import MODELS
-from vibsim.schemes import SCHEMES
+from vibsim.schemes import FIXED_STEP, SCHEMES, NumberOption
 
-PAIRS = [
-    pytest.param(scheme, model, id=f"{scheme.kind}-{model.kind}")
-    for scheme, model in itertools.product(SCHEMES.values(), MODELS.values())
+UNIT = 2.0**-53
+
+
+def case(scheme, *rest, options=None):
+    name = runs_of.name_of(scheme, options) if options is not None else scheme.kind
+    values = [scheme, *([options] if options is not None else []), *rest]
+    return pytest.param(*values, id="-".join([name, *(part.kind for part in rest)]))
+
+
+SMOOTH = [case(*pair) for pair in runs_of.pairs(MODELS.values())]
+VARIED = [
+    case(scheme, model, options=options)
+    for scheme, model in runs_of.pairs(runs_of.ALL_MODELS)
+    for options in runs_of.variants(scheme)
+    # a trap: the promise of the centred scheme is that of a sound start (`test_central`)
+    if (scheme.kind, options.get("start")) != ("central", "first_order")
 ]
-LEVELS = [7, 8, 9, 10]
+FIXED = [case(scheme) for scheme in FIXED_STEP.values()]
 
 
-def ladder(scheme, model, **options):
-    """Return the experiment of one scheme with every option at its default, or as given."""
-    initial = {model.position: 1.1, model.velocity: -0.3}
-    named = {option.name for option in scheme.options}
-    chosen = {name: value for name, value in options.items() if name in named}
+def ladder(scheme, model, quantities, levels):
     return Experiment.from_dict(
         {
             "title": "t",
             "model": {"kind": model.kind},
-            "initial": initial,
-            "time": {"end": 12.0},
-            "levels": LEVELS,
-            "schemes": [{"kind": scheme.kind, **chosen}],
+            "initial": dict(zip((model.position, model.velocity), runs_of.INITIAL, strict=True)),
+            "time": {"end": runs_of.END},
+            "levels": levels,
+            "schemes": [scheme.kind],
             "checks": [
                 {"id": q, "converges": q, "order": "scheme", "norm": "linf_interior"}
-                for q in (model.position, model.velocity, "energy_deviation")
+                for q in quantities
             ],
         }
     )
 
 
-@pytest.mark.parametrize(("scheme", "model"), PAIRS)
+@pytest.mark.parametrize(("scheme", "model"), SMOOTH)
 def test_every_quantity_converges_with_the_promised_order(scheme, model):
-    experiment = ladder(scheme, model)
-    convergence = analyse(experiment, [simulate(experiment, level) for level in LEVELS])
-    for verdict in verdicts(experiment, convergence):
-        assert (verdict.status, verdict.reason) == ("PASS", "asymptotic"), verdict.text
-        (result,) = verdict.results
-        promised = scheme.formal_order(verdict.quantity, model, scheme.defaults())
-        assert abs(result.order - promised) < 0.05
-        assert result.interval[1] - result.interval[0] < 0.1
+    """By the verdict of the analysis; quantities of one order share a ladder."""
+
+    def promised(quantity):
+        return scheme.formal_order(quantity, model, scheme.defaults())
+
+    quantities = (model.position, model.velocity, "energy_deviation")
+    for order, named in itertools.groupby(sorted(quantities, key=promised), promised):
+        if math.isinf(order):
+            continue
+        levels = runs_of.levels_for(order)
+        experiment = ladder(scheme, model, list(named), levels)
+        convergence = analyse(experiment, [simulate(experiment, level) for level in levels])
+        for verdict in verdicts(experiment, convergence):
+            assert (verdict.status, verdict.reason) == ("PASS", "asymptotic"), verdict.text
+            (result,) = verdict.results
+            assert abs(result.order - order) < 0.05
+            low, high = result.interval
+            # the interval is that of the scatter; the next power of dt is seen beyond it
+            assert low - 1e-3 <= order <= high + 1e-3
+            assert high - low <= 0.1
 
 
-@pytest.mark.parametrize(("scheme", "model"), PAIRS)
-def test_the_errors_fall_with_the_promised_order(scheme, model):
-    """Against the exact solution, without the analysis."""
-    if model.exact is None:
-        return
-    experiment = ladder(scheme, model)
-    errors = []
-    for level in LEVELS:
-        data = simulate(experiment, level).isel(scheme=0, case=0)
-        difference = (data[model.position] - data[f"{model.position}_exact"]).values
-        errors.append(np.sqrt(np.mean(difference**2)))
-    promised = scheme.formal_order(model.position, model, scheme.defaults())
-    np.testing.assert_allclose(np.log2(np.divide(errors[:-1], errors[1:])), promised, atol=0.05)
+@pytest.mark.parametrize(("scheme", "options", "model"), VARIED)
+def test_differences_fall_with_the_promised_order_whatever_the_options(scheme, options, model):
+    """Without the analysis, for all quantities, those with ``[D_2t u]`` too, and for forces of every kind."""
+    known = {}
+    for quantity in (*runs_of.series(scheme, model, options, 4),):
+        order = scheme.formal_order(quantity, model, options)
+        if math.isinf(order):
+            continue
+        levels = runs_of.levels_for(order, count=3)
+        for level in levels:
+            if level not in known:
+                known[level] = runs_of.series(scheme, model, options, 2**level)
+        coarse, middle, fine = (
+            # the points of the coarsest level between its ends
+            known[level][quantity][2**i - 1 :: 2**i][: 2 ** levels[0] - 1]
+            for i, level in enumerate(levels)
+        )
+        first, second = np.max(np.abs(coarse - middle)), np.max(np.abs(middle - fine))
+        assert np.log2(first / second) == pytest.approx(order, abs=0.1), quantity
 
 
-@pytest.mark.parametrize(("scheme", "model"), PAIRS)
+@pytest.mark.parametrize(("scheme", "model"), SMOOTH)
 def test_the_error_expands_in_the_powers_that_the_scheme_says(scheme, model):
     """One extrapolation removes h^p; what is left falls with p + 2 where the powers are even, else with p + 1."""
-    if model.exact is None:
-        return
-    experiment = ladder(scheme, model, end_velocity="kick")
-    options = experiment.schemes[0].options
+    assert model.exact is not None
+    options = runs_of.own_end(scheme)
+    initial = dict(zip((model.position, model.velocity), runs_of.INITIAL, strict=True))
+    parameters = {parameter.name: parameter.default for parameter in model.parameters}
     for name in (model.position, model.velocity):
         order = scheme.formal_order(name, model, options)
-        values, exact = [], None
-        for level in LEVELS:
-            data = simulate(experiment, level).isel(scheme=0, case=0)
-            stride = 2 ** (level - LEVELS[0])
-            values.append(data[name].values[::stride])
-            exact = data[f"{name}_exact"].values[::stride]
-        best = [
-            fine + (fine - coarse) / (2**order - 1) for coarse, fine in itertools.pairwise(values)
-        ]
-        errors = [np.max(np.abs(value - exact)[:-1]) for value in best]
         left = order + (2 if scheme.even_powers(name, model, options) else 1)
-        assert np.log2(errors[-2] / errors[-1]) > left - 0.5
+        levels = runs_of.levels_for(left, digits=8.5)
+        values = [
+            runs_of.series(scheme, model, options, 2**level)[name][2**i - 1 :: 2**i]
+            for i, level in enumerate(levels)
+        ]
+        t = np.linspace(0.0, runs_of.END, 2 ** levels[0] + 1)[1:-1]
+        exact = model.exact(t, initial, parameters)[name]
+        best = [
+            fine + (fine - coarse) / (2.0**order - 1.0)
+            for coarse, fine in itertools.pairwise(values)
+        ]
+        errors = [np.max(np.abs(value - exact)) for value in best]
+        assert np.log2(errors[-2] / errors[-1]) > left - 0.3
 
 
-@pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
-def test_the_stability_limit_is_where_it_is_said_to_be(scheme):
-    if scheme.stability_limit is None:
+@pytest.mark.parametrize(("scheme", "model"), SMOOTH)
+def test_what_is_exact_is_kept_to_round_off(scheme, model):
+    """Each of N steps rounds a handful of terms of the size of the state, and N of them may add up."""
+    options = scheme.defaults()
+    steps = 2**10
+    found = runs_of.series(scheme, model, options, steps)
+    size = max(np.max(np.abs(found[name])) for name in (model.position, model.velocity)) ** 2
+    for quantity in ("energy_deviation", "energy_deviation_d2t"):
+        if math.isinf(scheme.formal_order(quantity, model, options)):
+            assert np.max(np.abs(found[quantity])) <= 8.0 * steps * UNIT * size
+
+
+@pytest.mark.parametrize(("scheme", "model"), SMOOTH)
+def test_a_symmetric_scheme_runs_backwards_to_where_it_came_from(scheme, model):
+    """With the velocity reversed; an unsymmetric one must not, or it is symmetric and does not say so."""
+    options = runs_of.own_end(scheme)
+    steps = 64
+    there = runs_of.run(scheme, model, options, steps)
+    turned = (there.position[0, -1], -there.velocity[0, -1])
+    back = runs_of.run(scheme, model, options, steps, initial=turned)
+    arrived = np.array([back.position[0, -1], -back.velocity[0, -1]])
+    missed = np.max(np.abs(arrived - runs_of.INITIAL))
+    # 2 N steps round some ten terms of the size of the state, and errors of v move u for the time that is left
+    bound = 2 * steps * 10 * UNIT * (1.0 + runs_of.END) * np.max(np.abs(there.position))
+    assert (missed <= bound) == scheme.symmetric
+
+
+@pytest.mark.parametrize("scheme", FIXED)
+def test_lanes_give_the_same_bits(scheme):
+    """On a force that depends on all that it may; implicit steps have no lane of vector instructions."""
+    options = scheme.defaults()
+    model = runs_of.DRAGGED if scheme.velocity_forces else runs_of.DRIVEN
+    lanes = [lane for lane in LANES if scheme.explicit or lane != "blocks"]
+    plain, *others = (runs_of.run(scheme, model, options, 64, lane=lane, end=3.0) for lane in lanes)
+    assert np.isfinite(plain.position).all()
+    for other in others:
+        assert plain.position.tobytes() == other.position.tobytes()
+        assert plain.velocity.tobytes() == other.velocity.tobytes()
+        assert plain.gathered.deviation.tobytes() == other.gathered.deviation.tobytes()
+
+
+@pytest.mark.parametrize("scheme", FIXED)
+def test_the_force_is_evaluated_as_often_as_the_scheme_says(scheme):
+    """Per step, where nothing iterates."""
+    if not scheme.explicit:
         return
-    model = MODELS["linear_pendulum"]
-    parameters = np.ones((2, len(model.parameters)))
-    dt = scheme.stability_limit * np.array([0.995, 1.005])
-    runs = integrate(
-        model, scheme, scheme.defaults(), parameters, np.array([[1.0, 0.0]] * 2), dt, 2000, 1
-    )
-    assert np.max(np.abs(runs.position[0])) < 20
-    assert runs.last_step[1] < 2000 or np.max(np.abs(runs.position[1])) > 1e6
+    asked = []
+
+    def acceleration(u, v, t, p):
+        asked.append(t)
+        return -u
+
+    stepper = scheme.stepper(scheme.defaults())
+    state = stepper.start(stepper.variant, 1.0, 0.0, 0.1, (), acceleration)
+    assert min(asked) >= 0.0
+    asked.clear()
+    stepper.step(state, 0.1, 0.1, (), acceleration)
+    assert len(asked) == scheme.force_evaluations
+    assert all(0.1 - 0.05 < t < 0.2 + 0.05 for t in asked)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
 def test_predicted_round_off_is_finite_and_does_not_shrink(scheme):
-    choices = [[(option.name, choice) for choice in option.choices] for option in scheme.options]
-    for options in map(dict, itertools.product(*choices)):
+    for options in runs_of.variants(scheme):
         predicted = [scheme.round_off(options, 2**level) for level in range(0, 31, 5)]
         assert predicted[0] >= 2.0**-54
         assert np.all(np.diff(predicted) >= 0)
@@ -116,6 +193,13 @@ def test_predicted_round_off_is_finite_and_does_not_shrink(scheme):
 def test_the_scheme_says_what_it_is(scheme):
     assert scheme.title
     assert scheme.source
+    assert scheme.family
+    assert scheme.start
     assert scheme.force_evaluations >= 1
-    assert scheme.defaults() == {option.name: option.choices[0] for option in scheme.options}
+    assert scheme.defaults() == {option.name: option.default for option in scheme.options}
     assert all(option.description for option in scheme.options)
+    for option in scheme.options:
+        if isinstance(option, NumberOption):
+            assert option.least <= option.default <= option.most
+    # kernels are kept by their functions
+    assert scheme.adaptive or scheme.stepper(scheme.defaults()) == scheme.stepper(scheme.defaults())

@@ -38,11 +38,9 @@ def derivative(node: Expression, name: str) -> Expression:
                 _times(left, derivative(right, name)),
             )
         case Binary("/", left, right):
-            return _sum(
-                "-",
-                _over(derivative(left, name), right),
-                _over(_times(left, derivative(right, name)), Binary("**", right, TWO)),
-            )
+            # not over right**2, which overflows before the quotient does
+            change = _times(node, derivative(right, name))
+            return _over(_sum("-", derivative(left, name), change), right)
         case Binary("**", base, exponent):
             return _of_power(node, base, exponent, name)
         case Call(function, arguments):
@@ -79,6 +77,12 @@ def _square(node: Expression) -> Expression:
     return Binary("**", node, TWO)
 
 
+def _over_leg(x: Expression) -> Expression:
+    """Return ``1/sqrt(1 - x^2)``, without cancellation near x = 1."""
+    product = Binary("*", Binary("-", ONE, x), Binary("+", ONE, x))
+    return Binary("/", ONE, _call("sqrt", product))
+
+
 _OUTER: Mapping[str, Callable[[Expression, Expression], Expression]] = {
     "sin": lambda x, f: _call("cos", x),
     "cos": lambda x, f: Negate(_call("sin", x)),
@@ -87,9 +91,10 @@ _OUTER: Mapping[str, Callable[[Expression, Expression], Expression]] = {
     "log": lambda x, f: Binary("/", ONE, x),
     "sinh": lambda x, f: _call("cosh", x),
     "cosh": lambda x, f: _call("sinh", x),
-    "tanh": lambda x, f: Binary("-", ONE, _square(f)),
-    "asin": lambda x, f: Binary("/", ONE, _call("sqrt", Binary("-", ONE, _square(x)))),
-    "acos": lambda x, f: Negate(Binary("/", ONE, _call("sqrt", Binary("-", ONE, _square(x))))),
+    # 1 - tanh(x)**2 has no digits left for large x
+    "tanh": lambda x, f: Binary("/", ONE, _square(_call("cosh", x))),
+    "asin": lambda x, f: _over_leg(x),
+    "acos": lambda x, f: Negate(_over_leg(x)),
     "atan": lambda x, f: Binary("/", ONE, Binary("+", ONE, _square(x))),
     "sqrt": lambda x, f: Binary("/", Number(0.5), f),
     "abs": lambda x, f: _call("sign", x),

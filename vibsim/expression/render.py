@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Mapping
+from itertools import accumulate
 
 from vibsim.elementary import ELEMENTARY
 from vibsim.expression.parser import MAX_POWER, ExpressionError, literal, parse
@@ -25,6 +26,8 @@ from vibsim.expression.tree import (
 
 MAX_SOURCE = 10_000
 """Longest factor, in characters, that `to_python` repeats."""
+MAX_NESTING = 120
+"""Parentheses in each other from which `to_statements` gives a part a name: Python reads 200, derivatives have more."""
 
 _OPERATORS: Mapping[str, Callable[[float, float], float]] = {
     "+": operator.add,
@@ -148,6 +151,16 @@ def to_statements(expression: Expression, result: str) -> list[str]:
 
 
 def _source(node: Expression, share: Callable[[str], str]) -> str:
+    source = _source_of(node, share)
+    is_deep = source.count("(") > MAX_NESTING and _nesting(source) > MAX_NESTING
+    return share(source) if is_deep else source
+
+
+def _nesting(source: str) -> int:
+    return max(accumulate((c == "(") - (c == ")") for c in source))
+
+
+def _source_of(node: Expression, share: Callable[[str], str]) -> str:
     match node:
         case Number(value):
             return repr(value)

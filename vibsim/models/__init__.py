@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from vibsim.models.base import ENERGIES, Model, Parameter, State, natural_end, quantities
+from vibsim.models.base import (
+    ENERGIES,
+    Model,
+    Parameter,
+    State,
+    centred,
+    natural_end,
+    quantities,
+)
 from vibsim.models.linear_pendulum import LINEAR_PENDULUM
 from vibsim.models.pendulum import PENDULUM
 from vibsim.models.spring import SPRING
@@ -14,4 +22,13 @@ MODELS: Mapping[str, Model] = MappingProxyType(
     {model.kind: model for model in (PENDULUM, LINEAR_PENDULUM, SPRING)}
 )
 
-__all__ = ["ENERGIES", "MODELS", "Model", "Parameter", "State", "natural_end", "quantities"]
+__all__ = [
+    "ENERGIES",
+    "MODELS",
+    "Model",
+    "Parameter",
+    "State",
+    "centred",
+    "natural_end",
+    "quantities",
+]

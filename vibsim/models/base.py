@@ -87,6 +87,18 @@ def natural_end(model: Model, periods: float, parameters: Numbers) -> Any:
 ENERGIES = ("kinetic_energy", "potential_energy", "energy", "energy_deviation")
 
 
-def quantities(model: Model) -> tuple[str, ...]:
-    """Name every quantity of `model` that is stored as a series."""
-    return (*(state.name for state in model.states), *ENERGIES)
+def quantities(model: Model, own_velocity: bool = False) -> tuple[str, ...]:
+    """Name every quantity of `model` that is stored as a series.
+
+    Parameters
+    ----------
+    own_velocity
+        Whether some scheme has another velocity than the centred difference: then `centred` is stored as well.
+    """
+    more = centred(model) if own_velocity else ()
+    return (*(state.name for state in model.states), *ENERGIES, *more)
+
+
+def centred(model: Model) -> tuple[str, str, str]:
+    """Name the centred difference of the position, ``[D_2t u]``, the energy with it as velocity, and its deviation."""
+    return (f"{model.velocity}_d2t", "energy_d2t", "energy_deviation_d2t")

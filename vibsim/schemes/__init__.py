@@ -5,12 +5,32 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from vibsim.schemes.adaptive import ADAPTIVE
 from vibsim.schemes.base import AnyOption, Flag, NumberOption, Option, Options, Scheme, Stepper
 from vibsim.schemes.central import CENTRAL
+from vibsim.schemes.composition import COMPOSITIONS
+from vibsim.schemes.gauss import GAUSS4
+from vibsim.schemes.implicit import IMPLICIT
+from vibsim.schemes.multistep import ADAMS_BASHFORTH
+from vibsim.schemes.newmark import NEWMARK
+from vibsim.schemes.nystrom import RKN4
 from vibsim.schemes.runge_kutta import RUNGE_KUTTA
 
 SCHEMES: Mapping[str, Scheme] = MappingProxyType(
-    {scheme.kind: scheme for scheme in (CENTRAL, *RUNGE_KUTTA)}
+    {
+        scheme.kind: scheme
+        for scheme in (
+            CENTRAL,
+            *RUNGE_KUTTA,
+            *ADAMS_BASHFORTH,
+            *COMPOSITIONS,
+            RKN4,
+            *IMPLICIT,
+            *NEWMARK,
+            GAUSS4,
+            *ADAPTIVE,
+        )
+    }
 )
 
 FIXED_STEP: Mapping[str, Scheme] = MappingProxyType(

@@ -11,12 +11,13 @@ import inspect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.expression import names_in, parse
 from vibsim.models.base import Model
 
 OptionValue = str | float | bool
@@ -97,6 +98,8 @@ class Stepper:
     """Whether a step solves an equation, for which it may ask for `slopes`."""
     scaling: Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], ...]] | None = None
     """Factors of the acceleration and of the initial velocity that enters the start, from ``w dt``; None for 1."""
+    tabulated: bool = False
+    """Whether the points are known before, and stand behind the parameters (`vibsim.simulation.adaptive`)."""
 
 
 END_RULES = ("own", "extrapolate", "backward")
@@ -115,6 +118,14 @@ def handed(
     return partial(function, **{name: known[name] for name in HANDED if name in asked})
 
 
+@cache
+def depends_on_velocity(model: Model) -> bool:
+    """Tell whether the acceleration of a model depends on the velocity."""
+    names = [parameter.name for parameter in model.parameters]
+    known = (model.position, model.velocity, "t", *names)
+    return model.velocity in names_in(parse(model.acceleration, known))
+
+
 @dataclass(frozen=True)
 class Orders:
     """Powers of dt with which the errors of a scheme vanish, infinite where a quantity is exact.
@@ -131,6 +142,10 @@ class Orders:
     energy_d2t: float | None = None
     """Of the energy with that velocity; None: that of the energy, 2 at most."""
     energy_d2t_linear: float | None = None
+    position_linear: float | None = None
+    """Of the position of a linear, conservative model; None: that of any other one."""
+    velocity_dependent: Orders | None = None
+    """What is promised instead where the acceleration depends on the velocity; None: the same."""
 
     def of(self, quantity: str, model: Model) -> float:
         """Return the order of a quantity of a model.
@@ -140,16 +155,20 @@ class Orders:
         quantity
             A state, an energy (`vibsim.models.ENERGIES`), or either with ``_d2t`` behind it.
         """
+        if self.velocity_dependent is not None and depends_on_velocity(model):
+            return self.velocity_dependent.of(quantity, model)
         is_simple = model.linear and model.conservative
+        linear = self.position if self.position_linear is None else self.position_linear
+        position = linear if is_simple else self.position
         energy = self.energy_linear if is_simple else self.energy
         given = self.energy_d2t_linear if is_simple else self.energy_d2t
         energy_d2t = min(energy, 2.0) if given is None else given
-        velocity_d2t = min(self.position, 2.0) if self.velocity_d2t is None else self.velocity_d2t
+        velocity_d2t = min(position, 2.0) if self.velocity_d2t is None else self.velocity_d2t
         return {
-            model.position: self.position,
+            model.position: position,
             model.velocity: self.velocity,
             "kinetic_energy": self.velocity,
-            "potential_energy": self.position,
+            "potential_energy": position,
             f"{model.velocity}_d2t": velocity_d2t,
             "energy_d2t": energy_d2t,
             "energy_deviation_d2t": energy_d2t,

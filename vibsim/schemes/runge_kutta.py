@@ -13,13 +13,12 @@ Ordinary Differential Equations I, section II.1 (Kutta's third and fourth order 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
 from vibsim.schemes.base import Options, Orders, Scheme, Stepper
 from vibsim.schemes.one_step import self_starting
-from vibsim.schemes.written import written
+from vibsim.schemes.written import weighted, written
 
 
 @dataclass(frozen=True)
@@ -36,31 +35,20 @@ def from_tableau(tableau: Tableau) -> Stepper:
     """Return the arithmetic of an explicit method."""
     formulas: dict[str, str] = {}
 
-    def weighted(prefix: str, row: Sequence[str], names: Sequence[str]) -> str:
-        """Write a sum of names with the weights of a row; zeros and factors of 1 are left out."""
-        terms = []
-        for j, (weight, name) in enumerate(zip(row, names, strict=True), 1):
-            if weight not in ("0", "1"):
-                formulas[f"{prefix}_{j}"] = weight
-                terms.append(f"{prefix}_{j} * {name}")
-            elif weight == "1":
-                terms.append(name)
-        return " + ".join(terms)
-
     lines = ["u, v = state", "a_1 = acceleration(u, v, t, p)"]
     velocities, accelerations = ["v"], ["a_1"]
     for i, row in enumerate(tableau.a, 2):
         formulas[f"C_{i}"] = " + ".join(f"({entry})" for entry in row)
-        drift = weighted(f"A_{i}", row, velocities)
-        kick = weighted(f"A_{i}", row, accelerations)
+        drift = weighted(f"A_{i}", row, velocities, formulas)
+        kick = weighted(f"A_{i}", row, accelerations, formulas)
         lines += [
             f"v_{i} = v + dt * ({kick})",
             f"a_{i} = acceleration(u + dt * ({drift}), v_{i}, t + C_{i} * dt, p)",
         ]
         velocities.append(f"v_{i}")
         accelerations.append(f"a_{i}")
-    drift = weighted("B", tableau.b, velocities)
-    kick = weighted("B", tableau.b, accelerations)
+    drift = weighted("B", tableau.b, velocities, formulas)
+    kick = weighted("B", tableau.b, accelerations, formulas)
     lines.append(f"return (u + dt * ({drift}), v + dt * ({kick})), v")
     body = "\n    ".join(lines)
     text = f"def step_runge_kutta(state, t, dt, p, acceleration):\n    {body}\n"

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import linecache
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from types import FunctionType
 from typing import Any
@@ -59,6 +59,20 @@ def _written(
     )
     _FORMULAS[function] = dict(formulas)
     return function
+
+
+def weighted(
+    prefix: str, weights: Sequence[str], names: Sequence[str], formulas: dict[str, str]
+) -> str:
+    """Write a sum of names with weights, which join `formulas` as ``prefix_1``, ...; weights 0 and 1 are left out."""
+    terms = []
+    for j, (weight, name) in enumerate(zip(weights, names, strict=True), 1):
+        if weight not in ("0", "1"):
+            formulas[f"{prefix}_{j}"] = weight
+            terms.append(f"{prefix}_{j} * {name}")
+        elif weight == "1":
+            terms.append(name)
+    return " + ".join(terms)
 
 
 _FORMULAS: dict[FunctionType, Mapping[str, str]] = {}

@@ -1,0 +1,118 @@
+"""References that choose their own steps, from SciPy: DOP853, LSODA and Radau; each is its name and its tolerance.
+
+They stand outside the ladder: a run knows a tolerance and no level, so that no order is promised. The rows that they
+have in the files of the levels are their dense output at the points of each level (`vibsim.simulation.adaptive`).
+
+Source: vibration text (B), exercise 4; E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations
+I, section II.10 (DOP853), and II, section IV.8 (Radau IIA of order 5); A. C. Hindmarsh, ODEPACK, and L. Petzold, SIAM
+J. Sci. Stat. Comput. 4 (1983) (LSODA).
+"""
+
+from __future__ import annotations
+
+import math
+
+from vibsim.errors import SimulationError
+from vibsim.schemes.base import NumberOption, Options, Orders, Scheme, Stepper
+
+LEAST_RELATIVE = 100 * 2.0**-52
+"""Relative tolerance that SciPy does not go below, 2.2e-14; a smaller one acts on the absolute tolerance alone."""
+
+TOLERANCE = NumberOption(
+    name="tolerance",
+    default=1e-10,
+    least=1e-14,
+    most=1e-1,
+    description=(
+        "error that is allowed of each step, relative to the state, and to the size of the problem where the state "
+        "passes zero; below 2.2e-14, SciPy's least relative tolerance, the second alone becomes smaller"
+    ),
+)
+
+_MEASURED = {
+    "dop853": (10.0, 1 / 8, 2e-4),
+    "lsoda": (46.0, 0.075, 3e-5),
+    "radau": (150.0, 1 / 4, 3e-4),
+}
+"""Steps per period at a tolerance of 1e-8, the power of the tolerance by which they grow, seconds of a step:
+measured on the pendulum."""
+START_SECONDS = 3e-3
+"""Of a member beside its steps."""
+
+
+def seconds(kind: str, tolerance: float, periods: float) -> float:
+    """Return the seconds that SciPy takes of one member, as far as periods of small oscillations tell."""
+    steps, power, cost = _MEASURED[kind]
+    periods = periods if math.isfinite(periods) else 1.0
+    return float(START_SECONDS + periods * steps * (1e-8 / tolerance) ** power * cost)
+
+
+_NO_ORDERS = Orders(
+    position=math.nan,
+    velocity=math.nan,
+    energy=math.nan,
+    energy_linear=math.nan,
+    velocity_d2t=math.nan,
+    energy_d2t=math.nan,
+    energy_d2t_linear=math.nan,
+)
+
+
+def _own_steps(options: Options) -> Stepper:
+    raise SimulationError("an adaptive scheme takes its own steps, and has no step of a given size")
+
+
+def _no_orders(options: Options) -> Orders:
+    return _NO_ORDERS
+
+
+def _tolerated(options: Options, steps: int) -> float:
+    """Return the error below which nothing is promised: the tolerance, whatever the level."""
+    return float(options["tolerance"])
+
+
+def _scheme(
+    kind: str, title: str, source: str, family: str, force_evaluations: int, *, explicit: bool
+) -> Scheme:
+    return Scheme(
+        kind=kind,
+        title=title,
+        source=f"vibration text, exercise 4; {source}",
+        family=family,
+        stepper=_own_steps,
+        orders=_no_orders,
+        force_evaluations=force_evaluations,
+        start="none: it chooses its first step and every other one",
+        explicit=explicit,
+        options=(TOLERANCE,),
+        round_off=_tolerated,
+        adaptive=True,
+    )
+
+
+DOP853 = _scheme(
+    "dop853",
+    "Dormand and Prince's Runge-Kutta method of order 8, adaptive (SciPy)",
+    "Hairer, Norsett and Wanner I, section II.10",
+    "Runge-Kutta",
+    12,
+    explicit=True,
+)
+LSODA = _scheme(
+    "lsoda",
+    "Adams and BDF methods of variable order, adaptive (SciPy, ODEPACK)",
+    "Petzold, SIAM J. Sci. Stat. Comput. 4 (1983)",
+    "multistep",
+    2,
+    explicit=False,
+)
+RADAU = _scheme(
+    "radau",
+    "Radau IIA method of order 5, adaptive (SciPy)",
+    "Hairer and Wanner II, section IV.8",
+    "implicit Runge-Kutta",
+    3,
+    explicit=False,
+)
+
+ADAPTIVE = (DOP853, LSODA, RADAU)

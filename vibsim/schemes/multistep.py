@@ -1,0 +1,112 @@
+r"""Explicit multistep methods (Adams-Bashforth) for ``u' = v``, ``v' = a(u, v, t)``; each is its weights.
+
+``u^(n+1) = u^n + dt sum_j b_j v^(n-j)``, ``v^(n+1) = v^n + dt sum_j b_j a^(n-j)``, j = 0, ..., k-1: order k with one
+evaluation of the force per step, on any force. The state carries the slopes of the k-1 points behind.
+
+**Start.** The missing points come from a Runge-Kutta method of order k, one more than a start needs. The second-order
+method has its slopes at n = 0 and 1 after one step of Heun's method. The third-order one needs u^2 as well before its
+formula has all slopes. A scheme hands the engine its state at step 1 only; so the start takes two steps with Kutta's
+method, and puts in place of the slope at n = -1, which nobody has, the one with which the formula gives just that u^2:
+``f^(-1) = ((u^2 - u^1)/dt - b_0 f^1 - b_1 f^0)/b_2``, for v likewise. The force is never asked for at t < 0.
+
+On ``u'' + w^2 u = 0`` both grow slowly: a step multiplies the amplitude by ``1 + p^4/4`` (k = 2) and ``1 - 3 p^4/8``
+(k = 3, damped up to its stability limit), p = w dt, so that the energy is of order 3 there with both.
+
+Source: E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, section III.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from vibsim.schemes.base import Acceleration, Options, Orders, Scheme, Stepper
+from vibsim.schemes.runge_kutta import HEUN, RK3
+from vibsim.schemes.written import weighted, written
+
+heun_step = HEUN.stepper({}).step
+kutta_step = RK3.stepper({}).step
+
+
+def adams_bashforth(weights: tuple[str, ...]) -> Callable[..., Any]:
+    """Write the step of the method with these weights, formulas, the latest slope first.
+
+    The state is (u, v), then velocity and acceleration of the point behind, then of the one behind that.
+    """
+    formulas: dict[str, str] = {}
+    behind = range(1, len(weights))
+    velocities, accelerations = ([name, *(f"{name}_{j}" for j in behind)] for name in ("v", "a"))
+    carried = [name for j in behind for name in (f"v_{j}", f"a_{j}")]
+    drift, kick = (weighted("W", weights, names, formulas) for names in (velocities, accelerations))
+    following = [f"u + dt * ({drift})", f"v + dt * ({kick})", "v", "a", *carried[:-2]]
+    text = (
+        "def step_adams(state, t, dt, p, acceleration):\n"
+        f"    u, v, {', '.join(carried)} = state\n"
+        "    a = acceleration(u, v, t, p)\n"
+        f"    return ({', '.join(following)}), v\n"
+    )
+    return written(text, formulas)
+
+
+def start_two(
+    variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
+) -> tuple[float, ...]:
+    """Return u^1 and v^1 by a step of Heun's method, and the slopes at n = 0."""
+    one, _ = heun_step((u, v), 0.0, dt, p, acceleration)
+    return one[0], one[1], v, acceleration(u, v, 0.0, p)
+
+
+def start_three(
+    variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
+) -> tuple[float, ...]:
+    """Return u^1 and v^1 by Kutta's method, the slopes at n = 0, and in place of those at n = -1 what gives u^2."""
+    one, _ = kutta_step((u, v), 0.0, dt, p, acceleration)
+    two, _ = kutta_step(one, dt, dt, p, acceleration)
+    u_1, v_1 = one
+    a_0, a_1 = acceleration(u, v, 0.0, p), acceleration(u_1, v_1, dt, p)
+    v_before = (12.0 * (two[0] - u_1) / dt - 23.0 * v_1 + 16.0 * v) / 5.0
+    a_before = (12.0 * (two[1] - v_1) / dt - 23.0 * a_1 + 16.0 * a_0) / 5.0
+    return u_1, v_1, v, a_0, v_before, a_before
+
+
+def _scheme(
+    kind: str,
+    title: str,
+    weights: tuple[str, ...],
+    start: Callable[..., tuple[float, ...]],
+    start_in_words: str,
+    orders: Orders,
+) -> Scheme:
+    def stepper(options: Options) -> Stepper:
+        return Stepper(start, adams_bashforth(weights))
+
+    return Scheme(
+        kind=kind,
+        title=title,
+        source="Hairer, Norsett and Wanner I, section III.1",
+        family="multistep",
+        stepper=stepper,
+        orders=lambda options: orders,
+        force_evaluations=1,
+        start=start_in_words,
+    )
+
+
+AB2 = _scheme(
+    "ab2",
+    "Adams-Bashforth method (order 2)",
+    ("3/2", "-1/2"),
+    start_two,
+    "u^1 by Heun's method",
+    Orders(position=2, velocity=2, energy=2, energy_linear=3),
+)
+AB3 = _scheme(
+    "ab3",
+    "Adams-Bashforth method (order 3)",
+    ("23/12", "-4/3", "5/12"),
+    start_three,
+    "u^1 and u^2 by Kutta's third-order method",
+    Orders(position=3, velocity=3, energy=3, energy_linear=3),
+)
+
+ADAMS_BASHFORTH = (AB2, AB3)

@@ -1,0 +1,193 @@
+r"""Newmark's scheme and those that damp the highest frequencies: HHT-alpha and generalized-alpha.
+
+With ``f^n = a(u^n, v^n, t^n)`` the force per unit mass, all of them are
+
+``u^(n+1) = u^n + dt v^n + dt^2 ((1/2 - beta) a^n + beta a^(n+1))``,
+``v^(n+1) = v^n + dt ((1 - gamma) a^n + gamma a^(n+1))``,
+``(1 - alpha_m) a^(n+1) + alpha_m a^n = (1 - alpha_f) f^(n+1) + alpha_f f^n``,
+
+with a^0 = f^0. The state carries (u, v, a). Forces are averaged, and external forces with them, rather than taken at an
+averaged point: the two agree on a linear structure but for the time of the load, and both are of order 2.
+
+- ``newmark``: alpha_m = alpha_f = 0, any beta and gamma. Order 2 for gamma = 1/2 only. beta = 1/4 is the trapezoidal
+  rule (Crank-Nicolson), 1/6 the linear acceleration method, 1/12 Fox-Goodwin, 0 velocity Verlet, which is explicit.
+- ``hht``: alpha_m = 0, alpha_f = -alpha, with alpha from -1/3 (most damping) to 0, beta = (1 - alpha)^2/4 and
+  gamma = (1 - 2 alpha)/2.
+- ``generalized_alpha``: by rho_inf, what is left of the highest frequencies in one step, from 0 to 1 (none is damped):
+  alpha_m = (2 rho_inf - 1)/(rho_inf + 1), alpha_f = rho_inf/(rho_inf + 1), beta = (1 - alpha_m + alpha_f)^2/4 and
+  gamma = 1/2 - alpha_m + alpha_f.
+
+Source: N. M. Newmark, A method of computation for structural dynamics, J. Eng. Mech. 85 (1959); H. M. Hilber,
+T. J. R. Hughes and R. L. Taylor, Improved numerical dissipation for time integration algorithms in structural
+dynamics, Earthq. Eng. Struct. Dyn. 5 (1977); J. Chung and G. M. Hulbert, A time integration algorithm for structural
+dynamics with improved numerical dissipation: the generalized-alpha method, J. Appl. Mech. 60 (1993).
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+from vibsim.models.base import Model
+from vibsim.schemes.base import NumberOption, Options, Orders, Scheme, Stepper
+from vibsim.schemes.newton import solved
+from vibsim.schemes.written import written
+
+_STEP = """\
+def step_newmark(state, t, dt, p, acceleration, slopes):
+    u, v, a = state
+    {rest}
+    push = v + dt * (LATE * a + GAMMA * rest)
+    reach = u + dt * (v + dt * (NEAR * a + BETA * rest))
+    force = solved({guess}, reach, FAR * dt * dt, push, FAST * dt, t + dt, p, acceleration, slopes)
+    ahead = rest + SHARE * force
+    drift = dt * (v + dt * (NEAR * a + BETA * ahead))
+    return (u + drift, v + dt * (LATE * a + GAMMA * ahead), ahead), v
+"""
+"""Solved for the force at the next point, with ``a^(n+1) = rest + SHARE f^(n+1)``."""
+
+_ALONE = {"rest": "rest = 0.0", "guess": "a"}
+_AVERAGED = {
+    "rest": "now = acceleration(u, v, t, p)\n    rest = OLD_FORCE * now - OLD * a",
+    "guess": "now",
+}
+
+_START = """\
+def start_newmark(variant, u, v, dt, p, acceleration, slopes):
+    a = acceleration(u, v, 0.0, p)
+    following, velocity = step_newmark((u, v, a), 0.0, dt, p, acceleration, slopes)
+    return following
+"""
+
+
+@cache
+def _stepper(beta: str, gamma: str, alpha_m: str = "0", alpha_f: str = "0") -> Stepper:
+    """Return the arithmetic for these parameters, which are formulas."""
+    is_averaged = (alpha_m, alpha_f) != ("0", "0")
+    new, share = f"(1 - ({alpha_m}))", f"(1 - ({alpha_f}))/(1 - ({alpha_m}))"
+    formulas = {
+        "SHARE": share,
+        "NEAR": f"1/2 - ({beta})",
+        "BETA": beta,
+        "FAR": f"({beta})*{share}",
+        "LATE": f"1 - ({gamma})",
+        "GAMMA": gamma,
+        "FAST": f"({gamma})*{share}",
+    }
+    if is_averaged:
+        formulas |= {"OLD_FORCE": f"({alpha_f})/{new}", "OLD": f"({alpha_m})/{new}"}
+    text = _STEP.format(**(_AVERAGED if is_averaged else _ALONE))
+    step = written(text, formulas, {"solved": solved})
+    start = written(_START, functions={"step_newmark": step})
+    return Stepper(start, step, implicit=True)
+
+
+def _newmark(options: Options) -> Stepper:
+    return _stepper(repr(options["beta"]), repr(options["gamma"]))
+
+
+def _hht(options: Options) -> Stepper:
+    alpha = f"({options['alpha']!r})"
+    return _stepper(f"(1 - {alpha})**2/4", f"(1 - 2*{alpha})/2", alpha_f=f"-{alpha}")
+
+
+def _generalized_alpha(options: Options) -> Stepper:
+    rho = repr(options["rho_inf"])
+    alpha_m, alpha_f = f"(2*{rho} - 1)/({rho} + 1)", f"{rho}/({rho} + 1)"
+    apart = f"({alpha_f} - {alpha_m})"
+    return _stepper(f"(1 + {apart})**2/4", f"1/2 + {apart}", alpha_m, alpha_f)
+
+
+def _is_centred(options: Options) -> bool:
+    """Tell whether the velocity of `newmark` is advanced by the trapezoidal rule."""
+    return options["gamma"] == 0.5
+
+
+def _newmark_orders(options: Options) -> Orders:
+    if not _is_centred(options):
+        return Orders(position=1, velocity=1, energy=1, energy_linear=1)
+    energy_linear = math.inf if options["beta"] == 0.25 else 2.0
+    return Orders(
+        position=2, velocity=2, energy=2, energy_linear=energy_linear, energy_d2t_linear=2
+    )
+
+
+def _damps(options: Options) -> bool:
+    """Tell whether high frequencies are damped: with alpha = 0 or rho_inf = 1 the scheme is the trapezoidal rule."""
+    return options.get("alpha", 1.0) != 0.0 and options.get("rho_inf", 0.0) != 1.0
+
+
+def _averaged_orders(options: Options) -> Orders:
+    energy_linear = 2.0 if _damps(options) else math.inf
+    return Orders(
+        position=2, velocity=2, energy=2, energy_linear=energy_linear, energy_d2t_linear=2
+    )
+
+
+def _newmark_even_powers(quantity: str, model: Model, options: Options) -> bool:
+    """Tell whether the scheme is symmetric, which it is with gamma = 1/2 for any beta."""
+    return _is_centred(options)
+
+
+def _averaged_even_powers(quantity: str, model: Model, options: Options) -> bool:
+    """Tell whether nothing is damped, and the scheme symmetric."""
+    return not _damps(options)
+
+
+NEWMARK_BETA = Scheme(
+    kind="newmark",
+    title="Newmark's scheme",
+    source="Newmark (1959); the trapezoidal rule of the vibration text, equation (37), by default",
+    family="Newmark",
+    options=(
+        NumberOption(
+            "beta", 0.25, 0.0, 1.0, "weight of the new acceleration in the position; 0: explicit"
+        ),
+        NumberOption(
+            "gamma", 0.5, 0.0, 1.5, "weight of the new acceleration in the velocity; 1/2: order 2"
+        ),
+    ),
+    stepper=_newmark,
+    orders=_newmark_orders,
+    even_powers=_newmark_even_powers,
+    force_evaluations=1,
+    start="a^0, from the equation of motion",
+    explicit=False,
+    symmetric=True,
+)
+HHT = Scheme(
+    kind="hht",
+    title="HHT-alpha (Hilber, Hughes and Taylor)",
+    source="Hilber, Hughes and Taylor (1977)",
+    family="Newmark",
+    options=(
+        NumberOption(
+            "alpha", -0.1, -1.0 / 3.0, 0.0, "damping of high frequencies, the most at -1/3"
+        ),
+    ),
+    stepper=_hht,
+    orders=_averaged_orders,
+    even_powers=_averaged_even_powers,
+    force_evaluations=1,
+    start="a^0, from the equation of motion",
+    explicit=False,
+)
+GENERALIZED_ALPHA = Scheme(
+    kind="generalized_alpha",
+    title="Generalized-alpha (Chung and Hulbert)",
+    source="Chung and Hulbert (1993)",
+    family="Newmark",
+    options=(
+        NumberOption(
+            "rho_inf", 0.8, 0.0, 1.0, "what is left of the highest frequencies in one step"
+        ),
+    ),
+    stepper=_generalized_alpha,
+    orders=_averaged_orders,
+    even_powers=_averaged_even_powers,
+    force_evaluations=1,
+    start="a^0, from the equation of motion",
+    explicit=False,
+)
+
+NEWMARK = (NEWMARK_BETA, HHT, GENERALIZED_ALPHA)

@@ -1,0 +1,165 @@
+r"""Newton's method for the one equation that a step of an implicit scheme leaves.
+
+Every scheme of `vibsim.schemes.implicit` and `vibsim.schemes.newmark` reduces to one unknown: the acceleration x at
+the next point, with ``x = a(u + d_u x, v + d_v x, t)`` and known u, d_u, v, d_v. Newton's method takes the model's own
+derivative, ``1 - (d_u da/du + d_v da/dv)``, and goes on to round-off: a quasi-Newton method that stopped at 1e-4 is
+what spoiled the Crank-Nicolson rows of the vibration text (B), section 6.2 (`errata`).
+
+It stops when what is left, by the rate at which the corrections fall, is a few units in the last place of the terms of
+the equation (E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, equation IV.8.10). A linear force
+takes two iterations, of which the second one finds the first one exact. Where Newton's method circles (a steep friction
+law), bisection takes turns with it between two places where the residual has different signs. Where no solution is
+found the result is NaN, so that the member ends there as failed: never a value that does not solve the equation. Of
+several solutions, which large steps may have, it is the one that Newton's method reaches from the present acceleration.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, TypeVar
+
+from vibsim.schemes.base import Acceleration, Slopes
+
+F = TypeVar("F")
+Two = tuple[float, float]
+Four = tuple[float, float, float, float]
+
+TOLERANCE = 2.0**-51
+"""Largest error that is left, relative to the terms of the equation."""
+STALLED = 2.0**-30
+"""Largest correction that may be taken for round-off once corrections no longer fall."""
+MOST = 12
+"""Iterations before bisection helps."""
+MOST_TOGETHER = 50
+"""Iterations before a system has no solution."""
+MOST_BISECTED = 200
+"""Iterations before the equation has no solution: every second one halves the interval."""
+
+
+def alone(function: F) -> F:
+    """Mark a function that a kernel compiles for itself instead of into its callers: start and step share it."""
+    return function
+
+
+@alone
+def solved(
+    x: float,
+    u: float,
+    d_u: float,
+    v: float,
+    d_v: float,
+    t: float,
+    p: Any,
+    acceleration: Acceleration,
+    slopes: Slopes,
+) -> float:
+    """Return the x with ``x = acceleration(u + d_u x, v + d_v x, t, p)``, from a first guess x; NaN for none.
+
+    It runs on exact numbers too, for which a change is either 0 or too large.
+    """
+    guess, before = x, 0.0
+    for k in range(MOST):
+        here, speed = u + d_u * x, v + d_v * x
+        force = acceleration(here, speed, t, p)
+        by_u, by_v = slopes(here, speed, t, p)
+        change = (x - force) / (1.0 - (d_u * by_u + d_v * by_v))
+        scale = abs(force) + abs(by_u * here) + abs(by_v * speed)
+        rate = change / before if k else 1.0
+        x = x - change
+        # not a number where x or a slope is infinite or NaN
+        sound = (x - x) + (scale - scale)
+        if sound != sound:
+            break
+        if not abs(change * rate) > TOLERANCE * scale:
+            return x
+        if k and not abs(change) > STALLED * scale and not abs(rate) < 0.5:
+            return x
+        before = change
+    return bisected(guess, u, d_u, v, d_v, t, p, acceleration, slopes)
+
+
+@alone
+def bisected(
+    x: float,
+    u: float,
+    d_u: float,
+    v: float,
+    d_v: float,
+    t: float,
+    p: Any,
+    acceleration: Acceleration,
+    slopes: Slopes,
+) -> float:
+    """Return what `solved` does, by Newton's method and bisection in turns, or NaN."""
+    below = above = math.nan
+    change, scale = math.inf, 0.0
+    for k in range(MOST_BISECTED):
+        here, speed = u + d_u * x, v + d_v * x
+        force = acceleration(here, speed, t, p)
+        by_u, by_v = slopes(here, speed, t, p)
+        slope = 1.0 - (d_u * by_u + d_v * by_v)
+        terms = abs(by_u * here) + abs(by_v * speed)
+        # a slope that is infinite or none is replaced by that of a constant force
+        if not abs(slope) > 0.0 or not abs(slope) + terms < math.inf:
+            slope, terms = 1.0, 0.0
+        change, scale = (x - force) / slope, abs(force) + terms
+        if not abs(change) > TOLERANCE * scale:
+            return x - change
+        if x < force:
+            below = x
+        else:
+            above = x
+        ahead = x - change
+        if (
+            below == below
+            and above == above
+            and not (k % 2 == 0 and (ahead - below) * (ahead - above) < 0.0)
+        ):
+            ahead = 0.5 * (below + above)
+        x = ahead
+    return x if abs(change) <= STALLED * scale else math.nan
+
+
+@alone
+def solved_together(
+    x: float,
+    y: float,
+    u: Two,
+    d_u: Four,
+    v: Two,
+    d_v: Four,
+    t: Two,
+    p: Any,
+    acceleration: Acceleration,
+    slopes: Slopes,
+) -> Two:
+    """Return x and y with ``x = a(U_1, V_1, t_1)`` and ``y = a(U_2, V_2, t_2)``, from first guesses; NaN for none.
+
+    ``U_i = u_i + d_u_i1 x + d_u_i2 y`` and V_i likewise; `d_u` and `d_v` are matrices row by row.
+    """
+    before = 0.0
+    for k in range(MOST_TOGETHER):
+        u_1, u_2 = u[0] + (d_u[0] * x + d_u[1] * y), u[1] + (d_u[2] * x + d_u[3] * y)
+        v_1, v_2 = v[0] + (d_v[0] * x + d_v[1] * y), v[1] + (d_v[2] * x + d_v[3] * y)
+        force_1, force_2 = acceleration(u_1, v_1, t[0], p), acceleration(u_2, v_2, t[1], p)
+        a, b = slopes(u_1, v_1, t[0], p)
+        c, d = slopes(u_2, v_2, t[1], p)
+        j_11, j_12 = 1.0 - (a * d_u[0] + b * d_v[0]), -(a * d_u[1] + b * d_v[1])
+        j_21, j_22 = -(c * d_u[2] + d * d_v[2]), 1.0 - (c * d_u[3] + d * d_v[3])
+        off_1, off_2 = x - force_1, y - force_2
+        determinant = j_11 * j_22 - j_12 * j_21
+        d_x = (off_1 * j_22 - off_2 * j_12) / determinant
+        d_y = (off_2 * j_11 - off_1 * j_21) / determinant
+        x, y = x - d_x, y - d_y
+        change = abs(d_x) if abs(d_x) > abs(d_y) else abs(d_y)
+        scale = (
+            abs(force_1) + abs(force_2) + abs(a * u_1) + abs(b * v_1) + abs(c * u_2) + abs(d * v_2)
+        )
+        rate = change / before if k else 1.0
+        # `not >`, so that NaN ends it as well
+        if not change * rate > TOLERANCE * scale:
+            return x, y
+        if k and not change > STALLED * scale and not rate < 0.5:
+            return x, y
+        before = change
+    return math.nan, math.nan
