@@ -3,16 +3,13 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from vibsim import schemes
 from vibsim.cli import deleted, jobs, main, room, workflow
 from vibsim.errors import FileError, VibsimError
 from vibsim.models import MODELS
-from vibsim.schemes import SCHEMES
 
 TEXT = """\
 title: A tiny pendulum
@@ -188,17 +185,6 @@ def test_list_of_models_tells_which_are_linear(capsys: Capture) -> None:
     assert shapes == {
         kind: "linear" if model.linear else "nonlinear" for kind, model in MODELS.items()
     }
-
-
-def test_list_of_schemes_tells_work_and_limit(
-    capsys: Capture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    free = replace(SCHEMES["central"], kind="free", stability_limit=None, force_evaluations=4)
-    monkeypatch.setattr(schemes, "SCHEMES", {**SCHEMES, "free": free})
-    assert main(["list", "schemes"]) == 0
-    lines = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
-    assert "1 force evaluation per step; stable while w dt < 2" in lines["central"]
-    assert "4 force evaluations per step; stable for every step" in lines["free"]
 
 
 @pytest.mark.parametrize(

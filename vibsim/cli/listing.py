@@ -5,6 +5,10 @@ from __future__ import annotations
 import math
 from argparse import Namespace
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from vibsim.schemes import AnyOption, Scheme
 
 
 def list_(options: Namespace) -> int:
@@ -32,18 +36,49 @@ def _models() -> Iterable[tuple[str, str]]:
 
 
 def _schemes() -> Iterable[tuple[str, str]]:
-    from vibsim.schemes import SCHEMES, Option
+    """Yield a line of facts for each scheme, then what it is and where it comes from, then its options."""
+    from vibsim.schemes import SCHEMES
+
+    head = ("order", "step", "symplectic", "forces/step", "stability limit")
+    facts = {scheme.kind: _facts(scheme) for scheme in SCHEMES.values()}
+    widths = [max(map(len, column)) for column in zip(head, *facts.values(), strict=True)]
+
+    def line(columns: Iterable[str]) -> str:
+        return "  ".join(text.ljust(width) for text, width in zip(columns, widths, strict=True))
+
+    yield "kind", line(head)
+    for scheme in SCHEMES.values():
+        yield scheme.kind, line(facts[scheme.kind])
+        yield "", f"{scheme.title}; {scheme.source}"
+        for option in scheme.options:
+            yield f"  {option.name}", f"{_choices(option)}: {option.description}"
+
+
+def _facts(scheme: Scheme) -> tuple[str, ...]:
+    """Return what `_schemes` says of a scheme with its default options."""
     from vibsim.theory import stability_limit
 
-    for scheme in SCHEMES.values():
-        plural = "" if scheme.force_evaluations == 1 else "s"
-        work = f"{scheme.force_evaluations} force evaluation{plural} per step"
-        limit = stability_limit(scheme, scheme.defaults())
-        stable = "stable for every step" if limit == math.inf else f"stable while w dt < {limit:g}"
-        yield scheme.kind, f"{scheme.title}; {work}; {stable}"
-        for option in scheme.options:
-            choices = " | ".join(option.choices) if isinstance(option, Option) else ""
-            yield f"  {option.name}", f"{choices}: {option.description}"
+    forces = str(scheme.force_evaluations)
+    symplectic = "yes" if scheme.symplectic else "no"
+    if scheme.adaptive:
+        return "-", "adaptive", symplectic, forces, "chooses its own steps"
+    options = scheme.defaults()
+    limit = stability_limit(scheme, options)
+    stable = {math.inf: "none", 0.0: "grows at every step"}.get(limit, f"w dt < {limit:.6g}")
+    kind = "explicit" if scheme.explicit else "implicit"
+    per_step = forces if scheme.explicit else f"{forces} x iterations"
+    return f"{scheme.orders(options).position:g}", kind, symplectic, per_step, stable
+
+
+def _choices(option: AnyOption) -> str:
+    """Return what an option may be, and what it is where nothing is said."""
+    from vibsim.schemes import Flag, Option
+
+    if isinstance(option, Option):
+        return f"{' | '.join(option.choices)} (default {option.default})"
+    if isinstance(option, Flag):
+        return f"true | false (default {str(option.default).lower()})"
+    return f"{option.least:g} to {option.most:g} (default {option.default:g})"
 
 
 def _checks() -> Iterable[tuple[str, str]]:
@@ -53,6 +88,15 @@ def _checks() -> Iterable[tuple[str, str]]:
     yield (
         "claim",
         "a statement of a source, with the check that decides it: {claim:, that:, holds:}",
+    )
+    yield "stable", "schemes are stable, or not: {stable: true | false, schemes:, level:, case:}"
+    yield (
+        "conserves",
+        "how the energy drifts: {conserves: energy | energy_d2t, drift: none | bounded | linear | quadratic}",
+    )
+    yield (
+        "equal",
+        "two solutions are one: {equal: [scheme, scheme | exact | discrete], quantity:, atol:}",
     )
     yield "value", "a number of the outcome: {value: NAME, quantity:, at:, equals | below | above:}"
     for name, value in VALUES.items():

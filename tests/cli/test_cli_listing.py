@@ -1,0 +1,69 @@
+"""``vibsim list schemes``: what a user chooses by, for every scheme of the registry."""
+
+import math
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+
+from vibsim import schemes, theory
+from vibsim.cli import main
+from vibsim.schemes import SCHEMES
+
+
+def listed(capsys: pytest.CaptureFixture[str]) -> list[str]:
+    assert main(["list", "schemes"]) == 0
+    return capsys.readouterr().out.splitlines()
+
+
+def test_every_scheme_has_its_facts_in_columns(capsys: pytest.CaptureFixture[str]) -> None:
+    lines = listed(capsys)
+    head = lines[0]
+    columns = [head.index(name) for name in ("order", "step", "symplectic", "forces", "stability")]
+    for scheme in SCHEMES.values():
+        (k,) = (k for k, line in enumerate(lines) if line.split()[0] == scheme.kind)
+        order, step, symplectic, forces, stable = (
+            lines[k][start:stop].strip()
+            for start, stop in zip(columns, [*columns[1:], None], strict=True)
+        )
+        assert lines[k + 1].strip() == f"{scheme.title}; {scheme.source}"
+        assert symplectic == ("yes" if scheme.symplectic else "no")
+        assert forces.split()[0] == str(scheme.force_evaluations)
+        if scheme.adaptive:
+            assert (order, step, stable) == ("-", "adaptive", "chooses its own steps")
+            continue
+        assert float(order) == scheme.orders(scheme.defaults()).position
+        assert step == ("explicit" if scheme.explicit else "implicit")
+        limit = theory.stability_limit(scheme, scheme.defaults())
+        if limit in (0.0, math.inf):
+            assert stable == ("none" if limit else "grows at every step")
+        else:
+            assert float(stable.removeprefix("w dt < ")) == pytest.approx(limit, rel=1e-5)
+
+
+def test_every_option_has_its_values_and_its_default(capsys: pytest.CaptureFixture[str]) -> None:
+    text = "\n".join(listed(capsys))
+    for scheme in SCHEMES.values():
+        for option in scheme.options:
+            assert option.description in text
+    assert "compensated | increment | three_term (default compensated)" in text
+    assert "0 to 1 (default 0.25)" in text
+    assert "true | false (default false)" in text
+
+
+def test_a_scheme_added_tomorrow_is_listed(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    new = replace(SCHEMES["rk4"], kind="new", title="A new one", force_evaluations=7)
+    monkeypatch.setattr(schemes, "SCHEMES", {**SCHEMES, "new": new})
+    (line,) = (line for line in listed(capsys) if line.startswith("new "))
+    assert line.split() == ["new", "4", "explicit", "no", "7", "w", "dt", "<", "2.82843"]
+
+
+def test_the_list_and_the_numbers_of_theory_do_without_sympy() -> None:
+    code = (
+        "import sys; from vibsim.cli import main; main(['list', 'schemes']); "
+        "assert 'sympy' not in sys.modules and 'scipy' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)

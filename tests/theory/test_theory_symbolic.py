@@ -1,0 +1,122 @@
+"""Formulas in p: against the numbers of every scheme, and against those of the vibration text."""
+
+import numpy as np
+import pytest
+import sympy
+
+from vibsim import theory
+from vibsim.schemes import FIXED_STEP, SCHEMES
+from vibsim.theory import symbolic
+
+P, X, N = (symbolic.symbol(name) for name in ("p", "x", "n"))
+BEGIN, PUSH, W = (symbolic.symbol(name) for name in ("I", "V", "w"))
+
+
+def stepper(kind, **options):
+    scheme = SCHEMES[kind]
+    return scheme.stepper({**scheme.defaults(), **options})
+
+
+@pytest.mark.parametrize("scheme", FIXED_STEP.values(), ids=FIXED_STEP)
+def test_formulas_and_numbers_are_one_theory(scheme):
+    method = scheme.stepper(scheme.defaults())
+    at = sympy.Rational(3, 8)
+    numbers = theory.amplification(method, float(at))
+    for formula, matrix in (
+        (symbolic.matrix(method), numbers.matrix),
+        (symbolic.start(method), numbers.start),
+    ):
+        values = np.array(formula.subs(P, at).evalf(30).tolist(), dtype=float)
+        np.testing.assert_allclose(values, matrix, rtol=1e-15, atol=1e-30)
+    polynomial = sympy.Poly(symbolic.characteristic(method).subs(P, at).evalf(30), X)
+    np.testing.assert_allclose(
+        np.array(polynomial.all_coeffs(), dtype=float), np.poly(numbers.matrix), atol=1e-13
+    )
+
+
+@pytest.mark.parametrize("scheme", FIXED_STEP.values(), ids=FIXED_STEP)
+def test_series_are_those_of_the_numbers(scheme):
+    method = scheme.stepper(scheme.defaults())
+    p = 0.02
+    grown = symbolic.growth_series(method, 7).subs(P, sympy.Rational(1, 50)).evalf(40) - 1
+    assert float(sympy.log(1 + grown)) == pytest.approx(
+        float(theory.log_growth(method, p)), rel=1e-6, abs=1e-30
+    )
+    faster = symbolic.frequency_series(method, 7).subs(P, sympy.Rational(1, 50)).evalf(40) - 1
+    assert float(faster) == pytest.approx(float(theory.frequency_ratio(method, p)) - 1, abs=3e-16)
+    early = symbolic.phase_error_series(method, 7).subs(P, sympy.Rational(1, 50)).evalf(40)
+    assert float(early) == pytest.approx(float(theory.phase_error_per_period(method, p)), abs=3e-16)
+
+
+@pytest.mark.parametrize("scheme", FIXED_STEP.values(), ids=FIXED_STEP)
+def test_the_series_begin_with_the_declared_order(scheme):
+    """Of the position; a start of lower order is no matter of the roots (Euler-Cromer: 2 against 1)."""
+    method = scheme.stepper(scheme.defaults())
+    frequency = symbolic.frequency_series(method) - 1
+    growth = symbolic.growth_series(method) - 1
+    tiny = 1e-12  # coefficients that were published as decimals
+
+    def lowest(series):
+        terms = sympy.Poly(series, P).terms() if series != 0 else []
+        return min((power for (power,), value in terms if abs(value) > tiny), default=np.inf)
+
+    promised = scheme.orders(scheme.defaults()).position
+    order = min(lowest(frequency), lowest(growth) - 1)
+    assert order == (2 if scheme.kind.startswith("euler_cromer") else promised)
+
+
+def test_the_series_of_the_text():
+    # (19), section 5.6 and the errata of 6.2
+    assert symbolic.frequency_series(stepper("central"), 2) == 1 + P**2 / 24
+    assert symbolic.frequency_series(stepper("forward_euler"), 2) == 1 - P**2 / 3
+    assert symbolic.growth_series(stepper("forward_euler"), 2) == 1 + P**2 / 2
+    assert symbolic.growth_series(stepper("rk2"), 3) == 1 + P**4 / 8
+    assert symbolic.growth_series(stepper("rk4"), 4) == 1 - P**6 / 144
+    assert symbolic.frequency_series(stepper("crank_nicolson"), 2) == 1 - P**2 / 12
+    assert symbolic.growth_series(stepper("gauss4"), 6) == 1
+    # exercise 3
+    corrected = symbolic.frequency_series(stepper("central", frequency_correction=True), 3)
+    assert corrected.coeff(P, 2) == 0
+    assert corrected.coeff(P, 4) != 0
+
+
+def test_the_characteristic_polynomial_of_the_text():
+    """Section 4.1: A^2 - (2 - p^2) A + 1 = 0."""
+    found = symbolic.characteristic(stepper("central", arithmetic="three_term"))
+    assert sympy.expand(found - (X**2 - (2 - P**2) * X + 1)) == 0
+
+
+@pytest.mark.parametrize(("kind", "sign"), [("euler_cromer", 1), ("euler_cromer_u_first", -1)])
+def test_the_solution_of_euler_cromer(kind, sign):
+    """Exercise 17: I cos((n +- 1/2) th)/cos(th/2), p = 2 sin(th/2)."""
+    theta = sympy.Symbol("theta", positive=True)
+    wanted = BEGIN * sympy.cos((N + sign * sympy.Rational(1, 2)) * theta) / sympy.cos(theta / 2)
+    solution = symbolic.solution(stepper(kind)).subs(PUSH, 0)
+    # acos(1 - p^2/2) = theta for theta from 0 to pi
+    found = solution.subs(sympy.acos(1 - P**2 / 2), theta).subs(
+        sympy.sqrt(1 - (1 - P**2 / 2) ** 2), sympy.sin(theta)
+    )
+    found = found.subs(P, 2 * sympy.sin(theta / 2))
+    assert sympy.simplify(sympy.expand_trig(found - wanted)) == 0
+
+
+def test_the_solutions_of_the_text():
+    angle = sympy.acos(1 - P**2 / 2)
+    found = symbolic.solution(stepper("central")).subs(PUSH, 0)
+    assert sympy.simplify(found - BEGIN * sympy.cos(N * angle)) == 0
+    with pytest.raises(ValueError, match="parasitic"):
+        symbolic.solution(stepper("ab2"))
+
+
+@pytest.mark.parametrize("kind", ["central", "crank_nicolson", "rk4", "velocity_verlet", "newmark"])
+def test_a_solution_is_the_exact_discrete_one(kind):
+    method = stepper(kind)
+    formula = sympy.lambdify((N, P, BEGIN, PUSH, W), symbolic.solution(method))
+    n = np.arange(200)
+    u, _ = theory.discrete(method, 2.0, 0.25, 1.1, -0.6, n)
+    np.testing.assert_allclose(formula(n, 0.5, 1.1, -0.6, 2.0), u, atol=1e-12)
+
+
+def test_the_error_fraction_of_exercise_7():
+    fraction = symbolic.error_fraction()
+    assert symbolic.taylor(fraction, 4) == 1 - P**2 / 12 + P**4 / 360
