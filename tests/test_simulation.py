@@ -7,6 +7,7 @@ import pytest
 
 from vibsim import Experiment, simulate
 from vibsim.simulation import simulate_record
+from vibsim.spec.series import FEWEST_EXTREMA, MOST_EXTREMA, extrema_kept
 
 BASE = {
     "title": "t",
@@ -144,15 +145,20 @@ def test_a_level_that_the_experiment_does_not_have_is_refused():
 def lean_experiment(**changes):
     """4200 members of 65 samples are just too many for every series to be stored."""
     sweep = {"initial.theta": {"linspace": [-3.0, 9.0, 4200]}}
-    return experiment(sweep=sweep, schemes=["central"], **changes)
+    return experiment(**{"sweep": sweep, "schemes": ["central"], **changes})
+
+
+def of_dim(record, dim):
+    return {name for name, variable in record.variables.items() if dim in variable.dims}
 
 
 def test_a_large_sweep_stores_states_and_the_energys_deviation_only():
     record = simulate_record(lean_experiment(), 6)
     assert record.attrs["storage"] == "lean"
-    series = {name for name, variable in record.variables.items() if "t" in variable.dims}
-    assert series == {"theta", "omega", "energy_deviation"}
+    assert of_dim(record, "t") == {"theta", "omega", "energy_deviation"}
+    assert not of_dim(record, "extremum")
     assert "theta_exact" not in record
+    assert "energy_deviation_d2t_max_abs" not in record
     assert simulate_record(experiment(), 6).attrs["storage"] == "series"
 
 
@@ -167,7 +173,101 @@ def test_the_energy_of_samples_is_that_of_every_step():
     np.testing.assert_array_equal(largest, record["energy_deviation_max_abs"])
 
 
-@pytest.mark.parametrize("make", [lean_experiment, experiment])
+def test_a_large_sweep_has_the_largest_deviation_by_the_centred_difference():
+    record = simulate_record(lean_experiment(schemes=["rk4"]), 6)
+    assert of_dim(record, "t") == {"theta", "omega", "energy_deviation"}
+    assert np.isfinite(record["energy_deviation_d2t_max_abs"]).all()
+
+
+@pytest.mark.parametrize(
+    ("check", "name"),
+    [
+        ({"converges": "energy_deviation_d2t", "order": 2}, "energy_deviation_d2t"),
+        ({"converges": "omega_d2t", "order": 2}, "omega_d2t"),
+        (
+            {"value": "running_max", "quantity": "energy_deviation", "below": 1},
+            "energy_deviation_running_max",
+        ),
+        (
+            {"conserves": "energy_d2t", "drift": "bounded"},
+            "energy_deviation_d2t_running_max",
+        ),
+    ],
+)
+def test_a_large_sweep_stores_of_the_centred_difference_what_its_checks_ask_for(check, name):
+    record = simulate_record(lean_experiment(schemes=["rk4"], checks=[check]), 6)
+    assert record.attrs["storage"] == "lean"
+    assert name in of_dim(record, "t")
+    assert record[name].shape == record["theta"].shape
+
+
+def both(**changes):
+    """A scheme that has a velocity of its own, and one whose velocity is the centred difference."""
+    return experiment(schemes=["central", "rk4"], **changes)
+
+
+CENTRED = ("omega_d2t", "energy_d2t", "energy_deviation_d2t", "energy_deviation_d2t_running_max")
+
+
+def test_both_energies_are_stored_and_named():
+    data = simulate(both(), 7)
+    for name in (*CENTRED, "energy_deviation_running_max"):
+        assert data[name].dims == ("scheme", "case", "t")
+        assert data[name].attrs["units"] == {"omega_d2t": "rad s-1"}.get(name, "J")
+    for name in CENTRED:
+        assert data[name].sel(scheme="central").isnull().all()
+    rk4 = data.sel(scheme="rk4").isel(case=0)
+    inner = slice(1, -1)
+    for name in ("omega_d2t", "energy_d2t", "energy_deviation_d2t"):
+        assert rk4[name][inner].notnull().all()
+        assert rk4[name][[0, -1]].isnull().all()
+    kinetic = 0.5 * 3.0 * (0.5 * rk4.omega_d2t) ** 2
+    np.testing.assert_allclose(rk4.energy_d2t, kinetic + rk4.potential_energy, rtol=1e-15)
+    np.testing.assert_array_equal(rk4.energy_deviation_d2t, rk4.energy_d2t - rk4.energy_initial)
+    largest = abs(rk4.energy_deviation_d2t).max()
+    assert rk4.energy_deviation_d2t_max_abs == largest
+    assert rk4.energy_deviation_d2t_running_max[-1] == largest
+    assert rk4.energy_deviation_running_max[-1] == rk4.energy_deviation_max_abs
+    assert np.isnan(data.energy_deviation_d2t_max_abs.sel(scheme="central")).all()
+
+
+def test_without_a_velocity_of_its_own_nothing_is_stored_of_the_centred_difference():
+    record = simulate_record(experiment(), 7)
+    assert not [name for name in CENTRED if name in record]
+    assert "energy_deviation_running_max" in record
+
+
+@pytest.mark.parametrize("samples", ["all", "common", {"every": 32}])
+def test_extrema_do_not_depend_on_what_is_stored(samples):
+    data = simulate(both(samples=samples), 8).isel(case=0)
+    every_step = simulate(both(samples="all"), 8).isel(case=0)
+    for kind in ("peak", "trough"):
+        for name in ("_time", "", "_time_grid", "_grid"):
+            assert data[kind + name].dims == ("scheme", "extremum")
+            np.testing.assert_array_equal(data[kind + name], every_step[kind + name])
+        assert (data[f"{kind}_count"] == np.isfinite(data[kind]).sum("extremum")).all()
+    assert data.sizes["extremum"] == 129
+    largest = every_step.theta[:, 1:-1].max("t")
+    np.testing.assert_array_equal(data.peak_grid.max("extremum"), largest)
+
+
+def test_among_many_members_fewer_extrema_are_kept_and_all_are_counted():
+    assert extrema_kept(2**20, 1) == MOST_EXTREMA
+    assert extrema_kept(6, 10**6) == 4
+    assert extrema_kept(2**20, 10**6) == FEWEST_EXTREMA
+    swept = experiment(
+        sweep={"model.g": {"linspace": [1, 2, 2000]}},
+        time={"end": 100.0},
+        schemes=["central"],
+        levels=[7, 8],
+        samples="all",
+    )
+    record = simulate_record(swept, 8)
+    assert record["peak"].shape == (1, 2000, 64)
+    assert record["peak_count"].max() < 64
+
+
+@pytest.mark.parametrize("make", [lean_experiment, experiment, both])
 @pytest.mark.parametrize("shards", [1, 2, 7])
 @pytest.mark.parametrize("threads", [1, 2])
 def test_shards_and_threads_change_no_bit(make, shards, threads):

@@ -1,6 +1,23 @@
 """The engine: from (model, scheme, numbers) to trajectories."""
 
 from vibsim.engine.kernel import LANES
-from vibsim.engine.trajectories import Gathered, Trajectories, energies, integrate, lane_for
+from vibsim.engine.trajectories import (
+    Extrema,
+    Gathered,
+    Series,
+    Trajectories,
+    energies,
+    integrate,
+    lane_for,
+)
 
-__all__ = ["LANES", "Gathered", "Trajectories", "energies", "integrate", "lane_for"]
+__all__ = [
+    "LANES",
+    "Extrema",
+    "Gathered",
+    "Series",
+    "Trajectories",
+    "energies",
+    "integrate",
+    "lane_for",
+]

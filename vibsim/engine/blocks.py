@@ -8,7 +8,8 @@ of its branch-free form, which gives NaN there: the step of such a member is tak
 Every operation on a member's numbers is one that `vibsim.engine.loop` does, in the same order, so that the bits are
 the same. `rows` is the scratch memory of one block, flat: row r of lane j is ``rows[r * LANES + j]``, because a stride
 that the compiler knows tells it that rows do not overlap. Two sets of rows, of the last step and of this one, swap
-their parts at each step; each holds the scheme's state, the position and the scheme's own velocity.
+their parts at each step; each holds the scheme's state, the position and the scheme's own velocity, and where extrema
+are kept the position before.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from typing import Any
 from vibsim.engine.bound import (
     ALIVE,
     BOTTOM,
+    D2T,
     DT,
     ENERGY,
     EVENT,
@@ -25,7 +27,12 @@ from vibsim.engine.bound import (
     FIRST_PARAMETER,
     GATHER,
     INTERIOR,
+    KEEP,
+    LARGEST_D2T,
     PARAMETERS,
+    PENDING,
+    RATE,
+    SERIES,
     SET,
     STATES,
     TWO_BEFORE,
@@ -45,16 +52,22 @@ from vibsim.engine.bound import (
     step_fast,
     total,
 )
+from vibsim.engine.extrema import is_turned, note_turned
 from vibsim.engine.gather import (
     LARGEST_DEVIATION,
     LAST_STEP,
     N_EXTREMA,
     OVERFLOW,
+    RUNNING_D2T_ROW,
+    RUNNING_ROW,
+    VELOCITY_D2T_ROW,
     bottom_of,
     end_velocity,
     first_extrema,
     is_event,
+    larger,
     next_extrema,
+    note_d2t,
     note_events,
     note_extrema,
 )
@@ -67,22 +80,28 @@ VECTOR = 8
 ROWS = ("DT", "ENERGY", "BOTTOM", "VELOCITY", "TWO_BEFORE", "INTERIOR", "ALIVE", "EVENT", "EXTREMA")
 """Rows behind the two sets, in their order. A kernel binds their numbers; from ``EXTREMA`` on stand the entries of
 `vibsim.engine.gather.Extrema`, from ``FIRST_PARAMETER`` on the parameters."""
+ROWS_D2T = ("RATE", "PENDING", "LARGEST_D2T")
+"""Rows behind the parameters."""
 
 
-def set_of(states: int) -> int:
-    """Return how many rows a set has: the state, the position, the scheme's own velocity."""
-    return states + 2
+def set_of(states: int, with_peaks: bool) -> int:
+    """Return how many rows a set has: the state, the position, the scheme's own velocity, the position before."""
+    return states + (3 if with_peaks else 2)
 
 
-def n_rows(states: int, parameters: int) -> int:
+def n_rows(states: int, parameters: int, with_peaks: bool) -> int:
     """Return how many rows a kernel needs."""
-    return 2 * set_of(states) + len(ROWS) - 1 + N_EXTREMA + parameters
+    numbers = row_numbers(states, parameters, with_peaks)
+    return numbers[ROWS_D2T[-1]] + 1
 
 
-def row_numbers(states: int) -> dict[str, int]:
+def row_numbers(states: int, parameters: int, with_peaks: bool) -> dict[str, int]:
     """Return the number of every row behind the two sets, and of the first parameter."""
-    numbers = {name: 2 * set_of(states) + i for i, name in enumerate(ROWS)}
-    return numbers | {"FIRST_PARAMETER": numbers["EXTREMA"] + N_EXTREMA}
+    behind = 2 * set_of(states, with_peaks)
+    numbers = {name: behind + i for i, name in enumerate(ROWS)}
+    first = numbers["EXTREMA"] + N_EXTREMA
+    last = {name: first + parameters + i for i, name in enumerate(ROWS_D2T)}
+    return numbers | {"FIRST_PARAMETER": first} | last
 
 
 def run(
@@ -99,6 +118,7 @@ def run(
     samples: Any,
     stats: Any,
     counts: Any,
+    kept: Any,
     rows: Any,
 ) -> None:
     """Step members first..stop-1 of one scheme: see `vibsim.engine.loop.run`.
@@ -118,6 +138,8 @@ def run(
         for j in range(width):
             samples[0, base + j, 0] = initial[base + j, 0]
             samples[1, base + j, 0] = initial[base + j, 1]
+            if SERIES:
+                samples[RUNNING_ROW, base + j, 0] = 0.0
         sample = 1
         due = every
         for n in range(1, steps + 1):
@@ -132,23 +154,38 @@ def run(
             if bad or is_last:
                 for j in range(width):
                     if rows[ALIVE * LANES + j] != 0.0:
-                        mend(rows, old, new, base + j, j, n, is_last, end_rule, stats, counts)
+                        mend(
+                            rows,
+                            old,
+                            new,
+                            base + j,
+                            j,
+                            n,
+                            is_last,
+                            end_rule,
+                            every,
+                            samples,
+                            stats,
+                            counts,
+                        )
             if GATHER:
                 odd = n & 1
                 if gather_odd(rows, filled, n, turn) if odd else gather_even(rows, filled, n, turn):
                     for j in range(width):
                         if rows[EVENT * LANES + j] != 0.0 and rows[ALIVE * LANES + j] != 0.0:
-                            note(rows, old, new, base + j, j, n, turn, stats, counts)
+                            note(rows, old, new, base + j, j, n, turn, stats, counts, kept)
             if n == due:
                 for j in range(width):
                     if rows[ALIVE * LANES + j] != 0.0:
                         samples[0, base + j, sample] = rows[(new + STATES) * LANES + j]
                         samples[1, base + j, sample] = rows[VELOCITY * LANES + j]
+                        if SERIES:
+                            take_series(rows, old, new, base + j, j, sample, samples)
                 sample += 1
                 due += every
         for j in range(width):
             if rows[ALIVE * LANES + j] != 0.0:
-                finish(rows, base + j, j, steps, stats, counts)
+                finish(rows, base + j, j, steps, every, samples, stats, counts)
 
 
 @called
@@ -179,6 +216,12 @@ def begin(
     put_states(rows, 0, j, start(variant, u, v, h, p))
     rows[(0 + STATES) * LANES + j] = u
     rows[(0 + STATES + 1) * LANES + j] = v
+    if KEEP:
+        rows[(0 + STATES + 2) * LANES + j] = u
+    if D2T:
+        rows[RATE * LANES + j] = 0.5 / h
+        rows[PENDING * LANES + j] = 0.0
+        rows[LARGEST_D2T * LANES + j] = 0.0
 
 
 @called
@@ -204,6 +247,8 @@ def step_block(rows: Any, old: int, new: int, filled: int, n: int) -> int:
         u = state[0]
         rows[(new + STATES) * LANES + j] = u
         rows[(new + STATES + 1) * LANES + j] = own
+        if KEEP:
+            rows[(new + STATES + 2) * LANES + j] = rows[(old + STATES) * LANES + j]
         rows[VELOCITY * LANES + j] = own
         whole = total(following)
         bad = bad | ((not abs(u) + abs(own) < OVERFLOW) | (whole != whole))
@@ -220,6 +265,8 @@ def mend(
     n: int,
     is_last: bool,
     end_rule: int,
+    every: int,
+    samples: Any,
     stats: Any,
     counts: Any,
 ) -> None:
@@ -240,7 +287,7 @@ def mend(
     if not abs(state[0]) + abs(v) < OVERFLOW:
         # of a member that failed, all points came before the last one
         rows[INTERIOR * LANES + j] = rows[(EXTREMA + LARGEST_DEVIATION) * LANES + j]
-        finish(rows, case, j, n - 1, stats, counts)
+        finish(rows, case, j, n - 1, every, samples, stats, counts)
         rows[ALIVE * LANES + j] = 0.0
         rows[VELOCITY * LANES + j] = 0.0
         for i in range(SET):
@@ -271,14 +318,65 @@ def gather_block(rows: Any, old: int, new: int, filled: int, n: int, turn: float
         own, own_before = rows[(new + STATES + 1) * LANES + j], rows[(old + STATES + 1) * LANES + j]
         event = is_event(turn, rows[BOTTOM * LANES + j], own_before, u, own)
         event = event | (deviation != deviation)
+        if D2T:
+            size = deviation_d2t(rows, old, new, j, n)
+            rows[LARGEST_D2T * LANES + j] = larger(
+                rows[PENDING * LANES + j], rows[LARGEST_D2T * LANES + j]
+            )
+            rows[PENDING * LANES + j] = size
+            event = event | (size != size)
+        if KEEP:
+            event = event | is_turned(
+                rows[(old + STATES + 2) * LANES + j], rows[(old + STATES) * LANES + j], u
+            )
         rows[EVENT * LANES + j] = 1.0 if event else 0.0
         events = events | event
     return events
 
 
+def velocity_d2t(rows: Any, old: int, new: int, j: int) -> float:
+    """Return ``[D_2t u]^n`` of a lane, whose next position is the first entry of its new state."""
+    ahead = float(rows[new * LANES + j])
+    behind = float(rows[(old + STATES) * LANES + j])
+    return (ahead - behind) * float(rows[RATE * LANES + j])
+
+
+def deviation_d2t(rows: Any, old: int, new: int, j: int, n: int) -> float:
+    """Return the size of the energy deviation by ``[D_2t u]^n`` of a lane, or NaN; the potential energy is known."""
+    kinetic, potential = energies_fast(
+        rows[(new + STATES) * LANES + j],
+        velocity_d2t(rows, old, new, j),
+        n * rows[DT * LANES + j],
+        parameters_in(rows, j),
+    )
+    return abs((kinetic + potential) - float(rows[ENERGY * LANES + j]))
+
+
+@called
+def take_series(
+    rows: Any, old: int, new: int, case: int, j: int, sample: int, samples: Any
+) -> None:
+    """Write what samples have of a lane beside position and velocity."""
+    samples[RUNNING_ROW, case, sample] = rows[(EXTREMA + LARGEST_DEVIATION) * LANES + j]
+    if D2T:
+        samples[VELOCITY_D2T_ROW, case, sample] = velocity_d2t(rows, old, new, j)
+        samples[RUNNING_D2T_ROW, case, sample] = larger(
+            rows[PENDING * LANES + j], rows[LARGEST_D2T * LANES + j]
+        )
+
+
 @called
 def note(
-    rows: Any, old: int, new: int, case: int, j: int, n: int, turn: float, stats: Any, counts: Any
+    rows: Any,
+    old: int,
+    new: int,
+    case: int,
+    j: int,
+    n: int,
+    turn: float,
+    stats: Any,
+    counts: Any,
+    kept: Any,
 ) -> None:
     """Note the peak, trough or turn of a lane at step n, and an energy that no fast function could give."""
     h = rows[DT * LANES + j]
@@ -287,6 +385,15 @@ def note(
     size = abs((kinetic + potential) - rows[ENERGY * LANES + j])
     if size > rows[(EXTREMA + LARGEST_DEVIATION) * LANES + j]:
         rows[(EXTREMA + LARGEST_DEVIATION) * LANES + j] = size
+    if D2T:
+        kinetic, potential = energies(
+            u, velocity_d2t(rows, old, new, j), n * h, parameters_in(rows, j)
+        )
+        rows[PENDING * LANES + j] = abs((kinetic + potential) - rows[ENERGY * LANES + j])
+    if KEEP:
+        behind, middle = rows[(old + STATES + 2) * LANES + j], rows[(old + STATES) * LANES + j]
+        if is_turned(behind, middle, u):
+            note_turned(kept, counts, case, n - 1, h, behind, middle, u)
     rows[BOTTOM * LANES + j] = note_events(
         stats,
         counts,
@@ -303,10 +410,21 @@ def note(
 
 
 @called
-def finish(rows: Any, case: int, j: int, good: int, stats: Any, counts: Any) -> None:
+def finish(
+    rows: Any,
+    case: int,
+    j: int,
+    good: int,
+    every: int,
+    samples: Any,
+    stats: Any,
+    counts: Any,
+) -> None:
     """Write what was gathered of a member that has arrived, or that failed after step `good`."""
     if GATHER:
         note_extrema(
             stats, case, extrema_in(rows, j), rows[INTERIOR * LANES + j], rows[DT * LANES + j]
         )
+    if D2T:
+        note_d2t(stats, samples, case, good, every, rows[LARGEST_D2T * LANES + j])
     counts[case, LAST_STEP] = good

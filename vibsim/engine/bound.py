@@ -18,17 +18,24 @@ P = tuple[float, ...]
 
 GATHER = True
 """Whether energies, extrema, norms, peaks and turns are gathered."""
+D2T = True
+"""Whether the energy by ``[D_2t u]^n = (u^(n+1) - u^(n-1))/(2 dt)`` is gathered beside that by the own velocity."""
+SERIES = True
+"""Whether samples are taken of the running maxima of the energy deviation, and of ``[D_2t u]``."""
+KEEP = True
+"""Whether local extrema are kept one by one (`vibsim.engine.extrema`)."""
 STATES = 1
 """Entries of the scheme's state."""
-SET = 3
-"""Rows of one set (`vibsim.engine.blocks`): the state, the position, the scheme's own velocity."""
+SET = 4
+"""Rows of one set (`vibsim.engine.blocks`): the state, the position, the scheme's own velocity, the position before."""
 PARAMETERS = 1
 """Number of parameters."""
-DT, ENERGY, BOTTOM, VELOCITY, TWO_BEFORE, INTERIOR, ALIVE, EVENT, EXTREMA = range(6, 15)
-FIRST_PARAMETER = 24
+DT, ENERGY, BOTTOM, VELOCITY, TWO_BEFORE, INTERIOR, ALIVE, EVENT, EXTREMA = range(8, 17)
+FIRST_PARAMETER, RATE, PENDING, LARGEST_D2T = range(26, 30)
 """Rows behind the two sets: step, initial energy, multiple of a turn below, velocity at this point, velocity two points
 before, largest deviation before this point, 1 for a lane that goes on, 1 for a lane with something to note, what is
-gathered at every step, and the parameters."""
+gathered at every step, the parameters; and where `D2T` is, ``1/(2 dt)``, the deviation by ``[D_2t u]`` at this point,
+and the largest one before."""
 
 
 def called(function: F) -> F:

@@ -15,7 +15,7 @@ import math
 from typing import Any
 
 from vibsim.elementary.rounding import nearest_whole
-from vibsim.engine.bound import called
+from vibsim.engine.bound import SERIES, called
 
 OVERFLOW = 1e150
 """A member that grows beyond has failed: its energy could no longer be stored."""
@@ -49,13 +49,25 @@ LAST_PEAK = 15
 LAST_TROUGH = 16
 FIRST_TURN_TIME = 17
 LAST_TURN_TIME = 18
-N_STATS = 19
+DEVIATION_D2T = 19
+N_STATS = 20
 
 # Columns of `counts`.
 PEAKS = 0
 TURNS = 1
 LAST_STEP = 2
 N_COUNTS = 3
+
+
+# Rows of `samples` behind position and velocity, where series are kept of more.
+RUNNING_ROW = 2
+VELOCITY_D2T_ROW = 3
+RUNNING_D2T_ROW = 4
+
+
+def n_sample_rows(with_series: bool, own_velocity: bool) -> int:
+    """Return how many rows samples have."""
+    return (5 if own_velocity else 3) if with_series else 2
 
 
 def end_velocity(
@@ -67,6 +79,26 @@ def end_velocity(
     if end_rule == 2:
         return backward
     return own
+
+
+def larger(size: float, largest: float) -> float:
+    """Return the larger one, and `largest` where `size` is NaN."""
+    return size if size > largest else largest
+
+
+@called
+def note_d2t(stats: Any, samples: Any, case: int, good: int, every: int, largest: float) -> None:
+    """Write the largest energy deviation by ``[D_2t u]`` of a member whose last sound point is number `good`.
+
+    The centred difference has no value there: a sample that was taken of it is taken back. Nor has it at t = 0, so that
+    a largest one takes two points more.
+    """
+    value = largest if good > 1 else math.nan
+    stats[case, DEVIATION_D2T] = value
+    if SERIES:  # noqa: SIM102
+        if good % every == 0:
+            samples[VELOCITY_D2T_ROW, case, good // every] = math.nan
+            samples[RUNNING_D2T_ROW, case, good // every] = value
 
 
 def first_extrema(u: float, v: float) -> Extrema:

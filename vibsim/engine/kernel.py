@@ -45,14 +45,26 @@ called = entry = njit(**inner)
     + primitives.COMPILED
 )
 
-_STEPPING = "f2 f2 f1 i i i i i i f f3 f2 i2 f1"
+_FULL_STEP = """\
+@compiled
+def step_fast(state, t, dt, p):
+    return step(state, t, dt, p)"""
+
+_STEPPING = "f2 f2 f1 i i i i i i f f3 f2 i2 f3 f1"
 """Arguments of `vibsim.engine.loop.run`, as `vibsim.engine.entry` writes them."""
 _OBSERVING = "f2 f1 i i f3 f3"
 """Arguments of `vibsim.engine.observe.run`."""
 
 
 @cache
-def kernel(model: Model, stepper: Stepper, lane: str, with_gathered: bool = True) -> Kernel:
+def kernel(
+    model: Model,
+    stepper: Stepper,
+    lane: str,
+    with_gathered: bool = True,
+    with_series: bool = False,
+    with_peaks: bool = False,
+) -> Kernel:
     """Return the function that steps members of `model` by `stepper` (`vibsim.engine.loop.run`).
 
     Parameters
@@ -60,14 +72,19 @@ def kernel(model: Model, stepper: Stepper, lane: str, with_gathered: bool = True
     lane
         One of `LANES`: the same bits at different speeds.
     with_gathered
-        Whether energies, extrema, norms, peaks and turns are gathered.
+        Whether energies, extrema, norms, peaks and turns are gathered, and beside the energy by the scheme's own
+        velocity that by ``[D_2t u]``.
+    with_series, with_peaks
+        Whether samples have more rows than position and velocity (`vibsim.engine.gather`), and whether local extrema
+        are kept (`vibsim.engine.extrema`), where anything is gathered.
 
     Raises
     ------
     SimulationError
         Where the kernel cannot be compiled.
     """
-    return _in_lane(source(model, stepper, lane, with_gathered), lane, _STEPPING)
+    text = source(model, stepper, lane, with_gathered, with_series, with_peaks)
+    return _in_lane(text, lane, _STEPPING)
 
 
 @cache
@@ -79,15 +96,26 @@ def observer(model: Model, lane: str) -> Kernel:
     return _in_lane(module.text, lane, _OBSERVING)
 
 
-def source(model: Model, stepper: Stepper, lane: str = "scalar", with_gathered: bool = True) -> str:
+def source(
+    model: Model,
+    stepper: Stepper,
+    lane: str = "scalar",
+    with_gathered: bool = True,
+    with_series: bool = False,
+    with_peaks: bool = False,
+) -> str:
     """Return the text of the kernel of `model` and `stepper`, without the head that says what compiles it."""
     states, parameters = carried(stepper, model), n_parameters(stepper, model)
+    with_peaks = with_peaks and with_gathered
     settings = {
         "GATHER": with_gathered,
+        "D2T": with_gathered and stepper.own_velocity,
+        "SERIES": with_gathered and with_series,
+        "KEEP": with_peaks,
         "STATES": states,
-        "SET": blocks.set_of(states),
+        "SET": blocks.set_of(states, with_peaks),
         "PARAMETERS": parameters,
-        **blocks.row_numbers(states),
+        **blocks.row_numbers(states, parameters, with_peaks),
     }
     module = _module(lane, settings)
     _put_formulas(module, model, "", stepper, is_rare=lane == "blocks")
@@ -98,8 +126,12 @@ def source(model: Model, stepper: Stepper, lane: str = "scalar", with_gathered: 
         _put_formulas(module, model, "_fast", stepper)
         functions = (n for n, v in stepper.step.__globals__.items() if isinstance(v, FunctionType))
         renamed = {name: f"{name}_fast" for name in (*HANDED, *functions)}
-        collect(module, stepper.step, "step_fast", renamed)
-        for name, text in _rows(states, parameters).items():
+        if stepper.implicit:
+            # where an iteration ends is a comparison, which would hide the NaN of a fast function out of its range
+            module.put("step_fast", _FULL_STEP)
+        else:
+            collect(module, stepper.step, "step_fast", renamed)
+        for name, text in _rows(states, parameters, settings).items():
             module.put(name, text)
     collect(module, blocks.run if lane == "blocks" else loop.run, "kernel", {})
     return module.text
@@ -107,7 +139,8 @@ def source(model: Model, stepper: Stepper, lane: str = "scalar", with_gathered: 
 
 def carried(stepper: Stepper, model: Model) -> int:
     """Return how many floats the state of a scheme has, by asking for one."""
-    p = (1.0,) * n_parameters(stepper, model)
+    p: tuple[Any, ...] = (1.0,) * n_parameters(stepper, model)
+    p += ((0.0,) * 4,) if stepper.tabulated else ()
     start = handed(stepper.start, lambda u, v, t, p: 0.0, lambda u, v, t, p: (0.0, 0.0))
     return len(start(stepper.variant, 0.0, 0.0, 1.0, p))
 
@@ -191,6 +224,8 @@ def _put_formulas(
         module.put(function + suffix, head + "\n    ".join(lines))
     count = len(names) + (2 if is_scaled else 0)
     values = ", ".join(f"float(parameters[case, {i}])" for i in range(count)) or "0.0"
+    if stepper is not None and stepper.tabulated:
+        values += f", parameters[case, {count}:]"
     text = f"@compiled\ndef parameters_of(parameters, case):\n    return ({values},)"
     module.put("parameters_of", text)
 
@@ -230,22 +265,21 @@ def _nothing(node: Expression) -> Expression:
     return Binary("-", node, node)
 
 
-def _rows(states: int, parameters: int) -> dict[str, str]:
+def _rows(states: int, parameters: int, rows: Mapping[str, object]) -> dict[str, str]:
     """Write the functions that move tuples into and out of the rows of `vibsim.engine.blocks`."""
-    rows = blocks.row_numbers(states)
 
     def function(head: str, *lines: str) -> str:
         return f"@compiled\ndef {head}:\n    " + "\n    ".join(lines)
 
-    def places(first: str | int, count: int) -> list[str]:
+    def places(first: object, count: int) -> list[str]:
         return [f"rows[({first} + {i}) * {blocks.LANES} + j]" for i in range(count)]
 
-    def get(name: str, argument: str, first: str | int, count: int) -> str:
+    def get(name: str, argument: str, first: object, count: int) -> str:
         return function(
             f"{name}(rows, {argument}j)", f"return ({', '.join(places(first, count)) or '0.0'},)"
         )
 
-    def put(name: str, argument: str, first: str | int, count: int) -> str:
+    def put(name: str, argument: str, first: object, count: int) -> str:
         lines = (f"{where} = values[{i}]" for i, where in enumerate(places(first, count)))
         return function(f"{name}(rows, {argument}j, values)", *lines)
 

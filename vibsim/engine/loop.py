@@ -9,15 +9,32 @@ from __future__ import annotations
 
 from typing import Any
 
-from vibsim.engine.bound import GATHER, backward, energies, parameters_of, start, step
+from vibsim.engine.bound import (
+    D2T,
+    GATHER,
+    KEEP,
+    SERIES,
+    backward,
+    energies,
+    parameters_of,
+    start,
+    step,
+)
+from vibsim.engine.extrema import is_turned, note_turned
 from vibsim.engine.gather import (
+    LARGEST_DEVIATION,
     LAST_STEP,
     OVERFLOW,
+    RUNNING_D2T_ROW,
+    RUNNING_ROW,
+    VELOCITY_D2T_ROW,
     bottom_of,
     end_velocity,
     first_extrema,
     is_event,
+    larger,
     next_extrema,
+    note_d2t,
     note_events,
     note_extrema,
 )
@@ -37,6 +54,7 @@ def run(
     samples: Any,
     stats: Any,
     counts: Any,
+    kept: Any,
     rows: Any,
 ) -> None:
     """Step members first..stop-1 of one scheme, and fill `samples`, `stats` and `counts`.
@@ -54,11 +72,14 @@ def run(
     turn
         Angle of a whole turn; 0 where the position is no angle.
     samples
-        Shape (2, case, n_samples), filled with NaN: position and velocity.
+        Shape (rows, case, n_samples), filled with NaN: position, velocity, and the rows of `vibsim.engine.gather`.
     stats
         Shape (case, `N_STATS`), filled with NaN: columns of `vibsim.engine.gather`.
     counts
-        Shape (case, `N_COUNTS`), filled with zeros: columns of `vibsim.engine.gather`.
+        Shape (case, `N_COUNTS`), filled with zeros: columns of `vibsim.engine.gather`, and behind them those of
+        `vibsim.engine.extrema`.
+    kept
+        Shape (`N_KEPT`, case, extremum), filled with NaN: rows of `vibsim.engine.extrema`.
     rows
         Scratch of `vibsim.engine.blocks`, which this loop does without.
     """
@@ -73,6 +94,8 @@ def run(
             energy_0 = kinetic + potential
         samples[0, case, 0] = u
         samples[1, case, 0] = v
+        if SERIES:
+            samples[RUNNING_ROW, case, 0] = 0.0
         extrema = first_extrema(u, v)
         bottom = bottom_of(u, turn)
         state = start(variant, u, v, h, p)
@@ -81,8 +104,15 @@ def run(
         sample = 1
         due = every
         v_before = v
+        if D2T:
+            rate = 0.5 / h
+            velocity_d2t = pending = largest_d2t = 0.0
+        if KEEP:
+            u_before = u
         for n in range(1, steps + 1):
             t = n * h
+            if KEEP:
+                u_two_before = u_before
             u_before, v_two_before, v_before = u, v_before, v
             u = state[0]
             following, own = step(state, t, h, p)
@@ -96,19 +126,37 @@ def run(
             good = n
             if GATHER:
                 kinetic, potential = energies(u, v, t, p)
-                interior = extrema[4]
+                interior = extrema[LARGEST_DEVIATION]
                 extrema = next_extrema(extrema, u, v, (kinetic + potential) - energy_0)
                 # the scheme's own velocity: an end formula would move a peak in the last step
                 if is_event(turn, bottom, v_before, u, own):
                     bottom = note_events(
                         stats, counts, case, t, h, turn, bottom, u_before, v_before, u, own
                     )
+            if D2T:
+                # that of the point before counts now that this one is sound, since it rests on it
+                largest_d2t = larger(pending, largest_d2t)
+                velocity_d2t = (following[0] - u_before) * rate
+                kinetic, potential = energies(u, velocity_d2t, t, p)
+                pending = abs((kinetic + potential) - energy_0)
+            if KEEP:  # noqa: SIM102
+                if is_turned(u_two_before, u_before, u):
+                    note_turned(kept, counts, case, n - 1, h, u_two_before, u_before, u)
             if n == due:
                 samples[0, case, sample] = u
                 samples[1, case, sample] = v
+                if SERIES:
+                    samples[RUNNING_ROW, case, sample] = extrema[LARGEST_DEVIATION]
+                    if D2T:
+                        samples[VELOCITY_D2T_ROW, case, sample] = velocity_d2t
+                        samples[RUNNING_D2T_ROW, case, sample] = larger(pending, largest_d2t)
                 sample += 1
                 due += every
         if GATHER:
             # of a member that failed, all points came before the last one
-            note_extrema(stats, case, extrema, interior if good == steps else extrema[4], h)
+            note_extrema(
+                stats, case, extrema, interior if good == steps else extrema[LARGEST_DEVIATION], h
+            )
+        if D2T:
+            note_d2t(stats, samples, case, good, every, largest_d2t)
         counts[case, LAST_STEP] = good

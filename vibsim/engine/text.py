@@ -76,6 +76,7 @@ def collect(
     if not isinstance(tree, ast.FunctionDef):
         raise SimulationError(f"{name} is no function with a name, so it cannot enter a kernel")
     _strip(tree, name)
+    tree = _Settled(module.settings).visit(tree)
     local = set(function.__code__.co_varnames) - set(HANDED)
     mark = _mark(module, function, tree, is_called)
     names = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id not in local]
@@ -137,6 +138,20 @@ def _strip(tree: ast.FunctionDef, name: str) -> None:
         call.args = [
             argument for argument in call.args if getattr(argument, "id", None) not in HANDED
         ]
+
+
+class _Settled(ast.NodeTransformer):
+    """Leaves out what stands under ``if NAME:`` where a setting says no, and the question where it says yes."""
+
+    def __init__(self, settings: Mapping[str, object]) -> None:
+        self.settings = settings
+
+    def visit_If(self, node: ast.If) -> ast.AST | list[ast.stmt] | None:
+        self.generic_visit(node)
+        answer = self.settings.get(node.test.id) if isinstance(node.test, ast.Name) else None
+        if not isinstance(answer, bool) or node.orelse:
+            return node
+        return node.body if answer else None
 
 
 def divided(a: float, b: float) -> float:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.engine import blocks, gather
+from vibsim.engine import blocks, extrema, gather
 from vibsim.engine.kernel import carried, kernel, observer
 from vibsim.models import Model
 from vibsim.schemes import Scheme
@@ -45,6 +45,45 @@ class Gathered:
     first_peak: Floats
     last_peak: Floats
     last_trough: Floats
+    deviation_d2t: Floats
+    """Largest absolute deviation of the energy by ``[D_2t u]``, n = 1, ..., N-1; NaN where that is the own velocity."""
+    accepted_steps: Floats
+    """Of a scheme that chooses its own steps; NaN of any other one."""
+    force_evaluations: Floats
+
+
+@dataclass(frozen=True)
+class Extrema:
+    """Local extrema of the position (`vibsim.engine.extrema`); the first of each kind in order of time, NaN behind.
+
+    Arrays have the shape (case, extremum), the counts (case,).
+    """
+
+    peak_time: Floats
+    """Of the parabola through three points."""
+    peak: Floats
+    peak_time_grid: Floats
+    """Of the highest point."""
+    peak_grid: Floats
+    trough_time: Floats
+    trough: Floats
+    trough_time_grid: Floats
+    trough_grid: Floats
+    peak_count: Integers
+    """All peaks, those for which there was no room among them."""
+    trough_count: Integers
+
+
+@dataclass(frozen=True)
+class Series:
+    """What samples have beside position and velocity; arrays of shape (case, n_samples)."""
+
+    deviation_running: Floats
+    """Largest absolute energy deviation at every step so far."""
+    velocity_d2t: Floats
+    """``[D_2t u]``; NaN at either end, and of a scheme whose own velocity it is."""
+    deviation_d2t_running: Floats
+    """Largest absolute deviation of the energy with that velocity so far; at the end that of the point before."""
 
 
 @dataclass(frozen=True)
@@ -58,13 +97,19 @@ class Trajectories:
     """Last step with finite values, shape (case,): the number of steps where nothing failed."""
     gathered: Gathered | None
     """None where nothing was to be gathered."""
+    series: Series | None = None
+    """None where they were not asked for."""
+    extrema: Extrema | None = None
 
 
-def lane_for(members: int, steps: int) -> str:
-    """Choose the lane from the size of the work; the bits are the same in every lane."""
+def lane_for(members: int, steps: int, *, implicit: bool = False) -> str:
+    """Choose the lane from the size of the work; the bits are the same in every lane.
+
+    An implicit step iterates as often as its member needs, which no vector instruction can.
+    """
     if members * steps <= PLAIN_MEMBER_STEPS:
         return "plain"
-    return "blocks" if members > 1 else "scalar"
+    return "blocks" if members > 1 and not implicit else "scalar"
 
 
 def integrate(
@@ -80,6 +125,8 @@ def integrate(
     lane: str | None = None,
     threads: int = 1,
     with_gathered: bool = True,
+    with_series: bool = False,
+    n_extrema: int = 0,
 ) -> Trajectories:
     """Step every member from t = 0.
 
@@ -99,6 +146,10 @@ def integrate(
         How many threads share the members.
     with_gathered
         Whether extrema, norms, peaks, turns and energies are gathered at every step.
+    with_series
+        Whether samples have more than position and velocity.
+    n_extrema
+        How many peaks and troughs of a member are kept.
 
     Raises
     ------
@@ -107,25 +158,33 @@ def integrate(
     """
     members = len(dt)
     stepper = scheme.stepper(options)
-    lane = lane or lane_for(members, steps)
-    run = kernel(model, stepper, lane, with_gathered)
-    samples = np.full((2, members, steps // every + 1), np.nan)
-    rows = gather.N_STATS if with_gathered else 0
-    stats = np.full((members, rows), np.nan)
-    counts = np.zeros((members, gather.N_COUNTS), dtype=np.int64)
+    lane = lane or lane_for(members, steps, implicit=stepper.implicit)
+    run = kernel(model, stepper, lane, with_gathered, with_series, n_extrema > 0)
+    rows = gather.n_sample_rows(with_series, stepper.own_velocity)
+    samples = np.full((rows, members, steps // every + 1), np.nan)
+    stats = np.full((members, gather.N_STATS if with_gathered else 0), np.nan)
+    columns = extrema.N_COUNTS_KEPT if n_extrema else gather.N_COUNTS
+    counts = np.zeros((members, columns), dtype=np.int64)
+    kept = np.full((extrema.N_KEPT, members if n_extrema else 0, n_extrema), np.nan)
     parameters = _scaled(model, stepper, parameters, dt)
     numbers = [np.ascontiguousarray(array, dtype=float) for array in (parameters, initial, dt)]
-    scratch = blocks.n_rows(carried(stepper, model), parameters.shape[1]) * blocks.LANES
-    scratch = scratch if lane == "blocks" else 0
+    rows = blocks.n_rows(carried(stepper, model), parameters.shape[1], n_extrema > 0)
+    scratch = rows * blocks.LANES if lane == "blocks" else 0
     end_rule, turn = END_RULES.index(stepper.end), model.turn or 0.0
 
     def task(first: int) -> None:
         stop = min(first + (TASK if threads > 1 else members), members)
-        run(*numbers, first, stop, steps, every, stepper.variant, end_rule, turn, samples, stats, counts, _aligned(scratch))  # fmt: skip # noqa: E501
+        run(*numbers, first, stop, steps, every, stepper.variant, end_rule, turn, samples, stats, counts, kept, _aligned(scratch))  # fmt: skip # noqa: E501
 
     _share(task, range(0, members, TASK) if threads > 1 else range(1), threads)
-    gathered = _name(stats, counts) if with_gathered else None
-    return Trajectories(samples[0], samples[1], counts[:, gather.LAST_STEP], gathered)
+    return Trajectories(
+        position=samples[0],
+        velocity=samples[1],
+        last_step=counts[:, gather.LAST_STEP],
+        gathered=_name(stats, counts) if with_gathered else None,
+        series=_series(samples) if with_series else None,
+        extrema=_extrema(kept, counts) if n_extrema else None,
+    )
 
 
 def _scaled(model: Model, stepper: Stepper, parameters: Floats, dt: Floats) -> Floats:
@@ -209,4 +268,39 @@ def _name(stats: Floats, counts: Integers) -> Gathered:
         first_peak=stats[:, gather.FIRST_PEAK],
         last_peak=stats[:, gather.LAST_PEAK],
         last_trough=stats[:, gather.LAST_TROUGH],
+        deviation_d2t=_storable(stats[:, gather.DEVIATION_D2T]),
+        accepted_steps=np.full(len(stats), np.nan),
+        force_evaluations=np.full(len(stats), np.nan),
+    )
+
+
+def _series(samples: Floats) -> Series:
+    if len(samples) <= gather.VELOCITY_D2T_ROW:
+        nothing = np.broadcast_to(np.nan, samples.shape[1:])
+        return Series(samples[gather.RUNNING_ROW], nothing, nothing)
+    return Series(
+        deviation_running=samples[gather.RUNNING_ROW],
+        velocity_d2t=samples[gather.VELOCITY_D2T_ROW],
+        deviation_d2t_running=_storable(samples[gather.RUNNING_D2T_ROW]),
+    )
+
+
+def _storable(energy: Floats) -> Floats:
+    """Return NaN for an energy that is too large: ``[D_2t u]`` may be so where neither point has failed."""
+    return np.where(np.isfinite(energy), energy, np.nan)
+
+
+def _extrema(kept: Floats, counts: Integers) -> Extrema:
+    trough = kept[extrema.OF_A_KIND :]
+    return Extrema(
+        peak_time=kept[extrema.TIME],
+        peak=kept[extrema.HEIGHT],
+        peak_time_grid=kept[extrema.TIME_GRID],
+        peak_grid=kept[extrema.HEIGHT_GRID],
+        trough_time=trough[extrema.TIME],
+        trough=trough[extrema.HEIGHT],
+        trough_time_grid=trough[extrema.TIME_GRID],
+        trough_grid=trough[extrema.HEIGHT_GRID],
+        peak_count=counts[:, extrema.PEAK_COUNT],
+        trough_count=counts[:, extrema.TROUGH_COUNT],
     )

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.engine import Gathered
+from vibsim.engine import Extrema, Gathered
 from vibsim.models import Model, State
 from vibsim.record import Variable, attributes
 from vibsim.simulation.members import Members
@@ -21,7 +21,13 @@ STATUS = ("ok", "non_finite")
 
 
 def gathered(
-    model: Model, run: Gathered, last_step: NDArray[np.int64], group: Members, steps: int
+    model: Model,
+    run: Gathered,
+    last_step: NDArray[np.int64],
+    group: Members,
+    steps: int,
+    *,
+    with_d2t: bool,
 ) -> dict[str, Variable]:
     """Return what was gathered over every step.
 
@@ -29,10 +35,52 @@ def gathered(
     ----------
     run, last_step
         Arrays of shape (scheme, case) or (scheme, case, 2).
+    with_d2t
+        Whether the energy by ``[D_2t u]`` has a place in the file.
     """
     rows = _extremes(model, run) | _peaks(model, run) | _outcomes(last_step, group.end, steps)
+    if with_d2t:
+        words = "largest absolute deviation of the energy with [D_2t u] as velocity, over every inner step"
+        attrs = attributes(words, model.energy_unit)
+        rows["energy_deviation_d2t_max_abs"] = run.deviation_d2t, attrs
     return {
         name: Variable(("scheme", "case"), values, attrs) for name, (values, attrs) in rows.items()
+    }
+
+
+def extrema(model: Model, found: Extrema) -> dict[str, Variable]:
+    """Return the local extrema of the position, and how many there are (vibration text, section 3.5)."""
+    dims, unit = ("scheme", "case", "extremum"), model.states[0].unit
+    parabola = "on the parabola through three points"
+    table = {}
+    for kind in ("peak", "trough"):
+        rows = {
+            f"{kind}_time": (f"time of the {kind}s, {parabola}", "s"),
+            kind: (f"height of the {kind}s, {parabola}", unit),
+            f"{kind}_time_grid": (f"time of the {kind}s at grid points", "s"),
+            f"{kind}_grid": (f"height of the {kind}s at grid points", unit),
+        }
+        for name, (words, units) in rows.items():
+            table[name] = Variable(dims, getattr(found, name), attributes(words, units))
+        words = f"number of {kind}s, those that are not kept among them"
+        counted = getattr(found, f"{kind}_count")
+        table[f"{kind}_count"] = Variable(dims[:2], counted, attributes(words, "1"))
+    return table
+
+
+def of_own_steps(run: Gathered) -> dict[str, Variable]:
+    """Return what adaptive schemes did of their own; NaN where steps are fixed."""
+    words = "of an adaptive scheme, whatever the level"
+    rows = {
+        "accepted_steps": (run.accepted_steps, f"accepted steps {words}"),
+        "force_evaluations_total": (
+            run.force_evaluations,
+            f"evaluations of the acceleration {words}, with those for its dense output",
+        ),
+    }
+    return {
+        name: Variable(("scheme", "case"), values, attributes(long_name, "1"))
+        for name, (values, long_name) in rows.items()
     }
 
 

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable
 from itertools import chain, count
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibsim import plan
-from vibsim.models import ENERGIES, MODELS, Model
+from vibsim.models import ENERGIES, MODELS, Model, State, centred
 from vibsim.record import Attribute, Record, Variable, attributes
-from vibsim.simulation.gathered import gathered
+from vibsim.simulation.gathered import extrema, gathered, of_own_steps
 from vibsim.simulation.members import Members, members
-from vibsim.simulation.solution import Solution, energies_of, solve
-from vibsim.spec.sampling import is_lean
-from vibsim.spec.series import lean_series
+from vibsim.simulation.solution import Solution, energies_of, has_adaptive, solve
+from vibsim.spec.series import RUNNING, asks_for_peaks, extrema_kept, is_bounded, stored_series
 
 if TYPE_CHECKING:
     import xarray
@@ -30,7 +29,13 @@ _ENERGY_WORDS = {
     "potential_energy": "potential energy",
     "energy": "total mechanical energy",
     "energy_deviation": "deviation of the total energy from its initial value",
+    "energy_d2t": "total mechanical energy with [D_2t u] as velocity",
+    "energy_deviation_d2t": "deviation of the total energy with [D_2t u] as velocity from its initial value",
 }
+
+
+_OF_STATES = frozenset(ENERGIES)
+"""Series that follow from the states at the samples alone."""
 
 
 def simulate(experiment: Experiment, level: int, *, threads: int = 1) -> xarray.Dataset:
@@ -70,14 +75,25 @@ def simulate_record(
     model = MODELS[experiment.model.kind]
     group = members(experiment, start, plan.count(experiment) if stop is None else stop)
     steps, every = experiment.steps(level), plan.sampling(experiment, level)
-    solution = solve(experiment, group, steps, every, threads)
-    is_bounded = stores_little(experiment)
-    wanted = lean_series(experiment) if is_bounded else (*_states(model), *ENERGIES)
+    is_lean, wanted = is_bounded(experiment), stored_series(experiment)
+    kept = extrema_kept(steps, len(experiment.schemes) * experiment.members)
+    solution = solve(
+        experiment,
+        group,
+        steps,
+        every,
+        threads,
+        with_series=not _OF_STATES.issuperset(set(wanted) - set(_states(model))),
+        n_extrema=0 if is_lean and not asks_for_peaks(experiment) else kept,
+    )
+    with_d2t = experiment.own_velocity or not is_lean
     names = [scheme.name for scheme in experiment.schemes]
     variables = {
         **_series(model, group, solution, steps, every, wanted),
-        **({} if is_bounded else _exact(model, group, steps, every)),
-        **gathered(model, solution.gathered, solution.last_step, group, steps),
+        **({} if is_lean else _exact(model, group, steps, every)),
+        **gathered(model, solution.gathered, solution.last_step, group, steps, with_d2t=with_d2t),
+        **(extrema(model, solution.extrema) if solution.extrema else {}),
+        **(of_own_steps(solution.gathered) if has_adaptive(experiment) else {}),
         **_constants(model, group, steps),
     }
     attrs: dict[str, Attribute] = {
@@ -85,16 +101,10 @@ def simulate_record(
         "level": level,
         "steps": steps,
         "every": every,
-        "storage": "lean" if is_bounded else "series",
+        "storage": "lean" if is_lean else "series",
     }
     coords = coordinates(model, names, group, steps, every, same_end=not experiment.end_varies)
     return Record(coords, variables, attrs)
-
-
-def stores_little(experiment: Experiment) -> bool:
-    """Tell whether `experiment` has so many members that storage is bounded."""
-    trajectories = len(experiment.schemes) * experiment.members
-    return is_lean(experiment.samples, experiment.steps(experiment.levels[0]), trajectories)
 
 
 def _states(model: Model) -> list[str]:
@@ -163,19 +173,36 @@ def _series(
     wanted: Iterable[str],
 ) -> dict[str, Variable]:
     names = list(wanted)
-    arrays = zip(model.states, (solution.position, solution.velocity), strict=True)
+    position, velocity = model.states
     table = {
-        state.name: Variable(SERIES, values, attributes(state.long_name, state.unit))
-        for state, values in arrays
+        position.name: Variable(SERIES, solution.position, _of(position)),
+        velocity.name: Variable(SERIES, solution.velocity, _of(velocity)),
     }
-    of_energy = [name for name in ENERGIES if name in names]
+    if solution.series is not None:
+        words = f"{velocity.long_name} by [D_2t u], the centred difference of the position"
+        table[centred(model)[0]] = Variable(
+            SERIES, solution.series.velocity_d2t, attributes(words, velocity.unit)
+        )
+        for name, values in (
+            ("energy_deviation", solution.series.deviation_running),
+            ("energy_deviation_d2t", solution.series.deviation_d2t_running),
+        ):
+            words = f"largest absolute {_ENERGY_WORDS[name]}, over every step so far"
+            attrs = attributes(words, model.energy_unit)
+            table[name + RUNNING] = Variable(SERIES, values, attrs)
+        table = {name: variable for name, variable in table.items() if name in names}
+    of_energy = [name for name in _ENERGY_WORDS if name in names]
     found = energies_of(model, group, solution, steps, every, of_energy)
     for name in of_energy:
         attrs = attributes(_ENERGY_WORDS[name], model.energy_unit)
         table[name] = Variable(SERIES, found[name], attrs)
-    words = attributes("total mechanical energy at t = 0", model.energy_unit)
-    table["energy_initial"] = Variable(("scheme", "case"), found["energy_initial"], words)
+    attrs = attributes("total mechanical energy at t = 0", model.energy_unit)
+    table["energy_initial"] = Variable(("scheme", "case"), found["energy_initial"], attrs)
     return table
+
+
+def _of(state: State) -> dict[str, Any]:
+    return attributes(state.long_name, state.unit)
 
 
 def _exact(model: Model, group: Members, steps: int, every: int) -> dict[str, Variable]:

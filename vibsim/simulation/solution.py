@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibsim import plan
-from vibsim.engine import Gathered, Trajectories, energies, integrate, lane_for
+from vibsim.engine import (
+    Extrema,
+    Gathered,
+    Series,
+    Trajectories,
+    energies,
+    integrate,
+    lane_for,
+)
 from vibsim.models import MODELS, Model
 from vibsim.schemes import SCHEMES
+from vibsim.simulation import adaptive
 from vibsim.simulation.members import Members
 
 if TYPE_CHECKING:
@@ -35,15 +44,30 @@ class Solution:
     """Shape (scheme, case)."""
     gathered: Gathered
     """Its arrays have the shape (scheme, case) or (scheme, case, 2)."""
+    series: Series | None
+    """Its arrays have the shape (scheme, case, t)."""
+    extrema: Extrema | None
+    """Its arrays have the shape (scheme, case, extremum) or (scheme, case)."""
 
 
-def solve(experiment: Experiment, group: Members, steps: int, every: int, threads: int) -> Solution:
-    """Step every scheme of `experiment` for the members of `group`."""
+def solve(
+    experiment: Experiment,
+    group: Members,
+    steps: int,
+    every: int,
+    threads: int,
+    *,
+    with_series: bool = False,
+    n_extrema: int = 0,
+) -> Solution:
+    """Step every scheme of `experiment` for the members of `group`; see `vibsim.engine.integrate`."""
+    keep = {"with_series": with_series, "n_extrema": n_extrema}
     rows = [
         _in_order(
             [
-                (_run(experiment, i, options, group, where, steps, every, threads), where)
-                for options, where in plan.option_groups(experiment, i, group.columns)
+                (_run(experiment, i, options, group, where, steps, every, threads, keep), where)
+                for options, members in plan.option_groups(experiment, i, group.columns)
+                for where in _pieces(experiment, i, members, steps)
             ]
         )
         for i in range(len(experiment.schemes))
@@ -53,7 +77,22 @@ def solve(experiment: Experiment, group: Members, steps: int, every: int, thread
         velocity=_stack(row.velocity for row in rows),
         last_step=_stack(row.last_step for row in rows),
         gathered=_each(Gathered, [row.gathered for row in rows], _stack),
+        series=_each(Series, [row.series for row in rows], _stack) if with_series else None,
+        extrema=_each(Extrema, [row.extrema for row in rows], _stack) if n_extrema else None,
     )
+
+
+def has_adaptive(experiment: Experiment) -> bool:
+    """Tell whether a scheme of `experiment` chooses its own steps."""
+    return any(SCHEMES[scheme.kind].adaptive for scheme in experiment.schemes)
+
+
+def _pieces(
+    experiment: Experiment, scheme: int, where: NDArray[np.int64], steps: int
+) -> Iterable[NDArray[np.int64]]:
+    """Yield members to be stepped together."""
+    is_adaptive = SCHEMES[experiment.schemes[scheme].kind].adaptive
+    return adaptive.pieces(where, steps) if is_adaptive else (where,)
 
 
 def _run(
@@ -65,12 +104,14 @@ def _run(
     steps: int,
     every: int,
     threads: int,
+    keep: Mapping[str, Any],
 ) -> Trajectories:
     model = MODELS[experiment.model.kind]
+    method = SCHEMES[experiment.schemes[scheme].kind]
     parameters = [group.parameters[p.name][where] for p in model.parameters]
-    return integrate(
+    return (adaptive.integrate if method.adaptive else integrate)(
         model,
-        SCHEMES[experiment.schemes[scheme].kind],
+        method,
         options,
         np.stack(parameters, axis=-1) if parameters else np.empty((len(where), 0)),
         np.stack([group.initial[state.name][where] for state in model.states], axis=-1),
@@ -78,6 +119,7 @@ def _run(
         steps,
         every,
         threads=threads,
+        **keep,
     )
 
 
@@ -91,15 +133,21 @@ def _in_order(parts: list[tuple[Trajectories, NDArray[np.int64]]]) -> Trajectori
         return np.asarray(np.concatenate(list(arrays))[order])
 
     runs = [run for run, _ in parts]
+    one = runs[0]
     return Trajectories(
         position=sorted_(run.position for run in runs),
         velocity=sorted_(run.velocity for run in runs),
         last_step=sorted_(run.last_step for run in runs),
         gathered=_each(Gathered, [run.gathered for run in runs], sorted_),
+        series=_each(Series, [run.series for run in runs], sorted_) if one.series else None,
+        extrema=_each(Extrema, [run.extrema for run in runs], sorted_) if one.extrema else None,
     )
 
 
-def _each(kind: type[Gathered], rows: list[Any], join: Any) -> Gathered:
+Kind = TypeVar("Kind", Gathered, Series, Extrema)
+
+
+def _each(kind: type[Kind], rows: list[Any], join: Any) -> Kind:
     names = [field.name for field in fields(kind)]
     return kind(**{name: join(getattr(row, name) for row in rows) for name in names})
 
@@ -123,7 +171,8 @@ def energies_of(
     Parameters
     ----------
     wanted
-        Names out of ``kinetic_energy``, ``potential_energy``, ``energy``, ``energy_deviation``.
+        Names out of ``kinetic_energy``, ``potential_energy``, ``energy``, ``energy_deviation``, ``energy_d2t``,
+        ``energy_deviation_d2t``.
 
     Returns
     -------
@@ -156,6 +205,41 @@ def energies_of(
                 "energy_deviation": energy - energy[:, :1],
                 "energy_initial": energy[:, 0],
             }
+            if not set(found) <= series.keys():
+                energy_d2t = _energy_d2t(
+                    model, parameters, group, solution, steps, every, s, part, lane
+                )
+                series["energy_d2t"] = energy_d2t
+                series["energy_deviation_d2t"] = energy_d2t - energy[:, :1]
             for name, values in found.items():
                 values[s, part] = series[name]
     return found
+
+
+def _energy_d2t(
+    model: Model,
+    parameters: Floats,
+    group: Members,
+    solution: Solution,
+    steps: int,
+    every: int,
+    scheme: int,
+    part: slice,
+    lane: str,
+) -> Floats:
+    """Return the energy with ``[D_2t u]`` as the velocity, shape (case, t); NaN where there is none or it overflows."""
+    assert solution.series is not None
+    velocity = solution.series.velocity_d2t[scheme, part]
+    if np.isnan(velocity).all():
+        return np.full(velocity.shape, np.nan)
+    kinetic, potential = energies(
+        model,
+        parameters[part],
+        group.end[part] / steps,
+        every,
+        solution.position[scheme, part],
+        velocity,
+        lane=lane,
+    )
+    energy = kinetic + potential
+    return np.where(np.isfinite(energy), energy, np.nan)

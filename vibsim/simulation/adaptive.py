@@ -1,0 +1,259 @@
+"""Members integrated by SciPy, each alone and once per tolerance, and sampled at the points of a level.
+
+The steps are the solver's own and depend on no level. What a level has of them is the dense output at its N + 1 points:
+extrema, periods, norms and energies are gathered over these points by the loop that gathers those of every other
+scheme, so that a number means the same for all. Radau's dense output is a polynomial of degree 3 and between its steps
+less accurate than at them.
+
+A step is accepted when its error estimate is below ``rtol |y| + atol``, for position and velocity, with ``rtol`` the
+tolerance (SciPy takes 2.2e-14 at least) and ``atol`` the tolerance times the size of the problem:
+``max(|u_0|, |v_0|/w)`` for the position, w times that for the velocity, w the natural frequency; 1 where both vanish.
+
+The forces are those of the engine, in plain Python. The implicit methods get the model's own derivative. The last bits
+depend on SciPy's version and on the machine, but on nothing else: not on the level, the shard or the number of cores.
+
+Source: vibration text (B), exercise 4.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections import OrderedDict
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.engine import Trajectories
+from vibsim.engine import integrate as gather_over
+from vibsim.engine.gather import OVERFLOW
+from vibsim.engine.kernel import kernel
+from vibsim.models import Model
+from vibsim.schemes.base import Acceleration, CarriedState, Options, Scheme, Stepper
+from vibsim.spec.cost import PLAIN_MEMBER_STEPS
+
+Floats = NDArray[np.float64]
+
+MOST_STEPS = 2**20
+"""Steps after which a run is given up, as one that fails: some minutes of work."""
+KEPT_STEPS = 140_000
+"""Steps that are kept in the process for the other levels of a job, of all runs together."""
+PIECE = 2**20
+"""Points that are worked out at a time."""
+
+CLASSES = {"dop853": "DOP853", "lsoda": "LSODA", "radau": "Radau"}
+"""SciPy's name of each scheme."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One member and how it is to be integrated; equal problems have the same run."""
+
+    model: Model
+    kind: str
+    tolerance: float
+    parameters: tuple[float, ...]
+    initial: tuple[float, float]
+    end: float
+
+    @property
+    def scale(self) -> tuple[float, float]:
+        """Sizes of position and velocity that the absolute tolerances are relative to."""
+        u, v = self.initial
+        named = {row.name: x for row, x in zip(self.model.parameters, self.parameters, strict=True)}
+        w = float(self.model.natural_frequency(named))
+        if not (w > 0.0 and math.isfinite(w)):
+            w = 2.0 * math.pi / self.end
+        size = max(abs(u), abs(v) / w) or 1.0
+        return size, w * size
+
+
+@dataclass(frozen=True)
+class Run:
+    """What SciPy did with a problem."""
+
+    times: list[float]
+    """Ends of the accepted steps, from 0 on."""
+    pieces: list[Any]
+    """The dense output of every step: SciPy's functions of time."""
+    force_evaluations: int
+    """Evaluations of the acceleration, with those for the error estimates and for the dense output."""
+
+    @property
+    def accepted_steps(self) -> int:
+        """Number of accepted steps."""
+        return len(self.pieces)
+
+    def at(self, t: Floats) -> Floats:
+        """Return position and velocity at ascending times, shape (2, n_t); NaN behind the last step."""
+        found = np.full((2, len(t)), np.nan)
+        which = np.searchsorted(self.times, t, side="left") - 1
+        first = np.searchsorted(which, np.arange(len(self.pieces) + 1))
+        for piece, start, stop in zip(self.pieces, first[:-1], first[1:], strict=True):
+            if start < stop:
+                found[:, start:stop] = piece(t[start:stop])
+        return found
+
+
+def start_tabulated(
+    variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
+) -> CarriedState:
+    """Return the first point behind the start, and its number."""
+    return float(p[-1][2]), 1.0
+
+
+def step_tabulated(
+    state: CarriedState, t: float, dt: float, p: Any, acceleration: Acceleration
+) -> tuple[CarriedState, float]:
+    """Return the next point of the table ``u_0, v_0, u_1, v_1, ...`` and the velocity at this one."""
+    n = int(state[1])
+    return (float(p[-1][2 * n + 2]), state[1] + 1.0), float(p[-1][2 * n + 1])
+
+
+TABULATED = Stepper(start=start_tabulated, step=step_tabulated, own_velocity=False, tabulated=True)
+"""Steps along a table of points that stands behind the parameters, and ends with one more point."""
+
+
+def pieces(where: NDArray[np.int64], steps: int) -> Iterator[NDArray[np.int64]]:
+    """Yield as many members at a time as `integrate` may hold the points of."""
+    size = max(PIECE // (steps + 1), 1)
+    for first in range(0, len(where), size):
+        yield where[first : first + size]
+
+
+def integrate(
+    model: Model,
+    scheme: Scheme,
+    options: Options,
+    parameters: Floats,
+    initial: Floats,
+    dt: Floats,
+    steps: int,
+    every: int,
+    *,
+    threads: int = 1,
+    with_series: bool = False,
+    n_extrema: int = 0,
+) -> Trajectories:
+    """Integrate every member, and gather over the points of a level; see `vibsim.engine.integrate`.
+
+    A member whose integration fails, or that grows beyond what can be stored, ends there, and the others go on.
+    """
+    members = len(dt)
+    table = np.zeros((members, steps + 2, 2))
+    done = np.empty((2, members))
+    for i in range(members):
+        problem = Problem(
+            model=model,
+            kind=scheme.kind,
+            tolerance=float(options["tolerance"]),
+            parameters=tuple(parameters[i].tolist()),
+            initial=(float(initial[i, 0]), float(initial[i, 1])),
+            end=steps * float(dt[i]),
+        )
+        run = solved(problem)
+        # the loop over the points has the first one from elsewhere
+        for first in range(1, steps + 1, PIECE):
+            n = np.arange(first, min(first + PIECE, steps + 1))
+            table[i, n] = run.at(n * dt[i]).T
+        done[:, i] = run.accepted_steps, run.force_evaluations
+    found = gather_over(
+        model,
+        replace(scheme, stepper=lambda options: TABULATED),
+        options,
+        np.concatenate([parameters, table.reshape(members, -1)], axis=1),
+        initial,
+        dt,
+        steps,
+        every,
+        lane="plain" if members * steps <= PLAIN_MEMBER_STEPS else "scalar",
+        threads=threads,
+        with_series=with_series,
+        n_extrema=n_extrema,
+    )
+    assert found.gathered is not None
+    counts = replace(found.gathered, accepted_steps=done[0], force_evaluations=done[1])
+    return replace(found, gathered=counts)
+
+
+_kept: OrderedDict[Problem, Run] = OrderedDict()
+
+
+def solved(problem: Problem) -> Run:
+    """Return the run of a problem: that of another level, where it is still kept."""
+    run = _kept.pop(problem, None) or solve(problem)
+    _kept[problem] = run
+    total = sum(other.accepted_steps for other in _kept.values())
+    while total > KEPT_STEPS and len(_kept) > 1:
+        total -= _kept.popitem(last=False)[1].accepted_steps
+    return run
+
+
+def solve(problem: Problem) -> Run:
+    """Integrate a problem to its end, or as far as it goes."""
+    right, jacobian, count = _right_hand_side(problem)
+    times: list[float] = [0.0]
+    found: list[Any] = []
+    # what overflows or is no number is a result; LSODA warns why it stops, and all of them of small tolerances
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        solver = _solver(problem, right, jacobian)
+        # a first step that is no number would be tried for ever
+        going = math.isfinite(getattr(solver, "h_abs", 0.0))
+        while going and solver.status == "running" and len(found) < MOST_STEPS:
+            solver.step()
+            # written so that NaN ends it as well
+            going = solver.t > times[-1] and bool(np.abs(solver.y).sum() < OVERFLOW)
+            if going and solver.status != "failed":
+                found.append(solver.dense_output())
+                times.append(float(solver.t))
+    return Run(times, found, count())
+
+
+def _solver(problem: Problem, right: Any, jacobian: Any) -> Any:
+    """Return SciPy's solver, at the start."""
+    from scipy import integrate as scipy_integrate
+
+    more = {} if problem.kind == "dop853" else {"jac": jacobian}
+    return getattr(scipy_integrate, CLASSES[problem.kind])(
+        right,
+        0.0,
+        problem.initial,
+        problem.end,
+        # SciPy takes its least one where this is less, and warns
+        rtol=problem.tolerance,
+        atol=problem.tolerance * np.array(problem.scale),
+        **more,
+    )
+
+
+def _right_hand_side(
+    problem: Problem,
+) -> tuple[Callable[..., Any], Callable[..., Any], Callable[[], int]]:
+    """Return the derivative of (u, v), that derivative's own derivative, and what counts the forces."""
+    acceleration, slopes = _forces(problem.model)
+    p = problem.parameters
+    count = 0
+
+    def right(t: float, y: Floats) -> tuple[float, float]:
+        nonlocal count
+        count += 1
+        u, v = y.tolist()
+        return v, acceleration(u, v, float(t), p)
+
+    def jacobian(t: float, y: Floats) -> Floats:
+        u, v = y.tolist()
+        return np.array([(0.0, 1.0), slopes(u, v, float(t), p)])
+
+    return right, jacobian, lambda: count
+
+
+@cache
+def _forces(model: Model) -> tuple[Callable[..., float], Callable[..., tuple[float, float]]]:
+    """Return the acceleration of a model and its slopes, as plain functions of (u, v, t, p)."""
+    plain: Any = kernel(model, replace(TABULATED, implicit=True), "plain", False)
+    return plain.__globals__["acceleration"], plain.__globals__["slopes"]
