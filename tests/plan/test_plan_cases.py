@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vibsim import plan
 from vibsim.analysis import analyse_records, verdicts
+from vibsim.schemes import SCHEMES
 from vibsim.simulation import simulate_record
 from vibsim.spec import Experiment
 from vibsim.spec.sampling import SMALL
@@ -205,7 +206,9 @@ def test_options_come_in_groups() -> None:
         ({**base, "start": "first_order", "end_velocity": "backward"}, [3, 4]),
     ]
     assert [(dict(options), list(members)) for options, members in groups] == expected
-    assert {type(word) for options, _ in groups for word in options.values()} == {str}
+    types = {name: type(value) for name, value in SCHEMES["central"].defaults().items()}
+    for options, _ in groups:
+        assert {name: type(value) for name, value in options.items()} == types
 
 
 def test_without_swept_options_there_is_one_group() -> None:

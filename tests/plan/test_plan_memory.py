@@ -19,6 +19,8 @@ CASES = {
     "lean": "levels: [6, 7]\nschemes: [central]\n" + GRID % 200_000,
     "every step, two schemes": "levels: [6, 10]\nsamples: all\n"
     "schemes: [central, {kind: central, label: other, end_velocity: kick}]\n" + GRID % 2000,
+    "a velocity of its own": "levels: [6, 10]\nsamples: all\nschemes: [central, rk4]\n"
+    + GRID % 2000,
 }
 PROBE = r"""
 import re, sys

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 import time
 from collections.abc import Callable
@@ -158,6 +159,18 @@ def test_a_shard_is_some_seconds_in_bounded_memory(level: int, schemes: int, sam
         assert held <= cost.SHARD_BYTES
     if members < cost.LARGEST_SHARD:
         assert 2 * work > cost.SHARD_SECONDS or 2 * held > cost.SHARD_BYTES
+
+
+def test_more_evaluations_take_more_time_and_so_smaller_shards() -> None:
+    ladder = [cost.work(evaluations, True) for evaluations in (1, 2, 4)]
+    ladder += [cost.work(evaluations, False) for evaluations in (1, 2)]
+    loads = [cost.Load(1, 2**10, 17, 3, work=w, iterated=i) for w, i in ladder]
+    for one, other in itertools.pairwise(loads):
+        assert one.seconds(1) < other.seconds(1)
+        assert one.seconds(2**16) < other.seconds(2**16)
+        assert one.shard >= other.shard
+    assert loads[0].shard == cost.Load(1, 2**10, 17, 3).shard
+    assert loads[0].shard > loads[-1].shard
 
 
 def test_every_file_is_made_by_one_job(plan_of: Plans, small_shards: None) -> None:

@@ -80,7 +80,10 @@ def test_defaults_are_filled_in() -> None:
 @pytest.mark.parametrize("kind", MODELS)
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_every_model_and_scheme_of_the_registries_can_be_named(kind: str, scheme: str) -> None:
-    experiment = build(model={"kind": kind}, initial={}, schemes=[{"kind": scheme}])
+    # levels need a scheme with equal steps
+    schemes = ["central", {"kind": scheme, "label": "named"}]
+    experiment = build(model={"kind": kind}, initial={}, schemes=schemes)
+    assert experiment.schemes[1].options == SCHEMES[scheme].defaults()
     assert tuple(experiment.initial) == tuple(state.name for state in MODELS[kind].states)
 
 

@@ -289,7 +289,12 @@ CASES: list[tuple[dict[str, Any], str, str, str]] = [
     ({"samples": {"every": 3}}, "samples.every", "must divide the 64 steps", ""),
     ({"samples": {"evry": 2, "every": 2}}, "samples.evry", "unknown key", "every"),
     # checks
-    (check(foo=1), "checks[0]", "must be a mapping with the key converges, value or claim", ""),
+    (
+        check(foo=1),
+        "checks[0]",
+        "must be a mapping with the key converges, value, stable, conserves, equal or claim",
+        "",
+    ),
     ({"checks": ["theta"]}, "checks[0]", "must be a mapping with the key converges", ""),
     (check(converges="thta"), "checks[0].converges", "unknown quantity", "did you mean 'theta'?"),
     (check(converges="theta", id="A"), "checks[0].id", "a to z, 0 to 9", ""),
@@ -392,7 +397,7 @@ CASES: list[tuple[dict[str, Any], str, str, str]] = [
     ),
     (value(value="richardson_error", at={"level": 6}), "checks[0].at.level", "takes no level", ""),
     (check(claim="x"), "checks[0].that", "required key is missing", ""),
-    (check(claim="x", that={"claim": "y"}), "checks[0].that", "key converges or value", ""),
+    (check(claim="x", that={"claim": "y"}), "checks[0].that", "stable, conserves or equal", ""),
     (check(claim="x", that={"converges": "x"}), "checks[0].that.converges", "unknown quantity", ""),
     (
         check(claim="x", holds="yes", that={"converges": "theta"}),

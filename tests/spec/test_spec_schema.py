@@ -106,6 +106,11 @@ def test_every_key_is_described() -> None:
 def test_choices_follow_the_registries() -> None:
     kinds = {row["const"] for name, row in _properties(schema()) if name == "kind"}
     assert kinds == {*MODELS, *SCHEMES}
-    defaults = {name: row["default"] for name, row in _properties(schema()) if "default" in row}
-    for scheme in SCHEMES.values():
+    sections = {d["properties"]["kind"]["const"]: d["properties"] for d in _of_kinds()}
+    for kind, scheme in SCHEMES.items():
+        defaults = {name: row.get("default") for name, row in sections[kind].items()}
         assert scheme.defaults().items() <= defaults.items()
+
+
+def _of_kinds() -> list[dict[str, Any]]:
+    return [d for d in schema()["$defs"].values() if "kind" in d.get("properties", {})]

@@ -57,7 +57,7 @@ def _is_cheap(group: Sequence[LevelJob]) -> bool:
     share = group[0].shards[0].stop / group[0].shards[-1].stop
     return (
         len(borders) == 1
-        and share * sum(level.seconds for level in group) <= CHEAP_SECONDS
+        and share * sum(level.seconds - level.shared for level in group) <= CHEAP_SECONDS
         and share * sum(level.bytes for level in group) <= CHEAP_BYTES
     )
 
@@ -65,7 +65,8 @@ def _is_cheap(group: Sequence[LevelJob]) -> bool:
 def _batch(group: Sequence[LevelJob], index: int, trajectories: int) -> Batch:
     whole = group[0].shards[-1].stop
     shard = group[0].shards[index]
-    work = sum(level.seconds for level in group) * (shard.stop - shard.start) / whole
+    once = group[0].shared + sum(level.seconds - level.shared for level in group)
+    work = once * (shard.stop - shard.start) / whole
     return Batch(
         levels=tuple(level.level for level in group),
         shard=index,

@@ -59,6 +59,7 @@ def _analysis(
             "levels": _digests(levels),
             "title": experiment.title,
             "checks": content.get("checks"),
+            "published": content.get("published"),
             # How the members lie in the space of parameters is no number of theirs.
             "sweep": content.get("sweep"),
             "tolerance": content.get("tolerance"),
@@ -88,7 +89,7 @@ def extrapolated(content: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in content.items() if key not in _NOT_EXTRAPOLATED}
 
 
-_NOT_EXTRAPOLATED = ("title", "source", "checks")
+_NOT_EXTRAPOLATED = ("title", "source", "checks", "published")
 
 
 @cache

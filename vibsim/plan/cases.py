@@ -56,7 +56,7 @@ def sampling(experiment: Experiment, level: int) -> int:
 
 def option_groups(
     experiment: Experiment, scheme: int, columns: Mapping[str, NDArray[Any]]
-) -> list[tuple[Mapping[str, str], NDArray[np.int64]]]:
+) -> list[tuple[Mapping[str, str | float | bool], NDArray[np.int64]]]:
     """Return the options that members have of one scheme.
 
     Parameters
@@ -72,9 +72,12 @@ def option_groups(
     -------
     list
         Every distinct set of options, in the order in which members first have it, with the positions of those
-        members in `columns`, increasing. Without a sweep, the one set of the one member.
+        members in `columns`, increasing. Without a sweep, the one set of the one member. A word is text, a number a
+        float, and a flag a bool.
     """
     import numpy as np
+
+    from vibsim.spec.options import as_option
 
     base = experiment.scheme_options(scheme)
     size = len(next(iter(columns.values()))) if columns else 1
@@ -82,12 +85,14 @@ def option_groups(
     swept = {name: columns[key] for name in base if (key := prefix + name) in columns}
     if not swept:
         return [(base, np.arange(size))]
-    groups: list[tuple[Mapping[str, str], NDArray[np.int64]]] = []
-    left = np.ones(size, dtype=bool)
-    while left.any():
-        place = left.argmax()
-        options = {**base, **{name: str(column[place]) for name, column in swept.items()}}
-        same = np.all([column == column[place] for column in swept.values()], axis=0)
-        groups.append((options, np.flatnonzero(same)))
-        left &= ~same
-    return groups
+    kind = np.zeros(size, dtype=np.int64)
+    for column in swept.values():
+        distinct, place = np.unique(column, return_inverse=True)
+        # numbered anew for each key, so that the numbers stay small
+        kind = np.unique(kind * len(distinct) + place, return_inverse=True)[1]
+    order = np.argsort(kind, kind="stable")
+    members = np.split(order, np.flatnonzero(np.diff(kind[order])) + 1)
+    return [
+        ({**base, **{n: as_option(base[n], c[where[0]]) for n, c in swept.items()}}, where)
+        for where in sorted(members, key=lambda where: int(where[0]))
+    ]

@@ -43,6 +43,8 @@ class LevelJob:
     """Size of the files, estimated."""
     seconds: float
     """Seconds of one core that the steps and the files take, estimated."""
+    shared: float
+    """Those among them that a job takes once for all of its levels: of schemes that choose their own steps."""
     memory: int
     """Bytes that the largest job of the level holds at its peak, estimated."""
     shards: tuple[ShardJob, ...]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -17,15 +18,14 @@ from vibsim.plan import code
 from vibsim.plan.cases import columns, sampling
 from vibsim.plan.jobs import LevelJob, ShardJob, shard_path
 from vibsim.plan.versions import NUMERICAL, versions
-from vibsim.spec.cost import Load
-from vibsim.spec.sampling import is_lean
+from vibsim.spec.cost import Load, work
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
 
 _NOT_SIMULATED = (
     *("title", "source", "checks", "levels", "samples", "sweep"),
-    *("output", "tolerance"),
+    *("output", "tolerance", "published"),
 )
 
 
@@ -43,32 +43,55 @@ def simulated(content: Mapping[str, Any]) -> dict[str, Any]:
 def load_of(experiment: Experiment, level: int) -> Load:
     """Return what one member of `experiment` costs at `level`."""
     from vibsim.models import MODELS
+    from vibsim.schemes import SCHEMES
+    from vibsim.spec.series import extrema_kept
 
     model, steps = MODELS[experiment.model.kind], experiment.steps(level)
     lean = is_bounded(experiment)
+    trajectories = len(experiment.schemes) * experiment.members
+    kinds = [SCHEMES[experiment.schemes[i].kind] for i in experiment.ladder]
+    works = [work(kind.force_evaluations, kind.explicit) for kind in kinds]
     return Load(
         schemes=len(experiment.schemes),
         steps=steps,
         samples=steps // sampling(experiment, level) + 1,
         series=len(_series(experiment)),
         exact=0 if lean or model.exact is None else len(model.states),
+        work=sum(explicit for explicit, _ in works),
+        iterated=sum(iterated for _, iterated in works),
+        extrema=0 if lean else extrema_kept(steps, trajectories),
+        d2t=experiment.own_velocity or not lean,
+        own=_own_seconds(experiment),
+    )
+
+
+def _own_seconds(experiment: Experiment) -> float:
+    """Return the seconds that schemes which choose their own steps take of a member that is not swept."""
+    from vibsim.models import MODELS
+    from vibsim.schemes import SCHEMES
+    from vibsim.schemes.adaptive import seconds
+
+    model = MODELS[experiment.model.kind]
+    turns = experiment.time.end * float(model.natural_frequency(experiment.model.parameters))
+    return sum(
+        seconds(scheme.kind, float(scheme.options["tolerance"]), turns / (2.0 * math.pi))
+        for scheme in experiment.schemes
+        if SCHEMES[scheme.kind].adaptive
     )
 
 
 def is_bounded(experiment: Experiment) -> bool:
     """Tell whether `experiment` is so large that its storage is bounded."""
-    trajectories = len(experiment.schemes) * experiment.members
-    return is_lean(experiment.samples, experiment.steps(experiment.levels[0]), trajectories)
+    from vibsim.spec import series
+
+    return series.is_bounded(experiment)
 
 
 def _series(experiment: Experiment) -> tuple[str, ...]:
     """Name the series that are kept of every scheme and member."""
-    from vibsim.models import MODELS, quantities
-    from vibsim.spec.series import lean_series
+    from vibsim.spec.series import stored_series
 
-    if is_bounded(experiment):
-        return lean_series(experiment)
-    return quantities(MODELS[experiment.model.kind])
+    return stored_series(experiment)
 
 
 def level_jobs(experiment: Experiment, content: Mapping[str, Any]) -> tuple[LevelJob, ...]:
@@ -114,6 +137,7 @@ def _level(
             "steps": load.steps,
             "every": every,
             "series": [*_series(experiment), "lean" if is_bounded(experiment) else "all"],
+            "extrema": load.extrema,
             "own ends": experiment.end_varies,
             "code": _simulation_code(experiment),
             "versions": versions(NUMERICAL),
@@ -134,6 +158,7 @@ def _level(
         member_steps=load.schemes * members * load.steps,
         bytes=load.disk(members),
         seconds=round(load.seconds(members), 3),
+        shared=round(members * load.own, 3),
         memory=load.memory(min(members, load.shard)),
         shards=tuple(map(shard, range(load.shards(members)))),
     )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from vibsim.lazy import loader
 
 if TYPE_CHECKING:
+    from vibsim.spec.about import schemes_of
     from vibsim.spec.axes import Axis, Draw, Linspace, Logspace, Range
     from vibsim.spec.checks import (
         At,
@@ -29,11 +30,14 @@ if TYPE_CHECKING:
         canonical,
         restore,
     )
+    from vibsim.spec.published import PublishedRow, PublishedTable
     from vibsim.spec.reading import from_dict, load
     from vibsim.spec.sampling import stride
+    from vibsim.spec.scheme_checks import ConservesCheck, EqualCheck, StableCheck
     from vibsim.spec.values import VALUES, Value
 
 _HOMES = {
+    "about": ("schemes_of",),
     "axes": ("Axis", "Draw", "Linspace", "Logspace", "Range"),
     "checks": (
         "At",
@@ -53,8 +57,10 @@ _HOMES = {
         "canonical",
         "restore",
     ),
+    "published": ("PublishedRow", "PublishedTable"),
     "reading": ("from_dict", "load"),
     "sampling": ("stride",),
+    "scheme_checks": ("ConservesCheck", "EqualCheck", "StableCheck"),
     "values": ("VALUES", "Value"),
 }
 _HOME = {name: f"vibsim.spec.{module}" for module, names in _HOMES.items() for name in names}
@@ -65,15 +71,20 @@ __all__ = [
     "Axis",
     "Check",
     "ClaimCheck",
+    "ConservesCheck",
     "ConvergesCheck",
     "Draw",
+    "EqualCheck",
     "Expect",
     "Experiment",
     "Linspace",
     "Logspace",
     "ModelSpec",
+    "PublishedRow",
+    "PublishedTable",
     "Range",
     "SchemeSpec",
+    "StableCheck",
     "Sweep",
     "TimeSpec",
     "Value",
@@ -83,6 +94,7 @@ __all__ = [
     "from_dict",
     "load",
     "restore",
+    "schemes_of",
     "stride",
 ]
 

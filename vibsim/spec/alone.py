@@ -7,10 +7,12 @@ from typing import Any
 
 from vibsim.errors import Fault, InputError
 from vibsim.models import MODELS
-from vibsim.spec.checks import Check, ClaimCheck, ConvergesCheck, ValueCheck
+from vibsim.spec.checks import Check, ClaimCheck, ConvergesCheck, Measurement, ValueCheck
 from vibsim.spec.columns import columns
 from vibsim.spec.experiment import Experiment, ModelSpec, SchemeSpec, TimeSpec
 from vibsim.spec.fields import FrozenDict
+from vibsim.spec.options import as_option
+from vibsim.spec.published import PublishedTable, claims
 
 
 def alone(experiment: Experiment, case: int) -> Experiment:
@@ -34,6 +36,7 @@ def alone(experiment: Experiment, case: int) -> Experiment:
     swept = {key: column[0].item() for key, column in columns(axes, case, case + 1).items()}
     parameters = _filled(swept, "model", experiment.model.parameters)
     end = swept.get("time.end", float(experiment.natural_end(parameters)))
+    published = _published(experiment, case, end)
     return experiment.model_copy(
         update={
             "name": f"{experiment.name}_case_{case}",
@@ -42,7 +45,8 @@ def alone(experiment: Experiment, case: int) -> Experiment:
             "time": TimeSpec.model_validate({**experiment.time.model_dump(), "end": end}),
             "schemes": tuple(_scheme(swept, scheme) for scheme in experiment.schemes),
             "sweep": None,
-            "checks": _checks(experiment, case, end),
+            "checks": _checks(experiment, published, case, end),
+            "published": published,
         }
     )
 
@@ -54,22 +58,53 @@ def _filled(swept: dict[str, Any], section: str, values: Mapping[str, Any]) -> F
 
 
 def _scheme(swept: dict[str, Any], scheme: SchemeSpec) -> SchemeSpec:
-    options = _filled(swept, f"schemes.{scheme.name}", scheme.options)
+    found = _filled(swept, f"schemes.{scheme.name}", scheme.options)
+    options = {name: as_option(scheme.options[name], value) for name, value in found.items()}
     return SchemeSpec(name=scheme.name, kind=scheme.kind, options=options)
 
 
-def _checks(experiment: Experiment, case: int, end: float) -> tuple[Check, ...]:
-    scale = end if experiment.end_varies else 1.0
-    kept = [_adapted(check, scale) for check in experiment.checks if _concerns(check, case)]
+def _scale(experiment: Experiment, end: float) -> float:
+    """Return the time that the unit of checked times is: the member's end where times are fractions of it."""
+    return end if experiment.end_varies else 1.0
+
+
+def _published(experiment: Experiment, case: int, end: float) -> tuple[PublishedTable, ...]:
+    """Return the rows of printed tables that speak of this member or of every one."""
+    scale = _scale(experiment, end)
+    tables = []
+    for table in experiment.published:
+        rows = [row for row in table.rows if row.at.case in (None, case)]
+        kept = []
+        for row in rows:
+            t = None if row.at.t is None else row.at.t * scale
+            at = row.at.model_copy(update={"case": None, "t": t})
+            kept.append(row.model_copy(update={"at": at}))
+        if kept:
+            tables.append(table.model_copy(update={"rows": tuple(kept)}))
+    return tuple(tables)
+
+
+def _checks(
+    experiment: Experiment, published: tuple[PublishedTable, ...], case: int, end: float
+) -> tuple[Check, ...]:
+    scale = _scale(experiment, end)
+    kept = [_adapted(check, scale) for check in experiment.written if _concerns(check, case)]
+    kept.extend(claims(published, experiment.source))
     if kept:
         return tuple(kept)
     position = MODELS[experiment.model.kind].position
     return (ConvergesCheck(id="check_1", converges=position),)
 
 
+def case_of(check: Measurement) -> int | None:
+    """Return the member that a check speaks of; None for every one."""
+    if isinstance(check, ConvergesCheck):
+        return None
+    return check.at.case if isinstance(check, ValueCheck) else check.case
+
+
 def _concerns(check: Check, case: int) -> bool:
-    measured = check.measured
-    return isinstance(measured, ConvergesCheck) or measured.at.case in (None, case)
+    return case_of(check.measured) in (None, case)
 
 
 def _adapted(check: Check, scale: float) -> Check:
@@ -80,4 +115,4 @@ def _adapted(check: Check, scale: float) -> Check:
         t = None if check.at.t is None else check.at.t * scale
         at = check.at.model_copy(update={"case": None, "t": t})
         return check.model_copy(update={"at": at})
-    return check
+    return check if isinstance(check, ConvergesCheck) else check.model_copy(update={"case": None})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -13,20 +13,24 @@ from pydantic import ValidationError
 from vibsim.errors import nearest
 from vibsim.expression import names_in, parse
 from vibsim.models import MODELS, Model, quantities
-from vibsim.schemes import SCHEMES
+from vibsim.schemes import FIXED_STEP, SCHEMES
 from vibsim.spec import limits, sweep
-from vibsim.spec.check_places import Ladder
+from vibsim.spec.check_places import Ladder, kinds_of
 from vibsim.spec.check_rules import finish_checks
 from vibsim.spec.checks import ConvergesCheck
 from vibsim.spec.document import Document, Every, LevelRange, Partial
 from vibsim.spec.experiment import Experiment, ModelSpec, SchemeSpec, Sweep, TimeSpec
 from vibsim.spec.faults import Report, plain_path
-from vibsim.spec.mending import without
+from vibsim.spec.mending import as_written, without
+from vibsim.spec.published import claims
+from vibsim.spec.published_rules import finish_published
+from vibsim.spec.scheme_checks import SOLUTIONS
+from vibsim.spec.scheme_section import TOLERANCE, scheme_names, specs
 from vibsim.spec.source import Path_, Source
 from vibsim.spec.sweep_keys import Keys, targets
 from vibsim.spec.timing import time_spec
 
-_LISTS = ("schemes", "checks")
+_LISTS = ("schemes", "checks", "published")
 _OPTIONAL = [name for name, field in Document.model_fields.items() if not field.is_required()]
 
 
@@ -59,15 +63,18 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
     shape = limits.Shape(
         base_steps=time.base_steps if time else None,
         levels=levels,
-        schemes=len(part.schemes),
+        schemes=max(len(schemes), len(part.schemes)),
         members=varied.members,
         samples=samples,
         variables=len(quantities(model)) if model else 0,
         end=varied.least_end(time) if time else None,
+        own_velocity=any(scheme.own_velocity for scheme in schemes),
     )
     limits.check(shape, report)
     _check_output(part.output, levels, report)
-    checks = _checks(part, source, model, shape, time, varied, report)
+    ladder = _ladder(part, source, model, schemes, shape, time, varied)
+    checks = _checks(part, model, ladder, report)
+    published = finish_published(part.published, _ids(part), ladder, report)
     report.raise_any()
     assert model is not None
     assert time is not None
@@ -85,7 +92,8 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
         samples=samples,
         output=part.output,
         tolerance=part.tolerance,
-        checks=checks,
+        checks=(*checks, *claims(published, part.source)),
+        published=published,
     )
     experiment._file = place.file
     return experiment
@@ -93,7 +101,8 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
 
 def _sections(source: Source, report: Report) -> Any:
     """Return the sections without fault as a `Partial`; faulty schemes and checks are None in their lists."""
-    data = {k: v for k, v in source.data.items() if v is not None or k not in _OPTIONAL}
+    whole = as_written(source.data, source)
+    data = {k: v for k, v in whole.items() if v is not None or k not in _OPTIONAL}
     try:
         Document.model_validate(data)
     except ValidationError as error:
@@ -168,13 +177,6 @@ def _levels(part: Any, source: Source, report: Report) -> tuple[int, ...]:
     return levels if good else ()
 
 
-def _scheme(section: Any) -> SchemeSpec:
-    if isinstance(section, str):
-        return SchemeSpec(name=section, kind=section, options=SCHEMES[section].defaults())
-    options = {row.name: getattr(section, row.name) for row in SCHEMES[section.kind].options}
-    return SchemeSpec(name=section.label or section.kind, kind=section.kind, options=options)
-
-
 def _schemes(part: Any, model: Model | None, report: Report) -> list[SchemeSpec]:
     found: list[SchemeSpec] = []
     first: dict[str, int] = {}
@@ -183,13 +185,27 @@ def _schemes(part: Any, model: Model | None, report: Report) -> list[SchemeSpec]
             hint = nearest(section, sorted(SCHEMES))
             report.add(("schemes", i), "unknown scheme", hint, section)
         elif section is not None:
-            spec = _scheme(section)
-            found.append(spec)
-            _check_forces(spec, i, model, report)
-            if first.setdefault(spec.name, i) != i:
-                rule = f"two schemes are named '{spec.name}'"
-                report.add(("schemes", i), rule, "give one of them a label")
+            several = specs(section)
+            found.extend(several)
+            _check_forces(several[0], i, model, report)
+            _check_names(several, i, first, report)
+    if _all_known(part) and all(spec.adaptive for spec in found):
+        rule = "at least one scheme must take equal steps, on the levels that are compared"
+        report.add(("schemes",), rule, "choose from " + ", ".join(FIXED_STEP), at_key=True)
     return found
+
+
+def _check_names(several: list[SchemeSpec], i: int, first: dict[str, int], report: Report) -> None:
+    """Check the names of the schemes of entry number `i`; `first` holds where each name came first."""
+    for j, spec in enumerate(several):
+        if spec.name in SOLUTIONS:
+            rule = f"'{spec.name}' is what checks compare a scheme with, and names none"
+            report.add(("schemes", i, "label"), rule, value=spec.name)
+        elif spec.name in [other.name for other in several[:j]]:
+            report.add(("schemes", i, TOLERANCE, j), "a tolerance must not be repeated")
+        elif first.setdefault(spec.name, i) != i:
+            rule = f"two schemes are named '{spec.name}'"
+            report.add(("schemes", i), rule, "give one of them a label")
 
 
 def _check_forces(spec: SchemeSpec, i: int, model: Model | None, report: Report) -> None:
@@ -207,14 +223,6 @@ def _uses_velocity(model: Model) -> bool:
     return model.velocity in names_in(parse(model.acceleration, known))
 
 
-def scheme_names(data: Any) -> Iterator[str]:
-    """Yield the names that a list of schemes gives, right or wrong."""
-    for item in data if isinstance(data, list) else ():
-        name = item if not isinstance(item, Mapping) else item.get("label") or item.get("kind")
-        if isinstance(name, str):
-            yield name
-
-
 def _swept(
     part: Any,
     source: Source,
@@ -226,7 +234,7 @@ def _swept(
     is_whole = not any(path[:1] == ("sweep",) for path in report.faulty)
     if part.sweep is None:
         return sweep.Swept(is_whole=is_whole)
-    lacks_scheme = len(schemes) < len(part.schemes)
+    lacks_scheme = not _all_known(part)
     keys = Keys(targets(model, schemes), model, part.time, lacks_scheme, report)
     found = sweep.read(part.sweep, list(source.data["sweep"]), keys)
     if is_whole and found.is_whole and not found.axes:
@@ -240,22 +248,42 @@ def _check_output(output: str, levels: tuple[int, ...], report: Report) -> None:
         report.add(("output",), rule)
 
 
-def _checks(
+def _ladder(
     part: Any,
     source: Source,
     model: Model | None,
+    schemes: list[SchemeSpec],
     shape: limits.Shape,
     time: TimeSpec | None,
     varied: sweep.Swept,
-    report: Report,
-) -> tuple[Any, ...]:
-    names = tuple(dict.fromkeys(scheme_names(source.data.get("schemes"))))
-    end = varied.fixed_end(time) if time else None
-    # a faulty sweep may change the end: then nothing is said about times
-    known = time if varied.is_whole else None
-    by_tolerance = source.data.get("tolerance") is not None
-    ladder = Ladder(model, names, shape, known, end, by_tolerance)
+) -> Ladder:
+    """Return what checks may name."""
+    named = {"schemes": tuple(dict.fromkeys(scheme_names(source.data.get("schemes"))))}
+    return Ladder(
+        model=model,
+        shape=shape,
+        # a faulty sweep may change the end: then nothing is said about times
+        time=time if varied.is_whole else None,
+        end=varied.fixed_end(time) if time else None,
+        by_tolerance=source.data.get("tolerance") is not None,
+        is_whole=_all_known(part),
+        **{**kinds_of(schemes), **named},
+    )
+
+
+def _all_known(part: Any) -> bool:
+    """Tell whether nothing is wrong with any scheme."""
+    known = (s is not None and (not isinstance(s, str) or s in SCHEMES) for s in part.schemes)
+    return bool(part.schemes) and all(known)
+
+
+def _checks(part: Any, model: Model | None, ladder: Ladder, report: Report) -> tuple[Any, ...]:
     checks = list(part.checks)
-    if not checks and model is not None:
+    if not checks and not part.published and model is not None:
         checks = [ConvergesCheck(converges=model.position)]
     return finish_checks(checks, ladder, report)
+
+
+def _ids(part: Any) -> list[str]:
+    """Return the ids that the file gives its checks; empty for those without."""
+    return [check.id if check is not None else "" for check in part.checks]

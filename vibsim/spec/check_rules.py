@@ -6,18 +6,20 @@ from collections.abc import Iterable
 from typing import Any
 
 from vibsim.errors import nearest
-from vibsim.models import Model, quantities
 from vibsim.spec.check_places import (
     Ladder,
     check_anywhere,
     check_place,
     is_faulty,
-    known_scheme,
+    known_schemes,
 )
 from vibsim.spec.checks import Check, ClaimCheck, ConvergesCheck, ValueCheck
 from vibsim.spec.faults import Report
+from vibsim.spec.quantity_rules import has_quantity, known_quantity
+from vibsim.spec.scheme_check_rules import conserves, equal, stable
+from vibsim.spec.scheme_checks import ConservesCheck, EqualCheck, StableCheck
 from vibsim.spec.source import Path_
-from vibsim.spec.values import VALUES, Value
+from vibsim.spec.value_rules import known_value, value_of
 from vibsim.vocabulary import BY_TOLERANCE, REASONS
 
 
@@ -71,19 +73,24 @@ def _check(check: Check, path: Path_, ladder: Ladder, report: Report) -> None:
         path = (*path, "that")
         if check.that.id:
             report.add((*path, "id"), "the id belongs to the claim", at_key=True)
-    measured = check.measured
-    if isinstance(measured, ConvergesCheck):
-        _converges(measured, path, ladder, report)
-    else:
-        _value(measured, path, ladder, report)
+    match check.measured:
+        case ConvergesCheck() as inner:
+            _converges(inner, path, ladder, report)
+        case ValueCheck() as inner:
+            _value(inner, path, ladder, report)
+        case StableCheck() as inner:
+            stable(inner, path, ladder, report)
+        case ConservesCheck() as inner:
+            conserves(inner, path, ladder, report)
+        case EqualCheck() as inner:
+            equal(inner, path, ladder, report)
 
 
 def _converges(check: ConvergesCheck, path: Path_, ladder: Ladder, report: Report) -> None:
-    _quantity(check.converges, (*path, "converges"), ladder, report)
-    for i, name in enumerate(check.schemes or ()):
-        known_scheme(name, (*path, "schemes", i), ladder, report)
-        if name in (check.schemes or ())[:i]:
-            report.add((*path, "schemes", i), "a scheme must not be repeated", value=name)
+    known_schemes(check.schemes, path, ladder, report)
+    if known_quantity(check.converges, (*path, "converges"), ladder, report):
+        named = ((name, (*path, "schemes", i)) for i, name in enumerate(check.schemes or ()))
+        has_quantity(check.converges, named, ladder, report)
     reason = check.expect.reason
     if reason is None:
         return
@@ -98,22 +105,16 @@ def _converges(check: ConvergesCheck, path: Path_, ladder: Ladder, report: Repor
         report.add(place, rule, "choose from " + ", ".join(choices), reason)
 
 
-def _quantity(name: str, path: Path_, ladder: Ladder, report: Report) -> None:
-    if ladder.model is not None and name not in quantities(ladder.model):
-        report.add(path, "unknown quantity", nearest(name, quantities(ladder.model)), name)
-
-
 def _value(check: ValueCheck, path: Path_, ladder: Ladder, report: Report) -> None:
     _comparison(check, path, report)
-    row = VALUES.get(check.value)
+    row = known_value(check.value, (*path, "value"), report)
     if row is None:
-        report.add(
-            (*path, "value"), "unknown value", nearest(check.value, list(VALUES)), check.value
-        )
         check_anywhere(check.at, (*path, "at"), ladder, report)
         return
-    _of(check, row, path, ladder, report)
-    _exact(check, row, path, ladder, report)
+    value_of(row, check.quantity, check.at.level == "best", path, ladder, report)
+    if check.quantity is not None and check.at.scheme is not None:
+        named = [(check.at.scheme, (*path, "at", "scheme"))]
+        has_quantity(check.quantity, named, ladder, report)
     check_place(check.at, row, (*path, "at"), ladder, report)
 
 
@@ -127,53 +128,3 @@ def _comparison(check: ValueCheck, path: Path_, report: Report) -> None:
     for name in ("rtol", "atol"):
         if getattr(check, name) is not None and "equals" not in given:
             report.add((*path, name), "is used with equals only", at_key=True)
-
-
-def _of(check: ValueCheck, row: Value, path: Path_, ladder: Ladder, report: Report) -> None:
-    """Check which quantity a value is of."""
-    if row.of == "none":
-        if check.quantity is not None:
-            rule = f"{row.name} is of the motion as a whole and takes no quantity"
-            report.add((*path, "quantity"), rule, at_key=True)
-        return
-    choices = allowed(row, ladder.model, check.at.level == "best")
-    if check.quantity is None:
-        rule = f"required key is missing: {row.name} is of a quantity"
-        report.add((*path, "quantity"), rule, "choose from " + ", ".join(choices))
-    elif choices and check.quantity not in choices:
-        known = ladder.model is not None and check.quantity in quantities(ladder.model)
-        rule = f"{row.name} is not known of this quantity" if known else "unknown quantity"
-        hint = "choose from " + ", ".join(choices) if known else nearest(check.quantity, choices)
-        report.add((*path, "quantity"), rule, hint, check.quantity)
-
-
-def _exact(check: ValueCheck, row: Value, path: Path_, ladder: Ladder, report: Report) -> None:
-    """Check that the model knows exactly what the value is compared with."""
-    model = ladder.model
-    if model is None or row.needs_exact is None:
-        return
-    if row.needs_exact == "period" and model.exact_period is None:
-        report.add((*path, "value"), f"the exact period of {model.kind} is not known")
-    # the energy is known where it is conserved, and nowhere else
-    energies = ("energy", "energy_deviation")
-    known = model.conservative if check.quantity in energies else model.exact is not None
-    if row.needs_exact == "solution" and not known:
-        hint = f"{' and '.join(energies)} are" if model.conservative else ""
-        rule = f"the exact {check.quantity or 'solution'} of {model.kind} is not known"
-        report.add((*path, "value"), rule, hint)
-
-
-def allowed(row: Value, model: Model | None, best: bool = False) -> tuple[str, ...]:
-    """Name the quantities of `model` that `row` can be of; `best`: of the extrapolated solution."""
-    if model is None or row.of == "none":
-        return ()
-    states = tuple(state.name for state in model.states)
-    if row.of == "states":
-        return states
-    if row.of == "deviation":
-        return ("energy_deviation",)
-    if row.of == "extremal":
-        return (*states, "energy_deviation")
-    if row.of == "convergent" or best:
-        return (*states, "energy", "energy_deviation")
-    return quantities(model)

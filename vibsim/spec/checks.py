@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import (
@@ -18,7 +20,7 @@ from pydantic_core import PydanticCustomError
 
 from vibsim.spec.fields import (
     MAX_LEVEL,
-    Identifier,
+    GivenId,
     Index,
     NonNegative,
     Number,
@@ -29,6 +31,7 @@ from vibsim.spec.fields import (
     tag,
     whole,
 )
+from vibsim.spec.scheme_checks import ConservesCheck, EqualCheck, StableCheck
 from vibsim.spec.values import VALUES
 from vibsim.vocabulary import REASONS, TOLERANCE, TYPICAL_NORM, Norm, Status
 
@@ -60,12 +63,6 @@ def _level(value: Any) -> Any:
     return level
 
 
-def _no_default(schema: dict[str, Any]) -> None:
-    """Leave the default out of the schema: an empty id stands for a generated one."""
-    schema.pop("default", None)
-
-
-GivenId = Annotated[Identifier, Field(json_schema_extra=_no_default)]
 Order = Annotated[
     Literal["scheme"] | float,
     BeforeValidator(_order),
@@ -136,6 +133,11 @@ class ConvergesCheck(Section):
         """The check that is measured: this one."""
         return self
 
+    @property
+    def about(self) -> str | None:
+        """The quantity that must be known over time."""
+        return self.converges
+
 
 class ValueCheck(Section):
     """A number of the outcome equals, is below or is above a given one."""
@@ -165,22 +167,39 @@ class ValueCheck(Section):
         """The check that is measured: this one."""
         return self
 
+    @property
+    def about(self) -> str | None:
+        """The quantity that must be known over time."""
+        return self.quantity
+
 
 def _which(value: Any) -> str | None:
     """Tell the kind of a check from its leading key."""
-    if isinstance(value, ConvergesCheck | ValueCheck | ClaimCheck):
+    if isinstance(value, ClaimCheck | Measurement):
         return tag(value.kind)
     keys = value if isinstance(value, dict) else ()
-    return next((tag(key) for key in ("claim", "converges", "value") if key in keys), None)
+    return next((tag(key) for key in CLASSES if key in keys), None)
 
 
+def _keys(*more: str) -> str:
+    """Say in words which key a check must have."""
+    *others, last = (*MEASURED, *more)
+    return f"must be a mapping with the key {', '.join(others)} or {last}"
+
+
+MEASURED: Mapping[str, type[Section]] = MappingProxyType(
+    {row.kind: row for row in (ConvergesCheck, ValueCheck, StableCheck, ConservesCheck, EqualCheck)}
+)
+"""The checks that measure something, by their leading key."""
+
+Measurement = ConvergesCheck | ValueCheck | StableCheck | ConservesCheck | EqualCheck
 Measured = Annotated[
-    Annotated[ConvergesCheck, Tag(tag("converges"))] | Annotated[ValueCheck, Tag(tag("value"))],
-    Discriminator(
-        _which,
-        custom_error_type="check",
-        custom_error_message="must be a mapping with the key converges or value",
-    ),
+    Annotated[ConvergesCheck, Tag(tag("converges"))]
+    | Annotated[ValueCheck, Tag(tag("value"))]
+    | Annotated[StableCheck, Tag(tag("stable"))]
+    | Annotated[ConservesCheck, Tag(tag("conserves"))]
+    | Annotated[EqualCheck, Tag(tag("equal"))],
+    Discriminator(_which, custom_error_type="check", custom_error_message=_keys()),
 ]
 
 
@@ -198,20 +217,24 @@ class ClaimCheck(Section):
     """The check that measures it."""
     holds: StrictBool = True
     """Whether the statement is expected to be true."""
+    note: Text | None = None
+    """What a reader of the report should know of it."""
 
     @property
-    def measured(self) -> ConvergesCheck | ValueCheck:
+    def measured(self) -> Measurement:
         """The check that is measured: the one that decides the claim."""
         return self.that
 
 
+CLASSES: Mapping[str, type[Section]] = MappingProxyType({"claim": ClaimCheck, **MEASURED})
+"""Every kind of check by its leading key."""
+
 Check = Annotated[
     Annotated[ConvergesCheck, Tag(tag("converges"))]
     | Annotated[ValueCheck, Tag(tag("value"))]
+    | Annotated[StableCheck, Tag(tag("stable"))]
+    | Annotated[ConservesCheck, Tag(tag("conserves"))]
+    | Annotated[EqualCheck, Tag(tag("equal"))]
     | Annotated[ClaimCheck, Tag(tag("claim"))],
-    Discriminator(
-        _which,
-        custom_error_type="check",
-        custom_error_message="must be a mapping with the key converges, value or claim",
-    ),
+    Discriminator(_which, custom_error_type="check", custom_error_message=_keys("claim")),
 ]

@@ -17,22 +17,37 @@ ONE_SECONDS = 12e-9
 """Of one compiled step of a member that is alone: a chain in which each operation waits for the one before."""
 MANY_SECONDS = 3e-9
 """Of one compiled member-step among many members."""
+EVALUATION = 0.45
+"""Part of an explicit step with one evaluation of the acceleration that each further evaluation takes as well; the rest
+is what every step has: the scheme's arithmetic, energies, extrema."""
+ITERATED = 3.0
+"""Steps with one evaluation that an implicit step takes as long as, for each evaluation of an iteration."""
 WRITTEN_SECONDS = 4e-9
 """Of one byte that is made, written, sealed and flushed."""
 JOB_SECONDS = 0.5
 """Of a job before and after its steps: start, imports, kernels from the disk."""
 
 GATHERED = 160
-"""Bytes that are kept of a scheme and member beside its series: extrema, peaks, periods, status."""
+"""Bytes that are kept of a scheme and member beside its series: extremes, peaks, periods, status."""
+GATHERED_D2T = 8
+"""Bytes beside these where a scheme has another velocity than the centred difference."""
+EXTREMUM = 64
+"""Bytes of a peak and a trough: time and height, of the parabola and of the grid."""
 CONSTANT = 48
 """Bytes that are kept of a member whatever the schemes: index, frequency, swept values."""
 FILE = 33_000
 """Bytes of a file beside its data."""
+SERIES_FILE = 11_000
+"""Bytes of a file beside these where every series is kept, and extrema."""
 
 PLAIN_MEMORY = 68 * 10**6
 """Bytes of a simulate job without its arrays, in plain Python."""
 COMPILED_MEMORY = 120 * 10**6
 """Bytes of a simulate job without its arrays, with a compiled kernel."""
+ADAPTIVE_MEMORY = 160 * 10**6
+"""Bytes of a simulate job with an adaptive scheme beside all others: SciPy, and the runs that are kept."""
+TABULATED = 64
+"""Bytes that such a job holds of each point of a level."""
 SCRATCH = 520
 """Bytes that a job holds of a scheme and member beside its series: what is gathered, as it is and as it is kept."""
 EXACT_SCRATCH = 5
@@ -58,10 +73,23 @@ RESULT = 100
 
 COMPARED = (80, 190)
 """Bytes that an analysis writes of a scheme and member: once, and for each level; two norms, and no series."""
-COMPARED_SERIES = (-80, 176)
+COMPARED_SERIES = (-80, 184)
 """Bytes beside these of a scheme, member and sample, where an analysis writes series."""
 COMPARED_FILE = 130_000
 """Bytes of the file of an analysis beside its data."""
+
+
+def work(force_evaluations: int, explicit: bool) -> tuple[float, float]:
+    """Return what a step of a scheme takes in explicit steps with one evaluation: as such steps, and as iterations.
+
+    Parameters
+    ----------
+    force_evaluations
+        Of a step; of an implicit scheme, of an iteration.
+    """
+    if explicit:
+        return 1.0 + EVALUATION * (force_evaluations - 1), 0.0
+    return 0.0, ITERATED * force_evaluations
 
 
 @dataclass(frozen=True)
@@ -76,23 +104,36 @@ class Load:
     """Series that are kept of a scheme and member."""
     exact: int = 0
     """Series that are kept of a member whatever the schemes: the states of the exact solution."""
+    work: float | None = None
+    """Work of a step of all explicit schemes together (`work`); a step with one evaluation each where None."""
+    iterated: float = 0.0
+    """Work of a step of all implicit schemes together, which one member takes as long as many."""
+    extrema: int = 0
+    """Peaks, and troughs, that are kept of a scheme and member."""
+    d2t: bool = False
+    """Whether a scheme has another velocity than the centred difference."""
+    own: float = 0.0
+    """Seconds that the schemes which choose their own steps take of a member (`vibsim.schemes.adaptive`)."""
 
     @property
     def stored(self) -> int:
         """Bytes on disk of one member."""
         series = self.schemes * self.series + self.exact
-        return 8 * self.samples * series + GATHERED * self.schemes + CONSTANT
+        numbers = GATHERED + EXTREMUM * self.extrema + (GATHERED_D2T if self.d2t else 0)
+        return 8 * self.samples * series + numbers * self.schemes + CONSTANT
 
     @property
     def held(self) -> int:
         """Bytes in memory of one member at the peak of a job."""
         series = self.schemes * self.series + EXACT_SCRATCH * self.exact
-        return 8 * self.samples * series + SCRATCH * self.schemes
+        # extrema of several schemes are held twice while they are put together
+        extrema = EXTREMUM * self.extrema * (2 if self.schemes > 1 else 1)
+        return 8 * self.samples * series + (SCRATCH + extrema) * self.schemes
 
     @property
     def shard(self) -> int:
         """Members of a shard: a power of two, so that another measured constant seldom changes it."""
-        by_time = SHARD_SECONDS / (self.schemes * self.steps * MANY_SECONDS)
+        by_time = SHARD_SECONDS / (self.steps * self._step(MANY_SECONDS, ONE_SECONDS) + self.own)
         most = max(1, min(int(by_time), SHARD_BYTES // self.held, LARGEST_SHARD))
         return 1 << (most.bit_length() - 1)
 
@@ -102,18 +143,27 @@ class Load:
 
     def disk(self, members: int) -> int:
         """Return the bytes of the files of `members`."""
-        return members * self.stored + self.shards(members) * FILE
+        each = FILE + (SERIES_FILE if self.extrema else 0)
+        return members * self.stored + self.shards(members) * each
 
     def memory(self, members: int) -> int:
         """Return the bytes that a job with `members` holds at its peak."""
         base = PLAIN_MEMORY if self._is_plain(members) else COMPILED_MEMORY
+        base += ADAPTIVE_MEMORY + TABULATED * self.steps if self.own else 0
         return base + members * self.held
 
     def seconds(self, members: int) -> float:
         """Return the seconds of one core that the steps and the files of `members` take."""
         compiled = MANY_SECONDS + (ONE_SECONDS - MANY_SECONDS) / members
-        step = PLAIN_SECONDS if self._is_plain(members) else compiled
-        return members * (self.schemes * self.steps * step + self.stored * WRITTEN_SECONDS)
+        step = self._step(compiled, ONE_SECONDS)
+        if self._is_plain(members):
+            step = self._step(PLAIN_SECONDS, PLAIN_SECONDS)
+        return members * (self.steps * step + self.own + self.stored * WRITTEN_SECONDS)
+
+    def _step(self, explicit: float, iterated: float) -> float:
+        """Return the seconds of a step of all schemes, where one with one evaluation takes so many."""
+        units = self.schemes if self.work is None else self.work
+        return units * explicit + self.iterated * iterated
 
     def _is_plain(self, members: int) -> bool:
         return members * self.steps <= PLAIN_MEMBER_STEPS
@@ -150,4 +200,5 @@ def analysis_disk(loads: Sequence[Load], members: int, is_lean: bool) -> int:
     if not is_lean:
         once, each = COMPARED_SERIES
         size += loads[0].samples * (once + each * len(loads))
+        size += EXTREMUM * len(loads) * max(load.extrema for load in loads)
     return loads[0].schemes * members * size + COMPARED_FILE

@@ -15,7 +15,7 @@ from pydantic import (
 )
 
 from vibsim.models import MODELS, Model
-from vibsim.schemes import SCHEMES, Scheme
+from vibsim.schemes import SCHEMES
 from vibsim.spec.checks import Check
 from vibsim.spec.fields import (
     FORMULA,
@@ -24,7 +24,7 @@ from vibsim.spec.fields import (
     Count,
     Fraction,
     Level,
-    Line,
+    MadeSection,
     Number,
     Output,
     Positive,
@@ -33,11 +33,9 @@ from vibsim.spec.fields import (
     short,
     tag,
 )
+from vibsim.spec.published import PublishedRow, PublishedTable
+from vibsim.spec.scheme_section import class_name, scheme_section
 from vibsim.spec.sweep_section import SweepSection
-
-
-def _class_name(kind: str) -> str:
-    return kind.title().replace("_", "")
 
 
 def _model_section(model: Model) -> type[Section]:
@@ -50,27 +48,7 @@ def _model_section(model: Model) -> type[Section]:
         number = Annotated[float, Field(**bound), FORMULA]
         fields[row.name] = (number, Field(default=row.default, description=description))
     doc = f"{model.title}: {model.equation} ({model.source})."
-    return create_model(_class_name(model.kind), __base__=Section, __doc__=doc, **fields)
-
-
-def _scheme_section(scheme: Scheme) -> type[Section]:
-    label = Field(
-        default=None, description="Name of the scheme in this experiment, if not its kind."
-    )
-    fields: dict[str, Any] = {
-        "kind": (Literal[scheme.kind], Field(description=scheme.title)),
-        "label": (Line | None, label),
-    }
-    for option in scheme.words:
-        choices: Any = Literal[option.choices]
-        fields[option.name] = (
-            choices,
-            Field(default=option.default, description=option.description),
-        )
-    doc = f"{scheme.title} ({scheme.source})."
-    return create_model(
-        f"{_class_name(scheme.kind)}Scheme", __base__=Section, __doc__=doc, **fields
-    )
+    return create_model(class_name(model.kind), __base__=MadeSection, __doc__=doc, **fields)
 
 
 def _kind(value: Any) -> str | None:
@@ -95,7 +73,7 @@ AnyModel: Any = Annotated[
     _by_kind({kind: _model_section(model) for kind, model in MODELS.items()}), Discriminator(_kind)
 ]
 AnyScheme: Any = Annotated[
-    _by_kind({kind: _scheme_section(s) for kind, s in SCHEMES.items()}, (_SCHEME_NAME,)),
+    _by_kind({kind: scheme_section(s) for kind, s in SCHEMES.items()}, (_SCHEME_NAME,)),
     Discriminator(_scheme_tag),
 ]
 
@@ -219,12 +197,28 @@ class Document(Section):
     """What the experiment is for: a verdict, or beside it the best solution, extrapolated over the levels."""
     checks: Annotated[tuple[Check, ...], short(MAX_ENTRIES)] = ()
     """What must come out; when left out, that the position converges as the scheme promises."""
+    published: Annotated[tuple[PublishedTable, ...], short(MAX_ENTRIES)] = ()
+    """Tables that a source printed: every row is a claim, shown beside our number."""
+
+
+def _partial_table() -> Any:
+    """Return the class of a printed table without what is faulty; a faulty row is None."""
+    fields: dict[str, Any] = {
+        name: (field.rebuild_annotation() | None, None)
+        for name, field in PublishedTable.model_fields.items()
+    }
+    fields["rows"] = (tuple[PublishedRow | None, ...], ())
+    fields["beside"] = (tuple[str, ...], ())
+    return create_model("PartialTable", __base__=MadeSection, **fields)
+
+
+_ITEMS: dict[str, Any] = {"schemes": AnyScheme, "checks": Check, "published": _partial_table()}
 
 
 def _part(name: str) -> tuple[Any, Any]:
     field = Document.model_fields[name]
-    if name in ("schemes", "checks"):
-        item: Any = AnyScheme if name == "schemes" else Check
+    if name in _ITEMS:
+        item: Any = _ITEMS[name]
         return (tuple[item | None, ...], ())
     if field.is_required():
         return (field.rebuild_annotation() | None, None)
@@ -233,5 +227,5 @@ def _part(name: str) -> tuple[Any, Any]:
 
 _PARTS: dict[str, Any] = {name: _part(name) for name in Document.model_fields}
 
-Partial: Any = create_model("Partial", __base__=Section, **_PARTS)
-"""A document without its faulty sections; faulty schemes and checks are None in their lists."""
+Partial: Any = create_model("Partial", __base__=MadeSection, **_PARTS)
+"""A document without its faulty sections; faulty schemes, checks, tables and rows are None in their lists."""

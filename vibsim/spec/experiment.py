@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Field, PrivateAttr
+from pydantic import AfterValidator, Field, PrivateAttr, StrictBool
 
-from vibsim.models import MODELS, natural_end
+from vibsim.models import MODELS, natural_end, quantities
+from vibsim.schemes import SCHEMES
 from vibsim.spec.axes import Axis
 from vibsim.spec.checks import Check
 from vibsim.spec.collection import ADHOC
@@ -24,9 +25,10 @@ from vibsim.spec.fields import (
     Text,
 )
 from vibsim.spec.members import end_varies
+from vibsim.spec.published import PublishedTable
 
 Numbers = Annotated[dict[str, float], AfterValidator(FrozenDict)]
-Words = Annotated[dict[str, str], AfterValidator(FrozenDict)]
+Options = Annotated[dict[str, StrictBool | float | str], AfterValidator(FrozenDict)]
 
 
 class ModelSpec(Section):
@@ -53,7 +55,17 @@ class SchemeSpec(Section):
     name: Text
     """The label, else the kind."""
     kind: Text
-    options: Words
+    options: Options
+
+    @property
+    def adaptive(self) -> bool:
+        """Whether it chooses its own steps, outside the ladder."""
+        return SCHEMES[self.kind].adaptive
+
+    @property
+    def own_velocity(self) -> bool:
+        """Whether it has another velocity than the centred difference ``[D_2t u]``, which is then kept beside it."""
+        return not self.adaptive and SCHEMES[self.kind].stepper(self.options).own_velocity
 
 
 class Sweep(Section):
@@ -95,6 +107,9 @@ class Experiment(Section):
     tolerance: float | None = None
     """Error bound that chooses the levels; None where the file gives them."""
     checks: tuple[Check, ...] = ()
+    """As written, and behind them one claim for every row of `published`."""
+    published: tuple[PublishedTable, ...] = ()
+    """Tables of numbers that a source printed."""
     _file: Path | None = PrivateAttr(default=None)
 
     @property
@@ -127,7 +142,28 @@ class Experiment(Section):
         swept = (pair for axis in axes for pair in zip(axis.keys, axis.varies, strict=True))
         return end_varies(swept, self.time.periods is not None)
 
-    def scheme_options(self, scheme: int) -> Mapping[str, str]:
+    @property
+    def written(self) -> tuple[Check, ...]:
+        """The checks without those of `published`."""
+        rows = sum(len(table.rows) for table in self.published)
+        return self.checks[: len(self.checks) - rows]
+
+    @property
+    def ladder(self) -> tuple[int, ...]:
+        """Numbers of the schemes that take equal steps, and so have levels to compare; at least one."""
+        return tuple(i for i, scheme in enumerate(self.schemes) if not scheme.adaptive)
+
+    @property
+    def own_velocity(self) -> bool:
+        """Whether some scheme has another velocity than the centred difference ``[D_2t u]``."""
+        return any(scheme.own_velocity for scheme in self.schemes)
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of every quantity that is kept as a series where storage is not bounded."""
+        return quantities(MODELS[self.model.kind], self.own_velocity)
+
+    def scheme_options(self, scheme: int) -> Mapping[str, str | float | bool]:
         """Return the options of scheme number `scheme`, apart from those that are swept.
 
         `vibsim.plan.option_groups` gives the options of each member.
@@ -186,11 +222,13 @@ def canonical(experiment: Experiment) -> dict[str, Any]:
 
     The sections stand apart, so that a digest can take those that a job uses: ``collection``, ``name``, ``title``,
     ``source``, ``model``, ``initial``, ``time``, ``levels``, ``schemes``, ``sweep``, ``samples``, ``output``,
-    ``tolerance``, ``checks``.
+    ``tolerance``, ``checks``, and ``published`` where there is any.
     """
     data = experiment.model_dump(mode="json", exclude={"checks"})
     data["sweep"] = data["sweep"] and data["sweep"]["axes"]
     data["checks"] = [_check(check) for check in experiment.checks]
+    if not experiment.published:
+        del data["published"]
     return data
 
 

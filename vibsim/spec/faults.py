@@ -10,9 +10,10 @@ from pydantic import ValidationError
 from vibsim.errors import Fault, InputError, nearest
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
-from vibsim.spec.checks import At, ClaimCheck, ConvergesCheck, Expect, ValueCheck
+from vibsim.spec.checks import CLASSES, At, Expect, ValueCheck
 from vibsim.spec.document import Document, Every, LevelRange, TimeSection
 from vibsim.spec.fields import Section
+from vibsim.spec.published import PublishedAt, PublishedRow, PublishedTable
 from vibsim.spec.source import MAX_FAULTS, Path_, Source, dotted
 from vibsim.spec.sweep_section import Sample
 
@@ -45,6 +46,7 @@ _FORMS = {
 }
 """How each rule for the values of a sweep is written."""
 _INTERVAL = "must be [least, largest]"
+_PAIR = "must be [scheme, another scheme or exact or discrete]"
 
 
 class Report:
@@ -168,6 +170,8 @@ def _whole_list(path: Path_, rule: str) -> tuple[Path_, str]:
             return path[: path.index(name) + 1], form
     if path[:3] == ("sweep", "sample", "over") and len(path) > 3:
         return path[:4], _INTERVAL
+    if path[0] == "checks" and "equal" in path:
+        return path[: path.index("equal") + 1], _PAIR
     return path, rule
 
 
@@ -208,6 +212,12 @@ def known_keys(path: Path_, data: Any) -> list[str]:
         case ("schemes", _):
             options = (row.name for row in SCHEMES[value["kind"]].options)
             return ["kind", "label", *options]
+        case ("published", _):
+            return list(PublishedTable.model_fields)
+        case ("published", _, "rows", _):
+            return list(PublishedRow.model_fields)
+        case ("published", *_, "at"):
+            return list(PublishedAt.model_fields)
         case (*_, "at"):
             return list(At.model_fields)
         case (*_, "expect"):
@@ -217,6 +227,4 @@ def known_keys(path: Path_, data: Any) -> list[str]:
 
 
 def _check_class(value: Any) -> type[Section]:
-    if "claim" in value:
-        return ClaimCheck
-    return ConvergesCheck if "converges" in value else ValueCheck
+    return next((row for key, row in CLASSES.items() if key in value), ValueCheck)

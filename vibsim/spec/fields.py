@@ -40,6 +40,12 @@ class Section(BaseModel):
     )
 
 
+class MadeSection(Section):
+    """A part that is made from a registry: its descriptions are given, and not looked for in a source file."""
+
+    model_config = ConfigDict(use_attribute_docstrings=False)
+
+
 class FrozenDict(dict[str, Any]):
     """A dictionary that does not change, and therefore has a hash."""
 
@@ -161,6 +167,15 @@ Level = Annotated[int, Field(ge=0, le=MAX_LEVEL), BeforeValidator(whole)]
 Count = Annotated[int, Field(ge=1), BeforeValidator(whole)]
 Index = Annotated[int, Field(ge=0), BeforeValidator(whole)]
 Identifier = Annotated[str, Field(pattern=IDENTIFIER)]
+
+
+def _no_default(schema: dict[str, Any]) -> None:
+    """Leave the default out of the schema: an empty id stands for a generated one."""
+    schema.pop("default", None)
+
+
+GivenId = Annotated[Identifier, Field(json_schema_extra=_no_default)]
+"""The id of a check; empty where the file gives none."""
 Text = Annotated[str, Field(min_length=1), AfterValidator(_printable)]
 """Text that may have several lines."""
 Line = Annotated[Text, AfterValidator(_one_line)]

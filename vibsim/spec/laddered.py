@@ -7,12 +7,13 @@ from itertools import pairwise
 
 from vibsim.models import MODELS, quantities
 from vibsim.spec import limits
-from vibsim.spec.check_places import Ladder
+from vibsim.spec.check_places import Ladder, kinds_of
 from vibsim.spec.check_rules import finish_checks
 from vibsim.spec.checks import Check, ClaimCheck
 from vibsim.spec.experiment import Experiment
 from vibsim.spec.faults import Report
 from vibsim.spec.fields import MAX_LEVEL
+from vibsim.spec.published_rules import finish_published
 from vibsim.spec.source import Source
 from vibsim.spec.sweep import Swept
 
@@ -40,12 +41,14 @@ def with_levels(experiment: Experiment, levels: Sequence[int]) -> Experiment:
         samples=experiment.samples,
         variables=len(quantities(model)),
         end=swept.least_end(time),
+        own_velocity=experiment.own_velocity,
     )
     report = Report(Source(str(experiment.file or experiment.name), {}))
     limits.check(shape, report)
-    names = tuple(scheme.name for scheme in experiment.schemes)
-    ladder = Ladder(model, names, shape, time, swept.fixed_end(time))
-    finish_checks((_as_written(check) for check in experiment.checks), ladder, report)
+    end = swept.fixed_end(time)
+    ladder = Ladder(model=model, shape=shape, time=time, end=end, **kinds_of(experiment.schemes))
+    finish_checks((_as_written(check) for check in experiment.written), ladder, report)
+    finish_published(experiment.published, (), ladder, report)
     report.raise_any()
     return experiment.model_copy(update={"levels": tuple(levels)})
 

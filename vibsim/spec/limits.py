@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from vibsim.spec.cost import Load
 from vibsim.spec.faults import Report
 from vibsim.spec.sampling import is_lean, stride
+from vibsim.spec.series import extrema_kept
 
 MAX_MEMBERS = 10**7
 MAX_MEMBER_STEPS = 2**40
@@ -21,6 +22,10 @@ MAX_FILES = 5_000
 _FEWEST = 6
 """Series of the smallest model: two states and the energies."""
 _ENERGIES = 4
+_RUNNING = 1
+"""Running maxima: that of the energy deviation."""
+_D2T = 4
+"""Series with the centred difference as velocity: itself, two energies, and a running maximum."""
 _LEFT_OUT = 3
 """Energies that a lean experiment does not keep, unless a check is about them."""
 MIN_DT = 1e-100
@@ -39,6 +44,8 @@ class Shape:
     variables: int
     """Quantities of the model that are kept as series; 0 where the model is unknown."""
     end: float | None
+    own_velocity: bool = False
+    """Whether a scheme has another velocity than the centred difference, which is then kept beside it."""
 
     def steps(self, level: int) -> int | None:
         """Return the number of steps at `level`."""
@@ -59,9 +66,18 @@ class Shape:
         steps, coarsest = self.steps(level) or 1, self.steps(self.levels[0]) or 1
         kept = steps // self.stride(level) + 1
         series = max(self.variables, _FEWEST)
+        schemes = max(self.schemes, 1)
         if is_lean(self.samples, coarsest, self.trajectories):
-            return Load(max(self.schemes, 1), steps, kept, series - _LEFT_OUT)
-        return Load(max(self.schemes, 1), steps, kept, series, exact=series - _ENERGIES)
+            return Load(schemes, steps, kept, series - _LEFT_OUT, d2t=self.own_velocity)
+        return Load(
+            schemes,
+            steps,
+            kept,
+            series + _RUNNING + (_D2T if self.own_velocity else 0),
+            exact=series - _ENERGIES,
+            extrema=extrema_kept(steps, self.trajectories),
+            d2t=True,
+        )
 
 
 def check(shape: Shape, report: Report) -> None:

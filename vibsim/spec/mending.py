@@ -6,11 +6,18 @@ import copy
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from vibsim.spec.source import Path_
+from vibsim.spec.source import Path_, Source
 
-_REQUIRED = ("claim", "converges", "value")
 _STAND_IN = "?"
 """Takes the place of text that cannot be left out; nothing is said about it a second time."""
+_REQUIRED: dict[str | int, Any] = {
+    **dict.fromkeys(("claim", "converges", "value"), _STAND_IN),
+    "stable": True,
+    "conserves": "energy",
+    "equal": [_STAND_IN, _STAND_IN],
+}
+"""What takes the place of a value that makes a check what it is."""
+_LISTS = ("initial", "sweep", "schemes", "checks", "published")
 _SAMPLE: dict[str | int, Any] = {"method": "random", "n": 1, "seed": 0}
 """Take the place of what a sample cannot be without."""
 
@@ -19,11 +26,11 @@ def without(data: Mapping[str, Any], faulty: Iterable[Path_]) -> dict[str, Any]:
     """Return `data` without the values at the places `faulty`.
 
     Values of mappings (`initial`, `sweep`) are left out one by one, and so are the parts of checks and those of a
-    sweep's `zip` and `sample`; an entry of `schemes` and a check that is no mapping become None; any other section
-    goes as a whole.
+    sweep's `zip` and `sample`; an entry of `schemes`, a row of a printed table, and a check that is no mapping become
+    None; any other section goes as a whole.
     """
     kept = dict(data)
-    copied = {path[0] for path in faulty if path[0] in ("initial", "sweep", "schemes", "checks")}
+    copied = {path[0] for path in faulty if path[0] in _LISTS}
     kept.update((key, copy.deepcopy(kept[key])) for key in copied if key in kept)
     for path in faulty:
         _take_out(kept, path)
@@ -32,7 +39,7 @@ def without(data: Mapping[str, Any], faulty: Iterable[Path_]) -> dict[str, Any]:
 
 def _take_out(kept: dict[str, Any], path: Path_) -> None:
     section = kept.get(str(path[0]))
-    if len(path) == 1 or path[0] not in ("initial", "sweep", "schemes", "checks"):
+    if len(path) == 1 or path[0] not in _LISTS:
         kept.pop(str(path[0]), None)
     elif path[0] == "sweep" and path[1] in ("zip", "sample") and len(path) > 2:
         _take_out_axis(section, path[1:])
@@ -41,6 +48,8 @@ def _take_out(kept: dict[str, Any], path: Path_) -> None:
     elif isinstance(section, list) and isinstance(path[1], int):
         if path[0] == "schemes" or len(path) == 2:
             section[path[1]] = None
+        elif path[0] == "published":
+            _take_out_row(section[path[1]], path[2:])
         else:
             _take_out_part(section[path[1]], path[2:])
 
@@ -61,6 +70,33 @@ def _take_out_axis(sweep: Any, path: Path_) -> None:
         sweep.pop(name)
 
 
+def _take_out_row(table: Any, path: Path_) -> None:
+    """Leave one value of a printed table out; a row goes as a whole."""
+    if not isinstance(table, dict):
+        return
+    if path[0] == "rows" and len(path) > 1 and isinstance(path[1], int):
+        table["rows"][path[1]] = None
+    else:
+        table.pop(path[0], None)
+
+
+def as_written(data: Mapping[str, Any], source: Source) -> dict[str, Any]:
+    """Return `data` with the printed numbers of its tables as text: their digits count, not their value."""
+    kept = dict(data)
+    tables = kept.get("published")
+    if source.top is None or not isinstance(tables, list):
+        return kept
+    kept["published"] = copy.deepcopy(tables)
+    for i, table in enumerate(kept["published"]):
+        rows = table.get("rows") if isinstance(table, dict) else None
+        for j, row in enumerate(rows if isinstance(rows, list) else ()):
+            place = source.place(("published", i, "rows", j, "printed"))
+            number = row.get("printed") if isinstance(row, dict) else None
+            if place and isinstance(number, int | float) and not isinstance(number, bool):
+                row["printed"] = place.text
+    return kept
+
+
 def _take_out_part(check: Any, path: Path_) -> None:
     """Leave one value of a check out, or put the stand-in there where it is required."""
     holder = check
@@ -71,8 +107,10 @@ def _take_out_part(check: Any, path: Path_) -> None:
         holder = inner
     last = path[-1]
     listed = isinstance(holder, list) and isinstance(last, int)
-    if listed or (isinstance(holder, dict) and last in _REQUIRED and last in holder):
+    if listed:
         holder[last] = _STAND_IN
+    elif isinstance(holder, dict) and last in _REQUIRED and last in holder:
+        holder[last] = copy.copy(_REQUIRED[last])
     elif isinstance(holder, dict) and last == "at" and isinstance(holder.get("at"), dict):
         # at itself is at fault where it has both best and level, or another value of best
         holder["at"] = {k: v for k, v in holder["at"].items() if k not in ("best", "level")}

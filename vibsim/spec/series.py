@@ -1,20 +1,33 @@
-"""Which quantities an experiment's checks are about, and which are stored as series where storage is bounded."""
+"""What a level stores beside numbers per member: which quantities over time, and how many extrema."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from vibsim.models import MODELS
+from vibsim.spec.sampling import SMALL, is_lean
 
 if TYPE_CHECKING:
     from vibsim.spec.experiment import Experiment
 
+RUNNING = "_running_max"
+"""Behind the name of an energy deviation: its largest absolute value over every step so far."""
+MOST_EXTREMA = 512
+"""Peaks, and troughs, that are kept of a scheme and member."""
+FEWEST_EXTREMA = 16
+"""As many are kept of however many members."""
+
 
 def asked(experiment: Experiment) -> tuple[str, ...]:
     """Name the quantities that the checks are about."""
-    inner = [check.measured for check in experiment.checks]
-    named = (check.converges if check.kind == "converges" else check.quantity for check in inner)
+    named = (check.measured.about for check in experiment.checks)
     return tuple(dict.fromkeys(name for name in named if name is not None))
+
+
+def is_bounded(experiment: Experiment) -> bool:
+    """Tell whether `experiment` is so large that its storage is bounded (`sampling.is_lean`)."""
+    trajectories = len(experiment.schemes) * experiment.members
+    return is_lean(experiment.samples, experiment.steps(experiment.levels[0]), trajectories)
 
 
 def lean_series(experiment: Experiment) -> tuple[str, ...]:
@@ -25,3 +38,54 @@ def lean_series(experiment: Experiment) -> tuple[str, ...]:
     """
     states = (state.name for state in MODELS[experiment.model.kind].states)
     return tuple(dict.fromkeys([*states, "energy_deviation", *asked(experiment)]))
+
+
+def running_series(experiment: Experiment) -> tuple[str, ...]:
+    """Name the running maxima that a level stores; where storage is bounded, those that a check asks for."""
+    known = [name for name in experiment.quantities if name.startswith("energy_deviation")]
+    if is_bounded(experiment):
+        checks = [check.measured for check in experiment.checks]
+        wanted = {
+            check.about
+            for check in checks
+            if check.kind == "conserves"
+            or (check.kind == "value" and check.value.endswith("running_max"))
+        }
+        known = [name for name in known if name in wanted]
+    return tuple(name + RUNNING for name in known)
+
+
+_OF_PEAKS = frozenset({"growth_per_period", "amplitude_error", "phase_error_slope"})
+"""Values that are made of the first `FEWEST_EXTREMA` peaks, which are kept whatever else is."""
+
+
+def asks_for_peaks(experiment: Experiment) -> bool:
+    """Tell whether a check is about a number that is made of single peaks."""
+    checks = [check.measured for check in experiment.checks]
+    return any(check.kind == "value" and check.value in _OF_PEAKS for check in checks)
+
+
+def stored_series(experiment: Experiment) -> tuple[str, ...]:
+    """Name every series that a level stores of each scheme and member."""
+    bounded = is_bounded(experiment)
+    names = lean_series(experiment) if bounded else experiment.quantities
+    return (*names, *running_series(experiment))
+
+
+def extrema_kept(steps: int, trajectories: int) -> int:
+    """Return how many peaks, and how many troughs, a level keeps of every scheme and member.
+
+    There cannot be more than half as many as steps. Among many members fewer are kept, so that they take no more room
+    than a series does (`sampling.SMALL`); all are counted.
+
+    Parameters
+    ----------
+    steps
+        Of the level.
+    trajectories
+        Number of schemes times number of members.
+    """
+    kept = min(steps // 2 + 1, MOST_EXTREMA)
+    while kept > FEWEST_EXTREMA and kept * trajectories > SMALL:
+        kept = max(kept // 2, FEWEST_EXTREMA)
+    return kept

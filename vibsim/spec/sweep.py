@@ -12,7 +12,7 @@ from vibsim.spec.members import end_varies
 from vibsim.spec.source import Path_
 from vibsim.spec.sweep_keys import Keys
 from vibsim.spec.sweep_section import Sample, SweepSection, Written
-from vibsim.spec.sweep_values import bounded, numbers, ruled, spans, words
+from vibsim.spec.sweep_values import bounded, flags, numbers, ruled, spans, words
 
 MAX_HYPERCUBE = 10**6
 """Points of a latin hypercube: none of them is known before all are drawn."""
@@ -102,8 +102,8 @@ def _interval(key: str, interval: tuple[float, float], keys: Keys) -> bool:
     target = keys.find(key, path)
     if target is None:
         return False
-    if target.choices:
-        rule = "takes words, which cannot be drawn"
+    if target.choices or target.is_flag:
+        rule = f"takes {'words' if target.choices else 'true and false'}, which cannot be drawn"
         keys.report.add(path, rule, "sweep it by a list outside sample", at_key=True)
         return False
     low, high = interval
@@ -122,6 +122,8 @@ def _values(key: str, written: Written, path: Path_, keys: Keys) -> Values | Non
         return None
     if target.choices:
         return words(written, target.choices, path, keys.report)
+    if target.is_flag:
+        return flags(written, path, keys.report)
     if isinstance(written, tuple):
         listed = numbers(written, path, keys.report)
         sound = listed is not None and bounded(listed, target.bound, path, keys.report)

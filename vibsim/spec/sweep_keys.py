@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from vibsim.errors import nearest
 from vibsim.models import Model, Parameter
-from vibsim.schemes import SCHEMES
+from vibsim.schemes import SCHEMES, AnyOption, NumberOption, Option
 from vibsim.spec.document import TimeSection
 from vibsim.spec.experiment import SchemeSpec
 from vibsim.spec.faults import Report
@@ -18,17 +19,31 @@ _LEVELS = "levels cannot be swept: they are what is compared"
 _FIXED = {
     f"time.{name}": _STEPS for name in ("base_steps", "base_dt", "steps_per_period", "periods")
 }
-_END = Parameter("end", 1.0, "s", "", minimum=0.0, exclusive=True)
+
+
+@dataclass(frozen=True)
+class Bound:
+    """The least and the largest value that is allowed."""
+
+    least: float = -math.inf
+    most: float = math.inf
+    exclusive: bool = False
+    """Whether the least value itself is refused."""
+
+
+_END = Bound(least=0.0, exclusive=True)
 
 
 @dataclass(frozen=True)
 class Target:
     """What a key of the sweep stands for."""
 
-    bound: Parameter | None = None
-    """Whose least value its numbers must keep to."""
+    bound: Bound = Bound()
+    """What its numbers must keep to."""
     choices: tuple[str, ...] = ()
     """The words of an option; empty where it takes numbers."""
+    is_flag: bool = False
+    """Whether it takes true and false."""
 
 
 @dataclass(frozen=True)
@@ -72,9 +87,22 @@ def targets(model: Model | None, schemes: Sequence[SchemeSpec]) -> dict[str, Tar
     found: dict[str, Target] = {}
     if model is not None:
         found.update((f"initial.{state.name}", Target()) for state in model.states)
-        found.update((f"model.{row.name}", Target(row)) for row in model.parameters)
+        found.update((f"model.{row.name}", _parameter(row)) for row in model.parameters)
     found["time.end"] = Target(_END)
     for scheme in schemes:
-        for option in SCHEMES[scheme.kind].words:
-            found[f"schemes.{scheme.name}.{option.name}"] = Target(choices=option.choices)
+        for option in SCHEMES[scheme.kind].options:
+            found[f"schemes.{scheme.name}.{option.name}"] = _option(option)
     return found
+
+
+def _parameter(row: Parameter) -> Target:
+    least = -math.inf if row.minimum is None else row.minimum
+    return Target(Bound(least, exclusive=row.exclusive))
+
+
+def _option(option: AnyOption) -> Target:
+    if isinstance(option, Option):
+        return Target(choices=option.choices)
+    if isinstance(option, NumberOption):
+        return Target(Bound(option.least, option.most))
+    return Target(is_flag=True)

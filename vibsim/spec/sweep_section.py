@@ -5,9 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, Tag, WithJsonSchema
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    StrictBool,
+    Tag,
+    WithJsonSchema,
+)
 
-from vibsim.schemes import SCHEMES
+from vibsim.schemes import SCHEMES, NumberOption, Option
 from vibsim.spec.axes import RULES, Interval, Linspace, Logspace, Method, Range, Seed
 from vibsim.spec.fields import Count, Section, number, plain, tag
 
@@ -15,8 +23,8 @@ LIST_RULE = "must be a list, or a mapping with one of " + ", ".join(RULES)
 
 
 def _entry(value: Any) -> Any:
-    """Leave text as it is: only the key tells whether it is an option or a formula."""
-    return value if isinstance(value, str) else number(value)
+    """Leave text as it is: only the key tells whether it is an option or a formula, and a flag likewise."""
+    return value if isinstance(value, str | bool) else number(value)
 
 
 def _which(value: Any) -> str | None:
@@ -28,11 +36,13 @@ def _which(value: Any) -> str | None:
 
 
 _Entry = Annotated[
-    float | str, BeforeValidator(_entry), WithJsonSchema({"type": ["number", "string"]})
+    StrictBool | float | str,
+    BeforeValidator(_entry),
+    WithJsonSchema({"type": ["number", "string", "boolean"]}),
 ]
 _List = Annotated[tuple[_Entry, ...], Field(min_length=1), BeforeValidator(plain)]
-Written = tuple[float | str, ...] | Linspace | Logspace | Range
-"""Values of one key as written: text is an option word or a formula, which its key tells."""
+Written = tuple[bool | float | str, ...] | Linspace | Logspace | Range
+"""Values of one key as written: text is an option word or a formula, a truth value a flag, which its key tells."""
 _Values = Annotated[
     Annotated[Linspace, Tag(tag("linspace"))]
     | Annotated[Logspace, Tag(tag("logspace"))]
@@ -55,11 +65,13 @@ class Sample(Section):
     """Least and largest value of every parameter, by dotted path."""
 
 
-def _option_words() -> dict[str, Any]:
-    """Describe the options of every scheme, for editors."""
-    words: dict[str, list[str]] = {}
-    for option in (option for scheme in SCHEMES.values() for option in scheme.words):
-        words.setdefault(option.name, []).extend(option.choices)
+def _options() -> dict[str, Any]:
+    """Describe the options of every scheme that take a list of words or flags, for editors."""
+    words: dict[str, list[str | bool]] = {}
+    for option in (option for scheme in SCHEMES.values() for option in scheme.options):
+        if not isinstance(option, NumberOption):
+            choices = option.choices if isinstance(option, Option) else (False, True)
+            words.setdefault(option.name, []).extend(choices)
     return {
         rf"^schemes\..+\.{name}$": {
             "type": "array",
@@ -75,7 +87,7 @@ class SweepSection(Section):
 
     model_config = ConfigDict(
         extra="allow",
-        json_schema_extra={"minProperties": 1, "patternProperties": _option_words()},
+        json_schema_extra={"minProperties": 1, "patternProperties": _options()},
     )
     __pydantic_extra__: dict[str, _Values]
 

@@ -1,4 +1,4 @@
-"""The values of one swept key: words of an option, or numbers that a bound allows."""
+"""The values of one swept key: words of an option, flags, or numbers that a bound allows."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from collections.abc import Iterable
 from pydantic_core import PydanticCustomError
 
 from vibsim.errors import nearest
-from vibsim.models import Parameter
 from vibsim.spec.axes import Linspace, Logspace, Range, Rule
 from vibsim.spec.faults import Report
 from vibsim.spec.fields import number
+from vibsim.spec.options import FLAGS
 from vibsim.spec.source import Path_
+from vibsim.spec.sweep_keys import Bound
 from vibsim.spec.sweep_section import Written
 
 MOST = 2.0**53
@@ -33,8 +34,20 @@ def words(
     return tuple(words) if len(words) == len(written) else None
 
 
+def flags(written: Written, path: Path_, report: Report) -> tuple[str, ...] | None:
+    """Return flags as words (`vibsim.spec.options`); None where one of them is neither true nor false."""
+    if not isinstance(written, tuple):
+        report.add(path, "must be a list of true and false")
+        return None
+    for i, value in enumerate(written):
+        if not isinstance(value, bool):
+            report.add((*path, i), "must be true or false", value=value)
+    found = tuple(FLAGS[value] for value in written if isinstance(value, bool))
+    return found if len(found) == len(written) else None
+
+
 def numbers(
-    written: tuple[float | str, ...], path: Path_, report: Report
+    written: tuple[bool | float | str, ...], path: Path_, report: Report
 ) -> tuple[float, ...] | None:
     """Return a list of numbers; None where one of them is a formula without a value."""
     found: list[float] = []
@@ -88,14 +101,17 @@ def spans(low: float, high: float, path: Path_, report: Report) -> bool:
     return False
 
 
-def bounded(ends: Iterable[float], row: Parameter | None, path: Path_, report: Report) -> bool:
-    """Check values against the bound of what they are for; a rule is nowhere lower than at an end."""
+def bounded(ends: Iterable[float], bound: Bound, path: Path_, report: Report) -> bool:
+    """Check values against the bound of what they are for; a rule goes nowhere beyond its ends."""
     is_sound = True
-    if row is None or row.minimum is None:
-        return True
-    word = "greater than" if row.exclusive else "at least"
+    word = "greater than" if bound.exclusive else "at least"
     for i, value in enumerate(ends):
-        if value < row.minimum or (row.exclusive and value == row.minimum):
-            report.add((*path, i), f"must be {word} {row.minimum:g}", value=value)
+        rule = ""
+        if value < bound.least or (bound.exclusive and value == bound.least):
+            rule = f"must be {word} {bound.least:g}"
+        elif value > bound.most:
+            rule = f"must be at most {bound.most:g}"
+        if rule:
+            report.add((*path, i), rule, value=value)
             is_sound = False
     return is_sound

@@ -8,10 +8,11 @@ from types import MappingProxyType
 from typing import Literal
 
 AtPart = Literal["t", "step", "level", "scheme", "case"]
-Which = Literal["series", "convergent", "states", "extremal", "deviation", "none"]
+Which = Literal["series", "convergent", "states", "extremal", "deviation", "running", "none"]
 """Which quantities a value is of: every one; those that are compared between levels; the states, of which least and
-largest value are gathered over every step; these and the energy deviation; the energy deviation alone, whose last point
-is gathered apart; or none because the value belongs to the motion as a whole."""
+largest value are gathered over every step; these and the energy deviations; the energy deviation alone, whose last
+point is gathered apart; the energy deviations, whose largest value so far is gathered; or none because the value
+belongs to the motion as a whole."""
 Exact = Literal["solution", "period"]
 
 
@@ -33,12 +34,16 @@ class Value:
     """Whether ``t`` or ``step`` must be given."""
     needs_exact: Exact | None = None
     """What the model must know exactly."""
+    needs_linear: bool = False
+    """Whether it comes from the theory of linear models without damping."""
+    fixed_step: bool = False
+    """Whether it does not exist of schemes that choose their own steps."""
 
 
 _ANYWHERE: tuple[AtPart, ...] = ("t", "step", "level", "scheme", "case")
-_LADDER: tuple[AtPart, ...] = ("scheme", "case")
+_NO_LEVEL: tuple[AtPart, ...] = ("scheme", "case")
 
-_ROWS = (
+_SERIES = (
     Value("end", "value at the last time, or at `t` or `step`", "series", _ANYWHERE, best=True),
     Value(
         "at",
@@ -57,16 +62,93 @@ _ROWS = (
         "largest absolute value over every step, over that of the next finer level",
         "extremal",
         finer_levels=1,
+        fixed_step=True,
     ),
-    Value("max_abs_interior_ratio", "the same without the last point", "deviation", finer_levels=1),
+    Value(
+        "max_abs_interior_ratio",
+        "the same without the last point",
+        "deviation",
+        finer_levels=1,
+        fixed_step=True,
+    ),
+    Value(
+        "running_max",
+        "largest absolute value over every step up to `t` or `step`, or the end",
+        "running",
+        _ANYWHERE,
+    ),
+    Value("relative_running_max", "the same, over |E(0)|", "running", _ANYWHERE),
+)
+_OSCILLATION = (
     Value("period", "period, from interpolated peaks", "none"),
     Value("period_grid", "period, from peaks at grid points", "none"),
     Value("exact_period", "period of the exact solution", "none", ("case",), needs_exact="period"),
     Value("period_error", "period over the exact period, less one", "none", needs_exact="period"),
     Value("frequency", "angular frequency, 2 pi over the period", "none"),
+    Value(
+        "error_of_frequency",
+        "angular frequency over that of the exact solution, less one",
+        "none",
+        needs_exact="period",
+    ),
+    Value(
+        "predicted_frequency",
+        "angular frequency by the theory of the scheme",
+        "none",
+        needs_linear=True,
+        fixed_step=True,
+    ),
+    Value(
+        "phase_error_per_period",
+        "time by which the peaks come early, per period; negative where they come late",
+        "none",
+        needs_exact="period",
+    ),
+    Value(
+        "predicted_phase_error",
+        "the same by the theory of the scheme",
+        "none",
+        needs_linear=True,
+        fixed_step=True,
+    ),
+    Value(
+        "phase_error_slope",
+        "slope of the time by which a peak comes early over the number of its period",
+        "none",
+        needs_exact="period",
+    ),
     Value("amplitude", "half the height from the last trough to the last peak", "none"),
+    Value("amplitude_error", "last amplitude over the first one, less one", "none"),
     Value("growth_factor", "last peak over the first peak", "none"),
+    Value("growth_per_period", "factor by which the amplitude grows in a period", "none"),
+    Value(
+        "predicted_growth_per_period",
+        "the same by the theory of the scheme",
+        "none",
+        needs_linear=True,
+        fixed_step=True,
+    ),
+)
+_ENERGY = (
     Value("relative_energy_error", "max |E(t) - E(0)| / |E(0)| over every step", "none"),
+    Value(
+        "relative_energy_error_d2t",
+        "the same with the centred difference of the position as velocity, without the end points",
+        "none",
+    ),
+)
+_COST = (
+    Value("accepted_steps", "number of steps taken", "none"),
+    Value("force_evaluations", "number of evaluations of the acceleration", "none"),
+    Value(
+        "stability_limit",
+        "largest stable w dt of the scheme, infinite where there is none",
+        "none",
+        _NO_LEVEL,
+        fixed_step=True,
+    ),
+)
+_ERRORS = (
     Value("error_l1", "L1 norm of the true error", "convergent", best=True, needs_exact="solution"),
     Value("error_l2", "L2 norm of the true error", "convergent", best=True, needs_exact="solution"),
     Value("error_linf", "largest true error", "convergent", best=True, needs_exact="solution"),
@@ -78,22 +160,50 @@ _ROWS = (
         needs_exact="solution",
     ),
     Value(
+        "discrete_error",
+        "largest difference from the exact solution of the scheme's own steps",
+        "states",
+        needs_linear=True,
+        fixed_step=True,
+    ),
+    Value(
         "error_estimate_defect",
         "max |estimate - true error| over max |true error|",
         "convergent",
         finer_levels=1,
         needs_exact="solution",
+        fixed_step=True,
     ),
-    Value("observed_order", "order of a triple of levels, L2 norm", "convergent", finer_levels=2),
-    Value("ratio", "ratio of the differences of a triple, L2 norm", "convergent", finer_levels=2),
-    Value("coincidence", "how well rescaled differences coincide", "convergent", finer_levels=2),
+    Value(
+        "observed_order",
+        "order of a triple of levels, L2 norm",
+        "convergent",
+        finer_levels=2,
+        fixed_step=True,
+    ),
+    Value(
+        "ratio",
+        "ratio of the differences of a triple, L2 norm",
+        "convergent",
+        finer_levels=2,
+        fixed_step=True,
+    ),
+    Value(
+        "coincidence",
+        "how well rescaled differences coincide",
+        "convergent",
+        finer_levels=2,
+        fixed_step=True,
+    ),
     Value(
         "richardson_error",
         "largest error bound of the extrapolated solution",
         "convergent",
-        _LADDER,
+        _NO_LEVEL,
+        fixed_step=True,
     ),
 )
+_ROWS = (*_SERIES, *_OSCILLATION, *_ENERGY, *_COST, *_ERRORS)
 
 VALUES: Mapping[str, Value] = MappingProxyType({row.name: row for row in _ROWS})
 """Every value name with its meaning, as `vibsim list checks` prints it."""
