@@ -39,6 +39,9 @@ REASONS: Mapping[str, Status] = MappingProxyType(
 REASON_NAMES = tuple(REASONS)
 """The same without statuses; files hold a reason's position here."""
 
+DRIFTS = ("none", "bounded", "linear", "quadratic", "exponential", "unclear")
+"""How the error of an energy grows with time; files hold a position here."""
+
 Norm = Literal["l1", "l2", "linf", "linf_interior"]
 NORMS: tuple[Norm, ...] = get_args(Norm)
 """Every norm over time; ``linf_interior`` leaves the last point out."""

@@ -13,14 +13,16 @@ from vibsim.analysis.belonging import SAME_AT_EVERY_LEVEL
 from vibsim.analysis.compare import Comparison, comparisons
 from vibsim.analysis.evidence import judgement
 from vibsim.analysis.measured import definition, flags, measured
-from vibsim.analysis.part import Part, part_of
+from vibsim.analysis.motion import motion
+from vibsim.analysis.part import CENTRED, Part, part_of
 from vibsim.analysis.reached import bounds
 from vibsim.analysis.tables import SERIES, Table, numbers, over_time, precision_of
+from vibsim.analysis.work import work_precision
 from vibsim.errors import VibsimError
-from vibsim.models import MODELS
+from vibsim.models import MODELS, centred
 from vibsim.record import Record, Variable, attributes
 from vibsim.schemes import SCHEMES
-from vibsim.spec.series import asked, lean_series
+from vibsim.spec.series import RUNNING, asked, lean_series
 from vibsim.vocabulary import REASON_NAMES, STATUSES, TYPICAL_NORM
 
 if TYPE_CHECKING:
@@ -72,17 +74,17 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
     What is found of a member does not depend on the members beside it.
     """
     part = part_of(experiment, records)
-    found = comparisons(part, compared(experiment, part.lean))
+    found = comparisons(part, compared(experiment, part.lean) + _centred(part))
     table: Table = {}
     for q in found.values():
         table |= numbers(q) | _verdict(q)
         if not part.lean:
             table |= over_time(q)
-    table |= _scalars(part) | measured(part, found)
+    table |= _scalars(part) | measured(part, found) | motion(part, found)
     if experiment.tolerance is not None:
         table |= bounds(part)
     if not part.lean:
-        table |= _scaled_deviation(found["energy_deviation"])
+        table |= _scaled_deviation(found["energy_deviation"]) | work_precision(part, found)
     attrs: dict[str, Any] = {
         "title": experiment.title,
         "model": experiment.model.kind,
@@ -99,6 +101,12 @@ def compared(experiment: Experiment, lean: bool = False) -> tuple[str, ...]:
         return lean_series(experiment)
     states = (state.name for state in MODELS[experiment.model.kind].states)
     return tuple(dict.fromkeys([*states, "energy", "energy_deviation", *asked(experiment)]))
+
+
+def _centred(part: Part) -> tuple[str, ...]:
+    """Name what is made with ``[D_2t u]``, where series are kept and a scheme has another velocity."""
+    names = () if part.lean else centred(part.model)
+    return tuple(name for name in names if name in part.finest)
 
 
 def _coords(part: Part) -> Table:
@@ -138,7 +146,7 @@ def _widened(part: Part, variable: Variable) -> Variable:
 
 def _scaled_deviation(q: Comparison) -> Table:
     """Return dE_l (2^p)^k, which coincide where the energy converges to conservation (A, section 2.6)."""
-    levels, p = q.part.grid.levels, q.order[..., None]
+    levels, p = q.part.grid.levels, q.power[..., None]
     scaled = [
         u * series.gap_ratio(p, level - levels[0])
         for u, level in zip(q.values, levels, strict=True)
@@ -154,6 +162,9 @@ def _scalars(part: Part) -> Table:
     table: Table = {}
     for name, variable in rows[-1].variables.items():
         attrs, dims = dict(variable.attrs), variable.dims
+        if dims == SERIES and name.endswith((CENTRED, RUNNING)):
+            # neither has a value of its own at the end
+            continue
         if dims == SERIES:
             attrs["long_name"] = f"{attrs.get('long_name', name)} at the last stored time"
             last = np.stack([row[name][..., -1] for row in rows], -1)

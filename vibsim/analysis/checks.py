@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from vibsim.analysis import behaviour
 from vibsim.analysis.converges import converges
 from vibsim.analysis.measured import definition
 from vibsim.analysis.outcome import FAIL, PASS, Outcome
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     import xarray
 
     from vibsim.spec import Experiment
-    from vibsim.spec.checks import ClaimCheck, ConvergesCheck, ValueCheck
+    from vibsim.spec.checks import Check, ClaimCheck, Measurement
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,8 @@ class Verdict:
     """Number of results by status, compared with what was expected."""
     where: dict[str, Any]
     """For every status but PASS, where in a sweep its results lie; see `vibsim.analysis.where`."""
+    note: str | None = None
+    """What the experiment says to a reader of a claim."""
 
 
 def verdicts(experiment: Experiment, convergence: xarray.Dataset | Record) -> list[Verdict]:
@@ -70,22 +73,30 @@ def verdicts(experiment: Experiment, convergence: xarray.Dataset | Record) -> li
     if record.attrs["checks"] != definition(experiment):
         raise VibsimError("the checks are not those of the analysis: analyse the levels again")
     found = [
-        _claim(experiment, record, check, index)
-        if check.kind == "claim"
-        else _verdict(record, check.id, check.kind, _measure(experiment, record, check, index))
-        for index, check in enumerate(experiment.checks)
+        _of_check(experiment, record, check, index) for index, check in enumerate(experiment.checks)
     ]
     if experiment.tolerance is not None:
         found.append(_verdict(record, BY_TOLERANCE, BY_TOLERANCE, reached(experiment, record)))
     return found
 
 
-def _measure(
-    experiment: Experiment, record: Record, check: ConvergesCheck | ValueCheck, index: int
-) -> Outcome:
-    if check.kind == "converges":
-        return converges(experiment, record, check, index)
-    return valued(record, check, record["check_value"][index])
+def _of_check(experiment: Experiment, record: Record, check: Check, index: int) -> Verdict:
+    if check.kind == "claim":
+        return _claim(experiment, record, check, index)
+    return _verdict(record, check.id, check.kind, _measure(experiment, record, check, index))
+
+
+def _measure(experiment: Experiment, record: Record, check: Measurement, index: int) -> Outcome:
+    match check.kind:
+        case "converges":
+            return converges(experiment, record, check, index)
+        case "value":
+            return valued(experiment, record, check, record["check_value"][index])
+        case "stable":
+            return behaviour.stable(experiment, record, check, index)
+        case "conserves":
+            return behaviour.conserves(experiment, record, check, index)
+    return behaviour.equal(experiment, record, check, index)
 
 
 def _verdict(record: Record, id_: str, kind: str, outcome: Outcome) -> Verdict:
@@ -152,7 +163,7 @@ def _claim(experiment: Experiment, record: Record, check: ClaimCheck, index: int
     truth = "true" if inner.status == "PASS" else "false"
     status, reason, advice = inner.status, inner.reason, inner.advice
     # a number that broke down shows neither a statement nor its opposite
-    unmeasured = check.that.kind == "value" and inner.reason == "non_finite"
+    unmeasured = check.that.kind != "converges" and inner.reason == "non_finite"
     if inner.status != "INCONCLUSIVE" and not unmeasured:
         right = (inner.status == "PASS") == check.holds
         status = "PASS" if right else "FAIL"
@@ -175,4 +186,5 @@ def _claim(experiment: Experiment, record: Record, check: ClaimCheck, index: int
         results=inner.results,
         counts=inner.counts,
         where=inner.where,
+        note=check.note,
     )

@@ -21,6 +21,8 @@ Floats = NDArray[np.float64]
 
 ROUND_OFF_SAFETY = 10.0
 """Factor on the predicted round-off in an error bound: the prediction is an order of magnitude."""
+NOTHING_LEFT = 16.0
+"""Order with which a quantity that is promised to be exact is extrapolated: the finest level then stands as it is."""
 
 
 @dataclass(frozen=True)
@@ -53,14 +55,25 @@ class Comparison:
     """Formal order, shape (scheme, 1 or case)."""
     floor: Floats
     """Predicted round-off at one point, shape (scheme, case, level)."""
+    scale: Floats
+    """Size that round-off is relative to, shape (scheme, case)."""
     judged: dict[tuple[str, str, float], Judgement] = field(default_factory=dict, repr=False)
     """Judgements made so far, by norm, order and tolerance."""
     _norms: dict[str, InNorm] = field(default_factory=dict, repr=False)
 
+    @property
+    def power(self) -> Floats:
+        """Order by which differences are rescaled: 0 where the quantity is promised to be exact."""
+        return np.where(np.isinf(self.order), 0.0, self.order)
+
     @cached_property
     def differences(self) -> list[Floats]:
-        """Level minus next level."""
-        return [coarse - fine for coarse, fine in pairwise(self.values)]
+        """Level minus next level; NaN for a scheme that has no levels."""
+        found = [coarse - fine for coarse, fine in pairwise(self.values)]
+        if self.part.adaptive.any():
+            for d in found:
+                d[self.part.adaptive] = np.nan
+        return found
 
     @cached_property
     def errors(self) -> list[Floats] | None:
@@ -72,9 +85,8 @@ class Comparison:
         """Extrapolation to a vanishing step, and the bound of its error; for a lean part its largest value only."""
         part = self.part
         even = even_powers(part.experiment, self.name, part.columns)
-        value, bound = extrapolate(
-            self.values, part.grid.levels, self.order, even, largest=part.lean
-        )
+        order = np.where(np.isinf(self.order), NOTHING_LEFT, self.order)
+        value, bound = extrapolate(self.values, part.grid.levels, order, even, largest=part.lean)
         return value, bound + ROUND_OFF_SAFETY * self.floor[..., -1:]
 
     @property
@@ -110,11 +122,12 @@ class Comparison:
 
     @cached_property
     def coincidence(self) -> Floats:
-        """Relative distance of the rescaled differences, shape (scheme, case, triple)."""
+        """Relative distance of the rescaled differences, shape (scheme, case, triple); NaN without a finite order."""
         levels = self.part.grid.levels
+        order = np.where(np.isinf(self.order), np.nan, self.order)
         return by_level(
             [
-                series.coincidence(a, b, series.target_ratio(self.order, levels[i : i + 3]))
+                series.coincidence(a, b, series.target_ratio(order, levels[i : i + 3]))
                 for i, (a, b) in enumerate(pairwise(self.differences))
             ]
         )
@@ -143,8 +156,8 @@ def comparisons(part: Part, names: tuple[str, ...]) -> Mapping[str, Comparison]:
     sizes[position] = part.size(position, values[position], sizes)
     found = {}
     for name in names:
-        size = part.size(name, values[name], sizes) * part.magnified
-        attrs = part.finest.variables[name].attrs
+        scale = part.size(name, values[name], sizes)
+        attrs = part.finest.variables[name].attrs if name in part.finest else {}
         found[name] = Comparison(
             part=part,
             name=name,
@@ -153,7 +166,8 @@ def comparisons(part: Part, names: tuple[str, ...]) -> Mapping[str, Comparison]:
             values=values[name],
             exact=part.exact_of(name),
             order=formal_orders(part.experiment, name, part.columns),
-            floor=part.relative_floor * size[..., None],
+            floor=part.floor_of(name, scale * part.magnified),
+            scale=scale,
         )
     return found
 

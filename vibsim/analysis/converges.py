@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,9 +11,12 @@ from numpy.typing import NDArray
 from vibsim.analysis.evidence import omega_dt
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Orders, Outcome
 from vibsim.analysis.promise import columns_of, formal_orders, options_of, stability_limits
+from vibsim.analysis.stability import growth_of
 from vibsim.analysis.wording import Story, advise, tell
 from vibsim.models import MODELS
 from vibsim.record import Record
+from vibsim.schemes import SCHEMES, Options, Scheme
+from vibsim.spec.about import schemes_of
 from vibsim.vocabulary import REASON_NAMES, STATUSES
 
 if TYPE_CHECKING:
@@ -44,7 +48,7 @@ def converges(experiment: Experiment, record: Record, check: ConvergesCheck, ind
     )
     order = expected_order(experiment, record, check)
     names = record.words("scheme")
-    chosen = [i for i, name in enumerate(names) if check.schemes is None or name in check.schemes]
+    chosen = list(schemes_of(experiment, check))
 
     def story(scheme: int, case: int) -> Story:
         expected = order[scheme, case if order.shape[1] > 1 else 0]
@@ -98,6 +102,8 @@ def _story(
     columns = columns_of(record)
     limits = stability_limits(experiment, columns)[scheme]
     at = levels.index(culprit) if culprit >= 0 else None
+    options = options_of(experiment, columns, scheme, case)
+    p = float("nan") if at is None else float(omega_dt(record)[case, at])
     return Story(
         quantity=check.converges,
         reason=reason,
@@ -111,9 +117,21 @@ def _story(
         norm=check.norm,
         levels=levels,
         culprit=culprit,
-        omega_dt=float("nan") if at is None else float(omega_dt(record)[case, at]),
+        omega_dt=p,
+        growth=_growth(record, SCHEMES[spec.kind], options, p, (scheme, case, at)),
         limit=float(limits[case if len(limits) > 1 else 0]),
-        options=options_of(experiment, columns, scheme, case),
+        options=options,
         is_position=check.converges == MODELS[experiment.model.kind].position,
         scheme=spec.name,
     )
+
+
+def _growth(
+    record: Record, scheme: Scheme, options: Options, p: float, place: tuple[int, int, int | None]
+) -> tuple[float, float]:
+    """Return the growth factor per period at w dt = p, predicted and measured; NaN where it is not known."""
+    if math.isnan(p) or scheme.adaptive:
+        return math.nan, math.nan
+    predicted = float(growth_of(scheme.stepper(options), np.array(p)))
+    measured = "measured_growth" in record
+    return predicted, float(record["measured_growth"][place]) if measured else math.nan

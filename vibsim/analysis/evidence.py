@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from vibsim.analysis.compare import Comparison
 from vibsim.analysis.floor import norm_of_floor
-from vibsim.analysis.promise import stability_limits
+from vibsim.analysis.part import plain_name
 from vibsim.analysis.rules import Evidence
 from vibsim.analysis.series import largest
 from vibsim.analysis.verdict import Judgement, judge
+from vibsim.models import ENERGIES
 from vibsim.record import Record
 from vibsim.vocabulary import TOLERANCE
 
@@ -66,6 +67,9 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
     grid, shape = part.grid, part.shape
     points = len(grid.t)
     size, exists = _size(q.values[-1])
+    if plain_name(q.name) in ENERGIES:
+        # what is left of an energy is known no better than the energy
+        size = q.scale
 
     def in_norm(noise: Floats) -> Floats:
         return norm_of_floor(noise, norm, points, grid.spacing)
@@ -80,9 +84,9 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
         error=measured.error,
         size=in_norm(size),
         failed=part.failed,
-        applicable=exists | np.any(part.failed, axis=-1),
+        applicable=(exists | np.any(part.failed, axis=-1)) & ~part.adaptive[:, None],
         omega_dt=np.broadcast_to(part.omega_dt, (*shape, len(grid.levels))),
-        stability_limit=np.broadcast_to(stability_limits(part.experiment, part.columns), shape),
+        stability_limit=np.broadcast_to(part.stability_limit, shape),
         growth=part.growth,
         span=np.broadcast_to(part.omega_dt[:, 0] * float(grid.steps[0]), shape),
         relative_floor=np.broadcast_to(part.relative_floor[..., 0], shape),

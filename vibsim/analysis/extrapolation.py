@@ -30,7 +30,7 @@ REACHED = ("no", "yes")
 
 
 def best_record(experiment: Experiment, records: Mapping[int, Record]) -> Record:
-    """Extrapolate the solution of every scheme and member over all levels.
+    """Extrapolate the solution of every scheme with equal steps, and every member, over all levels.
 
     Parameters
     ----------
@@ -61,13 +61,13 @@ def best_record(experiment: Experiment, records: Mapping[int, Record]) -> Record
 def extrapolated(
     experiment: Experiment, records: Mapping[int, Record], grid: Grid
 ) -> list[Extrapolated]:
-    """Extrapolate level Records over all levels, at their common times: one row for each scheme."""
+    """Extrapolate level Records over all levels, at their common times: one row for each scheme of the ladder."""
     finest = records[grid.levels[-1]]
     group = members(experiment, int(finest["case"][0]), int(finest["case"][-1]) + 1)
     states = [state.name for state in MODELS[experiment.model.kind].states]
     levels = [tuple(take(grid, records[level], name) for name in states) for level in grid.levels]
     rows = []
-    for i in range(len(experiment.schemes)):
+    for i in experiment.ladder:
         parts = [
             (_of_method(method, start_of(method, group, where), grid, levels, i, where), where)
             for method, where in methods(experiment, i, group)
@@ -136,6 +136,8 @@ def record_of(
     """Name what was extrapolated, one row for each scheme."""
     model = MODELS[experiment.model.kind]
     kept = {name: v for name, v in coords.items() if v.dims in (("scheme",), ("case",), ("t",))}
+    names = np.asarray([experiment.schemes[i].name for i in experiment.ladder])
+    kept["scheme"] = Variable(("scheme",), names, coords["scheme"].attrs)
     variables: dict[str, Variable] = {}
 
     def add(name: str, values: Sequence[NDArray[Any]], words: str, units: str, **more: Any) -> None:

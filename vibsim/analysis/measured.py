@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis import values
+from vibsim.analysis import behaviour, values
 from vibsim.analysis.compare import Comparison
 from vibsim.analysis.evidence import judge_check
 from vibsim.analysis.part import Part
@@ -18,12 +18,13 @@ from vibsim.vocabulary import REASON_NAMES, STATUSES
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
+    from vibsim.spec.scheme_checks import ConservesCheck, EqualCheck, StableCheck
 
 Codes = NDArray[Any]
 
 FIELDS: Mapping[str, tuple[str, type[np.generic], float, str]] = {
     "value": ("order", np.float64, np.nan, "number that each check measured"),
-    "low": ("low", np.float64, np.nan, "lower end of the order of each check"),
+    "low": ("low", np.float64, np.nan, "lower end of the order of each check, or what it allows"),
     "high": ("high", np.float64, np.nan, "upper end of the order of each check"),
     "first": ("first", np.int16, -1, "first level that the order rests on, -1 for none"),
     "last": ("last", np.int16, -1, "last level that the order rests on, -1 for none"),
@@ -31,7 +32,10 @@ FIELDS: Mapping[str, tuple[str, type[np.generic], float, str]] = {
     "status": ("status", np.int8, 0, "status of each check on an order"),
     "reason": ("reason", np.int8, 0, "reason of each check on an order"),
 }
-"""Variable ``check_<name>``: the field of a judgement, its type, its value for a number, and its meaning."""
+"""Variable ``check_<name>``: the field of a judgement, its type, its value for a number, and its meaning.
+
+Checks of stability, energy and equality have other numbers there: `vibsim.analysis.behaviour`.
+"""
 
 
 def flags(names: tuple[str, ...]) -> dict[str, Any]:
@@ -52,13 +56,16 @@ def measured(part: Part, compared: Mapping[str, Comparison]) -> dict[str, Variab
     for i, check in enumerate(checks):
         inner = check.measured
         if inner.kind == "converges":
-            found = judge_check(compared[inner.converges], inner)
+            judged = judge_check(compared[inner.converges], inner)
             for name, (of, *_) in FIELDS.items():
-                table[name][i] = getattr(found, of)
-        else:
+                table[name][i] = getattr(judged, of)
+        elif inner.kind == "value":
             at = inner.at
             place = values.Place(part, compared, inner.quantity or "", at.level, at.t, at.step)
             table["value"][i] = values.value(inner.value, place)
+        else:
+            for name, found in _behaviour(part, compared, inner).items():
+                table[name][i] = found
     dims = ("check", "scheme", "case")
     if not checks:
         return {}
@@ -66,6 +73,18 @@ def measured(part: Part, compared: Mapping[str, Comparison]) -> dict[str, Variab
         f"check_{name}": Variable(dims, array, attributes(FIELDS[name][3], "1") | _flags_of(name))
         for name, array in table.items()
     }
+
+
+def _behaviour(
+    part: Part,
+    compared: Mapping[str, Comparison],
+    check: StableCheck | ConservesCheck | EqualCheck,
+) -> behaviour.Row:
+    if check.kind == "stable":
+        return behaviour.measure_stable(part, check)
+    if check.kind == "conserves":
+        return behaviour.measure_conserves(part, check)
+    return behaviour.measure_equal(part, compared, check)
 
 
 def _flags_of(name: str) -> dict[str, Any]:

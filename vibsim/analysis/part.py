@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis.belonging import check_belonging
-from vibsim.analysis.floor import solution_size
+from vibsim.analysis.floor import SPACING_AT_ONE, solution_size
 from vibsim.analysis.grid import Grid, common_grid, take
-from vibsim.analysis.promise import Columns, columns_of, relative_floors
+from vibsim.analysis.promise import Columns, columns_of, relative_floors, stability_limits
 from vibsim.analysis.sensitivity import sensitivity
 from vibsim.analysis.series import laid_out, largest
 from vibsim.models import ENERGIES, MODELS, Model
 from vibsim.record import Record
+from vibsim.schemes import SCHEMES
 from vibsim.simulation import Members, members
 from vibsim.vocabulary import NORMS, TYPICAL_NORM
 
@@ -25,6 +26,14 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+
+CENTRED = "_d2t"
+"""What follows the name of a velocity or an energy that is made with ``[D_2t u]``."""
+
+
+def plain_name(name: str) -> str:
+    """Return the name of a quantity without the mark of the velocity that it is made with."""
+    return name.removesuffix(CENTRED)
 
 
 @dataclass(frozen=True)
@@ -50,6 +59,12 @@ class Part:
     """w dt, shape (c, l)."""
     failed: Flags
     """Whether a level broke down, shape (s, c, l)."""
+    group: Members
+    """The numbers of the members."""
+    stability_limit: Floats
+    """Largest stable w dt, infinite for none, shape (s, 1 or c)."""
+    adaptive: Flags
+    """Whether a scheme chooses its own steps and so has no levels, shape (s,)."""
     growth: Floats
     """Largest position over the largest exact position, shape (s, c, l); NaN where not known."""
 
@@ -70,18 +85,45 @@ class Part:
         return schemes, cases
 
     def series(self, name: str) -> list[Floats]:
-        """Return a quantity at every level, coarse to fine, each of shape (s, c, t)."""
-        return [take(self.grid, self.records[level], name) for level in self.grid.levels]
+        """Return a quantity at every level, coarse to fine, each of shape (s, c, t); NaN where it is not stored.
+
+        ``[D_2t u]`` does not exist at the first and the last step. There both the quantity and its exact values count
+        as 0, so that differences and errors vanish and norms are those of the other points.
+        """
+        if any(name not in self.records[level] for level in self.grid.levels):
+            return [np.full((*self.shape, len(self.grid.t)), np.nan) for _ in self.grid.levels]
+        found = [take(self.grid, self.records[level], name) for level in self.grid.levels]
+        return [self._closed(values) for values in found] if name.endswith(CENTRED) else found
+
+    def ends(self) -> list[int]:
+        """Return the places on the common grid of the first and the last step, as far as they are on it."""
+        return [0, -1] if self.grid.end_included else [0]
+
+    def _closed(self, values: Floats) -> Floats:
+        """Return a series with 0 at `ends`, where it has a value anywhere."""
+        values = values.copy(order="K")
+        exists = np.any(np.isfinite(values), axis=-1)
+        for place in self.ends():
+            values[..., place] = np.where(exists, 0.0, np.nan)
+        return values
 
     def exact_of(self, name: str) -> Floats | None:
         """Return a quantity's exact values, which broadcast against (s, c, t); None where they are not known."""
-        if name in self.exact:
-            return self.exact[name][None]
-        if not self.model.conservative:
+        plain = plain_name(name)
+        if plain in self.exact:
+            found = self.exact[plain][None]
+        elif self.model.conservative and plain == "energy":
+            found = energy_at_start(self.finest)[..., None]
+        elif self.model.conservative and plain == "energy_deviation":
+            return np.zeros((1, 1, 1))
+        else:
             return None
-        if name == "energy":
-            return energy_at_start(self.finest)[..., None]
-        return np.zeros((1, 1, 1)) if name == "energy_deviation" else None
+        if plain == name:
+            return found
+        # as the series itself, see `series`
+        inside = np.ones(len(self.grid.t))
+        inside[self.ends()] = 0.0
+        return np.asarray(found * inside)
 
     def size(self, name: str, values: list[Floats], sizes: Mapping[str, Floats]) -> Floats:
         """Return the size that round-off is relative to, shape (s, c).
@@ -96,14 +138,26 @@ class Part:
         sizes
             Sizes of the solutions that are known already.
         """
-        if name in ENERGIES:
+        plain = plain_name(name)
+        if plain in ENERGIES:
             return sizes["energy"]
         own = solution_size(values)
-        if name != self.model.velocity:
+        if plain != self.model.velocity:
             return own
         duration = self.grid.dt[0] * self.grid.steps[0]
         rate = np.maximum(self.finest["natural_frequency"], 1.0 / duration)
         return np.asarray(np.maximum(own, sizes[self.model.position] * rate))
+
+    def floor_of(self, name: str, size: Floats) -> Floats:
+        """Return the predicted round-off of a quantity of a size, shape (s, c, l).
+
+        ``[D_2t u]`` divides the last digit of the position by dt: eps/(w dt) of the velocity's size.
+        """
+        relative = self.relative_floor
+        if name.endswith(CENTRED):
+            with np.errstate(divide="ignore"):
+                relative = relative + SPACING_AT_ONE / self.omega_dt
+        return np.asarray(relative * size[..., None])
 
 
 def part_of(experiment: Experiment, records: Mapping[int, Record]) -> Part:
@@ -134,7 +188,10 @@ def part_of(experiment: Experiment, records: Mapping[int, Record]) -> Part:
         magnified=sensitivity(experiment, t, group, exact if lean else None),
         relative_floor=relative_floors(experiment, grid.steps, columns),
         omega_dt=by_level([records[level]["omega_dt"] for level in grid.levels]),
+        group=group,
         failed=by_level([records[level]["status"] for level in grid.levels]) != 0,
+        stability_limit=stability_limits(experiment, columns),
+        adaptive=np.array([SCHEMES[scheme.kind].adaptive for scheme in experiment.schemes]),
         growth=_growth(experiment, grid, records, exact),
     )
 
@@ -154,7 +211,10 @@ def _norms(experiment: Experiment) -> tuple[str, ...]:
     named: set[str] = {TYPICAL_NORM}
     for check in experiment.checks:
         inner = check.measured
-        named.add(inner.norm if inner.kind == "converges" else inner.value.removeprefix("error_"))
+        if inner.kind == "converges":
+            named.add(inner.norm)
+        elif inner.kind == "value":
+            named.add(inner.value.removeprefix("error_"))
     return tuple(norm for norm in NORMS if norm in named)
 
 

@@ -87,7 +87,7 @@ def _read(
         yield {level: read(start, stop) for level, read in readers.items()}
 
 
-_DECISIVE = ("status", "failure_time", "last_step", "omega_dt")
+_DECISIVE = ("status", "failure_time", "last_step", "omega_dt", "measured_growth")
 
 
 def kept(parts: Iterable[Record], thin: list[Record]) -> Iterator[Record]:

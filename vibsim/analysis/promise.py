@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +15,7 @@ from vibsim.analysis.floor import relative_floor
 from vibsim.models import MODELS
 from vibsim.record import Record
 from vibsim.schemes import SCHEMES, Options, Scheme
+from vibsim.schemes.base import OptionValue
 from vibsim.theory import stability_limit
 
 if TYPE_CHECKING:
@@ -47,7 +50,8 @@ def options_of(experiment: Experiment, columns: Columns, scheme: int, case: int)
 def formal_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floats:
     """Return the order that every scheme promises for a quantity, shape (scheme, case).
 
-    Where no option is swept there is one case for all, here and below.
+    It is infinite for what is exact, and NaN for a scheme that chooses its own steps. Where no option is swept there is
+    one case for all, here and below.
     """
     model = MODELS[experiment.model.kind]
     return _each(experiment, columns, lambda s, o: float(s.formal_order(quantity, model, o)))
@@ -68,13 +72,25 @@ def relative_floors(experiment: Experiment, steps: tuple[int, ...], columns: Col
 def stability_limits(experiment: Experiment, columns: Columns) -> Floats:
     """Return the largest stable w dt of every scheme, infinite for none, shape (scheme, case).
 
-    It is infinite too for a scheme that grows at every step: its growth vanishes with dt, and is no instability.
+    It is infinite too for a scheme that grows at every step (its growth vanishes with dt, and is no instability), and
+    for one that chooses its own steps.
     """
+    return _each(experiment, columns, _finite_limit)
 
-    def limit(scheme: Scheme, options: Options) -> float:
-        return stability_limit(scheme, options) or np.inf
 
-    return _each(experiment, columns, limit)
+def _finite_limit(scheme: Scheme, options: Options) -> float:
+    limit = limit_of(scheme, options)
+    return limit if limit > 0.0 else np.inf
+
+
+def limit_of(scheme: Scheme, options: Options) -> float:
+    """Return the largest stable w dt of a scheme, infinite for none, 0 where every step grows; NaN where it adapts."""
+    return math.nan if scheme.adaptive else _limit(scheme, tuple(sorted(options.items())))
+
+
+@lru_cache(maxsize=1024)
+def _limit(scheme: Scheme, options: tuple[tuple[str, OptionValue], ...]) -> float:
+    return float(stability_limit(scheme, dict(options)))
 
 
 def _each(

@@ -34,9 +34,14 @@ def is_bound(name: str) -> bool:
 
 
 def bounds(part: Part) -> dict[str, Variable]:
-    """Return the largest bound over time of every extrapolated state, shape (scheme, case); infinite without one."""
+    """Return the largest bound over time of every extrapolated state, shape (scheme, case); infinite without one.
+
+    It is NaN of schemes that choose their own steps, and so have no levels.
+    """
     rows = extrapolated(part.experiment, part.records, part.grid)
-    largest = np.stack([row.largest_bounds() for row in rows], axis=1)
+    bounds = np.stack([row.largest_bounds() for row in rows], axis=1)
+    largest = np.full((len(bounds), *part.shape), np.nan)
+    largest[:, list(part.experiment.ladder)] = bounds
     return {
         f"{state.name}{_BOUND}": Variable(
             ("scheme", "case"), values, attributes(f"{state.long_name}: {_WORDS}", state.unit)
@@ -63,6 +68,8 @@ def reached(experiment: Experiment, record: Record) -> Outcome:
     status = np.where(largest <= tolerance, PASS, FAIL).astype(np.int8)
     codes = [REASON_NAMES.index(name) for name in ("match", "mismatch")]
     names, cases = record.words("scheme"), np.asarray(record["case"])
+    # what chooses its own steps is no part of the ladder
+    schemes = list(experiment.ladder)
     rule = f"at most {number(tolerance)}"
 
     def tell(scheme: int, case: int) -> str:
@@ -72,8 +79,8 @@ def reached(experiment: Experiment, record: Record) -> Outcome:
         return _advise(experiment, scheme, states[which[scheme, case]])
 
     return Outcome(
-        schemes=names,
-        scheme_index=list(range(len(names))),
+        schemes=[names[i] for i in schemes],
+        scheme_index=schemes,
         cases=cases,
         case_index=np.arange(len(cases)),
         status=status,

@@ -54,6 +54,8 @@ MOST_ABOVE = 2.0
 """A superconvergent quantity gains at most the next even power."""
 AGREEMENT = 0.25
 """Orders of differences and of errors agree within half of what separates two orders."""
+ORDINARY = 2.0
+"""Order of the error that would have been seen where an exact quantity is promised."""
 LEAST_ORDER = 0.25
 """No stated order is taken for less when errors are predicted: half the least that an expansion has, 1/2."""
 
@@ -71,7 +73,7 @@ class Evidence:
     floor: Floats
     """Predicted round-off at every level in the same norm, shape (..., n)."""
     order: Floats
-    """The order p that is expected, shape (...)."""
+    """The order p that is expected, infinite for what is to be exact, shape (...)."""
     omega_dt: Floats
     """w dt, shape (..., n)."""
     size: Floats
@@ -111,8 +113,11 @@ def breakdown(e: Evidence, shape: tuple[int, ...]) -> tuple[Flags, Flags, Flags]
 
 def rules(e: Evidence, t: Trend) -> list[tuple[Flags, str]]:
     """Return the rules for ladders of three levels and more, first to last."""
-    p, tol = e.order, e.tolerance
+    exactly, tol = np.isinf(e.order), e.tolerance
+    # the rules of an order do not reach those ladders
+    p = np.where(exactly, ORDINARY, e.order)
     nothing = t.count == 0
+    exact = (exactly | nothing) & _truly_exact(e)
     near = (np.abs(t.order - p) <= tol) & (t.width <= tol)
     several = t.count > 1
     together = np.abs(t.scatter) <= np.where(several, COINCIDENT, SINGLE)
@@ -133,9 +138,10 @@ def rules(e: Evidence, t: Trend) -> list[tuple[Flags, str]]:
     missed = too_large & (right | (wrong & _errors_stay(e, t)))
     wrong &= _errors_agree(e, t)
     return [
-        (nothing & _truly_exact(e) & _far_from_exact(e), "wrong_limit"),
-        (nothing & _truly_exact(e), "exact"),
-        (nothing, "round_off"),
+        (exact & _far_from_exact(e), "wrong_limit"),
+        (exact, "exact"),
+        (exactly & ~at_round_off(e), "order_low"),
+        (nothing | exactly, "round_off"),
         (t.alternating, "oscillating"),
         (missed, "wrong_limit"),
         (right & ~too_small, "asymptotic"),
@@ -194,15 +200,20 @@ def _floor_of_pairs(e: Evidence) -> Floats:
     return np.asarray(e.floor[..., :-1] + e.floor[..., 1:])
 
 
+def at_round_off(e: Evidence) -> Flags:
+    """Say where all differences may be round-off."""
+    return np.asarray(np.all(e.difference <= BLAME * _floor_of_pairs(e), axis=-1))
+
+
 def _truly_exact(e: Evidence) -> Flags:
     """Say where all differences are round-off although an ordinary error would have been seen."""
-    small = np.asarray(np.all(e.difference <= BLAME * _floor_of_pairs(e), axis=-1))
     # what a short run has accumulated is smaller by (w T)^2
-    ordinary = np.minimum(e.omega_dt[..., 0], 1.0) ** e.order
+    power = np.where(np.isinf(e.order), ORDINARY, e.order)
+    ordinary = np.minimum(e.omega_dt[..., 0], 1.0) ** power
     if e.span is not None:
         ordinary = ordinary * np.minimum(e.span, 1.0) ** 2
     tiny = np.all(e.difference <= TINY * e.size[..., None], axis=-1)
-    return np.asarray(small & tiny & (ordinary >= VISIBLE * BLAME * e.relative_floor))
+    return np.asarray(at_round_off(e) & tiny & (ordinary >= VISIBLE * BLAME * e.relative_floor))
 
 
 def _accuracy(e: Evidence) -> Floats:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vibsim.analysis import series
 from vibsim.analysis.compare import Comparison
-from vibsim.analysis.part import by_level
+from vibsim.analysis.part import CENTRED, by_level, plain_name
 from vibsim.analysis.promise import options_swept
 from vibsim.models import ENERGIES
 from vibsim.record import Variable, attributes
@@ -28,6 +28,9 @@ def _adder(table: Table, q: Comparison) -> Add:
 
     def add(name: str, dims: tuple[str, ...], values: Floats, words: str, units: str) -> None:
         attrs = attributes(f"{q.long_name}: {words}", units)
+        if dims[-1] == "t" and q.name.endswith(CENTRED):
+            values = np.array(values)
+            values[..., q.part.ends()] = np.nan
         table[f"{q.name}_{name}"] = Variable(dims, np.ascontiguousarray(values), attrs)
 
     return add
@@ -56,7 +59,7 @@ def numbers(q: Comparison) -> Table:
         words = "largest error bound of the extrapolation"
         add("richardson_error_max", ("scheme", "case"), q.largest_bound, words, q.units)
     add("floor", of_level, q.floor, "predicted round-off", q.units)
-    words = "order that the scheme promises"
+    words = "order that the scheme promises, infinite for what is exact"
     if options_swept(part.experiment):
         add("formal_order", ("scheme", "case"), np.broadcast_to(q.order, part.shape), words, "1")
     else:
@@ -104,7 +107,7 @@ def over_time(q: Comparison) -> Table:
     add("richardson_error", SERIES, bound, "error bound of the extrapolation", q.units)
     add("finest", SERIES, q.values[-1], "finest level", q.units)
     if q.exact is not None:
-        if q.name in ENERGIES:
+        if plain_name(q.name) in ENERGIES:
             add("exact", SERIES, np.broadcast_to(q.exact, value.shape), "exact", q.units)
         else:
             add("exact", SERIES[1:], q.exact[0], "exact", q.units)
@@ -117,7 +120,7 @@ def over_time(q: Comparison) -> Table:
 
 def _pairs(q: Comparison, add: Add) -> None:
     dims = ("scheme", "case", "pair", "t")
-    levels, d, p = q.part.grid.levels, q.differences, q.order[..., None]
+    levels, d, p = q.part.grid.levels, q.differences, q.power[..., None]
     unknown = [np.full_like(x, np.nan) for x in d]
     rescaled = [x * series.rescaling(p, levels[: i + 2]) for i, x in enumerate(d)]
     errors = unknown if q.errors is None else q.errors[:-1]

@@ -10,34 +10,47 @@ from numpy.typing import NDArray
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
 from vibsim.analysis.wording import number
 from vibsim.record import Record
+from vibsim.spec.about import schemes_of
 from vibsim.vocabulary import REASON_NAMES
 
 if TYPE_CHECKING:
+    from vibsim.spec import Experiment
     from vibsim.spec.checks import ValueCheck
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-SURVIVES_FAILURE = frozenset({"at", "exact_period"})
+FROM_THEORY = frozenset(
+    {
+        "stability_limit",
+        "predicted_growth_per_period",
+        "predicted_frequency",
+        "predicted_phase_error",
+    }
+)
+"""Numbers that no run enters."""
+SURVIVES_FAILURE = frozenset({"at", "exact_period", "growth_per_period"}) | FROM_THEORY
 """Numbers that may be sound although the member broke down later."""
 MAY_BE_INFINITE = frozenset({"exact_period"})
 """Numbers that are infinite for a sound member, on the separatrix: they do not exist there."""
+UNBOUNDED = frozenset({"stability_limit"})
+"""Numbers of which infinity is a value: above every other number."""
 DEFAULT_RTOL, DEFAULT_ATOL = 1e-9, 1e-12
 """Tolerance of ``equals`` where a check gives none."""
 
 
-def valued(record: Record, check: ValueCheck, measured: Floats) -> Outcome:
+def valued(experiment: Experiment, record: Record, check: ValueCheck, measured: Floats) -> Outcome:
     """Compare a measured number, shape (scheme, case), with what the check asks of it."""
     names = record.words("scheme")
     at = check.at
-    schemes = [i for i, name in enumerate(names) if at.scheme is None or name == at.scheme]
+    schemes = list(schemes_of(experiment, check))
     every = np.asarray(record["case"])
     cases = np.flatnonzero(every == at.case) if at.case is not None else np.arange(len(every))
     holds, away, rule = _compare(check, measured)
     lost = _failed(record, check) & ~(
         np.isfinite(measured) if check.value in SURVIVES_FAILURE else np.zeros_like(holds)
     )
-    infinite = np.isinf(measured)
+    infinite = np.isinf(measured) & (check.value not in UNBOUNDED)
     if check.value in MAY_BE_INFINITE:
         infinite, measured = np.zeros_like(infinite), np.where(infinite, np.nan, measured)
     masks = [lost | infinite, np.isnan(measured), holds]

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.analysis import oscillation, predicted
+from vibsim.analysis.apart import discrete_error
 from vibsim.analysis.compare import Comparison
 from vibsim.analysis.part import Part, energy_at_start
 from vibsim.analysis.series import largest, safe_ratio
@@ -45,10 +47,15 @@ class Place:
         """The levels."""
         return self.part.grid.levels
 
-    def data(self) -> Record | None:
-        """Return the level Record that is asked for, by default the finest."""
+    @property
+    def at_level(self) -> int | None:
+        """The level that is asked for, by default the finest; None for one that is not there."""
         level = self.levels[-1] if self.level is None else self.level
-        return self.part.records.get(level) if isinstance(level, int) else None
+        return level if isinstance(level, int) and level in self.part.records else None
+
+    def data(self) -> Record | None:
+        """Return the level Record that is asked for."""
+        return None if self.at_level is None else self.part.records[self.at_level]
 
     def comparison(self) -> Comparison | None:
         """Return the quantity as it was compared between levels."""
@@ -135,26 +142,59 @@ def _quotient(top: str, bottom: str) -> Callable[[Place], Floats]:
     return take
 
 
-def _growth_factor(p: Place) -> Floats:
-    """Return the last peak over the first: two peaks at least."""
-    several = _gathered("period_count")(p) >= 1
-    return np.where(several, _quotient("last_peak", "first_peak")(p), np.nan)
+def _measured(of: Callable[[Record], Floats]) -> Callable[[Place], Floats]:
+    """Return what is measured of the Record of a level."""
+
+    def take(p: Place) -> Floats:
+        data = p.data()
+        return p.missing if data is None else of(data)
+
+    return take
 
 
-def _frequency(p: Place) -> Floats:
-    period = _gathered("period")(p)
-    return safe_ratio(np.full_like(period, 2 * np.pi), period)
+def _at_level(of: Callable[[Part, int], Floats]) -> Callable[[Place], Floats]:
+    """Return what belongs to a level of the members."""
+
+    def take(p: Place) -> Floats:
+        return p.missing if p.at_level is None else of(p.part, p.at_level)
+
+    return take
+
+
+def _error_of_frequency(p: Place) -> Floats:
+    return _quotient("exact_period", "period")(p) - 1.0
+
+
+def _running_max(p: Place) -> Floats:
+    """Return the largest deviation so far; at the end it is the largest of all, which is there without the series."""
+    data, name = p.data(), f"{p.quantity}_running_max"
+    at_end = p.t is None and p.step is None
+    return _max_abs(p) if at_end or data is None else _sample(replace(p, quantity=name))
+
+
+def _over_initial(of: Callable[[Place], Floats]) -> Callable[[Place], Floats]:
+    """Return a number over the size of the energy at the start."""
+
+    def take(p: Place) -> Floats:
+        data = p.data()
+        if data is None:
+            return p.missing
+        return safe_ratio(*np.broadcast_arrays(of(p), np.abs(energy_at_start(data))))
+
+    return take
+
+
+def _energy_error_d2t(p: Place) -> Floats:
+    data = p.data()
+    return p.missing if data is None else oscillation.energy_error_d2t(p.part, data)
+
+
+def _discrete_error(p: Place) -> Floats:
+    return p.missing if p.at_level is None else discrete_error(p.part, p.at_level, p.quantity)
 
 
 def _period_error(p: Place) -> Floats:
     return _quotient("period", "exact_period")(p) - 1.0
-
-
-def _relative_energy_error(p: Place) -> Floats:
-    data = p.data()
-    if data is None:
-        return p.missing
-    return safe_ratio(data["energy_deviation_max_abs"], np.abs(energy_at_start(data)))
 
 
 def _error(norm: str) -> Callable[[Place], Floats]:
@@ -213,10 +253,25 @@ KNOWN: Mapping[str, Callable[[Place], Any]] = {
     "period_grid": _gathered("period_grid"),
     "exact_period": _gathered("exact_period"),
     "period_error": _period_error,
-    "frequency": _frequency,
+    "running_max": _running_max,
+    "relative_running_max": _over_initial(_running_max),
+    "frequency": _measured(oscillation.frequency),
+    "predicted_frequency": _at_level(predicted.frequency),
+    "error_of_frequency": _error_of_frequency,
+    "phase_error_per_period": _measured(oscillation.phase_error),
+    "predicted_phase_error": _at_level(predicted.phase_error),
+    "phase_error_slope": _measured(oscillation.phase_error_slope),
     "amplitude": _gathered("amplitude"),
-    "growth_factor": _growth_factor,
-    "relative_energy_error": _relative_energy_error,
+    "amplitude_error": _measured(oscillation.amplitude_error),
+    "growth_factor": _measured(oscillation.growth_factor),
+    "growth_per_period": _at_level(oscillation.growth_per_period),
+    "predicted_growth_per_period": _at_level(predicted.growth_per_period),
+    "stability_limit": lambda p: predicted.limits(p.part),
+    "relative_energy_error": _over_initial(_gathered("energy_deviation_max_abs")),
+    "relative_energy_error_d2t": _over_initial(_energy_error_d2t),
+    "accepted_steps": _at_level(oscillation.steps_taken),
+    "force_evaluations": _at_level(oscillation.force_evaluations),
+    "discrete_error": _discrete_error,
     "error_l1": _error("l1"),
     "error_l2": _error("l2"),
     "error_linf": _error("linf"),

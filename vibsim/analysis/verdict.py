@@ -10,7 +10,8 @@ The rules, in the order in which they apply (the first that applies decides):
    ``too_few_levels``;
 2. round-off: a triple whose finer differences are all within `rules.BLAME` times the predicted floor is suspect, and
    it is cut off, with all finer ones, where it breaks the trend. Nothing left: ``exact`` where the differences of an
-   inexact scheme would have been seen, else ``round_off``. Differences above ``BLAME * floor`` are never excused;
+   inexact scheme would have been seen, else ``round_off``. Differences above ``BLAME * floor`` are never excused.
+   Where the promise is that a quantity is exact, this alone decides: a difference above is ``order_low``;
 3. one triple left: the two difference series over time are the evidence, and must be proportional;
 4. several left: the sequence of local orders, its last change and the trend of the proportionality;
 5. the order is stated with an interval. PASS where it is within the tolerance, its interval is as narrow, the series
@@ -26,7 +27,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis.rules import BLAME, Evidence, breakdown, rules
+from vibsim.analysis.rules import BLAME, Evidence, at_round_off, breakdown, rules
 from vibsim.analysis.series import order_of_ratio, safe_ratio
 from vibsim.analysis.window import trend
 from vibsim.vocabulary import REASON_NAMES, REASONS, STATUSES
@@ -86,7 +87,8 @@ def judge(evidence: Evidence) -> Judgement:
         return _decide(cases, culprit, orders, nan, nan, nan, nothing, nothing)
     found = trend(orders, e.scatter, e.difference, e.floor, BLAME, e.tolerance)
     cases += rules(e, found)
-    stated = sound & (found.count > 0)
+    # the order of noise is none
+    stated = sound & (found.count > 0) & ~(np.isinf(e.order) & at_round_off(e))
     order, low, high = (np.where(stated, x, np.nan) for x in (found.order, found.low, found.high))
     return _decide(
         cases,

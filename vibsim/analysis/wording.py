@@ -20,7 +20,7 @@ class Story:
     first: int
     last: int
     expected: float
-    """The order that was expected."""
+    """The order that was expected; infinite where the quantity was to be exact."""
     tolerance: float
     norm: str
     levels: tuple[int, ...]
@@ -28,6 +28,8 @@ class Story:
     """Level that failed or is beyond the stability limit; -1 for none."""
     omega_dt: float
     """w dt at the culprit; NaN for none."""
+    growth: tuple[float, float]
+    """Growth factor per period at the culprit, predicted and measured; NaN where it is not known."""
     limit: float
     """Stability limit of the scheme; infinite for none."""
     options: Options
@@ -41,6 +43,16 @@ def number(value: float) -> str:
     return f"{value:.6g}"
 
 
+def growth_in_words(predicted: float, measured: float) -> str:
+    """Say what growth theory predicts and what was measured; empty where neither is known."""
+    told = [
+        f"{value:.6g} {word}"
+        for value, word in ((predicted, "predicted"), (measured, "measured"))
+        if not math.isnan(value)
+    ]
+    return f": growth factor per period {', '.join(told)}" if told else ""
+
+
 def _measured(s: Story) -> str:
     """Return the stated order with its interval and levels; empty where there is none."""
     if math.isnan(s.order):
@@ -51,6 +63,9 @@ def _measured(s: Story) -> str:
 def tell(s: Story) -> str:
     """Say what was measured of a convergence, in one sentence."""
     measured, promised = _measured(s), f"order {number(s.expected)}"
+    if s.reason == "order_low" and math.isinf(s.expected):
+        so_far = f": with {measured}" if measured else ""
+        return f"{s.quantity} is promised to be exact, but the levels differ by more than round-off{so_far}."
     match s.reason:
         case "asymptotic":
             return (
@@ -184,7 +199,7 @@ def _unstable(s: Story) -> str:
     if math.isfinite(s.omega_dt) and s.omega_dt > s.limit:
         return (
             f"The run is unstable: at level {s.culprit}, w dt = {s.omega_dt:.4g} is beyond the limit "
-            f"{number(s.limit)} of scheme {s.scheme}."
+            f"{number(s.limit)} of scheme {s.scheme}{growth_in_words(*s.growth)}."
         )
     return (
         f"{s.quantity} is unstable: the solution grows where the exact one does not, and finer levels "

@@ -1,0 +1,295 @@
+"""Checks of stability and equality, exact quantities, and a scheme that is wrong: each verdict is provoked."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from ladders import T, evidence_of
+from spring_runs import PERIODS, STEPS, judged, registered, spring
+
+from vibsim.analysis.verdict import judge
+from vibsim.record import Variable
+from vibsim.schemes import SCHEMES
+from vibsim.schemes.base import Orders
+from vibsim.schemes.runge_kutta import Tableau, from_tableau
+from vibsim.theory import rounding_bound
+from vibsim.vocabulary import REASON_NAMES
+
+LIMIT = 2.0
+
+
+def at_limit(over: float) -> dict[str, float]:
+    """Return the time section with w dt = `over` times the limit of the centred scheme at level 0."""
+    return {"end": STEPS * LIMIT * over / (2 * np.pi), "base_steps": STEPS}
+
+
+def test_just_above_the_limit_the_growth_is_the_predicted_one() -> None:
+    checks = [{"stable": False, "level": 0}, {"stable": True, "level": 0}, {"stable": True}]
+    run = spring(["central"], *checks, {"converges": "u"}, levels=(0, 1, 2), time=at_limit(1.001))
+    at, wrong, finest, ladder = run.verdicts
+    assert (at.status, at.reason) == ("PASS", "match")
+    assert (wrong.status, wrong.reason) == ("FAIL", "unstable")
+    assert (finest.status, finest.reason) == ("PASS", "match")
+    assert (ladder.status, ladder.reason) == ("FAIL", "unstable")
+    # u = (-r)^n with r + 1/r = p^2 - 2, and 2 pi/p steps to a period
+    p = LIMIT * 1.001
+    root = np.arccosh(p * p / 2 - 1)
+    predicted = run.record["theory_growth"][0, 0, 0]
+    assert predicted == pytest.approx(np.exp(root * 2 * np.pi / p), rel=1e-9)
+    measured = run.record["measured_growth"][0, 0, 0]
+    # both roots are there at first: ln 2 of the whole
+    periods = STEPS * p / (2 * np.pi)
+    assert np.log(measured / predicted) == pytest.approx(0.0, abs=np.log(4) / periods)
+    for text in (at.text, ladder.text):
+        assert f"{predicted:.6g} predicted" in text
+        assert f"{measured:.6g} measured" in text
+
+
+@pytest.mark.parametrize(
+    ("scheme", "over", "stable"),
+    [("central", 1.0, True), ("euler_cromer", 1.0, False), ("central", 0.99, True)],
+)
+def test_at_the_limit_the_measurement_decides(scheme: str, over: float, stable: bool) -> None:
+    # plain Euler-Cromer has u^n = (-1)^n (1 + 2 n) I at w dt = 2
+    run = spring([scheme], {"stable": stable}, {"stable": not stable}, time=at_limit(over))
+    assert [v.status for v in run.verdicts] == ["PASS", "FAIL"]
+
+
+def test_growth_that_vanishes_with_dt_is_no_instability() -> None:
+    run = spring(["forward_euler"], {"stable": True, "level": 0}, levels=(0, 1, 2))
+    assert float(run.record["measured_growth"][0, 0, 0]) > 1.3
+    assert run.verdicts[0].status == "PASS"
+    assert run.record["stability_limit"][0, 0] == 0.0
+
+
+def test_growth_that_nothing_shows_to_vanish_is_an_instability() -> None:
+    run = spring(["forward_euler"], {"stable": True}, {"stable": False})
+    assert [v.reason for v in run.verdicts] == ["unstable", "match"]
+
+
+def test_overflow_is_unstable_with_its_time() -> None:
+    time = {"end": 400.0, "base_steps": 400}
+    run = spring(["central"], {"stable": True}, {"stable": False}, time=time)
+    assert [v.reason for v in run.verdicts] == ["unstable", "match"]
+    failed = float(run.record["failure_time"][0, 0, 0])
+    assert np.isfinite(failed)
+    assert f"at t = {failed:.6g}" in run.verdicts[0].text
+    assert run.summary["failures"][0]["t"] == failed
+
+
+def test_growth_that_contradicts_theory_fails_whatever_is_expected() -> None:
+    checks = [{"stable": False}, {"stable": True}]
+    run = spring(["central"], *checks, time=at_limit(1.01))
+    level = run.levels[0]
+    last = level.variable("last_peak")
+    # half the growth, in the logarithm, that the scheme has
+    variables = {
+        **level.variables,
+        "last_peak": Variable(last.dims, np.sqrt(np.abs(last.values)), {}),
+    }
+    found = judged(run.experiment, {0: replace(level, variables=variables)})
+    assert [v.status for v in run.verdicts] == ["PASS", "FAIL"]
+    assert [v.status for v in found.verdicts] == ["FAIL", "FAIL"]
+    assert [v.reason for v in found.verdicts] == ["mismatch", "mismatch"]
+    assert "not what the theory is of" in found.verdicts[0].text
+
+
+SAME = [
+    (["central", "velocity_verlet"], True),
+    (["central", "euler_cromer"], False),
+    (["crank_nicolson", "newmark"], True),
+    (["crank_nicolson", "central"], False),
+]
+
+
+@pytest.mark.parametrize(("pair", "equal"), SAME)
+@pytest.mark.parametrize("wrapped", [False, True])
+def test_two_schemes_are_equal_or_not(pair: list[str], equal: bool, wrapped: bool) -> None:
+    check = {"equal": pair, "quantity": "u"}
+    claim = {"claim": "they are one scheme", "that": check, "holds": equal}
+    run = spring(sorted(pair), claim if wrapped else check)
+    assert run.verdicts[0].status == ("PASS" if equal or wrapped else "FAIL")
+    assert run.verdicts[0].results[0].scheme == pair[0]
+    assert len(run.verdicts[0].results) == 1
+
+
+def test_a_scheme_equals_its_own_discrete_solution_and_not_the_exact_one() -> None:
+    checks = [
+        {"equal": ["rk4", "discrete"], "quantity": "u"},
+        {"equal": ["rk4", "discrete"], "quantity": "v"},
+        {"equal": ["rk4", "exact"], "quantity": "u"},
+        {"equal": ["rk4", "exact"], "quantity": "u", "atol": 1.0},
+        {"equal": ["crank_nicolson", "exact"], "quantity": "energy"},
+        {"equal": ["rk4", "exact"], "quantity": "energy"},
+        {"equal": ["rk4", "crank_nicolson"], "quantity": "v_d2t"},
+        {"value": "discrete_error", "quantity": "u", "below": 1e-13},
+    ]
+    run = spring(["rk4", "crank_nicolson"], *checks)
+    expected = ["PASS", "PASS", "FAIL", "PASS", "PASS", "FAIL", "FAIL", "PASS"]
+    assert [v.status for v in run.verdicts] == expected
+
+
+def test_a_disturbance_of_ten_times_the_bound_is_seen() -> None:
+    run = spring(["rk4"], {"equal": ["rk4", "discrete"], "quantity": "u"})
+    level = run.levels[0]
+    u = level.variable("u")
+    moved = u.values + 10 * float(run.record["check_low"][0, 0, 0]) * (np.arange(STEPS + 1) == 7)
+    variables = {**level.variables, "u": Variable(u.dims, moved, u.attrs)}
+    found = judged(run.experiment, {0: replace(level, variables=variables)})
+    assert (found.verdicts[0].status, found.verdicts[0].reason) == ("FAIL", "mismatch")
+
+
+def test_what_is_allowed_are_the_rounding_errors_of_both_sides() -> None:
+    pair = ["central", "velocity_verlet"]
+    checks = [{"equal": pair, "quantity": name} for name in ("u", "v")]
+    run = spring(pair, *checks, {"equal": [pair[0], "discrete"], "quantity": "u"})
+    steppers = [SCHEMES[name].stepper(SCHEMES[name].defaults()) for name in pair]
+    numbers = 2 * np.pi, PERIODS / STEPS, 1.0, 0.0, STEPS
+    bounds = np.array([rounding_bound(stepper, *numbers) for stepper in steppers])
+    allowed = run.record["check_low"][:, 0, 0]
+    assert allowed == pytest.approx([*np.sum(bounds, axis=0), bounds[0, 0]], rel=1e-9)
+
+
+LADDER = (0, 1, 2, 3)
+
+
+@pytest.mark.parametrize(("size", "reason"), [(1e-14, "exact"), (1e-11, "order_low")])
+def test_what_is_exact_may_differ_smoothly_within_round_off(size: float, reason: str) -> None:
+    wrong = [size * 4.0**-k * np.sin(T) for k in range(4)]
+    exact = np.cos(T)
+    evidence = evidence_of([exact - e for e in wrong], (3, 4, 5, 6), order=np.inf, exact=exact)
+    found = judge(evidence)
+    assert REASON_NAMES[int(found.reason[0])] == reason
+    assert np.isnan(found.order[0]) == (reason == "exact")
+
+
+def test_what_is_conserved_exactly_passes_as_exact() -> None:
+    check = {"converges": "energy_deviation"}
+    run = spring(["crank_nicolson", "gauss4"], check, {"converges": "energy"}, levels=LADDER)
+    for verdict in run.verdicts:
+        assert (verdict.status, verdict.reason) == ("PASS", "exact")
+        assert all(result.order is None for result in verdict.results)
+    record = run.record
+    assert np.all(np.isinf(record["energy_deviation_formal_order"]))
+    for name in ("rescaled", "error_estimate", "richardson", "richardson_error"):
+        assert np.all(np.isfinite(record[f"energy_deviation_{name}"])), name
+    difference, rescaled = (record[f"energy_deviation_{n}"] for n in ("difference", "rescaled"))
+    assert np.array_equal(difference, rescaled)
+    bound = np.max(record["energy_deviation_richardson_error"])
+    assert bound < 1e-12 * float(record["energy_initial"][0, 0])
+
+
+@pytest.mark.parametrize("kind", ["central", "rk4", "forward_euler"])
+def test_a_scheme_that_falsely_promises_to_conserve_energy_fails(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scheme = SCHEMES[kind]
+    own = scheme.orders(scheme.defaults())
+    boast = replace(own, energy_linear=np.inf)
+    registered(monkeypatch, replace(scheme, kind="boaster", orders=lambda options: boast))
+    run = spring(["boaster"], {"converges": "energy_deviation"}, levels=LADDER)
+    verdict = run.verdicts[0]
+    assert (verdict.status, verdict.reason) == ("FAIL", "order_low")
+    assert "promised to be exact" in verdict.text
+
+
+def test_a_wrong_weight_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
+    # the sum of the weights is 1, and the scheme of order 2 only
+    rows = (("1/2",), ("0", "1/2"), ("0", "0", "1"))
+    wrong = from_tableau(Tableau(rows, ("1/6", "1/2", "1/6", "1/6")))
+    broken = replace(SCHEMES["rk4"], kind="rk4_typo", stepper=lambda options: wrong)
+    registered(monkeypatch, broken)
+    checks = [
+        {"converges": "u"},
+        {"converges": "u", "expect": {"status": "FAIL", "reason": "order_low"}},
+        {"equal": ["rk4_typo", "rk4"], "quantity": "u"},
+        {"equal": ["rk4_typo", "discrete"], "quantity": "u"},
+    ]
+    run = spring(["rk4_typo", "rk4"], *[c | _only(c) for c in checks], levels=LADDER)
+    assert [v.status for v in run.verdicts] == ["FAIL", "PASS", "FAIL", "PASS"]
+    assert run.verdicts[0].reason == "order_low"
+
+
+def _only(check: dict[str, object]) -> dict[str, object]:
+    return {"schemes": ["rk4_typo"]} if "converges" in check else {}
+
+
+def test_wrong_weights_do_not_reach_the_exact_solution(monkeypatch: pytest.MonkeyPatch) -> None:
+    wrong = from_tableau(Tableau((("1/2",),), ("0", "9/10")))
+    orders = Orders(position=1, velocity=1, energy=1, energy_linear=1)
+    broken = replace(
+        SCHEMES["rk2"],
+        kind="rk2_typo",
+        stepper=lambda options: wrong,
+        orders=lambda options: orders,
+    )
+    registered(monkeypatch, broken)
+    run = spring(["rk2_typo"], {"converges": "u"}, levels=(0, 1, 2, 3, 4))
+    assert run.verdicts[0].status == "FAIL"
+    assert run.verdicts[0].reason in {"wrong_limit", "order_high"}
+
+
+def test_adaptive_schemes_have_errors_and_no_orders() -> None:
+    adaptive = {"kind": "dop853", "tolerance": [1e-6, 1e-10]}
+    names = ["dop853_1e-06", "dop853_1e-10"]
+    checks = [
+        {"converges": "u"},
+        {"converges": "u", "schemes": names},
+        {"value": "error_linf", "quantity": "u", "below": 1e-4, "at": {"scheme": names[0]}},
+        {"value": "force_evaluations", "above": STEPS / 100, "at": {"scheme": names[1]}},
+        {"value": "force_evaluations", "equals": 4 * STEPS, "at": {"scheme": "rk4", "level": 0}},
+        {"value": "accepted_steps", "equals": 2 * STEPS, "at": {"scheme": "rk4", "level": 1}},
+        {"conserves": "energy", "drift": "none", "schemes": names[:1]},
+    ]
+    run = spring(["rk4", adaptive], *checks, levels=LADDER)
+    ladder, own, error, *rest, drift = run.verdicts
+    assert (ladder.status, len(ladder.results)) == ("PASS", 1)
+    assert (own.status, own.reason) == ("INCONCLUSIVE", "not_applicable")
+    assert error.status == "PASS"
+    assert [v.status for v in rest] == ["PASS"] * 3
+    # its tolerance is no round-off
+    assert drift.status == "FAIL"
+    record = run.record
+    assert np.all(np.isnan(record["u_difference"][1:]))
+    assert np.all(np.isnan(record["u_formal_order"][1:]))
+    assert np.all(np.isfinite(record["u_error_norm"]))
+    assert np.all(np.isnan(record["theory_growth"][1:]))
+    assert np.all(np.isnan(record["stability_limit"][1:]))
+    assert float(run.record["t"][-1]) == PERIODS
+
+
+def test_notes_and_tables_of_a_source_reach_the_summary() -> None:
+    p = 2 * np.pi * PERIODS / STEPS
+    value = {"value": "relative_energy_error_d2t"}
+    (plain,) = spring(["central", "rk4"], {**value, "above": 0.0, "at": {"scheme": "rk4"}}).verdicts
+    ours = plain.results[0].value
+    # the leading error that [D_2t u] makes of RK4's energy
+    assert ours == pytest.approx(p * p / 3, rel=0.01)
+    table = {
+        "title": "printed",
+        **value,
+        "beside": ["relative_energy_error", "predicted_growth_per_period"],
+        "rows": [
+            {"scheme": "rk4", "printed": f"{ours:.3e}", "level": 0},
+            {
+                "scheme": "rk4",
+                "printed": f"{ours * 1.01:.3e}",
+                "level": 0,
+                "holds": False,
+                "note": "a misprint",
+            },
+        ],
+    }
+    run = spring(["central", "rk4"], published=[table])
+    right, wrong = run.verdicts
+    assert (right.status, wrong.status) == ("PASS", "PASS")
+    assert (right.note, wrong.note) == (None, "a misprint")
+    assert run.summary["checks"][1]["note"] == "a misprint"
+    beside = run.record["published_beside"]
+    assert run.record.variable("published_beside").dims == ("check", "case", "beside")
+    growth = run.record["theory_growth"][1, 0, 0]
+    assert np.array_equal(beside[:, 0, 1], [growth, growth])
+    own = run.record["energy_deviation_max_abs"][1, 0, 0] / run.record["energy_initial"][1, 0]
+    assert beside[0, 0, 0] == own

@@ -1,0 +1,148 @@
+"""How far the solution of a scheme is from another scheme's, from the exact one, or from that of its own steps.
+
+What may be called equal follows from the arithmetic: each side is known no better than its accumulated rounding errors.
+For the states of a linear model theory bounds them (`vibsim.theory.rounding_bound`); elsewhere, and for energies,
+it is `rules.BLAME` times the predicted floor, an order of magnitude.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim import theory
+from vibsim.analysis.compare import Comparison
+from vibsim.analysis.floor import SPACING_AT_ONE
+from vibsim.analysis.part import CENTRED, Part, energy_at_start, plain_name
+from vibsim.analysis.predicted import is_simple, natural_frequency, steppers
+from vibsim.analysis.rules import BLAME
+from vibsim.models import ENERGIES
+from vibsim.schemes import SCHEMES
+
+if TYPE_CHECKING:
+    from vibsim.spec.scheme_checks import EqualCheck
+
+Floats = NDArray[np.float64]
+
+
+def apart(
+    part: Part, compared: Mapping[str, Comparison], check: EqualCheck
+) -> tuple[int, Floats, Floats]:
+    """Return the scheme that a check compares, the largest distance over the stored times, and what it may be.
+
+    Returns
+    -------
+    scheme
+        Its number.
+    distance, allowed
+        Shape (case,); NaN where one of the two does not exist.
+    """
+    names = [scheme.name for scheme in part.experiment.schemes]
+    level = part.grid.levels[-1] if check.level is None else check.level
+    first, name = names.index(check.first), check.quantity
+    record = part.records[level]
+    missing = np.full((*part.shape, len(record["t"])), np.nan)
+    values = np.asarray(record[name], dtype=float) if name in record else missing
+    floor = BLAME * compared[name].floor[..., part.grid.levels.index(level)]
+    bound = rounding(part, level, name, first, floor[first])
+    if check.second in names:
+        second = names.index(check.second)
+        other, more = values[second], rounding(part, level, name, second, floor[second])
+    elif check.second == "exact":
+        other, more = _exact(part, level, name)[first], _of_exact(part, level, values[first])
+    else:
+        other, more = discrete(part, level, name)[first], 0.0 * bound
+    inside = slice(1, -1) if name.endswith(CENTRED) else slice(None)
+    with np.errstate(invalid="ignore", over="ignore"):
+        distance = np.max(np.abs(values[first] - other)[..., inside], axis=-1)
+    allowed = np.full(distance.shape, check.atol) if check.atol is not None else bound + more
+    return first, distance, allowed
+
+
+def rounding(part: Part, level: int, name: str, scheme: int, floor: Floats) -> Floats:
+    """Return a bound of the rounding errors of one scheme over the whole run, shape (case,); else `floor`."""
+    plain = plain_name(name)
+    if not is_simple(part) or plain in ENERGIES or part.adaptive[scheme]:
+        return np.broadcast_to(floor, part.shape[1:])
+    found = np.full(part.shape[1:], np.nan)
+    which = int(plain == part.model.velocity)
+    for options, where in steppers(part, scheme):
+        stepper = SCHEMES[part.experiment.schemes[scheme].kind].stepper(options)
+        w, dt, u, v = (x[where] for x in _numbers(part, level))
+        bounds = theory.rounding_bound(stepper, w, dt, u, v, steps_of(part, level))
+        # the centred difference divides the rounding errors of two positions by 2 dt
+        found[where] = bounds[0] / dt if name.endswith(CENTRED) else bounds[which]
+    return found
+
+
+def discrete(part: Part, level: int, name: str) -> Floats:
+    """Return the exact solution of every scheme's own steps at the stored times, shape (scheme, case, t).
+
+    Of a linear model without damping; NaN elsewhere, and for what is no state.
+    """
+    record = part.records[level]
+    found = np.full((*part.shape, len(record["t"])), np.nan)
+    if not is_simple(part) or name not in (part.model.position, part.model.velocity):
+        return found
+    which, steps = int(name == part.model.velocity), steps_of(part, level)
+    n = np.arange(len(record["t"])) * int(np.asarray(record.attrs["every"]).item())
+    for i, scheme in enumerate(part.experiment.schemes):
+        for options, where in steppers(part, i):
+            stepper = SCHEMES[scheme.kind].stepper(options)
+            w, dt, u, v = (x[where] for x in _numbers(part, level))
+            found[i, where] = theory.discrete(stepper, w, dt, u, v, n, steps=steps)[which]
+    return found
+
+
+def discrete_error(part: Part, level: int, name: str) -> Floats:
+    """Return the largest distance of a state from the exact solution of the scheme's own steps, (scheme, case)."""
+    record = part.records[level]
+    if name not in record:
+        return np.full(part.shape, np.nan)
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.asarray(np.max(np.abs(record[name] - discrete(part, level, name)), axis=-1))
+
+
+def steps_of(part: Part, level: int) -> int:
+    """Return the number of steps of a level."""
+    return part.grid.steps[part.grid.levels.index(level)]
+
+
+def _numbers(part: Part, level: int) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return w, dt and the initial position and velocity, each of shape (case,)."""
+    model, initial = part.model, part.group.initial
+    cases = part.shape[1:]
+    return (
+        np.broadcast_to(natural_frequency(part), cases),
+        np.broadcast_to(part.group.end / steps_of(part, level), cases),
+        np.broadcast_to(initial[model.position], cases),
+        np.broadcast_to(initial[model.velocity], cases),
+    )
+
+
+def _exact(part: Part, level: int, name: str) -> Floats:
+    """Return the exact values at the stored times of a level, shape (scheme, case, t); NaN where they are not known."""
+    record, model, plain = part.records[level], part.model, plain_name(name)
+    shape = (*part.shape, len(record["t"]))
+    if plain in ("energy", "energy_deviation") and model.conservative:
+        start = energy_at_start(record)[..., None]
+        return np.broadcast_to(start if plain == "energy" else 0.0 * start, shape)
+    if model.exact is None or plain not in (model.position, model.velocity):
+        return np.full(shape, np.nan)
+    n = np.arange(shape[-1]) * int(np.asarray(record.attrs["every"]).item())
+    t = n * (part.group.end / steps_of(part, level))[:, None]
+    initial, parameters = (
+        {key: values[:, None] for key, values in table.items()}
+        for table in (part.group.initial, part.group.parameters)
+    )
+    return np.broadcast_to(np.asarray(model.exact(t, initial, parameters)[plain]), shape)
+
+
+def _of_exact(part: Part, level: int, values: Floats) -> Floats:
+    """Return how well an exact solution is known, shape (case,): its phase w t has a rounding error."""
+    phase = natural_frequency(part) * part.group.end
+    size = np.max(np.abs(np.nan_to_num(values)), axis=-1)
+    return np.asarray(SPACING_AT_ONE * (1.0 + phase) * size * part.magnified)

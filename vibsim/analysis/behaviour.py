@@ -1,0 +1,270 @@
+"""The checks ``stable``, ``conserves`` and ``equal``: what they measured, compared with what they expect.
+
+What was measured stands in ``check_value``, ``check_low``, ``check_high`` and ``check_first`` of the convergence Record
+(`vibsim.analysis.measured`), with these meanings:
+
+- ``stable``: growth per period, measured and predicted; w dt; the level. The reason is ``match`` where it is stable,
+  ``unstable``, or ``mismatch`` where it grows otherwise than predicted;
+- ``conserves``: the largest error over the energy at the start; rate and k of the drift (`vibsim.analysis.drift`); its
+  kind, as a position in `vocabulary.DRIFTS`;
+- ``equal``: the largest distance, and what it may be; nothing; the level.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.analysis.apart import apart
+from vibsim.analysis.compare import Comparison
+from vibsim.analysis.drifting import drift_at
+from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
+from vibsim.analysis.part import Part
+from vibsim.analysis.stability import growth_at
+from vibsim.analysis.wording import growth_in_words, number
+from vibsim.record import Record
+from vibsim.spec.about import schemes_of
+from vibsim.vocabulary import DRIFTS, REASON_NAMES
+
+if TYPE_CHECKING:
+    from vibsim.spec import Experiment
+    from vibsim.spec.scheme_checks import ConservesCheck, EqualCheck, StableCheck
+
+Floats = NDArray[np.float64]
+Codes = NDArray[np.int8]
+Row = Mapping[str, NDArray[Any] | int]
+"""Field of a check to its values, shape (scheme, case)."""
+
+MATCH, MISMATCH, UNSTABLE, NON_FINITE, PRE_ASYMPTOTIC, NOT_APPLICABLE = map(
+    REASON_NAMES.index,
+    ("match", "mismatch", "unstable", "non_finite", "pre_asymptotic", "not_applicable"),
+)
+
+
+def measure_stable(part: Part, check: StableCheck) -> Row:
+    """Return what a ``stable`` check measures."""
+    level = part.grid.levels[-1] if check.level is None else check.level
+    found = growth_at(part, level)
+    reason = np.where(found.unstable, UNSTABLE, MATCH)
+    return {
+        "value": found.measured,
+        "low": found.predicted,
+        "high": np.broadcast_to(part.omega_dt[:, part.grid.levels.index(level)], part.shape),
+        "first": level,
+        "culprit": level,
+        "reason": np.where(found.contradicted, MISMATCH, reason),
+        "status": np.where(found.unstable | found.contradicted, FAIL, PASS),
+    }
+
+
+def measure_conserves(part: Part, check: ConservesCheck) -> Row:
+    """Return what a ``conserves`` check measures."""
+    level = part.grid.levels[-1] if check.level is None else check.level
+    found = drift_at(part, level, check.about or "")
+    return {
+        "value": found.largest,
+        "low": found.rate,
+        "high": found.power,
+        "first": found.kind,
+        "culprit": level,
+    }
+
+
+def measure_equal(part: Part, compared: Mapping[str, Comparison], check: EqualCheck) -> Row:
+    """Return what an ``equal`` check measures; of other schemes NaN."""
+    level = part.grid.levels[-1] if check.level is None else check.level
+    scheme, distance, allowed = apart(part, compared, check)
+    value, low = (np.full(part.shape, np.nan) for _ in range(2))
+    value[scheme], low[scheme] = distance, allowed
+    return {"value": value, "low": low, "first": level, "culprit": level}
+
+
+def stable(experiment: Experiment, record: Record, check: StableCheck, index: int) -> Outcome:
+    """Compare whether schemes are stable with what a check expects."""
+    reason, status = record["check_reason"][index], record["check_status"][index]
+    measured, expected, p = (record[f"check_{n}"][index] for n in ("value", "low", "high"))
+    level = int(np.max(record["check_first"][index]))
+    as_expected = reason == (MATCH if check.stable else UNSTABLE)
+
+    def tell(scheme: int, case: int) -> str:
+        name = experiment.schemes[scheme].name
+        unstable = reason[scheme, case] != MATCH
+        word = "unstable" if unstable else "stable"
+        told = f"Scheme {name} is {word} at level {level}, w dt = {p[scheme, case]:.4g}"
+        told += growth_in_words(float(expected[scheme, case]), float(measured[scheme, case]))
+        if record["status"][scheme, case, _place(record, level)]:
+            t = float(record["failure_time"][scheme, case, _place(record, level)])
+            told += f"; it met a number that is not finite or too large at t = {number(t)}"
+        if reason[scheme, case] == MISMATCH:
+            told += "; the two do not agree, so the scheme is not what the theory is of"
+        return told + "."
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        size = np.abs(np.log(measured))
+    return _outcome(
+        experiment,
+        record,
+        check,
+        status=status,
+        reason=reason,
+        compared=np.where(as_expected, PASS, FAIL).astype(np.int8),
+        away=np.where(np.isnan(size), np.inf, size),
+        expected="stable" if check.stable else "unstable",
+        expects_pass=check.stable,
+        quantity=None,
+        tell=tell,
+        advise=lambda scheme, case: _ADVICE["stable"],
+        value=measured,
+    )
+
+
+def conserves(experiment: Experiment, record: Record, check: ConservesCheck, index: int) -> Outcome:
+    """Compare how the energy error grows with what a check expects."""
+    kind = record["check_first"][index]
+    largest, rate = record["check_value"][index], record["check_low"][index]
+    broken = record["status"][..., _place(record, int(np.max(record["check_culprit"][index])))] != 0
+    wanted = {DRIFTS.index(check.drift)}
+    if check.drift == "bounded":
+        # what is conserved is bounded too
+        wanted.add(DRIFTS.index("none"))
+    masks = [
+        (broken, NON_FINITE),
+        (np.isnan(largest) & (kind == DRIFTS.index("unclear")), NOT_APPLICABLE),
+        (kind == DRIFTS.index("unclear"), PRE_ASYMPTOTIC),
+        (np.isin(kind, list(wanted)), MATCH),
+    ]
+    reason = np.select([mask for mask, _ in masks], [code for _, code in masks], MISMATCH)
+
+    def tell(scheme: int, case: int) -> str:
+        if reason[scheme, case] == NON_FINITE:
+            return f"{check.conserves} means nothing here: the calculation met a number that is not finite."
+        if reason[scheme, case] == NOT_APPLICABLE:
+            return f"{check.conserves} does not exist here, or was not stored."
+        told = _DRIFT_WORDS[DRIFTS[int(kind[scheme, case])]]
+        size, per = float(largest[scheme, case]), float(rate[scheme, case])
+        speed = (
+            "" if not per else f", {_RATES.get(DRIFTS[int(kind[scheme, case])], '')}".format(per)
+        )
+        return (
+            f"The error of {check.conserves} {told}{speed if np.isfinite(per) else ''}; it is at most "
+            f"{size:.4g} of the energy. Expected is: {check.drift}."
+        )
+
+    return _valued(experiment, record, check, reason, largest, check.drift, tell, largest)
+
+
+_DRIFT_WORDS = {
+    "none": "is round-off",
+    "bounded": "is bounded: its largest value no longer grows",
+    "linear": "grows in proportion to the time",
+    "quadratic": "grows in proportion to the square of the time",
+    "exponential": "grows or decays exponentially with time",
+    "unclear": "grows in a way that this run is too short to name",
+}
+_RATES = {
+    "linear": "by {:.4g} of the energy per period",
+    "quadratic": "by {:.4g} of the energy per period squared",
+    "exponential": "the energy by the factor exp({:.4g}) per period",
+}
+
+
+def equal(experiment: Experiment, record: Record, check: EqualCheck, index: int) -> Outcome:
+    """Compare the largest distance between two solutions with what it may be."""
+    distance, allowed = record["check_value"][index], record["check_low"][index]
+    place = _place(record, int(np.max(record["check_culprit"][index])))
+    names = record.words("scheme")
+    involved = [names.index(name) for name in check.equal if name in names]
+    broken = np.any(record["status"][involved, :, place] != 0, axis=0)
+    masks = [
+        (np.broadcast_to(broken, distance.shape), NON_FINITE),
+        (np.isnan(distance) | np.isnan(allowed), NOT_APPLICABLE),
+        (distance <= allowed, MATCH),
+    ]
+    reason = np.select([mask for mask, _ in masks], [code for _, code in masks], MISMATCH)
+    other = {"exact": "the exact solution", "discrete": "the exact solution of its own steps"}
+    second = other.get(check.second, f"scheme {check.second}")
+
+    def tell(scheme: int, case: int) -> str:
+        if reason[scheme, case] == NON_FINITE:
+            return f"{check.quantity} means nothing here: the calculation met a number that is not finite."
+        if reason[scheme, case] == NOT_APPLICABLE:
+            return f"{check.quantity} and {second} cannot be compared here, or were not stored."
+        verb = "equals" if reason[scheme, case] == MATCH else "differs from"
+        return (
+            f"{check.quantity} of scheme {check.first} {verb} {second}: they are at most "
+            f"{distance[scheme, case]:.4g} apart, and may be {allowed[scheme, case]:.4g}."
+        )
+
+    return _valued(
+        experiment, record, check, reason, distance, f"equal to {second}", tell, distance - allowed
+    )
+
+
+def _valued(
+    experiment: Experiment,
+    record: Record,
+    check: ConservesCheck | EqualCheck,
+    reason: NDArray[Any],
+    value: Floats,
+    expected: str,
+    tell: Callable[[int, int], str],
+    away: Floats,
+) -> Outcome:
+    """Return the outcome of a check that expects a PASS, from its reasons."""
+    statuses = {MATCH: PASS, NOT_APPLICABLE: INCONCLUSIVE, PRE_ASYMPTOTIC: INCONCLUSIVE}
+    status = np.full(reason.shape, FAIL, dtype=np.int8)
+    for code, which in statuses.items():
+        status[reason == code] = which
+    return _outcome(
+        experiment,
+        record,
+        check,
+        status=status,
+        reason=reason.astype(np.int8),
+        compared=status,
+        away=away,
+        expected=expected,
+        expects_pass=True,
+        quantity=check.about,
+        tell=tell,
+        advise=lambda scheme, case: _ADVICE.get(
+            "non_finite" if reason[scheme, case] == NON_FINITE else check.kind, ""
+        ),
+        value=value,
+    )
+
+
+_ADVICE = {
+    "stable": "Take finer `levels:` (w dt within the limit of the scheme), or correct `stable:`.",
+    "conserves": "Lengthen the run (`time:`), take finer `levels:`, or correct `drift:`.",
+    "equal": "Compare the two in the report, give `atol:`, or correct what the check expects.",
+    "non_finite": "Start `levels:` at a finer level, or shorten `time: end`.",
+}
+
+
+def _outcome(
+    experiment: Experiment,
+    record: Record,
+    check: StableCheck | ConservesCheck | EqualCheck,
+    **more: Any,
+) -> Outcome:
+    """Return an outcome with the schemes and members that a check is about."""
+    names, every = record.words("scheme"), np.asarray(record["case"])
+    schemes = (
+        [names.index(check.first)] if check.kind == "equal" else list(schemes_of(experiment, check))
+    )
+    cases = np.arange(len(every)) if check.case is None else np.flatnonzero(every == check.case)
+    return Outcome(
+        schemes=[names[i] for i in schemes],
+        scheme_index=schemes,
+        cases=every,
+        case_index=cases,
+        **more,
+    )
+
+
+def _place(record: Record, level: int) -> int:
+    return [int(known) for known in record["level"]].index(level)

@@ -1,0 +1,133 @@
+r"""How the error of the energy grows with time: none, bounded, linear, quadratic or exponential.
+
+What is fitted is M(t), the largest absolute deviation at every step so far. Let m1, m2, m3 be its means over
+[T/2, T], [T/4, T/2] and [T/8, T/4]. Where ``M = a + b t^k``, whatever a and b, ``(m1 - m2)/(m2 - m3) = 2^k``: a means
+smooths the stairs in which a drift climbs under an oscillation, and the oscillation itself is a. So, in this order:
+
+- ``none``: M(T) is no more than `rules.BLAME` times the predicted round-off of the energy;
+- ``unclear``: fewer than `LEAST_PERIODS` periods, in which the window from T/8 on would not see the whole of an
+  oscillation, or fewer than `LEAST_SAMPLES` samples;
+- ``exponential``: the energy itself has changed by more than a factor e^`LARGE` and the k of ``|ln(E/E(0))|`` is nearer
+  to 1 than that of M. A smaller change cannot be told from a linear one, and the linear one is meant then;
+- ``bounded``: m1 is above m2 by less than `STILL` of M(T), or it creeps only: k below `CREEP`, m1 above m2 by less
+  than `STILL_CREEPS` (finer sampling of the same maximum);
+- ``linear``, ``quadratic``: k within `NEAR` of 1 or 2;
+- else ``unclear``.
+
+A drift so slow that a run shows less than `STILL` of it is called bounded: a longer run decides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.analysis.rules import BLAME
+from vibsim.analysis.series import safe_ratio
+from vibsim.vocabulary import DRIFTS
+
+Floats = NDArray[np.float64]
+
+LEAST_PERIODS = 4.0
+"""The energy error of a vibration repeats every half period, which T/8 is then."""
+LEAST_SAMPLES = 32
+"""Samples on [0, T], four of them on the shortest window."""
+STILL = 0.01
+"""Rise of M from one window to the next, as a part of itself, that is none."""
+STILL_CREEPS = 0.2
+"""Largest rise of a maximum that is found more exactly with time only."""
+CREEP = -0.5
+"""Largest k of such a rise."""
+NEAR = 0.25
+"""How far k may be from 1 or 2: a quarter of what separates them."""
+LARGE = 0.2
+"""ln(E/E(0)) beyond which exponential and linear growth differ in k by more than rounding: by about 0.1 at 0.2."""
+
+NONE, BOUNDED, LINEAR, QUADRATIC, EXPONENTIAL, UNCLEAR = range(len(DRIFTS))
+"""Index into `vocabulary.DRIFTS`."""
+
+
+@dataclass(frozen=True)
+class Drift:
+    """How the energy error of members grows; arrays of shape (scheme, case)."""
+
+    kind: NDArray[np.int8]
+    """Index into `vocabulary.DRIFTS`."""
+    rate: Floats
+    """Of a linear or quadratic drift the relative energy error per period, or per period squared; of an exponential
+    one the change of ln E per period; 0 for none and bounded, NaN for unclear."""
+    power: Floats
+    """k; NaN where it cannot be told."""
+    largest: Floats
+    """M(T) over the energy at the start; NaN where that vanishes."""
+
+
+def drift_of(
+    running: Floats, ratio: Floats, energy: Floats, floor: Floats, periods: Floats
+) -> Drift:
+    """Find how the energy error grows.
+
+    Parameters
+    ----------
+    running
+        M, shape (scheme, case, t), evenly sampled from 0 to the end; NaN at the ends does not matter.
+    ratio
+        The energy over that at the start, of the same shape.
+    energy
+        The energy at the start, shape (scheme, case).
+    floor
+        Predicted round-off of the energy at the end, shape (scheme, case).
+    periods
+        Length of the run in natural periods, shape (case,).
+    """
+    samples = running.shape[-1] - 1
+    # a one-sided velocity at the last point says nothing about the drift
+    end = np.fmax.reduce(running[..., :-1], axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        change = np.log(np.abs(ratio))
+        rise, k = _power(running)
+        fall, k_log = _power(np.abs(change))
+        last = change[..., -2]
+    size = np.where(np.isfinite(end) & (end > 0), end, 1.0)
+    still = rise <= STILL * size
+    creeps = (rise <= STILL_CREEPS * size) & (k <= CREEP)
+    closer = ~(np.abs(k_log - 1.0) >= np.abs(k - 1.0))
+    exponential = (np.abs(last) > LARGE) & (np.abs(k_log - 1.0) <= NEAR) & closer
+    short = (periods < LEAST_PERIODS) | (samples < LEAST_SAMPLES)
+    unknown = ~np.isfinite(end) | np.isnan(running[..., -2])
+    rules = [
+        (unknown, UNCLEAR),
+        (end <= BLAME * floor, NONE),
+        (np.broadcast_to(short, end.shape), UNCLEAR),
+        (exponential, EXPONENTIAL),
+        (still | creeps, BOUNDED),
+        (np.abs(k - 1.0) <= NEAR, LINEAR),
+        (np.abs(k - 2.0) <= NEAR, QUADRATIC),
+    ]
+    kind = np.select([mask for mask, _ in rules], [code for _, code in rules], UNCLEAR)
+    relative = safe_ratio(rise, np.abs(energy))
+    time = np.linspace(0.0, 1.0, samples + 1)
+    first, second = (_power(time**j)[0] * periods**j + 0.0 * end for j in (1, 2))
+    per_period, per_square = safe_ratio(relative, first), safe_ratio(relative, second)
+    of_log = safe_ratio(np.sign(last) * fall, first)
+    zero = np.zeros(end.shape)
+    rates = {NONE: zero, BOUNDED: zero, LINEAR: per_period, QUADRATIC: per_square}
+    rates[EXPONENTIAL] = of_log
+    rate = np.select([kind == code for code in rates], list(rates.values()), np.nan)
+    known = (kind != NONE) & ~unknown & ~short
+    return Drift(
+        kind.astype(np.int8), rate, np.where(known, k, np.nan), safe_ratio(end, np.abs(energy))
+    )
+
+
+def _power(values: Floats) -> tuple[Floats, Floats]:
+    """Return by how much the mean over the last window exceeds the one before, and k."""
+    n = values.shape[-1] - 1
+    # each with its last point, but for the end of the run
+    windows = [(n // 8, n // 4 + 1), (n // 4, n // 2 + 1), (n // 2, max(n, n // 2 + 1))]
+    third, second, first = (np.mean(values[..., a:b], axis=-1) for a, b in windows)
+    rise = np.asarray(first - second)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return rise, np.log2(rise / (second - third))

@@ -1,0 +1,158 @@
+"""What was measured of an oscillation: growth, frequency, phase error, from the peaks that every step was searched for.
+
+Shapes are (scheme, case). A number that does not exist is NaN: a growth needs two peaks.
+
+Source: vibration text (B), sections 3.5 and 4.1, exercise 2.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.analysis.part import Part
+from vibsim.analysis.predicted import is_simple, natural_frequency
+from vibsim.analysis.series import safe_ratio
+from vibsim.record import Record
+from vibsim.schemes import SCHEMES
+from vibsim.spec.series import FEWEST_EXTREMA
+
+Floats = NDArray[np.float64]
+
+
+def growth_factor(record: Record) -> Floats:
+    """Return the last peak over the first: two peaks at least."""
+    several = np.asarray(record["period_count"]) >= 1
+    return np.where(several, safe_ratio(record["last_peak"], record["first_peak"]), np.nan)
+
+
+def amplitude_error(record: Record) -> Floats:
+    """Return the last amplitude over the first, less one, of the first `FEWEST_EXTREMA` peaks."""
+    if "peak" not in record:
+        return np.full_like(growth_factor(record), np.nan)
+    return np.asarray(_kept(record)[0] - 1.0)
+
+
+def _kept(record: Record) -> tuple[Floats, Floats]:
+    """Return the last of the first `FEWEST_EXTREMA` peaks over the first, and the time between them; NaN below two.
+
+    So many are kept of every member, and no number depends on how many more are.
+    A parabola through three positions owes nothing to the velocity, which may belong to another time than the position
+    (Euler-Cromer), and the motion starts on no peak that was computed.
+    """
+    peaks = np.asarray(record["peak"], dtype=float)[..., :FEWEST_EXTREMA]
+    count = np.sum(np.isfinite(peaks), axis=-1)
+    last = np.maximum(count - 1, 0)[..., None]
+    (low, high), (start, stop) = (
+        (values[..., 0], np.take_along_axis(values, last, axis=-1)[..., 0])
+        for values in (peaks, np.asarray(record["peak_time"], dtype=float))
+    )
+    several = count > 1
+    return np.where(several, safe_ratio(high, low), np.nan), np.where(several, stop - start, np.nan)
+
+
+def growth_per_period(part: Part, level: int) -> Floats:
+    """Return the factor by which the amplitude grows in a period.
+
+    The period is the natural one where the model is linear, so that it can be compared with theory even where the
+    scheme's own period is far from it; else it is the measured one. Beyond a stability limit it is the growth over the
+    whole run, behind which the start is soon left.
+    """
+    record, index = part.records[level], part.grid.levels.index(level)
+    whole = growth_over_run(part, record)
+    if "peak" not in record:
+        return whole
+    beyond = part.omega_dt[:, index] > part.stability_limit
+    return np.where(beyond, whole, _per_period(part, record, *_kept(record)))
+
+
+def growth_over_run(part: Part, record: Record) -> Floats:
+    """Return the same from the first and the last peak of the whole run, the start among them; always there.
+
+    Beyond a limit, where the sign changes at every step, the height of a peak may have either sign.
+    """
+    time = np.asarray(record["period"] * record["period_count"], dtype=float)
+    return _per_period(part, record, np.abs(growth_factor(record)), time)
+
+
+def _per_period(part: Part, record: Record, factor: Floats, time: Floats) -> Floats:
+    period = np.asarray(record["period"], dtype=float)
+    natural = 2.0 * np.pi / natural_frequency(part) if is_simple(part) else period
+    intervals = safe_ratio(*np.broadcast_arrays(time, natural))
+    usable = (factor > 0) & (intervals > 0)
+    log = np.log(np.where(usable, factor, 1.0)) / np.where(usable, intervals, 1.0)
+    with np.errstate(over="ignore"):
+        return np.where(usable, np.exp(log), np.nan)
+
+
+def frequency(record: Record) -> Floats:
+    """Return 2 pi over the period."""
+    period = np.asarray(record["period"], dtype=float)
+    return safe_ratio(np.full_like(period, 2 * np.pi), period)
+
+
+def phase_error(record: Record) -> Floats:
+    """Return the exact period less the measured one: the time by which peaks come early, per period."""
+    if "exact_period" not in record:
+        return np.full_like(frequency(record), np.nan)
+    found = np.asarray(record["exact_period"] - record["period"], dtype=float)
+    return np.where(np.isfinite(found), found, np.nan)
+
+
+def phase_error_slope(record: Record) -> Floats:
+    """Return the least-squares slope of the time by which peak m comes early over m (exercise 2).
+
+    Of the first `FEWEST_EXTREMA` peaks, two at least.
+
+    It is the exact period less the slope of the times of the peaks: the phase of the motion drops out.
+    """
+    missing = np.full_like(frequency(record), np.nan)
+    if "exact_period" not in record or "peak_time" not in record:
+        return missing
+    time = np.asarray(record["peak_time"], dtype=float)[..., :FEWEST_EXTREMA]
+    number = np.arange(time.shape[-1], dtype=float)
+    known = np.isfinite(time)
+    count = np.sum(known, axis=-1)
+    several = count > 1
+    mean = np.sum(np.where(known, number, 0.0), axis=-1) / np.maximum(count, 1)
+    away = np.where(known, number - mean[..., None], 0.0)
+    squares = np.sum(away * away, axis=-1)
+    slope = np.sum(away * np.where(known, time, 0.0), axis=-1) / np.where(several, squares, 1.0)
+    found = np.asarray(record["exact_period"], dtype=float) - slope
+    return np.where(several & np.isfinite(found), found, missing)
+
+
+def energy_error_d2t(part: Part, record: Record) -> Floats:
+    """Return max |E - E(0)| with the velocity ``[D_2t u]``, n = 1, ..., N-1.
+
+    A scheme whose own velocity that is has its own, without the last point.
+    """
+    found = np.full(part.shape, np.nan)
+    if "energy_deviation_d2t_max_abs" in record:
+        found[...] = record["energy_deviation_d2t_max_abs"]
+    own = record["energy_deviation_max_abs_interior"]
+    for i, scheme in enumerate(part.experiment.schemes):
+        if not scheme.adaptive and not scheme.own_velocity:
+            found[i] = own[i]
+    return found
+
+
+def force_evaluations(part: Part, level: int) -> Floats:
+    """Return the number of evaluations of the acceleration; of an implicit scheme one for each step and stage."""
+    counts = [SCHEMES[scheme.kind].force_evaluations for scheme in part.experiment.schemes]
+    return _own_or(part, level, "force_evaluations_total", np.array(counts, dtype=float))
+
+
+def steps_taken(part: Part, level: int) -> Floats:
+    """Return the number of steps taken."""
+    return _own_or(part, level, "accepted_steps", np.ones(len(part.experiment.schemes)))
+
+
+def _own_or(part: Part, level: int, name: str, per_step: Floats) -> Floats:
+    """Return what an adaptive scheme counted, or the number of steps times a number per step."""
+    record = part.records[level]
+    steps = part.grid.steps[part.grid.levels.index(level)]
+    found = np.array(np.broadcast_to((per_step * steps)[:, None], part.shape))
+    own = np.asarray(record[name], dtype=float) if name in record else np.full(part.shape, np.nan)
+    found[part.adaptive] = own[part.adaptive]
+    return found

@@ -1,0 +1,88 @@
+"""What theory predicts of the schemes of an experiment on its members, from w dt: growth, frequency, phase error.
+
+The theory is that of ``u'' + w^2 u = 0``. It depends on w dt alone, so it is worked out once for every value that
+occurs, however many members have it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim import plan, theory
+from vibsim.analysis.part import Part
+from vibsim.analysis.promise import limit_of
+from vibsim.schemes import SCHEMES, Options, Stepper
+
+Floats = NDArray[np.float64]
+Function = Callable[[Stepper, Floats], Any]
+
+
+def is_simple(part: Part) -> bool:
+    """Tell whether the model is the one that the theory is of: linear, without damping and forcing."""
+    return part.model.linear and part.model.conservative
+
+
+def steppers(part: Part, scheme: int) -> list[tuple[Options, NDArray[np.int64] | slice]]:
+    """Return the options of one scheme, and the members that have them; empty for one that chooses its own steps."""
+    if part.adaptive[scheme]:
+        return []
+    groups = plan.option_groups(part.experiment, scheme, part.columns)
+    return [(o, where if len(groups) > 1 else slice(None)) for o, where in groups]
+
+
+def of_steps(part: Part, level: int, function: Function) -> Floats:
+    """Return `function` of the arithmetic of every scheme and of w dt, shape (scheme, case); NaN for adaptive ones.
+
+    Parameters
+    ----------
+    level
+        A level of the ladder.
+    """
+    found = np.full(part.shape, np.nan)
+    p = part.omega_dt[:, part.grid.levels.index(level)]
+    for i, scheme in enumerate(part.experiment.schemes):
+        for options, where in steppers(part, i):
+            values, back = np.unique(p[where], return_inverse=True)
+            stepper = SCHEMES[scheme.kind].stepper(options)
+            found[i, where] = np.asarray(function(stepper, values), dtype=float)[back]
+    return found
+
+
+def growth_per_period(part: Part, level: int) -> Floats:
+    """Return the factor of the amplitude per natural period, shape (scheme, case); NaN where the model is another."""
+    if not is_simple(part):
+        return np.full(part.shape, np.nan)
+    return of_steps(part, level, theory.growth_per_period)
+
+
+def frequency(part: Part, level: int) -> Floats:
+    """Return the angular frequency of the computed motion [rad per unit of time], shape (scheme, case)."""
+    if not is_simple(part):
+        return np.full(part.shape, np.nan)
+    return natural_frequency(part) * of_steps(part, level, theory.frequency_ratio)
+
+
+def phase_error(part: Part, level: int) -> Floats:
+    """Return the time by which peaks come early, per period, shape (scheme, case)."""
+    if not is_simple(part):
+        return np.full(part.shape, np.nan)
+    fraction = of_steps(part, level, theory.phase_error_per_period)
+    return fraction * (2.0 * np.pi / natural_frequency(part))
+
+
+def natural_frequency(part: Part) -> Floats:
+    """Return w, shape (case,)."""
+    return np.asarray(part.finest["natural_frequency"], dtype=np.float64)
+
+
+def limits(part: Part) -> Floats:
+    """Return the largest stable w dt, shape (scheme, case): 0 where every step grows, NaN for adaptive schemes."""
+    found = np.full(part.shape, np.nan)
+    for i, scheme in enumerate(part.experiment.schemes):
+        for options, where in steppers(part, i):
+            found[i, where] = limit_of(SCHEMES[scheme.kind], options)
+    return found

@@ -1,0 +1,101 @@
+"""What a ``stable`` check measures: whether a run grows, and whether by as much as theory predicts.
+
+Unstable is (design, section 4.4) an overflow, w dt beyond the stability limit of the scheme, or growth beyond the exact
+solution's that refinement within the ladder does not remove. The growth of Forward Euler vanishes with dt and is none.
+At the limit itself a scheme may be stable or grow in proportion to t: there the measurement alone decides.
+
+Beyond the limit of a linear model the growth must be the predicted one. The amplitude may follow it late: at a limit
+two roots meet, and ``1 + 2 N`` comes before the power takes over. So the logarithms of both over the whole run may
+differ by `NEAR` of themselves and ln(4 + 2 N). A larger difference means that scheme or theory is not what it claims to
+be.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim import theory
+from vibsim.analysis import oscillation, predicted
+from vibsim.analysis.part import Part
+from vibsim.analysis.rules import BLOWN_UP
+from vibsim.schemes import Stepper
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+LIMIT_ROUNDING = 1e-9
+"""w dt within this part of the limit is at the limit, as in `rules.breakdown`."""
+NEAR = 0.1
+"""How far the logarithm of a growth may be from the predicted one, as a part of it."""
+
+
+@dataclass(frozen=True)
+class Growth:
+    """What was found of a level; arrays of shape (scheme, case)."""
+
+    unstable: Flags
+    contradicted: Flags
+    """Whether a linear model beyond the limit grows otherwise than predicted."""
+    measured: Floats
+    """Growth factor of the amplitude per period; NaN below two peaks."""
+    predicted: Floats
+    """The same by theory, of small oscillations; NaN for adaptive schemes."""
+
+
+def growth_at(part: Part, level: int) -> Growth:
+    """Find whether schemes and members are stable at a level."""
+    index = part.grid.levels.index(level)
+    p = np.broadcast_to(part.omega_dt[:, index], part.shape)
+    beyond = p > part.stability_limit * (1.0 + LIMIT_ROUNDING)
+    at_limit = ~beyond & (p >= part.stability_limit * (1.0 - LIMIT_ROUNDING))
+    broken = part.failed[..., index]
+    growth = part.growth[..., index]
+    grown = (growth > BLOWN_UP) & (at_limit | ~_removed(part, index))
+    measured = oscillation.growth_over_run(part, part.records[level])
+    expected = predicted_growth(part, level)
+    short = ~broken & predicted.is_simple(part) & beyond
+    return Growth(
+        unstable=broken | beyond | grown,
+        contradicted=short & _differs(part, index, measured, expected),
+        measured=measured,
+        predicted=expected,
+    )
+
+
+def predicted_growth(part: Part, level: int) -> Floats:
+    """Return the growth factor per natural period of the largest root, parasitic ones included, of any model."""
+
+    def function(stepper: Stepper, p: Floats) -> Floats:
+        return growth_of(stepper, p)
+
+    return predicted.of_steps(part, level, function)
+
+
+def growth_of(stepper: Stepper, p: Floats) -> Floats:
+    """Return the growth factor per natural period of the largest root, at w dt = p."""
+    principal = np.asarray(theory.growth_per_period(stepper, p))
+    with np.errstate(over="ignore"):
+        largest = np.asarray(theory.spectral_radius(stepper, p)) ** (2.0 * np.pi / p)
+    # the roots of a stable step are found to a few digits less than its growth
+    return np.where(largest > principal * (1.0 + 1e-6), largest, principal)
+
+
+def _removed(part: Part, index: int) -> Flags:
+    """Say where the next finer level, or the step from the next coarser one, at least halves the growth."""
+    growth = part.growth
+    if growth.shape[-1] == 1:
+        return np.zeros(part.shape, dtype=bool)
+    coarse = min(index, growth.shape[-1] - 2)
+    return np.asarray(growth[..., coarse + 1] < 0.5 * growth[..., coarse])
+
+
+def _differs(part: Part, index: int, measured: Floats, expected: Floats) -> Flags:
+    periods = predicted.natural_frequency(part) * part.group.end / (2.0 * np.pi)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        apart = np.abs(np.log(measured) - np.log(expected)) * periods
+        whole = np.log(expected) * periods
+    late = np.log(4.0 + 2.0 * part.grid.steps[index])
+    return np.asarray(apart > NEAR * np.abs(whole) + late)
