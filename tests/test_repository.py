@@ -13,7 +13,7 @@ import yaml
 
 from vibsim.cli.arguments import parser
 from vibsim.models import MODELS
-from vibsim.schemes import SCHEMES
+from vibsim.schemes import SCHEMES, Option
 from vibsim.spec import Experiment
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -234,17 +234,23 @@ def test_every_model_is_documented_with_its_states_and_parameters() -> None:
 
 
 def test_every_scheme_is_documented_with_its_options() -> None:
-    """The paragraph of a scheme begins with its name and ends with the table of its options."""
     text = section("schemes")
-    starts = [
-        (match[1], match.start()) for match in re.finditer(r"^`(\w+)` is ", text, re.MULTILINE)
+    schemes = re.findall(r"^\| `(\w+)` \| ([^|`]+) \| (.*) \|$", text, re.MULTILINE)
+    assert [(kind, title) for kind, title, _ in schemes] == [
+        (k, s.title) for k, s in SCHEMES.items()
     ]
-    assert [kind for kind, _ in starts] == list(SCHEMES)
-    ends = [start for _, start in starts[1:]] + [len(text)]
-    for (kind, start), end in zip(starts, ends, strict=True):
-        rows = table_rows(text[start:end])
-        found = {name: re.findall(r"`(\w+)`", row) for name, row in rows.items()}
-        assert found == {option.name: list(option.choices) for option in SCHEMES[kind].options}
+    for kind, _, options in schemes:
+        assert re.findall(r"`(\w+)`", options) == [option.name for option in SCHEMES[kind].options]
+    rows = re.findall(r"^\| `(\w+)` \| (`.*`) \| (.*) \|$", text, re.MULTILINE)
+    told = {(kind, name): row for name, of, row in rows for kind in re.findall(r"`(\w+)`", of)}
+    every = {(kind, o.name): o for kind, scheme in SCHEMES.items() for o in scheme.options}
+    assert set(told) == set(every)
+    for place, option in every.items():
+        words = list(option.choices) if isinstance(option, Option) else []
+        found = [
+            word for word in re.findall(r"`(\w+)`", told[place]) if word not in ("true", "false")
+        ]
+        assert (place, found) == (place, words)
 
 
 def test_every_reason_is_documented_with_its_status() -> None:

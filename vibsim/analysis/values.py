@@ -165,6 +165,27 @@ def _error_of_frequency(p: Place) -> Floats:
     return _quotient("exact_period", "period")(p) - 1.0
 
 
+def _own_norm(p: Place) -> Floats:
+    """Return ``sqrt(dt sum (u_exact - u)^2 / T)`` over the stored points of a level (vibration text, section 2.2)."""
+    data = p.data()
+    if data is None or f"{p.quantity}_exact" not in data:
+        return p.missing
+    error = np.asarray(data[f"{p.quantity}_exact"] - data[p.quantity])
+    return np.asarray(np.sqrt(np.sum(error**2, axis=-1) / (error.shape[-1] - 1)))
+
+
+def _second_difference(p: Place) -> Floats:
+    """Return ``E = [D_tD_t u]/u''`` of the exact position by least squares (vibration text, exercise 7)."""
+    data, position = p.data(), p.part.model.position
+    if data is None or f"{position}_exact" not in data or int(np.asarray(data.attrs["every"])) != 1:
+        return p.missing
+    exact = np.asarray(data[f"{position}_exact"])
+    inner = exact[..., 1:-1]
+    ahead, behind = exact[..., 2:] - inner, inner - exact[..., :-2]
+    squares = np.sum(inner**2, axis=-1) * np.asarray(data["omega_dt"]) ** 2
+    return safe_ratio(-np.sum((ahead - behind) * inner, axis=-1), squares)
+
+
 def _running_max(p: Place) -> Floats:
     """Return the largest deviation so far; at the end it is the largest of all, which is there without the series."""
     data, name = p.data(), f"{p.quantity}_running_max"
@@ -271,6 +292,8 @@ KNOWN: Mapping[str, Callable[[Place], Any]] = {
     "relative_energy_error_d2t": _over_initial(_energy_error_d2t),
     "accepted_steps": _at_level(oscillation.steps_taken),
     "force_evaluations": _at_level(oscillation.force_evaluations),
+    "error_rate": lambda p: np.log2(_fall(_own_norm)(p)),
+    "second_difference_fraction": _second_difference,
     "discrete_error": _discrete_error,
     "error_l1": _error("l1"),
     "error_l2": _error("l2"),

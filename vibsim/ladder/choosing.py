@@ -129,7 +129,7 @@ def _runs(experiment: Experiment) -> list[_Run]:
     group = _gathered(experiment, cases)
     return [
         _Run(method, i, start_of(method, group, where), cases[where], [], [])
-        for i in range(len(experiment.schemes))
+        for i in experiment.ladder
         for method, where in methods(experiment, i, group)
     ]
 

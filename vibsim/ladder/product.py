@@ -55,14 +55,14 @@ def best(
     every = plan.sampling(experiment, experiment.levels[0])
     points = steps[0] // every
     size = max(PART // (points + 1), 1)
-    schemes = range(len(experiment.schemes))
+    schemes = experiment.ladder
     parts = []
     for first in range(0, experiment.members, size):
         group = members(experiment, first, min(first + size, experiment.members))
         parts.append([climbed(experiment, i, group, steps, points, threads) for i in schemes])
-    rows = [joined([part[i] for part in parts]) for i in schemes]
+    rows = [joined([part[i] for part in parts]) for i in range(len(schemes))]
     group = members(experiment, 0, experiment.members)
-    names = [scheme.name for scheme in experiment.schemes]
+    names = [experiment.schemes[i].name for i in schemes]
     same_end = not experiment.end_varies
     coords = coordinates(
         MODELS[experiment.model.kind], names, group, steps[0], every, same_end=same_end

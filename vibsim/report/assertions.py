@@ -8,13 +8,15 @@ from vibsim.report import words
 
 if TYPE_CHECKING:
     from vibsim.spec import Check, ConvergesCheck, ValueCheck
+    from vibsim.spec.checks import Measurement
+    from vibsim.spec.scheme_checks import ConservesCheck, EqualCheck, StableCheck
 
 
 def heading(check: Check) -> str:
     """Return the assertion of a check in one line."""
     if check.kind == "claim":
         return f"Claim: {check.claim}"
-    return _converges(check) if check.kind == "converges" else _value(check)
+    return _measured(check)
 
 
 def of_tolerance(bound: str) -> str:
@@ -28,8 +30,21 @@ def background(check: Check) -> str:
         return ""
     source = f"Source: {check.source}. " if check.source else ""
     truth = "true" if check.holds else "false"
-    inner = _converges(check.that) if check.that.kind == "converges" else _value(check.that)
-    return f"{source}Expected to be {truth}. Measured by: {inner}."
+    return f"{source}Expected to be {truth}. Measured by: {_measured(check.that)}."
+
+
+def _measured(check: Measurement) -> str:
+    match check.kind:
+        case "converges":
+            return _converges(check)
+        case "value":
+            return _value(check)
+        case "stable":
+            return _stable(check)
+        case "conserves":
+            return _conserves(check)
+        case "equal":
+            return _equal(check)
 
 
 def _converges(check: ConvergesCheck) -> str:
@@ -55,6 +70,43 @@ def _value(check: ValueCheck) -> str:
     rule = next((f"{verb} {value!r}" for verb, value in bounds.items() if value is not None), "")
     extra = f" ({', '.join(tolerances)})" if tolerances else ""
     return f"{check.value}{of}{f' at {where}' if where else ''} {rule}{extra}"
+
+
+def _stable(check: StableCheck) -> str:
+    verb = "stays bounded" if check.stable else "grows without bound"
+    return f"the amplitude {verb}{_where(check)}"
+
+
+DRIFTS = {
+    "none": "is conserved up to round-off",
+    "bounded": "has an error that stays bounded",
+    "linear": "has an error that grows like t",
+    "quadratic": "has an error that grows like t²",
+}
+"""What is said of the energy for every kind of drift."""
+
+
+def _conserves(check: ConservesCheck) -> str:
+    velocity = "the scheme's own velocity" if check.conserves == "energy" else "[D₂ₜu]"
+    return f"the energy by {velocity} {DRIFTS[check.drift]}{_where(check)}"
+
+
+def _equal(check: EqualCheck) -> str:
+    known = {"exact": "the exact solution", "discrete": "the exact solution of its own steps"}
+    other = known.get(check.second, check.second)
+    within = "round-off" if check.atol is None else f"{check.atol:g}"
+    letter = words.symbol(check.quantity)
+    return f"{letter} by {check.first} equals that of {other} to {within}{_where(check)}"
+
+
+def _where(check: StableCheck | ConservesCheck | EqualCheck) -> str:
+    """Say in brackets which schemes, which level and which member a check is about."""
+    names = getattr(check, "schemes", None)
+    parts = [_listed("scheme", names)] if names else []
+    parts += [
+        f"{key} {value}" for key in ("level", "case") if (value := getattr(check, key)) is not None
+    ]
+    return f" ({', '.join(parts)})" if parts else ""
 
 
 def _listed(word: str, names: tuple[str, ...]) -> str:

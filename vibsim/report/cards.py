@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from vibsim.plan.versions import DRAWING, versions
 from vibsim.record import Record
-from vibsim.report import assertions, contents, data, reasons, setting, words
+from vibsim.report import assertions, contents, contents_published, data, reasons, setting, words
 from vibsim.report.tables import Cell, Column, Table
 from vibsim.spec.collection import ADHOC, ENDINGS
 from vibsim.vocabulary import BY_TOLERANCE
@@ -25,6 +25,7 @@ def context(
     provenance: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Return the words of a page by the names that its template uses."""
+    checks = _carded(experiment, summary)
     return {
         "collection": experiment.collection,
         "name": experiment.name,
@@ -33,8 +34,8 @@ def context(
         "status": summary["status"],
         "sentence": words.overall(summary),
         "unsettled": words.unsettled(summary),
-        "checks": [card(experiment, record, check) for check in summary["checks"]],
-        "brief": len(summary["checks"]) > BRIEF,
+        "checks": [card(experiment, record, check) for check in checks],
+        "brief": len(checks) > BRIEF,
         "failures": contents.failures(summary, record),
         "unlisted": _unlisted(summary),
         "setup": list(setting.setup(experiment, record)),
@@ -45,6 +46,16 @@ def context(
         "target": quote(experiment.word),
         "python": _python(experiment),
     }
+
+
+def _carded(experiment: Experiment, summary: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return the checks that get a card: of printed numbers those that did not come out as expected."""
+    in_tables = contents_published.ids(experiment)
+    return [
+        check
+        for check in summary["checks"]
+        if check["id"] not in in_tables or check["status"] != "PASS"
+    ]
 
 
 SETTLED = ("asymptotic", "order_low", "order_high")
@@ -85,6 +96,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         "kind": check["kind"],
         "heading": heading,
         "background": assertions.background(asserted) if asserted else "",
+        "note": (getattr(asserted, "note", None) or "") if asserted else "",
         "text": words.told(check).removeprefix(heading).lstrip(". "),
         "status": check["status"],
         "reason": check["reason"] or "–",

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from vibsim.models import MODELS
 from vibsim.record import Record
 from vibsim.report.data import Member, case_name, flags, formal_orders, pick, swept
+from vibsim.schemes import SCHEMES
 from vibsim.spec.series import asked
 from vibsim.vocabulary import SEVERITY, TOLERANCE, TYPICAL_NORM
 
@@ -18,15 +19,16 @@ if TYPE_CHECKING:
 
 
 def promises(experiment: Experiment, record: Record, quantity: str) -> list[tuple[float, float]]:
-    """Return every order that a scheme promises for a quantity, with its tolerance, in ascending order.
+    """Return every finite order that a scheme promises for a quantity, with its tolerance, in ascending order.
 
+    What is exact has no order to compare with, nor has a scheme that chooses its own steps.
     The tolerance is the smallest that a check has which is about the quantity and the scheme.
     """
     promised = formal_orders(record, quantity)
     found = {
         (float(order), tolerance(experiment, quantity, scheme))
         for s, scheme in enumerate(record.words("scheme"))
-        for order in np.unique(promised[s])
+        for order in np.unique(promised[s][np.isfinite(promised[s])])
     }
     return sorted(found)
 
@@ -76,6 +78,11 @@ def members(record: Record, quantity: str) -> list[Member]:
         for case, role in reversed(roles.items())
         for s, name in enumerate(schemes)
     ]
+
+
+def with_levels(experiment: Experiment, found: list[Member]) -> list[Member]:
+    """Leave out schemes that choose their own steps, which no level changes, unless there are no others."""
+    return [m for m in found if not SCHEMES[experiment.schemes[m.scheme].kind].adaptive] or found
 
 
 def _ranking(record: Record, quantity: str) -> NDArray[np.intp]:

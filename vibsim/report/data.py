@@ -6,6 +6,7 @@ scheme) is read by the same call.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -159,6 +160,12 @@ def formal_order(record: Record, member: Member, quantity: str) -> float:
     return float(at(record, f"{quantity}_formal_order", member))
 
 
+def power(record: Record, member: Member, quantity: str) -> float:
+    """Return the order by which levels are rescaled: the promised one, or 0 for none where that is not finite."""
+    order = formal_order(record, member, quantity)
+    return order if math.isfinite(order) else 0.0
+
+
 def formal_orders(record: Record, quantity: str) -> Floats:
     """Return the promised order of every scheme and member, shape (scheme, case): options may be swept."""
     variable = record.variable(f"{quantity}_formal_order")
@@ -170,7 +177,7 @@ def formal_orders(record: Record, quantity: str) -> Floats:
 def promised_text(record: Record, quantity: str, scheme: int) -> str:
     """Write the order that a scheme promises: a number, or that it depends on the member."""
     found = np.unique(formal_orders(record, quantity)[scheme])
-    return f"{found[0]:g}" if found.size == 1 else "promised"
+    return f"{found[0]:g}".replace("inf", "∞") if found.size == 1 else "promised"
 
 
 def is_lean(record: Record) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 from vibsim.record import Record
 from vibsim.report import style, words
 from vibsim.report.choice import promises
-from vibsim.report.data import Floats, Member, at, pick, sound_pairs, whole
+from vibsim.report.data import Floats, Member, at, formal_orders, pick, sound_pairs, whole
 from vibsim.vocabulary import TYPICAL_NORM
 
 if TYPE_CHECKING:
@@ -80,6 +80,42 @@ def draw(
     return stated
 
 
+def draw_each(
+    ax: Axes, experiment: Experiment, record: Record, quantity: str, case: int, schemes: list[str]
+) -> bool | None:
+    """Draw the stated order of every scheme in a row of its own; return as `draw` does."""
+    name = f"{quantity}_observed_order"
+    if name not in record or not np.isfinite(pick(record, name, case=case)).any():
+        return draw(ax, experiment, record, quantity, case, schemes)
+    norm = record.words("norm").index(TYPICAL_NORM)
+    seen: list[float] = []
+    settled = False
+    chosen = np.flatnonzero(~np.isnan(formal_orders(record, quantity)[:, case])).tolist()
+    for row, s in enumerate(chosen):
+        scheme = schemes[s]
+        member, colour = Member(s, case, scheme), style.look(s)["color"]
+        promised = float(formal_orders(record, quantity)[s, case])
+        order, low, high = (
+            float(at(record, f"{quantity}_order{end}", member, norm=norm))
+            for end in ("", "_low", "_high")
+        )
+        settled |= bool(np.isfinite(order))
+        last = float(at(record, name, member, norm=norm)[-1])
+        face = colour if np.isfinite(order) else "white"
+        value = order if np.isfinite(order) else last
+        ax.plot([low, high], [row, row], color=colour, linewidth=3.0, alpha=0.35)
+        ax.plot([value], [row], **style.look(s) | {"markerfacecolor": face, "markersize": 5})
+        ax.plot([promised], [row], color="black", marker="|", markersize=9, markeredgewidth=1.2)
+        seen += [x for x in (promised, value if np.isfinite(order) else promised) if np.isfinite(x)]
+    if seen:
+        ax.set_xlim(min(seen) - 0.6, max(seen) + 0.6)
+    names = [style.entry(schemes[s]) for s in chosen]
+    ax.set_yticks(range(len(chosen)), names, fontsize=7.5)
+    ax.set_ylim(len(chosen) - 0.4, -0.6)
+    ax.set_xlabel(f"order of {words.symbol(quantity)} ({TYPICAL_NORM})")
+    return settled
+
+
 def _draw_stated(ax: Axes, record: Record, quantity: str, member: Member, norm: int) -> bool:
     """Draw the stated order as a bar over the levels of its window, with its interval; say whether there is one."""
     order = float(at(record, f"{quantity}_order", member, norm=norm))
@@ -110,6 +146,9 @@ def _draw_stated(ax: Axes, record: Record, quantity: str, member: Member, norm: 
 def _order_limits(sound: list[Floats], promised: list[float]) -> tuple[float, float]:
     """Hold the promised orders and those that count, no further than 5 below the least and 2 above the largest."""
     values = np.concatenate([part[np.isfinite(part)] for part in sound] or [np.array(promised)])
+    if not promised:
+        # of schemes that promise none
+        return style.limits(values)
     low = min([promised[0] - 0.3, *values.tolist()])
     high = max([promised[-1] + 0.3, *values.tolist()])
     room = 0.08 * (high - low)

@@ -19,6 +19,7 @@ from vibsim.report.data import (
     at,
     case_name,
     floor_norm,
+    formal_orders,
     norm_unit,
     steps_of,
     unit,
@@ -38,21 +39,25 @@ LEGEND_COLUMNS = 5
 def against_step(experiment: Experiment, record: Record, quantity: str, case: int) -> Picture:
     """Draw the norms of differences and errors against the step, and the local order against the level."""
     schemes = record.words("scheme")
-    height = 3.15 + 0.2 * math.ceil((len(schemes) + 4) / LEGEND_COLUMNS)
+    many = style.crowded(record)
+    panel = max(2.2, 0.17 * len(schemes)) if many else 2.2
+    rows = math.ceil((len(schemes) + 4) / LEGEND_COLUMNS)
+    height = panel + 0.95 + 0.2 * rows
     figure = style.canvas(height)
-    low, tall = 0.5 / height, 2.2 / height
+    low, tall = 0.5 / height, panel / height
     left, right = (
         figure.add_axes((0.088, low, 0.365, tall)),
-        figure.add_axes((0.555, low, 0.425, tall)),
+        figure.add_axes((0.68 if many else 0.555, low, 0.3 if many else 0.425, tall)),
     )
     kinds = _draw_norms(left, experiment, record, quantity, case, schemes)
-    is_settled = figures_local_order.draw(right, experiment, record, quantity, case, schemes)
+    draw = figures_local_order.draw_each if many else figures_local_order.draw
+    is_settled = draw(right, experiment, record, quantity, case, schemes)
     handles, texts = left.get_legend_handles_labels()
     figure.legend(
         handles,
         texts,
         loc="lower left",
-        bbox_to_anchor=(0.075, 3.02 / height),
+        bbox_to_anchor=(0.075, (panel + 0.82) / height),
         ncols=LEGEND_COLUMNS,
         fontsize=8,
         borderaxespad=0.0,
@@ -63,13 +68,13 @@ def against_step(experiment: Experiment, record: Record, quantity: str, case: in
     return Picture(
         name=f"order_{quantity}_{case}",
         title=f"How fast does the error shrink? {letter}{suffix}",
-        caption=_caption(kinds, is_settled),
+        caption=_caption(kinds, is_settled, many),
         alt=f"Norm of the level differences of {words.name(quantity)} against the step, and local order against level",
         figure=figure,
     )
 
 
-def _caption(kinds: frozenset[str], is_settled: bool | None) -> str:
+def _caption(kinds: frozenset[str], is_settled: bool | None, many: bool = False) -> str:
     """Explain what is drawn, and nothing else (see `_draw_norms`, `_draw_orders`)."""
     if not kinds:
         return "Nothing is drawn: there is no error to measure here."
@@ -80,12 +85,17 @@ def _caption(kinds: frozenset[str], is_settled: bool | None) -> str:
         "Parallel to a dashed line means that promised order." if "slope" in kinds else "",
         "Points on the dotted line are round-off." if "floor" in kinds else "",
     ]
-    if is_settled is not None:
+    if is_settled is not None and many:
+        parts.append(
+            "Right: the stated order of every scheme with its interval; where none is stated, hollow, the order of the "
+            "finest three levels; the vertical stroke is the promised one."
+        )
+    elif is_settled is not None:
         parts.append(
             "Right: the order that three successive levels give, drawn at the coarsest of the three; it should "
             "settle inside a grey band; beyond the frame is what round-off makes of it."
         )
-    if is_settled:
+    if is_settled and not many:
         parts.append("The bar is the stated order with its interval, over the levels it rests on.")
     return " ".join(part for part in parts if part)
 
@@ -98,7 +108,11 @@ def _draw_norms(
     measure = norm_unit(record, quantity, TYPICAL_NORM)
     seen: list[Floats] = []
     floors: list[Floats] = []
+    promised = formal_orders(record, quantity)[:, case]
     for s, scheme in enumerate(schemes):
+        if np.isnan(promised[s]):
+            # a scheme that chooses its own steps has no error against dt
+            continue
         member = Member(s, case, scheme)
         look = style.look(s)
         difference = style.no_zeros(at(record, f"{quantity}_difference_norm", member, norm=norm))

@@ -113,7 +113,7 @@ def _room(found: Measured, exact: Floats | None) -> tuple[float, float]:
 def _draw_errors(ax: Axes, record: Record, along: Along, found: Measured) -> None:
     levels, schemes = whole(record, "level"), record.words("scheme")
     several = len(along.lines) > 1
-    count = 1 if several else 6 if len(schemes) == 1 else 3
+    count = 1 if several or style.crowded(record) else 6 if len(schemes) == 1 else 3
     spaced = np.linspace(len(levels) - 1, 0, min(len(levels), count)).round().astype(int)
     chosen = np.unique(spaced)[::-1].tolist()
     error = {i: finest.period_error(record, i) for i in chosen}
@@ -126,7 +126,7 @@ def _draw_errors(ax: Axes, record: Record, along: Along, found: Measured) -> Non
             grey: dict[str, Any] = {"color": "#9a9a9a", "linewidth": 4.0, "alpha": 0.6, "zorder": 1}
             line(ax, x, style.no_zeros(predicted[s, members]), label=text, **grey)
             for m, i in enumerate(chosen):
-                colour = k + s if several else m
+                colour = k + s if several or style.crowded(record) else m
                 label = _text(scheme if len(schemes) > 1 else "", name, f"level {levels[i]}")
                 look = _mark(s, colour, len(schemes)) | {
                     "linestyle": style.look(colour)["linestyle"],
@@ -136,7 +136,8 @@ def _draw_errors(ax: Axes, record: Record, along: Along, found: Measured) -> Non
     _log_limits(ax, np.stack(list(error.values())))
     ax.set_ylabel("|period / exact − 1|")
     ax.set_title("Relative error of the period")
-    style.beside(ax, fontsize=8)
+    if not style.crowded(record):
+        style.beside(ax, fontsize=8)
 
 
 def _log_limits(ax: Axes, values: Floats) -> None:

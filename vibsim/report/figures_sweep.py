@@ -89,11 +89,13 @@ def _draw_orders(
             x = along.key.values[members]
             interval(ax, x, low[s, members], high[s, members], look["color"])
             line(ax, x, value[s, members], label="" if k else style.entry(scheme), **look)
-    bottom, top = style.limits(value, np.array([promised[0][0] - 0.25, promised[-1][0] + 0.25]))
-    ax.set_ylim(max(bottom, promised[0][0] - 3), min(top, promised[-1][0] + 2))
+    if promised:
+        least, most = promised[0][0], promised[-1][0]
+        bottom, top = style.limits(value, np.array([least - 0.25, most + 0.25]))
+        ax.set_ylim(max(bottom, least - 3), min(top, most + 2))
     ax.set_ylabel(f"order of {words.symbol(quantity)} ({TYPICAL_NORM})")
     ax.set_title("Stated order with its interval")
-    style.beside(ax)
+    style.beside(ax, **({"fontsize": 7.5} if style.crowded(record) else {}))
 
 
 def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> bool:
@@ -124,7 +126,8 @@ def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> bool:
         style.label(f"error of {words.symbol(quantity)}", norm_unit(record, quantity, TYPICAL_NORM))
     )
     ax.set_title(f"Error on level {whole(record, 'level')[-1]} ({TYPICAL_NORM} norm)")
-    style.beside(ax)
+    if not style.crowded(record):
+        style.beside(ax)
     return found.is_known
 
 
@@ -166,7 +169,9 @@ def _draw_verdicts(ax: Axes, along: Along, status: NDArray[Any], schemes: list[s
             label=f"{word} ({int((status == word).sum())})",
             clip_on=False,
         )
-    ax.set_yticks(np.arange(len(schemes)) + 0.17, schemes)
+    # long names have the room at the left where there are many, at the price of their size
+    size = 5.5 if len(schemes) > style.MANY else 8.5
+    ax.set_yticks(np.arange(len(schemes)) + 0.17, schemes, fontsize=size)
     ax.set_ylim(-0.3, len(schemes) - 0.3)
     ax.grid(visible=False, axis="y")
     style.beside(ax, handlelength=1.2)

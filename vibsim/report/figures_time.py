@@ -5,6 +5,7 @@ Source: pendulum lecture, sections 2.5 and 2.6.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from vibsim.report.data import (
     Member,
     at,
     formal_order,
+    power,
     sound_levels,
     sound_pairs,
     times,
@@ -34,9 +36,15 @@ CURVES = 6
 TARGET: dict[str, Any] = {"color": "black", "linestyle": (0, (4, 3)), "linewidth": 1.0}
 
 
+EXACT = (
+    ". The scheme is exact in this quantity, so nothing is rescaled and what is seen is round-off."
+)
+
+
 def overlay(record: Record, quantity: str, member: Member) -> Picture:
     """Draw the rescaled level differences of a quantity, their spread, and the ratio over time."""
-    t, order = times(record, member.case), formal_order(record, member, quantity)
+    t, order = times(record, member.case), power(record, member, quantity)
+    is_exact = math.isinf(formal_order(record, member, quantity))
     letter, measure = words.symbol(quantity), unit(record, f"{quantity}_difference")
     curves = differences(record, quantity, member)
     spread, ratios = comparable(curves), len(whole(record, "triple")) > 0
@@ -50,10 +58,13 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
     axes[-1].set_xlabel(style.label("t", unit(record, "t") or "s"))
     first = whole(record, "pair")[0]
     low = words.lowered(first)
-    parts = [
-        f"{letter}{low} is {letter} on level {first}, and so on. Top: the differences between successive levels, "
+    shrinks = (
         f"{_multiplied(order, whole(record, 'level'))}; if the error shrinks as dt{words.raised(order)}, the curves "
-        "fall on one another.",
+        "fall on one another."
+    )
+    parts = [
+        f"{letter}{low} is {letter} on level {first}, and so on. Top: the differences between successive levels"
+        + (EXACT if is_exact else f", {shrinks}"),
         "Then the spread: how far each curve is from the finest one above round-off."
         if spread
         else "",
@@ -74,7 +85,8 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
 
 def energy(record: Record, member: Member) -> Picture:
     """Draw the energy deviation of every level times ``(2**p)**k``: convergence to conservation."""
-    order = formal_order(record, member, "energy_deviation")
+    order = power(record, member, "energy_deviation")
+    is_exact = math.isinf(formal_order(record, member, "energy_deviation"))
     measure, levels = unit(record, "energy_deviation_scaled"), whole(record, "level")
     above = sound_levels(record, "energy_deviation", member)
     curves = []
@@ -94,9 +106,15 @@ def energy(record: Record, member: Member) -> Picture:
     axes[-1].set_xlabel(style.label("t", unit(record, "t") or "s"))
     caption = (
         f"dE{words.lowered(levels[0])} is dE on level {levels[0]}, and so on. The exact energy is constant, so dE "
-        f"itself is an error. Multiplied by {2.0**order:g} for each level the curves should coincide; look at the "
-        "last point too, where the velocity comes from a formula of its own."
+        "itself is an error. "
     )
+    if is_exact:
+        caption += "The scheme conserves the energy exactly: what is seen is round-off."
+    else:
+        caption += (
+            f"Multiplied by {2.0**order:g} for each level the curves should coincide; look at the last point too, "
+            "where the velocity comes from a formula of its own."
+        )
     if spread:
         caption += " Below, the spread: how far each curve is from the finest one above round-off."
     return Picture(
@@ -110,7 +128,7 @@ def energy(record: Record, member: Member) -> Picture:
 
 def differences(record: Record, quantity: str, member: Member) -> list[Curve]:
     """Return the level differences, rescaled so that an error ``C dt**p`` makes them coincide; at most `CURVES`."""
-    order, levels = formal_order(record, member, quantity), whole(record, "level")
+    order, levels = power(record, member, quantity), whole(record, "level")
     above, letter = sound_pairs(record, quantity, member), words.symbol(quantity)
     curves = []
     for i in _few(above):

@@ -10,13 +10,19 @@ from vibsim.report import (
     choice,
     data,
     figures_cloud,
+    figures_energy,
+    figures_extrema,
+    figures_growth,
     figures_map,
     figures_order,
     figures_period,
+    figures_phase,
     figures_solution,
     figures_spread,
     figures_sweep,
+    figures_theory,
     figures_time,
+    figures_work,
     layout,
 )
 from vibsim.report.data import Member
@@ -27,8 +33,10 @@ from vibsim.vocabulary import SEVERITY
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
 
+FEW = 3
+"""Schemes up to which each one's figures over time stand before those that lay schemes beside each other."""
 SHOWN = 6
-"""Most schemes and members that get figures of their own; the tables have all of them."""
+"""Most schemes and members that get figures of their own, of more schemes half as many; the tables have them all."""
 
 
 def pictures(experiment: Experiment, record: Record, shown: list[Member]) -> list[Picture]:
@@ -38,18 +46,47 @@ def pictures(experiment: Experiment, record: Record, shown: list[Member]) -> lis
     over = over_members(experiment, record, found)
     cases = sorted({member.case for member in shown})
     series = [] if data.is_lean(record) else shown
-    drawn = list(over)
+    several = len(record["scheme"]) > FEW
+    drawn = _theory(experiment, record) + list(over)
+    beside = _of_all_schemes(experiment, record, series, cases)
+    alone: list[Picture] = []
     for quantity in found:
-        drawn += _of_quantity(experiment, record, quantity, series, levels)
+        # of several schemes what they have in common comes first, and what each does over time behind it
+        (alone if several else drawn).extend(
+            _of_quantity(experiment, record, quantity, series, levels)
+        )
         drawn += [
             figures_order.against_step(experiment, record, quantity, case)
             for case in cases
             if levels
         ]
+    drawn += beside + alone
     drawn += [
         figures_solution.solution(record, choice.position(experiment), member) for member in series
     ]
     return drawn
+
+
+def _theory(experiment: Experiment, record: Record) -> list[Picture]:
+    """Return the figures of what theory predicts: order and stability of all schemes, and the runs that grow."""
+    drawn = [figures_theory.order_and_stability(experiment, record)]
+    if not data.is_lean(record):
+        drawn.append(figures_growth.growing(experiment, record))
+    return [picture for picture in drawn if picture is not None]
+
+
+def _of_all_schemes(
+    experiment: Experiment, record: Record, series: list[Member], cases: list[int]
+) -> list[Picture]:
+    """Return the figures that lay schemes beside each other: energy, work, peaks, phase plane."""
+    if not series:
+        return []
+    drawn = [figures_energy.running(record, case) for case in cases]
+    drawn += [figures_work.precision(experiment, record, case) for case in cases]
+    drawn.append(figures_extrema.local(experiment, record, series))
+    if not data.swept(record):
+        drawn.append(figures_phase.plane(experiment, record, series))
+    return [picture for picture in drawn if picture is not None]
 
 
 def over_members(experiment: Experiment, record: Record, found: list[str]) -> list[Picture]:
@@ -92,10 +129,11 @@ def _of_quantity(
 def choose(experiment: Experiment, record: Record) -> tuple[list[Member], str]:
     """Return what gets figures of its own, and a sentence saying what was left out."""
     quantity = choice.quantities(experiment, record)[0]
-    everyone = choice.members(record, quantity)
+    everyone = choice.with_levels(experiment, choice.members(record, quantity))
     status = data.flags(record, f"{quantity}_status")
     severity = [SEVERITY[status[m.scheme, m.case]] for m in everyone]
-    ranked = sorted(range(len(everyone)), key=lambda i: (-severity[i], i))[:SHOWN]
+    room = SHOWN if len(record["scheme"]) <= SHOWN else SHOWN // 2
+    ranked = sorted(range(len(everyone)), key=lambda i: (-severity[i], i))[:room]
     shown = [everyone[i] for i in sorted(ranked)]
     parts = []
     if data.is_lean(record):
@@ -107,8 +145,8 @@ def choose(experiment: Experiment, record: Record) -> tuple[list[Member], str]:
         )
     elif data.swept(record):
         parts.append("The worst and a typical member are shown over time, for every scheme.")
-    if len(everyone) > SHOWN:
+    if len(everyone) > room:
         parts.append(
-            f"{len(everyone) - SHOWN} more have no figures over time; the tables hold their numbers."
+            f"{len(everyone) - room} more have no figures over time; the tables hold their numbers."
         )
     return shown, " ".join(parts)

@@ -16,6 +16,10 @@ from vibsim.report import (
     cards,
     choice,
     contents,
+    contents_energy,
+    contents_published,
+    contents_theory,
+    contents_work,
     data,
     drawing,
     figures_time,
@@ -89,7 +93,8 @@ def write(
     listed, folded = _tables(experiment, convergence, summary)
     beside = [contents.checks(summary), contents.failures(summary, convergence)]
     beside.append(members.table(convergence, position))
-    everything = [*listed, *(table for _, group in folded for table in group)]
+    printed = contents_published.tables(experiment, convergence, summary)
+    everything = [*printed, *listed, *(table for _, group in folded for table in group)]
     everything += [table for table in beside if table is not None and table not in everything]
     _replace(directory / "figures", figures)
     tables = dict(_table_files(everything))
@@ -102,6 +107,8 @@ def write(
     context = cards.context(experiment, convergence, summary, provenance) | {
         "tables": listed,
         "folded": folded,
+        "printed": printed,
+        "printed_sentence": contents_published.sentence(printed),
         "shown": left_out,
         "digits": members.digits(convergence),
         "pictures": [
@@ -195,15 +202,24 @@ def _tables(
 ) -> tuple[list[Table], list[tuple[str, list[Table]]]]:
     """Return the tables of the page, and those that it folds away under a heading."""
     found = choice.quantities(experiment, record)
-    shown = choice.members(record, found[0])
+    shown = choice.with_levels(experiment, choice.members(record, found[0]))
+    schemes = contents_theory.schemes(experiment, record)
     norms = [name for name in record.words("norm") if name != TYPICAL_NORM]
-    listed = [contents.orders(record, quantity, shown) for quantity in found]
+    found_orders = [contents.orders(record, quantity, shown) for quantity in found]
+    beside = [*contents_theory.predictions(record), contents_energy.velocities(record)]
     optional = [contents.maxima(record, shown), contents.scalars(record, shown)]
-    listed += [table for table in optional if table is not None]
+    optional.append(None if data.is_lean(record) else contents_work.table(experiment, record))
+    if len(record["scheme"]) > gallery.FEW:
+        # a row for each scheme says more than many for each
+        order, kept = [schemes, *beside, *found_orders, *optional], 1 + len(beside)
+    else:
+        order = [schemes, *found_orders, *beside, *optional]
+        kept = len(order)
+    listed = [table for table in order[:kept] if table is not None]
     # the first table is what the page is about; a long one after it would push the figures away
     long = [table for table in listed[1:] if len(table.rows) > LONG]
     listed = [table for table in listed if table not in long]
-    folded = [(table.caption, [table]) for table in long]
+    folded = [(table.caption, [table]) for table in [*long, *order[kept:]] if table is not None]
     other = [contents.orders(record, quantity, shown, norm) for quantity in found for norm in norms]
     if other:
         folded.append(("Norms and orders in the other norms", other))

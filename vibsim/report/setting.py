@@ -13,6 +13,7 @@ from vibsim.report import data, words
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
     from vibsim.spec.axes import Axis
+    from vibsim.spec.experiment import SchemeSpec
 
 
 def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
@@ -33,15 +34,25 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
         yield "Tolerance", f"the levels were chosen so that the error bound reaches {bound}"
     if experiment.output == "best":
         yield "Output", "best.nc: the solution extrapolated over the levels, with its error bound"
-    for spec in experiment.schemes:
-        options = ", ".join(
-            f"{key} swept" if f"schemes.{spec.name}.{key}" in keys else f"{key}: {value}"
-            for key, value in spec.options.items()
-        )
-        yield f"Scheme {spec.name}", f"{spec.kind}" + (f" ({options})" if options else "")
+    yield "Schemes", "; ".join(_scheme(spec, keys) for spec in experiment.schemes)
     if axes:
         count = words.number(len(record["case"]), "integer")
         yield "Sweep", f"{count} members. {'; '.join(map(_axis, axes))}"
+
+
+def _scheme(spec: SchemeSpec, swept: set[str]) -> str:
+    """Write a scheme: its name, its kind where that is another word, and its options."""
+    options = [
+        f"{key} swept" if f"schemes.{spec.name}.{key}" in swept else f"{key}: {_option(value)}"
+        for key, value in spec.options.items()
+        if value is not False or f"schemes.{spec.name}.{key}" in swept
+    ]
+    named = spec.kind if spec.name == spec.kind else f"{spec.name}: {spec.kind}"
+    return f"{named} ({', '.join(options)})" if options else named
+
+
+def _option(value: str | float | bool) -> str:
+    return "true" if value is True else _plain(value)
 
 
 def _grid(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:

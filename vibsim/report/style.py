@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from vibsim.record import Record
+
 Floats = NDArray[np.float64]
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -166,6 +168,15 @@ def thin(t: Floats, y: Floats, width: int = POINTS) -> tuple[Floats, Floats]:
     high = order[edges - 1 + np.maximum(finite - 1, 0)] + 1
     keep = np.unique([0, *low.tolist(), *high.tolist(), n - 1])
     return t[keep], y[keep]
+
+
+MANY = 7
+"""Schemes above which a figure has one legend for all of its panels: there are no more colours than these."""
+
+
+def crowded(record: Record) -> bool:
+    """Say whether a record has more schemes than there are colours."""
+    return len(record["scheme"]) > MANY
 
 
 def entry(text: str) -> str:

@@ -15,6 +15,18 @@ from vibsim.report.style import LOWER, SUPERSCRIPTS
 Cell = str | int | float | None
 
 
+class Written(float):
+    """A number with the text that a reader sees in place of it; files for computing hold the number."""
+
+    text: str
+
+    def __new__(cls, value: float, text: str) -> Written:
+        """Return the number `value`, written as `text`."""
+        made = super().__new__(cls, value)
+        made.text = text
+        return made
+
+
 @dataclass(frozen=True)
 class Column:
     """One column."""
@@ -22,7 +34,7 @@ class Column:
     header: str
     unit: str = ""
     form: str = "text"
-    """``text``, or a form of `vibsim.report.words.number`."""
+    """``text``, ``printed`` (text of a printed number, `words.printed`), or a form of `vibsim.report.words.number`."""
 
     @property
     def title(self) -> str:
@@ -66,7 +78,11 @@ class Table:
 def _text(cell: Cell, form: str) -> str:
     if cell is None:
         return "–"
-    return str(cell) if isinstance(cell, str) else words.number(cell, form)
+    if isinstance(cell, Written):
+        return cell.text
+    if isinstance(cell, str):
+        return words.printed(cell) if form == "printed" and cell else cell
+    return words.number(cell, form)
 
 
 def to_csv(table: Table) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 from vibsim.report.style import power
@@ -27,14 +28,22 @@ NAMES = {
 }
 
 
+CENTRED = "_d2t"
+"""Ends the name of a quantity that is made with the centred difference ``[D_2t u]`` of the position."""
+
+
 def symbol(quantity: str) -> str:
     """Return the letter of a quantity; its name where it has none."""
-    return SYMBOLS.get(quantity, quantity)
+    plain = quantity.removesuffix(CENTRED)
+    letter = SYMBOLS.get(plain, plain)
+    return letter if plain == quantity else f"{letter} by [D₂ₜu]"
 
 
 def name(quantity: str) -> str:
     """Return a quantity in words."""
-    return NAMES.get(quantity, quantity)
+    plain = quantity.removesuffix(CENTRED)
+    text = NAMES.get(plain, plain)
+    return text if plain == quantity else f"{text} by the centred difference [D₂ₜu]"
 
 
 STATUS = {
@@ -95,8 +104,8 @@ def number(value: Any, form: str = "norm") -> str:
         A number, or None; NaN and None give a dash.
     form
         ``norm``: 4 significant digits; ``small``: the same, always with a power of ten; ``order``: 3 decimals;
-        ``integer``; ``full``: 10 significant digits; ``step``, ``value``: up to 6 and 15 significant digits, no
-        trailing zeros.
+        ``integer``; ``close``, ``full``: 8 and 10 significant digits; ``brief``: 2; ``step``, ``value``: up to 6 and
+        15 significant digits, no trailing zeros.
     """
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "–"
@@ -106,13 +115,37 @@ def number(value: Any, form: str = "norm") -> str:
         return f"{int(value):,}".replace(",", "\N{NARROW NO-BREAK SPACE}").replace("-", "−")
     if form == "order":
         return f"{value:.3f}".replace("-", "−") if abs(value) < 1e4 else number(value)
-    text = _significant(
-        float(value), {"full": 10, "step": 6, "value": 15}.get(form, 4), fixed=form != "small"
-    )
+    text = _significant(float(value), DIGITS.get(form, 4), fixed=form != "small")
     if form not in {"step", "value"} or "." not in text:
         return text
     mantissa, dot, exponent = text.partition("·")
     return mantissa.rstrip("0").rstrip(".") + dot + exponent
+
+
+DIGITS: Mapping[str, int] = MappingProxyType(
+    {"brief": 2, "close": 8, "full": 10, "step": 6, "value": 15}
+)
+"""Significant digits of forms."""
+
+
+def printed(text: str) -> str:
+    """Write a number as a source printed it, digit by digit, a power of ten in Unicode: ``1.120e8``."""
+    found = re.fullmatch(r"\s*(.+?)\s*(?:[eE]|[x*·×]?\s*10\s*\^\s*)\{?([-+]?\d+)\}?\s*", text)
+    if found is None:
+        return text.strip().replace("-", "−")
+    return f"{found[1]}·{power(int(found[2]))}".replace("-", "−")
+
+
+def like(value: float, text: str, more: int = 2) -> str:
+    """Write a number in the manner of a printed one, with `more` digits behind those of `text`."""
+    if not math.isfinite(value):
+        return number(value)
+    mantissa, _, _ = printed(text).partition("·")
+    places = len(mantissa.partition(".")[2])
+    if "·" in printed(text) and value != 0.0:
+        head, exponent = f"{value:.{places + more}e}".split("e")
+        return f"{head}·{power(int(exponent))}".replace("-", "−", 1)
+    return f"{value:.{places + more}f}".replace("-", "−")
 
 
 def _significant(value: float, digits: int, fixed: bool) -> str:

@@ -160,6 +160,22 @@ _ERRORS = (
         needs_exact="solution",
     ),
     Value(
+        "error_rate",
+        "log2 of the L2 norm of the true error over that of the next finer level, each over its own stored points",
+        "states",
+        finer_levels=1,
+        needs_exact="solution",
+        fixed_step=True,
+    ),
+    Value(
+        "second_difference_fraction",
+        "[D_tD_t u] over u'' of the exact position at the points of the level, least squares",
+        "none",
+        ("level", "case"),
+        needs_exact="solution",
+        needs_linear=True,
+    ),
+    Value(
         "discrete_error",
         "largest difference from the exact solution of the scheme's own steps",
         "states",

@@ -1,0 +1,64 @@
+"""The table of energy errors by a scheme's own velocity and by the centred difference ``[D_2t u]``.
+
+The text's tables (vibration text, sections 6.2 and 7.1) use ``[D_2t u]^n = (u^(n+1) - u^(n-1))/(2 dt)``, n = 1 .. N-1,
+whatever the scheme; for many schemes what they show is the error of that difference and not the scheme's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from vibsim.record import Record
+from vibsim.report.contents_theory import MEMBER, OF_LEVEL, everyone
+from vibsim.report.data import Floats, flags, known, steps_of, swept, unit, whole
+from vibsim.report.tables import Cell, Column, Table
+
+OWN, CENTRED = "energy_deviation_max_abs", "energy_deviation_d2t_max_abs"
+
+
+def velocities(record: Record) -> Table | None:
+    """Return the largest relative energy error with both velocities; None where no scheme has one of its own."""
+    if CENTRED not in record or not np.isfinite(known(record, CENTRED, OF_LEVEL)).any():
+        return None
+    named = "energy_drift_kind" in record
+    columns = (
+        Column("scheme"), *([Column("member")] if swept(record) else []), Column("level", form="integer"),
+        Column("dt", unit(record, "dt") or "s", "step"),
+        Column("max |dE|/E(0), own velocity", form="small"), Column("max |dE|/E(0), [D₂ₜu]", form="small"),
+        Column("second over first", form="norm"),
+        *([Column("growth of the error, own velocity")] if named else []),
+    )  # fmt: skip
+    caption = (
+        "Energy error by the velocity that it is made with: the scheme's own, over every step; and [D₂ₜu], over every "
+        "step but the first and the last, as in the tables of the text. Where they differ, the second shows the error "
+        "of the centred difference and not that of the scheme"
+    )
+    rows = tuple(_rows(record, named))
+    return Table("energy_velocities", caption, columns, rows, 2 * int(bool(swept(record))))
+
+
+def relative(record: Record, name: str) -> Floats:
+    """Return a number over the first energy of each member, shape (scheme, case, level); NaN where that vanishes."""
+    values, first = known(record, name, OF_LEVEL), np.abs(known(record, "energy_initial", MEMBER))
+    return np.asarray(values / np.where(first > 0.0, first, np.nan)[..., None])
+
+
+def _rows(record: Record, named: bool) -> Iterator[tuple[Cell, ...]]:
+    own, centred = relative(record, OWN), relative(record, CENTRED)
+    interior = relative(record, f"{OWN}_interior")
+    kinds = flags(record, "energy_drift_kind") if named else None
+    for member in everyone(record):
+        dt = steps_of(record, member.case)
+        place = member.scheme, member.case
+        is_same = np.isnan(centred[place]).all()
+        for i, level in enumerate(whole(record, "level")):
+            who = [member.scheme_name, *([member.case_name] if swept(record) else [])]
+            a = float(own[(*place, i)])
+            # the velocity of such a scheme is the centred difference, but at the last step
+            b = float((interior if is_same else centred)[(*place, i)])
+            quotient = b / a if a > 0.0 and not is_same else math.nan
+            kind = [str(kinds[(*place, i)]).replace("_", " ")] if kinds is not None else []
+            yield (*who, level, float(dt[i]), a, b, quotient, *kind)

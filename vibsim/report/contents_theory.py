@@ -1,0 +1,209 @@
+"""Tables of what theory predicts of every scheme beside what was measured.
+
+Source: vibration text, sections 4.1 to 4.6 (frequency and growth on ``u'' + w^2 u = 0``), 5.6, 6.2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vibsim.models import MODELS
+from vibsim.record import Record
+from vibsim.report import choice, finest, words
+from vibsim.report.data import (
+    Floats,
+    Member,
+    case_name,
+    formal_orders,
+    known,
+    swept,
+    unit,
+    whole,
+)
+from vibsim.report.tables import Cell, Column, Table, Written
+from vibsim.schemes import SCHEMES
+from vibsim.vocabulary import TYPICAL_NORM
+
+if TYPE_CHECKING:
+    from vibsim.spec import Experiment
+
+MEMBER = ("scheme", "case")
+OF_LEVEL = ("scheme", "case", "level")
+EDGE = 1e-9
+"""Relative distance within which a step counts as lying on the limit of stability."""
+
+
+def everyone(record: Record) -> list[Member]:
+    """Return every scheme and member, all members of a scheme together."""
+    return [
+        Member(s, case, name, case_name(record, case))
+        for s, name in enumerate(record.words("scheme"))
+        for case in range(len(record["case"]))
+    ]
+
+
+def predicted(record: Record) -> bool:
+    """Say whether theory predicts anything here: it does for linear models."""
+    return bool(np.isfinite(known(record, "theory_growth", OF_LEVEL)).any())
+
+
+def schemes(experiment: Experiment, record: Record) -> Table | None:
+    """Return one row per scheme: what it states, and the orders found; None for one scheme alone."""
+    names = record.words("scheme")
+    if len(names) < 2:
+        return None
+    quantities = [choice.position(experiment)]
+    if MODELS[experiment.model.kind].conservative and "energy_deviation_order" in record:
+        quantities.append("energy_deviation")
+    columns = [
+        Column("scheme"), Column("family"), Column("type"),
+        Column("force evaluations per step", form="integer"), Column("stable up to w dt", form="step"),
+    ]  # fmt: skip
+    for quantity in quantities:
+        letter = words.symbol(quantity)
+        columns += [
+            Column(f"order of {letter}, stated", form="step"),
+            Column("measured, ± half its interval", form="order"),
+        ]
+    rows = tuple(tuple(_scheme(experiment, record, s, quantities)) for s in range(len(names)))
+    several = (
+        "; of a sweep the member whose order is farthest from the stated one"
+        if swept(record)
+        else ""
+    )
+    caption = (
+        "Schemes: what each states (explicit or implicit, s: symplectic), and the order measured in the "
+        f"{TYPICAL_NORM} norm (∞: exact, there is no error to shrink){several}"
+    )
+    return Table("schemes", caption, tuple(columns), rows)
+
+
+def _scheme(
+    experiment: Experiment, record: Record, s: int, quantities: list[str]
+) -> Iterator[Cell]:
+    spec = experiment.schemes[s]
+    scheme = SCHEMES[spec.kind]
+    words_of = ["adaptive" if scheme.adaptive else "explicit" if scheme.explicit else "implicit"]
+    words_of += ["s"] if scheme.symplectic else []
+    named = spec.name if spec.name.startswith(spec.kind) else f"{spec.name} ({spec.kind})"
+    yield from (named, scheme.family, ", ".join(words_of))
+    yield None if scheme.adaptive else scheme.force_evaluations
+    limit = _alike(known(record, "stability_limit", MEMBER)[s])
+    yield Written(0.0, "never") if limit == 0.0 else limit
+    for quantity in quantities:
+        formal = formal_orders(record, quantity)[s]
+        value, low, high = (part[s] for part in finest.orders(record, quantity))
+        with np.errstate(invalid="ignore"):
+            away = np.abs(value - formal)
+        case = int(np.argmax(np.where(np.isfinite(away), away, -1.0)))
+        yield _alike(formal)
+        yield _with_interval(float(value[case]), 0.5 * float(high[case] - low[case]))
+
+
+def _with_interval(order: float, half: float) -> Cell:
+    """Return an order that is written with its interval, to no more digits than that leaves."""
+    if not math.isfinite(order) or not math.isfinite(half):
+        return order
+    places = min(max(1 - math.floor(math.log10(half)), 1), 6) if half > 0.0 else 6
+    return Written(order, f"{order:.{places}f} ± {half:.{places}f}".replace("-", "−"))
+
+
+def _alike(values: Floats) -> Cell:
+    """Return the one number that all members have, or a word where they differ; None where there is none."""
+    found = np.unique(values[~np.isnan(values)])
+    if found.size > 1:
+        return "varies"
+    return float(found[0]) if found.size else None
+
+
+def predictions(record: Record) -> list[Table]:
+    """Return what is predicted and measured of every scheme, member and level: growth; frequency and phase error."""
+    if not predicted(record):
+        return []
+    time = unit(record, "t") or "s"
+    rate = unit(record, "theory_frequency") or f"rad/{time}"
+    peaks = (
+        "The measured numbers come from peaks interpolated by a parabola, which leaves an error of its own on coarse "
+        "levels"
+    )
+    growth = (
+        "Theory beside measurement: growth of the amplitude per natural period, predicted by the matrix of one step. "
+        f"{peaks}"
+    )
+    phase = (
+        "Theory beside measurement: frequency, and the time by which the peaks come early (+) or late (−) in each "
+        f"period. {peaks}"
+    )
+    return [
+        _predictions(record, "theory_growth", growth, {"growth": ("growth per period", "")}),
+        _predictions(
+            record,
+            "theory_phase",
+            phase,
+            {"frequency": ("frequency", rate), "phase_error": ("phase error", time)},
+        ),
+    ]
+
+
+def _predictions(
+    record: Record, name: str, caption: str, shown: dict[str, tuple[str, str]]
+) -> Table:
+    columns = [
+        Column("scheme"), *([Column("member")] if swept(record) else []), Column("level", form="integer"),
+        Column("w dt", form="step"), Column("stable"),
+    ]  # fmt: skip
+    for text, measure in shown.values():
+        columns += [
+            Column(f"{text}: predicted", measure, "close"),
+            Column("measured", measure, "close"),
+            Column("difference", measure, "brief"),
+        ]
+    rows = tuple(_prediction_rows(record, tuple(shown)))
+    return Table(name, caption, tuple(columns), rows, 2 * int(bool(swept(record))))
+
+
+def _prediction_rows(record: Record, names: tuple[str, ...]) -> Iterator[tuple[Cell, ...]]:
+    levels, product = whole(record, "level"), omega_dt(record)
+    limit = known(record, "stability_limit", MEMBER)
+    theory = known(record, "theory_growth", OF_LEVEL)
+    pairs = [
+        (known(record, f"theory_{name}", OF_LEVEL), known(record, f"measured_{name}", OF_LEVEL))
+        for name in names
+    ]
+    for member in everyone(record):
+        place = member.scheme, member.case
+        for i, level in enumerate(levels):
+            if not math.isfinite(theory[(*place, i)]):
+                continue
+            who = [member.scheme_name, *([member.case_name] if swept(record) else [])]
+            numbers: list[Cell] = []
+            for told, seen in pairs:
+                a, b = float(told[(*place, i)]), float(seen[(*place, i)])
+                numbers += [a, b, b - a]
+            p = float(product[member.case, i])
+            yield (*who, level, p, is_stable(p, float(limit[place])), *numbers)
+
+
+def is_stable(p: float, limit: float) -> str:
+    """Say in a word whether ``w dt = p`` is within the limit of stability."""
+    if math.isnan(limit) or math.isnan(p):
+        return "–"
+    if limit == 0.0:
+        return "never"
+    if abs(p - limit) <= EDGE * p:
+        return "at the limit"
+    return "yes" if p < limit else "no"
+
+
+def omega_dt(record: Record) -> Floats:
+    """Return w dt of every member and level, shape (case, level); NaN where the record does not have it."""
+    if "omega_dt" not in record:
+        return np.full((len(record["case"]), len(record["level"])), np.nan)
+    variable = record.variable("omega_dt")
+    values = np.asarray(variable.values, dtype=np.float64)
+    values = values if "case" in variable.dims else values[None, :]
+    return np.broadcast_to(values, (len(record["case"]), len(record["level"])))

@@ -1,0 +1,186 @@
+"""Local periods and amplitudes against their number, and the phase error of every peak.
+
+Source: vibration text, section 3.5 (figure 2) and exercise 2. The local period number m is the time from the m-th
+peak to the next one, the local amplitude half the height from a peak to the trough behind it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vibsim.models import MODELS
+from vibsim.record import Record
+from vibsim.report import style
+from vibsim.report.choice import position
+from vibsim.report.data import Floats, Member, at, exact_periods, pick, unit, whole
+from vibsim.report.panels import figure_of, panels
+from vibsim.report.style import Picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from vibsim.spec import Experiment
+
+CURVES = 6
+"""Most curves; more lie on one another."""
+MARKED = 40
+"""Most numbers of one curve that get a marker each."""
+EXACT: dict[str, Any] = {"color": "black", "linestyle": (0, (4, 3)), "linewidth": 1.0, "zorder": 1}
+WILD = 3.0
+"""Amplitudes beyond so many times the first one, and periods so many times the exact one, are cut off."""
+
+
+def local(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
+    """Draw local periods, amplitudes and the phase error of one member; None where there are fewer than two periods."""
+    if "peak_time" not in record or not shown:
+        return None
+    case = shown[0].case
+    runs = _runs(record, [member for member in shown if member.case == case])
+    if not runs:
+        return None
+    axes = panels([2.1, 2.1, 2.1])
+    exact = float(exact_periods(record)[case])
+    start = first_peak(experiment, record, case, exact)
+    for i, (label, member, level) in enumerate(runs):
+        _draw(axes, record, member, level, style.entry(label), style.look(i), exact, start)
+    where = position(experiment)
+    size = _amplitude(experiment, record, case)
+    for ax, value in ((axes[0], exact), (axes[1], size), (axes[2], 0.0)):
+        if math.isfinite(value):
+            ax.axhline(value, label="exact" if ax is axes[0] else "", **EXACT)
+    _ranges(axes, exact, size)
+    for ax in axes:
+        # amplitudes that hardly differ need long numbers
+        ax.yaxis.set_label_coords(-0.115, 0.5)
+    time = unit(record, "t") or "s"
+    axes[0].set_ylabel(style.label("local period", time))
+    axes[1].set_ylabel(style.label("local amplitude", unit(record, f"{where}_finest")))
+    axes[2].set_ylabel(style.label("peak early by", time))
+    axes[0].set_title("Local period")
+    axes[1].set_title("Local amplitude")
+    axes[2].set_title("Phase error of the peaks")
+    axes[2].set_xlabel("number of the peak")
+    style.beside(axes[0], fontsize=8)
+    reference = "its exact time" if math.isfinite(start) else "its time after the first peak"
+    return Picture(
+        name=f"extrema_{case}",
+        title="Local periods and amplitudes, and the phase error from peak to peak",
+        caption="Lines with markers: peaks interpolated by a parabola; faint circles: the same from grid points alone, "
+        "whose period jumps by a whole dt. Dashed: exact. Bottom: how much earlier than "
+        f"{reference} each peak comes; a straight line means the same phase error in every period.",
+        alt="Local period, local amplitude and phase error against the number of the peak",
+        figure=figure_of(axes[0]),
+    )
+
+
+def _runs(record: Record, members: list[Member]) -> list[tuple[str, Member, int]]:
+    """Choose the curves: of one or two schemes several levels, of more schemes the coarsest level."""
+    levels = whole(record, "level")
+    each = max(1, min(len(levels), 4, CURVES // max(1, len(members))))
+    found = []
+    for member in members[:CURVES]:
+        for i in range(each):
+            if np.isfinite(at(record, "peak_time", member, level=i)).sum() >= 2:
+                who = member.scheme_name if len(members) > 1 else ""
+                label = ", ".join(filter(None, [who, f"level {levels[i]}" if each > 1 else ""]))
+                found.append((label or f"level {levels[i]}", member, i))
+    return found
+
+
+def _draw(
+    axes: list[Axes],
+    record: Record,
+    member: Member,
+    level: int,
+    label: str,
+    look: dict[str, Any],
+    exact: float,
+    start: float,
+) -> None:
+    time, peak, trough = (
+        at(record, name, member, level=level) for name in ("peak_time", "peak", "trough")
+    )
+    trough_time = at(record, "trough_time", member, level=level)
+    keep = np.isfinite(time)
+    number, time, peak = np.arange(1, keep.sum() + 1), time[keep], peak[keep]
+    line = look | {"linewidth": 1.1, "markersize": 4}
+    line |= {"marker": look["marker"] if number.size <= MARKED else ""}
+    grid = at(record, "peak_time_grid", member, level=level)[keep]
+    faint: dict[str, Any] = {
+        "color": look["color"],
+        "linestyle": "none",
+        "marker": "o",
+        "markerfacecolor": "none",
+        "alpha": 0.45,
+    }
+    axes[0].plot(number[:-1], np.diff(grid), **faint, markersize=6.5, zorder=1.5)
+    axes[0].plot(number[:-1], np.diff(time), label=label, **line)
+    axes[1].plot(number, heights(time, peak, trough_time, trough), **line)
+    offset = time[0] - exact if math.isnan(start) else start - exact
+    axes[2].plot(number, offset + number * exact - time, **line)
+
+
+def heights(time: Floats, peak: Floats, trough_time: Floats, trough: Floats) -> Floats:
+    """Return half the height from every peak to the trough behind it, else to the one before; NaN without one."""
+    known = np.isfinite(trough_time)
+    if not known.any():
+        return np.full(peak.shape, np.nan)
+    times, values = trough_time[known], trough[known]
+    after = np.minimum(np.searchsorted(times, time), times.size - 1)
+    return np.asarray(0.5 * (peak - values[after]))
+
+
+def first_peak(experiment: Experiment, record: Record, case: int, period: float) -> float:
+    """Return the time of the first exact peak after the start; NaN where no formula gives it.
+
+    It is known of a linear model, and of any motion that starts at rest: there it is one period, or half of one.
+    """
+    u, v = _start(experiment, record, case)
+    if not math.isfinite(period) or u == v == 0.0:
+        return math.nan
+    if v == 0.0:
+        return period if u > 0.0 else period / 2.0
+    if not MODELS[experiment.model.kind].linear:
+        return math.nan
+    angle = math.atan2(v * period / (2.0 * math.pi), u) % (2.0 * math.pi)
+    return angle / (2.0 * math.pi) * period
+
+
+def _start(experiment: Experiment, record: Record, case: int) -> tuple[float, float]:
+    """Return the first position and velocity of a member."""
+    model = MODELS[experiment.model.kind]
+    u, v = (
+        float(at(record, f"{n}_finest", Member(0, case, ""))[0])
+        for n in (model.position, model.velocity)
+    )
+    return u, v
+
+
+def _amplitude(experiment: Experiment, record: Record, case: int) -> float:
+    """Return the exact amplitude where it is known: of a linear model, or of a start at rest."""
+    u, v = _start(experiment, record, case)
+    if v == 0.0:
+        return abs(u)
+    model = MODELS[experiment.model.kind]
+    if not model.linear or "natural_frequency" not in record:
+        return math.nan
+    w = float(np.ravel(pick(record, "natural_frequency", case=case))[0])
+    return math.hypot(u, v / w)
+
+
+def _ranges(axes: list[Axes], exact: float, size: float) -> None:
+    """Hold what is drawn; amplitudes and periods of a run that grows without bound are cut off."""
+    from matplotlib.ticker import MaxNLocator
+
+    for ax, value in zip(axes, (exact, size, math.nan), strict=True):
+        values = np.concatenate(
+            [np.asarray(line.get_ydata(), dtype=np.float64) for line in ax.lines]
+        )
+        if math.isfinite(value):
+            kept = values[np.abs(values) <= WILD * abs(value)]
+            values = kept if kept.size else values
+        ax.set_ylim(*style.limits(values))
+    axes[0].xaxis.set_major_locator(MaxNLocator(nbins=10, integer=True))
