@@ -3,7 +3,8 @@ SHELL := /bin/sh
 BIN := .venv/bin
 
 .DEFAULT_GOAL := run
-.PHONY: run test test-slow lint bench scale clean help set-up-run set-up-dev
+CATALOGUE := $(filter-out scale,$(notdir $(wildcard configs/*)))
+.PHONY: run catalogue test test-slow lint bench scale clean help set-up-run set-up-dev
 
 run: set-up-run  ## run the default experiments and write results/index.html (this is what plain `make` does)
 	@$(BIN)/vibsim run
@@ -25,6 +26,9 @@ lint: set-up-dev  ## check style, types, layers, workflow and generated files
 
 bench: set-up-run  ## measure everything against C and other solvers, 10 minutes (PARTS="jobs storage" for some of it)
 	$(BIN)/python bench/run.py $(PARTS)
+
+catalogue: set-up-run  ## run every experiment but those of scale: the source texts, section by section
+	$(BIN)/vibsim run $(CATALOGUE)
 
 scale: set-up-run  ## run what is too large for the default: 10^6 members, 10^9 steps
 	$(BIN)/vibsim run scale
