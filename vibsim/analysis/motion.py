@@ -32,6 +32,9 @@ THEORY_RUNS = 2**12
 
 OF_LEVEL = ("scheme", "case", "level")
 
+RECURRENCE, PEAKS = "recurrence of the steps", "interpolated peaks"
+"""How growth and frequency were measured (`vibsim.analysis.oscillation`): attribute ``method``."""
+
 
 def motion(part: Part, compared: Mapping[str, Comparison]) -> Table:
     """Return the variables of the convergence Record that belong to the motion of every scheme, member and level."""
@@ -53,11 +56,10 @@ def _by_level(part: Part, of: Callable[[int], Floats]) -> Floats:
 
 def _theory(part: Part) -> Table:
     """Return growth, frequency and phase error, predicted and measured."""
-    records = part.records
     measured: dict[str, Callable[[int], Floats]] = {
         "growth": lambda level: oscillation.growth_per_period(part, level),
-        "frequency": lambda level: oscillation.frequency(records[level]),
-        "phase_error": lambda level: oscillation.phase_error(records[level]),
+        "frequency": lambda level: oscillation.frequency(part, level),
+        "phase_error": lambda level: oscillation.phase_error(part, level),
     }
     known: dict[str, Callable[[int], Floats]] = {
         "growth": lambda level: predicted.growth_per_period(part, level),
@@ -80,8 +82,16 @@ def _theory(part: Part) -> Table:
         for name, of in functions.items():
             text, units = words[name]
             attrs = attributes(f"{adjective} {text}", units)
+            if functions is measured:
+                attrs["method"] = _method(part)
             table[f"{prefix}_{name}"] = Variable(OF_LEVEL, _by_level(part, of), attrs)
     return table
+
+
+def _method(part: Part) -> str:
+    """Say how growth and frequency were measured."""
+    seen = all(oscillation.has_recurrence(part, level) for level in part.grid.levels)
+    return RECURRENCE if seen else PEAKS
 
 
 def _different(part: Part) -> int:

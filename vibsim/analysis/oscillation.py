@@ -1,6 +1,9 @@
-"""What was measured of an oscillation: growth, frequency, phase error, from the peaks that every step was searched for.
+"""What was measured of an oscillation: growth, frequency, phase error.
 
-Shapes are (scheme, case). A number that does not exist is NaN: a growth needs two peaks.
+Of a linear, conservative model whose every step is stored they are those of the recurrence that the steps satisfy
+(`vibsim.analysis.recurrence`). Elsewhere they come from the peaks that every step was searched for.
+
+Shapes are (scheme, case). A number that does not exist is NaN: a growth by peaks needs two of them.
 
 Source: vibration text (B), sections 3.5 and 4.1, exercise 2.
 """
@@ -12,6 +15,7 @@ from numpy.typing import NDArray
 
 from vibsim.analysis.part import Part
 from vibsim.analysis.predicted import is_simple, natural_frequency
+from vibsim.analysis.recurrence import Motion, fitted
 from vibsim.analysis.series import safe_ratio
 from vibsim.record import Record
 from vibsim.schemes import SCHEMES
@@ -55,15 +59,32 @@ def growth_per_period(part: Part, level: int) -> Floats:
     """Return the factor by which the amplitude grows in a period.
 
     The period is the natural one where the model is linear, so that it can be compared with theory even where the
-    scheme's own period is far from it; else it is the measured one. Beyond a stability limit it is the growth over the
-    whole run, behind which the start is soon left.
+    scheme's own period is far from it; else it is the measured one. By peaks it is, beyond a stability limit, the
+    growth over the whole run, behind which the start is soon left.
     """
     record, index = part.records[level], part.grid.levels.index(level)
-    whole = growth_over_run(part, record)
-    if "peak" not in record:
-        return whole
-    beyond = part.omega_dt[:, index] > part.stability_limit
-    return np.where(beyond, whole, _per_period(part, record, *_kept(record)))
+    found = growth_over_run(part, record)
+    if "peak" in record:
+        beyond = part.omega_dt[:, index] > part.stability_limit
+        found = np.where(beyond, found, _per_period(part, record, *_kept(record)))
+    motion = _recurrence(part, level)
+    if motion is None:
+        return found
+    with np.errstate(over="ignore"):
+        own = np.exp(motion.log_growth * (2.0 * np.pi / part.omega_dt[:, index]))
+    return np.where(np.isfinite(own), own, found)
+
+
+def has_recurrence(part: Part, level: int) -> bool:
+    """Tell whether the steps of a level satisfy a recurrence that can be seen: a linear model, and no step left out."""
+    return is_simple(part) and int(np.asarray(part.records[level].attrs["every"])) == 1
+
+
+def _recurrence(part: Part, level: int) -> Motion | None:
+    """Return the recurrence of every run, where there is one."""
+    if not has_recurrence(part, level):
+        return None
+    return fitted(np.asarray(part.records[level][part.model.position], dtype=float))
 
 
 def growth_over_run(part: Part, record: Record) -> Floats:
@@ -85,17 +106,40 @@ def _per_period(part: Part, record: Record, factor: Floats, time: Floats) -> Flo
         return np.where(usable, np.exp(log), np.nan)
 
 
-def frequency(record: Record) -> Floats:
-    """Return 2 pi over the period."""
+def frequency(part: Part, level: int) -> Floats:
+    """Return the angular frequency: 2 pi over the period."""
+    by_peaks = _frequency_by_peaks(part.records[level])
+    motion = _recurrence(part, level)
+    if motion is None:
+        return by_peaks
+    p = part.omega_dt[:, part.grid.levels.index(level)]
+    own = motion.angle * (natural_frequency(part) / p)
+    return np.where(own > 0, own, by_peaks)
+
+
+def _frequency_by_peaks(record: Record) -> Floats:
     period = np.asarray(record["period"], dtype=float)
     return safe_ratio(np.full_like(period, 2 * np.pi), period)
 
 
-def phase_error(record: Record) -> Floats:
+def error_of_frequency(part: Part, level: int) -> Floats:
+    """Return the frequency over the exact one, less one."""
+    return np.asarray(frequency(part, level) * _exact_period(part, level) / (2 * np.pi) - 1.0)
+
+
+def phase_error(part: Part, level: int) -> Floats:
     """Return the exact period less the measured one: the time by which peaks come early, per period."""
+    found = frequency(part, level)
+    period = safe_ratio(np.full_like(found, 2 * np.pi), found)
+    return np.asarray(_exact_period(part, level) - period)
+
+
+def _exact_period(part: Part, level: int) -> Floats:
+    """Return the exact period, shape (case,); NaN where it is not known or infinite."""
+    record = part.records[level]
     if "exact_period" not in record:
-        return np.full_like(frequency(record), np.nan)
-    found = np.asarray(record["exact_period"] - record["period"], dtype=float)
+        return np.full(part.shape[1], np.nan)
+    found = np.asarray(record["exact_period"], dtype=float)
     return np.where(np.isfinite(found), found, np.nan)
 
 
@@ -106,7 +150,7 @@ def phase_error_slope(record: Record) -> Floats:
 
     It is the exact period less the slope of the times of the peaks: the phase of the motion drops out.
     """
-    missing = np.full_like(frequency(record), np.nan)
+    missing = np.full_like(_frequency_by_peaks(record), np.nan)
     if "exact_period" not in record or "peak_time" not in record:
         return missing
     time = np.asarray(record["peak_time"], dtype=float)[..., :FEWEST_EXTREMA]

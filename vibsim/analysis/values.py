@@ -161,10 +161,6 @@ def _at_level(of: Callable[[Part, int], Floats]) -> Callable[[Place], Floats]:
     return take
 
 
-def _error_of_frequency(p: Place) -> Floats:
-    return _quotient("exact_period", "period")(p) - 1.0
-
-
 def _own_norm(p: Place) -> Floats:
     """Return ``sqrt(dt sum (u_exact - u)^2 / T)`` over the stored points of a level (vibration text, section 2.2)."""
     data = p.data()
@@ -276,10 +272,10 @@ KNOWN: Mapping[str, Callable[[Place], Any]] = {
     "period_error": _period_error,
     "running_max": _running_max,
     "relative_running_max": _over_initial(_running_max),
-    "frequency": _measured(oscillation.frequency),
+    "frequency": _at_level(oscillation.frequency),
     "predicted_frequency": _at_level(predicted.frequency),
-    "error_of_frequency": _error_of_frequency,
-    "phase_error_per_period": _measured(oscillation.phase_error),
+    "error_of_frequency": _at_level(oscillation.error_of_frequency),
+    "phase_error_per_period": _at_level(oscillation.phase_error),
     "predicted_phase_error": _at_level(predicted.phase_error),
     "phase_error_slope": _measured(oscillation.phase_error_slope),
     "amplitude": _gathered("amplitude"),

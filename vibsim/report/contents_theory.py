@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vibsim.analysis.motion import PEAKS
 from vibsim.models import MODELS
 from vibsim.record import Record
 from vibsim.report import choice, finest, words
@@ -126,9 +127,12 @@ def predictions(record: Record) -> list[Table]:
         return []
     time = unit(record, "t") or "s"
     rate = unit(record, "theory_frequency") or f"rad/{time}"
+    by_peaks = record.variable("measured_growth").attrs.get("method") == PEAKS
     peaks = (
         "The measured numbers come from peaks interpolated by a parabola, which leaves an error of its own on coarse "
         "levels"
+        if by_peaks
+        else "The measured numbers are those of the recurrence that the computed steps satisfy"
     )
     growth = (
         "Theory beside measurement: growth of the amplitude per natural period, predicted by the matrix of one step. "

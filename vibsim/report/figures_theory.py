@@ -74,8 +74,8 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
         title="Theory beside measurement: growth and phase error per period",
         caption="Curves: what the matrix of one step predicts, solid where the amplitude grows or the peaks come "
         "early, dotted where it decays or they come late. Dots: what was measured. The slope of a curve is the order "
-        "of that error. A scheme without a curve at the top neither grows nor decays by theory; its dots are what the "
-        "interpolation of peaks leaves. Triangles at the upper edge are limits of stability.",
+        "of that error. A scheme without a curve at the top neither grows nor decays by theory; its dots are "
+        "what rounding or the interpolation of peaks leaves. Triangles at the upper edge are limits of stability.",
         alt="Growth per period and phase error per period of every scheme against w dt, predicted and measured",
         figure=figure_of(axes[0]),
     )

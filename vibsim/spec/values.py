@@ -84,7 +84,7 @@ _OSCILLATION = (
     Value("period_grid", "period, from peaks at grid points", "none"),
     Value("exact_period", "period of the exact solution", "none", ("case",), needs_exact="period"),
     Value("period_error", "period over the exact period, less one", "none", needs_exact="period"),
-    Value("frequency", "angular frequency, 2 pi over the period", "none"),
+    Value("frequency", "angular frequency of the computed motion", "none"),
     Value(
         "error_of_frequency",
         "angular frequency over that of the exact solution, less one",
