@@ -27,7 +27,7 @@ MEASURED = ROOT / "bench" / "measured.json"
 PAGE = ROOT / "docs" / "benchmarks.md"
 PARTS = (
     *("one_member", "many_members", "same_error", "same_error_many", "pipeline", "jobs"),
-    *("work_precision", "cost", "scale", "storage"),
+    *("work_precision", "lanes", "cost", "scale", "storage"),
 )
 
 

@@ -140,6 +140,15 @@ TARGETS = (
         at_least=True,
         note="why files are not compressed by default",
     ),
+    *(
+        Target(
+            f"explicit schemes, lane {lane}, {words}: cost over that of their force evaluations, the worst",
+            f"lanes.{lane}.{figure}",
+            1.3,
+        )
+        for lane in ("plain", "scalar", "blocks")
+        for figure, words in (("bare", "stepping alone"), ("gathering", "gathering"))
+    ),
     Target("round-off at level 24: increment over three-term", "round_off.ratio", 1e-4),
 )
 

@@ -34,6 +34,7 @@ from vibsim.engine.bound import (
     RATE,
     SERIES,
     SET,
+    STAGED,
     STATES,
     TWO_BEFORE,
     VELOCITY,
@@ -42,13 +43,16 @@ from vibsim.engine.bound import (
     energies,
     energies_fast,
     extrema_in,
+    kept_in,
     parameters_in,
     parameters_of,
     put_extrema,
     put_states,
+    stages_of,
     start,
     states_in,
     step,
+    step_end,
     step_fast,
     total,
 )
@@ -80,8 +84,8 @@ VECTOR = 8
 ROWS = ("DT", "ENERGY", "BOTTOM", "VELOCITY", "TWO_BEFORE", "INTERIOR", "ALIVE", "EVENT", "EXTREMA")
 """Rows behind the two sets, in their order. A kernel binds their numbers; from ``EXTREMA`` on stand the entries of
 `vibsim.engine.gather.Extrema`, from ``FIRST_PARAMETER`` on the parameters."""
-ROWS_D2T = ("RATE", "PENDING", "LARGEST_D2T")
-"""Rows behind the parameters."""
+ROWS_BEHIND = ("RATE", "PENDING", "LARGEST_D2T", "FIRST_KEPT")
+"""Rows behind the parameters; from the last one on stands what is kept from stage to stage."""
 
 
 def set_of(states: int, with_peaks: bool) -> int:
@@ -89,10 +93,9 @@ def set_of(states: int, with_peaks: bool) -> int:
     return states + (3 if with_peaks else 2)
 
 
-def n_rows(states: int, parameters: int, with_peaks: bool) -> int:
-    """Return how many rows a kernel needs."""
-    numbers = row_numbers(states, parameters, with_peaks)
-    return numbers[ROWS_D2T[-1]] + 1
+def n_rows(states: int, parameters: int, with_peaks: bool, kept: int) -> int:
+    """Return how many rows a kernel needs, `kept` of them from stage to stage (`vibsim.engine.stages`)."""
+    return row_numbers(states, parameters, with_peaks)["FIRST_KEPT"] + kept
 
 
 def row_numbers(states: int, parameters: int, with_peaks: bool) -> dict[str, int]:
@@ -100,7 +103,7 @@ def row_numbers(states: int, parameters: int, with_peaks: bool) -> dict[str, int
     behind = 2 * set_of(states, with_peaks)
     numbers = {name: behind + i for i, name in enumerate(ROWS)}
     first = numbers["EXTREMA"] + N_EXTREMA
-    last = {name: first + parameters + i for i, name in enumerate(ROWS_D2T)}
+    last = {name: first + parameters + i for i, name in enumerate(ROWS_BEHIND)}
     return numbers | {"FIRST_PARAMETER": first} | last
 
 
@@ -239,10 +242,15 @@ def step_even(rows: Any, filled: int, n: int) -> int:
 def step_block(rows: Any, old: int, new: int, filled: int, n: int) -> int:
     """Take step n of every lane; return whether one may have failed or left the range of a fast function."""
     bad = 0
+    if STAGED:
+        stages_of(rows, old, filled, n)
     for j in range(filled):
         h = rows[DT * LANES + j]
         state = states_in(rows, old, j)
-        following, own = step_fast(state, n * h, h, parameters_in(rows, j))
+        if STAGED:
+            following, own = step_end(state, n * h, h, parameters_in(rows, j), kept_in(rows, j))
+        else:
+            following, own = step_fast(state, n * h, h, parameters_in(rows, j))
         put_states(rows, new, j, following)
         u = state[0]
         rows[(new + STATES) * LANES + j] = u

@@ -24,6 +24,8 @@ SERIES = True
 """Whether samples are taken of the running maxima of the energy deviation, and of ``[D_2t u]``."""
 KEEP = True
 """Whether local extrema are kept one by one (`vibsim.engine.extrema`)."""
+STAGED = True
+"""Whether a step is cut into stages (`vibsim.engine.stages`)."""
 STATES = 1
 """Entries of the scheme's state."""
 SET = 4
@@ -31,11 +33,11 @@ SET = 4
 PARAMETERS = 1
 """Number of parameters."""
 DT, ENERGY, BOTTOM, VELOCITY, TWO_BEFORE, INTERIOR, ALIVE, EVENT, EXTREMA = range(8, 17)
-FIRST_PARAMETER, RATE, PENDING, LARGEST_D2T = range(26, 30)
+FIRST_PARAMETER, RATE, PENDING, LARGEST_D2T, FIRST_KEPT = range(26, 31)
 """Rows behind the two sets: step, initial energy, multiple of a turn below, velocity at this point, velocity two points
 before, largest deviation before this point, 1 for a lane that goes on, 1 for a lane with something to note, what is
 gathered at every step, the parameters; and where `D2T` is, ``1/(2 dt)``, the deviation by ``[D_2t u]`` at this point,
-and the largest one before."""
+and the largest one before; what is kept from stage to stage."""
 
 
 def called(function: F) -> F:
@@ -66,6 +68,23 @@ def step_fast(state: State, t: float, dt: float, p: P) -> tuple[State, float]:
     _unbound()
 
 
+def stages_of(rows: Any, old: int, filled: int, n: int) -> None:
+    """Take every stage but the last of step n of every lane (`vibsim.engine.stages`)."""
+    _unbound()
+
+
+def step_end(
+    state: State, t: float, dt: float, p: P, kept: tuple[float, ...]
+) -> tuple[State, float]:
+    """Return what `step_fast` does, from what the stages before have kept."""
+    _unbound()
+
+
+def kept_in(rows: Any, j: int) -> tuple[float, ...]:
+    """Return what the last stage takes of a lane."""
+    _unbound()
+
+
 def backward(state: State, dt: float) -> float:
     """Return the one-sided velocity at the present time (`vibsim.schemes.base.Stepper.backward`)."""
     _unbound()
@@ -78,6 +97,11 @@ def energies(u: float, v: float, t: float, p: P) -> tuple[float, float]:
 
 def energies_fast(u: float, v: float, t: float, p: P) -> tuple[float, float]:
     """Return what `energies` does, or NaN where a fast function is out of its range."""
+    _unbound()
+
+
+def energy_with(u: float, v: float, t: float, p: P, potential: float) -> float:
+    """Return the energy where the potential energy at this place and time is known."""
     _unbound()
 
 

@@ -16,8 +16,9 @@ from typing import Any
 
 from vibsim import expression
 from vibsim.elementary import ELEMENTARY, primitives
-from vibsim.engine import blocks, gather, loop, observe
+from vibsim.engine import blocks, loop, observe, rows
 from vibsim.engine.cache import Kernel, load
+from vibsim.engine.stages import stages
 from vibsim.engine.text import Module, collect, divided, with_quotients
 from vibsim.errors import SimulationError
 from vibsim.expression import Binary, Call, Compare, Expression
@@ -112,13 +113,17 @@ def source(
         "D2T": with_gathered and stepper.own_velocity,
         "SERIES": with_gathered and with_series,
         "KEEP": with_peaks,
+        "STAGED": bool(stages(stepper.step)),
         "STATES": states,
         "SET": blocks.set_of(states, with_peaks),
         "PARAMETERS": parameters,
         **blocks.row_numbers(states, parameters, with_peaks),
     }
     module = _module(lane, settings)
-    _put_formulas(module, model, "", stepper, is_rare=lane == "blocks")
+    again = lane != "blocks" and bool(settings["D2T"])
+    _put_formulas(module, model, "", stepper, is_rare=lane == "blocks", with_kinetic=again)
+    if again:
+        _put_energy_with(module, model)
     _put_start(module, stepper)
     for name in ("step", "backward"):
         collect(module, getattr(stepper, name), name, {})
@@ -129,9 +134,11 @@ def source(
         if stepper.implicit:
             # where an iteration ends is a comparison, which would hide the NaN of a fast function out of its range
             module.put("step_fast", _FULL_STEP)
+        elif settings["STAGED"]:
+            rows.put_stages(module, stepper, renamed, settings)
         else:
             collect(module, stepper.step, "step_fast", renamed)
-        for name, text in _rows(states, parameters, settings).items():
+        for name, text in rows.texts(states, parameters, settings).items():
             module.put(name, text)
     collect(module, blocks.run if lane == "blocks" else loop.run, "kernel", {})
     return module.text
@@ -148,6 +155,20 @@ def carried(stepper: Stepper, model: Model) -> int:
 def n_parameters(stepper: Stepper, model: Model) -> int:
     """Return how many parameters a member has: those of the model, and the factors of `Stepper.scaling` behind them."""
     return len(model.parameters) + (2 if stepper.scaling else 0)
+
+
+def _put_energy_with(module: Module, model: Model) -> None:
+    """Write the energy at another velocity, for which a potential energy is known unless it depends on that.
+
+    Uncompiled, nobody else would see that it is the same again.
+    """
+    known = (model.position, model.velocity, "t", *(row.name for row in model.parameters))
+    potential = expression.parse(model.potential_energy, known)
+    line = "kinetic = kinetic_energy(u, v, t, p)"
+    if model.velocity in expression.names_in(potential):
+        line = "kinetic, potential = energies(u, v, t, p)"
+    head = "@compiled\ndef energy_with(u, v, t, p, potential):"
+    module.put("energy_with", f"{head}\n    {line}\n    return kinetic + potential")
 
 
 def _put_start(module: Module, stepper: Stepper) -> None:
@@ -183,6 +204,7 @@ def _put_formulas(
     stepper: Stepper | None = None,
     *,
     is_rare: bool = False,
+    with_kinetic: bool = False,
 ) -> None:
     """Write the model's acceleration and energies as functions of ``(u, v, t, p)``, and what they call.
 
@@ -194,6 +216,8 @@ def _put_formulas(
         Whether they are seldom needed, so that elementary functions are not compiled into them.
     stepper
         For whom: an implicit one needs derivatives too, one with `Stepper.scaling` a factor.
+    with_kinetic
+        Whether the kinetic energy is needed for itself.
     """
     names = [parameter.name for parameter in model.parameters]
     known = (model.position, model.velocity, "t", *names)
@@ -211,13 +235,15 @@ def _put_formulas(
             "_by_position": expression.derivative(acceleration, model.position),
             "_by_velocity": expression.derivative(acceleration, model.velocity),
         }
+    if with_kinetic:
+        formulas["kinetic_energy"] = {"_kinetic": formulas["energies"]["_kinetic"]}
     is_scaled = stepper is not None and stepper.scaling is not None
     for function, results in formulas.items():
         lines = list(unpack)
         for result, formula in results.items():
             tree = _with_functions(module, formula, suffix, is_rare)
             lines += expression.to_statements(tree, result)
-            if is_scaled and function != "energies":
+            if is_scaled and function in HANDED:
                 lines.append(f"{result} = {result} * p[{len(names)}]")
         lines.append(f"return {', '.join(results)}")
         head = f"@compiled\ndef {function}{suffix}({model.position}, {model.velocity}, t, p):\n    "
@@ -263,32 +289,3 @@ def _is_whole(exponent: Expression) -> bool:
 def _nothing(node: Expression) -> Expression:
     """Return an expression that is 0, or NaN where `node` is not finite."""
     return Binary("-", node, node)
-
-
-def _rows(states: int, parameters: int, rows: Mapping[str, object]) -> dict[str, str]:
-    """Write the functions that move tuples into and out of the rows of `vibsim.engine.blocks`."""
-
-    def function(head: str, *lines: str) -> str:
-        return f"@compiled\ndef {head}:\n    " + "\n    ".join(lines)
-
-    def places(first: object, count: int) -> list[str]:
-        return [f"rows[({first} + {i}) * {blocks.LANES} + j]" for i in range(count)]
-
-    def get(name: str, argument: str, first: object, count: int) -> str:
-        return function(
-            f"{name}(rows, {argument}j)", f"return ({', '.join(places(first, count)) or '0.0'},)"
-        )
-
-    def put(name: str, argument: str, first: object, count: int) -> str:
-        lines = (f"{where} = values[{i}]" for i, where in enumerate(places(first, count)))
-        return function(f"{name}(rows, {argument}j, values)", *lines)
-
-    whole = " + ".join(f"state[{i}]" for i in range(states))
-    return {
-        "states_in": get("states_in", "first, ", "first", states),
-        "put_states": put("put_states", "first, ", "first", states),
-        "extrema_in": get("extrema_in", "", rows["EXTREMA"], gather.N_EXTREMA),
-        "put_extrema": put("put_extrema", "", rows["EXTREMA"], gather.N_EXTREMA),
-        "parameters_in": get("parameters_in", "", rows["FIRST_PARAMETER"], parameters),
-        "total": function("total(state)", f"return {whole}"),
-    }

@@ -16,6 +16,7 @@ from vibsim.engine.bound import (
     SERIES,
     backward,
     energies,
+    energy_with,
     parameters_of,
     start,
     step,
@@ -137,8 +138,7 @@ def run(
                 # that of the point before counts now that this one is sound, since it rests on it
                 largest_d2t = larger(pending, largest_d2t)
                 velocity_d2t = (following[0] - u_before) * rate
-                kinetic, potential = energies(u, velocity_d2t, t, p)
-                pending = abs((kinetic + potential) - energy_0)
+                pending = abs(energy_with(u, velocity_d2t, t, p, potential) - energy_0)
             if KEEP:  # noqa: SIM102
                 if is_turned(u_two_before, u_before, u):
                     note_turned(kept, counts, case, n - 1, h, u_two_before, u_before, u)

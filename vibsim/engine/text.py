@@ -70,14 +70,39 @@ def collect(
     SimulationError
         Where it uses something that cannot enter a kernel.
     """
+    enter(module, function, definition(function, name), name, renamed, is_called=is_called)
+
+
+def definition(function: Callable[..., Any], name: str) -> ast.FunctionDef:
+    """Return the parsed text of a function that is to stand under `name`.
+
+    Raises
+    ------
+    SimulationError
+        Where it is no plain function, so that it cannot enter a kernel.
+    """
     if not isinstance(function, types.FunctionType):
         raise SimulationError(f"{name} is no plain Python function, so it cannot enter a kernel")
     tree = ast.parse(inspect.cleandoc("\n" + inspect.getsource(function))).body[0]
     if not isinstance(tree, ast.FunctionDef):
         raise SimulationError(f"{name} is no function with a name, so it cannot enter a kernel")
+    return tree
+
+
+def enter(
+    module: Module,
+    function: Callable[..., Any],
+    tree: ast.FunctionDef,
+    name: str,
+    renamed: Mapping[str, str],
+    *,
+    is_called: bool = False,
+) -> None:
+    """Write the text `tree`, which is that of `function` or a part of it, under `name`: see `collect`."""
     _strip(tree, name)
     tree = _Settled(module.settings).visit(tree)
-    local = set(function.__code__.co_varnames) - set(HANDED)
+    arguments = {argument.arg for argument in tree.args.args}
+    local = (arguments | set(function.__code__.co_varnames)) - set(HANDED)
     mark = _mark(module, function, tree, is_called)
     names = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id not in local]
     for other in sorted({node.id for node in names} & function.__globals__.keys()):
@@ -141,7 +166,7 @@ def _strip(tree: ast.FunctionDef, name: str) -> None:
 
 
 class _Settled(ast.NodeTransformer):
-    """Leaves out what stands under ``if NAME:`` where a setting says no, and the question where it says yes."""
+    """Keeps of ``if NAME: ... else: ...`` what a setting says, without the question."""
 
     def __init__(self, settings: Mapping[str, object]) -> None:
         self.settings = settings
@@ -149,9 +174,9 @@ class _Settled(ast.NodeTransformer):
     def visit_If(self, node: ast.If) -> ast.AST | list[ast.stmt] | None:
         self.generic_visit(node)
         answer = self.settings.get(node.test.id) if isinstance(node.test, ast.Name) else None
-        if not isinstance(answer, bool) or node.orelse:
+        if not isinstance(answer, bool):
             return node
-        return node.body if answer else None
+        return (node.body if answer else node.orelse) or None
 
 
 def divided(a: float, b: float) -> float:

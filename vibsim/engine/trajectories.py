@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from vibsim.engine import blocks, extrema, gather
 from vibsim.engine.kernel import carried, kernel, observer
+from vibsim.engine.stages import kept_names
 from vibsim.models import Model
 from vibsim.schemes import Scheme
 from vibsim.schemes.base import END_RULES, Options, Stepper
@@ -168,8 +169,9 @@ def integrate(
     kept = np.full((extrema.N_KEPT, members if n_extrema else 0, n_extrema), np.nan)
     parameters = _scaled(model, stepper, parameters, dt)
     numbers = [np.ascontiguousarray(array, dtype=float) for array in (parameters, initial, dt)]
-    rows = blocks.n_rows(carried(stepper, model), parameters.shape[1], n_extrema > 0)
-    scratch = rows * blocks.LANES if lane == "blocks" else 0
+    scratch = (
+        _scratch(model, stepper, parameters.shape[1], n_extrema > 0) if lane == "blocks" else 0
+    )
     end_rule, turn = END_RULES.index(stepper.end), model.turn or 0.0
 
     def task(first: int) -> None:
@@ -185,6 +187,13 @@ def integrate(
         series=_series(samples) if with_series else None,
         extrema=_extrema(kept, counts) if n_extrema else None,
     )
+
+
+def _scratch(model: Model, stepper: Stepper, n_parameters: int, with_peaks: bool) -> int:
+    """Return how many floats of scratch memory a block needs."""
+    n_kept = len(kept_names(stepper.step))
+    n_rows = blocks.n_rows(carried(stepper, model), n_parameters, with_peaks, n_kept)
+    return n_rows * blocks.LANES
 
 
 def _scaled(model: Model, stepper: Stepper, parameters: Floats, dt: Floats) -> Floats:
