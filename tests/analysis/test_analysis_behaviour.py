@@ -83,11 +83,13 @@ def test_growth_that_contradicts_theory_fails_whatever_is_expected() -> None:
     checks = [{"stable": False}, {"stable": True}]
     run = spring(["central"], *checks, time=at_limit(1.01))
     level = run.levels[0]
-    last = level.variable("last_peak")
+    last, u = level.variable("last_peak"), level.variable("u")
     # half the growth, in the logarithm, that the scheme has
+    half = np.sqrt(np.abs(u.values))
     variables = {
         **level.variables,
         "last_peak": Variable(last.dims, np.sqrt(np.abs(last.values)), {}),
+        "u": Variable(u.dims, np.sign(u.values) * half, {}),
     }
     found = judged(run.experiment, {0: replace(level, variables=variables)})
     assert [v.status for v in run.verdicts] == ["PASS", "FAIL"]

@@ -107,7 +107,6 @@ def test_order_as_a_number_and_the_schemes_of_a_check() -> None:
         ),
         ({"value": "period"}, 2 * np.pi * (1 + 4.0**-7)),
         ({"value": "period_error", "at": {"level": 4}}, 4.0**-4),
-        ({"value": "frequency", "at": {"level": 4}}, 1 / (1 + 4.0**-4)),
         ({"value": "exact_period"}, 2 * np.pi),
         ({"value": "growth_factor"}, 1.5),
         (
@@ -129,6 +128,14 @@ def test_values(check: dict[str, Any], value: float) -> None:
     assert [v.status for v in found] == ["PASS", "FAIL", "PASS", "FAIL"]
     assert [v.reason for v in found] == ["match", "mismatch", "match", "mismatch"]
     assert found[0].results[0].value == pytest.approx(value, abs=1e-13)
+
+
+def test_without_every_step_the_frequency_is_that_of_the_period() -> None:
+    """That of the recurrence is tested in `test_analysis_recurrence`."""
+    exp = experiment()
+    part = part_of(exp, level_records(exp, every={4: 2}))
+    place = values.Place(part, {}, "", 4, None, None)
+    assert values.value("frequency", place) == pytest.approx(1 / (1 + 4.0**-4), rel=1e-15)
 
 
 def test_extrema_and_energies_over_every_step() -> None:
@@ -166,6 +173,7 @@ def test_numbers_that_rest_on_several_levels_are_those_of_the_registry() -> None
     found = {name for name in VALUES if sees_several_levels(name)}
     assert found == {
         "error_estimate_defect",
+        "error_rate",
         "observed_order",
         "ratio",
         "coincidence",

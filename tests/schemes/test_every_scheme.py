@@ -8,7 +8,6 @@ import pytest
 import scheme_runs as runs_of
 
 from vibsim import Experiment, analyse, simulate, verdicts
-from vibsim.engine import LANES
 from vibsim.models import MODELS
 from vibsim.schemes import FIXED_STEP, SCHEMES, NumberOption
 
@@ -68,8 +67,7 @@ def test_every_quantity_converges_with_the_promised_order(scheme, model):
             (result,) = verdict.results
             assert abs(result.order - order) < 0.05
             low, high = result.interval
-            # the interval is that of the scatter; the next power of dt is seen beyond it
-            assert low - 1e-3 <= order <= high + 1e-3
+            assert low <= order <= high
             assert high - low <= 0.1
 
 
@@ -144,20 +142,6 @@ def test_a_symmetric_scheme_runs_backwards_to_where_it_came_from(scheme, model):
     # 2 N steps round some ten terms of the size of the state, and errors of v move u for the time that is left
     bound = 2 * steps * 10 * UNIT * (1.0 + runs_of.END) * np.max(np.abs(there.position))
     assert (missed <= bound) == scheme.symmetric
-
-
-@pytest.mark.parametrize("scheme", FIXED)
-def test_lanes_give_the_same_bits(scheme):
-    """On a force that depends on all that it may; implicit steps have no lane of vector instructions."""
-    options = scheme.defaults()
-    model = runs_of.DRAGGED if scheme.velocity_forces else runs_of.DRIVEN
-    lanes = [lane for lane in LANES if scheme.explicit or lane != "blocks"]
-    plain, *others = (runs_of.run(scheme, model, options, 64, lane=lane, end=3.0) for lane in lanes)
-    assert np.isfinite(plain.position).all()
-    for other in others:
-        assert plain.position.tobytes() == other.position.tobytes()
-        assert plain.velocity.tobytes() == other.velocity.tobytes()
-        assert plain.gathered.deviation.tobytes() == other.gathered.deviation.tobytes()
 
 
 @pytest.mark.parametrize("scheme", FIXED)

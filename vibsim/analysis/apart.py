@@ -52,7 +52,7 @@ def apart(
         second = names.index(check.second)
         other, more = values[second], rounding(part, level, name, second, floor[second])
     elif check.second == "exact":
-        other, more = _exact(part, level, name)[first], _of_exact(part, level, values[first])
+        other, more = exact_series(part, level, name)[first], _of_exact(part, level, values[first])
     else:
         other, more = discrete(part, level, name)[first], 0.0 * bound
     inside = slice(1, -1) if name.endswith(CENTRED) else slice(None)
@@ -123,7 +123,7 @@ def _numbers(part: Part, level: int) -> tuple[Floats, Floats, Floats, Floats]:
     )
 
 
-def _exact(part: Part, level: int, name: str) -> Floats:
+def exact_series(part: Part, level: int, name: str) -> Floats:
     """Return the exact values at the stored times of a level, shape (scheme, case, t); NaN where they are not known."""
     record, model, plain = part.records[level], part.model, plain_name(name)
     shape = (*part.shape, len(record["t"]))

@@ -54,7 +54,7 @@ def growth_at(part: Part, level: int) -> Growth:
     broken = part.failed[..., index]
     growth = part.growth[..., index]
     grown = (growth > BLOWN_UP) & (at_limit | ~_removed(part, index))
-    measured = oscillation.growth_over_run(part, part.records[level])
+    measured = _measured(part, level)
     expected = predicted_growth(part, level)
     short = ~broken & predicted.is_simple(part) & beyond
     return Growth(
@@ -63,6 +63,13 @@ def growth_at(part: Part, level: int) -> Growth:
         measured=measured,
         predicted=expected,
     )
+
+
+def _measured(part: Part, level: int) -> Floats:
+    """Return the growth as `convergence.nc` has it, and where a run is too short for that the one over all of it."""
+    whole = oscillation.growth_over_run(part, part.records[level])
+    found = oscillation.growth_per_period(part, level)
+    return np.where(np.isfinite(found), found, whole)
 
 
 def predicted_growth(part: Part, level: int) -> Floats:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis import oscillation, predicted
-from vibsim.analysis.apart import discrete_error
+from vibsim.analysis.apart import discrete_error, exact_series
 from vibsim.analysis.compare import Comparison
 from vibsim.analysis.part import Part, energy_at_start
 from vibsim.analysis.series import largest, safe_ratio
@@ -164,9 +164,9 @@ def _at_level(of: Callable[[Part, int], Floats]) -> Callable[[Place], Floats]:
 def _own_norm(p: Place) -> Floats:
     """Return ``sqrt(dt sum (u_exact - u)^2 / T)`` over the stored points of a level (vibration text, section 2.2)."""
     data = p.data()
-    if data is None or f"{p.quantity}_exact" not in data:
+    if data is None or p.at_level is None:
         return p.missing
-    error = np.asarray(data[f"{p.quantity}_exact"] - data[p.quantity])
+    error = exact_series(p.part, p.at_level, p.quantity) - np.asarray(data[p.quantity], dtype=float)
     return np.asarray(np.sqrt(np.sum(error**2, axis=-1) / (error.shape[-1] - 1)))
 
 

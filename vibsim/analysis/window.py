@@ -31,6 +31,8 @@ GROWS = 1.3
 """The scatter drifts when it grows by more per level; a power lower by 1/2 makes it grow by 2^0.5."""
 LOUD = 10.0
 """Round-off may be so many times its predicted floor, an order of magnitude, and move the order accordingly."""
+LEAST_WIDTH = 1e-3
+"""Half the width of an interval at least: what is assumed of the powers beyond the next one carries no more digits."""
 LOG2 = float(np.log(2.0))
 
 
@@ -115,6 +117,8 @@ def trend(
         fade = _fade(spread, _at(scatter, last - 1), change, earlier)
         tail = np.where(fade < 1, change * fade / (1 - np.minimum(fade, FADING)), 0.0)
         width = np.where(several, _width(spread, change, tail, fade), np.abs(spread) / LOG2)
+        rounded = np.minimum(rest, SHOWS * np.abs(spread)) / LOG2
+        width = np.maximum(width, np.maximum(rounded, LEAST_WIDTH))
         settles = several & (fade <= FADING) & (np.abs(tail) <= tolerance)
         order = np.where(settles, local + tail, local)
         unexplained = np.abs(spread) > 3 * rest

@@ -86,8 +86,12 @@ def _modules(name: str) -> list[str]:
 
 @cache
 def _imports(module: str) -> frozenset[str]:
-    tree = ast.parse(_file(module).read_bytes())
-    found = {name for name in _named(tree) if name.split(".")[0] == "vibsim"}
+    return _imports_of(_file(module).read_bytes())
+
+
+@cache
+def _imports_of(source: bytes) -> frozenset[str]:
+    found = {name for name in _named(ast.parse(source)) if name.split(".")[0] == "vibsim"}
     return frozenset(name for name in found if _is_followed(name))
 
 
