@@ -297,7 +297,7 @@ def test_uneven_levels_are_rescaled_so_that_they_coincide():
         ({"checks": [{"claim": "it is round", "source": "a book", "holds": False,
                       "that": {"value": "period", "above": 100.0}},
                      {"converges": "omega", "order": 3, "schemes": ["central"]}]},
-         ["Claim: it is round", "Source: a book. Expected to be false. Measured by: period is above 100.0.",
+         ["Claim: it is round", "Source: a book. Expected to be false. Measured by: period is above 100.",
           "ω converges with order 3 ± 0.1 (l2 norm, scheme central)", "order_low"]),
     ],
 )  # fmt: skip

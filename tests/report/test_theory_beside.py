@@ -208,7 +208,7 @@ def test_runs_beyond_the_limit_show_predicted_and_measured_growth():
     )
     rec = samples.record(exp)
     picture = figures_growth.growing(exp, rec)
-    (entry,) = [t.get_text() for t in picture.figure.axes[1].get_legend().get_texts()]
+    (entry,) = [t.get_text() for t in picture.figure.axes[0].get_legend().get_texts()]
     assert words.number(float(rec["theory_growth"][0, 0, 0])) in entry
     assert words.number(float(rec["measured_growth"][0, 0, 0])) in entry
     assert figures_growth.growing(exp, samples.record(spring(schemes=["central"]))) is None

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from vibsim.spec.scheme_checks import ConservesCheck, EqualCheck, StableCheck
 
 
-def heading(check: Check) -> str:
+def heading(check: Check | Measurement) -> str:
     """Return the assertion of a check in one line."""
     if check.kind == "claim":
         return f"Claim: {check.claim}"
@@ -57,19 +57,35 @@ def _converges(check: ConvergesCheck) -> str:
     return f"{text}, expected to end as {check.expect.status}{why}"
 
 
-def _value(check: ValueCheck) -> str:
+def subject(check: Measurement) -> str:
+    """Return what is measured, and where, without what is expected of a number or of a difference."""
+    if check.kind == "equal":
+        return f"{words.symbol(check.quantity)} by {check.first}{_where(check)}"
+    if check.kind != "value":
+        return _measured(check)
     of = f" of {words.symbol(check.quantity)}" if check.quantity else ""
     places = ((key, getattr(check.at, key)) for key in ("t", "step", "level", "scheme", "case"))
     where = ", ".join(f"{key} {value}" for key, value in places if value is not None)
+    return f"{words.spoken(check.value)}{of}{f' at {where}' if where else ''}"
+
+
+def _value(check: ValueCheck) -> str:
     tolerances = [
-        f"{key} {value:g}"
+        f"{key} {words.readable(f'{value:g}')}"
         for key, value in (("rtol", check.rtol), ("atol", check.atol))
         if value is not None
     ]
     bounds = {"equals": check.equals, "is below": check.below, "is above": check.above}
-    rule = next((f"{verb} {value!r}" for verb, value in bounds.items() if value is not None), "")
+    rule = next(
+        (
+            f"{verb} {words.readable(repr(value))}"
+            for verb, value in bounds.items()
+            if value is not None
+        ),
+        "",
+    )
     extra = f" ({', '.join(tolerances)})" if tolerances else ""
-    return f"{check.value}{of}{f' at {where}' if where else ''} {rule}{extra}"
+    return f"{subject(check)} {rule}{extra}"
 
 
 def _stable(check: StableCheck) -> str:
@@ -94,7 +110,7 @@ def _conserves(check: ConservesCheck) -> str:
 def _equal(check: EqualCheck) -> str:
     known = {"exact": "the exact solution", "discrete": "the exact solution of its own steps"}
     other = known.get(check.second, check.second)
-    within = "round-off" if check.atol is None else f"{check.atol:g}"
+    within = "round-off" if check.atol is None else words.readable(f"{check.atol:g}")
     letter = words.symbol(check.quantity)
     return f"{letter} by {check.first} equals that of {other} to {within}{_where(check)}"
 

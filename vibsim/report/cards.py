@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 from vibsim.plan.versions import DRAWING, versions
 from vibsim.record import Record
-from vibsim.report import assertions, contents, contents_published, data, reasons, setting, words
+from vibsim.report import (
+    assertions,
+    briefs,
+    contents,
+    contents_published,
+    data,
+    reasons,
+    setting,
+    words,
+)
 from vibsim.report.tables import Cell, Column, Table
 from vibsim.spec.collection import ADHOC, ENDINGS
 from vibsim.vocabulary import BY_TOLERANCE
@@ -26,6 +35,10 @@ def context(
 ) -> dict[str, Any]:
     """Return the words of a page by the names that its template uses."""
     checks = _carded(experiment, summary)
+    asserted = {spec.id: spec for spec in experiment.checks}
+    plain = [check for check in checks if briefs.is_plain(asserted.get(check["id"]), check)]
+    plain = plain if len(checks) >= briefs.MANY else []
+    full = [check for check in checks if check not in plain]
     return {
         "collection": experiment.collection,
         "name": experiment.name,
@@ -34,7 +47,11 @@ def context(
         "status": summary["status"],
         "sentence": words.overall(summary),
         "unsettled": words.unsettled(summary),
-        "checks": [card(experiment, record, check) for check in checks],
+        "checks": [card(experiment, record, check) for check in full],
+        "plain": [
+            card(experiment, record, check) | briefs.row(asserted[check["id"]], check)
+            for check in plain
+        ],
         "brief": len(checks) > BRIEF,
         "failures": contents.failures(summary, record),
         "unlisted": _unlisted(summary),
@@ -103,7 +120,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         "meaning": explained.meaning,
         "needs": explained.needs,
         "advice": words.told(check, "advice"),
-        "expected": words.expectation(check.get("expected")),
+        "expected": words.readable(words.expectation(check.get("expected"))),
         "factor": _factor(check),
         "results": _results(record, check),
         "more": _more(check),
@@ -132,7 +149,9 @@ def _results(record: Record, check: Mapping[str, Any]) -> Table | None:
     columns += (
         [Column("order", form="order"), Column("interval"), Column("levels")] if measured else []
     )
-    columns += [Column("value", form="value")] if valued else []
+    # how far apart two solutions are has no digits worth reading, a number that a check names may have
+    form = "small" if check.get("kind") == "equal" else "value"
+    columns += [Column("value", form=form)] if valued else []
     rows = [tuple(_cells(record, r, sweep, measured, valued)) for r in results]
     return Table(f"results_{check['id']}", "Measured", tuple(columns), tuple(rows))
 

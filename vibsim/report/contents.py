@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -69,14 +69,30 @@ def orders(
     )  # fmt: skip
     rows = [row for member in shown for row in _order_rows(record, quantity, member, norm, sweep)]
     letter = words.symbol(quantity)
+    pairs, triples = bool(whole(record, "pair")), bool(whole(record, "triple"))
+    missing = () if triples else ("ratio", "order", "counts") if pairs else COMPARED
+    caption = f"{letter}: {norm} norm of {letter}(level) − {letter}(next level)"
+    caption += "; ratio and order from three levels starting here" if triples else ""
+    columns, rows = without(missing, columns, rows)
     return Table(
         f"orders_{quantity}_{norm}",
-        f"{letter}: {norm} norm of {letter}(level) − {letter}(next level); "
-        "ratio and order from three levels starting here",
+        caption if pairs else f"{letter}: {norm} norm of its error",
         columns,
         tuple(rows),
         heads=2 if sweep else 0,
     )
+
+
+COMPARED = ("difference", "ratio", "order", "counts")
+"""Columns that take several levels."""
+
+
+def without(
+    names: Sequence[str], columns: tuple[Column, ...], rows: Iterable[tuple[Cell, ...]]
+) -> tuple[tuple[Column, ...], list[tuple[Cell, ...]]]:
+    """Return columns and rows without the columns of these headers."""
+    kept = [i for i, column in enumerate(columns) if column.header not in names]
+    return tuple(columns[i] for i in kept), [tuple(row[i] for i in kept) for row in rows]
 
 
 def _order_rows(
@@ -162,7 +178,11 @@ def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
     caption = (
         "Largest energy deviation over every step; the last point has an end formula of its own"
     )
-    return Table("energy_maxima", caption, tuple(columns), tuple(rows), int(bool(swept(record))))
+    several = len(whole(record, "level")) > 1
+    missing = [c.header for c in columns if c.header.startswith("ratio") and not several]
+    shown_columns, shown_rows = without(missing, tuple(columns), rows)
+    heads = int(bool(swept(record)))
+    return Table("energy_maxima", caption, shown_columns, tuple(shown_rows), heads)
 
 
 def _ratio(values: Any, i: int) -> float:

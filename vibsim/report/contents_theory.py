@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 MEMBER = ("scheme", "case")
 OF_LEVEL = ("scheme", "case", "level")
+LIMITS = {0.0: "never", math.inf: "any"}
+"""Words for limits of stability that are no number."""
 EDGE = 1e-9
 """Relative distance within which a step counts as lying on the limit of stability."""
 
@@ -66,19 +68,21 @@ def schemes(experiment: Experiment, record: Record) -> Table | None:
     ]  # fmt: skip
     for quantity in quantities:
         letter = words.symbol(quantity)
-        columns += [
-            Column(f"order of {letter}, stated", form="step"),
-            Column("measured, ± half its interval", form="order"),
-        ]
+        columns.append(Column(f"order of {letter}, stated", form="step"))
+        if whole(record, "triple"):
+            columns.append(Column("measured, ± half its interval", form="order"))
     rows = tuple(tuple(_scheme(experiment, record, s, quantities)) for s in range(len(names)))
     several = (
         "; of a sweep the member whose order is farthest from the stated one"
         if swept(record)
         else ""
     )
+    measured = (
+        f", and the order measured in the {TYPICAL_NORM} norm" if whole(record, "triple") else ""
+    )
     caption = (
-        "Schemes: what each states (explicit or implicit, s: symplectic), and the order measured in the "
-        f"{TYPICAL_NORM} norm (∞: exact, there is no error to shrink){several}"
+        f"Schemes: what each states (explicit or implicit, s: symplectic){measured} (order ∞: exact, there is no "
+        f"error to shrink){several if measured else ''}"
     )
     return Table("schemes", caption, tuple(columns), rows)
 
@@ -94,7 +98,9 @@ def _scheme(
     yield from (named, scheme.family, ", ".join(words_of))
     yield None if scheme.adaptive else scheme.force_evaluations
     limit = _alike(known(record, "stability_limit", MEMBER)[s])
-    yield Written(0.0, "never") if limit == 0.0 else limit
+    if isinstance(limit, float):
+        limit = Written(limit, LIMITS.get(limit, words.number(limit, "step")))
+    yield limit
     for quantity in quantities:
         formal = formal_orders(record, quantity)[s]
         value, low, high = (part[s] for part in finest.orders(record, quantity))
@@ -102,7 +108,8 @@ def _scheme(
             away = np.abs(value - formal)
         case = int(np.argmax(np.where(np.isfinite(away), away, -1.0)))
         yield _alike(formal)
-        yield _with_interval(float(value[case]), 0.5 * float(high[case] - low[case]))
+        if whole(record, "triple"):
+            yield _with_interval(float(value[case]), 0.5 * float(high[case] - low[case]))
 
 
 def _with_interval(order: float, half: float) -> Cell:

@@ -15,7 +15,7 @@ from vibsim.record import Record
 from vibsim.report import style, words
 from vibsim.report.choice import position
 from vibsim.report.contents_theory import MEMBER, OF_LEVEL, everyone, omega_dt
-from vibsim.report.data import Member, at, exact_series, known, largest, times, unit, whole
+from vibsim.report.data import Floats, Member, at, exact_series, known, largest, times, unit, whole
 from vibsim.report.figures_phase import of_level
 from vibsim.report.panels import figure_of, panels
 from vibsim.report.style import Picture
@@ -31,6 +31,8 @@ WHOLE = 4.0
 """On a linear scale the solution is drawn up to so many times the exact one."""
 HIGHEST = 1e250
 """Sizes beyond are not drawn."""
+SEEN = 0.2
+"""Only runs that stay within the frame for so much of the time are drawn beside the exact solution."""
 BEYOND = 100.0
 """What is beyond so many times the exact solution is not drawn on that scale, so that curves leave the frame."""
 
@@ -58,9 +60,9 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
             if largest(exact) > 0.0
             else np.isfinite(values)
         )
-        axes[0].plot(
-            *style.thin(t, np.where(within, values, np.nan)), color=look["color"], linewidth=1.2
-        )
+        if k == 0 or _stays(values, largest(exact)):
+            x, y = style.thin(t, np.where(within, values, np.nan))
+            axes[0].plot(x, y, color=look["color"], linewidth=1.2)
         size = style.no_zeros(values)
         # the margin of an axis would overflow beyond
         size = np.where(size < HIGHEST, size, np.nan)
@@ -73,9 +75,7 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
         sizes.append(size[np.isfinite(size)])
         _envelope(axes[1], record, member, level, largest(exact), look["color"])
         if k == 0 and np.isfinite(exact).any():
-            axes[0].plot(
-                *style.thin(t, exact), color="black", linestyle=(0, (1, 2)), label="exact", zorder=5
-            )
+            axes[0].plot(*style.thin(t, exact), color="black", linestyle=(0, (1, 2)), zorder=5)
     if reference > 0.0:
         axes[0].set_ylim(-WHOLE * reference, WHOLE * reference)
     found = np.concatenate([part for part in sizes if part.size] or [np.array([1.0])])
@@ -84,17 +84,26 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
     axes[0].set_ylabel(style.label(letter, measure))
     axes[1].set_ylabel(style.label(f"|{letter}|", measure))
     axes[0].set_title(
-        f"The beginning: exact beside growing, up to {WHOLE:g} times the exact solution"
+        f"The slowest beside the exact solution (dotted), up to {WHOLE:g} times its size"
     )
     axes[1].set_title("Size of the solution, and the predicted growth (dashed)")
     axes[1].set_xlabel(style.label("t", unit(record, "t") or "s"))
-    if axes[0].get_legend_handles_labels()[0]:
-        style.beside(axes[0], fontsize=8)
-    style.beside(axes[1], fontsize=8)
+    # one legend for both panels
+    handles, texts = axes[1].get_legend_handles_labels()
+    axes[0].legend(
+        handles,
+        texts,
+        loc="upper left",
+        bbox_to_anchor=(1.01, 1.03),
+        borderaxespad=0.0,
+        fontsize=8,
+        handlelength=1.4,
+    )
     return Picture(
         name="growing",
         title="Unstable runs: growth predicted and measured",
-        caption="Runs whose w dt is at or beyond the limit of stability of their scheme. On the logarithmic scale a "
+        caption="Runs whose w dt is at or beyond the limit of stability of their scheme; the legend has the factor by "
+        "which the amplitude grows in each natural period, measured and by theory. On the logarithmic scale a "
         "constant factor in every step is a straight line; it should become parallel to the dashed one, the factor "
         "that the matrix of one step predicts. How far above or below depends on the start.",
         alt=f"{words.name(quantity)} of unstable runs against time, linear and logarithmic, with the predicted growth",
@@ -127,8 +136,13 @@ def _label(record: Record, member: Member, level: int) -> str:
         at(record, f"{who}_growth", member, level=level).item() for who in ("theory", "measured")
     )
     product = float(omega_dt(record)[member.case, level])
-    numbers = f"\n× {words.number(told)} a period (theory)\n× {words.number(seen)} (measured)"
+    numbers = f"\n× {words.number(seen)}, theory {words.number(told)}"
     return style.entry(f"{member.scheme_name}, w dt = {words.number(product, 'step')}{numbers}")
+
+
+def _stays(values: Floats, size: float) -> bool:
+    """Say whether a solution stays within the upper panel for a notable part of the time."""
+    return bool(np.mean(np.abs(values) <= WHOLE * size) >= SEEN)
 
 
 def _envelope(

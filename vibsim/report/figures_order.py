@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from vibsim.spec import Experiment
 
 LEGEND_COLUMNS = 5
+WILD = 1e4
+"""Errors beyond so many times the upper quartile leave the frame."""
 
 
 def against_step(experiment: Experiment, record: Record, quantity: str, case: int) -> Picture:
@@ -175,9 +177,15 @@ def _positive(parts: list[Floats]) -> Floats:
     return joined if joined.size else np.array([1.0])
 
 
+def _highest(values: Floats) -> float:
+    """Return the largest value that a range holds: an unstable level would hide all others."""
+    return min(float(values.max()), WILD * float(np.quantile(values, 0.75)), style.LARGEST)
+
+
 def _reference(ax: Axes, dt: Floats, seen: list[Floats], order: float) -> bool:
     """Draw the promised slope a little above the largest value at the coarsest step, and say whether there is room."""
-    start = 2.5 * max((float(part[0]) for part in seen if np.isfinite(part[0])), default=1.0)
+    coarsest = np.array([part[0] for part in seen if np.isfinite(part[0])] or [1.0])
+    start = 2.5 * _highest(coarsest)
     lowest = _positive(seen).min()
     reach = dt[start * (dt / dt[0]) ** order >= lowest]
     is_drawn = bool(reach.size > 1 and start > 0)
@@ -196,7 +204,7 @@ def _reference(ax: Axes, dt: Floats, seen: list[Floats], order: float) -> bool:
 def _step_limits(ax: Axes, dt: Floats, seen: list[Floats], floors: list[Floats]) -> bool:
     """Set the ranges; show the floor, and say so, only where the data come within three decades of it."""
     values = _positive(seen)
-    low, high = float(values.min()), min(float(values.max()), style.LARGEST)
+    low, high = float(values.min()), _highest(values)
     floor = float(_positive(floors).max())
     near = floor > 1e-3 * low
     bottom = min(low, floor) if near else low

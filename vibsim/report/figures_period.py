@@ -13,7 +13,7 @@ from vibsim.report.data import Floats, exact_periods, whole
 from vibsim.report.figures_sweep import MARKED, finish, interval, line
 from vibsim.report.finest import Measured
 from vibsim.report.layout import Along
-from vibsim.report.panels import figure_of, panels
+from vibsim.report.panels import explosive, figure_of, panels
 from vibsim.report.style import Picture
 
 if TYPE_CHECKING:
@@ -33,19 +33,20 @@ def period(experiment: Experiment, record: Record, along: Along) -> Picture | No
     if known:
         _draw_errors(axes[1], record, along, found)
     marked = finish(axes, experiment, along)
-    caption = (
-        "Top: the measured period, with its error bar from the two finest levels, and the exact one. Bottom: its "
-        "relative error; from level to level it should fall by the same factor, so lines of successive levels are "
-        "evenly spaced, and where they are not the coarse levels are too coarse. Grey: the error that the two finest "
-        "levels predict for the finest without knowing the exact period."
+    several = bool(whole(record, "pair"))
+    bars = ", with its error bar from the two finest levels" if several else ""
+    caption = f"Top: the measured period{bars}, and the exact one. Bottom: its relative error"
+    caption += (
+        "; from level to level it should fall by the same factor, so lines of successive levels are evenly spaced, "
+        "and where they are not the coarse levels are too coarse. Grey: the error that the two finest levels predict "
+        "for the finest without knowing the exact period."
+        if several
+        else "."
     )
     return Picture(
         name="period",
         title="Period over the swept parameter",
-        caption=(
-            caption if known else "The measured period on the finest level, with its error bar."
-        )
-        + marked,
+        caption=(caption if known else f"The measured period on the finest level{bars}.") + marked,
         alt="Period and its relative error against the swept parameter",
         figure=figure_of(axes[0]),
     )
@@ -56,29 +57,39 @@ def amplitude(experiment: Experiment, record: Record, along: Along) -> Picture |
     found = finest.amplitude(record, position(experiment))
     if not np.isfinite(found.value).any():
         return None
-    axes = panels([2.0, 1.5])
+    several = bool(whole(record, "pair"))
+    axes = panels([2.0, 1.5] if several else [3.7 if style.crowded(record) else 2.2])
     for ax in axes:
         # amplitudes that hardly differ need long numbers
         ax.yaxis.set_label_coords(-0.115, 0.5)
     _draw(axes[0], record, along, found, None)
+    if explosive([found.value.ravel()]):
+        _log_limits(axes[0], found.value)
+    if several:
+        _draw_error_bars(axes[1], record, along, found)
+    below = " Bottom: its error, estimated from the two finest levels. Members that go over the top have no amplitude."
+    marked = finish(axes, experiment, along)
+    return Picture(
+        name="amplitude",
+        title="Amplitude over the swept parameter",
+        caption=f"{'Top: half' if several else 'Half'} the height between the last peak and the last trough, on the "
+        f"finest level.{below if several else ''}{marked}",
+        alt=f"Amplitude{' and its estimated error' if several else ''} against the swept parameter",
+        figure=figure_of(axes[0]),
+    )
+
+
+def _draw_error_bars(ax: Axes, record: Record, along: Along, found: Measured) -> None:
+    """Draw the estimated error of a number of the finest level."""
     for s, scheme in enumerate(record.words("scheme")):
         for k, (_, members) in enumerate(along.lines):
             error = style.no_zeros(found.error[s, members])
             look = style.look(s if len(along.lines) == 1 else s + k)
             text = "" if k else style.entry(scheme)
-            line(axes[1], along.key.values[members], error, **look | {"markersize": 4}, label=text)
-    _log_limits(axes[1], found.error)
-    axes[1].set_ylabel(style.label("estimated error", found.unit))
-    axes[1].set_title("Error bar of the amplitude")
-    marked = finish(axes, experiment, along)
-    return Picture(
-        name="amplitude",
-        title="Amplitude over the swept parameter",
-        caption="Top: half the height between the last peak and the last trough, on the finest level. Bottom: its "
-        f"error, estimated from the two finest levels. Members that go over the top have no amplitude.{marked}",
-        alt="Amplitude and its estimated error against the swept parameter",
-        figure=figure_of(axes[0]),
-    )
+            line(ax, along.key.values[members], error, **look | {"markersize": 4}, label=text)
+    _log_limits(ax, found.error)
+    ax.set_ylabel(style.label("estimated error", found.unit))
+    ax.set_title(f"Error bar of the {found.name}")
 
 
 def _draw(ax: Axes, record: Record, along: Along, found: Measured, exact: Floats | None) -> None:
@@ -91,14 +102,14 @@ def _draw(ax: Axes, record: Record, along: Along, found: Measured, exact: Floats
             line(ax, x, values, color="black", linewidth=1.0, label="" if k else "exact", zorder=1)
         for s, scheme in enumerate(schemes):
             value, error = found.value[s, members], found.error[s, members]
-            label = _text(scheme if len(schemes) > 1 else "", name, f"level {level}")
+            label = _text(scheme if len(schemes) > 1 else "", name) or f"level {level}"
             look = _mark(s, s + k, len(schemes))
             interval(ax, x, value - error, value + error, look["color"])
             line(ax, x, value, linestyle="none" if x.size <= MARKED else "-", label=label, **look)
     ax.set_ylim(*_room(found, exact))
     ax.set_ylabel(style.label(found.name, found.unit))
-    ax.set_title(found.name.capitalize())
-    style.beside(ax, fontsize=8)
+    ax.set_title(f"{found.name.capitalize()}, level {level}")
+    style.beside(ax, fontsize=7.5 if style.crowded(record) else 8)
 
 
 def _room(found: Measured, exact: Floats | None) -> tuple[float, float]:

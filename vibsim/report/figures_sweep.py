@@ -28,7 +28,8 @@ MARKED = 60
 def orders(experiment: Experiment, record: Record, along: Along, quantity: str) -> Picture:
     """Draw the stated order of every member and its error, with their intervals, and the verdict as a strip below."""
     schemes, letter = record.words("scheme"), words.symbol(quantity)
-    axes = panels([2.3, 1.9, 0.3 * max(2, len(schemes))])
+    row = 0.17 if style.crowded(record) else 0.3
+    axes = panels([2.3, 1.9, row * max(2, len(schemes))])
     _draw_orders(axes[0], experiment, record, along, quantity)
     is_known = _draw_errors(axes[1], record, along, quantity)
     _draw_verdicts(axes[2], along, flags(record, f"{quantity}_status"), schemes)
@@ -162,16 +163,25 @@ def _draw_verdicts(ax: Axes, along: Along, status: NDArray[Any], schemes: list[s
             ys,
             linestyle="none",
             marker=style.STATUS_MARKERS[word],
-            markersize=5,
+            markersize=3.5 if len(schemes) > style.MANY else 5,
             color=style.STATUS_COLOURS[word],
             markeredgecolor="black",
             markeredgewidth=0.3,
             label=f"{word} ({int((status == word).sum())})",
             clip_on=False,
         )
-    # long names have the room at the left where there are many, at the price of their size
-    size = 5.5 if len(schemes) > style.MANY else 8.5
-    ax.set_yticks(np.arange(len(schemes)) + 0.17, schemes, fontsize=size)
+    many = len(schemes) > style.MANY
+    ax.set_yticks(np.arange(len(schemes)) + 0.17, schemes, fontsize=8.0 if many else 8.5)
     ax.set_ylim(-0.3, len(schemes) - 0.3)
     ax.grid(visible=False, axis="y")
-    style.beside(ax, handlelength=1.2)
+    if not many:
+        style.beside(ax, handlelength=1.2)
+        return
+    # there is room for many names at the right only, and for the legend then above
+    ax.tick_params(axis="y", left=False, labelleft=False, labelright=True)
+    place: dict[str, Any] = {
+        "loc": "lower left",
+        "bbox_to_anchor": (0.0, 1.0),
+        "borderaxespad": 0.1,
+    }
+    ax.legend(ncols=3, fontsize=8, handlelength=1.2, **place)

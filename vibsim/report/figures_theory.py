@@ -5,6 +5,7 @@ Source: vibration text, sections 4.1 to 4.6, and exercise 2; theory from the mat
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -62,7 +63,7 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
             else:
                 _signed(ax, grid, curve[k], look["color"])
             _dots(ax, p, found[s], look, style.entry(name))
-        _finish(ax, np.concatenate([told.ravel(), found.ravel()]), limits, grid)
+        _finish(ax, told, found, limits, grid)
     axes[0].set_ylabel("|growth per period − 1|")
     axes[0].set_title("Growth of the amplitude: filled grows, hollow decays")
     axes[1].set_ylabel("|phase error| / period")
@@ -130,9 +131,17 @@ def _dots(ax: Axes, p: Floats, y: Floats, look: dict[str, Any], text: str) -> No
         ax.plot(p[keep], size[keep], **mark, markerfacecolor=face, zorder=3)
 
 
-def _finish(ax: Axes, values: Floats, limits: Floats, grid: Floats) -> None:
-    """Choose both logarithmic ranges, and mark the limits of stability at the upper edge."""
-    size = np.abs(values[np.isfinite(values) & (np.abs(values) >= SMALLEST)])
+def _finish(ax: Axes, told: Floats, found: Floats, limits: Floats, grid: Floats) -> None:
+    """Choose both logarithmic ranges, and mark the limits of stability at the upper edge.
+
+    The range is that of theory, as far as it predicts anything but zero, and of what lies above: far below there is
+    round-off only.
+    """
+    predicted_size = told[np.isfinite(told) & (np.abs(told) >= SMALLEST)]
+    lowest = float(np.min(np.abs(predicted_size), initial=np.inf))
+    least = lowest / 10.0 if math.isfinite(lowest) else SMALLEST
+    values = np.concatenate([told.ravel(), found.ravel()])
+    size = np.abs(values[np.isfinite(values) & (np.abs(values) >= least)])
     if size.size == 0:
         style.remark(ax, "theory and measurement agree: there is none")
         ax.set(yticks=[])

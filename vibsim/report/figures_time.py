@@ -184,7 +184,11 @@ def _draw_ratios(
             **look,
         )
     if not drawn:
-        note = "nothing to divide: every difference is within round-off, or zero"
+        note = (
+            "no ratio means anything: the runs grow without bound, or break down"
+            if any(above)
+            else "nothing to divide: every difference is within round-off, or zero"
+        )
         ax.text(0.5, 0.7, note, transform=ax.transAxes, ha="center", color=style.GREY)
     triples = [(levels[i], levels[i + 1], levels[i + 2]) for i in chosen]
     targets = sorted({float(target_ratio(order, triple)) for triple in triples})

@@ -110,7 +110,9 @@ def over_members(experiment: Experiment, record: Record, found: list[str]) -> li
                 drawn.append(figures_map.verdicts(experiment, record, grid, quantity, scheme))
             elif along is None:
                 drawn.append(figures_cloud.projections(experiment, record, keys, quantity, scheme))
-        drawn.append(figures_spread.histograms(experiment, record, quantity))
+        if data.whole(record, "pair"):
+            # the verdict that colours them is on the order
+            drawn.append(figures_spread.histograms(experiment, record, quantity))
     if grid is not None:
         drawn += [figures_map.numbers(experiment, record, grid, scheme) for scheme in schemes]
     return [picture for picture in drawn if picture is not None]

@@ -106,6 +106,7 @@ def write(
         _replace(directory / "tables", tables)
     context = cards.context(experiment, convergence, summary, provenance) | {
         "tables": listed,
+        "several": len(data.whole(convergence, "level")) > 1,
         "folded": folded,
         "printed": printed,
         "printed_sentence": contents_published.sentence(printed),

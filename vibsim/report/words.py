@@ -76,12 +76,46 @@ def broken(summary: Mapping[str, Any]) -> int:
 def told(check: Mapping[str, Any], field: str = "text") -> str:
     """Return a text of a check with the letter of its quantity; a claim's own words and code stay as they are."""
     text, quantity = str(check[field] or ""), check.get("quantity")
-    if not quantity:
-        return text
     claim, mark, measured = text.rpartition(_MEASURED)
     parts = measured.split("`")
-    parts[::2] = [re.sub(rf"\b{re.escape(quantity)}\b", symbol(quantity), p) for p in parts[::2]]
+    if quantity:
+        letter = symbol(quantity)
+        parts[::2] = [re.sub(rf"\b{re.escape(quantity)}\b", letter, p) for p in parts[::2]]
+    parts[::2] = map(readable, parts[::2])
     return claim + mark + "`".join(parts)
+
+
+_POWER = re.compile(r"(?<![\w.])(-?)(\d+(?:\.\d+)?)e([-+]?\d+)(?!\w)")
+_LONG = re.compile(r"(?<![\w.])\d+\.(?:0\b|\d{9,})(?![\w.]*\w)")
+_NAMED = re.compile(r"(?<!scheme )\b[a-z0-9]+(?:_[a-z0-9]+)+(?=(?: of | is | at ))")
+
+
+def readable(text: str) -> str:
+    """Return a machine's sentence with no more digits than say something, powers of ten and names in words."""
+    text = re.sub(
+        r"\bstability_limit is 0;", "it grows at every step, so its stability_limit is 0;", text
+    )
+    text = _NAMED.sub(lambda found: spoken(found[0]), text)
+    text = _LONG.sub(lambda found: f"{float(found[0]):.10g}", text)
+    return _POWER.sub(_raised, text)
+
+
+def spoken(value: str) -> str:
+    """Write the name of a value as words; what is no such name stays as it is."""
+    from vibsim.spec.values import VALUES
+
+    return value.replace("_d2t", " by [D₂ₜu]").replace("_", " ") if value in VALUES else value
+
+
+def _raised(found: re.Match[str]) -> str:
+    sign, mantissa, exponent = found.groups()
+    shown = mantissa if len(mantissa) <= MOST_DIGITS else f"{float(mantissa):.10g}"
+    ten = power(int(exponent))
+    return f"{sign}{ten}" if float(mantissa) == 1.0 else f"{sign}{shown}·{ten}"
+
+
+MOST_DIGITS = 11
+"""Characters of a mantissa that are read."""
 
 
 _MEASURED = " Measured: the statement "
@@ -104,8 +138,8 @@ def number(value: Any, form: str = "norm") -> str:
         A number, or None; NaN and None give a dash.
     form
         ``norm``: 4 significant digits; ``small``: the same, always with a power of ten; ``order``: 3 decimals;
-        ``integer``; ``close``, ``full``: 8 and 10 significant digits; ``brief``: 2; ``step``, ``value``: up to 6 and
-        15 significant digits, no trailing zeros.
+        ``integer``; ``close``, ``full``: 7 and 10 significant digits; ``brief``: 2; ``step``, ``value``: up to 6 and
+        12 significant digits, no trailing zeros.
     """
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "–"
@@ -123,7 +157,7 @@ def number(value: Any, form: str = "norm") -> str:
 
 
 DIGITS: Mapping[str, int] = MappingProxyType(
-    {"brief": 2, "close": 8, "full": 10, "step": 6, "value": 15}
+    {"brief": 2, "close": 7, "full": 10, "step": 6, "value": 12}
 )
 """Significant digits of forms."""
 
