@@ -435,8 +435,8 @@ def test_an_extremum_that_is_accepted_is_measured(name: str, quantity: str) -> N
     assert np.isfinite(analyse_records(experiment, records)["check_value"]).all()
 
 
-def change_model(monkeypatch: pytest.MonkeyPatch, **changes: Any) -> None:
-    models = {**MODELS, "pendulum": replace(MODELS["pendulum"], **changes)}
+def change_model(monkeypatch: pytest.MonkeyPatch, kind: str = "pendulum", **changes: Any) -> None:
+    models = {**MODELS, kind: replace(MODELS[kind], **changes)}
     monkeypatch.setattr(building, "MODELS", models)
 
 
@@ -446,15 +446,16 @@ def test_nothing_is_compared_with_an_exact_value_that_is_not_known(
     monkeypatch: pytest.MonkeyPatch, name: str, lost: str
 ) -> None:
     of = {} if VALUES[name].of == "none" else {"quantity": "theta"}
-    changes = check(value=name, below=1, **of)
+    kind = "linear_pendulum" if VALUES[name].needs_linear else "pendulum"
+    changes = check(value=name, below=1, **of) | {"model": {"kind": kind}}
     build(**changes)
-    change_model(monkeypatch, **{lost: None})
+    change_model(monkeypatch, kind, **{lost: None})
     if (VALUES[name].needs_exact == "period") != (lost == "exact_period"):
         build(**changes)
         return
     fault = only_fault(**changes)
     assert fault.key == "checks[0].value"
-    assert "of pendulum is not known" in fault.rule
+    assert f"of {kind} is not known" in fault.rule
 
 
 def test_the_energy_is_known_exactly_where_it_is_conserved(monkeypatch: pytest.MonkeyPatch) -> None:
