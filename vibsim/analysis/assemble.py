@@ -19,7 +19,7 @@ from vibsim.analysis.reached import bounds
 from vibsim.analysis.tables import SERIES, Table, numbers, over_time, precision_of
 from vibsim.analysis.work import work_precision
 from vibsim.errors import VibsimError
-from vibsim.models import MODELS, centred
+from vibsim.models import centred
 from vibsim.record import Record, Variable, attributes
 from vibsim.schemes import SCHEMES
 from vibsim.spec.series import RUNNING, asked, lean_series
@@ -99,7 +99,7 @@ def compared(experiment: Experiment, lean: bool = False) -> tuple[str, ...]:
     """Name the quantities that are compared between levels: states, energy, and what a check asks for."""
     if lean:
         return lean_series(experiment)
-    states = (state.name for state in MODELS[experiment.model.kind].states)
+    states = (state.name for state in experiment.model.definition.states)
     return tuple(dict.fromkeys([*states, "energy", "energy_deviation", *asked(experiment)]))
 
 

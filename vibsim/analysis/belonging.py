@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vibsim.errors import VibsimError
-from vibsim.models import MODELS
 from vibsim.record import Record
 
 if TYPE_CHECKING:
@@ -41,7 +40,7 @@ def check_belonging(experiment: Experiment, records: Mapping[int, Record]) -> No
 
 
 def _faults(experiment: Experiment, level: int, record: Record, other: Record) -> Iterator[str]:
-    model = MODELS[experiment.model.kind]
+    model = experiment.model.definition
     if level not in experiment.levels:
         yield f"the experiment has levels {list(experiment.levels)}"
         return

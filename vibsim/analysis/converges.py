@@ -13,7 +13,6 @@ from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Orders, Outcome
 from vibsim.analysis.promise import columns_of, formal_orders, options_of, stability_limits
 from vibsim.analysis.stability import growth_of
 from vibsim.analysis.wording import Story, advise, tell
-from vibsim.models import MODELS
 from vibsim.record import Record
 from vibsim.schemes import SCHEMES, Options, Scheme
 from vibsim.spec.about import schemes_of
@@ -121,7 +120,7 @@ def _story(
         growth=_growth(record, SCHEMES[spec.kind], options, p, (scheme, case, at)),
         limit=float(limits[case if len(limits) > 1 else 0]),
         options=options,
-        is_position=check.converges == MODELS[experiment.model.kind].position,
+        is_position=check.converges == experiment.model.definition.position,
         scheme=spec.name,
     )
 

@@ -14,7 +14,6 @@ from vibsim.analysis.climb import Extrapolated, extrapolate_members, joined, noi
 from vibsim.analysis.grid import Grid, common_grid, take
 from vibsim.analysis.method import Method, Start
 from vibsim.analysis.tableau import Pair
-from vibsim.models import MODELS
 from vibsim.record import Attribute, Record, Variable, attributes
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import Members, members
@@ -64,7 +63,7 @@ def extrapolated(
     """Extrapolate level Records over all levels, at their common times: one row for each scheme of the ladder."""
     finest = records[grid.levels[-1]]
     group = members(experiment, int(finest["case"][0]), int(finest["case"][-1]) + 1)
-    states = [state.name for state in MODELS[experiment.model.kind].states]
+    states = [state.name for state in experiment.model.definition.states]
     levels = [tuple(take(grid, records[level], name) for name in states) for level in grid.levels]
     rows = []
     for i in experiment.ladder:
@@ -80,7 +79,7 @@ def methods(
     experiment: Experiment, scheme: int, group: Members
 ) -> list[tuple[Method, NDArray[np.int64]]]:
     """Return the methods of one scheme, which differ where options are swept, and the members that have each."""
-    model, kind = MODELS[experiment.model.kind], experiment.schemes[scheme].kind
+    model, kind = experiment.model.definition, experiment.schemes[scheme].kind
     return [
         (Method(model, SCHEMES[kind], options), where)
         for options, where in plan.option_groups(experiment, scheme, group.columns)
@@ -134,7 +133,7 @@ def record_of(
     rows: Sequence[Extrapolated],
 ) -> Record:
     """Name what was extrapolated, one row for each scheme."""
-    model = MODELS[experiment.model.kind]
+    model = experiment.model.definition
     kept = {name: v for name, v in coords.items() if v.dims in (("scheme",), ("case",), ("t",))}
     names = np.asarray([experiment.schemes[i].name for i in experiment.ladder])
     kept["scheme"] = Variable(("scheme",), names, coords["scheme"].attrs)

@@ -15,7 +15,7 @@ from vibsim.analysis.grid import Grid, common_grid, take
 from vibsim.analysis.promise import Columns, columns_of, relative_floors, stability_limits
 from vibsim.analysis.sensitivity import sensitivity
 from vibsim.analysis.series import laid_out, largest
-from vibsim.models import ENERGIES, MODELS, Model
+from vibsim.models import ENERGIES, Model
 from vibsim.record import Record
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import Members, members
@@ -71,7 +71,7 @@ class Part:
     @property
     def model(self) -> Model:
         """The model."""
-        return MODELS[self.experiment.model.kind]
+        return self.experiment.model.definition
 
     @property
     def finest(self) -> Record:
@@ -219,13 +219,13 @@ def _norms(experiment: Experiment) -> tuple[str, ...]:
 
 
 def _stored(experiment: Experiment, grid: Grid, finest: Record) -> dict[str, Floats]:
-    names = (state.name for state in MODELS[experiment.model.kind].states)
+    names = (state.name for state in experiment.model.definition.states)
     return {n: take(grid, finest, f"{n}_exact") for n in names if f"{n}_exact" in finest}
 
 
 def _exact(experiment: Experiment, t: Floats, group: Members) -> dict[str, Floats]:
     """Work the exact states out at times t, shape (c, t), once for all levels."""
-    model = MODELS[experiment.model.kind]
+    model = experiment.model.definition
     if model.exact is None:
         return {}
     initial, parameters = (
@@ -242,7 +242,7 @@ def _growth(
 
     Without an exact solution the coarsest level takes its place. NaN where the reference vanishes.
     """
-    position = MODELS[experiment.model.kind].position
+    position = experiment.model.definition.position
     low, high = (
         by_level([records[level][f"{position}_{name}"] for level in grid.levels])
         for name in ("min", "max")

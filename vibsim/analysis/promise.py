@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from vibsim import plan
 from vibsim.analysis.floor import relative_floor
-from vibsim.models import MODELS
 from vibsim.record import Record
 from vibsim.schemes import SCHEMES, Options, Scheme
 from vibsim.schemes.base import OptionValue
@@ -53,13 +52,13 @@ def formal_orders(experiment: Experiment, quantity: str, columns: Columns) -> Fl
     It is infinite for what is exact, and NaN for a scheme that chooses its own steps. Where no option is swept there is
     one case for all, here and below.
     """
-    model = MODELS[experiment.model.kind]
+    model = experiment.model.definition
     return _each(experiment, columns, lambda s, o: float(s.formal_order(quantity, model, o)))
 
 
 def even_powers(experiment: Experiment, quantity: str, columns: Columns) -> NDArray[np.bool_]:
     """Tell whether the error of a quantity has every second power only, shape (scheme, case)."""
-    model = MODELS[experiment.model.kind]
+    model = experiment.model.definition
     even = _each(experiment, columns, lambda s, o: float(s.even_powers(quantity, model, o)))
     return np.asarray(even != 0)
 

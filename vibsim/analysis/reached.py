@@ -15,7 +15,6 @@ from vibsim.analysis.outcome import FAIL, PASS, Outcome
 from vibsim.analysis.part import Part
 from vibsim.analysis.wording import number
 from vibsim.errors import VibsimError
-from vibsim.models import MODELS
 from vibsim.record import Record, Variable, attributes
 from vibsim.vocabulary import REASON_NAMES
 
@@ -58,7 +57,7 @@ def reached(experiment: Experiment, record: Record) -> Outcome:
     VibsimError
         Where `record`, the convergence Record, was made without the tolerance.
     """
-    states = [state.name for state in MODELS[experiment.model.kind].states]
+    states = [state.name for state in experiment.model.definition.states]
     missing = [name for name in states if f"{name}{_BOUND}" not in record]
     if missing or experiment.tolerance is None:
         raise VibsimError("the analysis knows of no tolerance: analyse the levels again")
@@ -118,7 +117,7 @@ def _advise(experiment: Experiment, scheme: int, state: str) -> str:
         "take such members into an experiment of their own, whose pilot tries them",
         f"give finer `levels:` than {levels[0]} to {levels[-1]} in place of `tolerance:`",
     ]
-    is_velocity = state == MODELS[experiment.model.kind].velocity
+    is_velocity = state == experiment.model.definition.velocity
     if is_velocity and options.get("end_velocity", "kick") != "kick":
         ways.insert(0, f"set `end_velocity: kick` for scheme {name}")
     if options.get("arithmetic", "compensated") != "compensated":

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis.series import laid_out, largest
-from vibsim.models import MODELS, Model
+from vibsim.models import Model
 from vibsim.simulation import Members
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def sensitivity(
     known
         The exact solution at these times, where it has been worked out.
     """
-    model = MODELS[experiment.model.kind]
+    model = experiment.model.definition
     if model.exact is None:
         return np.ones(len(t))
     parameters = {name: values[:, None] for name, values in group.parameters.items()}

@@ -10,7 +10,6 @@ from vibsim.analysis.climb import Extrapolated, joined
 from vibsim.analysis.extrapolation import in_order, methods, record_of, start_of
 from vibsim.ladder.choosing import resolve
 from vibsim.ladder.solving import climb
-from vibsim.models import MODELS
 from vibsim.simulation import Members, members
 from vibsim.simulation.level import coordinates
 
@@ -65,7 +64,7 @@ def best(
     names = [experiment.schemes[i].name for i in schemes]
     same_end = not experiment.end_varies
     coords = coordinates(
-        MODELS[experiment.model.kind], names, group, steps[0], every, same_end=same_end
+        experiment.model.definition, names, group, steps[0], every, same_end=same_end
     )
     return record_of(experiment, experiment.levels, coords, rows).to_xarray()
 

@@ -42,11 +42,10 @@ def simulated(content: Mapping[str, Any]) -> dict[str, Any]:
 
 def load_of(experiment: Experiment, level: int) -> Load:
     """Return what one member of `experiment` costs at `level`."""
-    from vibsim.models import MODELS
     from vibsim.schemes import SCHEMES
     from vibsim.spec.series import extrema_kept
 
-    model, steps = MODELS[experiment.model.kind], experiment.steps(level)
+    model, steps = experiment.model.definition, experiment.steps(level)
     lean = is_bounded(experiment)
     trajectories = len(experiment.schemes) * experiment.members
     kinds = [SCHEMES[experiment.schemes[i].kind] for i in experiment.ladder]
@@ -67,11 +66,10 @@ def load_of(experiment: Experiment, level: int) -> Load:
 
 def _own_seconds(experiment: Experiment) -> float:
     """Return the seconds that schemes which choose their own steps take of a member that is not swept."""
-    from vibsim.models import MODELS
     from vibsim.schemes import SCHEMES
     from vibsim.schemes.adaptive import seconds
 
-    model = MODELS[experiment.model.kind]
+    model = experiment.model.definition
     turns = experiment.time.end * float(model.natural_frequency(experiment.model.parameters))
     return sum(
         seconds(scheme.kind, float(scheme.options["tolerance"]), turns / (2.0 * math.pi))

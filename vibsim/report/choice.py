@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.models import MODELS
 from vibsim.record import Record
 from vibsim.report.data import Member, case_name, flags, formal_orders, pick, swept
 from vibsim.schemes import SCHEMES
@@ -48,12 +47,12 @@ def tolerance(experiment: Experiment, quantity: str, scheme: str) -> float:
 
 def position(experiment: Experiment) -> str:
     """Return the name of the model's position."""
-    return MODELS[experiment.model.kind].position
+    return experiment.model.definition.position
 
 
 def quantities(experiment: Experiment, record: Record) -> list[str]:
     """Return the quantities to show: the position, those that a check names, and the energy deviation."""
-    extra = ["energy_deviation"] if MODELS[experiment.model.kind].conservative else []
+    extra = ["energy_deviation"] if experiment.model.definition.conservative else []
     wanted = dict.fromkeys([position(experiment), *asked(experiment), *extra])
     return [name for name in wanted if f"{name}_order" in record]
 

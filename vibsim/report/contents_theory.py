@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vibsim.analysis.motion import PEAKS
-from vibsim.models import MODELS
 from vibsim.record import Record
 from vibsim.report import choice, finest, words
 from vibsim.report.data import (
@@ -60,7 +59,7 @@ def schemes(experiment: Experiment, record: Record) -> Table | None:
     if len(names) < 2:
         return None
     quantities = [choice.position(experiment)]
-    if MODELS[experiment.model.kind].conservative and "energy_deviation_order" in record:
+    if experiment.model.definition.conservative and "energy_deviation_order" in record:
         quantities.append("energy_deviation")
     columns = [
         Column("scheme"), Column("family"), Column("type"),

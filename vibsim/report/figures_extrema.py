@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vibsim.models import MODELS
 from vibsim.record import Record
 from vibsim.report import style
 from vibsim.report.choice import position
@@ -143,7 +142,7 @@ def first_peak(experiment: Experiment, record: Record, case: int, period: float)
         return math.nan
     if v == 0.0:
         return period if u > 0.0 else period / 2.0
-    if not MODELS[experiment.model.kind].linear:
+    if not experiment.model.definition.linear:
         return math.nan
     angle = math.atan2(v * period / (2.0 * math.pi), u) % (2.0 * math.pi)
     return angle / (2.0 * math.pi) * period
@@ -151,7 +150,7 @@ def first_peak(experiment: Experiment, record: Record, case: int, period: float)
 
 def _start(experiment: Experiment, record: Record, case: int) -> tuple[float, float]:
     """Return the first position and velocity of a member."""
-    model = MODELS[experiment.model.kind]
+    model = experiment.model.definition
     u, v = (
         float(at(record, f"{n}_finest", Member(0, case, ""))[0])
         for n in (model.position, model.velocity)
@@ -164,7 +163,7 @@ def _amplitude(experiment: Experiment, record: Record, case: int) -> float:
     u, v = _start(experiment, record, case)
     if v == 0.0:
         return abs(u)
-    model = MODELS[experiment.model.kind]
+    model = experiment.model.definition
     if not model.linear or "natural_frequency" not in record:
         return math.nan
     w = float(np.ravel(pick(record, "natural_frequency", case=case))[0])

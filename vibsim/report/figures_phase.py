@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vibsim.models import MODELS
 from vibsim.record import Record
 from vibsim.report import style, words
 from vibsim.report.data import Floats, Member, at, exact_periods, known, pick, times, unit, whole
@@ -20,6 +19,7 @@ from vibsim.report.style import Picture
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from vibsim.models import Model
     from vibsim.spec import Experiment
 
 ACROSS = 3
@@ -39,7 +39,7 @@ def plane(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
 
     A few schemes only, and series with samples enough in a period.
     """
-    model = MODELS[experiment.model.kind]
+    model = experiment.model.definition
     if not shown or len({member.scheme for member in shown}) > MOST:
         return None
     case = shown[0].case
@@ -52,7 +52,7 @@ def plane(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     levels = whole(record, "level")
     chosen = sorted({round(x) for x in np.linspace(0, len(levels) - 1, min(MOST, len(levels)))})
     figure, axes = _axes(len(chosen))
-    size = _draw_exact(axes, record, model.position, model.velocity, case, w, t <= 1.02 * period)
+    size = _draw_exact(axes, record, model, case, w, t <= 1.02 * period)
     early, late = t <= t[0] + period, t >= t[-1] - PERIODS * period
     is_long = bool(t[-1] > (PERIODS + 1.0) * period)
     largest = 0.0
@@ -126,14 +126,14 @@ def of_level(record: Record, name: str, member: Member, level: int) -> Floats:
 
 
 def _draw_exact(
-    axes: list[Axes], record: Record, position: str, velocity: str, case: int, w: float, first: Any
+    axes: list[Axes], record: Record, model: Model, case: int, w: float, first: Any
 ) -> float:
     """Draw the exact orbit, and return its size; 0 where it is not known."""
-    names = f"{position}_exact", f"{velocity}_exact"
+    names = f"{model.position}_exact", f"{model.velocity}_exact"
     if any(name not in record for name in names):
         return 0.0
     u, v = (np.asarray(pick(record, name, case=case), dtype=np.float64)[first] for name in names)
-    if MODELS[str(record.attrs["model"])].linear:
+    if model.linear:
         angle = np.linspace(0.0, 2.0 * np.pi, 121)
         radius = float(np.hypot(u[0], v[0] / w))
         u, v = radius * np.cos(angle), radius * w * np.sin(angle)

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vibsim.models import MODELS
 from vibsim.report.data import Floats
 from vibsim.report.layout import Grid, Key
 
@@ -29,7 +28,7 @@ SCANNED = 201
 
 def separatrix(experiment: Experiment, grid: Grid) -> tuple[Floats, Floats]:
     """Return points of the separatrix within a grid; none where the model has no exact period or no separatrix."""
-    model = MODELS[experiment.model.kind]
+    model = experiment.model.definition
     if model.exact_period is None or grid.x.words or grid.y.words:
         return np.empty(0), np.empty(0)
 
@@ -43,14 +42,14 @@ def separatrix(experiment: Experiment, grid: Grid) -> tuple[Floats, Floats]:
 
 def on_line(experiment: Experiment, key: Key) -> Floats:
     """Return the values of one swept key on the separatrix; none where there is no such value."""
-    if MODELS[experiment.model.kind].exact_period is None or key.words or key.distinct.size < 3:
+    if experiment.model.definition.exact_period is None or key.words or key.distinct.size < 3:
         return np.empty(0)
     return _peaks(lambda _, y: period_at(experiment, {key.key: y}), np.zeros(1), key.distinct)[1]
 
 
 def period_at(experiment: Experiment, values: dict[str, Floats]) -> Floats:
     """Return the exact period with some keys replaced by `values`; infinite where it does not exist."""
-    model = MODELS[experiment.model.kind]
+    model = experiment.model.definition
     if model.exact_period is None:
         raise ValueError(f"model {model.kind} has no exact period")
     initial, parameters = (

@@ -18,9 +18,7 @@ if TYPE_CHECKING:
 
 def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     """Yield what was computed as pairs of a term and its text."""
-    from vibsim.models import MODELS
-
-    model = MODELS[experiment.model.kind]
+    model = experiment.model.definition
     axes = experiment.sweep.axes if experiment.sweep else ()
     keys = {key for axis in axes for key in axis.keys}
     sizes = {p.name: data.pretty_unit(p.unit) for p in model.parameters}

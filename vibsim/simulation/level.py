@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim import plan
-from vibsim.models import ENERGIES, MODELS, Model, State, centred
+from vibsim.models import ENERGIES, Model, State, centred
 from vibsim.record import Attribute, Record, Variable, attributes
 from vibsim.simulation.gathered import extrema, gathered, of_own_steps
 from vibsim.simulation.members import Members, members
@@ -72,7 +72,7 @@ def simulate_record(
     """Run members start..stop-1 (default: all) and return plain arrays; see `simulate`."""
     if level not in experiment.levels:
         raise ValueError(f"level {level} is none of {list(experiment.levels)}")
-    model = MODELS[experiment.model.kind]
+    model = experiment.model.definition
     group = members(experiment, start, plan.count(experiment) if stop is None else stop)
     steps, every = experiment.steps(level), plan.sampling(experiment, level)
     is_lean, wanted = is_bounded(experiment), stored_series(experiment)

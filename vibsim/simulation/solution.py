@@ -19,7 +19,7 @@ from vibsim.engine import (
     integrate,
     lane_for,
 )
-from vibsim.models import MODELS, Model
+from vibsim.models import Model
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import adaptive
 from vibsim.simulation.members import Members
@@ -106,7 +106,7 @@ def _run(
     threads: int,
     keep: Mapping[str, Any],
 ) -> Trajectories:
-    model = MODELS[experiment.model.kind]
+    model = experiment.model.definition
     method = SCHEMES[experiment.schemes[scheme].kind]
     parameters = [group.parameters[p.name][where] for p in model.parameters]
     return (adaptive.integrate if method.adaptive else integrate)(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vibsim.models import MODELS, centred
+from vibsim.models import centred
 from vibsim.spec.checks import Check, Measurement, ValueCheck
 from vibsim.spec.experiment import Experiment
 from vibsim.spec.scheme_checks import ConservesCheck, EqualCheck
@@ -19,7 +19,7 @@ def schemes_of(experiment: Experiment, check: Check) -> tuple[int, ...]:
     if named is not None:
         return tuple(i for i, scheme in enumerate(experiment.schemes) if scheme.name in named)
     asked = inner.conserves if isinstance(inner, ConservesCheck) else inner.about
-    if asked not in centred(MODELS[experiment.model.kind]):
+    if asked not in centred(experiment.model.definition):
         return experiment.ladder
     return tuple(i for i in experiment.ladder if experiment.schemes[i].own_velocity)
 

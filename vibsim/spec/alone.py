@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from vibsim.errors import Fault, InputError
-from vibsim.models import MODELS
 from vibsim.spec.checks import Check, ClaimCheck, ConvergesCheck, Measurement, ValueCheck
 from vibsim.spec.columns import columns
 from vibsim.spec.experiment import Experiment, ModelSpec, SchemeSpec, TimeSpec
@@ -92,7 +91,7 @@ def _checks(
     kept.extend(claims(published, experiment.source))
     if kept:
         return tuple(kept)
-    position = MODELS[experiment.model.kind].position
+    position = experiment.model.definition.position
     return (ConvergesCheck(id="check_1", converges=position),)
 
 

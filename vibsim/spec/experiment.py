@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, PrivateAttr, StrictBool
 
-from vibsim.models import MODELS, natural_end, quantities
+from vibsim.models import MODELS, Model, natural_end, quantities
 from vibsim.schemes import SCHEMES
 from vibsim.spec.axes import Axis
 from vibsim.spec.checks import Check
@@ -36,6 +36,11 @@ class ModelSpec(Section):
 
     kind: Text
     parameters: Numbers
+
+    @property
+    def definition(self) -> Model:
+        """The equation of motion that this section describes."""
+        return MODELS[self.kind]
 
 
 class TimeSpec(Section):
@@ -161,7 +166,7 @@ class Experiment(Section):
     @property
     def quantities(self) -> tuple[str, ...]:
         """Names of every quantity that is kept as a series where storage is not bounded."""
-        return quantities(MODELS[self.model.kind], self.own_velocity)
+        return quantities(self.model.definition, self.own_velocity)
 
     def scheme_options(self, scheme: int) -> Mapping[str, str | float | bool]:
         """Return the options of scheme number `scheme`, apart from those that are swept.
@@ -186,7 +191,7 @@ class Experiment(Section):
         """Return the end time of a member with these `parameters` (numbers or arrays), unless swept."""
         if self.time.periods is None:
             return self.time.end
-        return natural_end(MODELS[self.model.kind], self.time.periods, parameters)
+        return natural_end(self.model.definition, self.time.periods, parameters)
 
     def steps(self, level: int) -> int:
         """Return the number of steps at `level`: ``base_steps * 2**level``."""

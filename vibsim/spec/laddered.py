@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from vibsim.models import MODELS, quantities
+from vibsim.models import quantities
 from vibsim.spec import limits
 from vibsim.spec.check_places import Ladder, kinds_of
 from vibsim.spec.check_rules import finish_checks
@@ -31,7 +31,7 @@ def with_levels(experiment: Experiment, levels: Sequence[int]) -> Experiment:
     rises = all(low < high for low, high in pairwise(levels))
     if not levels or not rises or not 0 <= levels[0] <= levels[-1] <= MAX_LEVEL:
         raise ValueError(f"{list(levels)} are not levels from 0 to {MAX_LEVEL} in increasing order")
-    model, time = MODELS[experiment.model.kind], experiment.time
+    model, time = experiment.model.definition, experiment.time
     swept = Swept(experiment.sweep.axes if experiment.sweep else ())
     shape = limits.Shape(
         base_steps=time.base_steps,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vibsim.models import MODELS
 from vibsim.spec.sampling import SMALL, is_lean
 
 if TYPE_CHECKING:
@@ -36,7 +35,7 @@ def lean_series(experiment: Experiment) -> tuple[str, ...]:
     They are the states and the energy deviation, of which every number about an experiment can be worked out, and what
     else a check asks for.
     """
-    states = (state.name for state in MODELS[experiment.model.kind].states)
+    states = (state.name for state in experiment.model.definition.states)
     return tuple(dict.fromkeys([*states, "energy_deviation", *asked(experiment)]))
 
 
