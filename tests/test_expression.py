@@ -21,6 +21,7 @@ from vibsim.expression import (
     evaluate,
     names_in,
     parse,
+    to_formula,
     to_python,
     to_statements,
 )
@@ -227,7 +228,8 @@ def test_powers_of_powers_do_not_explode() -> None:
 def test_model_formulas(model: Model) -> None:
     names = [*(s.name for s in model.states), "t", *(p.name for p in model.parameters)]
     values = {name: 0.7 + 0.1 * i for i, name in enumerate(names)}
-    for text in (model.acceleration, model.kinetic_energy, model.potential_energy):
+    for formula in (model.acceleration, model.kinetic_energy, model.potential_energy):
+        text = formula if isinstance(formula, str) else to_formula(formula)
         tree = parse(text, names)
         assert set(names_in(tree)) <= set(names)
         # the formula is Python too; only the powers are taken differently, which costs a few roundings

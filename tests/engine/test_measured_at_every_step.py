@@ -278,3 +278,35 @@ def test_the_tables_of_the_text_are_by_the_centred_difference(kind):
         unit = 10.0 ** (int(exponent) - len(mantissa) + 2)
         measured = runs.gathered.deviation_d2t[0] / (0.5 * w * w)
         assert measured == pytest.approx(float(printed), abs=0.5 * unit)
+
+
+@pytest.mark.parametrize("lane", LANES)
+@pytest.mark.parametrize("kind", ["euler_cromer", "euler_cromer_u_first"])
+@pytest.mark.parametrize("start", SCHEMES["euler_cromer"].words[0].choices)
+def test_peaks_lie_where_the_positions_turn_whenever_the_velocity_is(kind, start, lane):
+    """The velocity of Euler-Cromer is half a step away: peaks by it would be dt/2 early or late, and off by dt."""
+    scheme, p, steps = SCHEMES[kind], 0.2, 2000
+    found = integrate(
+        MODELS["spring"],
+        scheme,
+        {**scheme.defaults(), "start": start},
+        np.array([[1.0]]),
+        np.array([[0.7, 0.0]]),
+        np.array([p]),
+        steps,
+        1,
+        lane=lane,
+    )
+    # u^n = A cos(n th + phase) with sin(th/2) = p/2; the start is no peak that was computed
+    angle = 2.0 * np.arcsin(0.5 * p)
+    basis = np.stack([np.cos(angle * np.arange(steps + 1)), np.sin(angle * np.arange(steps + 1))])
+    (a, b), *_ = np.linalg.lstsq(basis.T, found.position[0], rcond=None)
+    period = 2.0 * np.pi / angle * p
+    first = np.arctan2(b, a) / angle * p % period
+    count = np.floor((steps * p - max(first, p)) / period)
+    whole = found.gathered
+    assert whole.period_count[0] in (count, count - 1)
+    assert whole.period[0] == pytest.approx(period, abs=0.01 * p / count)
+    # half a step late a peak would be p^2/8 higher or lower than its parabola says, and a velocity off by p/2 more
+    for height in (whole.first_peak[0], whole.last_peak[0], -whole.last_trough[0]):
+        assert height == pytest.approx(np.hypot(a, b), rel=p * p / 8.0)

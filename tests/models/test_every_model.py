@@ -3,20 +3,19 @@
 import numpy as np
 import pytest
 
-from vibsim.expression import evaluate, parse
-from vibsim.models import MODELS, quantities
+from vibsim.expression import evaluate
+from vibsim.models import MODELS, quantities, tree
 
 RNG = np.random.default_rng(11)
 EVERY = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 
 
-def formula(model, text):
+def formula(model, formula):
     """Return the formula as a function of (u, v, t, parameters)."""
-    names = [parameter.name for parameter in model.parameters]
-    tree = parse(text, (model.position, model.velocity, "t", *names))
+    read = tree(model, formula)
 
     def value(u, v, t, parameters):
-        return evaluate(tree, {model.position: u, model.velocity: v, "t": t, **parameters})
+        return evaluate(read, {model.position: u, model.velocity: v, "t": t, **parameters})
 
     return value
 

@@ -66,7 +66,7 @@ CASES: list[tuple[dict[str, Any], str, str, str]] = [
         {"model": {}},
         "model.kind",
         "required key is missing",
-        "choose from linear_pendulum, pendulum",
+        "choose from linear_pendulum, oscillator, pendulum",
     ),
     ({"model": {"kind": "pendulun"}}, "model.kind", "unknown model", "did you mean 'pendulum'?"),
     ({"model": {"kind": 3}}, "model.kind", "unknown model", "choose from"),
@@ -470,7 +470,7 @@ def test_a_scheme_that_cannot_treat_the_model_is_refused(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     central = SCHEMES["central"]
-    schemes = {"central": replace(central, velocity_forces=False)}
+    schemes = {"central": replace(central, velocity_forces=False, damped=())}
     monkeypatch.setattr(building, "SCHEMES", schemes)
     build()
     change_model(monkeypatch, acceleration="-(g/L)*sin(theta) - m*omega")

@@ -194,13 +194,14 @@ def test_a_step_that_is_too_long_is_not_refused(kind: str) -> None:
 def test_a_scheme_for_forces_without_velocity_names_those_that_can(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    schemes = dict(SCHEMES) | {"central": replace(SCHEMES["central"], velocity_forces=False)}
+    schemes = dict(SCHEMES) | {"central": SCHEMES["central"]}
     model = replace(MODELS["pendulum"], acceleration="-(g/L)*sin(theta) - 0.1*omega")
     monkeypatch.setattr(building, "SCHEMES", schemes)
     build()
     monkeypatch.setattr(building, "MODELS", {"pendulum": model})
     (fault,) = file_faults(tmp_path, GOOD)
-    assert fault.rule == "cannot treat pendulum, whose acceleration depends on omega"
+    rule = "cannot treat pendulum, whose acceleration depends on omega otherwise than by linear or quadratic damping"
+    assert fault.rule == rule
     able = [kind for kind, scheme in schemes.items() if scheme.velocity_forces]
     assert able
     assert fault.hint == "choose from " + ", ".join(able)

@@ -93,7 +93,7 @@ def start_of(method: Method, group: Members, where: NDArray[np.int64]) -> Start:
     parameters = {name: values[where] for name, values in group.parameters.items()}
     table = np.empty((len(end), len(model.parameters)))
     for i, parameter in enumerate(model.parameters):
-        table[:, i] = parameters[parameter.name]
+        table[:, i] = parameters[parameter.key]
     initial = np.stack([group.initial[state.name][where] for state in model.states], axis=-1)
     frequency = np.broadcast_to(np.asarray(model.natural_frequency(parameters)), end.shape)
     return Start(table, initial, end, frequency)

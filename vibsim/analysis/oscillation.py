@@ -31,42 +31,18 @@ def growth_factor(record: Record) -> Floats:
 
 
 def amplitude_error(record: Record) -> Floats:
-    """Return the last amplitude over the first, less one, of the first `FEWEST_EXTREMA` peaks."""
-    if "peak" not in record:
-        return np.full_like(growth_factor(record), np.nan)
-    return np.asarray(_kept(record)[0] - 1.0)
-
-
-def _kept(record: Record) -> tuple[Floats, Floats]:
-    """Return the last of the first `FEWEST_EXTREMA` peaks over the first, and the time between them; NaN below two.
-
-    So many are kept of every member, and no number depends on how many more are.
-    A parabola through three positions owes nothing to the velocity, which may belong to another time than the position
-    (Euler-Cromer), and the motion starts on no peak that was computed.
-    """
-    peaks = np.asarray(record["peak"], dtype=float)[..., :FEWEST_EXTREMA]
-    count = np.sum(np.isfinite(peaks), axis=-1)
-    last = np.maximum(count - 1, 0)[..., None]
-    (low, high), (start, stop) = (
-        (values[..., 0], np.take_along_axis(values, last, axis=-1)[..., 0])
-        for values in (peaks, np.asarray(record["peak_time"], dtype=float))
-    )
-    several = count > 1
-    return np.where(several, safe_ratio(high, low), np.nan), np.where(several, stop - start, np.nan)
+    """Return the last peak over the first one, less one."""
+    return np.asarray(growth_factor(record) - 1.0)
 
 
 def growth_per_period(part: Part, level: int) -> Floats:
     """Return the factor by which the amplitude grows in a period.
 
     The period is the natural one where the model is linear, so that it can be compared with theory even where the
-    scheme's own period is far from it; else it is the measured one. By peaks it is, beyond a stability limit, the
-    growth over the whole run, behind which the start is soon left.
+    scheme's own period is far from it; else it is the measured one.
     """
     record, index = part.records[level], part.grid.levels.index(level)
     found = growth_over_run(part, record)
-    if "peak" in record:
-        beyond = part.omega_dt[:, index] > part.stability_limit
-        found = np.where(beyond, found, _per_period(part, record, *_kept(record)))
     motion = _recurrence(part, level)
     if motion is None:
         return found

@@ -14,6 +14,7 @@ are kept the position before.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from vibsim.engine.bound import (
@@ -34,7 +35,10 @@ from vibsim.engine.bound import (
     RATE,
     SERIES,
     SET,
+    SLOPE,
+    SLOPE_BEFORE,
     STAGED,
+    STAGGERED,
     STATES,
     TWO_BEFORE,
     VELOCITY,
@@ -84,7 +88,7 @@ VECTOR = 8
 ROWS = ("DT", "ENERGY", "BOTTOM", "VELOCITY", "TWO_BEFORE", "INTERIOR", "ALIVE", "EVENT", "EXTREMA")
 """Rows behind the two sets, in their order. A kernel binds their numbers; from ``EXTREMA`` on stand the entries of
 `vibsim.engine.gather.Extrema`, from ``FIRST_PARAMETER`` on the parameters."""
-ROWS_BEHIND = ("RATE", "PENDING", "LARGEST_D2T", "FIRST_KEPT")
+ROWS_BEHIND = ("RATE", "PENDING", "LARGEST_D2T", "SLOPE", "SLOPE_BEFORE", "FIRST_KEPT")
 """Rows behind the parameters; from the last one on stands what is kept from stage to stage."""
 
 
@@ -225,6 +229,8 @@ def begin(
         rows[RATE * LANES + j] = 0.5 / h
         rows[PENDING * LANES + j] = 0.0
         rows[LARGEST_D2T * LANES + j] = 0.0
+    if STAGGERED:
+        rows[SLOPE * LANES + j] = math.nan
 
 
 @called
@@ -323,8 +329,14 @@ def gather_block(rows: Any, old: int, new: int, filled: int, n: int, turn: float
         kinetic, potential = energies_fast(u, v, n * rows[DT * LANES + j], parameters_in(rows, j))
         deviation = (kinetic + potential) - rows[ENERGY * LANES + j]
         put_extrema(rows, j, next_extrema(extrema_in(rows, j), u, v, deviation))
-        own, own_before = rows[(new + STATES + 1) * LANES + j], rows[(old + STATES + 1) * LANES + j]
-        event = is_event(turn, rows[BOTTOM * LANES + j], own_before, u, own)
+        if STAGGERED:
+            slope, slope_before = velocity_d2t(rows, old, new, j), rows[SLOPE * LANES + j]
+            rows[SLOPE_BEFORE * LANES + j] = slope_before
+            rows[SLOPE * LANES + j] = slope
+        else:
+            slope = rows[(new + STATES + 1) * LANES + j]
+            slope_before = rows[(old + STATES + 1) * LANES + j]
+        event = is_event(turn, rows[BOTTOM * LANES + j], slope_before, u, slope)
         event = event | (deviation != deviation)
         if D2T:
             size = deviation_d2t(rows, old, new, j, n)
@@ -402,6 +414,11 @@ def note(
         behind, middle = rows[(old + STATES + 2) * LANES + j], rows[(old + STATES) * LANES + j]
         if is_turned(behind, middle, u):
             note_turned(kept, counts, case, n - 1, h, behind, middle, u)
+    if STAGGERED:
+        slope, slope_before = rows[SLOPE * LANES + j], rows[SLOPE_BEFORE * LANES + j]
+    else:
+        slope = rows[(new + STATES + 1) * LANES + j]
+        slope_before = rows[(old + STATES + 1) * LANES + j]
     rows[BOTTOM * LANES + j] = note_events(
         stats,
         counts,
@@ -411,9 +428,9 @@ def note(
         turn,
         rows[BOTTOM * LANES + j],
         rows[(old + STATES) * LANES + j],
-        rows[(old + STATES + 1) * LANES + j],
+        slope_before,
         u,
-        rows[(new + STATES + 1) * LANES + j],
+        slope,
     )
 
 

@@ -24,6 +24,9 @@ SERIES = True
 """Whether samples are taken of the running maxima of the energy deviation, and of ``[D_2t u]``."""
 KEEP = True
 """Whether local extrema are kept one by one (`vibsim.engine.extrema`)."""
+STAGGERED = True
+"""Whether peaks are found by ``[D_2t u]``, since the scheme's own velocity belongs to another time; the start is then
+none."""
 STAGED = True
 """Whether a step is cut into stages (`vibsim.engine.stages`)."""
 STATES = 1
@@ -33,11 +36,12 @@ SET = 4
 PARAMETERS = 1
 """Number of parameters."""
 DT, ENERGY, BOTTOM, VELOCITY, TWO_BEFORE, INTERIOR, ALIVE, EVENT, EXTREMA = range(8, 17)
-FIRST_PARAMETER, RATE, PENDING, LARGEST_D2T, FIRST_KEPT = range(26, 31)
+FIRST_PARAMETER, RATE, PENDING, LARGEST_D2T, SLOPE, SLOPE_BEFORE, FIRST_KEPT = range(26, 33)
 """Rows behind the two sets: step, initial energy, multiple of a turn below, velocity at this point, velocity two points
 before, largest deviation before this point, 1 for a lane that goes on, 1 for a lane with something to note, what is
 gathered at every step, the parameters; and where `D2T` is, ``1/(2 dt)``, the deviation by ``[D_2t u]`` at this point,
-and the largest one before; what is kept from stage to stage."""
+and the largest one before; the velocity by which peaks are found where that is `STAGGERED`, at this point and the one
+before; what is kept from stage to stage."""
 
 
 def called(function: F) -> F:

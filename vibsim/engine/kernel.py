@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
+from inspect import signature
 from types import FunctionType
 from typing import Any
 
@@ -21,8 +22,9 @@ from vibsim.engine.cache import Kernel, load
 from vibsim.engine.stages import stages
 from vibsim.engine.text import Module, collect, divided, with_quotients
 from vibsim.errors import SimulationError
-from vibsim.expression import Binary, Call, Compare, Expression
+from vibsim.expression import Binary, Call, Compare, Expression, Name, Number
 from vibsim.models import Model
+from vibsim.models.base import Formula, parameter_names, tree
 from vibsim.schemes.base import HANDED, Stepper, handed
 
 LANES = ("plain", "scalar", "blocks")
@@ -46,6 +48,8 @@ called = entry = njit(**inner)
     + primitives.COMPILED
 )
 
+_MARK = "_"
+"""Behind the names of parameters in a kernel."""
 _FULL_STEP = """\
 @compiled
 def step_fast(state, t, dt, p):
@@ -113,6 +117,7 @@ def source(
         "D2T": with_gathered and stepper.own_velocity,
         "SERIES": with_gathered and with_series,
         "KEEP": with_peaks,
+        "STAGGERED": with_gathered and stepper.staggered,
         "STAGED": bool(stages(stepper.step)),
         "STATES": states,
         "SET": blocks.set_of(states, with_peaks),
@@ -162,8 +167,7 @@ def _put_energy_with(module: Module, model: Model) -> None:
 
     Uncompiled, nobody else would see that it is the same again.
     """
-    known = (model.position, model.velocity, "t", *(row.name for row in model.parameters))
-    potential = expression.parse(model.potential_energy, known)
+    potential = tree(model, model.potential_energy)
     line = "kinetic = kinetic_energy(u, v, t, p)"
     if model.velocity in expression.names_in(potential):
         line = "kinetic, potential = energies(u, v, t, p)"
@@ -219,15 +223,20 @@ def _put_formulas(
     with_kinetic
         Whether the kinetic energy is needed for itself.
     """
-    names = [parameter.name for parameter in model.parameters]
-    known = (model.position, model.velocity, "t", *names)
-    unpack = [f"{name} = p[{i}]" for i, name in enumerate(names)]
-    acceleration = expression.parse(model.acceleration, known)
+    names = parameter_names(model)
+    # marked, so that a user's name is none of this text
+    unpack = [f"{name}{_MARK} = p[{i}]" for i, name in enumerate(names)]
+    marked: dict[Expression, Expression] = {Name(n): Name(n + _MARK) for n in names}
+
+    def put(formula: Formula) -> Expression:
+        return expression.rebuilt(tree(model, formula), lambda node: marked.get(node, node))
+
+    acceleration = put(model.acceleration)
     formulas = {
         "acceleration": {"_result": acceleration},
         "energies": {
-            "_kinetic": expression.parse(model.kinetic_energy, known),
-            "_potential": expression.parse(model.potential_energy, known),
+            "_kinetic": put(model.kinetic_energy),
+            "_potential": put(model.potential_energy),
         },
     }
     if stepper is not None and stepper.implicit:
@@ -235,15 +244,18 @@ def _put_formulas(
             "_by_position": expression.derivative(acceleration, model.position),
             "_by_velocity": expression.derivative(acceleration, model.velocity),
         }
+    if stepper is not None and "damping_rate" in signature(stepper.step).parameters:
+        rate = put(model.damping.rate) if model.damping else Number(0.0)
+        formulas["damping_rate"] = {"_rate": rate}
     if with_kinetic:
         formulas["kinetic_energy"] = {"_kinetic": formulas["energies"]["_kinetic"]}
     is_scaled = stepper is not None and stepper.scaling is not None
     for function, results in formulas.items():
         lines = list(unpack)
         for result, formula in results.items():
-            tree = _with_functions(module, formula, suffix, is_rare)
-            lines += expression.to_statements(tree, result)
-            if is_scaled and function in HANDED:
+            ready = _with_functions(module, formula, suffix, is_rare)
+            lines += expression.to_statements(ready, result)
+            if is_scaled and function in ("acceleration", "slopes"):
                 lines.append(f"{result} = {result} * p[{len(names)}]")
         lines.append(f"return {', '.join(results)}")
         head = f"@compiled\ndef {function}{suffix}({model.position}, {model.velocity}, t, p):\n    "

@@ -7,6 +7,7 @@ and compiles it for the scalar one. What happens in a step is written once, in t
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from vibsim.engine.bound import (
@@ -14,6 +15,7 @@ from vibsim.engine.bound import (
     GATHER,
     KEEP,
     SERIES,
+    STAGGERED,
     backward,
     energies,
     energy_with,
@@ -104,7 +106,9 @@ def run(
         good = 0
         sample = 1
         due = every
-        v_before = v
+        v_before = slope = v
+        if STAGGERED:
+            slope = math.nan
         if D2T:
             rate = 0.5 / h
             velocity_d2t = pending = largest_d2t = 0.0
@@ -125,14 +129,17 @@ def run(
             if not abs(u) + abs(v) < OVERFLOW:
                 break
             good = n
+            # the scheme's own velocity: an end formula would move a peak in the last step
+            slope_before, slope = slope, own
+            if STAGGERED:
+                slope = (following[0] - u_before) * (0.5 / h)
             if GATHER:
                 kinetic, potential = energies(u, v, t, p)
                 interior = extrema[LARGEST_DEVIATION]
                 extrema = next_extrema(extrema, u, v, (kinetic + potential) - energy_0)
-                # the scheme's own velocity: an end formula would move a peak in the last step
-                if is_event(turn, bottom, v_before, u, own):
+                if is_event(turn, bottom, slope_before, u, slope):
                     bottom = note_events(
-                        stats, counts, case, t, h, turn, bottom, u_before, v_before, u, own
+                        stats, counts, case, t, h, turn, bottom, u_before, slope_before, u, slope
                     )
             if D2T:
                 # that of the point before counts now that this one is sound, since it rests on it

@@ -158,7 +158,7 @@ def integrate(
         Where the kernel cannot be compiled.
     """
     members = len(dt)
-    stepper = scheme.stepper(options)
+    stepper = scheme.stepper_for(model, options)
     lane = lane or lane_for(members, steps, implicit=stepper.implicit)
     run = kernel(model, stepper, lane, with_gathered, with_series, n_extrema > 0)
     rows = gather.n_sample_rows(with_series, stepper.own_velocity)

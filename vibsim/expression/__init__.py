@@ -5,7 +5,9 @@ allow-list of what it may hold: numbers, declared names, ``+ - * / **``, compari
 a user is never compiled or evaluated as Python.
 """
 
+from vibsim.expression.arrays import values
 from vibsim.expression.derivative import derivative
+from vibsim.expression.integral import integral
 from vibsim.expression.parser import (
     MAX_CHARACTERS,
     MAX_DEPTH,
@@ -14,7 +16,13 @@ from vibsim.expression.parser import (
     literal,
     parse,
 )
-from vibsim.expression.render import constant, evaluate, to_python, to_statements
+from vibsim.expression.render import (
+    constant,
+    evaluate,
+    to_formula,
+    to_python,
+    to_statements,
+)
 from vibsim.expression.tree import (
     CONSTANTS,
     FUNCTIONS,
@@ -47,11 +55,14 @@ __all__ = [
     "constant",
     "derivative",
     "evaluate",
+    "integral",
     "literal",
     "names_in",
     "parse",
     "rebuilt",
+    "to_formula",
     "to_python",
     "to_statements",
+    "values",
     "walk",
 ]

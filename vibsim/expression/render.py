@@ -115,6 +115,45 @@ def _power(base: float, exponent: float) -> float:
     return result if exponent > 0.0 else 1.0 / result
 
 
+def to_formula(expression: Expression) -> str:
+    """Write `expression` as a formula, with no more parentheses than needed: `parse` gives the same tree again."""
+    return _written(expression)[0]
+
+
+_BINDING = {"+": 2, "-": 2, "*": 3, "/": 3}
+_COMPARED, _NEGATED, _POWER, _ATOM = 1, 4, 5, 6
+"""How tightly a comparison, a sign, a power and anything that cannot be taken apart bind."""
+
+
+def _written(node: Expression) -> tuple[str, int]:
+    """Return the text of a formula and how tightly its last operation binds."""
+    match node:
+        case Number(value):
+            return f"{value:.0f}" if value < 1e15 and value.is_integer() else repr(value), _ATOM
+        case Name(name):
+            return name, _ATOM
+        case Negate(operand):
+            return f"-{_within(operand, _NEGATED)}", _NEGATED
+        case Binary("**", base, exponent):
+            # a power takes a sign behind it, and is itself taken from right to left
+            return f"{_within(base, _ATOM)}**{_within(exponent, _NEGATED)}", _POWER
+        case Binary(symbol, left, right):
+            own = _BINDING[symbol]
+            gap = " " if own == _BINDING["+"] else ""
+            text = f"{_within(left, own)}{gap}{symbol}{gap}{_within(right, own + 1)}"
+            return text, own
+        case Compare(symbol, left, right):
+            least = _COMPARED + 1
+            return f"{_within(left, least)} {symbol} {_within(right, least)}", _COMPARED
+        case Call(function, arguments):
+            return f"{function}({', '.join(_within(a, 0) for a in arguments)})", _ATOM
+
+
+def _within(node: Expression, least: int) -> str:
+    text, binding = _written(node)
+    return text if binding >= least else f"({text})"
+
+
 def to_python(expression: Expression) -> str:
     """Write `expression` as one Python expression for the engine.
 

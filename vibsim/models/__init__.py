@@ -7,28 +7,33 @@ from types import MappingProxyType
 
 from vibsim.models.base import (
     ENERGIES,
+    FormulaField,
     Model,
     Parameter,
     State,
     centred,
     natural_end,
     quantities,
+    tree,
 )
 from vibsim.models.linear_pendulum import LINEAR_PENDULUM
+from vibsim.models.oscillator import OSCILLATOR
 from vibsim.models.pendulum import PENDULUM
 from vibsim.models.spring import SPRING
 
 MODELS: Mapping[str, Model] = MappingProxyType(
-    {model.kind: model for model in (PENDULUM, LINEAR_PENDULUM, SPRING)}
+    {model.kind: model for model in (PENDULUM, LINEAR_PENDULUM, SPRING, OSCILLATOR)}
 )
 
 __all__ = [
     "ENERGIES",
     "MODELS",
+    "FormulaField",
     "Model",
     "Parameter",
     "State",
     "centred",
     "natural_end",
     "quantities",
+    "tree",
 ]

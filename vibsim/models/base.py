@@ -1,22 +1,27 @@
-"""What a model is: data about an equation of motion, its formulas as text.
+"""What a model is: data about an equation of motion, its formulas as text or as trees.
 
-A formula is text so that one statement of it serves every reader: the engine compiles it for each lane, sympy
-differentiates it, a report prints it.
+A formula is no function, so that one statement of it serves every reader: the engine compiles it for each lane,
+Newton's method differentiates it, a report prints it. Models that are written down here give text; those that are made
+from the formulas of a user give trees (`vibsim.expression`).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.expression import Expression, parse
+
 Floats = NDArray[np.float64]
 Numbers = Mapping[str, Any]
 """Values by name: floats, or arrays that broadcast against each other."""
+Formula = str | Expression
 
 
 @dataclass(frozen=True)
@@ -39,6 +44,38 @@ class Parameter:
     minimum: float | None = None
     exclusive: bool = False
     """Whether `minimum` itself is refused."""
+    path: str = ""
+    """Where it stands in the section ``model``, if not under its name: ``damping.linear``."""
+
+    @property
+    def key(self) -> str:
+        """Its place in the section ``model``, by which it is swept and its values are found."""
+        return self.path or self.name
+
+
+@dataclass(frozen=True)
+class FormulaField:
+    """A formula that a user may write."""
+
+    name: str
+    names: tuple[str, ...]
+    """What it may name beside the declared parameters: a state, or ``t``."""
+    default: str
+    description: str
+    terms: Mapping[str, str] = field(default_factory=dict, hash=False)
+    """Formulas with one coefficient b that may be written as ``{word: number}``."""
+
+
+@dataclass(frozen=True)
+class Damping:
+    """A damping force over the mass that schemes with a treatment of their own can tell from the others."""
+
+    kind: Literal["linear", "quadratic"]
+    """``rate*v`` or ``rate*abs(v)*v``."""
+    rate: Formula
+    """In the parameters."""
+    undamped: Formula
+    """The acceleration without it."""
 
 
 @dataclass(frozen=True)
@@ -52,10 +89,10 @@ class Model:
     states: tuple[State, State]
     """Position and velocity."""
     parameters: tuple[Parameter, ...]
-    acceleration: str
-    """Formula in the state names, ``t`` and the parameters."""
-    kinetic_energy: str
-    potential_energy: str
+    acceleration: Formula
+    """In the state names, ``t`` and the parameters."""
+    kinetic_energy: Formula
+    potential_energy: Formula
     energy_unit: str
     linear: bool
     conservative: bool
@@ -67,6 +104,14 @@ class Model:
     """Exact states at times t, shape (..., n_t), from initial values and parameters of shape (..., 1) or ()."""
     exact_period: Callable[[Numbers, Numbers], Any] | None = None
     """Exact period from initial values and parameters: of an oscillation, or of one turn."""
+    start: Callable[[Numbers], dict[str, Any]] | None = None
+    """Initial values that the parameters already give, as arrays that broadcast; None where a user gives them."""
+    damping: Damping | None = None
+    """The damping force, where it is one of two simple kinds."""
+    formulas: tuple[FormulaField, ...] = ()
+    """What a user writes as formulas."""
+    written: Callable[[Mapping[str, str], tuple[str, ...]], Model] | None = None
+    """The model of such formulas, by name, with declared parameters; see `vibsim.models.oscillator`."""
 
     @property
     def position(self) -> str:
@@ -77,6 +122,19 @@ class Model:
     def velocity(self) -> str:
         """Name of the velocity."""
         return self.states[1].name
+
+
+@cache
+def tree(model: Model, formula: Formula) -> Expression:
+    """Return a formula of a model in its states, ``t`` and its parameters."""
+    if not isinstance(formula, str):
+        return formula
+    return parse(formula, (*(state.name for state in model.states), "t", *parameter_names(model)))
+
+
+def parameter_names(model: Model) -> tuple[str, ...]:
+    """Name the parameters as formulas do, in the order of the engine."""
+    return tuple(parameter.name for parameter in model.parameters)
 
 
 def natural_end(model: Model, periods: float, parameters: Numbers) -> Any:

@@ -15,6 +15,36 @@ def motion(t: Floats, w: Any, u_0: Any, v_0: Any) -> tuple[Floats, Floats]:
     return u_0 * cos + v_0 / w * sin, v_0 * cos - u_0 * w * sin
 
 
+def damped_motion(
+    t: Floats, stiffness: Any, half: Any, u_0: Any, v_0: Any
+) -> tuple[Floats, Floats]:
+    """Return position and velocity of ``u'' + 2 half u' + stiffness u = 0`` at times `t`, in every regime.
+
+    Source: vibration text (B), section 8 and exercise 11; with ``q = sqrt(|stiffness - half^2|)`` the solution is
+    ``exp(-half t) (u_0 C + (v_0 + half u_0) S)``, with ``C = cos(q t)``, ``S = sin(q t)/q`` below critical damping,
+    1 and t at it, and the hyperbolic functions above, which are taken together with the exponential.
+    """
+    with np.errstate(all="ignore"):
+        square = stiffness - half * half
+        q = np.sqrt(np.abs(square))
+        decay = np.exp(-half * t)
+        # half - q and half + q: the smaller one from their product, without cancellation
+        large = half + np.copysign(q, half)
+        small_rate = stiffness / large
+        least, most = np.minimum(large, small_rate), np.maximum(large, small_rate)
+        fast, slow = np.exp(-most * t), np.exp(-least * t)
+        even = np.where(square >= 0.0, decay * np.cos(q * t), 0.5 * (slow + fast))
+        angle = q * t
+        # sin(x)/x and its hyperbolic twin are 1 where the damping is critical
+        small = np.abs(angle) < 1e-8
+        wave = np.where(small, decay * t, decay * np.sin(angle) / q)
+        rise = np.where(small, decay * t, -0.5 * slow * np.expm1(-2.0 * angle) / q)
+        odd = np.where(square >= 0.0, wave, rise)
+    u = u_0 * even + (v_0 + half * u_0) * odd
+    v = v_0 * even - (half * v_0 + stiffness * u_0) * odd
+    return np.asarray(u), np.asarray(v)
+
+
 def period(w: Any, u_0: Any, v_0: Any) -> Any:
     """Return ``2 pi/w``, whatever the amplitude; NaN at rest."""
     rest = (np.asarray(u_0) == 0) & (np.asarray(v_0) == 0)

@@ -21,7 +21,7 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     model = experiment.model.definition
     axes = experiment.sweep.axes if experiment.sweep else ()
     keys = {key for axis in axes for key in axis.keys}
-    sizes = {p.name: data.pretty_unit(p.unit) for p in model.parameters}
+    sizes = {p.key: data.pretty_unit(p.unit) for p in model.parameters}
     units = {state.name: data.pretty_unit(state.unit) for state in model.states}
     yield "Model", f"{model.title}: {model.equation}"
     yield "Parameters", _listing("model", experiment.model.parameters, sizes, keys)

@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from vibsim.schemes.adaptive import ADAPTIVE
 from vibsim.schemes.base import AnyOption, Flag, NumberOption, Option, Options, Scheme, Stepper
-from vibsim.schemes.central import CENTRAL
+from vibsim.schemes.central import CENTRED
 from vibsim.schemes.composition import COMPOSITIONS
 from vibsim.schemes.gauss import GAUSS4
 from vibsim.schemes.implicit import IMPLICIT
@@ -20,7 +20,7 @@ SCHEMES: Mapping[str, Scheme] = MappingProxyType(
     {
         scheme.kind: scheme
         for scheme in (
-            CENTRAL,
+            *CENTRED,
             *RUNGE_KUTTA,
             *ADAMS_BASHFORTH,
             *COMPOSITIONS,

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.expression import names_in, parse
-from vibsim.models.base import Model
+from vibsim.expression import names_in
+from vibsim.models.base import Model, tree
 
 OptionValue = str | float | bool
 Options = Mapping[str, OptionValue]
@@ -79,7 +79,8 @@ def no_backward(state: CarriedState, dt: float) -> float:
 class Stepper:
     """The arithmetic of a scheme: functions on the carried state of one member, and how it starts and ends.
 
-    A function may ask for `slopes` behind `acceleration`, by these names.
+    A function may ask for `slopes` or `damping_rate` (`vibsim.models.base.Damping`) behind `acceleration`, by these
+    names.
     """
 
     start: Callable[..., CarriedState]
@@ -94,6 +95,8 @@ class Stepper:
     """Velocity at the last point: `END_RULES`."""
     own_velocity: bool = True
     """Whether the velocity is another one than the centred difference ``[D_2t u]``."""
+    staggered: bool = False
+    """Whether the velocity belongs to another time than the position: peaks are then found by ``[D_2t u]``."""
     implicit: bool = False
     """Whether a step solves an equation, for which it may ask for `slopes`."""
     scaling: Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], ...]] | None = None
@@ -105,15 +108,23 @@ class Stepper:
 END_RULES = ("own", "extrapolate", "backward")
 """The scheme's own velocity, the linear extrapolation of the last two, or `Stepper.backward`."""
 
-HANDED = ("acceleration", "slopes")
+HANDED = ("acceleration", "slopes", "damping_rate")
 """Functions of the model that a function of a scheme is handed, by these names."""
 
 
+def no_damping(u: float, v: float, t: float, p: Any) -> float:
+    """Return 0."""
+    return 0.0
+
+
 def handed(
-    function: Callable[..., Any], acceleration: Acceleration, slopes: Slopes
+    function: Callable[..., Any],
+    acceleration: Acceleration,
+    slopes: Slopes,
+    damping_rate: Acceleration = no_damping,
 ) -> Callable[..., Any]:
     """Return `function`, a `Stepper`'s start or step, with those functions of the model that it asks for."""
-    known = {"acceleration": acceleration, "slopes": slopes}
+    known = {"acceleration": acceleration, "slopes": slopes, "damping_rate": damping_rate}
     asked = inspect.signature(function).parameters
     return partial(function, **{name: known[name] for name in HANDED if name in asked})
 
@@ -121,9 +132,7 @@ def handed(
 @cache
 def depends_on_velocity(model: Model) -> bool:
     """Tell whether the acceleration of a model depends on the velocity."""
-    names = [parameter.name for parameter in model.parameters]
-    known = (model.position, model.velocity, "t", *names)
-    return model.velocity in names_in(parse(model.acceleration, known))
+    return model.velocity in names_in(tree(model, model.acceleration))
 
 
 @dataclass(frozen=True)
@@ -190,6 +199,10 @@ def round_off(options: Options, steps: int) -> float:
     return float(UNIT_ROUND_OFF * steps**0.5)
 
 
+def _kind_of(model: Model) -> str:
+    return model.damping.kind if model.damping else ""
+
+
 @dataclass(frozen=True)
 class Scheme:
     """A time-stepping method."""
@@ -212,7 +225,9 @@ class Scheme:
     symmetric: bool = False
     """Whether a step with -dt takes a step back, up to round-off."""
     velocity_forces: bool = True
-    """Whether the acceleration may depend on the velocity."""
+    """Whether the acceleration may depend on the velocity, however it does."""
+    damped: tuple[tuple[str, Callable[[Options], Stepper]], ...] = ()
+    """Kinds of damping (`vibsim.models.base.Damping`) that it has a treatment of its own for, and the arithmetic."""
     options: tuple[AnyOption, ...] = ()
     even_powers: Callable[[str, Model, Options], bool] = never
     """Whether the error of a quantity expands in h^p, h^(p+2), ... rather than h^p, h^(p+1), ..."""
@@ -229,6 +244,18 @@ class Scheme:
     def words(self) -> tuple[Option, ...]:
         """The options that are a choice of words."""
         return tuple(option for option in self.options if isinstance(option, Option))
+
+    def treats(self, model: Model) -> bool:
+        """Tell whether the scheme can treat the forces of a model."""
+        return (
+            self.velocity_forces
+            or not depends_on_velocity(model)
+            or _kind_of(model) in dict(self.damped)
+        )
+
+    def stepper_for(self, model: Model, options: Options) -> Stepper:
+        """Return the arithmetic that the options ask for, with its treatment of the model's damping if it has one."""
+        return dict(self.damped).get(_kind_of(model), self.stepper)(options)
 
     def formal_order(self, quantity: str, model: Model, options: Options) -> float:
         """Return the order that is promised for a quantity of a model; infinite for what is exact."""

@@ -20,6 +20,8 @@ Compensated summation: E. Hairer, C. Lubich and G. Wanner, Geometric Numerical I
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -35,6 +37,16 @@ from vibsim.schemes.base import (
     Orders,
     Scheme,
     Stepper,
+    depends_on_velocity,
+)
+from vibsim.schemes.central_steps import (
+    BACKWARD,
+    GEOMETRIC,
+    LINEAR,
+    ROOT,
+    UNDAMPED,
+    Treatment,
+    step,
 )
 
 
@@ -44,15 +56,6 @@ def start_three_term(
     """Return u^1 and u^0; u^1 by A (11), or without its dt^2 term (the trap of A, section 2.3)."""
     kick = 0.0 if variant else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
     return u + dt * v + kick, u
-
-
-def step_three_term(
-    state: tuple[float, float], t: float, dt: float, p: Any, acceleration: Acceleration
-) -> tuple[tuple[float, float], float]:
-    """Return u^(n+1), u^n and the velocity at n: A (9)."""
-    u, behind = state
-    ahead = 2.0 * u - behind + (dt * dt) * acceleration(u, 0.0, t, p)
-    return (ahead, u), (ahead - behind) * (0.5 / dt)
 
 
 def backward_three_term(state: tuple[float, float], dt: float) -> float:
@@ -68,15 +71,6 @@ def start_increment(
     kick = 0.0 if variant else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
     d = dt * v + kick
     return u + d, d
-
-
-def step_increment(
-    state: tuple[float, float], t: float, dt: float, p: Any, acceleration: Acceleration
-) -> tuple[tuple[float, float], float]:
-    """Return u^(n+1), its increment and the velocity at n."""
-    u, d = state
-    ahead = d + (dt * dt) * acceleration(u, 0.0, t, p)
-    return (u + ahead, ahead), (d + ahead) * (0.5 / dt)
 
 
 def backward_increment(state: tuple[float, float], dt: float) -> float:
@@ -99,37 +93,17 @@ def start_compensated(
     return ahead, d, u_rest, d_rest
 
 
-def step_compensated(
-    state: tuple[float, float, float, float],
-    t: float,
-    dt: float,
-    p: Any,
-    acceleration: Acceleration,
-) -> tuple[tuple[float, float, float, float], float]:
-    """Return u^(n+1), its increment, their rounding errors, and the velocity at n."""
-    u, d, u_rest, d_rest = state
-    kick = (dt * dt) * acceleration(u, 0.0, t, p) + d_rest
-    d_ahead = d + kick
-    part = d_ahead - d
-    d_rest = (d - (d_ahead - part)) + (kick - part)
-    # the rest of d belongs to u as well, but only in the sum that u keeps
-    drift = d_ahead + u_rest
-    ahead = u + drift
-    part = ahead - u
-    u_rest = (u - (ahead - part)) + (drift - part)
-    return (ahead, d_ahead, u_rest, d_rest), (d + d_ahead) * (0.5 / dt)
-
-
 def backward_compensated(state: tuple[float, float, float, float], dt: float) -> float:
     """Return ``(u^n - u^(n-1))/dt``."""
     return state[1] / dt
 
 
-_FUNCTIONS: dict[str, tuple[Any, Any, Any]] = {
-    "compensated": (start_compensated, step_compensated, backward_compensated),
-    "increment": (start_increment, step_increment, backward_increment),
-    "three_term": (start_three_term, step_three_term, backward_three_term),
+_ENDINGS: dict[str, tuple[Any, Any]] = {
+    "compensated": (start_compensated, backward_compensated),
+    "increment": (start_increment, backward_increment),
+    "three_term": (start_three_term, backward_three_term),
 }
+"""Start and one-sided velocity of every arithmetic; its step is that of `vibsim.schemes.central_steps`."""
 
 
 def corrected(p: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -150,19 +124,22 @@ _ENDS = {"extrapolate": "extrapolate", "backward": "backward", "kick": "own"}
 _GROWTH = {"compensated": 0.0, "increment": 0.5, "three_term": 1.5}
 
 
-def stepper(options: Options) -> Stepper:
+def stepper(options: Options, treatment: Treatment = UNDAMPED) -> Stepper:
     """Return the arithmetic, the start and the end that the options ask for.
 
     The velocity at n is known once u^(n+1) is. At the last point that is one more step, whose velocity is the kick:
-    ``(u^(N+1) - u^(N-1))/(2 dt) = (u^N - u^(N-1))/dt + dt a^N/2``.
+    without damping ``(u^(N+1) - u^(N-1))/(2 dt) = (u^N - u^(N-1))/dt + dt a^N/2``.
     """
-    functions = _FUNCTIONS[str(options["arithmetic"])]
+    arithmetic = str(options["arithmetic"])
+    start, backward = _ENDINGS[arithmetic]
     return Stepper(
-        *functions,
+        start,
+        step(arithmetic, treatment),
+        backward,
         variant=int(options["start"] == "first_order"),
         end=_ENDS[str(options["end_velocity"])],
         own_velocity=False,
-        scaling=corrected if options["frequency_correction"] else None,
+        scaling=corrected if options.get("frequency_correction") else None,
     )
 
 
@@ -185,35 +162,40 @@ def round_off(options: Options, steps: int) -> float:
 def even_powers(quantity: str, model: Model, options: Options) -> bool:
     """Tell whether the error of `quantity` has even powers of dt only (A, section 2.4).
 
-    The start must be centred; whatever has the velocity in it also needs a centred velocity at the end.
+    The start must be centred and the damping smooth; whatever has the velocity in it needs a centred one at the end.
     """
     centred_end = quantity == model.position or options["end_velocity"] == "kick"
-    return options["start"] != "first_order" and centred_end
+    centred_damping = model.damping is None or model.damping.kind == "linear"
+    return options["start"] != "first_order" and centred_end and centred_damping
 
+
+_OPTIONS = (
+    Option(
+        "start",
+        _STARTS,
+        "formula of the first step: from the centred difference of u'(0), A (11); from a Taylor polynomial, which "
+        "gives the same (B, exercise 5); or without its dt^2 term",
+    ),
+    Option(
+        "end_velocity",
+        tuple(_ENDS),
+        "velocity at the last point: linear extrapolation, one-sided difference, "
+        "or (u_N - u_(N-1))/dt + dt a_N/2",
+    ),
+    Option(
+        "arithmetic",
+        tuple(_ENDINGS),
+        "how the scheme is written: equal in exact arithmetic, different in round-off",
+    ),
+)
 
 CENTRAL = Scheme(
     kind="central",
     title="Centred differences (Stoermer-Verlet)",
-    source="pendulum lecture, sections 2.2-2.3; vibration text, section 1.2",
+    source="pendulum lecture, sections 2.2-2.3; vibration text, sections 1.2, 8.1 and 8.2",
     family="two-step",
     options=(
-        Option(
-            "start",
-            _STARTS,
-            "formula of the first step: from the centred difference of u'(0), A (11); from a Taylor polynomial, which "
-            "gives the same (B, exercise 5); or without its dt^2 term",
-        ),
-        Option(
-            "end_velocity",
-            tuple(_ENDS),
-            "velocity at the last point: linear extrapolation, one-sided difference, "
-            "or (u_N - u_(N-1))/dt + dt a_N/2",
-        ),
-        Option(
-            "arithmetic",
-            tuple(_FUNCTIONS),
-            "how the scheme is written: equal in exact arithmetic, different in round-off",
-        ),
+        *_OPTIONS,
         Flag(
             "frequency_correction",
             "whether the force is scaled so that small oscillations have the right frequency to order 4",
@@ -228,4 +210,51 @@ CENTRAL = Scheme(
     symplectic=True,
     symmetric=True,
     velocity_forces=False,
+    damped=(
+        ("linear", partial(stepper, treatment=LINEAR)),
+        ("quadratic", partial(stepper, treatment=GEOMETRIC)),
+    ),
 )
+
+
+def orders_of_second(options: Options) -> Orders:
+    """Return 2, with the damping centred as well."""
+    return Orders(position=2, velocity=2, energy=2, energy_linear=2)
+
+
+def orders_of_backward(options: Options) -> Orders:
+    """Return 2, and 1 where there is a damping, which is taken half a step too early."""
+    first = Orders(position=1, velocity=1, energy=1, energy_linear=1)
+    return replace(orders_of_second(options), velocity_dependent=first)
+
+
+def even_without_damping(quantity: str, model: Model, options: Options) -> bool:
+    """Tell whether the error of `quantity` has even powers of dt only: see `even_powers`."""
+    return not depends_on_velocity(model) and even_powers(quantity, model, options)
+
+
+CENTRAL_QUADRATIC_ROOT = replace(
+    CENTRAL,
+    kind="central_quadratic_root",
+    title="Centred differences, quadratic damping centred as well",
+    source="vibration text, section 8.2",
+    options=_OPTIONS,
+    orders=orders_of_second,
+    damped=(
+        ("linear", partial(stepper, treatment=LINEAR)),
+        ("quadratic", partial(stepper, treatment=ROOT)),
+    ),
+)
+CENTRAL_BACKWARD_DAMPING = replace(
+    CENTRAL,
+    kind="central_backward_damping",
+    title="Centred differences, damping of the backward difference",
+    source="vibration text, exercise 16",
+    options=_OPTIONS,
+    stepper=partial(stepper, treatment=BACKWARD),
+    orders=orders_of_backward,
+    even_powers=even_without_damping,
+    velocity_forces=True,
+    damped=(),
+)
+CENTRED = (CENTRAL, CENTRAL_QUADRATIC_ROOT, CENTRAL_BACKWARD_DAMPING)

@@ -236,7 +236,7 @@ def _euler_cromer(
 
     def stepper(options: Options) -> Stepper:
         variant = _STARTS.index(str(options["start"]))
-        return Stepper(start, substep_function(substeps), variant=variant)
+        return Stepper(start, substep_function(substeps), variant=variant, staggered=True)
 
     return Scheme(
         kind=kind,

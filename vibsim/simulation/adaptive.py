@@ -64,7 +64,7 @@ class Problem:
     def scale(self) -> tuple[float, float]:
         """Sizes of position and velocity that the absolute tolerances are relative to."""
         u, v = self.initial
-        named = {row.name: x for row, x in zip(self.model.parameters, self.parameters, strict=True)}
+        named = {row.key: x for row, x in zip(self.model.parameters, self.parameters, strict=True)}
         w = float(self.model.natural_frequency(named))
         if not (w > 0.0 and math.isfinite(w)):
             w = 2.0 * math.pi / self.end

@@ -114,7 +114,7 @@ def _states(model: Model) -> list[str]:
 def _units(model: Model) -> dict[str, str]:
     """Return the unit of every number that can be swept, by dotted key."""
     states = {f"initial.{state.name}": state.unit for state in model.states}
-    return states | {f"model.{p.name}": p.unit for p in model.parameters} | {"time.end": "s"}
+    return states | {f"model.{p.key}": p.unit for p in model.parameters} | {"time.end": "s"}
 
 
 def _numbers(steps: int, every: int) -> NDArray[np.int64]:

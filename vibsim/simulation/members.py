@@ -44,10 +44,15 @@ def members(experiment: Experiment, start: int, stop: int) -> Members:
     if experiment.end_varies and "time.end" not in columns:
         # the end is a number of natural periods, and each member has its own
         end = np.asarray(experiment.natural_end(parameters), dtype=float)
+    initial = fill("initial", experiment.initial)
+    known = experiment.model.definition.start
+    if known is not None:
+        shape = (stop - start,)
+        initial |= {name: np.full(shape, value) for name, value in known(parameters).items()}
     return Members(
         index=np.arange(start, stop, dtype=np.int64),
         columns=columns,
         parameters=parameters,
-        initial=fill("initial", experiment.initial),
+        initial=initial,
         end=end,
     )

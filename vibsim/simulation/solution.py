@@ -108,7 +108,7 @@ def _run(
 ) -> Trajectories:
     model = experiment.model.definition
     method = SCHEMES[experiment.schemes[scheme].kind]
-    parameters = [group.parameters[p.name][where] for p in model.parameters]
+    parameters = [group.parameters[p.key][where] for p in model.parameters]
     return (adaptive.integrate if method.adaptive else integrate)(
         model,
         method,
@@ -182,7 +182,7 @@ def energies_of(
     schemes, cases, times = solution.position.shape
     found = {name: np.empty(solution.position.shape) for name in wanted}
     found["energy_initial"] = np.empty((schemes, cases))
-    parameters = np.stack([group.parameters[p.name] for p in model.parameters], axis=-1)
+    parameters = np.stack([group.parameters[p.key] for p in model.parameters], axis=-1)
     lane = lane_for(cases, schemes * times)
     piece = max(PIECE // times, 1)
     for s in range(schemes):

@@ -34,13 +34,20 @@ def alone(experiment: Experiment, case: int) -> Experiment:
     axes = experiment.sweep.axes if experiment.sweep else ()
     swept = {key: column[0].item() for key, column in columns(axes, case, case + 1).items()}
     parameters = _filled(swept, "model", experiment.model.parameters)
+    model = ModelSpec(
+        kind=experiment.model.kind, parameters=parameters, formulas=experiment.model.formulas
+    )
+    initial = _filled(swept, "initial", experiment.initial)
+    if model.definition.start is not None:
+        here = model.definition.start(parameters).items()
+        initial = FrozenDict({name: float(value) for name, value in here})
     end = swept.get("time.end", float(experiment.natural_end(parameters)))
     published = _published(experiment, case, end)
     return experiment.model_copy(
         update={
             "name": f"{experiment.name}_case_{case}",
-            "model": ModelSpec(kind=experiment.model.kind, parameters=parameters),
-            "initial": _filled(swept, "initial", experiment.initial),
+            "model": model,
+            "initial": initial,
             "time": TimeSpec.model_validate({**experiment.time.model_dump(), "end": end}),
             "schemes": tuple(_scheme(swept, scheme) for scheme in experiment.schemes),
             "sweep": None,

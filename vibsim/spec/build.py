@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -11,10 +12,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from vibsim.errors import nearest
-from vibsim.expression import names_in, parse
 from vibsim.models import MODELS, Model, quantities
 from vibsim.schemes import FIXED_STEP, SCHEMES
-from vibsim.spec import limits, sweep
+from vibsim.spec import limits, model_rules, sweep
 from vibsim.spec.check_places import Ladder, kinds_of
 from vibsim.spec.check_rules import finish_checks
 from vibsim.spec.checks import ConvergesCheck
@@ -52,12 +52,12 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
         With every fault of the file, and those already in `report`.
     """
     part = _sections(source, report)
-    model = _model(source)
-    parameters = _parameters(part, model)
+    read = model_rules.read(part.model, _model(source), report)
+    model, parameters = read.model, read.parameters
     levels = _levels(part, source, report)
     schemes = _schemes(part, model, report)
     time = time_spec(part.time, model, parameters, report) if part.time else None
-    initial = _initial(part, model, report)
+    initial = _initial(part, model, parameters, report)
     varied = _swept(part, source, model, schemes, report)
     samples = part.samples.every if isinstance(part.samples, Every) else part.samples
     shape = limits.Shape(
@@ -83,7 +83,7 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
         name=place.name,
         title=part.title,
         source=part.source,
-        model=ModelSpec(kind=model.kind, parameters=parameters),
+        model=ModelSpec(kind=model.kind, parameters=parameters, formulas=read.formulas),
         initial=initial,
         time=time,
         levels=levels,
@@ -139,20 +139,23 @@ def _model(source: Source) -> Model | None:
     return MODELS.get(kind) if isinstance(kind, str) else None
 
 
-def _parameters(part: Any, model: Model | None) -> dict[str, float]:
-    if part.model is None or model is None:
-        return {}
-    return {row.name: getattr(part.model, row.name) for row in model.parameters}
-
-
-def _initial(part: Any, model: Model | None, report: Report) -> dict[str, float]:
+def _initial(
+    part: Any, model: Model | None, parameters: Mapping[str, float], report: Report
+) -> dict[str, float]:
     if model is None:
         return {}
     states = [state.name for state in model.states]
+    start = model.start(parameters) if model.start and parameters else {}
     for name in part.initial or ():
         if name not in states:
             report.add(("initial", name), "unknown state", nearest(name, states), at_key=True)
-    return {name: (part.initial or {}).get(name, 0.0) for name in states}
+    found = {name: (part.initial or {}).get(name, 0.0) for name in states}
+    for name, value in start.items():
+        if name in (part.initial or {}) and not math.isclose(found[name], value, rel_tol=1e-12):
+            rule = f"must be {value:.15g}, where the exact solution starts, or be left out"
+            report.add(("initial", name), rule)
+        found[name] = float(value)
+    return found
 
 
 def _levels(part: Any, source: Source, report: Report) -> tuple[int, ...]:
@@ -210,17 +213,14 @@ def _check_names(several: list[SchemeSpec], i: int, first: dict[str, int], repor
 
 def _check_forces(spec: SchemeSpec, i: int, model: Model | None, report: Report) -> None:
     """Refuse a scheme that cannot treat the forces of the model."""
-    if model is None or SCHEMES[spec.kind].velocity_forces or not _uses_velocity(model):
+    if model is None or SCHEMES[spec.kind].treats(model):
         return
-    able = [kind for kind, scheme in SCHEMES.items() if scheme.velocity_forces]
+    able = [kind for kind, scheme in SCHEMES.items() if scheme.treats(model)]
     rule = f"cannot treat {model.kind}, whose acceleration depends on {model.velocity}"
+    if SCHEMES[spec.kind].damped:
+        rule += f" otherwise than by {' or '.join(kind for kind, _ in SCHEMES[spec.kind].damped)} damping"
     hint = "choose from " + ", ".join(able) if able else "no scheme can"
     report.add(("schemes", i), rule, hint, spec.kind)
-
-
-def _uses_velocity(model: Model) -> bool:
-    known = (*(state.name for state in model.states), "t", *(p.name for p in model.parameters))
-    return model.velocity in names_in(parse(model.acceleration, known))
 
 
 def _swept(

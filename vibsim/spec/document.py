@@ -14,11 +14,10 @@ from pydantic import (
     create_model,
 )
 
-from vibsim.models import MODELS, Model
+from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
 from vibsim.spec.checks import Check
 from vibsim.spec.fields import (
-    FORMULA,
     MAX_ENTRIES,
     MAX_LEVEL,
     Count,
@@ -33,22 +32,10 @@ from vibsim.spec.fields import (
     short,
     tag,
 )
+from vibsim.spec.model_section import model_section
 from vibsim.spec.published import PublishedRow, PublishedTable
-from vibsim.spec.scheme_section import class_name, scheme_section
+from vibsim.spec.scheme_section import scheme_section
 from vibsim.spec.sweep_section import SweepSection
-
-
-def _model_section(model: Model) -> type[Section]:
-    fields: dict[str, Any] = {"kind": (Literal[model.kind], Field(description=model.title))}
-    for row in model.parameters:
-        bound: dict[str, float] = {}
-        if row.minimum is not None:
-            bound = {"gt": row.minimum} if row.exclusive else {"ge": row.minimum}
-        description = f"{row.description} [{row.unit}]"
-        number = Annotated[float, Field(**bound), FORMULA]
-        fields[row.name] = (number, Field(default=row.default, description=description))
-    doc = f"{model.title}: {model.equation} ({model.source})."
-    return create_model(class_name(model.kind), __base__=MadeSection, __doc__=doc, **fields)
 
 
 def _kind(value: Any) -> str | None:
@@ -70,7 +57,7 @@ _SCHEME_NAME = Annotated[
     Tag(tag("name")),
 ]
 AnyModel: Any = Annotated[
-    _by_kind({kind: _model_section(model) for kind, model in MODELS.items()}), Discriminator(_kind)
+    _by_kind({kind: model_section(model) for kind, model in MODELS.items()}), Discriminator(_kind)
 ]
 AnyScheme: Any = Annotated[
     _by_kind({kind: scheme_section(s) for kind, s in SCHEMES.items()}, (_SCHEME_NAME,)),

@@ -31,16 +31,28 @@ Numbers = Annotated[dict[str, float], AfterValidator(FrozenDict)]
 Options = Annotated[dict[str, StrictBool | float | str], AfterValidator(FrozenDict)]
 
 
+DECLARED = "parameters"
+"""The key of the section ``model`` under which a file declares the names of its formulas."""
+
+
 class ModelSpec(Section):
     """The model, with every parameter."""
 
     kind: Text
     parameters: Numbers
+    """By the place of each in the section: ``m``, ``damping.linear``, ``parameters.k``."""
+    formulas: Annotated[dict[str, str], AfterValidator(FrozenDict)] = FrozenDict()
+    """What the file writes as formulas, by the names of `vibsim.models.Model.formulas`."""
 
     @property
     def definition(self) -> Model:
         """The equation of motion that this section describes."""
-        return MODELS[self.kind]
+        model = MODELS[self.kind]
+        if model.written is None:
+            return model
+        declared = (key.partition(".") for key in self.parameters)
+        names = (name for section, _, name in declared if section == DECLARED)
+        return model.written(self.formulas, tuple(names))
 
 
 class TimeSpec(Section):

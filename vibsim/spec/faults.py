@@ -12,6 +12,7 @@ from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
 from vibsim.spec.checks import CLASSES, At, Expect, ValueCheck
 from vibsim.spec.document import Document, Every, LevelRange, TimeSection
+from vibsim.spec.experiment import DECLARED
 from vibsim.spec.fields import Section
 from vibsim.spec.published import PublishedAt, PublishedRow, PublishedTable
 from vibsim.spec.source import MAX_FAULTS, Path_, Source, dotted
@@ -198,7 +199,13 @@ def known_keys(path: Path_, data: Any) -> list[str]:
         case ():
             return list(Document.model_fields)
         case ("model",):
-            return ["kind", *(row.name for row in MODELS[value["kind"]].parameters)]
+            model = MODELS[value["kind"]]
+            names = [row.name for row in model.parameters]
+            names += [row.name for row in model.formulas]
+            return ["kind", *names, *([DECLARED] if model.formulas else [])]
+        case ("model", name):
+            rows = {row.name: row.terms for row in MODELS[data["model"]["kind"]].formulas}
+            return list(rows.get(str(name), {}))
         case ("time",):
             return list(TimeSection.model_fields)
         case ("levels",):

@@ -54,7 +54,7 @@ def running_series(experiment: Experiment) -> tuple[str, ...]:
     return tuple(name + RUNNING for name in known)
 
 
-_OF_PEAKS = frozenset({"growth_per_period", "amplitude_error", "phase_error_slope"})
+_OF_PEAKS = frozenset({"phase_error_slope"})
 """Values that are made of the first `FEWEST_EXTREMA` peaks, which are kept whatever else is."""
 
 

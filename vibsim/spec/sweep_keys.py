@@ -86,8 +86,9 @@ def targets(model: Model | None, schemes: Sequence[SchemeSpec]) -> dict[str, Tar
     """Return everything that can be swept, by dotted key."""
     found: dict[str, Target] = {}
     if model is not None:
-        found.update((f"initial.{state.name}", Target()) for state in model.states)
-        found.update((f"model.{row.name}", _parameter(row)) for row in model.parameters)
+        if model.start is None:
+            found.update((f"initial.{state.name}", Target()) for state in model.states)
+        found.update((f"model.{row.key}", _parameter(row)) for row in model.parameters)
     found["time.end"] = Target(_END)
     for scheme in schemes:
         for option in SCHEMES[scheme.kind].options:

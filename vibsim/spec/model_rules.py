@@ -1,0 +1,198 @@
+"""From the section ``model`` to an equation of motion: what formulas may name, and whether they fit together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from vibsim.expression import (
+    MAX_CHARACTERS,
+    Expression,
+    ExpressionError,
+    evaluate,
+    names_in,
+    parse,
+    values,
+    walk,
+)
+from vibsim.expression.integral import has_rule
+from vibsim.models import FormulaField, Model, tree
+from vibsim.models.base import Floats
+from vibsim.spec.experiment import DECLARED
+from vibsim.spec.faults import Report
+from vibsim.spec.fields import Section
+from vibsim.spec.model_section import name_fault
+from vibsim.spec.source import Path_
+
+AMPLITUDES = (-6, 8)
+"""Powers of 2, from and to, of the amplitudes at which a potential energy is compared with its spring."""
+PANELS, POINTS = 32, 16
+"""Panels of an amplitude, and points of each."""
+AGREE = 1e-9
+"""How far both may differ, relative to the largest energy."""
+
+
+@dataclass(frozen=True)
+class Read:
+    """What a section says, as far as it is sound."""
+
+    model: Model | None
+    """The equation of motion; that of the defaults where a formula is at fault, None where even the kind is."""
+    parameters: dict[str, float] = field(default_factory=dict)
+    formulas: dict[str, str] = field(default_factory=dict)
+
+
+def read(section: Any, model: Model | None, report: Report) -> Read:
+    """Check the section of a `model` of the registry, and fill in what it leaves out.
+
+    Parameters
+    ----------
+    section
+        As pydantic read it; None where that found a fault.
+    """
+    if section is None or model is None:
+        return Read(model)
+    parameters = {row.name: getattr(section, row.name) for row in model.parameters}
+    if model.written is None:
+        return Read(model, parameters)
+    declared = _declared(section, model, report)
+    texts: dict[str, str] = {}
+    for row in model.formulas:
+        value = getattr(section, row.name)
+        path: Path_ = ("model", row.name)
+        if isinstance(value, Section):
+            texts |= _term(row, value, declared, parameters, report)
+        elif value is not None and _is_sound(value, row, model, declared, path, report):
+            texts[row.name] = value.strip()
+    if "exact" in texts and section.force is not None:
+        rule = "must not be given together with exact, from which it follows"
+        report.add(("model", "force"), rule, at_key=True)
+    if any(fault.key.split(".")[0] == "model" for fault in report.faults):
+        return Read(model)
+    parameters |= {f"{DECLARED}.{name}": value for name, value in declared.items()}
+    try:
+        found = model.written(texts, tuple(declared))
+    except ExpressionError as error:
+        report.add(("model", "exact"), error.rule, error.hint, error.text)
+        return Read(model)
+    start = found.start(parameters) if found.start else {}
+    for name, value in start.items():
+        if not np.isfinite(value):
+            rule = f"must have a finite value at t = 0, where {name} is {value:g}"
+            report.add(("model", "exact"), rule, value=texts["exact"])
+            return Read(model)
+    _check_potential(found, parameters, texts, report)
+    return Read(found, parameters, texts)
+
+
+def _declared(section: Any, model: Model, report: Report) -> dict[str, float]:
+    """Return the declared parameters with names that can be used."""
+    taken = {state.name: f"the {state.long_name}" for state in model.states}
+    taken |= {"t": "the time"}
+    taken |= {row.name: f"the {row.description} of the model" for row in model.parameters}
+    if any(isinstance(getattr(section, row.name), Section) for row in model.formulas):
+        taken["b"] = "the coefficient of the damping"
+    found = {}
+    for name, value in section.parameters.items():
+        fault = name_fault(name, taken)
+        if fault:
+            report.add(("model", "parameters", name), fault, "choose another name", at_key=True)
+        else:
+            found[name] = value
+    return found
+
+
+def _term(
+    row: FormulaField,
+    value: Section,
+    declared: Mapping[str, float],
+    parameters: dict[str, float],
+    report: Report,
+) -> dict[str, str]:
+    """Return the formula of ``{word: coefficient}``, and put the coefficient among the parameters."""
+    given = {word: getattr(value, word) for word in row.terms if getattr(value, word) is not None}
+    if len(given) != 1:
+        rule = f"must have one of {', '.join(row.terms)}, or be a formula"
+        report.add(("model", row.name), rule)
+        return {}
+    ((word, coefficient),) = given.items()
+    parameters[f"{row.name}.{word}"] = coefficient
+    return {row.name: row.terms[word]}
+
+
+def _is_sound(
+    text: str,
+    row: FormulaField,
+    model: Model,
+    declared: Mapping[str, float],
+    path: Path_,
+    report: Report,
+) -> bool:
+    """Tell whether a formula can be read; note its fault otherwise."""
+    known = (*row.names, *(own.name for own in model.parameters), *declared)
+    try:
+        read_tree = parse(text, known)
+    except ExpressionError as error:
+        place = f" at character {error.position + 1}" if error.position < MAX_CHARACTERS else ""
+        rule = f"{error.rule}{place}"
+        if error.rule.startswith("unknown name"):
+            rule += f"; it may name {', '.join(row.names)} and parameters"
+        report.add(path, rule, error.hint, text)
+        return False
+    try:
+        for part in walk(read_tree):
+            if not names_in(part):
+                evaluate(part, {})
+    except ExpressionError as error:
+        report.add(path, f"a constant in it {error.rule}", error.hint, text)
+        return False
+    return True
+
+
+def _check_potential(
+    model: Model, parameters: Mapping[str, float], texts: Mapping[str, str], report: Report
+) -> None:
+    """Compare the potential energy with the work of the spring between half and whole amplitudes."""
+    names = (model.position, *(row.name for row in model.parameters))
+    numbers = {row.name: parameters[row.key] for row in model.parameters}
+    spring = parse(texts.get("spring", model.position), names)
+    potential = tree(model, model.potential_energy)
+    is_given = "potential" in texts
+    size = 2.0 ** np.arange(*AMPLITUDES)
+    u = np.concatenate([-size, size])
+    with np.errstate(all="ignore"):
+        coarse, work = (_work(spring, numbers, model.position, u, n) for n in (PANELS, 2 * PANELS))
+        energy = [values(potential, {**numbers, model.position: x}) for x in (u, 0.5 * u)]
+        scale = np.abs(work) + np.abs(energy[0]) + np.abs(energy[1])
+        # the work across a corner or a pole is not known so well
+        is_known = np.abs(work - coarse) <= 0.1 * AGREE * scale
+        is_right = np.abs(energy[0] - energy[1] - work) <= AGREE * scale
+    is_compared = is_known & np.isfinite(energy).all(axis=0)
+    wrong = is_compared & ~is_right
+    if is_given and wrong.any():
+        rule = f"is not the integral of the spring: its slope differs near u = {u[wrong][0]:.3g}"
+        report.add(("model", "potential"), rule, value=texts["potential"])
+    elif is_given and not is_compared.any():
+        rule = "cannot be compared with the spring: one of them has a value nowhere"
+        report.add(("model", "potential"), rule, value=texts["potential"])
+    elif not is_given and not has_rule(spring, model.position):
+        wrong = np.isfinite(work) & ~(is_known & is_right)
+        if wrong.any():
+            rule = "its potential energy cannot be worked out: it has corners, is singular or varies fast"
+            hint = "write the energy as `potential`, a formula whose slope is the spring"
+            report.add(("model", "spring"), rule, hint)
+
+
+def _work(
+    spring: Expression, numbers: Mapping[str, float], position: str, u: Floats, panels: int
+) -> Floats:
+    """Return the integral of the spring from u/2 to u, by Gauss and Legendre's rule in every panel."""
+    place, weight = np.polynomial.legendre.leggauss(POINTS)
+    middle = (2.0 * np.arange(panels)[:, None] + 1.0 + place) / (2.0 * panels)
+    places = u[:, None, None] * (0.5 + 0.5 * middle)
+    force = np.broadcast_to(values(spring, {**numbers, position: places}), places.shape)
+    found: Floats = 0.5 / (2.0 * panels) * u * np.sum(weight * force, axis=(1, 2))
+    return found
