@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from spring_runs import spring
+from spring_runs import registered, spring
 
 from vibsim.analysis.drift import STILL, drift_of
+from vibsim.schemes import SCHEMES
+from vibsim.schemes.implicit import step_crank_nicolson
+from vibsim.schemes.one_step import self_starting
 from vibsim.vocabulary import DRIFTS
 
 PERIODS = 20.0
@@ -60,6 +65,75 @@ def test_exponential_growth_and_decay_are_named_with_their_rate(change: float) -
     )
     assert DRIFTS[int(found.kind[0, 0])] == "exponential"
     assert found.rate[0, 0] * PERIODS == pytest.approx(change, rel=1e-9)
+
+
+@pytest.mark.parametrize("steps", [400, 600, 5000])
+def test_a_decay_below_the_smallest_number_is_exponential(steps: int) -> None:
+    """Backward Euler at w dt = 2: the energy falls by 1/5 at each step, and is 0 from step 460 or so on."""
+    check = {"conserves": "energy", "drift": "bounded"}
+    run = spring(
+        ["backward_euler"],
+        check,
+        model={"kind": "spring", "w": 1.0},
+        time={"end": 2.0 * steps, "base_steps": steps},
+    )
+    assert [(v.status, v.reason) for v in run.verdicts] == [("FAIL", "mismatch")]
+    assert DRIFTS[int(run.record["energy_drift_kind"].item())] == "exponential"
+    rate = run.record["energy_drift_rate"].item()
+    assert rate == pytest.approx(-np.log(5.0) * np.pi, rel=1e-9)
+
+
+@pytest.mark.parametrize("end", [0.5, 0.05, 0.0])
+def test_what_is_above_underflow_decides(end: float) -> None:
+    """Until `end`, of which 0 leaves one sample only; what falls otherwise than by a power is not named."""
+    one = np.ones((1, 1))
+    running = np.where(S > 0, 1.0, 0.0)[None, None]
+
+    def found(ratio: Floats) -> tuple[str, float]:
+        drift = drift_of(running, ratio[None, None], one, 1e-15 * one, np.array([PERIODS]))
+        return DRIFTS[int(drift.kind[0, 0])], float(drift.rate[0, 0]) * PERIODS
+
+    decay = np.where(end >= S, np.exp(-700.0 * S / max(end, 0.01)), 0.0)
+    kind, rate = found(decay)
+    assert kind == "exponential"
+    assert rate == pytest.approx(-700.0 / end if end else -np.inf, rel=1e-9)
+    assert found(np.where(S < 0.5, (1.0 - 2.0 * S) ** 2, 0.0))[0] == "unclear"
+
+
+@pytest.mark.parametrize(
+    ("scheme", "p", "steps"),
+    [
+        ("gauss4", 3.0, 6000),
+        ("crank_nicolson", 30.0, 600),
+        ({"kind": "generalized_alpha", "rho_inf": 1.0}, 30.0, 600),
+        ("crank_nicolson", 1000.0, 600),
+    ],
+)
+def test_rounding_that_grows_with_the_steps_is_no_drift(scheme, p: float, steps: int) -> None:
+    check = {"conserves": "energy", "drift": "none"}
+    model, time = {"kind": "spring", "w": 1.0}, {"end": p * steps, "base_steps": steps}
+    run = spring([scheme], check, model=model, time=time)
+    assert [v.status for v in run.verdicts] == ["PASS"]
+
+
+def pushed(state, t, dt, p, acceleration, slopes):  # type: ignore[no-untyped-def]
+    (u, v), own = step_crank_nicolson(state, t, dt, p, acceleration, slopes)
+    return (u * (1.0 + 1e-12), v * (1.0 + 1e-12)), own
+
+
+@pytest.mark.parametrize("steps", [2000, 100_000])
+def test_a_small_drift_is_above_that_rounding(monkeypatch: pytest.MonkeyPatch, steps: int) -> None:
+    """RK4 loses p^6/72 at each step; Crank-Nicolson pushed by 1e-12 at each gains that much."""
+    stepper = self_starting(pushed, implicit=True)
+    genuine = SCHEMES["crank_nicolson"]
+    broken = replace(genuine, kind="pushed", stepper=lambda options: stepper)
+    registered(monkeypatch, broken)
+    model, time = {"kind": "spring", "w": 1.0}, {"end": 0.1 * steps, "base_steps": steps}
+    check = {"conserves": "energy", "drift": "linear"}
+    run = spring(["rk4", "pushed"], check, model=model, time=time)
+    assert [v.status for v in run.verdicts] == ["PASS"]
+    rate = run.record["energy_drift_rate"][:, 0, 0] * 0.1 / (2 * np.pi)
+    assert rate == pytest.approx([0.1**6 / 72, 2e-12], rel=0.02)
 
 
 def test_what_cannot_be_named_is_unclear() -> None:

@@ -6,7 +6,11 @@ from spring_runs import spring
 
 from vibsim import theory
 from vibsim.analysis.recurrence import LEAST_STEPS, fitted
+from vibsim.engine import integrate
+from vibsim.models import MODELS
 from vibsim.schemes import FIXED_STEP
+
+SPRING = MODELS["spring"]
 
 N = np.arange(201)
 
@@ -41,6 +45,43 @@ def test_what_is_no_such_recurrence_gives_nothing(run):
     found = fitted(run)
     assert np.isnan(found.log_growth)
     assert np.isnan(found.angle)
+
+
+@pytest.mark.parametrize("steps", [8, 12, 16, 24, 32, 64, 200])
+@pytest.mark.parametrize("kind", FIXED_STEP)
+def test_a_short_run_gives_nothing_or_all_digits(kind, steps):
+    """Nothing while parasitic roots are in it."""
+    scheme, p = FIXED_STEP[kind], np.array([0.05, 0.1, 0.3, 1.0])
+    stepper = scheme.stepper(scheme.defaults())
+    initial, parameters = np.tile([1.0, 0.0], (len(p), 1)), np.ones((len(p), 1))
+    run = integrate(SPRING, scheme, scheme.defaults(), parameters, initial, p, steps, 1)
+    found, (growth, angle) = fitted(run.position), theory.dominant(stepper, p)
+    seen = np.isfinite(found.angle)
+    if np.all(theory.roots(stepper, p).parasitic == 0):
+        assert np.all(seen)
+    np.testing.assert_array_less((np.abs(found.angle - angle) * p)[seen], 1e-13)
+    log = np.log(growth) * p / (2 * np.pi)
+    np.testing.assert_array_less((np.abs(found.log_growth - log) * p)[seen], 1e-13)
+
+
+def test_where_peaks_take_its_place_the_record_says_so():
+    """BDF2 with 16 steps: a parasitic root is still in them."""
+    time = {"end": 8.0, "base_steps": 16}
+    record = spring(["bdf2"], model={"kind": "spring", "w": 1.0}, time=time).record
+    assert "peaks" in record.variable("measured_frequency").attrs["method"]
+
+
+@pytest.mark.parametrize("p", [0.7236, 0.8])
+def test_what_is_predicted_is_of_the_dominant_root(p):
+    """And the same in the check: of AB3 it is a parasitic one there."""
+    time = {"end": 1500 * p, "base_steps": 1500}
+    model = {"kind": "spring", "w": 1.0}
+    run = spring(["ab3"], {"stable": p < 0.7237}, model=model, time=time)
+    for name in ("growth", "frequency", "phase_error"):
+        measured, predicted = (run.record[f"{who}_{name}"].item() for who in ("measured", "theory"))
+        assert predicted == pytest.approx(measured, rel=1e-9), name
+    assert run.verdicts[0].status == "PASS"
+    assert run.record["check_low"].item() == run.record["theory_growth"].item()
 
 
 @pytest.mark.parametrize("kind", FIXED_STEP)

@@ -408,3 +408,35 @@ def test_implicit_steps_stay_out_of_the_blocks():
     assert lane_for(2**10, 2**9, implicit=True) == "scalar"
     assert lane_for(2**10, 2**9) == "blocks"
     assert lane_for(1, 2, implicit=True) == "plain"
+
+
+@pytest.mark.parametrize("lane", ["plain", "scalar"])
+@pytest.mark.parametrize(
+    ("kind", "options"),
+    [
+        *((kind, {}) for kind in ("backward_euler", "bdf2")),
+        ("newmark", {"beta": 0.49, "gamma": 0.9}),
+    ],
+)
+def test_a_decay_goes_on_to_zero(kind, options, lane):
+    """Below the smallest normal number a part of a number may be rounded to 0, and with it an allowance."""
+    runs = run(kind, SPRING, 12_000, end=12_000.0, start=(1.0, 0.0), lane=lane, **options)
+    assert np.all(np.isfinite(runs.position))
+    assert np.max(np.abs(runs.position[0, -100:])) < 2.0**-1000
+
+
+def test_iterates_that_stay_on_one_side_of_the_solution_are_led_to_it():
+    """Theta'' = -100 sin(theta) with w dt = 2.5: Newton's method circles where x is always below the force."""
+    pendulum = MODELS["pendulum"]
+    runs = integrate(
+        pendulum,
+        SCHEMES["generalized_alpha"],
+        {"rho_inf": 0.0},
+        np.array([[100.0, 1.0, 1.0]]),
+        np.array([[1.0, 0.3]]),
+        np.array([0.25]),
+        400,
+        1,
+    )
+    assert runs.last_step[0] == 400
+    assert np.isfinite(runs.position).all()

@@ -7,6 +7,7 @@ import pytest
 from scheme_variants import VARIANTS
 
 from vibsim import theory
+from vibsim.analysis.recurrence import fitted
 from vibsim.engine import integrate
 from vibsim.models import MODELS
 from vibsim.schemes import FIXED_STEP, SCHEMES
@@ -84,6 +85,40 @@ def test_limits_that_are_published_to_some_digits():
 
     assert limit("ab3") == pytest.approx(0.7236, abs=5e-5)
     assert limit("yoshida4") == pytest.approx(1.5734, abs=5e-5)
+
+
+# Newmark damps where gamma > 1/2; a root at -1 leaves the circle at (gamma/2 - beta)^(-1/2)
+CROSSINGS = [
+    ("ab3", {}, 12 / (5 * math.sqrt(11))),
+    ("rkn4", {}, 2.58651889451956),
+    ("newmark", {"beta": 0.0, "gamma": 0.75}, 0.375**-0.5),
+    ("newmark", {"beta": 0.25, "gamma": 0.6}, 0.05**-0.5),
+]
+
+
+@pytest.mark.parametrize(("kind", "options", "limit"), CROSSINGS)
+def test_a_root_that_crosses_the_circle_gives_the_limit_to_rounding(kind, options, limit):
+    scheme = SCHEMES[kind]
+    found = theory.stability_limit(scheme, {**scheme.defaults(), **options})
+    assert found == pytest.approx(limit, rel=1e-14)
+
+
+@pytest.mark.parametrize(("gap", "rel"), [(1e-6, 1e-10), (1e-7, 1e-12), (1e-11, 1e-6)])
+def test_limits_far_beyond_any_use_are_found(gap, rel):
+    beta = round(0.25 - gap, 12)
+    limit = theory.stability_limit(SCHEMES["newmark"], {"beta": beta, "gamma": 0.5})
+    assert limit == pytest.approx(gap**-0.5, rel=rel)
+
+
+@pytest.mark.parametrize("p", [0.5, 0.7, 0.7236, 0.8])
+def test_a_long_run_is_left_with_the_dominant_root(p):
+    """Of AB3 that is a parasitic one from w dt = 0.68 on."""
+    scheme = SCHEMES["ab3"]
+    growth, angle = theory.dominant(scheme.stepper({}), p)
+    found = fitted(run(scheme, {}, p, 1500).position[0])
+    assert np.exp(found.log_growth * 2 * np.pi / p) == pytest.approx(growth, rel=1e-10)
+    assert found.angle == pytest.approx(angle, rel=1e-10)
+    assert (growth > theory.growth_per_period(scheme.stepper({}), p) * 1.1) == (p > 0.68)
 
 
 @pytest.mark.parametrize("beta", [0.0, 1 / 12, 1 / 6, 0.2, 0.25, 0.3])

@@ -54,7 +54,7 @@ def apart(
     elif check.second == "exact":
         other, more = exact_series(part, level, name)[first], _of_exact(part, level, values[first])
     else:
-        other, more = discrete(part, level, name)[first], 0.0 * bound
+        other, more = discrete(part, level, name)[first], np.zeros_like(bound)
     inside = slice(1, -1) if name.endswith(CENTRED) else slice(None)
     with np.errstate(invalid="ignore", over="ignore"):
         distance = np.max(np.abs(values[first] - other)[..., inside], axis=-1)

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim import theory
 from vibsim.analysis.evidence import omega_dt
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Orders, Outcome
 from vibsim.analysis.promise import columns_of, formal_orders, options_of, stability_limits
-from vibsim.analysis.stability import growth_of
 from vibsim.analysis.wording import Story, advise, tell
 from vibsim.record import Record
 from vibsim.schemes import SCHEMES, Options, Scheme
@@ -131,6 +131,6 @@ def _growth(
     """Return the growth factor per period at w dt = p, predicted and measured; NaN where it is not known."""
     if math.isnan(p) or scheme.adaptive:
         return math.nan, math.nan
-    predicted = float(growth_of(scheme.stepper(options), np.array(p)))
+    predicted = float(theory.dominant(scheme.stepper(options), p)[0])
     measured = "measured_growth" in record
     return predicted, float(record["measured_growth"][place]) if measured else math.nan

@@ -9,6 +9,7 @@ smooths the stairs in which a drift climbs under an oscillation, and the oscilla
   oscillation, or fewer than `LEAST_SAMPLES` samples;
 - ``exponential``: the energy itself has changed by more than a factor e^`LARGE` and the k of ``|ln(E/E(0))|`` is nearer
   to 1 than that of M. A smaller change cannot be told from a linear one, and the linear one is meant then;
+  An energy that falls below the smallest normal number is fitted above it alone, and is never bounded;
 - ``bounded``: m1 is above m2 by less than `STILL` of M(T), or it creeps only: k below `CREEP`, m1 above m2 by less
   than `STILL_CREEPS` (finer sampling of the same maximum);
 - ``linear``, ``quadratic``: k within `NEAR` of 1 or 2;
@@ -44,6 +45,8 @@ NEAR = 0.25
 """How far k may be from 1 or 2: a quarter of what separates them."""
 LARGE = 0.2
 """ln(E/E(0)) beyond which exponential and linear growth differ in k by more than rounding: by about 0.1 at 0.2."""
+SMALLEST = float(np.finfo(np.float64).tiny)
+"""The smallest normal number: what is below has lost digits."""
 
 NONE, BOUNDED, LINEAR, QUADRATIC, EXPONENTIAL, UNCLEAR = range(len(DRIFTS))
 """Index into `vocabulary.DRIFTS`."""
@@ -90,6 +93,7 @@ def drift_of(
         rise, k = _power(running)
         fall, k_log = _power(np.abs(change))
         last = change[..., -2]
+        gone = (np.abs(ratio * energy[..., None])[..., -2] < SMALLEST) & (np.abs(energy) > SMALLEST)
     size = np.where(np.isfinite(end) & (end > 0), end, 1.0)
     still = rise <= STILL * size
     creeps = (rise <= STILL_CREEPS * size) & (k <= CREEP)
@@ -102,6 +106,7 @@ def drift_of(
         (end <= BLAME * floor, NONE),
         (np.broadcast_to(short, end.shape), UNCLEAR),
         (exponential, EXPONENTIAL),
+        (gone, UNCLEAR),
         (still | creeps, BOUNDED),
         (np.abs(k - 1.0) <= NEAR, LINEAR),
         (np.abs(k - 2.0) <= NEAR, QUADRATIC),
@@ -112,6 +117,10 @@ def drift_of(
     first, second = (_power(time**j)[0] * periods**j + 0.0 * end for j in (1, 2))
     per_period, per_square = safe_ratio(relative, first), safe_ratio(relative, second)
     of_log = safe_ratio(np.sign(last) * fall, first)
+    for at in zip(*np.nonzero((kind == UNCLEAR) & gone & ~unknown & ~short), strict=True):
+        per_sample, k[at] = _decay(change[at], np.abs(ratio[at] * energy[at]) >= SMALLEST)
+        if per_sample < 0:
+            kind[at], of_log[at] = EXPONENTIAL, per_sample * samples / periods[at[-1]]
     zero = np.zeros(end.shape)
     rates = {NONE: zero, BOUNDED: zero, LINEAR: per_period, QUADRATIC: per_square}
     rates[EXPONENTIAL] = of_log
@@ -120,6 +129,20 @@ def drift_of(
     return Drift(
         kind.astype(np.int8), rate, np.where(known, k, np.nan), safe_ratio(end, np.abs(energy))
     )
+
+
+def _decay(change: Floats, is_normal: NDArray[np.bool_]) -> tuple[float, float]:
+    """Return the rate of an exponential decay up to the last normal number, per sample, and k; NaN where it is none.
+
+    Too few samples for a fit have their mean rate.
+    """
+    above = change[: np.flatnonzero(is_normal)[-1] + 1]
+    if len(above) <= LEAST_SAMPLES:
+        return float(above[-1] / (len(above) - 1)) if len(above) > 1 else -np.inf, np.nan
+    fall, k = _power(np.abs(above))
+    n = len(above) - 1
+    rise, _ = _power(np.arange(n + 1.0))
+    return float(-fall / rise) if abs(k - 1.0) <= NEAR else np.nan, float(k)
 
 
 def _power(values: Floats) -> tuple[Floats, Floats]:

@@ -32,7 +32,8 @@ THEORY_RUNS = 2**12
 
 OF_LEVEL = ("scheme", "case", "level")
 
-RECURRENCE, PEAKS = "recurrence of the steps", "interpolated peaks"
+PEAKS = "interpolated peaks"
+RECURRENCE = f"recurrence of the steps; {PEAKS} where a run satisfies none to rounding"
 """How growth and frequency were measured (`vibsim.analysis.oscillation`): attribute ``method``."""
 
 
@@ -44,7 +45,7 @@ def motion(part: Part, compared: Mapping[str, Comparison]) -> Table:
     table |= _beside(part, compared)
     words = "largest stable w dt: infinite for none, 0 where every step grows"
     limit = Variable(("scheme", "case"), predicted.limits(part), attributes(words, "1"))
-    words = "evaluations of the acceleration"
+    words = "evaluations of the acceleration; of an implicit scheme those of one iteration per step"
     counts = _by_level(part, lambda level: oscillation.force_evaluations(part, level))
     total = Variable(OF_LEVEL, counts, attributes(words, "1"))
     return table | {"stability_limit": limit, "force_evaluations_total": total}

@@ -43,7 +43,7 @@ def of_steps(part: Part, level: int, function: Function) -> Floats:
         A level of the ladder.
     """
     found = np.full(part.shape, np.nan)
-    p = part.omega_dt[:, part.grid.levels.index(level)]
+    p = _step(part, level)
     for i, scheme in enumerate(part.experiment.schemes):
         for options, where in steppers(part, i):
             values, back = np.unique(p[where], return_inverse=True)
@@ -52,26 +52,43 @@ def of_steps(part: Part, level: int, function: Function) -> Floats:
     return found
 
 
+def dominant_growth(part: Part, level: int) -> Floats:
+    """Return the factor of the amplitude per natural period, shape (scheme, case); of small oscillations of any model.
+
+    Of the root that a long run is left with, here and below: `vibsim.theory.dominant`.
+    """
+    return of_steps(part, level, lambda stepper, p: theory.dominant(stepper, p)[0])
+
+
 def growth_per_period(part: Part, level: int) -> Floats:
-    """Return the factor of the amplitude per natural period, shape (scheme, case); NaN where the model is another."""
-    if not is_simple(part):
-        return np.full(part.shape, np.nan)
-    return of_steps(part, level, theory.growth_per_period)
+    """Return the same, NaN where the model is another than that of the theory."""
+    return dominant_growth(part, level) if is_simple(part) else np.full(part.shape, np.nan)
 
 
 def frequency(part: Part, level: int) -> Floats:
     """Return the angular frequency of the computed motion [rad per unit of time], shape (scheme, case)."""
     if not is_simple(part):
         return np.full(part.shape, np.nan)
-    return natural_frequency(part) * of_steps(part, level, theory.frequency_ratio)
+    return natural_frequency(part) * (_angle(part, level) / _step(part, level))
 
 
 def phase_error(part: Part, level: int) -> Floats:
-    """Return the time by which peaks come early, per period, shape (scheme, case)."""
+    """Return the time by which peaks come early, per period, shape (scheme, case); minus infinity without any."""
     if not is_simple(part):
         return np.full(part.shape, np.nan)
-    fraction = of_steps(part, level, theory.phase_error_per_period)
-    return fraction * (2.0 * np.pi / natural_frequency(part))
+    angle = _angle(part, level)
+    with np.errstate(divide="ignore"):
+        fraction = (angle - _step(part, level)) / angle
+    return np.asarray(fraction * (2.0 * np.pi / natural_frequency(part)))
+
+
+def _angle(part: Part, level: int) -> Floats:
+    return of_steps(part, level, lambda stepper, p: theory.dominant(stepper, p)[1])
+
+
+def _step(part: Part, level: int) -> Floats:
+    """Return w dt, shape (case,)."""
+    return part.omega_dt[:, part.grid.levels.index(level)]
 
 
 def natural_frequency(part: Part) -> Floats:

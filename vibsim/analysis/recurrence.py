@@ -2,7 +2,8 @@ r"""Growth and frequency of a linear oscillation, from every step and without in
 
 A scheme with one principal pair of roots satisfies ``u^(n+1) = s u^n - q u^(n-1)`` on a linear problem; growth and
 frequency are those of the roots of ``x^2 - s x + q`` (Prony's method). s and q are fitted to the second half of the
-run, where the parasitic roots of a multistep method have faded, each step with the weight of its own size, so that a
+run, where the parasitic roots of a multistep method have faded (a run in which they have not, to rounding, has no such
+recurrence), each step with the weight of its own size, so that a
 growing run does not rest on its end. Peaks that are interpolated by a parabola have an error of dt^3 of their own, and
 none is seen where the sign changes at each step; the roots have round-off, about eps/(w dt)^2.
 
@@ -23,9 +24,15 @@ Floats = NDArray[np.float64]
 LEAST_STEPS = 8
 """Fewer steps leave too little behind the start."""
 SINGULAR = 1e-24
-"""Of the determinant over the product of its diagonal: below, only one root is in the run."""
-RESIDUAL = 1e-6
-"""Root mean square of what is left of the weighted steps: above, the run is no such recurrence."""
+"""Of the part of the differences that is no multiple of the positions, squared: below, only one root is in the run."""
+ROUNDING = 2.0**-44
+"""Root mean square of what is left of the weighted steps when only rounding is: at most 2^-45 up to w dt = 30."""
+RESIDUAL = 1e-11
+"""The same for larger steps, whose rounding errors are some w^2 dt^2 large: above, the run is no such recurrence."""
+FADES = 4.0
+"""What is left of a parasitic root is so many times larger early in the window than late; rounding is the same."""
+LEAST_LEFT = 16
+"""Steps in each half of the window of which that can be told."""
 
 
 @dataclass(frozen=True)
@@ -52,12 +59,16 @@ def fitted(position: Floats) -> Motion:
         slope = (here - behind) * weight
         level = here * weight
         bend = ((ahead - here) - (here - behind)) * weight
-        a, b, c = (np.sum(x, axis=-1) for x in (slope * slope, slope * level, level * level))
-        d, e = np.sum(slope * bend, axis=-1), np.sum(level * bend, axis=-1)
-        determinant = a * c - b * b
-        by_slope, by_level = (d * c - e * b) / determinant, (a * e - b * d) / determinant
-        left = bend - by_slope[..., None] * slope - by_level[..., None] * level
-        both = (determinant > SINGULAR * a * c) & _is_small(left)
+        # orthogonal first, for two roots of which one has nearly left the other behind
+        c = np.sum(level * level, axis=-1)
+        share, by_level = (np.sum(level * x, axis=-1) / c for x in (slope, bend))
+        apart = slope - share[..., None] * level
+        rest = bend - by_level[..., None] * level
+        square = np.sum(apart * apart, axis=-1)
+        by_slope = np.sum(apart * rest, axis=-1) / square
+        by_level = by_level - by_slope * share
+        is_plane = square > SINGULAR * np.sum(slope * slope, axis=-1)
+        both = is_plane & _is_small(rest - by_slope[..., None] * apart)
         # x - 1 = z solves z^2 - (by_slope + by_level) z - by_level = 0
         log_growth, angle = _roots(by_slope + by_level, by_level)
         # where one root has left all others behind, u^(n+1) = x u^n
@@ -70,7 +81,18 @@ def fitted(position: Floats) -> Motion:
 
 
 def _is_small(left: Floats) -> NDArray[np.bool_]:
-    return np.asarray(np.sqrt(np.mean(left * left, axis=-1)) < RESIDUAL)
+    """Say where what is left is rounding, and no parasitic root that is on its way out."""
+    whole = _mean_square(left)
+    found = whole < ROUNDING**2
+    middle = left.shape[-1] // 2
+    if middle >= LEAST_LEFT:
+        stays = _mean_square(left[..., :middle]) < FADES**2 * _mean_square(left[..., middle:])
+        found |= stays & (whole < RESIDUAL**2)
+    return found
+
+
+def _mean_square(left: Floats) -> Floats:
+    return np.asarray(np.mean(left * left, axis=-1))
 
 
 def _roots(total: Floats, product: Floats) -> tuple[Floats, Floats]:

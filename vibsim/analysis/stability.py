@@ -17,11 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim import theory
 from vibsim.analysis import oscillation, predicted
 from vibsim.analysis.part import Part
 from vibsim.analysis.rules import BLOWN_UP
-from vibsim.schemes import Stepper
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -55,7 +53,7 @@ def growth_at(part: Part, level: int) -> Growth:
     growth = part.growth[..., index]
     grown = (growth > BLOWN_UP) & (at_limit | ~_removed(part, index))
     measured = _measured(part, level)
-    expected = predicted_growth(part, level)
+    expected = predicted.dominant_growth(part, level)
     short = ~broken & predicted.is_simple(part) & beyond
     return Growth(
         unstable=broken | beyond | grown,
@@ -70,24 +68,6 @@ def _measured(part: Part, level: int) -> Floats:
     whole = oscillation.growth_over_run(part, part.records[level])
     found = oscillation.growth_per_period(part, level)
     return np.where(np.isfinite(found), found, whole)
-
-
-def predicted_growth(part: Part, level: int) -> Floats:
-    """Return the growth factor per natural period of the largest root, parasitic ones included, of any model."""
-
-    def function(stepper: Stepper, p: Floats) -> Floats:
-        return growth_of(stepper, p)
-
-    return predicted.of_steps(part, level, function)
-
-
-def growth_of(stepper: Stepper, p: Floats) -> Floats:
-    """Return the growth factor per natural period of the largest root, at w dt = p."""
-    principal = np.asarray(theory.growth_per_period(stepper, p))
-    with np.errstate(over="ignore"):
-        largest = np.asarray(theory.spectral_radius(stepper, p)) ** (2.0 * np.pi / p)
-    # the roots of a stable step are found to a few digits less than its growth
-    return np.where(largest > principal * (1.0 + 1e-6), largest, principal)
 
 
 def _removed(part: Part, index: int) -> Flags:

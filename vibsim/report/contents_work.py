@@ -107,6 +107,7 @@ def table(experiment: Experiment, record: Record) -> Table | None:
     name = case_name(record, 0)
     caption = (
         f"Work and precision of {words.symbol(position(experiment))}{f', {name}' if name else ''}"
+        "; force evaluations of an implicit scheme are those of one iteration per step"
     )
     return Table("work_precision", caption, columns, tuple(_rows(found)))
 

@@ -9,8 +9,9 @@ With ``f^n = a(u^n, v^n, t^n)`` the force per unit mass, all of them are
 with a^0 = f^0. The state carries (u, v, a). Forces are averaged, and external forces with them, rather than taken at an
 averaged point: the two agree on a linear structure but for the time of the load, and both are of order 2.
 
-- ``newmark``: alpha_m = alpha_f = 0, any beta and gamma. Order 2 for gamma = 1/2 only. beta = 1/4 is the trapezoidal
-  rule (Crank-Nicolson), 1/6 the linear acceleration method, 1/12 Fox-Goodwin, 0 velocity Verlet, which is explicit.
+- ``newmark``: alpha_m = alpha_f = 0, any beta and gamma. Order 2 for gamma = 1/2 only; above it the amplitude is
+  damped, below it grows at every step. beta = 1/4 is the trapezoidal rule (Crank-Nicolson), 1/6 the linear acceleration
+  method, 1/12 Fox-Goodwin, 0 velocity Verlet, which is explicit.
 - ``hht``: alpha_m = 0, alpha_f = -alpha, with alpha from -1/3 (most damping) to 0, beta = (1 - alpha)^2/4 and
   gamma = (1 - 2 alpha)/2.
 - ``generalized_alpha``: by rho_inf, what is left of the highest frequencies in one step, from 0 to 1 (none is damped):

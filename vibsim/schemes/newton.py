@@ -28,10 +28,16 @@ TOLERANCE = 2.0**-51
 """Largest error that is left, relative to the terms of the equation."""
 STALLED = 2.0**-30
 """Largest correction that may be taken for round-off once corrections no longer fall."""
+LEAST = 2.0**-1022
+"""Error that is left all the same: the smallest normal number, below which `TOLERANCE` of a number is rounded to 0."""
 MOST = 12
 """Iterations before bisection helps."""
 MOST_TOGETHER = 50
 """Iterations before a system has no solution."""
+ONE_SIDED = 8
+"""Iterations after which Newton's method is led where it stays on one side of the solution without meeting it."""
+LED = 3
+"""So many times, twice as far each time."""
 MOST_BISECTED = 200
 """Iterations before the equation has no solution: every second one halves the interval."""
 
@@ -70,9 +76,9 @@ def solved(
         sound = (x - x) + (scale - scale)
         if sound != sound:
             break
-        if not abs(change * rate) > TOLERANCE * scale:
+        if not abs(change * rate) > TOLERANCE * scale + LEAST:
             return x
-        if k and not abs(change) > STALLED * scale and not abs(rate) < 0.5:
+        if k and not abs(change) > STALLED * scale + LEAST and not abs(rate) < 0.5:
             return x
         before = change
     return bisected(guess, u, d_u, v, d_v, t, p, acceleration, slopes)
@@ -92,7 +98,7 @@ def bisected(
 ) -> float:
     """Return what `solved` does, by Newton's method and bisection in turns, or NaN."""
     below = above = math.nan
-    change, scale = math.inf, 0.0
+    change, scale, width = math.inf, 0.0, 0.0
     for k in range(MOST_BISECTED):
         here, speed = u + d_u * x, v + d_v * x
         force = acceleration(here, speed, t, p)
@@ -103,21 +109,24 @@ def bisected(
         if not abs(slope) > 0.0 or not abs(slope) + terms < math.inf:
             slope, terms = 1.0, 0.0
         change, scale = (x - force) / slope, abs(force) + terms
-        if not abs(change) > TOLERANCE * scale:
+        if not abs(change) > TOLERANCE * scale + LEAST:
             return x - change
         if x < force:
             below = x
         else:
             above = x
         ahead = x - change
-        if (
-            below == below
-            and above == above
-            and not (k % 2 == 0 and (ahead - below) * (ahead - above) < 0.0)
-        ):
-            ahead = 0.5 * (below + above)
+        if below == below and above == above:
+            if not (k % 2 == 0 and (ahead - below) * (ahead - above) < 0.0):
+                ahead = 0.5 * (below + above)
+        elif ONE_SIDED < k <= ONE_SIDED + LED:
+            # a force that hardly changes has its solution about |x - a| away: look there, but not for a far one
+            ahead = x + width if x < force else x - width
+            width = 2.0 * width
+        else:
+            width = abs(x - force)
         x = ahead
-    return x if abs(change) <= STALLED * scale else math.nan
+    return x if abs(change) <= STALLED * scale + LEAST else math.nan
 
 
 @alone
@@ -157,9 +166,9 @@ def solved_together(
         )
         rate = change / before if k else 1.0
         # `not >`, so that NaN ends it as well
-        if not change * rate > TOLERANCE * scale:
+        if not change * rate > TOLERANCE * scale + LEAST:
             return x, y
-        if k and not change > STALLED * scale and not rate < 0.5:
+        if k and not change > STALLED * scale + LEAST and not rate < 0.5:
             return x, y
         before = change
     return math.nan, math.nan

@@ -139,7 +139,11 @@ _ENERGY = (
 )
 _COST = (
     Value("accepted_steps", "number of steps taken", "none"),
-    Value("force_evaluations", "number of evaluations of the acceleration", "none"),
+    Value(
+        "force_evaluations",
+        "number of evaluations of the acceleration; of an implicit scheme those of one iteration per step",
+        "none",
+    ),
     Value(
         "stability_limit",
         "largest stable w dt of the scheme, infinite where there is none",

@@ -8,6 +8,7 @@ from vibsim.theory.amplification import Amplification, amplification
 from vibsim.theory.discrete import discrete
 from vibsim.theory.roots import (
     Roots,
+    dominant,
     frequency_ratio,
     growth,
     growth_per_period,
@@ -25,6 +26,7 @@ __all__ = [
     "Roots",
     "amplification",
     "discrete",
+    "dominant",
     "frequency_ratio",
     "growth",
     "growth_per_period",

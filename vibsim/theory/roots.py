@@ -30,6 +30,8 @@ GRID = np.concatenate([0.02 * np.arange(1, 401), np.geomspace(8.0, 1000.0, 61)[1
 """Where the principal roots are followed, p = w dt: close enough for each pair to lie next to the one before."""
 
 _REFINEMENTS = 3
+_LARGER = 1e-6
+"""Growth per period by which a parasitic root outgrows the principal pair."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,8 @@ class Roots:
     """Whether the principal roots are complex, so that the solution oscillates with any period."""
     parasitic: Floats
     """Largest absolute value of the other roots; 0 where there are none."""
+    parasitic_angle: Floats
+    """Angle of that root, from 0 to pi; 0 where there are none."""
 
 
 def growth(stepper: Stepper, p: ArrayLike) -> Floats:
@@ -76,6 +80,21 @@ def spectral_radius(stepper: Stepper, p: ArrayLike) -> Floats:
     return np.asarray(np.maximum(np.exp(found.log_growth), found.parasitic))
 
 
+def dominant(stepper: Stepper, p: ArrayLike) -> tuple[Floats, Floats]:
+    """Return growth per natural period and angle of the root that a long run is left with.
+
+    It is the larger one of the principal pair, or a parasitic root that is larger by more than its rounding.
+    """
+    found, steps = roots(stepper, p), np.asarray(p, dtype=float)
+    with np.errstate(divide="ignore", over="ignore"):
+        other = np.log(found.parasitic)
+        # parasitic roots are found to a few digits less than the principal pair
+        is_other = (other - found.log_growth) * (2.0 * np.pi / steps) > _LARGER
+        log_growth = np.where(is_other, other, found.log_growth)
+        factor = np.exp(log_growth * (2.0 * np.pi / steps))
+    return factor, np.where(is_other, found.parasitic_angle, found.angle)
+
+
 def numerical_frequency(stepper: Stepper, p: ArrayLike) -> Floats:
     """Return ``w~ dt``, as points on the mesh show it: from 0 to pi."""
     return roots(stepper, p).angle
@@ -100,7 +119,7 @@ def roots(stepper: Stepper, p: ArrayLike) -> Roots:
     """Return what the roots of a scheme say for each ``p = w dt``."""
     steps = np.asarray(p, dtype=float)
     with np.errstate(all="ignore"):
-        trace, determinant, parasitic = _quadratic(stepper, np.atleast_1d(steps).ravel())
+        trace, determinant, other = _quadratic(stepper, np.atleast_1d(steps).ravel())
         excess = determinant - trace * trace * 0.25
         is_complex = excess.high > 0
         angle = np.where(
@@ -119,21 +138,23 @@ def roots(stepper: Stepper, p: ArrayLike) -> Roots:
         rate.reshape(shape),
         angle.reshape(shape),
         np.asarray(is_complex).reshape(shape),
-        parasitic.reshape(shape),
+        np.abs(other).reshape(shape),
+        np.abs(np.angle(other)).reshape(shape),
     )
 
 
-def _quadratic(stepper: Stepper, p: Floats) -> tuple[Doubled, Doubled, Floats]:
+def _quadratic(stepper: Stepper, p: Floats) -> tuple[Doubled, Doubled, Complexes]:
     """Return T and D of ``x^2 - T x + D`` with the principal roots, and the largest other one, for p of shape (k,)."""
     matrix = step_matrix(stepper, doubled(p))
     if matrix.shape[-1] == 2:
         a, b, c, d = (matrix[..., i, j] for i in range(2) for j in range(2))
-        return a + d, a * d - b * c, np.zeros(len(p))
+        return a + d, a * d - b * c, np.zeros(len(p), dtype=complex)
     below = np.searchsorted(GRID, p, side="right") - 1
     before = np.where((below < 0)[:, None], _turned(p), _followed(stepper)[below])
     pair, others = _split(_eigenvalues(matrix), before)
     trace, determinant = (doubled(x.real) for x in (pair.sum(axis=-1), pair.prod(axis=-1)))
-    parasitic = np.max(np.abs(others), axis=-1)
+    largest = np.argmax(np.abs(others), axis=-1)[:, None]
+    parasitic = np.take_along_axis(others, largest, axis=-1)[:, 0]
     return *_refined(characteristic(matrix), trace, determinant), parasitic
 
 

@@ -5,7 +5,8 @@ Source: vibration text (B), section 4.5, equation (23), for the centred scheme.
 
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Callable
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +14,18 @@ from numpy.typing import NDArray
 from vibsim.schemes.base import Options, Scheme, Stepper
 from vibsim.theory.roots import GRID, roots
 
+Floats = NDArray[np.float64]
+
 _PARTS = 65
 _ROUNDS = 9
+_FAR = np.geomspace(GRID[-1], 1e8, 101)[1:]
+"""Where implicit schemes are looked at beyond `GRID`: the limit of Newmark's scheme goes to infinity as beta to 1/4."""
 _PARASITIC = 1e-9
 """Growth of a parasitic root that is no rounding."""
+_BESIDE = 1e-6
+"""Part of a limit within which the growth changes its sign, where the root crosses the unit circle."""
+_CROSSED = 1e-8
+"""Growth or decay at the ends of that which makes it a crossing, and no root that stays on the circle."""
 
 
 def stability_limit(scheme: Scheme, options: Options) -> float:
@@ -33,23 +42,40 @@ def stability_limit(scheme: Scheme, options: Options) -> float:
 
 @lru_cache(maxsize=256)
 def _limit(stepper: Stepper) -> float:
-    growing = np.flatnonzero(_grows(stepper, GRID))
+    grid = np.concatenate([GRID, _FAR])
+    growing = np.flatnonzero(_grows(stepper, grid))
     if not len(growing):
         return float(np.inf)
     if growing[0] == 0:
         return 0.0
-    low, high = GRID[growing[0] - 1], GRID[growing[0]]
+    limit = _first(partial(_grows, stepper), grid[growing[0] - 1], grid[growing[0]])
+    low, high = limit * (1.0 - _BESIDE), limit * (1.0 + _BESIDE)
+    below, above = _largest(stepper, np.array([low, high]))
+    if not (below < -_CROSSED and above > _CROSSED):
+        return limit
+    return _first(lambda p: ~(_largest(stepper, p) <= 0.0), low, high)
+
+
+def _first(grows: Callable[[Floats], NDArray[np.bool_]], low: float, high: float) -> float:
+    """Return the last point before growth begins, between one without and one with growth."""
     for _ in range(_ROUNDS):
         points = np.linspace(low, high, _PARTS)
-        first = int(np.argmax(_grows(stepper, points)[1:])) + 1
+        first = int(np.argmax(grows(points)[1:])) + 1
         low, high = points[first - 1], points[first]
     return float(low)
 
 
-def _grows(stepper: Stepper, p: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _largest(stepper: Stepper, p: Floats) -> Floats:
+    """Return the logarithm of the largest root: it crosses 0 where `_grows` allows for rounding."""
+    found = roots(stepper, p)
+    with np.errstate(divide="ignore"):
+        return np.maximum(found.log_growth, np.log(found.parasitic))
+
+
+def _grows(stepper: Stepper, p: Floats) -> NDArray[np.bool_]:
     """Say where a root is beyond the unit circle by more than rounding in twice the precision."""
     found = roots(stepper, p)
-    rounding = 1e-24 * (1.0 + p**4)
+    rounding = 1e-28 * (1.0 + p * p)
     # where the two roots meet, rounding enters with its square root
     rounding = np.where(found.is_complex, rounding, np.sqrt(rounding))
     is_principal = ~(found.log_growth <= rounding)
