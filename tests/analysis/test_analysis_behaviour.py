@@ -62,6 +62,47 @@ def test_growth_that_vanishes_with_dt_is_no_instability() -> None:
     assert float(run.record["measured_growth"][0, 0, 0]) > 1.3
     assert run.verdicts[0].status == "PASS"
     assert run.record["stability_limit"][0, 0] == 0.0
+    assert "it grows by " in run.verdicts[0].text
+    assert "per period, which vanishes with dt" in run.verdicts[0].text
+
+
+def test_a_factor_near_one_shows_its_growth() -> None:
+    checks = [{"stable": True, "schemes": [name], "level": 2} for name in ("rk2", "rk4", "central")]
+    run = spring(["rk2", "rk4", "central"], *checks, levels=(0, 1, 2))
+    predicted = run.record["theory_growth"][:, 0, 2]
+    grows, decays, neither = (verdict.text for verdict in run.verdicts)
+    assert f"per period 1 + {predicted[0] - 1:.3g} predicted" in grows
+    assert f"it grows by {predicted[0] - 1:.3g} per period" in grows
+    assert f"per period 1 - {1 - predicted[1]:.3g} predicted" in decays
+    assert "per period 1 predicted, 1 measured." in neither
+    assert "vanishes" not in decays + neither
+
+
+def test_advice_on_stability_points_the_right_way() -> None:
+    checks = [{"stable": False}, {"stable": True}]
+    stable = spring(["central"], *checks, time=at_limit(0.9)).verdicts[0]
+    unstable = spring(["central"], *checks, time=at_limit(1.01)).verdicts[1]
+    assert "coarser" in stable.advice
+    assert "finer" not in stable.advice
+    assert "finer" in unstable.advice
+
+
+def test_the_result_nearest_to_what_is_allowed_decides() -> None:
+    sweep = {"initial.u": [1e-3, 1.0, 0.5, 0.7, 30.0]}
+    run = spring(["rk4"], {"equal": ["rk4", "discrete"], "quantity": "u"}, sweep=sweep)
+    (verdict,) = run.verdicts
+    distance, allowed = (run.record[f"check_{n}"][0, 0] for n in ("value", "low"))
+    assert verdict.status == "PASS"
+    assert verdict.results[0].case == int(np.argmax(distance / allowed))
+    # which is no longer the one that is allowed the least
+    assert int(np.argmax(distance - allowed)) == 0
+
+
+def test_an_energy_that_decays_is_said_to_decay() -> None:
+    check = {"conserves": "energy", "drift": "bounded"}
+    for scheme, word in (("backward_euler", "decays"), ("forward_euler", "grows")):
+        text = spring([scheme], check).verdicts[0].text
+        assert f"{word} exponentially" in text
 
 
 def test_growth_that_nothing_shows_to_vanish_is_an_instability() -> None:
@@ -115,6 +156,14 @@ def test_two_schemes_are_equal_or_not(pair: list[str], equal: bool, wrapped: boo
     assert run.verdicts[0].status == ("PASS" if equal or wrapped else "FAIL")
     assert run.verdicts[0].results[0].scheme == pair[0]
     assert len(run.verdicts[0].results) == 1
+
+
+def test_a_run_that_overflows_is_compared_without_a_warning() -> None:
+    """Its rounding has no finite bound; pytest makes an error of every warning."""
+    check = {"equal": ["central", "discrete"], "quantity": "u"}
+    run = spring(["central"], check, time={"end": 2000.0, "base_steps": 4000})
+    assert run.record["check_low"].item() == np.inf
+    assert run.verdicts[0].status == "FAIL"
 
 
 def test_a_scheme_equals_its_own_discrete_solution_and_not_the_exact_one() -> None:
@@ -249,6 +298,8 @@ def test_adaptive_schemes_have_errors_and_no_orders() -> None:
     ladder, own, error, *rest, drift = run.verdicts
     assert (ladder.status, len(ladder.results)) == ("PASS", 1)
     assert (own.status, own.reason) == ("INCONCLUSIVE", "not_applicable")
+    assert "an order of u does not exist" in own.text
+    assert "fixed step" in own.advice
     assert error.status == "PASS"
     assert [v.status for v in rest] == ["PASS"] * 3
     # its tolerance is no round-off

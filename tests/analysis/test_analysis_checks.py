@@ -205,6 +205,26 @@ def test_a_number_that_does_not_exist_is_not_applicable() -> None:
     assert all(v.advice for v in found)
 
 
+@pytest.mark.parametrize(
+    ("check", "advice"),
+    [
+        ({"value": "stability_limit", "equals": 9.0}, "Correct"),
+        ({"value": "force_evaluations", "equals": 9.0}, "Correct"),
+        ({"value": "max", "quantity": "theta", "equals": 9.0}, "Add finer"),
+        (
+            {"value": "max", "quantity": "theta", "equals": 9.0, "at": {"level": 4}},
+            "Ask for a finer",
+        ),
+    ],
+)
+def test_finer_levels_are_advised_where_they_change_the_number(
+    check: dict[str, Any], advice: str
+) -> None:
+    (found,) = run(check)
+    assert found.status == "FAIL"
+    assert found.advice.startswith(advice)
+
+
 def test_values_of_a_member_that_broke_down() -> None:
     checks = [
         {"value": "max", "quantity": "theta", "below": 1e6, "at": {"level": 7}},

@@ -123,6 +123,36 @@ def test_what_is_said_of_a_border_is_true(value: float, side: float) -> None:
     assert float(border) == pytest.approx(value, rel=1e-5, abs=1e-12)
 
 
+@pytest.mark.parametrize("count", [6, 60, 95])
+def test_a_range_that_separates_is_told_however_large_it_is(count: int) -> None:
+    x = np.linspace(0.0, 1.0, 101)
+    y = np.tile([0.0, 1.0], 51)[:101]
+    hits = np.arange(101) >= 101 - count
+    text = where(sweep_record(x_a=x, x_b=y), outcome(hits.astype(np.int8)[None]))["FAIL"]["text"]
+    assert text == f"FAIL in {count} of 101 results, all with x.a of {x[101 - count]:g} or more"
+    # but for one within it that passed, a large range says nothing
+    hits[98] = False
+    text = where(sweep_record(x_a=x, x_b=y), outcome(hits.astype(np.int8)[None]))["FAIL"]["text"]
+    assert ("spread over the sweep" in text) == (count > 6)
+
+
+def test_words_that_separate_are_told_however_many() -> None:
+    words = np.array(["a", "b", "c", "d"] * 4)
+    compared = (words != "b").astype(np.int8)[None]
+    text = where(sweep_record(x_a=words), outcome(compared))["FAIL"]["text"]
+    assert text == "FAIL in 12 of 16 results, all with x.a a or c or d"
+
+
+@pytest.mark.parametrize("border", [1.9, 0.1 + 0.2, 0.7, 3.1])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_short_border_keeps_its_digits(border: float, side: float) -> None:
+    x = border + side * np.arange(-10.0, 5.0)
+    x[10] = border
+    compared = (side * x >= side * border).astype(np.int8)[None]
+    text = where(sweep_record(x_a=x), outcome(compared))["FAIL"]["text"]
+    assert f"all with x.a of {border:.15g} or" in text
+
+
 def test_without_a_sweep_nothing_is_anywhere() -> None:
     assert where(Record({}, {}), outcome(np.ones((3, 1), dtype=np.int8))) == {}
 

@@ -53,9 +53,17 @@ def lanes_of(scheme):
     return [lane for lane in LANES if scheme.explicit or lane != "blocks"]
 
 
-# a kernel takes some seconds to be compiled: one for every scheme, the others are slow
+FIRST = {scheme.family: kind for kind, scheme in reversed(FIXED_STEP.items())}.values()
+"""The first scheme of every family."""
+# a kernel takes some seconds to be compiled: those of one scheme of each family, the others are slow
 CASES = [
-    pytest.param(DRAGGED if scheme.velocity_forces else DRIVEN, scheme, scheme.defaults(), id=kind)
+    pytest.param(
+        DRAGGED if scheme.velocity_forces else DRIVEN,
+        scheme,
+        scheme.defaults(),
+        id=kind,
+        marks=() if kind in FIRST else pytest.mark.slow,
+    )
     for kind, scheme in FIXED_STEP.items()
 ]
 VARIED = [

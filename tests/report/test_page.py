@@ -18,6 +18,7 @@ from vibsim.errors import VibsimError
 from vibsim.models import MODELS
 from vibsim.record import Record, Variable
 from vibsim.report import (
+    cards,
     choice,
     drawing,
     figures_map,
@@ -415,6 +416,64 @@ def test_a_quantity_has_one_name_on_the_page(tmp_path):
 def test_every_reason_has_words():
     assert set(reasons.REASONS) == set(REASONS)
     assert all(r.meaning and r.needs for r in reasons.REASONS.values())
+
+
+def test_a_number_that_is_right_has_the_words_of_its_kind():
+    known = [reasons.reason("match", kind) for kind in ("stable", "conserves", "equal", "value")]
+    of_levels = "finer levels do not change"
+    assert [of_levels in r.needs for r in known] == [False, False, False, True]
+    assert of_levels not in reasons.reason("match", "value", value="stability_limit").needs
+    assert of_levels not in reasons.reason("match", "value", value="accepted_steps").needs
+    assert of_levels in reasons.reason("match", "value", value="period", levels=3).needs
+    alone = reasons.reason("match", "value", value="period", levels=1)
+    assert alone.needs.startswith("More levels")
+
+
+@pytest.mark.parametrize("is_stable", [True, False])
+def test_a_check_of_stability_does_not_say_that_a_run_stays_bounded(is_stable, tmp_path):
+    asked = {"stable": is_stable}
+    exp = samples.experiment(checks=[asked, {"claim": "it is so", "that": asked}], levels=[7])
+    record = samples.record(exp)
+    first, claim = (
+        cards.card(exp, record, check) for check in samples.summary(exp, record)["checks"]
+    )
+    assert "an error that vanishes with dt" in first["heading"]
+    assert "bounded" not in first["heading"]
+    assert first["heading"].startswith("no instability" if is_stable else "instability")
+    if is_stable:
+        assert claim["needs"] == reasons.reason("match", "stable").needs == first["needs"]
+
+
+def test_a_number_within_round_off_has_two_digits():
+    exp = samples.experiment(
+        model={"kind": "spring", "w": 2.0},
+        initial={"u": 1.0, "v": 0.0},
+        schemes=["crank_nicolson", "central"],
+        levels=[5, 6],
+        checks=[{"conserves": "energy", "drift": "none", "schemes": ["crank_nicolson"]},
+                {"conserves": "energy", "drift": "bounded", "schemes": ["central"]}],
+    )  # fmt: skip
+    record = samples.record(exp)
+    noise, number = (
+        next(iter(cards.card(exp, record, check)["results"].text_rows()))[-1]
+        for check in samples.summary(exp, record)["checks"]
+    )
+    assert re.fullmatch(r"\d\.\d·10⁻¹.", noise)
+    assert len(number) > 10
+
+
+def test_a_member_alone_carries_its_worst_verdict():
+    rows = [
+        ("FAIL", "order_low", "run a@1"),
+        ("PASS", "asymptotic", "run a@1"),
+        ("PASS", "match", "run a@0"),
+    ]
+    results = [dict(zip(("status", "reason", "command"), row, strict=True)) for row in rows]
+    told = cards._alone({"status": "FAIL", "results": results}).splitlines()
+    assert told == [
+        ".venv/bin/run a@1  # FAIL order_low",
+        ".venv/bin/run a@0  # PASS match",
+    ]
 
 
 def test_an_unknown_format_is_refused_before_anything_is_written(tmp_path):

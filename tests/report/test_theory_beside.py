@@ -95,7 +95,11 @@ def test_printed_digits_stand_beside_ours(text, tmp_path):
               zip(column(table, "ours"), exp.published[0].rows, strict=True)]  # fmt: skip
     assert agrees == [True, False, True, False]
     assert column(table, "agrees?") == ["yes", "no", "yes", "no (not as expected)"]
-    assert column(table, "beside: relative energy error")[1] < 1e-12 < column(table, "ours")[1]
+    assert (
+        column(table, "beside: relative energy error by own velocity")[1]
+        < 1e-12
+        < column(table, "ours")[1]
+    )
     page = write(tmp_path, exp, rec, summary)
     assert "1.221·10⁻²" in page
     assert "1.22237·10⁻²" in page
@@ -129,13 +133,17 @@ def test_theory_stands_beside_every_measured_number(text):
     growth, phase = contents_theory.predictions(rec)
     assert len(growth.rows) == len(phase.rows) == 4 * 3
     predicted, measured = (
-        column(growth, name) for name in ("growth per period: predicted", "measured")
+        column(growth, name) for name in ("growth per period − 1: predicted", "measured")
     )
-    np.testing.assert_allclose(column(growth, "difference"), np.subtract(measured, predicted))
+    np.testing.assert_allclose(measured, predicted, atol=1e-13)
+    # all agree to round-off, and there is no difference to show
+    for table in (growth, phase):
+        assert "difference" not in [c.header for c in table.columns]
+        assert "the two agree to round-off" in table.caption
     # Crank-Nicolson neither grows nor decays, forward Euler grows by (1 + p^2)^(1/2) in each step
     p = W * 0.05
-    assert predicted[0] == pytest.approx((1 + p * p) ** (0.5 * W / p), rel=1e-12)
-    assert predicted[3] == pytest.approx(1.0, abs=1e-14)
+    assert predicted[0] == pytest.approx((1 + p * p) ** (0.5 * W / p) - 1, rel=1e-12)
+    assert predicted[3] == pytest.approx(0.0, abs=1e-14)
     assert column(growth, "stable")[0] == "never"
     assert column(growth, "stable")[3] == "yes"
 
@@ -155,9 +163,49 @@ def test_a_scheme_conserves_with_its_own_velocity_what_the_centred_difference_se
     own, centred = (column(table, f"max |dE|/E(0), {v}") for v in ("own velocity", "[D₂ₜu]"))
     implicit = [i for i, name in enumerate(column(table, "scheme")) if name == "crank_nicolson"]
     assert all(own[i] < 1e-12 < 1e-3 < centred[i] for i in implicit)
+    # nothing is compared with round-off, and what is compared is written plainly
+    quotients = column(table, "second over first")
+    assert all(quotients[i] is None for i in implicit)
+    shown = [row[-2] for row in table.text_rows()]
+    assert shown[0] == "0.748"
+    assert not any("10" in text and "·" in text for text in shown)
     picture = figures_energy.running(rec, 0)
     texts = [t.get_text() for t in picture.figure.axes[0].get_legend().get_texts()]
     assert {"own velocity", "[D₂ₜu]"} <= set(texts)
+
+
+def test_an_energy_that_decays_does_not_grow():
+    rec = samples.record(spring(schemes=["forward_euler", "backward_euler"]))
+    table = contents_energy.velocities(rec)
+    drifts = column(table, "drift of the energy, own velocity")
+    assert drifts == ["exponential growth"] * 3 + ["exponential decay"] * 3
+
+
+def test_a_difference_above_round_off_is_shown():
+    # peaks interpolated by a parabola are not exact
+    exp = spring(schemes=["rk4", "central"], samples="common")
+    growth, phase = contents_theory.predictions(samples.record(exp))
+    assert any(isinstance(x, float) and abs(x) > 1e-9 for x in column(phase, "difference"))
+    differences = column(growth, "difference")
+    predicted, measured = (
+        column(growth, name) for name in ("growth per period − 1: predicted", "measured")
+    )
+    for a, b, difference in zip(predicted, measured, differences, strict=True):
+        assert difference is None or difference == pytest.approx(b - a, abs=1e-15)
+
+
+def test_a_further_number_by_the_own_velocity_says_so(tmp_path):
+    rows = [{"scheme": "rk4", "level": 0, "printed": "3.510e-2"}]
+    table = {
+        "title": "Relative error",
+        "value": "relative_energy_error_d2t",
+        "beside": ["relative_energy_error", "period"],
+        "rows": rows,
+    }
+    exp = spring(published=[table])
+    rec = samples.record(exp)
+    (found,) = contents_published.tables(exp, rec, samples.summary(exp, rec))
+    assert [c.header for c in found.columns][-2:] == ["by own velocity", "beside: period"]
 
 
 def test_the_centred_scheme_alone_has_no_second_energy():

@@ -397,13 +397,6 @@ def test_a_jump_without_a_solution_is_no_solution():
     assert runs.last_step[0] < 200
 
 
-@pytest.mark.parametrize("kind", IMPLICIT)
-def test_lanes_give_the_same_bits(kind):
-    plain, scalar = (run(kind, FORCED, 64, lane=lane) for lane in ("plain", "scalar"))
-    assert plain.position.tobytes() == scalar.position.tobytes()
-    assert plain.velocity.tobytes() == scalar.velocity.tobytes()
-
-
 def test_implicit_steps_stay_out_of_the_blocks():
     assert lane_for(2**10, 2**9, implicit=True) == "scalar"
     assert lane_for(2**10, 2**9) == "blocks"

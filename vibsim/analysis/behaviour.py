@@ -24,7 +24,7 @@ from vibsim.analysis.drifting import drift_at
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
 from vibsim.analysis.part import Part
 from vibsim.analysis.stability import growth_at
-from vibsim.analysis.wording import growth_in_words, number
+from vibsim.analysis.wording import growth_in_words, number, vanishing_in_words
 from vibsim.record import Record
 from vibsim.spec.about import schemes_of
 from vibsim.vocabulary import DRIFTS, REASON_NAMES
@@ -88,13 +88,19 @@ def stable(experiment: Experiment, record: Record, check: StableCheck, index: in
     measured, expected, p = (record[f"check_{n}"][index] for n in ("value", "low", "high"))
     level = int(np.max(record["check_first"][index]))
     as_expected = reason == (MATCH if check.stable else UNSTABLE)
+    # a scheme without a limit of its own grows at every step
+    limits = record["stability_limit"] if "stability_limit" in record else np.zeros(reason.shape)
+    never = np.broadcast_to(np.asarray(limits) == 0.0, reason.shape)
 
     def tell(scheme: int, case: int) -> str:
         name = experiment.schemes[scheme].name
         unstable = reason[scheme, case] != MATCH
         word = "unstable" if unstable else "stable"
         told = f"Scheme {name} is {word} at level {level}, w dt = {p[scheme, case]:.4g}"
-        told += growth_in_words(float(expected[scheme, case]), float(measured[scheme, case]))
+        factors = float(expected[scheme, case]), float(measured[scheme, case])
+        told += growth_in_words(*factors)
+        if not unstable and never[scheme, case]:
+            told += vanishing_in_words(*factors)
         if record["status"][scheme, case, _place(record, level)]:
             t = float(record["failure_time"][scheme, case, _place(record, level)])
             told += f"; it met a number that is not finite or too large at t = {number(t)}"
@@ -116,7 +122,7 @@ def stable(experiment: Experiment, record: Record, check: StableCheck, index: in
         expects_pass=check.stable,
         quantity=None,
         tell=tell,
-        advise=lambda scheme, case: _ADVICE["stable"],
+        advise=lambda scheme, case: _STABLE_ADVICE[int(reason[scheme, case])],
         value=measured,
     )
 
@@ -143,8 +149,10 @@ def conserves(experiment: Experiment, record: Record, check: ConservesCheck, ind
             return f"{check.conserves} means nothing here: the calculation met a number that is not finite."
         if reason[scheme, case] == NOT_APPLICABLE:
             return f"{check.conserves} does not exist here, or was not stored."
-        told = _DRIFT_WORDS[DRIFTS[int(kind[scheme, case])]]
         size, per = float(largest[scheme, case]), float(rate[scheme, case])
+        told = _DRIFT_WORDS[DRIFTS[int(kind[scheme, case])]]
+        if told == _DRIFT_WORDS["exponential"] and per < 0:
+            told = "is that of an energy that decays exponentially"
         speed = (
             "" if not per else f", {_RATES.get(DRIFTS[int(kind[scheme, case])], '')}".format(per)
         )
@@ -161,7 +169,7 @@ _DRIFT_WORDS = {
     "bounded": "is bounded: its largest value no longer grows",
     "linear": "grows in proportion to the time",
     "quadratic": "grows in proportion to the square of the time",
-    "exponential": "grows or decays exponentially with time",
+    "exponential": "grows exponentially with time",
     "unclear": "grows in a way that this run is too short to name",
 }
 _RATES = {
@@ -184,6 +192,9 @@ def equal(experiment: Experiment, record: Record, check: EqualCheck, index: int)
         (distance <= allowed, MATCH),
     ]
     reason = np.select([mask for mask, _ in masks], [code for _, code in masks], MISMATCH)
+    # as a part of what is allowed, which differs from member to member
+    with np.errstate(divide="ignore", invalid="ignore"):
+        away = np.where(distance > 0, distance / allowed, distance)
     other = {"exact": "the exact solution", "discrete": "the exact solution of its own steps"}
     second = other.get(check.second, f"scheme {check.second}")
 
@@ -198,9 +209,7 @@ def equal(experiment: Experiment, record: Record, check: EqualCheck, index: int)
             f"{distance[scheme, case]:.4g} apart, and may be {allowed[scheme, case]:.4g}."
         )
 
-    return _valued(
-        experiment, record, check, reason, distance, f"equal to {second}", tell, distance - allowed
-    )
+    return _valued(experiment, record, check, reason, distance, f"equal to {second}", tell, away)
 
 
 def _valued(
@@ -237,8 +246,13 @@ def _valued(
     )
 
 
+_STABLE_ADVICE = {
+    MATCH: "Set `stable: true`, or take coarser `levels:` where the scheme has a limit (w dt beyond it).",
+    UNSTABLE: "Take finer `levels:` (w dt within the limit of the scheme), or correct `stable:`.",
+    MISMATCH: "Look for an error in the scheme: it does not grow as its own theory says.",
+}
+"""Advice by what was measured."""
 _ADVICE = {
-    "stable": "Take finer `levels:` (w dt within the limit of the scheme), or correct `stable:`.",
     "conserves": "Lengthen the run (`time:`), take finer `levels:`, or correct `drift:`.",
     "equal": "Compare the two in the report, give `atol:`, or correct what the check expects.",
     "non_finite": "Start `levels:` at a finer level, or shorten `time: end`.",

@@ -35,6 +35,8 @@ MAY_BE_INFINITE = frozenset({"exact_period"})
 """Numbers that are infinite for a sound member, on the separatrix: they do not exist there."""
 UNBOUNDED = frozenset({"stability_limit"})
 """Numbers of which infinity is a value: above every other number."""
+ROUND_OFF = 1e-13
+"""A number that is no larger is rounding."""
 DEFAULT_RTOL, DEFAULT_ATOL = 1e-9, 1e-12
 """Tolerance of ``equals`` where a check gives none."""
 
@@ -76,7 +78,7 @@ def valued(experiment: Experiment, record: Record, check: ValueCheck, measured: 
         expects_pass=True,
         quantity=check.quantity,
         tell=tell,
-        advise=lambda scheme, case: _ADVICE.get(REASON_NAMES[int(reason[scheme, case])], ""),
+        advise=lambda scheme, case: _advise(check, REASON_NAMES[int(reason[scheme, case])]),
         value=measured,
     )
 
@@ -87,8 +89,28 @@ _ADVICE = {
         "Ask for a level, a step and a time that are stored (`at:`, `samples: all`), and choose `time: end` so that "
         "the number exists."
     ),
-    "mismatch": "Add finer `levels:`, or correct the number that the check asks for.",
 }
+_CORRECT = "orrect the number that the check asks for."
+COUNTED = frozenset({"accepted_steps", "force_evaluations"})
+"""Numbers that finer levels make larger, and no more accurate."""
+
+
+def _advise(check: ValueCheck, reason: str) -> str:
+    """Say what to change in the YAML; finer levels only where they change the number."""
+    if reason != "mismatch":
+        return _ADVICE.get(reason, "")
+    if check.value in COUNTED or not depends_on_level(check.value):
+        return f"C{_CORRECT}"
+    if isinstance(check.at.level, int):
+        return f"Ask for a finer level (`at: {{level: ...}}`), or c{_CORRECT}"
+    return f"Add finer `levels:`, or c{_CORRECT}"
+
+
+def depends_on_level(name: str) -> bool:
+    """Say whether a number is another at another level, or rests on the whole ladder."""
+    from vibsim.spec.values import VALUES
+
+    return "level" in VALUES[name].at or sees_several_levels(name)
 
 
 def _tell(what: str, reason: str, found: float, rule: str) -> str:
@@ -98,7 +120,9 @@ def _tell(what: str, reason: str, found: float, rule: str) -> str:
         case "not_applicable":
             return f"{what} does not exist here, or was not stored."
     verb = "is" if reason == "match" else "is not"
-    return f"{what} is {found:.10g}; it {verb} {rule}."
+    # of round-off two digits say all
+    digits = 2 if reason == "match" and abs(found) <= ROUND_OFF else 10
+    return f"{what} is {found:.{digits}g}; it {verb} {rule}."
 
 
 def sees_several_levels(name: str) -> bool:

@@ -130,39 +130,55 @@ def _sentence(
     start = f"{status} in {count} of {total} results"
     all_with = "all with" if count > 1 else "with"
     for name, words in (("range", all_with), ("box", f"at least {IN_BOX:.0%} of them with")):
-        places = [_place(key, columns[key], keys[key], name) for key in columns]
+        places = [_place(key, columns[key], keys[key], name, hits) for key in columns]
         telling = _telling(sorted(places)[:TOLD])
         if telling:
             return f"{start}, {words} {' and '.join(telling)}"
     return start if count == 1 else f"{start}, spread over the sweep"
 
 
-def _telling(places: list[tuple[float, str]]) -> list[str]:
-    """Return the places that tell where something is, each for itself or, if none does, together."""
-    found = [text for part, text in places if part <= TELLING]
-    if not found and math.prod(part for part, _ in places) <= TELLING:
-        return [text for part, text in places if part < 1]
+def _telling(places: list[tuple[float, str, bool]]) -> list[str]:
+    """Return the places that tell where something is, each for itself or, if none does, together.
+
+    However large, a place tells it that holds nothing else.
+    """
+    found = [text for part, text, alone in places if part <= TELLING or (alone and part < 1)]
+    if not found and math.prod(part for part, _, _ in places) <= TELLING:
+        return [text for part, text, _ in places if part < 1]
     return found
 
 
-def _place(key: str, values: Column, found: Mapping[str, Any], name: str) -> tuple[float, str]:
-    """Return the part of all members that a range or box holds along one key, and the range in words."""
+def _place(
+    key: str, values: Column, found: Mapping[str, Any], name: str, hits: Counts
+) -> tuple[float, str, bool]:
+    """Return the part of all members that a range or box holds along one key, that in words, and if it holds all alone.
+
+    All alone means that it separates the members with results from those without.
+    """
     if name not in found:
         words = [word for word, share in found["shares"].items() if share > 0]
-        return float(np.mean(np.isin(values, words))), f"{key} {' or '.join(words)}"
-    low, high = found[name]
-    part = float(np.mean((values >= low) & (values <= high)))
+        inside, text = np.isin(values, words), f"{key} {' or '.join(words)}"
+    else:
+        low, high = found[name]
+        inside, text = (values >= low) & (values <= high), _interval(key, values, low, high)
+    return float(np.mean(inside)), text, bool(np.array_equal(inside, hits > 0))
+
+
+def _interval(key: str, values: Column, low: float, high: float) -> str:
     if low == high:
-        return part, f"{key} equal to {number(low)}"
+        return f"{key} equal to {number(low)}"
     # rounded outward, so that what is said is true
     least, most = (_rounded(end, way) for end, way in ((low, ROUND_FLOOR), (high, ROUND_CEILING)))
     if high >= np.max(values):
-        return part, f"{key} of {least} or more"
+        return f"{key} of {least} or more"
     if low <= np.min(values):
-        return part, f"{key} of {most} or less"
-    return part, f"{key} from {least} to {most}"
+        return f"{key} of {most} or less"
+    return f"{key} from {least} to {most}"
 
 
 def _rounded(value: float, way: str) -> str:
-    """Write a number with up to 6 significant digits, rounded one way."""
-    return number(float(Context(prec=6, rounding=way).create_decimal_from_float(value)))
+    """Write a number with up to 6 significant digits, rounded one way where it has more.
+
+    What it has are its 15 decimal digits: those of 1.9 are no 1.8999999999999999.
+    """
+    return number(float(Context(prec=6, rounding=way).create_decimal(f"{value:.15g}")))

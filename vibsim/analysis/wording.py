@@ -43,10 +43,34 @@ def number(value: float) -> str:
     return f"{value:.6g}"
 
 
+NEAR_ONE, ROUND_OFF = 1e-2, 1e-13
+"""A factor that is nearer to 1 is written as 1 and the rest; nearer still, the rest is rounding."""
+
+
+def factor_in_words(value: float) -> str:
+    """Write a growth factor: near 1 as ``1 + 3.5e-06``, so that its growth can be read."""
+    rest = value - 1.0
+    if abs(rest) <= ROUND_OFF:
+        return "1"
+    if abs(rest) < NEAR_ONE:
+        return f"1 {'+' if rest > 0 else '-'} {abs(rest):.3g}"
+    return number(value)
+
+
+def vanishing_in_words(predicted: float, measured: float) -> str:
+    """Say by how much a scheme grows that grows at every step; empty where it does not, or nothing is known."""
+    known = [value for value in (predicted, measured) if not math.isnan(value)]
+    if not known or min(known) - 1.0 <= ROUND_OFF:
+        return ""
+    rest = known[0] - 1.0
+    much = f"by {rest:.3g}" if rest < 1.0 else f"by the factor {number(known[0])}"
+    return f"; it grows {much} per period, which vanishes with dt"
+
+
 def growth_in_words(predicted: float, measured: float) -> str:
     """Say what growth theory predicts and what was measured; empty where neither is known."""
     told = [
-        f"{value:.6g} {word}"
+        f"{factor_in_words(value)} {word}"
         for value, word in ((predicted, "predicted"), (measured, "measured"))
         if not math.isnan(value)
     ]
@@ -109,6 +133,11 @@ def tell(s: Story) -> str:
                 f"{count} level{'s are' if count > 1 else ' is'} too few to judge the convergence of "
                 f"{s.quantity}: three are needed, four are better."
             )
+        case "not_applicable" if _is_adaptive(s):
+            return (
+                f"Scheme {s.scheme} is adaptive: it chooses its own steps, whatever the level, so an order of "
+                f"{s.quantity} does not exist."
+            )
         case "not_applicable":
             return f"{s.quantity} does not exist here, so there is nothing to judge."
     so_far = f": the last estimate is {measured}" if measured else ""
@@ -159,9 +188,15 @@ def advise(s: Story) -> str:
             missing = max(4 - len(s.levels), 1)
             names = " and ".join(str(s.levels[-1] + 1 + i) for i in range(min(missing, 2)))
             return f"Add level{'s' if missing > 1 else ''} {names} to `levels:`."
+        case "not_applicable" if _is_adaptive(s):
+            return "Name schemes with a fixed step (`schemes:`), or ask for its error with a `value:` check."
         case "not_applicable":
             return "Choose a quantity that this model and scheme have."
     return f"Add levels {_finer(s)} to `levels:`."
+
+
+def _is_adaptive(s: Story) -> bool:
+    return "tolerance" in s.options
 
 
 def _or_expect(s: Story) -> str:

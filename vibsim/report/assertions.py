@@ -88,9 +88,15 @@ def _value(check: ValueCheck) -> str:
     return f"{subject(check)} {rule}{extra}"
 
 
+STABLE = {
+    True: "no instability: the amplitude grows by nothing but an error that vanishes with dt",
+    False: "instability: the amplitude grows, and by more than an error that vanishes with dt",
+}
+"""What is said of a check for stability: Forward Euler, whose growth refinement cures, is not unstable."""
+
+
 def _stable(check: StableCheck) -> str:
-    verb = "stays bounded" if check.stable else "grows without bound"
-    return f"the amplitude {verb}{_where(check)}"
+    return f"{STABLE[check.stable]}{_where(check)}"
 
 
 DRIFTS = {

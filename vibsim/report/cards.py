@@ -19,7 +19,7 @@ from vibsim.report import (
     setting,
     words,
 )
-from vibsim.report.tables import Cell, Column, Table
+from vibsim.report.tables import Cell, Column, Table, Written
 from vibsim.spec.collection import ADHOC, ENDINGS
 from vibsim.vocabulary import BY_TOLERANCE
 
@@ -100,8 +100,14 @@ def _python(experiment: Experiment) -> str:
 
 def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the page says of one check."""
-    explained = reasons.reason(check["reason"], check["kind"])
     asserted = next((spec for spec in experiment.checks if spec.id == check["id"]), None)
+    measured = asserted.measured if asserted else None
+    explained = reasons.reason(
+        check["reason"],
+        measured.kind if measured else check["kind"],
+        value=measured.value if measured and measured.kind == "value" else "",
+        levels=len(data.whole(record, "level")),
+    )
     if asserted:
         heading = assertions.heading(asserted)
     elif check["kind"] == BY_TOLERANCE:
@@ -172,7 +178,17 @@ def _cells(
             words.levels(result.get("levels")),
         )
     if valued:
-        yield result.get("value")
+        yield _value(result.get("value"))
+
+
+ROUND_OFF = 1e-12
+"""Numbers no larger than this have two digits: more would be noise."""
+
+
+def _value(value: float | None) -> Cell:
+    """Return a measured number, with two digits where it is round-off."""
+    is_noise = value is not None and 0.0 < abs(value) <= ROUND_OFF
+    return Written(value, words.number(value, "brief")) if is_noise and value else value
 
 
 def _where(check: Mapping[str, Any]) -> list[str]:
@@ -184,11 +200,12 @@ def _where(check: Mapping[str, Any]) -> list[str]:
 def _alone(check: Mapping[str, Any]) -> str:
     """Return the commands that run the listed members alone, a line for each; of a check that passes the first."""
     listed = (check.get("results") or [])[: 1 if check["status"] == "PASS" else None]
-    lines = {
-        f".venv/bin/{result['command']}": f"{result['status']} {result['reason']}"
-        for result in listed
-        if result.get("command")
-    }
+    lines: dict[str, str] = {}
+    for result in listed:
+        if result.get("command"):
+            # of the schemes of a member the worst comes first
+            found = f"{result['status']} {result['reason']}"
+            lines.setdefault(f".venv/bin/{result['command']}", found)
     width = max(map(len, lines), default=0)
     return "\n".join(f"{command:{width}}  # {found}" for command, found in lines.items())
 

@@ -14,7 +14,7 @@ import numpy as np
 from vibsim.record import Record
 from vibsim.report.contents_theory import MEMBER, OF_LEVEL, everyone
 from vibsim.report.data import Floats, flags, known, steps_of, swept, unit, whole
-from vibsim.report.tables import Cell, Column, Table
+from vibsim.report.tables import Cell, Column, Table, Written
 
 OWN, CENTRED = "energy_deviation_max_abs", "energy_deviation_d2t_max_abs"
 
@@ -29,12 +29,14 @@ def velocities(record: Record) -> Table | None:
         Column("dt", unit(record, "dt") or "s", "step"),
         Column("max |dE|/E(0), own velocity", form="small"), Column("max |dE|/E(0), [D₂ₜu]", form="small"),
         Column("second over first", form="norm"),
-        *([Column("growth of the error, own velocity")] if named else []),
+        *([Column("drift of the energy, own velocity")] if named else []),
     )  # fmt: skip
     caption = (
         "Energy error by the velocity that it is made with: the scheme's own, over every step; and [D₂ₜu], over every "
-        "step but the first and the last, as in the tables of the text. Where they differ, the second shows the error "
-        "of the centred difference and not that of the scheme"
+        "step but the first and the last, as in the tables of the text. Where the second is much larger, it shows the "
+        "error of the centred difference and not that of the scheme; where both are alike, the scheme makes it; where "
+        "the second is smaller, the own velocity is the less accurate one, as that of Euler-Cromer, which is of first "
+        "order only"
     )
     rows = tuple(_rows(record, named))
     return Table("energy_velocities", caption, columns, rows, 2 * int(bool(swept(record))))
@@ -50,6 +52,7 @@ def _rows(record: Record, named: bool) -> Iterator[tuple[Cell, ...]]:
     own, centred = relative(record, OWN), relative(record, CENTRED)
     interior = relative(record, f"{OWN}_interior")
     kinds = flags(record, "energy_drift_kind") if named else None
+    rates = known(record, "energy_drift_rate", OF_LEVEL)
     for member in everyone(record):
         dt = steps_of(record, member.case)
         place = member.scheme, member.case
@@ -59,6 +62,27 @@ def _rows(record: Record, named: bool) -> Iterator[tuple[Cell, ...]]:
             a = float(own[(*place, i)])
             # the velocity of such a scheme is the centred difference, but at the last step
             b = float((interior if is_same else centred)[(*place, i)])
-            quotient = b / a if a > 0.0 and not is_same else math.nan
-            kind = [str(kinds[(*place, i)]).replace("_", " ")] if kinds is not None else []
+            kind = [] if kinds is None else [_drift(kinds[(*place, i)], float(rates[(*place, i)]))]
+            is_noise = a <= ROUND_OFF or kind == ["none"]
+            quotient = None if is_same or is_noise else _plain(b / a)
             yield (*who, level, float(dt[i]), a, b, quotient, *kind)
+
+
+ROUND_OFF = 1e-13
+"""A relative error that is no larger is rounding, and nothing is worth comparing with it."""
+
+
+def _drift(kind: str, rate: float) -> str:
+    """Return how the energy drifts, in words: an exponential drift with its direction."""
+    if kind == "exponential":
+        return "exponential decay" if rate < 0.0 else "exponential growth"
+    return str(kind).replace("_", " ")
+
+
+def _plain(quotient: float) -> Cell:
+    """Return a quotient that is written without powers of ten, with three digits at least."""
+    if not math.isfinite(quotient) or quotient <= 0.0:
+        return quotient
+    rounded = float(f"{quotient:.2e}")
+    places = max(2 - math.floor(math.log10(rounded)), 0)
+    return Written(quotient, f"{quotient:.{places}f}")

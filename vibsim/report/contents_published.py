@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from vibsim.record import Record
 from vibsim.report import data, words
 from vibsim.report.tables import Cell, Column, Table, Written
+from vibsim.spec.values import VALUES
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
@@ -71,7 +72,7 @@ def _table(
         Column("ours", form="close"),
         Column("difference", form="brief"),
         Column(AGREES),
-        *(Column(f"beside: {_told(name)}", form="norm") for name in table.beside),
+        *(Column(_beside_header(name, table), form="norm") for name in table.beside),
         *([Column("why")] if noted else []),
     ]
     rows = tuple(
@@ -85,6 +86,17 @@ def _table(
         "last printed digit at most"
     )
     return Table(f"published_{i}", caption, tuple(columns), rows)
+
+
+def _beside_header(name: str, table: PublishedTable) -> str:
+    """Return the header of a further value: what it has by the scheme's own velocity, it says so."""
+    if f"{name}{words.CENTRED}" == table.value:
+        return OWN
+    own = f" {OWN}" if f"{name}{words.CENTRED}" in VALUES else ""
+    return f"beside: {_told(name)}{own}"
+
+
+OWN = "by own velocity"
 
 
 def _told(value: str) -> str:

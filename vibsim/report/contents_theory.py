@@ -149,7 +149,7 @@ def predictions(record: Record) -> list[Table]:
         f"period. {peaks}"
     )
     return [
-        _predictions(record, "theory_growth", growth, {"growth": ("growth per period", "")}),
+        _predictions(record, "theory_growth", growth, {"growth": ("growth per period − 1", "")}),
         _predictions(
             record,
             "theory_phase",
@@ -170,16 +170,40 @@ def _predictions(
         columns += [
             Column(f"{text}: predicted", measure, "close"),
             Column("measured", measure, "close"),
-            Column("difference", measure, "brief"),
+            Column(DIFFERENCE, measure, "brief"),
         ]
     rows = tuple(_prediction_rows(record, tuple(shown)))
-    return Table(name, caption, tuple(columns), rows, 2 * int(bool(swept(record))))
+    kept = [
+        i
+        for i, column in enumerate(columns)
+        if column.header != DIFFERENCE or any(row[i] is not None for row in rows)
+    ]
+    if len(kept) < len(columns):
+        caption += ". Where no difference is shown, the two agree to round-off"
+    told = tuple(tuple(row[i] for i in kept) for row in rows)
+    return Table(name, caption, tuple(columns[i] for i in kept), told, 2 * int(bool(swept(record))))
+
+
+DIFFERENCE = "difference"
+ROUNDINGS = 32.0
+"""Predicted and measured numbers agree to round-off within so many of them for each step of a period."""
+
+
+def _beside(name: str, told: float, seen: float, noise: float) -> Iterator[Cell]:
+    """Yield a predicted and a measured number and their difference, None where it is round-off; growth less one."""
+    difference = seen - told
+    for value in (told, seen):
+        shown = value - 1.0 if name == "growth" else value
+        is_noise = 0.0 < abs(shown) <= noise
+        yield Written(shown, words.number(shown, "brief")) if is_noise else shown
+    yield None if abs(difference) <= noise else difference
 
 
 def _prediction_rows(record: Record, names: tuple[str, ...]) -> Iterator[tuple[Cell, ...]]:
     levels, product = whole(record, "level"), omega_dt(record)
     limit = known(record, "stability_limit", MEMBER)
     theory = known(record, "theory_growth", OF_LEVEL)
+    rates = known(record, "theory_frequency", OF_LEVEL)
     pairs = [
         (known(record, f"theory_{name}", OF_LEVEL), known(record, f"measured_{name}", OF_LEVEL))
         for name in names
@@ -190,11 +214,15 @@ def _prediction_rows(record: Record, names: tuple[str, ...]) -> Iterator[tuple[C
             if not math.isfinite(theory[(*place, i)]):
                 continue
             who = [member.scheme_name, *([member.case_name] if swept(record) else [])]
-            numbers: list[Cell] = []
-            for told, seen in pairs:
-                a, b = float(told[(*place, i)]), float(seen[(*place, i)])
-                numbers += [a, b, b - a]
             p = float(product[member.case, i])
+            step = math.ulp(1.0) * ROUNDINGS * 2.0 * math.pi / p if p > 0.0 else 0.0
+            rate = abs(float(rates[(*place, i)]))
+            sizes = {"frequency": rate, "phase_error": 2.0 * math.pi / rate if rate > 0.0 else 1.0}
+            numbers: list[Cell] = []
+            for name, (told, seen) in zip(names, pairs, strict=True):
+                a, b = float(told[(*place, i)]), float(seen[(*place, i)])
+                size = sizes.get(name, max(abs(a), 1.0) if math.isfinite(a) else 1.0)
+                numbers += _beside(name, a, b, step * size)
             yield (*who, level, p, is_stable(p, float(limit[place])), *numbers)
 
 

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.record import Record
-from vibsim.report import style
+from vibsim.report import figures_frame, style
 from vibsim.report.contents_theory import MEMBER
-from vibsim.report.data import Floats, flags, known, pick, times, unit, whole
+from vibsim.report.data import Floats, flags, known, largest, pick, times, unit, whole
 from vibsim.report.panels import figure_of, panels
 from vibsim.report.style import Picture
 
@@ -44,6 +44,8 @@ def running(record: Record, case: int) -> Picture | None:
     names = record.words("scheme")
     groups = [range(i, min(i + TOGETHER, len(names))) for i in range(0, len(names), TOGETHER)]
     axes = panels([2.5] * len(groups))
+    most = figures_frame.WILD * (1.0 if usable else _least(both))
+    leaves = False
     for ax, group in zip(axes, groups, strict=True):
         for s in group:
             look = style.look(s)
@@ -53,7 +55,10 @@ def running(record: Record, case: int) -> Picture | None:
             )
             _draw(ax, t, both[1][s], {"color": look["color"], "marker": "", "linestyle": DASHED})
         style.log_axis(ax, "x", float(t[0]), float(t[-1]))
-        style.log_axis(ax, "y", *_limits([part[list(group)] for part in both]))
+        style.log_axis(ax, "y", *_limits([part[s] for part in both for s in group], most))
+        for s in group:
+            own = both[0][s] if np.isfinite(both[0][s]).any() else both[1][s]
+            leaves |= figures_frame.mark_leaving(ax, t, own, style.look(s)["color"])
         ax.plot([], [], color=style.GREY, label="own velocity")
         ax.plot([], [], color=style.GREY, linestyle=DASHED, label="[D₂ₜu]")
         style.beside(ax, fontsize=8, handlelength=2.4)
@@ -69,7 +74,8 @@ def running(record: Record, case: int) -> Picture | None:
         caption="The largest energy error over every step so far, on the coarsest level: solid with the scheme's own "
         "velocity, dashed with the centred difference [D₂ₜu] that the tables of the text use. Flat is bounded, slope "
         "1 is a linear drift, slope 2 a quadratic one. A scheme without a dashed curve has [D₂ₜu] for its velocity. "
-        "What is within round-off is left out where it is zero.",
+        "What is within round-off is left out where it is zero."
+        + (f" {figures_frame.LEAVING} They grow without bound." if leaves else ""),
         alt="Running maximum of the energy error of every scheme, with two velocities, against time, logarithmic",
         figure=figure_of(axes[0]),
     )
@@ -84,7 +90,12 @@ def _series(record: Record, name: str, case: int, first: Floats | None) -> Float
 
 
 def _drift(record: Record, s: int, case: int) -> str:
-    """Return the kind of drift that the analysis found, for the legend; empty where it found none of these."""
+    """Return the kind of drift that the analysis found, for the legend; empty where it found none of these.
+
+    Of a run that did not last to the end there is no other kind.
+    """
+    if record["status"][s, case, 0] != 0:
+        return f": {figures_frame.BROKE_DOWN}"
     if "energy_drift_kind" not in record:
         return ""
     kind = str(flags(record, "energy_drift_kind")[s, case, 0]).replace("_", " ")
@@ -98,11 +109,22 @@ def _draw(ax: Axes, t: Floats, values: Floats, look: dict[str, Any]) -> None:
     ax.plot(x, y, linewidth=1.3, markersize=4, markevery=max(1, x.size // 8), **look)
 
 
-def _limits(both: list[Floats]) -> tuple[float, float]:
-    parts = [part[np.isfinite(part)] for part in both]
-    values = np.concatenate([*parts, [np.nan]])
+def _least(both: list[Floats]) -> float:
+    """Return the largest error of the scheme that has the smallest: of a body at rest nothing else tells a size."""
+    sizes = [size for part in both for row in part if (size := largest(row)) > 0.0]
+    return min(sizes, default=1.0)
+
+
+def _limits(series: list[Floats], most: float) -> tuple[float, float]:
+    """Return limits that hold the series that stay below `most`, and of others where they begin to grow."""
+    kept = [values for values in series if 0.0 < largest(values) <= most]
+    grown = [values for values in series if largest(values) > most]
+    shown = kept or [values[values <= most] for values in grown]
+    values = np.concatenate([*shown, [np.nan]])
     values = values[np.isfinite(values)]
     if values.size == 0:
-        return 0.1, 1.0
+        return (most / figures_frame.WILD, most) if grown else (0.1, 1.0)
     high = min(float(values.max()), style.LARGEST)
+    if grown:
+        high = max(high, 1e3 * most / figures_frame.WILD)
     return max(float(values.min()), high / RANGE) / 2.0, 2.0 * high

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.record import Record
-from vibsim.report import style
+from vibsim.report import figures_frame, style
 from vibsim.report.choice import position
 from vibsim.report.data import Floats, Member, at, exact_periods, pick, unit, whole
 from vibsim.report.panels import figure_of, panels
@@ -27,9 +27,11 @@ CURVES = 6
 """Most curves; more lie on one another."""
 MARKED = 40
 """Most numbers of one curve that get a marker each."""
+MOSTLY = 0.5
+"""Where fewer than this part of the curves stay so small for two peaks or more, the scale is logarithmic."""
 EXACT: dict[str, Any] = {"color": "black", "linestyle": (0, (4, 3)), "linewidth": 1.0, "zorder": 1}
-WILD = 3.0
-"""Amplitudes beyond so many times the first one, and periods so many times the exact one, are cut off."""
+WILD = 10.0
+"""Amplitudes and periods beyond so many times the exact one are cut off, and the panel says so."""
 
 
 def local(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
@@ -43,14 +45,19 @@ def local(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     axes = panels([2.1, 2.1, 2.1])
     exact = float(exact_periods(record)[case])
     start = first_peak(experiment, record, case, exact)
-    for i, (label, member, level) in enumerate(runs):
-        _draw(axes, record, member, level, style.entry(label), style.look(i), exact, start)
+    schemes = {member.scheme for _, member, _ in runs}
+    drawn: list[list[Any]] = [[], [], []]
+    for label, member, level in runs:
+        look = _look(member, level, len(schemes) > 1, runs)
+        lines = _draw(axes, record, member, level, style.entry(label), look, exact, start)
+        for part, line in zip(drawn, lines, strict=True):
+            part.append(line)
     where = position(experiment)
     size = _amplitude(experiment, record, case)
     for ax, value in ((axes[0], exact), (axes[1], size), (axes[2], 0.0)):
         if math.isfinite(value):
             ax.axhline(value, label="exact" if ax is axes[0] else "", **EXACT)
-    _ranges(axes, exact, size)
+    leaves = _ranges(axes, drawn, exact, size)
     for ax in axes:
         # amplitudes that hardly differ need long numbers
         ax.yaxis.set_label_coords(-0.115, 0.5)
@@ -62,6 +69,8 @@ def local(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     axes[1].set_title("Local amplitude")
     axes[2].set_title("Phase error of the peaks")
     axes[2].set_xlabel("number of the peak")
+    for ax, lines in zip(axes, drawn, strict=True):
+        _tell_alike(ax, lines, [label for label, _, _ in runs])
     style.beside(axes[0], fontsize=8)
     reference = "its exact time" if math.isfinite(start) else "its time after the first peak"
     return Picture(
@@ -69,7 +78,9 @@ def local(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
         title="Local periods and amplitudes, and the phase error from peak to peak",
         caption="Lines with markers: peaks interpolated by a parabola; faint circles: the same from grid points alone, "
         "whose period jumps by a whole dt. Dashed: exact. Bottom: how much earlier than "
-        f"{reference} each peak comes; a straight line means the same phase error in every period.",
+        f"{reference} each peak comes; a straight line means the same phase error in every period. Of curves that "
+        "coincide the first is wide and pale, and the legend says which they are."
+        f"{f' {figures_frame.LEAVING}' if leaves else ''}",
         alt="Local period, local amplitude and phase error against the number of the peak",
         figure=figure_of(axes[0]),
     )
@@ -98,7 +109,8 @@ def _draw(
     look: dict[str, Any],
     exact: float,
     start: float,
-) -> None:
+) -> list[Any]:
+    """Draw a run in the three panels and return its lines."""
     time, peak, trough = (
         at(record, name, member, level=level) for name in ("peak_time", "peak", "trough")
     )
@@ -116,10 +128,49 @@ def _draw(
         "alpha": 0.45,
     }
     axes[0].plot(number[:-1], np.diff(grid), **faint, markersize=6.5, zorder=1.5)
-    axes[0].plot(number[:-1], np.diff(time), label=label, **line)
-    axes[1].plot(number, heights(time, peak, trough_time, trough), **line)
     offset = time[0] - exact if math.isnan(start) else start - exact
-    axes[2].plot(number, offset + number * exact - time, **line)
+    return [
+        *axes[0].plot(number[:-1], np.diff(time), label=label, **line),
+        *axes[1].plot(number, heights(time, peak, trough_time, trough), **line),
+        *axes[2].plot(number, offset + number * exact - time, **line),
+    ]
+
+
+def _look(
+    member: Member, level: int, several: bool, runs: list[tuple[str, Member, int]]
+) -> dict[str, Any]:
+    """Return the look of a run: of several schemes a colour is a scheme, and dashes and marker are a level."""
+    if not several:
+        return style.look([run[1:] for run in runs].index((member, level)))
+    look = style.look(member.scheme)
+    if len({i for _, _, i in runs}) == 1:
+        return look
+    place = sorted({i for _, _, i in runs}).index(level)
+    return look | {"linestyle": style.DASHES[place], "marker": style.MARKERS[place]}
+
+
+def _tell_alike(ax: Axes, lines: list[Any], labels: list[str]) -> None:
+    """Say beside a panel which curves lie on one another there, and draw the first of them wide and pale beneath."""
+    low, high = ax.get_ylim()
+    curves = [
+        np.where((y >= low) & (y <= high), y, np.nan)
+        for y in (np.asarray(line.get_ydata(), dtype=np.float64) for line in lines)
+    ]
+    texts: list[tuple[Any, str]] = []
+    for i, first in enumerate(figures_frame.same_as(curves, high - low)):
+        if first is None:
+            continue
+        lines[first].set(linewidth=3.4, alpha=0.5)
+        lines[i].set(zorder=3.0 + 0.01 * i)
+        text = style.entry(f"{labels[i]}:\n  same as {labels[first]}")
+        texts.append((lines[i], text))
+        if lines[i].get_label()[:1] != "_":
+            # the panel with the legend of all
+            lines[i].set_label(text)
+    if texts and lines[0].get_label()[:1] == "_":
+        handles, words = zip(*texts, strict=True)
+        place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.03)}
+        ax.legend(list(handles), list(words), borderaxespad=0.0, fontsize=7.5, **place)
 
 
 def heights(time: Floats, peak: Floats, trough_time: Floats, trough: Floats) -> Floats:
@@ -170,16 +221,54 @@ def _amplitude(experiment: Experiment, record: Record, case: int) -> float:
     return math.hypot(u, v / w)
 
 
-def _ranges(axes: list[Axes], exact: float, size: float) -> None:
-    """Hold what is drawn; amplitudes and periods of a run that grows without bound are cut off."""
+def _ranges(axes: list[Axes], drawn: list[list[Any]], exact: float, size: float) -> bool:
+    """Hold what is drawn; cut off what grows far beyond the exact number, with a mark; say whether anything is."""
     from matplotlib.ticker import MaxNLocator
 
-    for ax, value in zip(axes, (exact, size, math.nan), strict=True):
+    leaves = False
+    for ax, lines, value in zip(axes, drawn, (exact, size, math.nan), strict=True):
         values = np.concatenate(
             [np.asarray(line.get_ydata(), dtype=np.float64) for line in ax.lines]
         )
-        if math.isfinite(value):
-            kept = values[np.abs(values) <= WILD * abs(value)]
-            values = kept if kept.size else values
-        ax.set_ylim(*style.limits(values))
+        beyond = np.isfinite(values) & (np.abs(values) > WILD * abs(value))
+        kept = values[~beyond]
+        if not np.isfinite(kept).any() or not beyond.any():
+            ax.set_ylim(*style.limits(values))
+            continue
+        shown = [_within(line, WILD * abs(value)) for line in lines]
+        if sum(shown) < MOSTLY * len(shown):
+            # most of them would not be seen
+            _grow(ax, lines, abs(value))
+        else:
+            ax.set_ylim(*style.limits(kept))
+            note = f"cut off beyond {WILD:g} times the exact one"
+            ax.text(0.99, 0.9, note, transform=ax.transAxes, ha="right", fontsize=8.5)
+        found = [
+            figures_frame.mark_leaving(
+                ax,
+                np.asarray(line.get_xdata(), dtype=np.float64),
+                np.asarray(line.get_ydata(), dtype=np.float64),
+                line.get_color(),
+            )
+            for line in lines
+        ]
+        leaves |= any(found)
     axes[0].xaxis.set_major_locator(MaxNLocator(nbins=10, integer=True))
+    return leaves
+
+
+def _within(line: Any, most: float) -> bool:
+    """Say whether at least two points of a line are finite and not beyond `most`."""
+    values = np.abs(np.asarray(line.get_ydata(), dtype=np.float64))
+    return int(np.sum(values <= most)) > 1
+
+
+def _grow(ax: Axes, lines: list[Any], size: float) -> None:
+    """Show on a logarithmic scale how numbers grow, as far as a frame has room."""
+    for line in lines:
+        line.set_ydata(style.no_zeros(np.asarray(line.get_ydata(), dtype=np.float64)))
+    values = np.concatenate([np.asarray(line.get_ydata()) for line in lines] + [np.array([size])])
+    shown = values[(values <= figures_frame.WILD * size) & (values >= size / figures_frame.WILD)]
+    style.log_axis(ax, "y", float(shown.min()) / 2.0, 2.0 * float(shown.max()))
+    note = "size, logarithmic"
+    ax.text(0.99, 0.9, note, transform=ax.transAxes, ha="right", fontsize=8.5)

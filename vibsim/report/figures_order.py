@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.record import Record
-from vibsim.report import figures_local_order, style, words
+from vibsim.report import figures_frame, figures_local_order, style, words
 from vibsim.report.choice import promises
 from vibsim.report.data import (
     Floats,
@@ -33,7 +33,11 @@ if TYPE_CHECKING:
 
     from vibsim.spec import Experiment
 
-LEGEND_COLUMNS = 5
+FONT = 8
+"""Size of the legend [point]."""
+SLOPE: dict[str, Any] = {"color": "black", "linestyle": (0, (4, 3)), "linewidth": 1.0}
+SLOPES: tuple[Any, ...] = ((0, (4, 3)), (0, (1.2, 1.6)), (0, (7, 2, 1.2, 2)), (0, (10, 2)))
+"""Dashes of several promised slopes."""
 WILD = 1e4
 """Errors beyond so many times the upper quartile leave the frame."""
 
@@ -43,7 +47,11 @@ def against_step(experiment: Experiment, record: Record, quantity: str, case: in
     schemes = record.words("scheme")
     many = style.crowded(record)
     panel = max(2.2, 0.17 * len(schemes)) if many else 2.2
-    rows = math.ceil((len(schemes) + 4) / LEGEND_COLUMNS)
+    orders = dict.fromkeys(order for order, _ in promises(experiment, record, quantity))
+    told = [*schemes, "level difference", "true error", "predicted round-off"]
+    told += [f"slope {order:g} (promised)" for order in orders]
+    columns = figures_frame.columns(told, FONT, 0.9 * style.WIDTH)
+    rows = math.ceil(len(told) / columns)
     height = panel + 0.95 + 0.2 * rows
     figure = style.canvas(height)
     low, tall = 0.5 / height, panel / height
@@ -60,8 +68,8 @@ def against_step(experiment: Experiment, record: Record, quantity: str, case: in
         texts,
         loc="lower left",
         bbox_to_anchor=(0.075, (panel + 0.82) / height),
-        ncols=LEGEND_COLUMNS,
-        fontsize=8,
+        ncols=columns,
+        fontsize=FONT,
         borderaxespad=0.0,
     )
     member = case_name(record, case)
@@ -95,7 +103,8 @@ def _caption(kinds: frozenset[str], is_settled: bool | None, many: bool = False)
     elif is_settled is not None:
         parts.append(
             "Right: the order that three successive levels give, drawn at the coarsest of the three; it should "
-            "settle inside a grey band; beyond the frame is what round-off makes of it."
+            "settle inside a grey band; orders beyond the frame come from levels that are too coarse, within "
+            "round-off, or of runs that grow without bound."
         )
     if is_settled and not many:
         parts.append("The bar is the stated order with its interval, over the levels it rests on.")
@@ -145,7 +154,10 @@ def _draw_norms(
         style.remark(ax, "every difference and error is zero,\nor not finite: nothing to draw")
         return frozenset()
     orders = dict.fromkeys(order for order, _ in promises(experiment, record, quantity))
-    slopes = [_reference(ax, dt, seen, order) for order in orders]
+    slopes = [
+        _reference(ax, dt, seen, order, SLOPES[k % len(SLOPES)] if len(orders) > 1 else "")
+        for k, order in enumerate(orders)
+    ]
     near = _step_limits(ax, dt, seen, floors)
     kinds = {
         "difference": any(np.isfinite(part).any() for part in seen[::2]),
@@ -182,8 +194,11 @@ def _highest(values: Floats) -> float:
     return min(float(values.max()), WILD * float(np.quantile(values, 0.75)), style.LARGEST)
 
 
-def _reference(ax: Axes, dt: Floats, seen: list[Floats], order: float) -> bool:
-    """Draw the promised slope a little above the largest value at the coarsest step, and say whether there is room."""
+def _reference(ax: Axes, dt: Floats, seen: list[Floats], order: float, dashes: Any) -> bool:
+    """Draw the promised slope a little above the largest value at the coarsest step, and say whether there is room.
+
+    Of several each has dashes of its own, and its number at its end.
+    """
     coarsest = np.array([part[0] for part in seen if np.isfinite(part[0])] or [1.0])
     start = 2.5 * _highest(coarsest)
     lowest = _positive(seen).min()
@@ -193,10 +208,21 @@ def _reference(ax: Axes, dt: Floats, seen: list[Floats], order: float) -> bool:
         ax.plot(
             reach,
             start * (reach / dt[0]) ** order,
-            color="black",
-            linestyle=(0, (4, 3)),
-            linewidth=1.0,
+            **SLOPE | ({"linestyle": dashes} if dashes else {}),
             label=f"slope {order:g} (promised)",
+        )
+    if is_drawn and dashes:
+        end = float(reach[-1]), float(start * (reach[-1] / dt[0]) ** order)
+        ax.annotate(
+            f"{order:g}",
+            end,
+            xytext=(-2, 0),
+            textcoords="offset points",
+            ha="right",
+            va="center",
+            fontsize=7.5,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8},
+            annotation_clip=True,
         )
     return is_drawn
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vibsim.record import Record
-from vibsim.report import finest, style
+from vibsim.report import figures_frame, finest, style
 from vibsim.report.choice import position
-from vibsim.report.data import Floats, exact_periods, whole
-from vibsim.report.figures_sweep import MARKED, finish, interval, line
+from vibsim.report.data import Floats, exact_periods, largest, whole
+from vibsim.report.figures_sweep import MARKED, finish, interval, line, mark_members
 from vibsim.report.finest import Measured
 from vibsim.report.layout import Along
 from vibsim.report.panels import explosive, figure_of, panels
@@ -20,6 +21,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from vibsim.spec import Experiment
+
+DEEP = 1e-16
+"""Errors below this part of the largest leave the frame."""
+WIDE = 10.0
+"""Where some amplitudes leave the frame, others that many times a usual one are drawn on a logarithmic scale."""
 
 
 def period(experiment: Experiment, record: Record, along: Along) -> Picture | None:
@@ -57,37 +63,63 @@ def amplitude(experiment: Experiment, record: Record, along: Along) -> Picture |
     found = finest.amplitude(record, position(experiment))
     if not np.isfinite(found.value).any():
         return None
+    size = figures_frame.sizes(record, position(experiment))
+    bounded = figures_frame.is_bounded(found.value, size)
+    if not bounded.any():
+        bounded = np.isfinite(found.value)
+    # what is beyond the frame has no bar across it
+    barred = bounded & figures_frame.is_bounded(found.error, size)
+    held = replace(
+        found,
+        value=np.where(bounded, found.value, np.nan),
+        error=np.where(barred, found.error, np.nan),
+    )
     several = bool(whole(record, "pair"))
     axes = panels([2.0, 1.5] if several else [3.7 if style.crowded(record) else 2.2])
     for ax in axes:
         # amplitudes that hardly differ need long numbers
         ax.yaxis.set_label_coords(-0.115, 0.5)
-    _draw(axes[0], record, along, found, None)
-    if explosive([found.value.ravel()]):
-        _log_limits(axes[0], found.value)
+    _draw(axes[0], record, along, replace(found, error=held.error), None)
+    if _spans(found, held):
+        # a motion that a scheme damps away would fill the frame with its decades
+        least = np.nanmin(np.append(size, np.nanmax(held.value))) / figures_frame.WILD
+        _log_limits(axes[0], np.maximum(held.value, least))
+    else:
+        axes[0].set_ylim(*_room(held, None))
+    leaves = mark_members(axes[0], along, found.value)
     if several:
-        _draw_error_bars(axes[1], record, along, found)
+        _draw_error_bars(axes[1], record, along, found, held.error)
+        leaves |= mark_members(axes[1], along, found.error)
     below = " Bottom: its error, estimated from the two finest levels. Members that go over the top have no amplitude."
     marked = finish(axes, experiment, along)
     return Picture(
         name="amplitude",
         title="Amplitude over the swept parameter",
         caption=f"{'Top: half' if several else 'Half'} the height between the last peak and the last trough, on the "
-        f"finest level.{below if several else ''}{marked}",
+        f"finest level.{below if several else ''}{marked}{f' {figures_frame.LEAVING}' if leaves else ''}",
         alt=f"Amplitude{' and its estimated error' if several else ''} against the swept parameter",
         figure=figure_of(axes[0]),
     )
 
 
-def _draw_error_bars(ax: Axes, record: Record, along: Along, found: Measured) -> None:
-    """Draw the estimated error of a number of the finest level."""
+def _spans(found: Measured, held: Measured) -> bool:
+    """Say whether amplitudes that grow or are damped away take a logarithmic frame."""
+    values = held.value[np.isfinite(held.value)]
+    wide = values.size and float(values.max()) > WIDE * float(np.median(values))
+    return explosive([held.value.ravel()]) or (bool(wide) and explosive([found.value.ravel()]))
+
+
+def _draw_error_bars(ax: Axes, record: Record, along: Along, found: Measured, held: Floats) -> None:
+    """Draw the estimated error of a number of the finest level, in a frame that holds the errors `held`."""
     for s, scheme in enumerate(record.words("scheme")):
         for k, (_, members) in enumerate(along.lines):
             error = style.no_zeros(found.error[s, members])
             look = style.look(s if len(along.lines) == 1 else s + k)
             text = "" if k else style.entry(scheme)
             line(ax, along.key.values[members], error, **look | {"markersize": 4}, label=text)
-    _log_limits(ax, found.error)
+    shown = held if np.isfinite(held).any() else found.error
+    # of a motion that is damped away the error falls for ever
+    _log_limits(ax, np.where(shown > DEEP * largest(shown), shown, np.nan))
     ax.set_ylabel(style.label("estimated error", found.unit))
     ax.set_title(f"Error bar of the {found.name}")
 

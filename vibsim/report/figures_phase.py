@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.record import Record
-from vibsim.report import style, words
+from vibsim.report import figures_frame, style, words
 from vibsim.report.data import Floats, Member, at, exact_periods, known, pick, times, unit, whole
 from vibsim.report.style import Picture
 
@@ -30,6 +30,8 @@ CUT = 2.5
 """What leaves the exact orbit by more than this factor is cut off."""
 PERIODS = 3.0
 """Of a longer motion the first period and the last so many are drawn."""
+FONT = 8
+"""Size of the legend [point]."""
 SAMPLED = 8
 """Fewer samples than this in a period do not draw an orbit."""
 
@@ -82,7 +84,10 @@ def plane(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
         if n % ACROSS == 0:
             ax.set_ylabel(style.label(f"{words.symbol(model.velocity)} / w", measure))
     handles, texts = axes[0].get_legend_handles_labels()
-    figure.legend(handles, texts, loc="upper left", bbox_to_anchor=(0.06, 1.0), ncols=7, fontsize=8)
+    columns = figures_frame.columns(texts, FONT, 0.92 * style.WIDTH)
+    # below its upper edge there is room for one row; more stand above it
+    figure.legend(handles, texts, loc="lower left", borderaxespad=0.0, ncols=columns, fontsize=FONT,
+                  bbox_to_anchor=(0.06, 1.0 - 0.24 / float(figure.get_figheight())))  # fmt: skip
     parts_told = (
         f"Of the whole motion the first period (thin) and the last {PERIODS:g} are drawn. "
         if is_long

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.record import Record
-from vibsim.report import finest, ridge, style, words
+from vibsim.report import figures_frame, finest, ridge, style, words
 from vibsim.report.choice import promises
 from vibsim.report.data import Floats, flags, norm_unit, whole
 from vibsim.report.layout import Along
@@ -31,7 +31,7 @@ def orders(experiment: Experiment, record: Record, along: Along, quantity: str) 
     row = 0.17 if style.crowded(record) else 0.3
     axes = panels([2.3, 1.9, row * max(2, len(schemes))])
     _draw_orders(axes[0], experiment, record, along, quantity)
-    is_known = _draw_errors(axes[1], record, along, quantity)
+    is_known, leaves = _draw_errors(axes[1], record, along, quantity)
     _draw_verdicts(axes[2], along, flags(record, f"{quantity}_status"), schemes)
     marked = finish(axes, experiment, along)
     error = (
@@ -45,7 +45,7 @@ def orders(experiment: Experiment, record: Record, along: Along, quantity: str) 
         title=f"Order and error of every member: {letter}",
         caption="Top: the order that each member's levels state; a grey band is a promised order with the tolerance of "
         f"its check. {error} Bottom: what can be said of it. Members that fail or stay open are worth a look one by "
-        f"one.{marked}",
+        f"one.{marked}{f' {figures_frame.LEAVING}' if leaves else ''}",
         alt=f"Stated order of {words.name(quantity)}, its error and its verdict against the swept parameter",
         figure=figure_of(axes[0]),
     )
@@ -99,37 +99,69 @@ def _draw_orders(
     style.beside(ax, **({"fontsize": 7.5} if style.crowded(record) else {}))
 
 
-def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> bool:
-    """Draw the error of the finest level; return whether the true one is known."""
+def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> tuple[bool, bool]:
+    """Draw the error of the finest level; return whether the true one is known, and whether any leaves the frame."""
     found, schemes = finest.error(record, quantity), record.words("scheme")
+    size = figures_frame.sizes(record, quantity)
+    true, estimated = (
+        np.where(figures_frame.is_bounded(part, size), part, np.nan)
+        for part in (found.true, found.estimate)
+    )
     for s, scheme in enumerate(schemes):
         look = style.look(s)
         several = f", {scheme}" if len(schemes) > 1 else ""
         for k, (_, members) in enumerate(along.lines):
             x = along.key.values[members]
-            low, high = (style.no_zeros(part[s, members]) for part in (found.low, found.high))
+            # what is beyond the frame has no bar across it
+            there = np.isfinite(estimated[s, members])
+            low, high = (
+                np.where(there, style.no_zeros(part[s, members]), np.nan)
+                for part in (found.low, found.high)
+            )
             interval(ax, x, low, high, look["color"])
             estimate = style.no_zeros(found.estimate[s, members])
             text = "" if k else f"estimated{several}"
             line(ax, x, estimate, color=look["color"], linewidth=1.0, label=text)
-            true = style.no_zeros(found.true[s, members])
-            if np.isfinite(true).any():
+            dotted = style.no_zeros(found.true[s, members])
+            if np.isfinite(dotted).any():
                 text = "" if k else f"true{several}"
                 dots = look | {"linestyle": "none", "markersize": 4, "markerfacecolor": "white"}
-                line(ax, x, true, label=text, **dots)
-    values = np.concatenate([found.true.ravel(), found.estimate.ravel()])
-    positive = values[np.isfinite(values) & (values > 0)]
-    if positive.size:
-        most = min(float(positive.max()), style.LARGEST)
-        least = max(float(np.quantile(positive, 0.005)), most * 1e-16, style.TINIEST)
-        style.log_axis(ax, "y", least / 3, most * 3)
+                line(ax, x, dotted, label=text, **dots)
+    leaves = False
+    for values in (
+        np.concatenate([true.ravel(), estimated.ravel()]),
+        np.concatenate([found.true.ravel(), found.estimate.ravel()]),
+    ):
+        # where nothing is bounded all of it makes the range
+        positive = values[np.isfinite(values) & (values > 0)]
+        if positive.size:
+            most = min(float(positive.max()), style.LARGEST)
+            least = max(float(np.quantile(positive, 0.005)), most * 1e-16, style.TINIEST)
+            style.log_axis(ax, "y", least / 3, most * 3)
+            leaves = mark_members(ax, along, found.best)
+            break
     ax.set_ylabel(
         style.label(f"error of {words.symbol(quantity)}", norm_unit(record, quantity, TYPICAL_NORM))
     )
     ax.set_title(f"Error on level {whole(record, 'level')[-1]} ({TYPICAL_NORM} norm)")
     if not style.crowded(record):
         style.beside(ax)
-    return found.is_known
+    return found.is_known, leaves
+
+
+def mark_members(ax: Axes, along: Along, values: Floats) -> bool:
+    """Mark at the upper edge what grows out of the frame, of values of the shape (scheme, case); say whether any does.
+
+    Of few members each is marked, of many the first of every stretch.
+    """
+    high, leaves = ax.get_ylim()[1], False
+    for s in range(values.shape[0]):
+        for _, members in along.lines:
+            x, y = along.key.values[members], values[s, members]
+            grown = np.where(y > high, y, np.where(np.isfinite(y), high, np.nan))
+            each = x.size <= MARKED
+            leaves |= figures_frame.mark_leaving(ax, x, grown, style.look(s)["color"], each=each)
+    return leaves
 
 
 def line(ax: Axes, x: Floats, y: Floats, **look: Any) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.record import Record
-from vibsim.report import style
+from vibsim.report import figures_frame, style
 from vibsim.report.contents_theory import MEMBER, OF_LEVEL, omega_dt, predicted
 from vibsim.report.data import Floats, known
 from vibsim.report.panels import figure_of, panels
@@ -27,6 +27,9 @@ POINTS = 240
 """Points of a curve."""
 SMALLEST = 1e-13
 """Growth and phase error below this are round-off of what they are taken from."""
+KINDS = ("growth", "phase error")
+ALIKE = 1e-9
+"""Curves that differ by less than this part of themselves are the same."""
 FEW = 40
 """Dots of one scheme up to which they are large."""
 
@@ -64,22 +67,65 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
                 _signed(ax, grid, curve[k], look["color"])
             _dots(ax, p, found[s], look, style.entry(name))
         _finish(ax, told, found, limits, grid)
+    alike = _alike(record.words("scheme"), curves)
     axes[0].set_ylabel("|growth per period − 1|")
     axes[0].set_title("Growth of the amplitude: filled grows, hollow decays")
     axes[1].set_ylabel("|phase error| / period")
     axes[1].set_title("Phase error per period: filled comes early, hollow late")
     axes[1].set_xlabel("w dt")
     style.beside(axes[0], fontsize=8, handlelength=1.6)
+    if alike and not style.crowded(record):
+        for ax, kind in zip(axes, KINDS, strict=True):
+            _tell(ax, axes[0], [words for words in alike if words[0] == kind], KINDS.index(kind))
     return Picture(
         name="order_and_stability",
         title="Theory beside measurement: growth and phase error per period",
         caption="Curves: what the matrix of one step predicts, solid where the amplitude grows or the peaks come "
         "early, dotted where it decays or they come late. Dots: what was measured. The slope of a curve is the order "
         "of that error. A scheme without a curve at the top neither grows nor decays by theory; its dots are "
-        "what rounding or the interpolation of peaks leaves. Triangles at the upper edge are limits of stability.",
+        "what rounding or the interpolation of peaks leaves. Triangles at the upper edge are limits of stability."
+        + _sentence(alike),
         alt="Growth per period and phase error per period of every scheme against w dt, predicted and measured",
         figure=figure_of(axes[0]),
     )
+
+
+def _alike(
+    names: list[str], curves: list[tuple[Floats, Floats] | None]
+) -> list[tuple[str, str, str]]:
+    """Return which curves lie on an earlier one: what they are of, the scheme, and the earlier scheme."""
+    found = []
+    for k, kind in enumerate(KINDS):
+        drawn = [(s, curve[k]) for s, curve in enumerate(curves) if curve is not None]
+        drawn = [(s, np.log(np.where(np.abs(y) < SMALLEST, np.nan, np.abs(y)))) for s, y in drawn]
+        firsts = figures_frame.same_as([y for _, y in drawn], ALIKE / figures_frame.ALIKE)
+        for (s, _), first in zip(drawn, firsts, strict=True):
+            if first is not None:
+                found.append((kind, names[s], names[drawn[first][0]]))
+    return found
+
+
+def _tell(ax: Axes, first: Axes, alike: list[tuple[str, str, str]], k: int) -> None:
+    """Say beside a panel which curves of it are the same; in the upper panel below the legend."""
+    if not alike:
+        return
+    text = "\n".join(f"{name}:\n  same as {other}" for _, name, other in alike)
+    if k == 0:
+        rows = len(first.get_legend_handles_labels()[0])
+        text = "\n" * (rows + 2) + text
+    ax.text(1.02, 1.0, text, transform=ax.transAxes, va="top", fontsize=7.5, linespacing=1.25)
+
+
+def _sentence(alike: list[tuple[str, str, str]]) -> str:
+    """Say for the caption which curves are the same; empty where none are."""
+    told = []
+    for kind in KINDS:
+        groups: dict[str, list[str]] = {}
+        for found, name, other in alike:
+            if found == kind:
+                groups.setdefault(other, []).append(name)
+        told += [f"{kind} of {', '.join(names)} as of {first}" for first, names in groups.items()]
+    return f" The same curve: {'; '.join(told)}." if told else ""
 
 
 def _dt(record: Record) -> Floats:

@@ -12,7 +12,7 @@ import numpy as np
 
 from vibsim.analysis.series import gap_ratio, rescaling, target_ratio
 from vibsim.record import Record
-from vibsim.report import style, words
+from vibsim.report import figures_frame, style, words
 from vibsim.report.data import (
     Floats,
     Member,
@@ -94,7 +94,7 @@ def energy(record: Record, member: Member) -> Picture:
         values = at(record, "energy_deviation_scaled", member, level=i)
         factor = words.factor(float(gap_ratio(order, level - levels[0])), 2.0**order)
         text = f"{factor}dE{words.lowered(level)}"
-        curves.append(Curve(text, values, above[i]))
+        curves.append(Curve(text, values, above[i], _lost(record, "energy_deviation", member, [i])))
     curves = [curves[i] for i in _few([curve.sound for curve in curves])]
     spread = comparable(curves)
     axes = panels([2.4, 1.3] if spread else [2.4])
@@ -135,8 +135,20 @@ def differences(record: Record, quantity: str, member: Member) -> list[Curve]:
         gap = f"{letter}{words.lowered(levels[i])} − {letter}{words.lowered(levels[i + 1])}"
         factor = words.factor(float(rescaling(order, levels[: i + 2])), 2.0**order)
         values = at(record, f"{quantity}_rescaled", member, pair=i)
-        curves.append(Curve(f"{factor}({gap})" if factor else gap, values, above[i]))
+        lost = _lost(record, quantity, member, [i, i + 1])
+        curves.append(Curve(f"{factor}({gap})" if factor else gap, values, above[i], lost))
     return curves
+
+
+def _lost(record: Record, quantity: str, member: Member, levels: list[int]) -> str:
+    """Say why values of these positions of levels would mean nothing (see `figures_frame.why_lost`)."""
+    pairs = [i for i in levels if i < len(whole(record, "pair"))]
+    found = [at(record, f"{quantity}_difference", member, pair=i) for i in pairs[:1]]
+    if f"{quantity}_scaled" in record and len(levels) == 1:
+        found = [at(record, f"{quantity}_scaled", member, level=levels[0])]
+    return figures_frame.why_lost(
+        record, quantity, member, levels, np.concatenate([*found, np.zeros(1)])
+    )
 
 
 def _multiplied(order: float, levels: list[int]) -> str:
@@ -148,7 +160,7 @@ def _multiplied(order: float, levels: list[int]) -> str:
 
 
 def _few(sound: list[bool]) -> list[int]:
-    """Choose curves: the coarsest, the two finest sound ones, some between, and the first lost in round-off.
+    """Choose curves: the coarsest, the two finest sound ones, some between, and the first that is lost behind them.
 
     Where none is sound, round-off is what there is to see, and all count.
     """
@@ -169,6 +181,7 @@ def _draw_ratios(
     good = [all(above[i : i + 2]) for i in range(count)]
     chosen = _few(good)
     drawn: list[Floats] = []
+    lost = [_lost(record, quantity, member, [i, i + 1, i + 2]) for i in range(count)]
     for k, i in enumerate(chosen):
         sound, values = good[i] or not any(good), at(record, f"{quantity}_ratio", member, triple=i)
         if not np.isfinite(values).any():
@@ -180,13 +193,13 @@ def _draw_ratios(
         text = "levels " + ", ".join(map(str, levels[i : i + 3]))
         ax.plot(
             *style.thin(t, values),
-            label=text + ("" if good[i] else "\n(lost in round-off)"),
+            label=text + ("" if good[i] else f"\n({lost[i]})"),
             **look,
         )
     if not drawn:
         note = (
             "no ratio means anything: the runs grow without bound, or break down"
-            if any(above)
+            if any(above) or set(lost) != {figures_frame.ROUND_OFF}
             else "nothing to divide: every difference is within round-off, or zero"
         )
         ax.text(0.5, 0.7, note, transform=ax.transAxes, ha="center", color=style.GREY)

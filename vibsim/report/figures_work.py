@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.record import Record
-from vibsim.report import style, words
+from vibsim.report import figures_frame, style, words
 from vibsim.report.choice import position
 from vibsim.report.contents_work import Line, lines
 from vibsim.report.data import case_name, known, unit
@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 BOTTOM, HEIGHT = 0.55, 3.1
 """Of the panels [inch]."""
-LEGEND_COLUMNS = 6
+FONT = 8
+"""Size of the legend [point]."""
 
 
 def precision(experiment: Experiment, record: Record, case: int) -> Picture | None:
@@ -34,7 +35,9 @@ def precision(experiment: Experiment, record: Record, case: int) -> Picture | No
     found = lines(experiment, record, case)
     if sum(line.error.size > 1 for line in found) < 2:
         return None
-    top = 0.35 + 0.19 * math.ceil((len(found) + 1) / LEGEND_COLUMNS)
+    names = [line.name for line in found] + ["error of the reference"]
+    columns = figures_frame.columns(names, FONT, 0.92 * style.WIDTH)
+    top = 0.35 + 0.19 * math.ceil(len(names) / columns)
     total = BOTTOM + HEIGHT + top
     figure = style.canvas(total)
     axes: list[Any] = []
@@ -62,8 +65,8 @@ def precision(experiment: Experiment, record: Record, case: int) -> Picture | No
         texts,
         loc="upper left",
         bbox_to_anchor=(0.065, 1.0),
-        ncols=LEGEND_COLUMNS,
-        fontsize=8,
+        ncols=columns,
+        fontsize=FONT,
     )
     name = case_name(record, case)
     adaptive = (

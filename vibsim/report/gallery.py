@@ -12,6 +12,7 @@ from vibsim.report import (
     figures_cloud,
     figures_energy,
     figures_extrema,
+    figures_frame,
     figures_growth,
     figures_map,
     figures_order,
@@ -64,6 +65,8 @@ def pictures(experiment: Experiment, record: Record, shown: list[Member]) -> lis
     drawn += [
         figures_solution.solution(record, choice.position(experiment), member) for member in series
     ]
+    for picture in drawn:
+        figures_frame.hold_words(picture.figure)
     return drawn
 
 
@@ -149,6 +152,14 @@ def choose(experiment: Experiment, record: Record) -> tuple[list[Member], str]:
         parts.append("The worst and a typical member are shown over time, for every scheme.")
     if len(everyone) > room:
         parts.append(
-            f"{len(everyone) - room} more have no figures over time; the tables hold their numbers."
+            f"{_more(len(everyone) - room, bool(data.swept(record)))} no figures over time; the tables hold their "
+            "numbers."
         )
     return shown, " ".join(parts)
+
+
+def _more(count: int, is_swept: bool) -> str:
+    """Say of how many schemes, or members of them, more something holds."""
+    what = "member with its scheme" if is_swept else "scheme"
+    many = "members with their schemes" if is_swept else "schemes"
+    return f"{count} more {what} has" if count == 1 else f"{count} more {many} have"

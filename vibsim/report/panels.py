@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vibsim.report import style
+from vibsim.report import figures_frame, style
 from vibsim.report.data import Floats
 
 if TYPE_CHECKING:
@@ -19,6 +19,9 @@ WILD = 1e6
 APART = 8.0
 """Spreads that differ by more than this are drawn on a logarithmic scale."""
 
+LONG = 36
+"""Letters of a label above which its unit stands in a line of its own."""
+
 
 @dataclass(frozen=True)
 class Curve:
@@ -28,11 +31,21 @@ class Curve:
     values: Floats
     sound: bool = True
     """Whether it stands above round-off."""
+    lost: str = ""
+    """Why it does not, in words; round-off where nothing is said."""
 
     @property
     def is_whole(self) -> bool:
-        """Whether the run behind it lasted to the end."""
-        return bool(np.isfinite(self.values).all())
+        """Whether the runs behind it lasted to the end; at the first and last time a centred formula has no value."""
+        inner = self.values[1:-1] if self.values.size > 2 else self.values
+        return self.lost != figures_frame.BROKE_DOWN and bool(np.isfinite(inner).all())
+
+    @property
+    def fate(self) -> str:
+        """What the legend says of a curve that is not sound or not whole; else empty."""
+        if not self.is_whole:
+            return figures_frame.BROKE_DOWN
+        return "" if self.sound else self.lost or figures_frame.ROUND_OFF
 
 
 def figure_of(axes: Axes) -> Figure:
@@ -78,8 +91,7 @@ def draw_curves(ax: Axes, t: Floats, curves: list[Curve], text: str, measure: st
     for i, curve in enumerate(curves):
         values = style.no_zeros(curve.values) if wild else curve.values / 10.0**exponent
         x, y = style.thin(t, values)
-        note = "" if curve.sound else "\n(lost in round-off)"
-        note += "" if curve.is_whole else "\n(broke down)"
+        note = f"\n({curve.fate})" if curve.fate else ""
         look = _look(i, len(curves), x.size)
         if not curve.sound and any(c.sound for c in curves):
             look = {"color": "#a0a0a0", "linewidth": 0.6, "zorder": 1.5}
@@ -89,7 +101,9 @@ def draw_curves(ax: Axes, t: Floats, curves: list[Curve], text: str, measure: st
         style.log_axis(ax, "y", *decades(shown))
     else:
         ax.set_ylim(*style.limits(*(values / 10.0**exponent for values in shown)))
-    ax.set_ylabel(style.label(f"|{text}|" if wild else text, measure, exponent))
+    words = style.label(f"|{text}|" if wild else text, measure, exponent)
+    # a long label would run into the panel below
+    ax.set_ylabel(words.replace(f"{text} [", f"{text}\n[") if len(words) > LONG else words)
     style.beside(ax)
 
 
@@ -97,6 +111,8 @@ def stop_at_breakdown(ax: Axes, t: Floats, series: list[Floats]) -> None:
     """Let the time end with the last finite value of all series, and say so where that is not the end."""
     finite = np.flatnonzero(np.any([np.isfinite(values) for values in series], axis=0))
     last = max(int(finite[-1]), 1) if finite.size else t.size - 1
+    # a centred formula has no value at the last time
+    last = t.size - 1 if last >= t.size - 2 else last
     ax.set_xlim(float(t[0]), float(t[last]))
     if last < t.size - 1:
         note = f"ends with the breakdown, of {t[-1]:g} in all"
@@ -160,7 +176,7 @@ def draw_spread(ax: Axes, t: Floats, curves: list[Curve], measure: str) -> None:
         look = _look(i, len(curves), x.size) | {"linewidth": 1.3, "alpha": 1.0, "markersize": 4.0}
         ax.plot(x, y, **look)
     if logarithmic:
-        highest = min(max(float(np.max(np.abs(gap))) for gap in shown), style.LARGEST)
+        highest = min(max(float(np.nanmax(np.abs(gap))) for gap in shown), style.LARGEST)
         style.log_axis(ax, "y", max(0.02 * min(sizes), style.TINIEST), 2 * highest)
     else:
         ax.axhline(0.0, color=style.GREY, linewidth=0.7, zorder=1)
@@ -171,4 +187,4 @@ def draw_spread(ax: Axes, t: Floats, curves: list[Curve], measure: str) -> None:
 
 def _typical(values: Floats) -> float:
     """Return a size that nine tenths of the values stay below: an end point of its own kind does not count."""
-    return float(np.quantile(np.abs(values), 0.9))
+    return float(np.nanquantile(np.abs(values), 0.9))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from vibsim.analysis.valued import COUNTED, depends_on_level
 from vibsim.vocabulary import BY_TOLERANCE
 
 
@@ -85,10 +86,40 @@ REASONS = {
 }
 
 _UNKNOWN = Reason("", "")
+_SAYS = "The measured number is what the check says."
 _NUMBER = Reason(
-    "The measured number is what the check says.",
+    _SAYS,
     "A number that finer levels do not change, and that is not just inside its bound: the tables show both.",
 )
+_NUMBER_OF_ONE = Reason(
+    _SAYS,
+    "More levels: on one alone nothing shows how much of the number is the step's.",
+)
+_NUMBER_OF_SCHEME = Reason(
+    _SAYS,
+    "Nothing more: no level enters it. It comes from the equations of the scheme or the model, not from a run.",
+)
+_NUMBER_COUNTED = Reason(
+    _SAYS,
+    "Nothing more: it is counted, and exact.",
+)
+_BY_KIND = {
+    "stable": Reason(
+        "The scheme grows, or does not, as the check says.",
+        "A growth factor that agrees with the predicted one. Where the scheme has a limit, a w dt well within it, or "
+        "well beyond it; where it has none, a finer level on which the growth is smaller, or is not.",
+    ),
+    "conserves": Reason(
+        "The error of the energy changes with time as the check says.",
+        "A run of many periods: a slow drift below a larger oscillation shows late. The figure of the running maximum "
+        "has it at every time.",
+    ),
+    "equal": Reason(
+        "The two solutions are as near to each other as the check says.",
+        "A distance well below what is allowed, at every stored time; what is allowed without `atol` are the rounding "
+        "errors of both.",
+    ),
+}
 
 
 _OF_TOLERANCE = {
@@ -104,10 +135,29 @@ _OF_TOLERANCE = {
 }
 
 
-def reason(word: str | None, kind: str) -> Reason:
-    """Return the explanation of a reason for a kind of check; empty words for one that has none."""
+def reason(word: str | None, kind: str, value: str = "", levels: int = 2) -> Reason:
+    """Return the explanation of a reason for a kind of measurement; empty words for one that has none.
+
+    Parameters
+    ----------
+    value
+        What a ``value`` check measures.
+    levels
+        How many levels the page has.
+    """
     if kind == BY_TOLERANCE and word in _OF_TOLERANCE:
         return _OF_TOLERANCE[word]
+    if word == "match" and kind in _BY_KIND:
+        return _BY_KIND[kind]
     if word == "match" and kind != "converges":
-        return _NUMBER
+        return _number(value, levels)
     return REASONS.get(word or "", _UNKNOWN)
+
+
+def _number(value: str, levels: int) -> Reason:
+    """Return the words on a number that is as it should be."""
+    if value in COUNTED:
+        return _NUMBER_COUNTED
+    if value and not depends_on_level(value):
+        return _NUMBER_OF_SCHEME
+    return _NUMBER if levels > 1 else _NUMBER_OF_ONE

@@ -218,6 +218,8 @@ LEAST, MOST = 1e-290, 1e290
 def log_axis(ax: Axes, which: str, low: float, high: float) -> None:
     """Make an axis logarithmic from `low` to `high`, with at most about eight labelled ticks in Unicode."""
     low, high = _within(low, high)
+    # the limits first: a margin around values near the end of the floats would overflow
+    getattr(ax, f"set_{which}lim")(low, high)
     getattr(ax, f"set_{which}scale")("log")
     getattr(ax, f"set_{which}lim")(low, high)
     log_ticks(getattr(ax, f"{which}axis"), low, high)

@@ -145,7 +145,11 @@ NEWMARK_BETA = Scheme(
             "beta", 0.25, 0.0, 1.0, "weight of the new acceleration in the position; 0: explicit"
         ),
         NumberOption(
-            "gamma", 0.5, 0.0, 1.5, "weight of the new acceleration in the velocity; 1/2: order 2"
+            "gamma",
+            0.5,
+            0.0,
+            1.5,
+            "weight of the new acceleration in the velocity; 1/2: order 2, below it the amplitude grows",
         ),
     ),
     stepper=_newmark,

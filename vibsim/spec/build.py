@@ -151,7 +151,9 @@ def _initial(
             report.add(("initial", name), "unknown state", nearest(name, states), at_key=True)
     found = {name: (part.initial or {}).get(name, 0.0) for name in states}
     for name, value in start.items():
-        if name in (part.initial or {}) and not math.isclose(found[name], value, rel_tol=1e-12, abs_tol=1e-12):
+        if name in (part.initial or {}) and not math.isclose(
+            found[name], value, rel_tol=1e-12, abs_tol=1e-12
+        ):
             rule = f"must be {value:.15g}, where the exact solution starts, or be left out"
             report.add(("initial", name), rule)
         found[name] = float(value)
