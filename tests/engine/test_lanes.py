@@ -237,10 +237,10 @@ def test_members_that_fail_have_the_same_bits_in_every_lane(when, kind):
 @pytest.mark.parametrize(
     "acceleration",
     [
-        "-(g/L)*sin(theta)*exp(-0.01*t)",
+        pytest.param("-(g/L)*sin(theta)*exp(-0.01*t)", marks=pytest.mark.slow),
         "-(g/L)*where(sin(2*theta) < 0.5, theta, tanh(theta))",
-        "-(g/L)*sign(theta)*abs(theta)**1.5",
-        "-max(sin(theta), cos(t))*g",
+        pytest.param("-(g/L)*sign(theta)*abs(theta)**1.5", marks=pytest.mark.slow),
+        pytest.param("-max(sin(theta), cos(t))*g", marks=pytest.mark.slow),
         "-g*theta/L + where(theta > 0.1, sqrt(theta), log(1 + theta**2))",
     ],
 )

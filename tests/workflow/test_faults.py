@@ -25,8 +25,17 @@ def cut(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-100])
 
 
-@pytest.mark.parametrize("harm", [flip, cut], ids=lambda harm: harm.__name__)
-@pytest.mark.parametrize("name", ["level_07.nc", "convergence.nc", "summary.json"])
+@pytest.mark.parametrize(
+    ("name", "harm"),
+    [
+        ("level_07.nc", flip),
+        ("summary.json", cut),
+        pytest.param("convergence.nc", flip, marks=pytest.mark.slow),
+        pytest.param("convergence.nc", cut, marks=pytest.mark.slow),
+        pytest.param("level_07.nc", cut, marks=pytest.mark.slow),
+        pytest.param("summary.json", flip, marks=pytest.mark.slow),
+    ],
+)
 def test_a_damaged_file_is_named_deleted_and_made_again(
     place: Place, finished: Place, name: str, harm: object
 ) -> None:
@@ -121,10 +130,7 @@ MADE = {
 
 @pytest.mark.parametrize(
     "made",
-    [
-        name if name in ("first level", "analysis") else pytest.param(name, marks=pytest.mark.slow)
-        for name in MADE
-    ],
+    [name if name == "analysis" else pytest.param(name, marks=pytest.mark.slow) for name in MADE],
 )
 @pytest.mark.parametrize("whole", [True, False], ids=["all processes", "the run alone"])
 def test_after_a_kill_the_same_command_works(
