@@ -71,7 +71,7 @@ def _caption() -> str:
     return (
         "Every explicit scheme on the pendulum with its defaults (centred ones with `increment`), CPU time of one "
         "thread, ns per member-step. The ratio is that of the cost to (force evaluations per step) x (the cost of "
-        f"`central` in the same lane); {LIMIT:g} is to be reached. What a scheme's own vector arithmetic adds is taken off "
+        f"`central` in the same lane); {LIMIT:g} is to be reached. The scheme's own vector arithmetic is taken off "
         "first: the operations of its step beyond those of as many steps of `central`, counted by hand, times what an "
         f"operation costs in that lane (from {EXTRA} more in a step of Forward Euler)."
     )
