@@ -211,9 +211,10 @@ def test_faults_are_told_with_their_place(
     tmp_path: Path, capsys: Capture, model: str, line: int, key: str, value: str, rule: str
 ) -> None:
     file = write(tmp_path, text_of(model))
-    begin = time.perf_counter()
+    begin = time.process_time()
     assert main(["check", str(file)]) == 2
-    assert time.perf_counter() - begin < 1.0
+    # what is not refused at once takes half a minute at least
+    assert time.process_time() - begin < 10.0
     told = capsys.readouterr()
     assert told.out == ""
     assert "Traceback" not in told.err

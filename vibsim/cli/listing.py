@@ -32,6 +32,8 @@ def _models() -> Iterable[tuple[str, str]]:
     for model in MODELS.values():
         parameters = ", ".join(f"{p.name} = {p.default:g} {p.unit}" for p in model.parameters)
         shape = "linear" if model.linear else "nonlinear"
+        if model.formulas:
+            shape = f"formulas {', '.join(row.name for row in model.formulas)}"
         yield model.kind, f"{model.title}: {model.equation}; {parameters}; {shape}"
 
 

@@ -13,7 +13,7 @@ and the motion starts on it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import islice
 from typing import Any
@@ -375,4 +375,5 @@ def _is_plain(own: Written) -> bool:
     return all(name == "v" or "v" not in name for name in names_in(own.damping))
 
 
-OSCILLATOR = written({}, ())
+OSCILLATOR = replace(written({}, ()), equation="m u'' + f(u') + s(u) = F(t)")
+"""The model without formulas, under the equation of all."""

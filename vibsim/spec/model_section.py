@@ -113,6 +113,5 @@ def model_section(model: Model) -> type[Section]:
     if model.formulas:
         words = "names that the formulas use, with their values"
         fields["parameters"] = (Declared, Field(default={}, description=words))
-    what = "m u'' + f(u') + s(u) = F(t)" if model.formulas else model.equation
-    doc = f"{model.title}: {what} ({model.source})."
+    doc = f"{model.title}: {model.equation} ({model.source})."
     return create_model(class_name(model.kind), __base__=MadeSection, __doc__=doc, **fields)
