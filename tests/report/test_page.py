@@ -444,6 +444,17 @@ def test_a_check_of_stability_does_not_say_that_a_run_stays_bounded(is_stable, t
         assert claim["needs"] == reasons.reason("match", "stable").needs == first["needs"]
 
 
+@pytest.mark.parametrize("holds", [True, False])
+def test_a_refuted_claim_does_not_say_that_the_check_is_right(holds):
+    asked = {"stable": holds}
+    exp = samples.experiment(checks=[{"claim": "so", "that": asked, "holds": holds}], levels=[7])
+    record = samples.record(exp)
+    (check,) = samples.summary(exp, record)["checks"]
+    assert check["reason"] == "match"
+    says = reasons.reason("match", "stable").meaning if holds else reasons.REFUTED
+    assert cards.card(exp, record, check)["meaning"] == says
+
+
 def test_a_number_within_round_off_has_two_digits():
     exp = samples.experiment(
         model={"kind": "spring", "w": 2.0},

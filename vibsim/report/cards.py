@@ -20,6 +20,7 @@ from vibsim.report import (
     words,
 )
 from vibsim.report.tables import Cell, Column, Table, Written
+from vibsim.spec.checks import ClaimCheck
 from vibsim.spec.collection import ADHOC, ENDINGS
 from vibsim.vocabulary import BY_TOLERANCE
 
@@ -123,7 +124,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         "text": words.told(check).removeprefix(heading).lstrip(". "),
         "status": check["status"],
         "reason": check["reason"] or "–",
-        "meaning": explained.meaning,
+        "meaning": _meaning(asserted, check, explained),
         "needs": explained.needs,
         "advice": words.told(check, "advice"),
         "expected": words.readable(words.expectation(check.get("expected"))),
@@ -133,6 +134,14 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         "where": _where(check),
         "alone": _alone(check),
     }
+
+
+def _meaning(asserted: object, check: Mapping[str, Any], explained: reasons.Reason) -> str:
+    """Return what the reason means; of a claim that is refuted as expected, what it does not say is the point."""
+    is_refuted = (
+        isinstance(asserted, ClaimCheck) and not asserted.holds and check["reason"] == "match"
+    )
+    return reasons.REFUTED if is_refuted else explained.meaning
 
 
 def _factor(check: Mapping[str, Any]) -> str:

@@ -122,6 +122,9 @@ _BY_KIND = {
 }
 
 
+REFUTED = "The measurement contradicts the statement, as was expected of it."
+"""What it means that a claim matches which is expected to be false."""
+
 _OF_TOLERANCE = {
     "match": Reason(
         "The levels, extrapolated, bound the error of every scheme and member at every stored time by the tolerance.",
