@@ -27,6 +27,9 @@ REDUCED = 1e5
 STATED = {
     "atan2": lambda y, x: (abs(y) > 1e-99 * abs(x)) & np.isfinite(y) & np.isfinite(x),
     "cos": lambda x: abs(x) <= REDUCED,
+    "mod": lambda x, y: (
+        (abs(x) <= 1e15 * np.fmin(abs(y), 1e270)) & (abs(y) >= 1e-270) & (abs(y) <= 1e270)
+    ),
     "power": lambda x, y: np.isfinite(x) & (x > 0.0) & (abs(y) <= 1e9),
     "sin": lambda x: abs(x) <= REDUCED,
     "tan": lambda x: abs(x) <= REDUCED,

@@ -39,6 +39,7 @@ from vibsim.expression import (
     values,
     walk,
 )
+from vibsim.expression.derivative import STEPS
 from vibsim.models.base import (
     Damping,
     Floats,
@@ -55,6 +56,8 @@ MASS = Parameter("m", 1.0, "kg", "mass", minimum=0.0, exclusive=True)
 TERMS = {"linear": "b*v", "quadratic": "b*abs(v)*v"}
 UNITS = {"linear": "kg s-1", "quadratic": "kg m-1"}
 ZERO = Number(0.0)
+JUMPS = STEPS | {"mod"}
+"""Functions whose derivative is that between their jumps."""
 MAX_NODES = 20_000
 """Longest force of an exact solution, in operations and names."""
 
@@ -168,8 +171,8 @@ def put(node: Expression, name: str, what: Expression) -> Expression:
 
 def is_multiple(node: Expression, slope: Expression, name: str) -> bool:
     """Whether a formula with that derivative is a factor times `name`, whatever the parameters."""
-    jumps = (part for part in walk(node) if isinstance(part, Compare) or _is_call(part, "sign"))
-    # the derivative of a jump is 0
+    # the derivative does not tell of a jump
+    jumps = (part for part in walk(node) if is_jump(part))
     if name in names_in(slope) or any(name in names_in(part) for part in jumps):
         return False
     return _is_zero_with(node, name)
@@ -194,8 +197,9 @@ def _is_zero_with(node: Expression, name: str) -> bool:
             return False
 
 
-def _is_call(node: Expression, function: str) -> bool:
-    return isinstance(node, Call) and node.function == function
+def is_jump(node: Expression) -> bool:
+    """Whether the value jumps where an operand varies."""
+    return isinstance(node, Compare) or (isinstance(node, Call) and node.function in JUMPS)
 
 
 def damping_of(node: Expression) -> tuple[str, Expression] | None:
@@ -359,20 +363,13 @@ def _equation(own: Written) -> str:
     """Return the equation of motion as a user would write it."""
     terms = ["m u''"]
     if not own.is_zero(own.damping):
-        terms.append(to_formula(own.damping).replace("v", "u'") if _is_plain(own) else "f(u')")
+        terms.append(to_formula(put(own.damping, "v", Name("u'"))))
     terms.append(to_formula(own.spring))
     sides = " + ".join(terms).replace("+ -", "- ")
     told = f"{sides} = {to_formula(own.force)}" if own.exact is None else f"{sides} = F(t)"
-    if "f(u')" in terms:
-        told += f", f(v) = {to_formula(own.damping)}"
     if own.exact is not None:
         told += f", with F such that u = {to_formula(own.exact)}"
     return told
-
-
-def _is_plain(own: Written) -> bool:
-    """Whether no other name of the damping has a v in it."""
-    return all(name == "v" or "v" not in name for name in names_in(own.damping))
 
 
 OSCILLATOR = replace(written({}, ()), equation="m u'' + f(u') + s(u) = F(t)")
