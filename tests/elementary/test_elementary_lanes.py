@@ -110,10 +110,11 @@ def test_primitives_of_both_lanes_agree():
         assert same(values, plain(getattr(primitives, name), (column,))).all()
 
 
-def test_all_functions_fit_into_one_kernel():
+@pytest.mark.parametrize("is_called", [False, True])
+def test_all_functions_fit_into_one_kernel(is_called):
     module = text.Module("", given=primitives.NAMES)
     for name, function in ELEMENTARY.items():
-        text.collect(module, function.full, name, {})
+        text.collect(module, function.full, name, {}, is_called=is_called)
         text.collect(module, function.fast, f"{name}_fast", {})
     assert {*ELEMENTARY, *(f"{name}_fast" for name in ELEMENTARY)} <= set(module.parts)
 

@@ -29,7 +29,9 @@ def sign(x: float) -> float:
 
 def heaviside(x: float) -> float:
     """Return Heaviside's step: 0 below 0, 1/2 at 0, 1 above; NaN for NaN."""
-    return 0.5 + 0.5 * sign(x)
+    value = 1.0 if x > 0.0 else 0.0
+    value = 0.5 if x == 0.0 else value
+    return value if x == x else x
 
 
 def smaller(a: float, b: float) -> float:

@@ -32,13 +32,18 @@ def nearest(x: float) -> float:
 
 def floor(x: float) -> float:
     """Return the largest whole number that is not above `x`."""
-    value = nearest(x)
-    return value - 1.0 if value > x else value
+    return rounded_down(x)
 
 
 def ceil(x: float) -> float:
     """Return the smallest whole number that is not below `x`."""
-    return -floor(-x)
+    return -rounded_down(-x)
+
+
+def rounded_down(x: float) -> float:
+    """Return the same as `floor`: a kernel may compile what formulas call in another way than what functions call."""
+    value = nearest(x)
+    return value - 1.0 if value > x else value
 
 
 def mod(x: float, y: float) -> float:

@@ -104,11 +104,16 @@ def ramp(x: Expression) -> Expression:
 
 
 def of_mod(x: Expression, period: Expression) -> Expression:
-    """Write the antiderivative of ``mod(x, period)``: with m its value, ``(x period - m (period - m))/2``."""
+    """Write the antiderivative of ``mod(x, period)``, ``(n period^2 + m^2)/2`` with ``x = n period + m``.
+
+    In the periods beside 0, where that cancels, it is ``x (x/2 - n period)``.
+    """
     m = _call("mod", x, period)
-    whole = Binary("-", Binary("*", x, period), Binary("*", m, Binary("-", period, m)))
-    # which cancels in the first period
-    return _product(HALF, _call("where", Compare("==", m, x), Binary("*", m, m), whole))
+    n = _call("round", Binary("/", Binary("-", x, m), period))
+    near = Binary("*", x, Binary("-", _product(HALF, x), Binary("*", n, period)))
+    far = _product(HALF, Binary("+", _product(n, period, period), Binary("*", m, m)))
+    is_near = Compare("<", _call("abs", Binary("+", n, HALF)), ONE)
+    return _call("where", is_near, near, far)
 
 
 SMOOTH: Mapping[str, Callable[[Expression], Expression]] = {
