@@ -201,7 +201,20 @@ def test_tanh_and_acos_keep_their_digits_at_the_edge():
     assert value("acos(x)", 1 - 2.0**-50) == pytest.approx(-(2.0**24.5), rel=1e-14)
 
 
-@pytest.mark.parametrize("nest", ["(x/{})", "({}*x)", "atan2({}, x)", "tan({})", "({})**x"])
+@pytest.mark.parametrize(
+    "nest",
+    [
+        "(x/{})",
+        "({}*x)",
+        "atan2({}, x)",
+        "tan({})",
+        "({})**x",
+        "hypot({}, x)",
+        "erf({})",
+        "mod({}, 2 + x)",
+        "x if x > 2 else {}",
+    ],
+)
 def test_the_derivative_of_the_deepest_formula_is_still_python(nest):
     formula = "x"
     while len(longer := nest.format(formula)) <= 2000:

@@ -159,6 +159,17 @@ BROKEN = {
     "u > 1": [1.0],
     "k*(u <= -1) - (3 >= 2*u)": [-1.0, 1.5],
     "k < u": [1.7],
+    "(u - 1)*heaviside(u - 1)": [1.0],
+    "k*(u + u**3)*(2*u <= 3)": [1.5],
+    "(-1 < u)*(1 - u)": [-1.0],
+    "-1 < u < 2": [-1.0, 2.0],
+    "(k < u)*u*erf(2)": [1.7],
+    "max(u - 1, 0)**1.5": [1.0],
+    "max(-k - 2*u, 0)**2": [-0.85],
+    "u if u < 1 else 2*u - 1": [1.0],
+    "k*u + 2 if u < -1 else u if u < 1 else sin(u)": [-1.0, 1.0],
+    "u if k > 1 else 2*u": [],
+    "where(heaviside(u - 1), sin(u), u**3)": [1.0],
 }
 SMOOTH = {
     "erf(k*u)": "erf(k*u)",
@@ -176,6 +187,7 @@ _MP: dict[str, Any] = {
         for name in ("asinh", "atanh", "ceil", "erf", "erfc", "expm1", "floor")
     },
     **{"abs": abs, "cbrt": root3, "max": max, "min": min, "mod": rest, "round": mp.nint},
+    **{"sin": mp.sin, "where": lambda condition, yes, no: yes if condition else no},
     **{"sign": mp.sign, "heaviside": lambda x: (1 + mp.sign(x)) / 2, "k": mp.mpf(1.7)},
 }
 
@@ -211,9 +223,30 @@ def test_a_small_energy_has_all_its_digits(text: str, u: float) -> None:
     assert found == pytest.approx(true_integral(text, u, [0.0]), rel=1e-13, abs=0.0)
 
 
-@pytest.mark.parametrize("text", ["max(u, k*u)", "u == 1", "hypot(u, 1)", "log1p(u)", "mod(k, u)"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "max(u, k*u)",
+        "u == 1",
+        "hypot(u, 1)",
+        "log1p(u)",
+        "mod(k, u)",
+        "u*(k*u > 1)",
+        "u*(u > u**2)",
+    ],
+)
 def test_what_has_no_rule_is_left_to_points(text: str) -> None:
     assert not has_rule(parse(text, ("u", "k")), "u")
+
+
+@pytest.mark.parametrize(
+    ("inner", "outer"), [("u", "(u > 1)*({})"), ("u", "u if u > 1 else {}"), ("u", "max(u, {})")]
+)
+def test_the_integral_of_conditions_in_each_other_stays_short(inner: str, outer: str) -> None:
+    text = inner
+    while len(longer := outer.format(text)) < 600:
+        text = longer
+    assert sum(1 for _ in walk(integral(parse(text, ("u",)), "u"))) < 50_000
 
 
 @pytest.mark.parametrize("text", ["atanh(1.5)", "acosh(0.5)", "log1p(-2)", "mod(1, 0)", "log2(0)"])

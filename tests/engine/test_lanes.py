@@ -260,6 +260,16 @@ def test_formulas_with_branches_and_other_functions_have_the_same_bits(accelerat
         assert_same_bits(plain, other)
 
 
+def test_a_condition_is_a_number_in_every_lane():
+    """As a truth value it would have no -0."""
+    model = dataclasses.replace(MODELS["pendulum"], potential_energy="-(theta < -9e9)")
+    parameters, _, dt = members(model)
+    series = np.ones((MEMBERS, 3))
+    for lane in LANES:
+        _, potential = energies(model, parameters, dt, 1, series, series, lane=lane)
+        assert np.signbit(potential).all()
+
+
 @pytest.mark.parametrize("lane", LANES)
 def test_energies_of_samples_are_those_that_were_gathered(lane):
     """The largest deviation over all stored steps is the gathered one, to the last bit."""

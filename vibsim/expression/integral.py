@@ -3,8 +3,9 @@
 The integral is taken from 0, in forms that do not cancel there: a small energy has all its digits. A sum is integrated
 term by term; a term is a constant factor times a power of x, or a function of the table (`antiderivative`) of ``a x``.
 What has a corner or jumps is integrated for ``a x + b`` too, though the difference ``F(a x + b) - F(b)`` may cost a
-small energy some digits. Anything else is integrated by Gauss and Legendre's rule between 0 and x, written out as a
-formula: right to round-off for a function that is smooth there, even if it has a corner at 0.
+small energy some digits; what holds on one side of a place alone is integrated up to that place or from there. Anything
+else is integrated by Gauss and Legendre's rule between 0 and x, written out as a formula: right to round-off for a
+function that is smooth there, even if it has a corner at 0.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from functools import cache
 import numpy as np
 
 from vibsim.expression.antiderivative import BROKEN, SMOOTH, of_mod, ramp, ramp_integral
+from vibsim.expression.linear import factor_of, slope_of, start_of
 from vibsim.expression.parser import literal
 from vibsim.expression.tree import (
     Binary,
@@ -26,11 +28,14 @@ from vibsim.expression.tree import (
     Number,
     names_in,
     rebuilt,
+    walk,
 )
 
 ZERO, ONE, TWO, HALF = Number(0.0), Number(1.0), Number(2.0), Number(0.5)
 POINTS = 24
 """Points of the rule: polynomials up to degree 47 are integrated exactly."""
+MAX_CONDITIONS = 4
+"""Most conditions inside one that decides of a part: each of them doubles the text of the integral."""
 
 
 def integral(node: Expression, name: str) -> Expression:
@@ -70,7 +75,7 @@ def _found(node: Expression, name: str) -> Expression | None:
             raised = Binary("**", base, Number(power + 1.0))
             return Binary("/", raised, Number(power + 1.0))
         case Call(function, (argument,)) if function in SMOOTH:
-            factor = _factor(argument, name)
+            factor = factor_of(argument, name)
             return None if factor is None else Binary("/", SMOOTH[function](argument), factor)
         case _:
             return _of_broken(node, name)
@@ -93,8 +98,60 @@ def _of_broken(node: Expression, name: str) -> Expression | None:
             return _of_linear(ramp, Binary("-", right, left), name)
         case Compare(">" | ">=", left, right) if _is_in_one(left, right, name):
             return _of_linear(ramp, Binary("-", left, right), name)
+        case Binary("**", Call("max", (argument, Number(0.0))), exponent):
+            more = Number((literal(exponent) or -1.0) + 1.0)
+            if more.value <= 1.0:
+                return None
+            return _of_linear(
+                lambda x: Binary("/", Binary("**", ramp(x), more), more), argument, name
+            )
+        case Call("where", (condition, yes, no)) if name not in names_in(condition):
+            first, second = _found(yes, name), _found(no, name)
+            if first is None or second is None:
+                return None
+            return Call("where", (condition, first, second))
+        case Call("where", (condition, yes, no)):
+            first = _of_part(yes, condition, 1.0, name)
+            second = _of_part(no, condition, -1.0, name)
+            return None if first is None or second is None else Binary("+", first, second)
+        case Binary("*", left, right):
+            return _of_part(left, right, 1.0, name) or _of_part(right, left, 1.0, name)
         case _:
             return None
+
+
+def _of_part(node: Expression, condition: Expression, side: float, name: str) -> Expression | None:
+    """Return the integral of a formula where a condition ``a x + b > 0`` holds (side 1), or where it does not (-1).
+
+    On one side of the place c, where H is the integral of the formula, it is ``H(max(x, c)) - H(max(0, c))``, on the
+    other the same with ``min``.
+    """
+    match condition:
+        case Compare("<" | "<=", left, right):
+            difference = Binary("-", right, left)
+        case Compare(">" | ">=", left, right):
+            difference = Binary("-", left, right)
+        case Call("heaviside", (argument,)):
+            difference = Binary("-", argument, ZERO)
+        case _:
+            return None
+    inside = sum(isinstance(part, Compare | Call) for part in walk(node))
+    slope = literal(slope_of(difference, name) or ZERO)
+    whole = _found(node, name) if inside <= MAX_CONDITIONS else None
+    if not slope or whole is None:
+        return None
+    place = Binary("/", Negate(start_of(difference, name)), _number(slope))
+    function = "max" if slope * side > 0.0 else "min"
+
+    def up_to(end: Expression) -> Expression:
+        limit = Call(function, (end, place))
+        return rebuilt(whole, lambda part: limit if part == Name(name) else part)
+
+    return Binary("-", up_to(Name(name)), up_to(ZERO))
+
+
+def _number(value: float) -> Expression:
+    return Number(value) if value >= 0.0 else Negate(Number(-value))
 
 
 def _is_in_one(left: Expression, right: Expression, name: str) -> bool:
@@ -106,60 +163,14 @@ def _of_linear(
     write: Callable[[Expression], Expression], argument: Expression, name: str
 ) -> Expression | None:
     """Return the integral of a function of ``a x + b`` whose antiderivative is given; None for other arguments."""
-    factor = _factor(argument, name)
+    factor = factor_of(argument, name)
     if factor is not None:
         return Binary("/", write(argument), factor)
-    factor = _slope(argument, name)
+    factor = slope_of(argument, name)
     if factor is None:
         return None
-    start = rebuilt(argument, lambda part: ZERO if part == Name(name) else part)
-    return Binary("/", Binary("-", write(argument), write(start)), factor)
-
-
-def _slope(node: Expression, name: str) -> Expression | None:
-    """Return the a of a formula ``a x + b``; None where it is another one."""
-    match node:
-        case Negate(operand):
-            inner = _slope(operand, name)
-            return None if inner is None else Negate(inner)
-        case Binary("+" | "-" as symbol, left, right) if name not in names_in(left):
-            inner = _slope(right, name)
-            return Negate(inner) if inner is not None and symbol == "-" else inner
-        case Binary("+" | "-", left, right) if name not in names_in(right):
-            return _slope(left, name)
-        case Binary("*", left, right) if name not in names_in(left):
-            inner = _slope(right, name)
-            return None if inner is None else _times(left, inner)
-        case Binary("*" | "/" as symbol, left, right) if name not in names_in(right):
-            inner = _slope(left, name)
-            return None if inner is None else Binary(symbol, inner, right)
-        case _:
-            return _factor(node, name)
-
-
-def _factor(node: Expression, name: str) -> Expression | None:
-    """Return the a of a formula ``a x``; None where it is another one."""
-    match node:
-        case Name(own) if own == name:
-            return ONE
-        case Negate(operand):
-            inner = _factor(operand, name)
-            return None if inner is None else Negate(inner)
-        case Binary("*", left, right) if name not in names_in(left):
-            inner = _factor(right, name)
-            return None if inner is None else _times(left, inner)
-        case Binary("*", left, right) if name not in names_in(right):
-            inner = _factor(left, name)
-            return None if inner is None else _times(right, inner)
-        case Binary("/", left, right) if name not in names_in(right):
-            inner = _factor(left, name)
-            return None if inner is None else Binary("/", inner, right)
-        case _:
-            return None
-
-
-def _times(left: Expression, right: Expression) -> Expression:
-    return left if right == ONE else Binary("*", left, right)
+    start = write(start_of(argument, name))
+    return Binary("/", Binary("-", write(argument), start), factor)
 
 
 @cache
