@@ -421,6 +421,10 @@ def test_a_declared_b_is_the_users_own():
             "m u'' + c*u' + k*u = cos(2*t)",
         ),
         ({"spring": "-u"}, "m u'' - u = 0"),
+        (
+            {"spring": "u > 1", "damping": "v < 0 or v > k"},
+            "m u'' + max(u' < 0, u' > k) + (u > 1) = 0",
+        ),
         ({"exact": "cos(t)"}, "m u'' + u = F(t), with F such that u = cos(t)"),
     ],
 )

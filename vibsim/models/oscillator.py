@@ -363,13 +363,17 @@ def _equation(own: Written) -> str:
     """Return the equation of motion as a user would write it."""
     terms = ["m u''"]
     if not own.is_zero(own.damping):
-        terms.append(to_formula(put(own.damping, "v", Name("u'"))))
-    terms.append(to_formula(own.spring))
+        terms.append(_term(put(own.damping, "v", Name("u'"))))
+    terms.append(_term(own.spring))
     sides = " + ".join(terms).replace("+ -", "- ")
     told = f"{sides} = {to_formula(own.force)}" if own.exact is None else f"{sides} = F(t)"
     if own.exact is not None:
         told += f", with F such that u = {to_formula(own.exact)}"
     return told
+
+
+def _term(node: Expression) -> str:
+    return f"({to_formula(node)})" if isinstance(node, Compare) else to_formula(node)
 
 
 OSCILLATOR = replace(written({}, ()), equation="m u'' + f(u') + s(u) = F(t)")
