@@ -64,6 +64,8 @@ class FormulaField:
     description: str
     terms: Mapping[str, str] = field(default_factory=dict, hash=False)
     """Formulas with one coefficient b that may be written as ``{word: number}``."""
+    term_units: Mapping[str, str] = field(default_factory=dict, hash=False)
+    """The unit of b in each of them."""
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,7 @@ from vibsim.spec.scheme_section import TOLERANCE, scheme_names, specs
 from vibsim.spec.source import Path_, Source
 from vibsim.spec.sweep_keys import Keys, targets
 from vibsim.spec.timing import time_spec
+from vibsim.spec.units import plain_numbers
 
 _LISTS = ("schemes", "checks", "published")
 _OPTIONAL = [name for name, field in Document.model_fields.items() if not field.is_required()]
@@ -101,13 +102,13 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
 
 def _sections(source: Source, report: Report) -> Any:
     """Return the sections without fault as a `Partial`; faulty schemes and checks are None in their lists."""
-    whole = as_written(source.data, source)
+    whole, faulty = plain_numbers(as_written(source.data, source), report)
     data = {k: v for k, v in whole.items() if v is not None or k not in _OPTIONAL}
     try:
         Document.model_validate(data)
     except ValidationError as error:
-        faulty = report.add_invalid(error)
-    else:
+        faulty += report.add_invalid(error)
+    if not faulty:
         return Partial.model_validate(data)
     mended = without(data, faulty)
     try:

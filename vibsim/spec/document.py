@@ -153,6 +153,13 @@ def _initial_schema() -> dict[str, Any]:
     return {"type": "object", "properties": properties, "additionalProperties": False}
 
 
+UNITS_SCHEMA = {
+    "type": "object",
+    "additionalProperties": {"type": ["number", "string"]},
+    "propertyNames": {"pattern": "^[^0-9\\s]+$"},
+}
+
+
 class Document(Section):
     """An experiment of vibsim: what is simulated, and what is claimed about the outcome."""
 
@@ -164,6 +171,8 @@ class Document(Section):
     """What the experiment shows, in a line."""
     source: Text | None = None
     """What the experiment comes from."""
+    units: Annotated[dict[str, Number], WithJsonSchema(UNITS_SCHEMA)] = Field({})
+    """Units of the file's own, such as ``rod: 4.9 m``: every number with a unit may name them."""
     model: AnyModel
     """The equation of motion and its parameters."""
     initial: Annotated[dict[str, Number], WithJsonSchema(_initial_schema())] = Field({})
