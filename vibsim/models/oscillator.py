@@ -49,6 +49,7 @@ from vibsim.models.base import (
     State,
 )
 from vibsim.models.harmonic import damped_motion, period
+from vibsim.models.oscillator_scales import linear_scales
 
 STATES = (State("u", "m", "displacement"), State("v", "m s-1", "velocity"))
 MASS = Parameter("m", 1.0, "kg", "mass", minimum=0.0, exclusive=True)
@@ -322,6 +323,11 @@ def _written(formulas: tuple[tuple[str, str], ...], declared: tuple[str, ...]) -
         damping=damping,
         formulas=FORMULAS,
         written=written,
+        scales=(
+            linear_scales(own.stiffness, known if is_damped else None, own.force)
+            if own.is_linear
+            else None
+        ),
     )
 
 

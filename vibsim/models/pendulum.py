@@ -14,6 +14,7 @@ import numpy as np
 
 from vibsim.models.base import Model, Numbers, Parameter, State
 from vibsim.models.elliptic import pendulum_motion, pendulum_period
+from vibsim.models.scales import Scales
 
 STATES = (
     State("theta", "rad", "angle from the downward vertical"),
@@ -25,6 +26,14 @@ PARAMETERS = (
     Parameter("L", 1.0, "m", "length of the rod", minimum=0.0, exclusive=True),
     Parameter("m", 1.0, "kg", "mass of the bob", minimum=0.0, exclusive=True),
 )
+
+SCALES = Scales(
+    time="sqrt(L/g)",
+    position="1",
+    energy="m*g*L",
+    parameters=(("g", "1"), ("L", "1"), ("m", "1")),
+)
+"""Those in which g = L = m = 1 (A, section 1.2)."""
 
 
 def natural_frequency(parameters: Numbers) -> Any:
@@ -50,4 +59,5 @@ PENDULUM = Model(
     turn=2 * math.pi,
     exact=pendulum_motion,
     exact_period=pendulum_period,
+    scales=SCALES,
 )
