@@ -14,6 +14,7 @@ from vibsim.models import ENERGIES, Model, State, centred
 from vibsim.record import Attribute, Record, Variable, attributes
 from vibsim.simulation.gathered import extrema, gathered, of_own_steps
 from vibsim.simulation.members import Members, members
+from vibsim.simulation.scaled import in_scales
 from vibsim.simulation.solution import Solution, energies_of, has_adaptive, solve
 from vibsim.spec.series import RUNNING, asks_for_peaks, extrema_kept, is_bounded, stored_series
 
@@ -104,7 +105,7 @@ def simulate_record(
         "storage": "lean" if is_lean else "series",
     }
     coords = coordinates(model, names, group, steps, every, same_end=not experiment.end_varies)
-    return Record(coords, variables, attrs)
+    return in_scales(Record(coords, variables, attrs), experiment)
 
 
 def _states(model: Model) -> list[str]:

@@ -24,6 +24,7 @@ from vibsim.spec.faults import Report, plain_path
 from vibsim.spec.mending import as_written, without
 from vibsim.spec.published import claims
 from vibsim.spec.published_rules import finish_published
+from vibsim.spec.scaling import Numbers, scaled
 from vibsim.spec.scheme_checks import SOLUTIONS
 from vibsim.spec.scheme_section import TOLERANCE, scheme_names, specs
 from vibsim.spec.source import Path_, Source
@@ -60,6 +61,11 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
     time = time_spec(part.time, model, parameters, report) if part.time else None
     initial = _initial(part, model, parameters, report)
     varied = _swept(part, source, model, schemes, report)
+    numbers = Numbers(parameters, initial, time)
+    if part.scaled:
+        keys = (key for axis in varied.axes for key in axis.keys)
+        numbers = scaled(numbers, model, keys, report)
+        time = numbers.time
     samples = part.samples.every if isinstance(part.samples, Every) else part.samples
     shape = limits.Shape(
         base_steps=time.base_steps if time else None,
@@ -84,8 +90,10 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
         name=place.name,
         title=part.title,
         source=part.source,
-        model=ModelSpec(kind=model.kind, parameters=parameters, formulas=read.formulas),
-        initial=initial,
+        model=ModelSpec(
+            kind=model.kind, parameters=dict(numbers.parameters), formulas=read.formulas
+        ),
+        initial=dict(numbers.initial),
         time=time,
         levels=levels,
         schemes=tuple(schemes),
@@ -95,6 +103,8 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
         tolerance=part.tolerance,
         checks=(*checks, *claims(published, part.source)),
         published=published,
+        units=part.units,
+        scaling=numbers.scaling,
     )
     experiment._file = place.file
     return experiment

@@ -88,7 +88,10 @@ class Conversion:
 
 
 def plain_numbers(data: Mapping[str, Any], report: Report) -> tuple[dict[str, Any], list[Path_]]:
-    """Return `data` without units, and the places whose values are refused; 1 stands in for those."""
+    """Return `data` without units, and the places whose values are refused; 1 stands in for those.
+
+    The units that the file defines are left as text, in SI base units.
+    """
     conversion = Conversion(report)
     found = _copied(data)
     _define_all(found, conversion)
@@ -134,7 +137,9 @@ def _define_all(data: dict[str, Any], conversion: Conversion) -> None:
         except UnitError as error:
             conversion.refuse(("units", str(name)), error, value)
             conversion.broken.add(str(name))
-    data["units"] = {}
+    data["units"] = {
+        name: f"{float(unit.factor):.10g} {unit.text}" for name, unit in conversion.own.items()
+    }
 
 
 def _check_name(name: str) -> None:
