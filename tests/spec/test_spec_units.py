@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -18,7 +19,7 @@ from test_spec_fuzz import QUIET, attempt
 from vibsim import plan
 from vibsim.models import MODELS
 from vibsim.spec import Experiment
-from vibsim.spec.unit_names import finite, known, meaning, registry
+from vibsim.spec.unit_names import DEFINITIONS, finite, known, meaning, registry
 from vibsim.spec.unit_text import MAX_EXPONENT, MAX_UNIT, UnitError, factors, split
 from vibsim.spec.units import MAX_OWN
 
@@ -383,3 +384,11 @@ def test_pint_is_imported_for_units_alone(tmp_path: Path) -> None:
         command = [sys.executable, "-c", probe, str(path)]
         done = subprocess.run(command, capture_output=True, text=True, check=True)
         assert done.stdout.strip() == wanted
+
+
+def test_every_unit_is_documented() -> None:
+    text = (Path(__file__).resolve().parents[2] / "docs/experiment-file.md").read_text()
+    told = set(re.findall(r"`([^`\n]+)`", text.partition("\n## units\n")[2].partition("\n## ")[0]))
+    names = [line.split(" = ")[0] for line in DEFINITIONS.splitlines() if "offset" not in line]
+    assert len(names) > 30
+    assert [name for name in names if name.rstrip("-") not in told and name[-1] != "-"] == []

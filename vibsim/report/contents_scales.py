@@ -29,13 +29,11 @@ def table(experiment: Experiment, record: Record) -> Table | None:
     sizes, numbers = scales(model, parameters, initial), dimensionless(model, parameters, initial)
     named = [(f"{row.name}_c", f"scale of the {row.words}", row) for row in sizes]
     named += [(row.name, row.words, row) for row in numbers]
-    is_range = any(np.unique(row.value).size > 1 for _, _, row in named)
-    values = ("least", "largest") if is_range else ("value",)
+    ends = [_ends(row.value) for _, _, row in named]
+    values = ("least", "largest") if any(low < high for low, high in ends) else ("value",)
     rows: list[tuple[Cell, ...]] = []
-    for name, words, row in named:
-        known = np.asarray(row.value)[np.isfinite(row.value)]
-        ends = (known.min(), known.max()) if known.size else (np.nan, np.nan)
-        shown = (float(end) for end in ends[: len(values)])
+    for (name, words, row), span in zip(named, ends, strict=True):
+        shown = span[: len(values)]
         rows.append((name, words, row.formula, *shown, data.pretty_unit(row.unit) or "1"))
     columns = (
         *(Column("name"), Column("what it is"), Column("formula")),
@@ -55,3 +53,9 @@ def _members(section: str, values: Mapping[str, float], record: Record) -> dict[
         key: record[names[f"{section}.{key}"]] if f"{section}.{key}" in names else value
         for key, value in values.items()
     }
+
+
+def _ends(value: Any) -> tuple[float, float]:
+    """Return the least and the largest value that is defined; NaN where none is."""
+    known = np.asarray(value)[np.isfinite(value)]
+    return (float(known.min()), float(known.max())) if known.size else (np.nan, np.nan)

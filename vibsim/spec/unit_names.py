@@ -20,7 +20,7 @@ from vibsim.spec.unit_text import UnitError, factors
 MAX_POWER = 99
 """Largest exponent of a base unit."""
 
-_DEFINITIONS = """\
+DEFINITIONS = """\
 tera- = 1e12 = T-
 giga- = 1e9 = G-
 mega- = 1e6 = M-
@@ -157,7 +157,7 @@ def registry() -> Any:
     import pint
 
     found: Any = pint.UnitRegistry(None, non_int_type=Fraction, on_redefinition="raise")
-    found.load_definitions(_DEFINITIONS.splitlines())
+    found.load_definitions(DEFINITIONS.splitlines())
     return found
 
 
