@@ -21,7 +21,8 @@ def rows(experiment):
 
 def test_values_of_one_run():
     found = rows(samples.experiment(model=MODEL))
-    assert list(found) == ["t_c", "theta_c", "omega_c", "energy_c", "theta(0)", "omega(0)"]
+    scales = ["t_c", "theta_c", "omega_c", "energy_c", "wire_force_c"]
+    assert list(found) == [*scales, "theta(0)", "omega(0)"]
     assert found["t_c"] == ("scale of the time", "sqrt(L/g)", pytest.approx(0.5**0.5), "s")
 
 

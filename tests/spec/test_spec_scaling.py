@@ -30,14 +30,13 @@ def pair(**changes):
 def test_dimensionless_numbers_and_what_leads_back():
     plain, scaled = pair()
     t, omega = math.sqrt(0.5), math.sqrt(2.0)
-    assert scaled.model.parameters == {"g": 1.0, "L": 1.0, "m": 1.0}
+    assert scaled.model.parameters == {"g": 1.0, "L": 1.0, "m": 1.0, "drag": 0.0}
     assert scaled.initial["theta"] == 1.0
     assert scaled.initial["omega"] == pytest.approx(0.3 / omega, rel=1e-15)
     assert scaled.time.end == pytest.approx(14.0 / t, rel=1e-15)
     assert scaled.scaling is not None
-    assert scaled.scaling.scales == pytest.approx(
-        {"t": t, "theta": 1.0, "omega": omega, "energy": 96.04}
-    )
+    wanted = {"t": t, "theta": 1.0, "omega": omega, "energy": 96.04, "wire_force": 19.6}
+    assert scaled.scaling.scales == pytest.approx(wanted)
     assert scaled.scaling.parameters == plain.model.parameters
     assert scaled.scaling.initial == plain.initial
     assert scaled.scaling.end == 14.0
@@ -50,6 +49,7 @@ def test_dimensionless_numbers_and_what_leads_back():
     ("model", "initial"),
     [
         (PENDULUM, STATES),
+        ({**PENDULUM, "drag": 0.2}, STATES),
         ({**PENDULUM, "kind": "linear_pendulum"}, STATES),
         ({"kind": "spring", "w": 2.5}, {"u": 0.3, "v": 0.1}),
         ({"kind": "spring", "w": 2.5}, {"u": 0.0, "v": 0.1}),
@@ -58,7 +58,8 @@ def test_dimensionless_numbers_and_what_leads_back():
 def test_the_scaled_run_leads_back_to_the_plain_one(model, initial):
     plain, scaled = pair(model=model, initial=initial)
     records = [simulate_record(experiment, 6) for experiment in (plain, scaled)]
-    for name in ("t", *initial, "energy"):
+    outputs = [row.name for row in plain.model.definition.outputs]
+    for name in ("t", *initial, "energy", *outputs):
         factor = records[1].attrs[f"scale_{name}"]
         assert records[0][name] == pytest.approx(factor * records[1][name], rel=1e-12, abs=1e-12)
         assert records[1].variable(name).attrs["units"] == "1"
@@ -97,7 +98,7 @@ def test_sweeps_that_change_the_scales_are_refused(key):
 def test_models_without_a_scaled_equation_are_refused():
     fault = only_fault(scaled=True, model={"kind": "oscillator"}, initial={"u": 1.0})
     assert fault.rule == "the model oscillator has no scaled equation"
-    assert "pendulum, linear_pendulum, spring" in fault.hint
+    assert fault.hint == "choose from spring, pendulum, linear_pendulum"
 
 
 def test_scales_must_be_finite():

@@ -9,6 +9,7 @@ from vibsim.engine.trajectories import (
     energies,
     integrate,
     lane_for,
+    observed,
 )
 
 __all__ = [
@@ -20,4 +21,5 @@ __all__ = [
     "energies",
     "integrate",
     "lane_for",
+    "observed",
 ]

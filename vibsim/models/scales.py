@@ -22,8 +22,8 @@ T_C, X_C = Name("@t"), Name("@x")
 class Scales:
     """Formulas in the parameters and the initial values, which have the names of their states.
 
-    All but the first may name the scale of time, as text ``t_c``, and the last three that of the position, such as
-    ``u_c``.
+    All but the first may name the scale of time, as text ``t_c``, and those after the second that of the position, such
+    as ``u_c``.
     """
 
     time: Formula
@@ -34,6 +34,8 @@ class Scales:
     """Dimensionless numbers by name."""
     parameters: tuple[tuple[str, Formula], ...] | None = None
     """The parameters of the scaled equation, by key; None where a run cannot be made in these scales."""
+    outputs: tuple[tuple[str, Formula], ...] = ()
+    """Scales of the model's outputs."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ class Characteristic:
     """One scale or one dimensionless number."""
 
     name: str
-    """``t``, a state or ``energy`` for a scale; ``u(0)`` for a scaled initial value; else that of the number."""
+    """``t``, a state, ``energy`` or an output for a scale; ``u(0)`` for an initial value; else that of the number."""
     words: str
     formula: str
     unit: str
@@ -50,7 +52,7 @@ class Characteristic:
 
 
 def scales(model: Model, parameters: Numbers, initial: Numbers) -> tuple[Characteristic, ...]:
-    """Return the scales of time, position, velocity and energy; none where a model states none.
+    """Return the scales of time, position, velocity, energy and outputs; none where a model states none.
 
     Parameters
     ----------
@@ -66,11 +68,24 @@ def scales(model: Model, parameters: Numbers, initial: Numbers) -> tuple[Charact
     with np.errstate(all="ignore"):
         speed = numbers[X_C.name] / numbers[T_C.name]
     over, size = f"{x.name}_c/t_c", numbers[X_C.name]
+    formulas = dict(own.outputs)
+    outputs = (
+        Characteristic(
+            row.name,
+            row.long_name,
+            _text(model, formula),
+            row.unit,
+            _value(model, formula, numbers),
+        )
+        for row in model.outputs
+        if (formula := formulas.get(row.name)) is not None
+    )
     return (
         Characteristic("t", "time", _text(model, own.time), "s", numbers[T_C.name]),
         Characteristic(x.name, x.long_name, _text(model, own.position), x.unit, size),
         Characteristic(v.name, v.long_name, over, v.unit, speed),
         Characteristic("energy", "energy", _text(model, own.energy), model.energy_unit, energy),
+        *outputs,
     )
 
 

@@ -18,6 +18,7 @@ def in_scales(record: Record, experiment: Experiment) -> Record:
         return record
     model = experiment.model.definition
     units = {state.name: state.unit for state in model.states}
+    units |= {output.name: output.unit for output in model.outputs}
     units |= {"t": "s", "energy": model.energy_unit}
     attrs: dict[str, Any] = dict(record.attrs)
     for name, scale in experiment.scaling.scales.items():

@@ -1,4 +1,4 @@
-"""Characteristic scales of the general oscillator with a linear spring: vibration text (B), section 10.2.
+"""Characteristic scales of ``m u'' + f(u') + k u = F(t)``: vibration text (B), section 10.2.
 
 ``t_c = sqrt(m/k)``; ``u_c = A/k`` under a force ``A sin(phi t)``, else the initial amplitude; ``E_c = k u_c^2``. With
 them ``u'' + 2 beta |u'| u' + u = sin(gamma t)``, equation (85): ``beta = b u_c/(2 m) = A b/(2 m k)`` and
@@ -7,7 +7,11 @@ them ``u'' + 2 beta |u'| u' + u = sin(gamma t)``, equation (85): ``beta = b u_c/
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from vibsim.expression import (
+    ONE,
+    ZERO,
     Binary,
     Call,
     Compare,
@@ -18,44 +22,39 @@ from vibsim.expression import (
     derivative,
     literal,
     names_in,
+    over,
+    times,
 )
 from vibsim.models.base import Formula
 from vibsim.models.scales import T_C, X_C, Scales
 
-M, U, V = Name("m"), Name("u"), Name("v")
-ONE, TWO = Number(1.0), Number(2.0)
+if TYPE_CHECKING:
+    from vibsim.models.mechanical import Forces
+
+TWO = Number(2.0)
 
 
-def linear_scales(
-    k: Expression, damping: tuple[str, Expression] | None, force: Expression
-) -> Scales:
-    """Return the scales of an oscillator.
-
-    Parameters
-    ----------
-    k
-        The stiffness of its spring, a formula in the parameters.
-    damping
-        Kind and coefficient b of a linear or quadratic damping; None for none and for any other.
-    force
-        The driving force, a formula in t.
-    """
-    driven = amplitude_and_frequency(force)
+def linear_scales(forces: Forces) -> Scales | None:
+    """Return the scales of an oscillator; None where its spring is not linear."""
+    if not forces.is_linear:
+        return None
+    m, k = forces.mass, forces.stiffness
+    driven = amplitude_and_frequency(forces.force)
     if driven is None:
         # without an initial position the amplitude is V t_c
-        is_moved = Compare("!=", U, Number(0.0))
-        size: Expression = Call("where", (is_moved, _size(U), _times(_size(V), T_C)))
+        u, v = Name(forces.position), Name(forces.velocity)
+        size: Expression = Call("where", (Compare("!=", u, ZERO), _size(u), times(_size(v), T_C)))
     else:
-        size = _over(_size(driven[0]), k)
+        size = over(_size(driven[0]), k)
     numbers: list[tuple[str, Formula]] = []
-    if damping is not None:
-        kind, b = damping
+    if forces.known_damping is not None:
+        kind, b = forces.known_damping
         scale = T_C if kind == "linear" else X_C
-        numbers.append(("beta", _over(_times(b, scale), _times(TWO, M))))
+        numbers.append(("beta", over(times(b, scale), times(TWO, m))))
     if driven is not None:
-        numbers.append(("gamma", _times(driven[1], T_C)))
-    energy = _times(k, Binary("**", X_C, TWO))
-    return Scales(Call("sqrt", (_over(M, k),)), size, energy, tuple(numbers))
+        numbers.append(("gamma", times(driven[1], T_C)))
+    energy = times(k, Binary("**", X_C, TWO))
+    return Scales(Call("sqrt", (over(m, k),)), size, energy, tuple(numbers))
 
 
 def amplitude_and_frequency(force: Expression) -> tuple[Expression, Expression] | None:
@@ -71,7 +70,7 @@ def amplitude_and_frequency(force: Expression) -> tuple[Expression, Expression] 
             case Negate(operand):
                 parts[:0] = [operand]
             case _ if "t" not in names_in(part):
-                amplitude = _times(amplitude, part)
+                amplitude = times(amplitude, part)
             case Call("sin" | "cos", (argument,)) if frequency is None:
                 frequency = derivative(argument, "t")
             case _:
@@ -82,11 +81,3 @@ def amplitude_and_frequency(force: Expression) -> tuple[Expression, Expression] 
 def _size(node: Expression) -> Expression:
     number = literal(node)
     return Call("abs", (node,)) if number is None else Number(abs(number))
-
-
-def _over(left: Expression, right: Expression) -> Expression:
-    return left if right == ONE else Binary("/", left, right)
-
-
-def _times(left: Expression, right: Expression) -> Expression:
-    return right if left == ONE else Binary("*", left, right)
