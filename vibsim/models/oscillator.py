@@ -49,7 +49,12 @@ FORMULAS = (
         "spring", ("u",), "u", "force s(u) of the spring [N], positive where it pulls back"
     ),
     FormulaField(
-        "damping", ("v",), "0", "damping force f(v) [N], positive where it opposes v > 0", TERMS
+        "damping",
+        ("v",),
+        "0",
+        "damping force f(v) [N], positive where it opposes v > 0",
+        TERMS,
+        UNITS,
     ),
     FormulaField("force", ("t",), "0", "driving force F(t) [N]"),
     FormulaField("exact", ("t",), "", "exact solution u(t) [m], from which the force then follows"),
