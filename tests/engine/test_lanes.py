@@ -27,6 +27,8 @@ DRAGGED = dataclasses.replace(
     DRIVEN,
     kind="dragged",
     acceleration="-(g/L)*sin(theta) - 0.02*omega - 0.001*omega**3 + 0.3*cos(1.7*t)",
+    dissipation="(0.02 + 0.001*omega**2)*omega**2",
+    driving="0.3*cos(1.7*t)*omega",
 )
 """A force that depends on all that it may."""
 
@@ -71,7 +73,15 @@ VARIED = [
     for kind, scheme in FIXED_STEP.items()
     for options in (scheme.defaults(), *variants(scheme))
 ]
-MODEL_CASES = [pytest.param(model, id=kind) for kind, model in MODELS.items()]
+MODEL_CASES = [
+    pytest.param(
+        model.variant(frozenset(model.optional)) if model.variant else model,
+        id=kind,
+        marks=() if kind in ("pendulum", "spring") else pytest.mark.slow,
+    )
+    for kind, model in MODELS.items()
+]
+"""Every model with all of its terms."""
 
 
 def members(model, count=MEMBERS, seed=7):
