@@ -53,7 +53,8 @@ def apart(
         second = names.index(check.second)
         other, more = values[second], rounding(part, level, name, second, floor[second])
     elif check.second == "exact":
-        other, more = exact_series(part, level, name)[first], _of_exact(part, level, values[first])
+        other = exact_series(part, level, name)[first]
+        more = _of_exact(part, level, name, values[first])
     else:
         other, more = discrete(part, level, name)[first], np.zeros_like(bound)
     inside = slice(1, -1) if name.endswith(CENTRED) else slice(None)
@@ -136,15 +137,22 @@ def exact_series(part: Part, level: int, name: str) -> Floats:
         {key: values[:, None] for key, values in table.items()}
         for table in (part.group.initial, part.group.parameters)
     )
-    states = {} if model.exact is None else model.exact(t, initial, parameters)
+    if model.exact is not None:
+        states = model.exact(t, initial, parameters)
+    else:
+        names = (model.position, model.velocity)
+        states = {n: record[f"{n}_exact"] for n in names if f"{n}_exact" in record}
     if plain in states:
         return np.broadcast_to(np.asarray(states[plain]), shape)
     found = known_values(model, plain, states, t, part.group)
     return np.full(shape, np.nan) if found is None else np.broadcast_to(found, shape)
 
 
-def _of_exact(part: Part, level: int, values: Floats) -> Floats:
+def _of_exact(part: Part, level: int, name: str, values: Floats) -> Floats:
     """Return how well an exact solution is known, shape (case,): its phase w t has a rounding error."""
+    record, bound = part.records[level], f"{plain_name(name)}_exact_error"
+    if bound in record:
+        return np.asarray(record[bound], dtype=float)
     phase = natural_frequency(part) * part.group.end
     size = np.max(np.abs(np.nan_to_num(values)), axis=-1)
     return np.asarray(SPACING_AT_ONE * (1.0 + phase) * size * part.magnified)

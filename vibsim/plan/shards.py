@@ -55,7 +55,7 @@ def load_of(experiment: Experiment, level: int) -> Load:
         steps=steps,
         samples=steps // sampling(experiment, level) + 1,
         series=len(_series(experiment)),
-        exact=0 if lean or model.exact is None else len(model.states),
+        exact=0 if lean else len(model.states),
         work=sum(explicit for explicit, _ in works),
         iterated=sum(iterated for _, iterated in works),
         extrema=0 if lean else extrema_kept(steps, trajectories),

@@ -15,6 +15,7 @@ from vibsim.record import Attribute, Record, Variable, attributes
 from vibsim.simulation.derived import derived
 from vibsim.simulation.gathered import extrema, gathered, of_own_steps
 from vibsim.simulation.members import Members, members
+from vibsim.simulation.reference import METHOD, reference
 from vibsim.simulation.scaled import in_scales
 from vibsim.simulation.solution import Solution, has_adaptive, solve
 from vibsim.spec.series import RUNNING, asks_for_peaks, extrema_kept, is_bounded, stored_series
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
     from vibsim.spec import Experiment
 
 SERIES = ("scheme", "case", "t")
+MOST_REFERENCES = 1024
+"""Of more members no reference is computed where the exact solution is not known."""
 
 _ENERGY_WORDS = {
     "kinetic_energy": "kinetic energy",
@@ -95,7 +98,7 @@ def simulate_record(
     names = [scheme.name for scheme in experiment.schemes]
     variables = {
         **_series(model, group, solution, steps, every, wanted),
-        **({} if is_lean else _exact(model, group, steps, every)),
+        **({} if is_lean else _exact(experiment, group, steps, every)),
         **gathered(model, solution.gathered, solution.last_step, group, steps, with_d2t=with_d2t),
         **(extrema(model, solution.extrema) if solution.extrema else {}),
         **(of_own_steps(solution.gathered) if has_adaptive(experiment) else {}),
@@ -221,9 +224,12 @@ def _of(state: State) -> dict[str, Any]:
     return attributes(state.long_name, state.unit)
 
 
-def _exact(model: Model, group: Members, steps: int, every: int) -> dict[str, Variable]:
+def _exact(experiment: Experiment, group: Members, steps: int, every: int) -> dict[str, Variable]:
+    """Return the exact states, or a reference for them where they are not known and the motion is smooth."""
+    model = experiment.model.definition
     if model.exact is None:
-        return {}
+        few = experiment.members <= MOST_REFERENCES
+        return _computed(model, group, _numbers(steps, every) / steps) if few else {}
     t = _numbers(steps, every) * (group.end / steps)[:, None]
     exact = model.exact(
         t,
@@ -236,6 +242,22 @@ def _exact(model: Model, group: Members, steps: int, every: int) -> dict[str, Va
         )
         for state in model.states
     }
+
+
+def _computed(model: Model, group: Members, fraction: NDArray[np.float64]) -> dict[str, Variable]:
+    """Return reference solutions with the bounds of their errors; nothing where no member has one."""
+    with np.errstate(all="ignore"):
+        series, bounds = reference(model, group, fraction)
+    if not np.isfinite(bounds[model.position]).any():
+        return {}
+    table = {}
+    for state in model.states:
+        words = f"{state.long_name} of the reference solution"
+        attrs = attributes(words, state.unit, method=METHOD)
+        table[f"{state.name}_exact"] = Variable(("case", "t"), series[state.name], attrs)
+        attrs = attributes(f"bound of the error of the {words}", state.unit)
+        table[f"{state.name}_exact_error"] = Variable(("case",), bounds[state.name], attrs)
+    return table
 
 
 def _constants(model: Model, group: Members, steps: int) -> dict[str, Variable]:

@@ -74,7 +74,7 @@ def known_exactly(
     # the energy is known where it is conserved or the motion is known; the budget is 0 always
     name = plain(quantity or "")
     taken, done, budget = BUDGET
-    is_solved = model.exact is not None and name not in (taken, done)
+    is_solved = name not in (taken, done)
     known = is_solved or name == budget or (model.conservative and name in ENERGIES)
     if not known:
         of = (*(ENERGIES if model.conservative else ()), *((budget,) if has_budget(model) else ()))

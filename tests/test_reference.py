@@ -1,0 +1,107 @@
+"""The computed reference: against exact solutions, its bounds, its bits, and what it refuses."""
+
+import numpy as np
+import pytest
+
+from vibsim import Experiment, analyse, simulate, verdicts
+from vibsim.models import MODELS
+from vibsim.simulation.members import Members
+from vibsim.simulation.reference import reference
+
+FRACTION = np.arange(101) / 100
+
+
+def group(initial, parameters, end):
+    count = len(end)
+    return Members(
+        index=np.arange(count),
+        columns={},
+        parameters={
+            name: np.broadcast_to(value, count) + 0.0 for name, value in parameters.items()
+        },
+        initial={name: np.broadcast_to(value, count) + 0.0 for name, value in initial.items()},
+        end=np.asarray(end, dtype=float),
+    )
+
+
+PENDULUM = {"g": 1.0, "L": 1.0, "m": 1.0, "drag": 0.0}
+
+
+@pytest.mark.parametrize("end", [0.3, 7.0, 60.0])
+@pytest.mark.parametrize(("theta", "omega"), [(0.1, 0.0), (3.0, 0.0), (0.5, 3.0), (0.0, 0.0)])
+def test_the_reference_is_the_exact_pendulum(theta, omega, end):
+    model = MODELS["pendulum"]
+    initial = {"theta": theta, "omega": omega}
+    series, bounds = reference(model, group(initial, PENDULUM, [end]), FRACTION)
+    exact = model.exact(FRACTION * end, initial, PENDULUM)
+    for name, found in series.items():
+        size = max(np.max(np.abs(exact[name])), 1e-300)
+        # the phase of the exact solution is rounded as well
+        assert (
+            np.max(np.abs(found[0] - exact[name]))
+            <= bounds[name][0] + 1e-15 * (10 + 4 * end) * size
+        )
+        assert bounds[name][0] <= 1e-12 * size + 1e-300
+
+
+def test_a_member_has_its_bits_whatever_is_computed_beside_it():
+    model = MODELS["duffing"].variant(frozenset({"delta", "gamma"}))
+    numbers = {"delta": 0.2, "alpha": [1.0, -1.0, 0.3], "beta": 1.0, "gamma": 0.3, "omega": 1.2}
+    initial = {"u": [1.0, 0.1, 2.0], "v": 0.0}
+    together, bounds = reference(model, group(initial, numbers, [9.0, 20.0, 3.0]), FRACTION)
+    for case, end in enumerate((9.0, 20.0, 3.0)):
+        own = {**numbers, "alpha": numbers["alpha"][case]}
+        start = {**initial, "u": initial["u"][case]}
+        alone, bound = reference(model, group(start, own, [end]), FRACTION)
+        for name in ("u", "v"):
+            assert alone[name][0].tobytes() == together[name][case].tobytes()
+            assert bound[name][0] == bounds[name][case]
+
+
+def test_a_force_with_jumps_has_no_reference():
+    model = MODELS["oscillator"].written({"force": "sign(sin(3*t))"}, ())
+    series, bounds = reference(model, group({"u": 1.0, "v": 0.0}, {"m": 1.0}, [5.0]), FRACTION)
+    assert np.isnan(series["u"]).all()
+    assert np.isnan(bounds["u"]).all()
+
+
+def content(**changes):
+    return {
+        "title": "t",
+        "model": {"kind": "oscillator", "spring": "sinh(u)", "damping": "0.3*v**3", "force": "cos(2*t)"},
+        "initial": {"u": 1.0},
+        "time": {"end": 6.0},
+        "levels": [5, 6, 7, 8],
+        "schemes": ["rk4"],
+        "checks": [
+            {"converges": "u", "order": 4},
+            {"value": "error_linf", "quantity": "u", "below": 1e-7},
+            {"equal": ["rk4", "exact"], "quantity": "v", "atol": 1e-6},
+        ],
+        **changes,
+    }  # fmt: skip
+
+
+def test_errors_are_taken_against_the_reference():
+    experiment = Experiment.from_dict(content())
+    levels = [simulate(experiment, level) for level in experiment.levels]
+    assert "collocation" in levels[0]["u_exact"].attrs["method"]
+    assert 0.0 < float(levels[0]["u_exact_error"][0]) < 1e-13
+    for verdict in verdicts(experiment, analyse(experiment, levels)):
+        assert verdict.status == "PASS", verdict.text
+
+
+def test_convergence_to_another_equation_is_seen():
+    """Levels that were computed with a damping a tenth too small converge, but not to the reference."""
+    experiment = Experiment.from_dict(content(checks=[{"converges": "u", "order": 4}]))
+    model = {**content()["model"], "damping": "0.27*v**3"}
+    other = Experiment.from_dict(content(model=model))
+    levels = []
+    for level in experiment.levels:
+        data, wrong = simulate(experiment, level), simulate(other, level)
+        data = data.copy(deep=True)
+        for name in ("u", "v"):
+            data[name] = wrong[name]
+        levels.append(data)
+    (verdict,) = verdicts(experiment, analyse(experiment, levels))
+    assert (verdict.status, verdict.reason) == ("FAIL", "wrong_limit")
