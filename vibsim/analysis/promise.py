@@ -59,7 +59,7 @@ def formal_orders(experiment: Experiment, quantity: str, columns: Columns) -> Fl
 def even_powers(experiment: Experiment, quantity: str, columns: Columns) -> NDArray[np.bool_]:
     """Tell whether the error of a quantity has every second power only, shape (scheme, case)."""
     model = experiment.model.definition
-    even = _each(experiment, columns, lambda s, o: float(s.even_powers(quantity, model, o)))
+    even = _each(experiment, columns, lambda s, o: float(s.has_even_powers(quantity, model, o)))
     return np.asarray(even != 0)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.expression import Expression, parse
+from vibsim.models.events import Events
 
 Floats = NDArray[np.float64]
 Numbers = Mapping[str, Any]
@@ -31,6 +32,8 @@ class State:
     name: str
     unit: str
     long_name: str
+    minimum: float | None = None
+    """Least initial value."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,7 @@ class Parameter:
     minimum: float | None = None
     exclusive: bool = False
     """Whether `minimum` itself is refused."""
+    maximum: float | None = None
     path: str = ""
     """Where it stands in the section ``model``, if not under its name: ``damping.linear``."""
 
@@ -108,6 +112,8 @@ class Model:
     """Initial values that the parameters already give, as arrays that broadcast; None where a user gives them."""
     damping: Damping | None = None
     """The damping force, where it is one of two simple kinds."""
+    events: Events | None = None
+    """Where the motion is not smooth; None where it is smooth throughout."""
     formulas: tuple[FormulaField, ...] = ()
     """What a user writes as formulas."""
     written: Callable[[Mapping[str, str], tuple[str, ...]], Model] | None = None

@@ -5,9 +5,11 @@ and F [N]; energy ``m v^2/2 + V(u)`` [J] with V the integral of s from 0. With m
 them are dimensionless.
 
 The damping f is a formula in v, linear (``b v``) or quadratic (``b |v| v``, B section 8.2), whatever way it is written:
-schemes that treat these two in their own way recognise them. Instead of the force, an exact solution u_e(t) may be
-written: the force is then ``F = m u_e'' + f(u_e') + s(u_e)`` (a manufactured solution; B, section 2.2 and exercise 9),
-and the motion starts on it.
+schemes that treat these two in their own way recognise them. Coulomb friction, ``{coulomb: b}``, holds the body where
+``|F - s| <= b`` (`vibsim.models.events`; B, section 10.3); as a formula, ``b sign(v)``, it is a force like any other.
+
+Instead of the force, an exact solution u_e(t) may be written: the force is then ``F = m u_e'' + f(u_e') + s(u_e)`` (a
+manufactured solution; B, section 2.2 and exercise 9), and the motion starts on it.
 """
 
 from __future__ import annotations
@@ -48,12 +50,15 @@ from vibsim.models.base import (
     Parameter,
     State,
 )
+from vibsim.models.dry_friction import friction_motion
+from vibsim.models.events import Friction
 from vibsim.models.harmonic import damped_motion, period
 
 STATES = (State("u", "m", "displacement"), State("v", "m s-1", "velocity"))
 MASS = Parameter("m", 1.0, "kg", "mass", minimum=0.0, exclusive=True)
-TERMS = {"linear": "b*v", "quadratic": "b*abs(v)*v"}
-UNITS = {"linear": "kg s-1", "quadratic": "kg m-1"}
+COULOMB = "coulomb"
+TERMS = {"linear": "b*v", "quadratic": "b*abs(v)*v", COULOMB: "b*sign(v)"}
+UNITS = {"linear": "kg s-1", "quadratic": "kg m-1", COULOMB: "N"}
 ZERO = Number(0.0)
 MAX_NODES = 20_000
 """Longest force of an exact solution, in operations and names."""
@@ -88,6 +93,11 @@ class Written:
         """Whether the damping is a term with the coefficient b."""
         return self.formulas.get("damping") in TERMS.values() and "b" not in self.declared
 
+    @property
+    def has_friction(self) -> bool:
+        """Whether the damping is Coulomb friction."""
+        return self.is_coefficient_given and self.formulas["damping"] == TERMS[COULOMB]
+
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """Every parameter, in the order of the engine."""
@@ -95,7 +105,8 @@ class Written:
         if self.is_coefficient_given:
             kind = next(name for name, text in TERMS.items() if text == self.formulas["damping"])
             words = f"coefficient of the {kind} damping"
-            own.append(Parameter("b", 0.0, UNITS[kind], words, path=f"damping.{kind}"))
+            least = 0.0 if kind == COULOMB else None
+            own.append(Parameter("b", 0.0, UNITS[kind], words, least, path=f"damping.{kind}"))
         more = (
             Parameter(name, 0.0, "1", f"declared parameter {name}", path=f"parameters.{name}")
             for name in self.declared
@@ -269,7 +280,7 @@ def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
 @cache
 def _written(formulas: tuple[tuple[str, str], ...], declared: tuple[str, ...]) -> Model:
     own = Written(dict(formulas), declared)
-    known = damping_of(own.damping)
+    known = None if own.has_friction else damping_of(own.damping)
     undamped = _over_mass(_minus(own.force, own.spring))
     acceleration = _over_mass(_minus(_minus(own.force, own.damping), own.spring))
     is_damped, is_driven = not own.is_zero(own.damping), not own.is_zero(own.force)
@@ -293,6 +304,7 @@ def _written(formulas: tuple[tuple[str, str], ...], declared: tuple[str, ...]) -
         )
     exact, start = _exact(own, natural_frequency, is_driven, is_damped, known)
     is_free = own.is_linear and not is_driven and not is_damped
+    friction = Friction(drive=undamped, limit=_over_mass(Name("b"))) if own.has_friction else None
     return Model(
         kind="oscillator",
         title="Oscillator",
@@ -304,7 +316,7 @@ def _written(formulas: tuple[tuple[str, str], ...], declared: tuple[str, ...]) -
         kinetic_energy="0.5*m*v**2",
         potential_energy=potential,
         energy_unit="J",
-        linear=own.is_linear,
+        linear=own.is_linear and not own.has_friction,
         conservative=not is_damped and not is_driven,
         natural_frequency=natural_frequency,
         exact=exact,
@@ -315,6 +327,7 @@ def _written(formulas: tuple[tuple[str, str], ...], declared: tuple[str, ...]) -
         ),
         start=start,
         damping=damping,
+        events=friction,
         formulas=FORMULAS,
         written=written,
     )
@@ -341,6 +354,16 @@ def _exact(
             return manufactured(np.asarray(0.0), {}, parameters)
 
         return manufactured, start
+    if own.has_friction and own.is_linear and not is_driven:
+
+        def held(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
+            numbers = own.numbers(parameters)
+            stiffness = values(own.stiffness, numbers)
+            w = np.sqrt(stiffness / numbers["m"])
+            u, v = friction_motion(t, w, numbers["b"] / stiffness, initial["u"], initial["v"])
+            return {"u": u, "v": v}
+
+        return held, None
     if is_driven or not own.is_linear or (is_damped and (known is None or known[0] != "linear")):
         return None, None
     rate = known[1] if is_damped and known is not None else ZERO

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vibsim import plan
 from vibsim.models import ENERGIES, Model, State, centred
 from vibsim.record import Attribute, Record, Variable, attributes
-from vibsim.simulation.gathered import extrema, gathered, of_own_steps
+from vibsim.simulation.gathered import event_times, extrema, gathered, of_own_steps
 from vibsim.simulation.members import Members, members
 from vibsim.simulation.solution import Solution, energies_of, has_adaptive, solve
 from vibsim.spec.series import RUNNING, asks_for_peaks, extrema_kept, is_bounded, stored_series
@@ -93,6 +93,7 @@ def simulate_record(
         **({} if is_lean else _exact(model, group, steps, every)),
         **gathered(model, solution.gathered, solution.last_step, group, steps, with_d2t=with_d2t),
         **(extrema(model, solution.extrema) if solution.extrema else {}),
+        **(event_times(solution.events) if solution.events else {}),
         **(of_own_steps(solution.gathered) if has_adaptive(experiment) else {}),
         **_constants(model, group, steps),
     }
