@@ -66,7 +66,7 @@ CASES: list[tuple[dict[str, Any], str, str, str]] = [
         {"model": {}},
         "model.kind",
         "required key is missing",
-        "choose from linear_pendulum, oscillator, pendulum",
+        "choose from " + ", ".join(sorted(MODELS)[:3]),
     ),
     ({"model": {"kind": "pendulun"}}, "model.kind", "unknown model", "did you mean 'pendulum'?"),
     ({"model": {"kind": 3}}, "model.kind", "unknown model", "choose from"),

@@ -102,7 +102,7 @@ def passed(
                 note_event(stats, counts, case, t, t, ahead, before, mode)
     if count > 0:
         p = with_mode(p, mode_of(p), t)
-        following = start(variant, ahead, own, dt, p)
+        following = anew(variant, ahead, own, dt, p)
     return ahead, following, own, p, count
 
 
@@ -135,7 +135,15 @@ def across(
         p = with_mode(p, mode, t)
         if GATHER:
             note_event(stats, counts, case, t, end, u, before, mode)
+    if GATHER:
+        stats[case, REST_TIME] = t
     return u, 0.0, with_mode(p, 0.0, end), MOST_EVENTS
+
+
+@called
+def anew(variant: int, u: float, v: float, dt: float, p: P) -> State:
+    """Return the state of a scheme that starts anew, after its first step."""
+    return start(variant, u, v, dt, p)
 
 
 @called
@@ -144,7 +152,7 @@ def leap(variant: int, u: float, v: float, t: float, dt: float, p: P) -> tuple[f
     if mode_of(p) == 0.0 or not dt > 0.0:
         return u, v
     here = with_mode(p, mode_of(p), t)
-    state = start(variant, u, v, dt, here)
+    state = anew(variant, u, v, dt, here)
     return state[0], step(state, dt, dt, here)[1]
 
 

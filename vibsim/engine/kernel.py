@@ -134,7 +134,9 @@ def source(
     }
     module = _module(lane, settings)
     again = lane != "blocks" and bool(settings["D2T"])
-    _put_formulas(module, model, "", stepper, is_rare=lane == "blocks", with_kinetic=again)
+    # with events a step stands at several places, and would take long to compile
+    is_rare = lane == "blocks" or model.events is not None
+    _put_formulas(module, model, "", stepper, is_rare=is_rare, with_kinetic=again)
     if again:
         _put_energy_with(module, model)
     _put_start(module, stepper)
