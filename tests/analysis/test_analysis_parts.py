@@ -221,7 +221,7 @@ def test_without_an_exact_solution_only_errors_are_unknown(
     for record in records.values():
         for name in ("theta_exact", "omega_exact", "exact_period"):
             record.variables.pop(name, None)  # type: ignore[attr-defined]
-    bare = dataclasses.replace(MODELS["pendulum"], exact=None, exact_period=None)
+    bare = dataclasses.replace(MODELS["pendulum"], exact=None, exact_period=None, variant=None)
     for name, module in list(sys.modules.items()):
         if name.startswith("vibsim.") and hasattr(module, "MODELS"):
             monkeypatch.setattr(module, "MODELS", {"pendulum": bare})

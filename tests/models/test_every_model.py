@@ -21,10 +21,7 @@ def formula(model, formula):
 
 
 def random_parameters(model):
-    return {
-        p.name: (p.minimum if p.minimum is not None else -3.0) + float(RNG.uniform(0.2, 5.0))
-        for p in model.parameters
-    }
+    return {p.name: (p.minimum or 0.0) + float(RNG.uniform(0.2, 5.0)) for p in model.parameters}
 
 
 def random_members(model, count=20):

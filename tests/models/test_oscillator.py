@@ -9,7 +9,8 @@ import pytest
 
 from vibsim.expression import ExpressionError, derivative, names_in, parse, values
 from vibsim.models import MODELS, tree
-from vibsim.models.oscillator import Written, damping_of, written
+from vibsim.models.mechanical import damping_of
+from vibsim.models.oscillator import Written, written
 
 EPS = np.finfo(float).eps
 DAMPINGS = ("0", "c*v", "c*abs(v)*v", "c*v + v**3", "c*tanh(v)", "b*v", "b*abs(v)*v")
@@ -108,7 +109,11 @@ def test_exact_solutions_broadcast_over_members():
         ({"damping": "c*sign(v)"}, False),
         ({"spring": "u**3"}, False),
         ({"spring": "u + 1"}, False),
-        ({"force": "cos(t)"}, False),
+        ({"force": "cos(t)"}, True),
+        ({"force": "t*cos(t)"}, False),
+        ({"force": "cos(t**2)"}, False),
+        ({"force": "cos(t)*exp(-c*t)/(1 + c) + 2*sinh(3*t)**2", "damping": "c*v"}, True),
+        ({"force": "cos(t)", "spring": "u**3"}, False),
         ({"exact": "cos(t)", "spring": "u**3", "damping": "c*sign(v)"}, True),
     ],
 )

@@ -8,7 +8,6 @@ import pytest
 import scheme_runs as runs_of
 
 from vibsim import Experiment, analyse, simulate, verdicts
-from vibsim.models import MODELS
 from vibsim.schemes import FIXED_STEP, SCHEMES, NumberOption
 
 UNIT = 2.0**-53
@@ -20,7 +19,7 @@ def case(scheme, *rest, options=None):
     return pytest.param(*values, id="-".join([name, *(part.kind for part in rest)]))
 
 
-SMOOTH = [case(*pair) for pair in runs_of.pairs(MODELS.values())]
+SMOOTH = [case(*pair) for pair in runs_of.pairs(runs_of.BASIC)]
 VARIED = [
     case(scheme, model, options=options)
     for scheme, model in runs_of.pairs(runs_of.ALL_MODELS)

@@ -28,7 +28,12 @@ def test_alone_has_the_values_of_the_member() -> None:
         one = whole.alone(case)
         assert one.name == f"experiment_case_{case}"
         assert (one.sweep, one.members, one.end_varies) == (None, 1, False)
-        assert one.model.parameters == {"g": columns["model.g"][case], "L": 2.0, "m": 1.0}
+        assert one.model.parameters == {
+            "g": columns["model.g"][case],
+            "L": 2.0,
+            "m": 1.0,
+            "drag": 0.0,
+        }
         assert one.initial == {"theta": columns["initial.theta"][case], "omega": 0.0}
         assert one.time.end == columns["time.end"][case]
         assert one.schemes[0] == whole.schemes[0]

@@ -47,7 +47,7 @@ checks:
 def test_the_designs_example(tmp_path: Path) -> None:
     experiment = Experiment.from_yaml(write(tmp_path, DESIGN, "four_levels.yaml"))
     assert (experiment.collection, experiment.name) == ("adhoc", "four_levels")
-    assert experiment.model.parameters == {"g": 1.0, "L": 1.0, "m": 1.0}
+    assert experiment.model.parameters == {"g": 1.0, "L": 1.0, "m": 1.0, "drag": 0.0}
     assert experiment.levels == (6, 7, 8, 9)
     assert [experiment.steps(level) for level in experiment.levels] == [64, 128, 256, 512]
     assert [scheme.name for scheme in experiment.schemes] == ["central", "classical"]

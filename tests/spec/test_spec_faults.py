@@ -436,7 +436,7 @@ def test_an_extremum_that_is_accepted_is_measured(name: str, quantity: str) -> N
 
 
 def change_model(monkeypatch: pytest.MonkeyPatch, kind: str = "pendulum", **changes: Any) -> None:
-    models = {**MODELS, kind: replace(MODELS[kind], **changes)}
+    models = {**MODELS, kind: replace(MODELS[kind], variant=None, **changes)}
     monkeypatch.setattr(building, "MODELS", models)
 
 

@@ -17,7 +17,7 @@ from vibsim.spec.cost import Load
 from vibsim.spec.series import FEWEST_EXTREMA, MOST_EXTREMA
 
 ALL = Load(
-    schemes=1, steps=2**28, samples=2**28 + 1, series=7, exact=2, extrema=MOST_EXTREMA, d2t=True
+    schemes=1, steps=2**28, samples=2**28 + 1, series=8, exact=2, extrema=MOST_EXTREMA, d2t=True
 )
 MEMORY = ALL.memory(1)
 DISK = replace(ALL, steps=2**12, samples=2**12 + 1, extrema=FEWEST_EXTREMA).disk(10**7)

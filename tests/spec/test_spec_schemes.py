@@ -195,7 +195,7 @@ def test_a_scheme_for_forces_without_velocity_names_those_that_can(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     schemes = dict(SCHEMES) | {"central": SCHEMES["central"]}
-    model = replace(MODELS["pendulum"], acceleration="-(g/L)*sin(theta) - 0.1*omega")
+    model = replace(MODELS["pendulum"], variant=None, acceleration="-(g/L)*sin(theta) - 0.1*omega")
     monkeypatch.setattr(building, "SCHEMES", schemes)
     build()
     monkeypatch.setattr(building, "MODELS", {"pendulum": model})

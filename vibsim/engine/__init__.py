@@ -10,6 +10,7 @@ from vibsim.engine.trajectories import (
     energies,
     integrate,
     lane_for,
+    observed,
 )
 
 __all__ = [
@@ -22,4 +23,5 @@ __all__ = [
     "energies",
     "integrate",
     "lane_for",
+    "observed",
 ]

@@ -21,6 +21,8 @@ from vibsim.engine.bound import (
     ALIVE,
     BOTTOM,
     D2T,
+    DISSIPATED,
+    DRIVEN,
     DT,
     ENERGY,
     EVENT,
@@ -42,6 +44,7 @@ from vibsim.engine.bound import (
     STATES,
     TWO_BEFORE,
     VELOCITY,
+    WORK,
     backward,
     called,
     energies,
@@ -50,6 +53,8 @@ from vibsim.engine.bound import (
     kept_in,
     parameters_in,
     parameters_of,
+    powers,
+    powers_fast,
     put_extrema,
     put_states,
     stages_of,
@@ -62,6 +67,8 @@ from vibsim.engine.bound import (
 )
 from vibsim.engine.extrema import is_turned, note_turned
 from vibsim.engine.gather import (
+    DISSIPATED_ROW,
+    DRIVEN_ROW,
     LARGEST_DEVIATION,
     LAST_STEP,
     N_EXTREMA,
@@ -88,7 +95,16 @@ VECTOR = 8
 ROWS = ("DT", "ENERGY", "BOTTOM", "VELOCITY", "TWO_BEFORE", "INTERIOR", "ALIVE", "EVENT", "EXTREMA")
 """Rows behind the two sets, in their order. A kernel binds their numbers; from ``EXTREMA`` on stand the entries of
 `vibsim.engine.gather.Extrema`, from ``FIRST_PARAMETER`` on the parameters."""
-ROWS_BEHIND = ("RATE", "PENDING", "LARGEST_D2T", "SLOPE", "SLOPE_BEFORE", "FIRST_KEPT")
+ROWS_BEHIND = (
+    "RATE",
+    "PENDING",
+    "LARGEST_D2T",
+    "SLOPE",
+    "SLOPE_BEFORE",
+    "DISSIPATED",
+    "DRIVEN",
+    "FIRST_KEPT",
+)
 """Rows behind the parameters; from the last one on stands what is kept from stage to stage."""
 
 
@@ -147,6 +163,9 @@ def run(
             samples[1, base + j, 0] = initial[base + j, 1]
             if SERIES:
                 samples[RUNNING_ROW, base + j, 0] = 0.0
+            if WORK:
+                samples[DISSIPATED_ROW, base + j, 0] = rows[DISSIPATED * LANES + j]
+                samples[DRIVEN_ROW, base + j, 0] = rows[DRIVEN * LANES + j]
         sample = 1
         due = every
         for n in range(1, steps + 1):
@@ -231,6 +250,8 @@ def begin(
         rows[LARGEST_D2T * LANES + j] = 0.0
     if STAGGERED:
         rows[SLOPE * LANES + j] = math.nan
+    if WORK:
+        rows[DISSIPATED * LANES + j], rows[DRIVEN * LANES + j] = powers(u, v, 0.0, p)
 
 
 @called
@@ -345,6 +366,12 @@ def gather_block(rows: Any, old: int, new: int, filled: int, n: int, turn: float
             )
             rows[PENDING * LANES + j] = size
             event = event | (size != size)
+        if WORK:
+            taken, put = powers_fast(u, v, n * rows[DT * LANES + j], parameters_in(rows, j))
+            known = (taken + put) == (taken + put)
+            rows[DISSIPATED * LANES + j] = rows[DISSIPATED * LANES + j] + (taken if known else 0.0)
+            rows[DRIVEN * LANES + j] = rows[DRIVEN * LANES + j] + (put if known else 0.0)
+            event = event | (not known)
         if KEEP:
             event = event | is_turned(
                 rows[(old + STATES + 2) * LANES + j], rows[(old + STATES) * LANES + j], u
@@ -383,6 +410,9 @@ def take_series(
         samples[RUNNING_D2T_ROW, case, sample] = larger(
             rows[PENDING * LANES + j], rows[LARGEST_D2T * LANES + j]
         )
+    if WORK:
+        samples[DISSIPATED_ROW, case, sample] = rows[DISSIPATED * LANES + j]
+        samples[DRIVEN_ROW, case, sample] = rows[DRIVEN * LANES + j]
 
 
 @called
@@ -405,6 +435,12 @@ def note(
     size = abs((kinetic + potential) - rows[ENERGY * LANES + j])
     if size > rows[(EXTREMA + LARGEST_DEVIATION) * LANES + j]:
         rows[(EXTREMA + LARGEST_DEVIATION) * LANES + j] = size
+    if WORK:
+        taken, put = powers_fast(u, v, n * h, parameters_in(rows, j))
+        if taken + put != taken + put:
+            taken, put = powers(u, v, n * h, parameters_in(rows, j))
+            rows[DISSIPATED * LANES + j] = rows[DISSIPATED * LANES + j] + taken
+            rows[DRIVEN * LANES + j] = rows[DRIVEN * LANES + j] + put
     if D2T:
         kinetic, potential = energies(
             u, velocity_d2t(rows, old, new, j), n * h, parameters_in(rows, j)

@@ -27,6 +27,8 @@ KEEP = True
 STAGGERED = True
 """Whether peaks are found by ``[D_2t u]``, since the scheme's own velocity belongs to another time; the start is then
 none."""
+WORK = True
+"""Whether samples are taken of the sums of the powers of damping and of driving forces."""
 STAGED = True
 """Whether a step is cut into stages (`vibsim.engine.stages`)."""
 EVENTS = True
@@ -40,12 +42,13 @@ SET = 4
 PARAMETERS = 1
 """Number of parameters."""
 DT, ENERGY, BOTTOM, VELOCITY, TWO_BEFORE, INTERIOR, ALIVE, EVENT, EXTREMA = range(8, 17)
-FIRST_PARAMETER, RATE, PENDING, LARGEST_D2T, SLOPE, SLOPE_BEFORE, FIRST_KEPT = range(26, 33)
+FIRST_PARAMETER, RATE, PENDING, LARGEST_D2T, SLOPE, SLOPE_BEFORE = range(26, 32)
+DISSIPATED, DRIVEN, FIRST_KEPT = range(32, 35)
 """Rows behind the two sets: step, initial energy, multiple of a turn below, velocity at this point, velocity two points
 before, largest deviation before this point, 1 for a lane that goes on, 1 for a lane with something to note, what is
 gathered at every step, the parameters; and where `D2T` is, ``1/(2 dt)``, the deviation by ``[D_2t u]`` at this point,
 and the largest one before; the velocity by which peaks are found where that is `STAGGERED`, at this point and the one
-before; what is kept from stage to stage."""
+before; the sums of powers where they are wanted for `WORK`; what is kept from stage to stage."""
 
 
 def called(function: F) -> F:
@@ -110,6 +113,21 @@ def energies_fast(u: float, v: float, t: float, p: P) -> tuple[float, float]:
 
 def energy_with(u: float, v: float, t: float, p: P, potential: float) -> float:
     """Return the energy where the potential energy at this place and time is known."""
+    _unbound()
+
+
+def powers(u: float, v: float, t: float, p: P) -> tuple[float, float]:
+    """Return the power that damping takes, and that which driving forces put in."""
+    _unbound()
+
+
+def powers_fast(u: float, v: float, t: float, p: P) -> tuple[float, float]:
+    """Return what `powers` does, or NaN where a fast function is out of its range."""
+    _unbound()
+
+
+def observed(u: float, v: float, t: float, p: P) -> tuple[float, ...]:
+    """Return the values of the formulas that are worked out of samples."""
     _unbound()
 
 

@@ -63,11 +63,15 @@ N_COUNTS = 3
 RUNNING_ROW = 2
 VELOCITY_D2T_ROW = 3
 RUNNING_D2T_ROW = 4
+DISSIPATED_ROW = 5
+DRIVEN_ROW = 6
 
 
-def n_sample_rows(with_series: bool, own_velocity: bool) -> int:
-    """Return how many rows samples have."""
-    return (5 if own_velocity else 3) if with_series else 2
+def n_sample_rows(with_series: bool, own_velocity: bool, with_work: bool) -> int:
+    """Return how many rows samples have; one that a scheme has no use for stays NaN where others stand behind it."""
+    if not with_series:
+        return 2
+    return 7 if with_work else 5 if own_velocity else 3
 
 
 def end_velocity(

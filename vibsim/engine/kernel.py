@@ -9,7 +9,7 @@ the key of the cache: a changed formula, scheme or loop is another kernel.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import cache
 from inspect import signature
 from types import FunctionType
@@ -23,7 +23,7 @@ from vibsim.engine.stages import stages
 from vibsim.engine.text import Module, collect, divided, with_quotients
 from vibsim.errors import SimulationError
 from vibsim.expression import Binary, Call, Compare, Expression, Name, Number
-from vibsim.models import Model
+from vibsim.models import Model, has_budget
 from vibsim.models.base import Formula, parameter_names, tree
 from vibsim.models.events import Friction, Impact
 from vibsim.schemes.base import HANDED, Stepper, handed
@@ -99,10 +99,13 @@ def kernel(
 
 
 @cache
-def observer(model: Model, lane: str) -> Kernel:
-    """Return the function that works out the energies of samples (`vibsim.engine.observe.run`)."""
+def observer(model: Model, formulas: tuple[Formula, ...], lane: str) -> Kernel:
+    """Return the function that works out formulas of samples (`vibsim.engine.observe.run`)."""
     module = _module(lane, {})
-    _put_formulas(module, model, "")
+    marked = _marked(model)
+    results = {f"_{i}": marked(formula) for i, formula in enumerate(formulas)}
+    _put_functions(module, model, "", {"observed": results}, always_tuple=True)
+    _put_parameters(module, model)
     collect(module, observe.run, "kernel", {})
     return _in_lane(module.text, lane, _OBSERVING)
 
@@ -124,6 +127,7 @@ def source(
         "SERIES": with_gathered and with_series,
         "KEEP": with_peaks,
         "STAGGERED": with_gathered and stepper.staggered,
+        "WORK": with_gathered and with_series and has_budget(model),
         "STAGED": bool(stages(stepper.step)),
         "EVENTS": model.events is not None,
         "LOCATED": stepper.events != "mesh",
@@ -134,9 +138,10 @@ def source(
     }
     module = _module(lane, settings)
     again = lane != "blocks" and bool(settings["D2T"])
+    with_work = bool(settings["WORK"])
     # with events a step stands at several places, and would take long to compile
-    is_rare = lane == "blocks" or model.events is not None
-    _put_formulas(module, model, "", stepper, is_rare=is_rare, with_kinetic=again)
+    rare = lane == "blocks" or model.events is not None
+    _put_formulas(module, model, "", stepper, is_rare=rare, with_kinetic=again, with_work=with_work)
     if again:
         _put_energy_with(module, model)
     _put_start(module, stepper)
@@ -145,7 +150,7 @@ def source(
     for name in ("step", "backward"):
         collect(module, getattr(stepper, name), name, {})
     if lane == "blocks":
-        _put_formulas(module, model, "_fast", stepper)
+        _put_formulas(module, model, "_fast", stepper, with_work=with_work)
         functions = (n for n, v in stepper.step.__globals__.items() if isinstance(v, FunctionType))
         renamed = {name: f"{name}_fast" for name in (*HANDED, *functions)}
         if stepper.implicit:
@@ -238,10 +243,11 @@ def _put_formulas(
     module: Module,
     model: Model,
     suffix: str,
-    stepper: Stepper | None = None,
+    stepper: Stepper,
     *,
     is_rare: bool = False,
     with_kinetic: bool = False,
+    with_work: bool = False,
 ) -> None:
     """Write the model's acceleration and energies as functions of ``(u, v, t, p)``, and what they call.
 
@@ -255,15 +261,10 @@ def _put_formulas(
         For whom: an implicit one needs derivatives too, one with `Stepper.scaling` a factor.
     with_kinetic
         Whether the kinetic energy is needed for itself.
+    with_work
+        Whether the powers of damping and of driving forces are needed.
     """
-    names = parameter_names(model)
-    # marked, so that a user's name is none of this text
-    unpack = [f"{name}{_MARK} = p[{i}]" for i, name in enumerate(names)]
-    marked: dict[Expression, Expression] = {Name(n): Name(n + _MARK) for n in names}
-
-    def put(formula: Formula) -> Expression:
-        return expression.rebuilt(tree(model, formula), lambda node: marked.get(node, node))
-
+    put = _marked(model)
     acceleration = put(model.acceleration)
     parts = _of_events(model, put)
     if "drive" in parts:
@@ -277,18 +278,60 @@ def _put_formulas(
             "_potential": put(model.potential_energy),
         },
     }
-    if stepper is not None and stepper.implicit:
+    if stepper.implicit:
         formulas["slopes"] = {
             "_by_position": expression.derivative(acceleration, model.position),
             "_by_velocity": expression.derivative(acceleration, model.velocity),
         }
-    if stepper is not None and "damping_rate" in signature(stepper.step).parameters:
+    if "damping_rate" in signature(stepper.step).parameters:
         rate = put(model.damping.rate) if model.damping else Number(0.0)
         formulas["damping_rate"] = {"_rate": rate}
     if with_kinetic:
         formulas["kinetic_energy"] = {"_kinetic": formulas["energies"]["_kinetic"]}
-    is_scaled = stepper is not None and stepper.scaling is not None
-    first = len(names) + n_event_numbers(model)
+    if with_work:
+        formulas["powers"] = {
+            "_dissipation": put(model.dissipation or "0.0"),
+            "_driving": put(model.driving or "0.0"),
+        }
+    is_scaled = stepper.scaling is not None
+    scaled = ("acceleration", "slopes") if is_scaled else ()
+    _put_functions(module, model, suffix, formulas, is_rare=is_rare, scaled=scaled)
+    _put_parameters(module, model, 2 if is_scaled else 0, tabulated=stepper.tabulated)
+
+
+def _marked(model: Model) -> Callable[[Formula], Expression]:
+    """Return what reads a formula, its parameters marked so that no name of a user is one of the kernel's text."""
+    marked: dict[Expression, Expression] = {
+        Name(name): Name(name + _MARK) for name in parameter_names(model)
+    }
+
+    def put(formula: Formula) -> Expression:
+        return expression.rebuilt(tree(model, formula), lambda node: marked.get(node, node))
+
+    return put
+
+
+def _put_functions(
+    module: Module,
+    model: Model,
+    suffix: str,
+    formulas: Mapping[str, Mapping[str, Expression]],
+    *,
+    is_rare: bool = False,
+    scaled: Collection[str] = (),
+    always_tuple: bool = False,
+) -> None:
+    """Write functions of ``(u, v, t, p)``, each with the formulas of its results by their names.
+
+    Parameters
+    ----------
+    scaled
+        Functions whose results are multiplied by a factor that stands behind the parameters.
+    always_tuple
+        Whether a function with one result returns a tuple too.
+    """
+    names = parameter_names(model)
+    unpack = [f"{name}{_MARK} = p[{i}]" for i, name in enumerate(names)]
     for function, results in formulas.items():
         lines = list(unpack)
         if model.events is not None and function in ("acceleration", "slopes"):
@@ -296,16 +339,24 @@ def _put_formulas(
         for result, formula in results.items():
             ready = _with_functions(module, formula, suffix, is_rare)
             lines += expression.to_statements(ready, result)
-            if is_scaled and function in ("acceleration", "slopes"):
-                lines.append(f"{result} = {result} * p[{first}]")
-        lines.append(f"return {', '.join(results)}")
+            if function in scaled:
+                lines.append(f"{result} = {result} * p[{len(names) + n_event_numbers(model)}]")
+        returned = ", ".join(results)
+        lines.append(f"return ({returned},)" if always_tuple else f"return {returned}")
         head = f"@compiled\ndef {function}{suffix}({model.position}, {model.velocity}, t, p):\n    "
         module.put(function + suffix, head + "\n    ".join(lines))
-    count = len(names) + (2 if is_scaled else 0)
+
+
+def _put_parameters(
+    module: Module, model: Model, more: int = 0, *, tabulated: bool = False
+) -> None:
+    """Write what makes the parameters of a member a tuple, with `more` numbers and a table behind them."""
+    first = len(model.parameters)
+    count = first + more
     places = [f"float(parameters[case, {i}])" for i in range(count)]
-    places[len(names) : len(names)] = ["0.0"] * n_event_numbers(model)
+    places[first:first] = ["0.0"] * n_event_numbers(model)
     values = ", ".join(places) or "0.0"
-    if stepper is not None and stepper.tabulated:
+    if tabulated:
         values += f", parameters[case, {count}:]"
     text = f"@compiled\ndef parameters_of(parameters, case):\n    return ({values},)"
     module.put("parameters_of", text)

@@ -17,17 +17,21 @@ from vibsim.engine.bound import (
     KEEP,
     SERIES,
     STAGGERED,
+    WORK,
     backward,
     energies,
     energy_with,
     mode_of,
     parameters_of,
+    powers,
     start,
     step,
 )
 from vibsim.engine.events import begun, passed
 from vibsim.engine.extrema import is_turned, note_turned
 from vibsim.engine.gather import (
+    DISSIPATED_ROW,
+    DRIVEN_ROW,
     LARGEST_DEVIATION,
     LAST_STEP,
     OVERFLOW,
@@ -102,6 +106,10 @@ def run(
         samples[1, case, 0] = v
         if SERIES:
             samples[RUNNING_ROW, case, 0] = 0.0
+        if WORK:
+            dissipated, driven = powers(u, v, 0.0, p)
+            samples[DISSIPATED_ROW, case, 0] = dissipated
+            samples[DRIVEN_ROW, case, 0] = driven
         extrema = first_extrema(u, v)
         bottom = bottom_of(u, turn)
         if EVENTS:
@@ -161,6 +169,10 @@ def run(
                     bottom = note_events(
                         stats, counts, case, t, h, turn, bottom, u_before, slope_before, u, slope
                     )
+            if WORK:
+                taken, put = powers(u, v, t, p)
+                dissipated += taken
+                driven += put
             if D2T:
                 # that of the point before counts now that this one is sound, since it rests on it
                 largest_d2t = larger(pending, largest_d2t)
@@ -177,6 +189,9 @@ def run(
                     if D2T:
                         samples[VELOCITY_D2T_ROW, case, sample] = velocity_d2t
                         samples[RUNNING_D2T_ROW, case, sample] = larger(pending, largest_d2t)
+                    if WORK:
+                        samples[DISSIPATED_ROW, case, sample] = dissipated
+                        samples[DRIVEN_ROW, case, sample] = driven
                 sample += 1
                 due += every
         if GATHER:

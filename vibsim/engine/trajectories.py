@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from vibsim.engine import blocks, events, extrema, gather
 from vibsim.engine.kernel import carried, kernel, observer
 from vibsim.engine.stages import kept_names
-from vibsim.models import Model
+from vibsim.models import Model, has_budget
+from vibsim.models.base import Formula
 from vibsim.schemes import Scheme
 from vibsim.schemes.base import END_RULES, Options, Stepper
 from vibsim.spec.cost import PLAIN_MEMBER_STEPS
@@ -97,6 +98,10 @@ class Series:
     """``[D_2t u]``; NaN at either end, and of a scheme whose own velocity it is."""
     deviation_d2t_running: Floats
     """Largest absolute deviation of the energy with that velocity so far; at the end that of the point before."""
+    dissipated: Floats | None
+    """Sum of the power that damping takes, over every point so far; None of a model without such forces."""
+    driven: Floats | None
+    """Sum of the power that driving forces put in."""
 
 
 @dataclass(frozen=True)
@@ -177,7 +182,7 @@ def integrate(
     has_events = model.events is not None
     lane = lane or lane_for(members, steps, implicit=stepper.implicit or has_events)
     run = kernel(model, stepper, lane, with_gathered, with_series, n_extrema > 0)
-    rows = gather.n_sample_rows(with_series, stepper.own_velocity)
+    rows = gather.n_sample_rows(with_series, stepper.own_velocity, has_budget(model))
     samples = np.full((rows, members, steps // every + 1), np.nan)
     columns = events.N_STATS_EVENTS if has_events else gather.N_STATS
     stats = np.full((members, columns if with_gathered else 0), np.nan)
@@ -256,7 +261,26 @@ def energies(
     *,
     lane: str,
 ) -> tuple[Floats, Floats]:
-    """Return kinetic and potential energy at the samples of `integrate`, shape (case, n_samples).
+    """Return kinetic and potential energy at the samples of `integrate`, shape (case, n_samples); see `observed`."""
+    formulas = (model.kinetic_energy, model.potential_energy)
+    kinetic, potential = observed(
+        model, formulas, parameters, dt, every, position, velocity, lane=lane
+    )
+    return kinetic, potential
+
+
+def observed(
+    model: Model,
+    formulas: tuple[Formula, ...],
+    parameters: Floats,
+    dt: Floats,
+    every: int,
+    position: Floats,
+    velocity: Floats,
+    *,
+    lane: str,
+) -> Floats:
+    """Return formulas of a model at the samples of `integrate`, shape (formula, case, n_samples).
 
     Raises
     ------
@@ -264,10 +288,11 @@ def energies(
         Where the kernel cannot be compiled.
     """
     samples = np.stack([position, velocity])
-    found = np.empty(samples.shape)
+    found = np.empty((len(formulas), *position.shape))
     numbers = (np.ascontiguousarray(array, dtype=float) for array in (parameters, dt))
-    observer(model, "plain" if lane == "plain" else "scalar")(*numbers, every, 0, samples, found)
-    return found[0], found[1]
+    run = observer(model, formulas, "plain" if lane == "plain" else "scalar")
+    run(*numbers, every, 0, samples, found)
+    return found
 
 
 def _name(stats: Floats, counts: Integers) -> Gathered:
@@ -311,13 +336,18 @@ def _events(stats: Floats) -> EventTimes:
 
 
 def _series(samples: Floats) -> Series:
-    if len(samples) <= gather.VELOCITY_D2T_ROW:
-        nothing = np.broadcast_to(np.nan, samples.shape[1:])
-        return Series(samples[gather.RUNNING_ROW], nothing, nothing)
+    nothing = np.broadcast_to(np.nan, samples.shape[1:])
+
+    def row(number: int) -> Floats:
+        return samples[number] if number < len(samples) else nothing
+
+    with_work = len(samples) > gather.DRIVEN_ROW
     return Series(
-        deviation_running=samples[gather.RUNNING_ROW],
-        velocity_d2t=samples[gather.VELOCITY_D2T_ROW],
-        deviation_d2t_running=_storable(samples[gather.RUNNING_D2T_ROW]),
+        deviation_running=row(gather.RUNNING_ROW),
+        velocity_d2t=row(gather.VELOCITY_D2T_ROW),
+        deviation_d2t_running=_storable(row(gather.RUNNING_D2T_ROW)),
+        dissipated=samples[gather.DISSIPATED_ROW] if with_work else None,
+        driven=samples[gather.DRIVEN_ROW] if with_work else None,
     )
 
 

@@ -5,6 +5,17 @@ allow-list of what it may hold: numbers, declared names, ``+ - * / **``, compari
 a user is never compiled or evaluated as Python.
 """
 
+from vibsim.expression.algebra import (
+    ONE,
+    ZERO,
+    is_multiple,
+    is_zero,
+    minus,
+    over,
+    plus,
+    put,
+    times,
+)
 from vibsim.expression.arrays import values
 from vibsim.expression.derivative import derivative
 from vibsim.expression.integral import integral
@@ -44,6 +55,8 @@ __all__ = [
     "MAX_CHARACTERS",
     "MAX_DEPTH",
     "MAX_POWER",
+    "ONE",
+    "ZERO",
     "Binary",
     "Call",
     "Compare",
@@ -56,10 +69,17 @@ __all__ = [
     "derivative",
     "evaluate",
     "integral",
+    "is_multiple",
+    "is_zero",
     "literal",
+    "minus",
     "names_in",
+    "over",
     "parse",
+    "plus",
+    "put",
     "rebuilt",
+    "times",
     "to_formula",
     "to_python",
     "to_statements",

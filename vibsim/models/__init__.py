@@ -6,38 +6,57 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from vibsim.models.base import (
+    BUDGET,
     ENERGIES,
     FormulaField,
     Model,
+    Output,
     Parameter,
     State,
     centred,
+    has_budget,
     natural_end,
     quantities,
     tree,
 )
 from vibsim.models.bouncing_ball import BOUNCING_BALL
+from vibsim.models.circuit import CIRCUIT
+from vibsim.models.duffing import DUFFING
 from vibsim.models.linear_pendulum import LINEAR_PENDULUM
 from vibsim.models.oscillator import OSCILLATOR
 from vibsim.models.pendulum import PENDULUM
+from vibsim.models.physical_pendulum import PHYSICAL_PENDULUM
 from vibsim.models.sliding_box import SLIDING_BOX
 from vibsim.models.spring import SPRING
+from vibsim.models.vehicle import VEHICLE
+from vibsim.models.washing_machine import WASHING_MACHINE
 
-MODELS: Mapping[str, Model] = MappingProxyType(
-    {
-        model.kind: model
-        for model in (PENDULUM, LINEAR_PENDULUM, SPRING, OSCILLATOR, SLIDING_BOX, BOUNCING_BALL)
-    }
+_ALL = (
+    SPRING,
+    PENDULUM,
+    LINEAR_PENDULUM,
+    PHYSICAL_PENDULUM,
+    OSCILLATOR,
+    SLIDING_BOX,
+    WASHING_MACHINE,
+    VEHICLE,
+    BOUNCING_BALL,
+    CIRCUIT,
+    DUFFING,
 )
+MODELS: Mapping[str, Model] = MappingProxyType({model.kind: model for model in _ALL})
 
 __all__ = [
+    "BUDGET",
     "ENERGIES",
     "MODELS",
     "FormulaField",
     "Model",
+    "Output",
     "Parameter",
     "State",
     "centred",
+    "has_budget",
     "natural_end",
     "quantities",
     "tree",

@@ -8,7 +8,7 @@ from the formulas of a user give trees (`vibsim.expression`).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, Literal
@@ -55,6 +55,17 @@ class Parameter:
     def key(self) -> str:
         """Its place in the section ``model``, by which it is swept and its values are found."""
         return self.path or self.name
+
+
+@dataclass(frozen=True)
+class Output:
+    """A quantity that follows from the state at a time, such as a force in a wire."""
+
+    name: str
+    unit: str
+    long_name: str
+    formula: Formula
+    """In the state names, ``t`` and the parameters."""
 
 
 @dataclass(frozen=True)
@@ -108,8 +119,18 @@ class Model:
     """Exact states at times t, shape (..., n_t), from initial values and parameters of shape (..., 1) or ()."""
     exact_period: Callable[[Numbers, Numbers], Any] | None = None
     """Exact period from initial values and parameters: of an oscillation, or of one turn."""
+    dissipation: Formula | None = None
+    """Power that damping takes from the energy; None where there is no damping."""
+    driving: Formula | None = None
+    """Power that driving forces put into the energy; None where there are none."""
+    outputs: tuple[Output, ...] = ()
+    """What else is stored as a series."""
     start: Callable[[Numbers], dict[str, Any]] | None = None
     """Initial values that the parameters already give, as arrays that broadcast; None where a user gives them."""
+    optional: tuple[str, ...] = ()
+    """Parameters with a term of their own, which is no part of the equation where they are 0 and are not swept."""
+    variant: Callable[[frozenset[str]], Model] | None = None
+    """The model with the terms of some of `optional`; this one has those of none."""
     damping: Damping | None = None
     """The damping force, where it is one of two simple kinds."""
     events: Events | None = None
@@ -138,6 +159,14 @@ def tree(model: Model, formula: Formula) -> Expression:
     return parse(formula, (*(state.name for state in model.states), "t", *parameter_names(model)))
 
 
+def declared_parameters(names: Iterable[str]) -> tuple[Parameter, ...]:
+    """Return the parameters that a user declares for formulas."""
+    return tuple(
+        Parameter(name, 0.0, "1", f"declared parameter {name}", path=f"parameters.{name}")
+        for name in names
+    )
+
+
 def parameter_names(model: Model) -> tuple[str, ...]:
     """Name the parameters as formulas do, in the order of the engine."""
     return tuple(parameter.name for parameter in model.parameters)
@@ -149,6 +178,13 @@ def natural_end(model: Model, periods: float, parameters: Numbers) -> Any:
 
 
 ENERGIES = ("kinetic_energy", "potential_energy", "energy", "energy_deviation")
+BUDGET = ("dissipated_energy", "work_done", "energy_budget")
+"""What damping took, what driving forces put in, and ``E(t) - E(0)`` plus the one minus the other, which is 0."""
+
+
+def has_budget(model: Model) -> bool:
+    """Tell whether damping or driving forces change the energy of a model."""
+    return model.dissipation is not None or model.driving is not None
 
 
 def quantities(model: Model, own_velocity: bool = False) -> tuple[str, ...]:
@@ -159,8 +195,10 @@ def quantities(model: Model, own_velocity: bool = False) -> tuple[str, ...]:
     own_velocity
         Whether some scheme has another velocity than the centred difference: then `centred` is stored as well.
     """
+    budget = BUDGET if has_budget(model) else ()
+    outputs = (output.name for output in model.outputs)
     more = centred(model) if own_velocity else ()
-    return (*(state.name for state in model.states), *ENERGIES, *more)
+    return (*(state.name for state in model.states), *ENERGIES, *budget, *outputs, *more)
 
 
 def centred(model: Model) -> tuple[str, str, str]:

@@ -1,18 +1,24 @@
-r"""The nonlinear pendulum, ``theta'' = -(g/L) sin theta``.
+r"""The nonlinear pendulum, ``theta'' = -(g/L) sin theta``, with quadratic air resistance if wanted.
 
-Source: pendulum lecture (A), sections 1 and 2; vibration text (B), section 10.5. Units: g [m s-2], L [m], m [kg],
-theta [rad], omega [rad s-1], energy [J]; with g = L = m = 1 all of them are dimensionless. The angle is not
-wrapped: a pendulum that goes over the top keeps counting (A, section 1.2).
+Source: pendulum lecture (A), sections 1 and 2; vibration text (B), section 10.5, equations (87)-(94). Units: g [m s-2],
+L [m], m [kg], theta [rad], omega [rad s-1], energy [J]; with g = L = m = 1 all of them are dimensionless, and the
+forces are in units of the weight. The angle is not wrapped: a pendulum that goes over the top keeps counting (A,
+section 1.2).
+
+With `drag`, the number alpha of (91), the drag force is ``-m L alpha |omega| omega``, so that
+``theta'' = -alpha abs(theta') theta' - (g/L) sin theta``; alpha has no dimension.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
 
-from vibsim.models.base import Model, Numbers, Parameter, State
+from vibsim.models.base import Damping, Model, Numbers, Output, Parameter, State
 from vibsim.models.elliptic import pendulum_motion, pendulum_period
 
 STATES = (
@@ -25,6 +31,14 @@ PARAMETERS = (
     Parameter("L", 1.0, "m", "length of the rod", minimum=0.0, exclusive=True),
     Parameter("m", 1.0, "kg", "mass of the bob", minimum=0.0, exclusive=True),
 )
+DRAG = Parameter(
+    "drag", 0.0, "1", "drag number alpha, the air resistance over that of omega = 1", minimum=0.0
+)
+
+DRAGGED = "theta'' = -drag abs(theta') theta' - (g/L) sin(theta)"
+WEIGHT = "-(g/L)*sin(theta)"
+WIRE = Output("wire_force", "N", "force in the wire", "m*g*cos(theta) + m*L*omega**2")
+AIR = Output("drag_force", "N", "drag force on the bob", "-m*L*drag*abs(omega)*omega")
 
 
 def natural_frequency(parameters: Numbers) -> Any:
@@ -32,22 +46,43 @@ def natural_frequency(parameters: Numbers) -> Any:
     return np.sqrt(parameters["g"] / parameters["L"])
 
 
-PENDULUM = Model(
-    kind="pendulum",
-    title="Nonlinear pendulum",
-    source="pendulum lecture, sections 1-2",
-    equation="theta'' = -(g/L) sin(theta)",
-    states=STATES,
-    parameters=PARAMETERS,
-    acceleration="-(g/L)*sin(theta)",
-    kinetic_energy="0.5*m*(L*omega)**2",
-    # 1 - cos(theta) = 2 sin^2(theta/2), without the cancellation at small angles
-    potential_energy="2.0*m*g*L*sin(0.5*theta)**2",
-    energy_unit="J",
-    linear=False,
-    conservative=True,
-    natural_frequency=natural_frequency,
-    turn=2 * math.pi,
-    exact=pendulum_motion,
-    exact_period=pendulum_period,
-)
+@cache
+def pendulum(terms: frozenset[str]) -> Model:
+    """Return the pendulum, with air resistance where `terms` has ``drag``."""
+    free: dict[str, Any] = {
+        "equation": "theta'' = -(g/L) sin(theta)",
+        "acceleration": WEIGHT,
+        "conservative": True,
+        "exact": pendulum_motion,
+        "exact_period": pendulum_period,
+        "outputs": (WIRE,),
+    }
+    dragged: dict[str, Any] = {
+        "equation": DRAGGED,
+        "acceleration": f"-drag*abs(omega)*omega + ({WEIGHT})",
+        "conservative": False,
+        "damping": Damping("quadratic", "drag", WEIGHT),
+        "dissipation": "m*L**2*drag*abs(omega)*omega**2",
+        "outputs": (WIRE, AIR),
+    }
+    return Model(
+        kind="pendulum",
+        title="Nonlinear pendulum",
+        source="pendulum lecture, sections 1-2; vibration text, section 10.5",
+        states=STATES,
+        parameters=(*PARAMETERS, DRAG),
+        kinetic_energy="0.5*m*(L*omega)**2",
+        # 1 - cos(theta) = 2 sin^2(theta/2), without the cancellation at small angles
+        potential_energy="2.0*m*g*L*sin(0.5*theta)**2",
+        energy_unit="J",
+        linear=False,
+        natural_frequency=natural_frequency,
+        turn=2 * math.pi,
+        optional=(DRAG.name,),
+        variant=pendulum,
+        **(dragged if DRAG.name in terms else free),
+    )
+
+
+PENDULUM = replace(pendulum(frozenset()), equation=DRAGGED)
+"""The pendulum without air resistance, under the equation that has it."""

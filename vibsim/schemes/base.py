@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.expression import names_in
-from vibsim.models.base import Model, tree
+from vibsim.models.base import BUDGET, Model, tree
 from vibsim.models.events import TREATMENTS, Friction
 
 OptionValue = str | float | bool
@@ -195,7 +195,14 @@ class Orders:
         given = self.energy_d2t_linear if is_simple else self.energy_d2t
         energy_d2t = min(energy, 2.0) if given is None else given
         velocity_d2t = min(position, 2.0) if self.velocity_d2t is None else self.velocity_d2t
+        of_both = min(position, self.velocity)
+        outputs = {
+            row.name: of_both if model.velocity in names_in(tree(model, row.formula)) else position
+            for row in model.outputs
+        }
         return {
+            **outputs,
+            **dict.fromkeys(BUDGET, min(of_both, ORDER_OF_WORK)),
             model.position: position,
             model.velocity: self.velocity,
             "kinetic_energy": self.velocity,
@@ -204,6 +211,10 @@ class Orders:
             "energy_d2t": energy_d2t,
             "energy_deviation_d2t": energy_d2t,
         }.get(quantity, energy)
+
+
+ORDER_OF_WORK = 4.0
+"""Order of the sum by which the work of forces is found (`vibsim.simulation.budget`)."""
 
 
 def never(quantity: str, model: Model, options: Options) -> bool:

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim import plan
-from vibsim.models import ENERGIES, Model, State, centred
+from vibsim.models import BUDGET, ENERGIES, Model, State, centred, has_budget
 from vibsim.record import Attribute, Record, Variable, attributes
+from vibsim.simulation.derived import derived
 from vibsim.simulation.gathered import event_times, extrema, gathered, of_own_steps
 from vibsim.simulation.members import Members, members
-from vibsim.simulation.solution import Solution, energies_of, has_adaptive, solve
+from vibsim.simulation.solution import Solution, has_adaptive, solve
 from vibsim.spec.series import RUNNING, asks_for_peaks, extrema_kept, is_bounded, stored_series
 
 if TYPE_CHECKING:
@@ -34,8 +35,11 @@ _ENERGY_WORDS = {
 }
 
 
-_OF_STATES = frozenset(ENERGIES)
-"""Series that follow from the states at the samples alone."""
+_BUDGET_WORDS = (
+    "energy that damping took since t = 0",
+    "work of driving forces since t = 0",
+    "deviation of the total energy plus what damping took minus the work of driving forces",
+)
 
 
 def simulate(experiment: Experiment, level: int, *, threads: int = 1) -> xarray.Dataset:
@@ -83,7 +87,7 @@ def simulate_record(
         steps,
         every,
         threads,
-        with_series=not _OF_STATES.issuperset(set(wanted) - set(_states(model))),
+        with_series=not _of_states(model).issuperset(wanted),
         n_extrema=0 if is_lean and not asks_for_peaks(experiment) else kept,
     )
     with_d2t = experiment.own_velocity or not is_lean
@@ -108,8 +112,19 @@ def simulate_record(
     return Record(coords, variables, attrs)
 
 
-def _states(model: Model) -> list[str]:
-    return [state.name for state in model.states]
+def _of_states(model: Model) -> set[str]:
+    """Name the series that follow from the states at the samples alone."""
+    outputs = (output.name for output in model.outputs)
+    return {*(state.name for state in model.states), *ENERGIES, *outputs}
+
+
+def _derived_words(model: Model) -> dict[str, dict[str, Any]]:
+    """Return the attributes of every series that is worked out of the states."""
+    words = dict(_ENERGY_WORDS)
+    if has_budget(model):
+        words |= zip(BUDGET, _BUDGET_WORDS, strict=True)
+    energies = {name: attributes(told, model.energy_unit) for name, told in words.items()}
+    return energies | {row.name: attributes(row.long_name, row.unit) for row in model.outputs}
 
 
 def _units(model: Model) -> dict[str, str]:
@@ -192,11 +207,11 @@ def _series(
             attrs = attributes(words, model.energy_unit)
             table[name + RUNNING] = Variable(SERIES, values, attrs)
         table = {name: variable for name, variable in table.items() if name in names}
-    of_energy = [name for name in _ENERGY_WORDS if name in names]
-    found = energies_of(model, group, solution, steps, every, of_energy)
-    for name in of_energy:
-        attrs = attributes(_ENERGY_WORDS[name], model.energy_unit)
-        table[name] = Variable(SERIES, found[name], attrs)
+    told = _derived_words(model)
+    worked_out = [name for name in told if name in names]
+    found = derived(model, group, solution, steps, every, worked_out)
+    for name in worked_out:
+        table[name] = Variable(SERIES, found[name], told[name])
     attrs = attributes("total mechanical energy at t = 0", model.energy_unit)
     table["energy_initial"] = Variable(("scheme", "case"), found["energy_initial"], attrs)
     return table

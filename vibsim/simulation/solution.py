@@ -16,11 +16,8 @@ from vibsim.engine import (
     Gathered,
     Series,
     Trajectories,
-    energies,
     integrate,
-    lane_for,
 )
-from vibsim.models import Model
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import adaptive
 from vibsim.simulation.members import Members
@@ -29,9 +26,6 @@ if TYPE_CHECKING:
     from vibsim.spec import Experiment
 
 Floats = NDArray[np.float64]
-
-PIECE = 2**16
-"""Samples whose energies are worked out at a time, so that little memory is needed beside what is kept."""
 
 
 @dataclass(frozen=True)
@@ -153,98 +147,14 @@ Kind = TypeVar("Kind", Gathered, Series, Extrema, EventTimes)
 
 
 def _each(kind: type[Kind], rows: list[Any], join: Any) -> Kind:
-    names = [field.name for field in fields(kind)]
-    return kind(**{name: join(getattr(row, name) for row in rows) for name in names})
+    columns = {field.name: [getattr(row, field.name) for row in rows] for field in fields(kind)}
+    joined: dict[str, Any] = {
+        name: None if parts[0] is None else join(parts) for name, parts in columns.items()
+    }
+    return kind(**joined)
 
 
 def _stack(arrays: Iterable[NDArray[Any]]) -> NDArray[Any]:
     """Stack arrays along a new first axis; one array is not copied."""
     found = list(arrays)
     return found[0][None] if len(found) == 1 else np.stack(found)
-
-
-def energies_of(
-    model: Model,
-    group: Members,
-    solution: Solution,
-    steps: int,
-    every: int,
-    wanted: Iterable[str],
-) -> dict[str, Floats]:
-    """Work out series of energies from the stored states.
-
-    Parameters
-    ----------
-    wanted
-        Names out of ``kinetic_energy``, ``potential_energy``, ``energy``, ``energy_deviation``, ``energy_d2t``,
-        ``energy_deviation_d2t``.
-
-    Returns
-    -------
-    dict
-        Name to series, shape (scheme, case, t); and ``energy_initial``, shape (scheme, case).
-    """
-    schemes, cases, times = solution.position.shape
-    found = {name: np.empty(solution.position.shape) for name in wanted}
-    found["energy_initial"] = np.empty((schemes, cases))
-    parameters = np.stack([group.parameters[p.key] for p in model.parameters], axis=-1)
-    lane = lane_for(cases, schemes * times)
-    piece = max(PIECE // times, 1)
-    for s in range(schemes):
-        for first in range(0, cases, piece):
-            part = slice(first, first + piece)
-            kinetic, potential = energies(
-                model,
-                parameters[part],
-                group.end[part] / steps,
-                every,
-                solution.position[s, part],
-                solution.velocity[s, part],
-                lane=lane,
-            )
-            energy = kinetic + potential
-            series = {
-                "kinetic_energy": kinetic,
-                "potential_energy": potential,
-                "energy": energy,
-                "energy_deviation": energy - energy[:, :1],
-                "energy_initial": energy[:, 0],
-            }
-            if not set(found) <= series.keys():
-                energy_d2t = _energy_d2t(
-                    model, parameters, group, solution, steps, every, s, part, lane
-                )
-                series["energy_d2t"] = energy_d2t
-                series["energy_deviation_d2t"] = energy_d2t - energy[:, :1]
-            for name, values in found.items():
-                values[s, part] = series[name]
-    return found
-
-
-def _energy_d2t(
-    model: Model,
-    parameters: Floats,
-    group: Members,
-    solution: Solution,
-    steps: int,
-    every: int,
-    scheme: int,
-    part: slice,
-    lane: str,
-) -> Floats:
-    """Return the energy with ``[D_2t u]`` as the velocity, shape (case, t); NaN where there is none or it overflows."""
-    assert solution.series is not None
-    velocity = solution.series.velocity_d2t[scheme, part]
-    if np.isnan(velocity).all():
-        return np.full(velocity.shape, np.nan)
-    kinetic, potential = energies(
-        model,
-        parameters[part],
-        group.end[part] / steps,
-        every,
-        solution.position[scheme, part],
-        velocity,
-        lane=lane,
-    )
-    energy = kinetic + potential
-    return np.where(np.isfinite(energy), energy, np.nan)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -53,7 +53,8 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
         With every fault of the file, and those already in `report`.
     """
     part = _sections(source, report)
-    read = model_rules.read(part.model, _model(source), report)
+    swept = frozenset(_keys(source.data.get("sweep")))
+    read = model_rules.read(part.model, _model(source), swept, report)
     model, parameters = read.model, read.parameters
     levels = _levels(part, source, report)
     schemes = _schemes(part, model, report)
@@ -85,7 +86,9 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
         name=place.name,
         title=part.title,
         source=part.source,
-        model=ModelSpec(kind=model.kind, parameters=parameters, formulas=read.formulas),
+        model=ModelSpec(
+            kind=model.kind, parameters=parameters, formulas=read.formulas, terms=read.terms
+        ),
         initial=initial,
         time=time,
         levels=levels,
@@ -139,6 +142,14 @@ def _model(source: Source) -> Model | None:
     section = source.data.get("model")
     kind = section.get("kind") if isinstance(section, Mapping) else None
     return MODELS.get(kind) if isinstance(kind, str) else None
+
+
+def _keys(section: Any) -> Iterator[str]:
+    """Yield every key of a section, those inside of it too."""
+    if isinstance(section, Mapping):
+        for key, value in section.items():
+            yield str(key)
+            yield from _keys(value)
 
 
 def _initial(

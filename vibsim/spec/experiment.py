@@ -43,16 +43,18 @@ class ModelSpec(Section):
     """By the place of each in the section: ``m``, ``damping.linear``, ``parameters.k``."""
     formulas: Annotated[dict[str, str], AfterValidator(FrozenDict)] = FrozenDict()
     """What the file writes as formulas, by the names of `vibsim.models.Model.formulas`."""
+    terms: tuple[Text, ...] = ()
+    """Which of `vibsim.models.Model.optional` the equation has: those that are not 0, or are swept."""
 
     @property
     def definition(self) -> Model:
         """The equation of motion that this section describes."""
         model = MODELS[self.kind]
-        if model.written is None:
-            return model
-        declared = (key.partition(".") for key in self.parameters)
-        names = (name for section, _, name in declared if section == DECLARED)
-        return model.written(self.formulas, tuple(names))
+        if model.written is not None:
+            declared = (key.partition(".") for key in self.parameters)
+            names = (name for section, _, name in declared if section == DECLARED)
+            model = model.written(self.formulas, tuple(names))
+        return model.variant(frozenset(self.terms)) if model.variant is not None else model
 
 
 class TimeSpec(Section):

@@ -21,13 +21,13 @@ MAX_FILES = 5_000
 
 _FEWEST = 6
 """Series of the smallest model: two states and the energies."""
-_ENERGIES = 4
+_STATES = 2
 _RUNNING = 1
 """Running maxima: that of the energy deviation."""
 _D2T = 4
 """Series with the centred difference as velocity: itself, two energies, and a running maximum."""
-_LEFT_OUT = 3
-"""Energies that a lean experiment does not keep, unless a check is about them."""
+_LEAN = 3
+"""Series that a lean experiment keeps: two states and the energy deviation, and what else a check is about."""
 MIN_DT = 1e-100
 """Smallest time step: its square and what is divided by that must not leave the range of floats."""
 
@@ -68,13 +68,13 @@ class Shape:
         series = max(self.variables, _FEWEST)
         schemes = max(self.schemes, 1)
         if is_lean(self.samples, coarsest, self.trajectories):
-            return Load(schemes, steps, kept, series - _LEFT_OUT, d2t=self.own_velocity)
+            return Load(schemes, steps, kept, _LEAN, d2t=self.own_velocity)
         return Load(
             schemes,
             steps,
             kept,
             series + _RUNNING + (_D2T if self.own_velocity else 0),
-            exact=series - _ENERGIES,
+            exact=_STATES,
             extrema=extrema_kept(steps, self.trajectories),
             d2t=True,
         )

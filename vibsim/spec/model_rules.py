@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -44,16 +44,32 @@ class Read:
     """The equation of motion; that of the defaults where a formula is at fault, None where even the kind is."""
     parameters: dict[str, float] = field(default_factory=dict)
     formulas: dict[str, str] = field(default_factory=dict)
+    terms: tuple[str, ...] = ()
+    """Which of `Model.optional` the equation has."""
 
 
-def read(section: Any, model: Model | None, report: Report) -> Read:
+def read(section: Any, model: Model | None, swept: Collection[str], report: Report) -> Read:
     """Check the section of a `model` of the registry, and fill in what it leaves out.
 
     Parameters
     ----------
     section
         As pydantic read it; None where that found a fault.
+    swept
+        Dotted keys that the file sweeps.
     """
+    found = _read(section, model, report)
+    if found.model is None or found.model.variant is None or not found.parameters:
+        return found
+    terms = tuple(
+        name
+        for name in found.model.optional
+        if found.parameters[name] != 0.0 or f"model.{name}" in swept
+    )
+    return replace(found, model=found.model.variant(frozenset(terms)), terms=terms)
+
+
+def _read(section: Any, model: Model | None, report: Report) -> Read:
     if section is None or model is None:
         return Read(model)
     parameters = {row.name: getattr(section, row.name) for row in model.parameters}
@@ -88,7 +104,8 @@ def read(section: Any, model: Model | None, report: Report) -> Read:
             rule = f"must have a finite value at t = 0, where {name} is {value:g}"
             report.add(("model", "exact"), rule, value=texts["exact"])
             return Read(model)
-    _check_potential(found, parameters, texts, report)
+    if any(row.name == "spring" for row in model.formulas):
+        _check_potential(found, parameters, texts, report)
     return Read(found, parameters, texts)
 
 

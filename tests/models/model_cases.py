@@ -1,0 +1,154 @@
+"""One or more cases of every model of the registry, each with its equation written out again by hand."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from vibsim.engine import integrate
+from vibsim.models import MODELS
+
+
+@dataclass(frozen=True)
+class Case:
+    """A model with numbers, and its acceleration as a function of (u, v, t) that shares nothing with it."""
+
+    kind: str
+    acceleration: Callable[[float, float, float], float]
+    numbers: dict[str, float] = field(default_factory=dict)
+    """Parameters by their places in the section, where they differ from the defaults."""
+    initial: tuple[float, float] = (0.7, 0.4)
+    end: float = 2.0
+    formulas: dict[str, str] = field(default_factory=dict)
+    declared: tuple[str, ...] = ()
+
+    @property
+    def model(self):
+        model = MODELS[self.kind]
+        if model.written is not None:
+            model = model.written(self.formulas, self.declared)
+        terms = frozenset(name for name in model.optional if self.numbers.get(name, 0.0))
+        return model.variant(terms) if model.variant is not None else model
+
+    @property
+    def parameters(self):
+        return {p.key: self.numbers.get(p.key, p.default) for p in self.model.parameters}
+
+    @property
+    def start(self):
+        return dict(zip((s.name for s in self.model.states), self.initial, strict=True))
+
+    def reference(self, t):
+        """Position and velocity at times t, by SciPy at its smallest tolerance."""
+        found = solve_ivp(
+            lambda t, y: (y[1], self.acceleration(y[0], y[1], t)),
+            (0.0, max(self.end, t[-1])),
+            self.initial,
+            method="DOP853",
+            t_eval=t,
+            rtol=3e-14,
+            atol=1e-15,
+        )
+        return found.y
+
+    def run(self, scheme, steps, *, lane="plain", **more):
+        numbers = np.array([list(self.parameters.values())])
+        arrays = (numbers, np.array([self.initial]), np.array([self.end / steps]))
+        options = scheme.defaults()
+        if any(option.name == "end_velocity" for option in scheme.options):
+            options = {**options, "end_velocity": "kick"}
+        return integrate(self.model, scheme, options, *arrays, steps, 1, lane=lane, **more)
+
+
+# the velocity keeps its sign where there is drag, whose second derivative jumps with it
+CASES = {
+    "spring": Case("spring", lambda u, v, t: -2.25 * u, {"w": 1.5}),
+    "pendulum": Case("pendulum", lambda u, v, t: -9.81 / 2.0 * math.sin(u), {"g": 9.81, "L": 2.0}),
+    "pendulum-drag": Case(
+        "pendulum",
+        lambda u, v, t: -0.3 * abs(v) * v - 2.0 / 1.5 * math.sin(u),
+        {"g": 2.0, "L": 1.5, "m": 0.4, "drag": 0.3},
+        initial=(-1.4, 2.2),
+        end=1.0,
+    ),
+    "linear_pendulum": Case("linear_pendulum", lambda u, v, t: -2.0 / 0.5 * u, {"g": 2, "L": 0.5}),
+    "physical_pendulum": Case(
+        "physical_pendulum",
+        lambda u, v, t: -1.2 * 3.0 * 0.5 * math.sin(u) / 0.8,
+        {"inertia": 0.8, "m": 1.2, "g": 3.0, "L": 0.5},
+    ),
+    "physical_pendulum-drag": Case(
+        "physical_pendulum",
+        lambda u, v, t: (-0.25 * abs(v) * v - 1.2 * 3.0 * 0.5 * math.sin(u)) / 0.8,
+        {"inertia": 0.8, "m": 1.2, "g": 3.0, "L": 0.5, "drag": 0.25},
+        initial=(-1.4, 2.6),
+        end=1.0,
+    ),
+    "oscillator": Case(
+        "oscillator",
+        lambda u, v, t: (math.cos(1.3 * t) - 0.4 * v - 0.1 * v**3 - 2.0 * math.sinh(u)) / 1.5,
+        {"m": 1.5, "parameters.k": 2.0},
+        formulas={"spring": "k*sinh(u)", "damping": "0.4*v + 0.1*v**3", "force": "cos(1.3*t)"},
+        declared=("k",),
+    ),
+    "oscillator-linear": Case(
+        "oscillator",
+        lambda u, v, t: (
+            (0.8 * math.exp(-0.2 * t) * math.sin(3 * t + 0.4) - 0.3 * v - 2.0 * u) / 1.5
+        ),
+        {"m": 1.5, "parameters.b": 0.3},
+        formulas={"spring": "2*u", "damping": "b*v", "force": "0.8*exp(-0.2*t)*sin(3*t + 0.4)"},
+        declared=("b",),
+    ),
+    "washing_machine": Case(
+        "washing_machine",
+        lambda u, v, t: (0.2 * 2.25 * math.cos(1.5 * t) - 4.5 * u) / 2.0,
+        {"m": 2.0, "k": 4.5, "unbalance": 0.2, "speed": 1.5},
+    ),
+    "washing_machine-damped": Case(
+        "washing_machine",
+        lambda u, v, t: (0.2 * 1.44 * math.cos(1.2 * t) - 0.6 * v - 4.5 * u) / 2.0,
+        {"m": 2.0, "k": 4.5, "b": 0.6, "unbalance": 0.2, "speed": 1.2},
+    ),
+    "vehicle": Case(
+        "vehicle",
+        lambda u, v, t: (1.5 * 0.1 * 4.0 * 1.69 * math.sin(2.0 * 1.3 * t) - 3.0 * u) / 1.5,
+        {"m": 1.5, "speed": 1.3},
+        formulas={"spring": "3*u", "road": "0.1*sin(2*x)"},
+    ),
+    "vehicle-damped": Case(
+        "vehicle",
+        lambda u, v, t: (
+            (
+                -1.5 * 1.69 * 0.2 * (4.0 * (1.3 * t) ** 2 - 2.0) * math.exp(-((1.3 * t) ** 2))
+                - 0.4 * v
+                - math.tanh(u)
+            )
+            / 1.5
+        ),
+        {"m": 1.5, "b": 0.4, "speed": 1.3},
+        formulas={"spring": "tanh(u)", "road": "0.2*exp(-x**2)"},
+    ),
+    "circuit": Case("circuit", lambda u, v, t: -u / (0.5 * 0.8), {"L": 0.5, "C": 0.8}),
+    "circuit-driven": Case(
+        "circuit",
+        lambda u, v, t: (2.0 * 1.7 * math.cos(1.7 * t) - 0.3 * v - u / 0.8) / 0.5,
+        {"L": 0.5, "R": 0.3, "C": 0.8, "parameters.V0": 2.0},
+        formulas={"voltage": "V0*sin(1.7*t)"},
+        declared=("V0",),
+    ),
+    "duffing": Case("duffing", lambda u, v, t: -0.5 * u - 1.3 * u**3, {"alpha": 0.5, "beta": 1.3}),
+    "duffing-wells": Case(
+        "duffing", lambda u, v, t: u - 1.5 * u**3, {"alpha": -1.0, "beta": 1.5}, initial=(0.9, 0.1)
+    ),
+    "duffing-softening": Case(
+        "duffing", lambda u, v, t: -u + 0.4 * u**3, {"alpha": 1.0, "beta": -0.4}
+    ),
+    "duffing-driven": Case(
+        "duffing",
+        lambda u, v, t: 0.3 * math.cos(1.2 * t) - 0.2 * v + u - u**3,
+        {"delta": 0.2, "alpha": -1.0, "beta": 1.0, "gamma": 0.3, "omega": 1.2},
+    ),
+}

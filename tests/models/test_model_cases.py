@@ -1,0 +1,163 @@
+"""Every model against its equation written out by hand: forces, exact solution, energies, every scheme for it."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from model_cases import CASES
+
+from vibsim.expression import evaluate, values
+from vibsim.models import MODELS, has_budget, tree
+from vibsim.schemes import FIXED_STEP
+from vibsim.simulation.derived import rate
+
+EVERY = pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+PAIRS = [
+    pytest.param(case, scheme, id=f"{name}-{scheme.kind}")
+    for name, case in CASES.items()
+    for scheme in FIXED_STEP.values()
+    if scheme.treats(case.model)
+]
+T = np.linspace(0.0, 6.0, 61)
+
+
+def test_every_model_of_the_registry_has_a_case():
+    smooth = {kind for kind, model in MODELS.items() if model.events is None}
+    assert {case.kind for case in CASES.values()} == smooth
+    for kind, model in MODELS.items():
+        seen = set()
+        for case in CASES.values():
+            seen |= {n for n in model.optional if case.kind == kind and case.numbers.get(n)}
+        assert seen == set(model.optional)
+
+
+def named(case):
+    model = case.model
+    return {p.name: case.parameters[p.key] for p in model.parameters}
+
+
+@EVERY
+def test_the_acceleration_is_the_equation(case):
+    model = case.model
+    formula = tree(model, model.acceleration)
+    for u, v, t in itertools.product((-1.3, 0.0, 0.8), (-0.7, 0.0, 1.1), (0.0, 0.4, 2.1)):
+        at = {**named(case), model.position: u, model.velocity: v, "t": t}
+        assert evaluate(formula, at) == pytest.approx(
+            case.acceleration(u, v, t), rel=1e-13, abs=1e-15
+        )
+
+
+@EVERY
+def test_the_exact_solution_is_that_of_the_equation(case):
+    model = case.model
+    if model.exact is None:
+        return
+    found = model.exact(T, case.start, case.parameters)
+    for name, expected in zip((model.position, model.velocity), case.reference(T), strict=True):
+        np.testing.assert_allclose(found[name], expected, rtol=0.0, atol=2e-12)
+
+
+def test_linear_and_free_models_have_an_exact_solution():
+    known = {name for name, case in CASES.items() if case.model.exact is not None}
+    assert known == {
+        "spring", "pendulum", "linear_pendulum", "physical_pendulum", "oscillator-linear",
+        "washing_machine", "washing_machine-damped", "vehicle", "circuit", "circuit-driven",
+        "duffing", "duffing-wells", "duffing-softening",
+    }  # fmt: skip
+
+
+@EVERY
+def test_the_exact_period_is_a_period(case):
+    model = case.model
+    if model.exact_period is None:
+        return
+    period = float(model.exact_period(case.start, case.parameters))
+    now, later = (model.exact(T + shift, case.start, case.parameters) for shift in (0.0, period))
+    for name in (model.position, model.velocity):
+        np.testing.assert_allclose(later[name], now[name], rtol=0.0, atol=1e-11)
+    half = model.exact(np.array([0.0, 0.5 * period]), case.start, case.parameters)
+    assert not np.allclose(half[model.position][0], half[model.position][1])
+
+
+@EVERY
+def test_the_energy_changes_by_what_damping_takes_and_forces_give(case):
+    """``dE/dt`` along the motion by the derivatives of the formulas, at places and times of all kinds."""
+    model = case.model
+    u, v, t = np.meshgrid((-1.3, 0.2, 0.8), (-0.7, 0.3, 1.1), (0.0, 0.4, 2.1))
+    at = {**named(case), model.position: u, model.velocity: v, "t": t}
+    change = sum(
+        values(rate(model, tree(model, formula)), at)
+        for formula in (model.kinetic_energy, model.potential_energy)
+    )
+    taken, given = (
+        0.0 if formula is None else values(tree(model, formula), at)
+        for formula in (model.dissipation, model.driving)
+    )
+    assert np.all(np.asarray(taken) >= 0.0)
+    np.testing.assert_allclose(change, given - taken + np.zeros(u.shape), rtol=0.0, atol=1e-13)
+    assert model.conservative == (not has_budget(model))
+
+
+@EVERY
+def test_the_natural_frequency_is_that_of_small_oscillations(case):
+    """Twice the stiffness is felt at the bottom of a well."""
+    model = case.model
+    bottom = math.sqrt(1.0 / case.numbers["beta"]) if case.numbers.get("alpha") == -1.0 else 0.0
+    step = 1e-6
+    free = [0.0 if model.driving is None else case.acceleration(bottom, 0.0, 0.0)] * 2
+    slope = (
+        (case.acceleration(bottom + step, 0.0, 0.0) - free[0])
+        - (case.acceleration(bottom - step, 0.0, 0.0) - free[1])
+    ) / (2.0 * step)
+    found = float(model.natural_frequency(case.parameters))
+    assert found**2 == pytest.approx(-slope, rel=1e-7)
+
+
+@EVERY
+def test_outputs_are_what_their_names_say(case):
+    model, t = case.model, 0.4
+    u, v = 0.3, -0.6
+    p = named(case)
+    at = {**p, model.position: u, model.velocity: v, "t": t}
+    found = {row.name: evaluate(tree(model, row.formula), at) for row in model.outputs}
+    expected = {}
+    if case.kind == "pendulum":
+        # the acceleration towards the pivot is L omega^2
+        expected["wire_force"] = p["m"] * (p["g"] * math.cos(u) + p["L"] * v * v)
+        if p["drag"]:
+            expected["drag_force"] = p["m"] * p["L"] * p["drag"] * v * v
+    elif case.kind == "physical_pendulum":
+        expected["pivot_force"] = p["m"] * (p["g"] * math.cos(u) + p["L"] * v * v)
+        if p["drag"]:
+            expected["drag_moment"] = p["drag"] * v * v
+    elif case.kind == "washing_machine":
+        expected["floor_force"] = p["k"] * u + p["b"] * v
+    elif case.kind == "vehicle":
+        x = p["speed"] * t
+        height = 0.2 * math.exp(-x * x) if p["b"] else 0.1 * math.sin(2.0 * x)
+        expected |= {"road_height": height, "absolute_position": u + height}
+    elif case.kind == "circuit":
+        source = p.get("V0", 0.0) * math.sin(1.7 * t)
+        expected |= {"source_voltage": source}
+        expected |= {"capacitor_voltage": source - p["L"] * v - p["R"] * u}
+    assert found == pytest.approx(expected, rel=1e-13)
+
+
+def levels_for(order):
+    """Return the steps of two levels whose errors are far from round-off, and the coarser one asymptotic."""
+    return {1.0: (1024, 2048), 2.0: (256, 512), 3.0: (96, 192)}.get(order, (48, 96))
+
+
+@pytest.mark.parametrize(("case", "scheme"), PAIRS)
+def test_every_scheme_converges_to_the_solution_of_the_equation(case, scheme):
+    model = case.model
+    for name, index in ((model.position, 0), (model.velocity, 1)):
+        order = scheme.formal_order(name, model, scheme.defaults())
+        errors = []
+        for steps in levels_for(order):
+            run = case.run(scheme, steps, with_gathered=False)
+            found = (run.position, run.velocity)[index][0]
+            expected = case.reference(np.linspace(0.0, case.end, steps + 1))[index]
+            errors.append(np.max(np.abs(found - expected)))
+        assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.12)

@@ -1,0 +1,89 @@
+"""Formulas made of formulas, and what is seen of one without values for its names."""
+
+from __future__ import annotations
+
+from vibsim.expression.parser import literal
+from vibsim.expression.tree import (
+    Binary,
+    Call,
+    Compare,
+    Expression,
+    Name,
+    Negate,
+    Number,
+    names_in,
+    rebuilt,
+    walk,
+)
+
+ZERO, ONE = Number(0.0), Number(1.0)
+
+
+def put(node: Expression, name: str, what: Expression) -> Expression:
+    """Return a formula with another one in the place of a name."""
+    return rebuilt(node, lambda part: what if part == Name(name) else part)
+
+
+def is_zero(node: Expression) -> bool:
+    """Tell whether a formula is the number 0."""
+    return node in (ZERO, Negate(ZERO))
+
+
+def is_multiple(node: Expression, slope: Expression, name: str) -> bool:
+    """Tell whether a formula with that derivative is a factor times `name`, whatever the parameters."""
+    jumps = (part for part in walk(node) if isinstance(part, Compare) or _is_call(part, "sign"))
+    # the derivative of a jump is 0
+    if name in names_in(slope) or any(name in names_in(part) for part in jumps):
+        return False
+    return _is_zero_with(node, name)
+
+
+def _is_zero_with(node: Expression, name: str) -> bool:
+    """Tell whether a formula is seen to be 0 where `name` is."""
+    match node:
+        case Number(value):
+            return value == 0.0
+        case Name(own):
+            return own == name
+        case Negate(operand) | Binary("/", operand, _):
+            return _is_zero_with(operand, name)
+        case Binary("*", left, right):
+            return _is_zero_with(left, name) or _is_zero_with(right, name)
+        case Binary("+" | "-", left, right) | Call("where", (_, left, right)):
+            return _is_zero_with(left, name) and _is_zero_with(right, name)
+        case Binary("**", base, exponent):
+            return (literal(exponent) or 0.0) > 0.0 and _is_zero_with(base, name)
+        case _:
+            return False
+
+
+def _is_call(node: Expression, function: str) -> bool:
+    return isinstance(node, Call) and node.function == function
+
+
+def times(left: Expression, right: Expression) -> Expression:
+    """Return the product of two formulas, without factors 0 and 1."""
+    if ZERO in (left, right):
+        return ZERO
+    if ONE in (left, right):
+        return right if left == ONE else left
+    return Binary("*", left, right)
+
+
+def over(left: Expression, right: Expression) -> Expression:
+    """Return the quotient of two formulas."""
+    return left if right == ONE else Binary("/", left, right)
+
+
+def plus(left: Expression, right: Expression) -> Expression:
+    """Return the sum of two formulas, without 0."""
+    if left == ZERO:
+        return right
+    return left if right == ZERO else Binary("+", left, right)
+
+
+def minus(left: Expression, right: Expression) -> Expression:
+    """Return the difference of two formulas, without 0."""
+    if right == ZERO:
+        return left
+    return Negate(right) if left == ZERO else Binary("-", left, right)

@@ -1,0 +1,107 @@
+r"""The current of an electric circuit, ``L i'' + R i' + i/C = V'(t)``: coil, resistor and capacitor in series.
+
+Source: vibration text (B), section 10.10, equation (118) with the right-hand side V'/L (Kirchhoff). Units: L [H],
+R [ohm], C [F], i [A], di_dt [A s-1], V [V]; energy ``L i^2/2 + C v_C^2/2`` [J] of coil and capacitor, whose voltage is
+``v_C = V - L di_dt - R i``. The resistor takes ``R i^2``, the source gives ``V i``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache, partial
+
+from vibsim.expression import (
+    ZERO,
+    Expression,
+    Name,
+    derivative,
+    is_zero,
+    minus,
+    parse,
+    put,
+    times,
+    to_formula,
+)
+from vibsim.models.base import (
+    FormulaField,
+    Model,
+    Output,
+    Parameter,
+    State,
+    declared_parameters,
+)
+from vibsim.models.mechanical import Forces, mechanical
+
+STATES = (State("i", "A", "current"), State("di_dt", "A s-1", "rate of change of the current"))
+PARAMETERS = (
+    Parameter("L", 1.0, "H", "inductance", minimum=0.0, exclusive=True),
+    Parameter("R", 0.0, "ohm", "resistance", minimum=0.0),
+    Parameter("C", 1.0, "F", "capacitance", minimum=0.0, exclusive=True),
+)
+FORMULAS = (FormulaField("voltage", ("t",), "0", "voltage V(t) of the source [V]"),)
+
+
+def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
+    """Return the circuit with the voltage of a user, without its resistor.
+
+    Raises
+    ------
+    ExpressionError
+        Where the voltage names something else than t and parameters.
+    """
+    return circuit(formulas.get("voltage", "0"), declared, frozenset())
+
+
+@cache
+def circuit(voltage: str, declared: tuple[str, ...], terms: frozenset[str]) -> Model:
+    """Return the circuit, with a resistor where `terms` has ``R``."""
+    parameters = (*PARAMETERS, *declared_parameters(declared))
+    names = ("t", *(row.name for row in parameters))
+    source = parse(voltage, names)
+    is_driven, has_resistor = not is_zero(source), "R" in terms
+    current, rate = Name("i"), Name("di_dt")
+
+    def read(text: str) -> Expression:
+        return parse(text, ("i", "di_dt", *names))
+
+    drop = times(Name("L"), rate)
+    if has_resistor:
+        drop = parse("L*di_dt + R*i", ("i", "di_dt", *names))
+    capacitor = minus(source, drop)
+    forces = Forces(
+        spring=read("1/C*i"),
+        damping=read("R*di_dt") if has_resistor else ZERO,
+        force=derivative(source, "t"),
+        mass=Name("L"),
+        position="i",
+        velocity="di_dt",
+    )
+    left = "L i'' + R i' + i/C" if has_resistor else "L i'' + i/C"
+    of_source = f", V = {to_formula(source)}" if is_driven else ""
+    return mechanical(
+        forces,
+        parameters,
+        states=STATES,
+        kind="circuit",
+        title="Electric circuit of coil, resistor and capacitor",
+        source="vibration text, section 10.10, equation (118)",
+        equation=f"{left} = {'V' + chr(39) + '(t)' if is_driven else '0'}{of_source}",
+        kinetic_energy="0.5*L*i**2",
+        potential_energy=put(read("0.5*C*di_dt**2"), "di_dt", capacitor),
+        dissipation="R*i**2" if has_resistor else None,
+        driving=times(source, current) if is_driven else None,
+        conservative=not is_driven and not has_resistor,
+        outputs=(
+            Output("capacitor_voltage", "V", "voltage of the capacitor", capacitor),
+            Output("source_voltage", "V", "voltage of the source", source),
+        ),
+        formulas=FORMULAS,
+        written=written,
+        optional=("R",),
+        variant=partial(circuit, voltage, declared),
+    )
+
+
+CIRCUIT = replace(written({}, ()), equation="L i'' + R i' + i/C = V'(t)")
+"""The circuit without a voltage, under the equation of all."""

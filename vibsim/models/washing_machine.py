@@ -1,0 +1,68 @@
+r"""A washing machine on springs and dampers, ``m u'' + b u' + k u = e W^2 cos(W t)``: a rotating unbalance.
+
+Source: vibration text (B), section 10.4 (unfinished there); the force is that of a mass m_e which turns at a distance r
+with the angular speed W: ``e = m_e r`` [kg m], and m [kg] is the mass of everything that moves. Units: k [N m-1],
+b [kg s-1], speed W [rad s-1], u [m]. The steady amplitude is ``e W^2/sqrt((k - m W^2)^2 + (b W)^2)``: small below
+resonance, e/m far above it. The floor carries ``k u + b u'`` beside the weight; the machine jumps when that pulls
+harder than the weight.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from vibsim.expression import parse
+from vibsim.models.base import Floats, Model, Numbers, Output, Parameter
+from vibsim.models.mechanical import Forces, mechanical
+
+PARAMETERS = (
+    Parameter("m", 1.0, "kg", "mass", minimum=0.0, exclusive=True),
+    Parameter("k", 1.0, "N m-1", "stiffness of the springs", minimum=0.0, exclusive=True),
+    Parameter("b", 0.0, "kg s-1", "coefficient of the dampers", minimum=0.0),
+    Parameter("unbalance", 1.0, "kg m", "unbalanced mass times its distance from the axis"),
+    Parameter("speed", 0.5, "rad s-1", "angular speed of the drum", minimum=0.0),
+)
+
+
+def steady_amplitude(parameters: Numbers) -> Floats:
+    """Return the amplitude of the steady motion [m]; infinite at resonance without damping."""
+    p = parameters
+    square = np.square(p["speed"])
+    with np.errstate(divide="ignore"):
+        size = np.hypot(p["k"] - p["m"] * square, p["b"] * p["speed"])
+        return np.asarray(np.abs(p["unbalance"]) * square / size)
+
+
+@cache
+def washing_machine(terms: frozenset[str]) -> Model:
+    """Return the machine, with dampers where `terms` has ``b``."""
+    damped = "b" in terms
+    names = ("u", "v", "t", *(row.name for row in PARAMETERS))
+    forces = Forces(
+        spring=parse("k*u", names),
+        damping=parse("b*v" if damped else "0", names),
+        force=parse("unbalance*speed**2*cos(speed*t)", names),
+        mass=parse("m", names),
+    )
+    transmitted, term = ("k*u + b*v", "b u' + ") if damped else ("k*u", "")
+    more: dict[str, Any] = {"optional": ("b",), "variant": washing_machine}
+    return mechanical(
+        forces,
+        PARAMETERS,
+        kind="washing_machine",
+        title="Washing machine with an unbalance",
+        source="vibration text, section 10.4",
+        equation=f"m u'' + {term}k u = unbalance speed^2 cos(speed t)",
+        outputs=(Output("floor_force", "N", "force on the floor beside the weight", transmitted),),
+        **more,
+    )
+
+
+WASHING_MACHINE = replace(
+    washing_machine(frozenset()), equation="m u'' + b u' + k u = unbalance speed^2 cos(speed t)"
+)
+"""The machine without dampers, under the equation that has them."""
