@@ -9,8 +9,15 @@ import pytest
 
 from vibsim.elementary import ELEMENTARY
 from vibsim.engine.text import divided, with_quotients
-from vibsim.expression import Number, derivative, evaluate, parse, to_formula, to_statements
-from vibsim.expression.parser import ExpressionError
+from vibsim.expression import (
+    ExpressionError,
+    Number,
+    derivative,
+    evaluate,
+    parse,
+    to_formula,
+    to_statements,
+)
 from vibsim.models import MODELS
 from vibsim.models import tree as tree_of
 
@@ -18,16 +25,32 @@ FUNCTIONS = {name: function.full for name, function in ELEMENTARY.items()}
 EXACT = {
     "abs": lambda x: x if x >= 0 else -x,
     "acos": mpmath.acos,
+    "acosh": mpmath.acosh,
     "asin": mpmath.asin,
+    "asinh": mpmath.asinh,
     "atan": mpmath.atan,
     "atan2": mpmath.atan2,
+    "atanh": mpmath.atanh,
+    "cbrt": lambda x: mpmath.sign(x) * mpmath.cbrt(abs(x)),
+    "ceil": mpmath.ceil,
     "cos": mpmath.cos,
     "cosh": mpmath.cosh,
+    "erf": mpmath.erf,
+    "erfc": mpmath.erfc,
     "exp": mpmath.exp,
+    "expm1": mpmath.expm1,
+    "floor": mpmath.floor,
+    "heaviside": lambda x: (1 + mpmath.sign(x)) / 2,
+    "hypot": mpmath.hypot,
     "log": mpmath.log,
+    "log10": mpmath.log10,
+    "log1p": mpmath.log1p,
+    "log2": lambda x: mpmath.log(x, 2),
     "max": max,
     "min": min,
+    "mod": lambda x, y: x - mpmath.floor(x / y) * y,
     "power": mpmath.power,
+    "round": mpmath.nint,
     "sign": mpmath.sign,
     "sin": mpmath.sin,
     "sinh": mpmath.sinh,
@@ -39,16 +62,32 @@ EXACT = {
 FORMULAS = {
     "abs": ("abs({})", (-2.0, 3.0)),
     "acos": ("acos({})", (-0.9999, -0.3, 0.7, 0.99999)),
+    "acosh": ("acosh(1.1 + {}**2)", (-2.0, 0.1, 30.0)),
     "asin": ("asin({})", (-0.9999, -0.3, 0.7, 0.99999)),
+    "asinh": ("asinh({})", (-50.0, -0.3, 0.7)),
     "atan": ("atan({})", (-50.0, -0.3, 0.7)),
     "atan2": ("atan2({0}, 0.3 - {0}**2)", (-2.0, 0.1, 3.0)),
+    "atanh": ("atanh({})", (-0.9999, -0.3, 0.7, 0.99)),
+    "cbrt": ("cbrt({})", (-50.0, -0.3, 0.7)),
+    "ceil": ("ceil({0})*{0}", (-1.2, 0.4, 3.3)),
     "cos": ("cos({})", (-2.0, 0.1, 30.0)),
     "cosh": ("cosh({})", (-2.0, 0.1, 3.0)),
+    "erf": ("erf({})", (-2.0, 0.1, 3.0)),
+    "erfc": ("erfc({})", (-2.0, 0.1, 3.0)),
     "exp": ("exp({})", (-2.0, 0.1, 3.0)),
+    "expm1": ("expm1({})", (-2.0, 0.1, 3.0)),
+    "floor": ("floor({0})*{0}", (-1.2, 0.4, 3.3)),
+    "heaviside": ("heaviside({0})*{0}**2", (-2.0, 3.0)),
+    "hypot": ("hypot({0}, 0.3 - {0}**2)", (-2.0, 0.1, 3.0)),
     "log": ("log({})", (0.01, 2.0)),
+    "log10": ("log10({})", (0.01, 2.0)),
+    "log1p": ("log1p({})", (-0.9, 0.01, 2.0)),
+    "log2": ("log2({})", (0.01, 2.0)),
     "max": ("max({0}**2, 2*{0})", (-1.0, 0.5, 3.0)),
     "min": ("min({0}**2, 2*{0})", (-1.0, 0.5, 3.0)),
+    "mod": ("mod({0}, 0.7)*mod(3, 0.2 + {0}**2)", (-2.0, 0.1, 3.0)),
     "power": ("({0})**1.7 + 0.3*2.5**({0}) + ({0})**({0})", (0.2, 1.0, 3.0)),
+    "round": ("round({0})*{0}", (-1.2, 0.4, 3.3)),
     "sign": ("sign({0})*{0}", (-2.0, 3.0)),
     "sin": ("sin({})", (-2.0, 0.1, 30.0)),
     "sinh": ("sinh({})", (-2.0, 0.1, 3.0)),
@@ -73,6 +112,8 @@ OTHERS = {
     "x*sin(3*x)*exp(-x)/(2 + cos(x))": (-2.0, 0.0, 0.7),
     "where(x > 0, sqrt(x), x)": (-2.0, 0.7),
     "where(x, x, 1)*(x < 3)": (-2.0, 0.7),
+    "x**3 if x > 0 and not x > 1 else sin(x)": (-2.0, 0.7, 1.5),
+    "(0 < x < 1 or x < -1)*x**2": (-2.0, 0.7, 1.5),
 }
 CASES = [
     *((text.format("x"), x) for text, places in FORMULAS.values() for x in places),
@@ -130,6 +171,14 @@ def test_slopes_of_every_model(model):
         ("abs(x)**1.5", 0.0, 0.0),
         ("x*abs(x)", 0.0, 0.0),
         ("sign(x)", 2.0, 0.0),
+        ("heaviside(x)", 0.0, 0.0),
+        ("heaviside(x)*x", 0.0, 0.5),
+        ("floor(x) + ceil(x) + round(x)", 1.0, 0.0),
+        ("mod(x, 2)", 2.0, 1.0),
+        # a quotient that rounds to 3
+        ("mod(0.3, x)", 0.3 / 3 * (1 + 2.0**-52), -2.0),
+        ("asinh(1e200*x)", 1.0, 1.0),
+        ("erfc(x)", 30.0, 0.0),
         ("x > 1", 2.0, 0.0),
         ("where(x > 1, 2, 3)", 1.0, 0.0),
         ("max(x, -x)", 0.0, 1.0),
@@ -152,7 +201,20 @@ def test_tanh_and_acos_keep_their_digits_at_the_edge():
     assert value("acos(x)", 1 - 2.0**-50) == pytest.approx(-(2.0**24.5), rel=1e-14)
 
 
-@pytest.mark.parametrize("nest", ["(x/{})", "({}*x)", "atan2({}, x)", "tan({})", "({})**x"])
+@pytest.mark.parametrize(
+    "nest",
+    [
+        "(x/{})",
+        "({}*x)",
+        "atan2({}, x)",
+        "tan({})",
+        "({})**x",
+        "hypot({}, x)",
+        "erf({})",
+        "mod({}, 2 + x)",
+        "x if x > 2 else {}",
+    ],
+)
 def test_the_derivative_of_the_deepest_formula_is_still_python(nest):
     formula = "x"
     while len(longer := nest.format(formula)) <= 2000:

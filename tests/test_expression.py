@@ -24,6 +24,7 @@ from vibsim.expression import (
     to_formula,
     to_python,
     to_statements,
+    walk,
 )
 from vibsim.models import MODELS, Model
 
@@ -68,6 +69,32 @@ def run_statements(text: str, **values: float) -> float:
         ("4**0.5", 2.0),
         ("10**-8", 1e-8),
         ("0.3**0", 1.0),
+        ("heaviside(-2) + heaviside(0) + heaviside(3)", 1.5),
+        ("floor(-0.5) + ceil(0.5) + round(2.5)", 2.0),
+        ("mod(-1, 3)", 2.0),
+        ("mod(1, -3)", -2.0),
+        ("hypot(3, -4)", 5.0),
+        ("cbrt(-27)", -3.0),
+        ("log10(1000) + log2(8)", 6.0),
+        ("expm1(log1p(0))", 0.0),
+        ("erf(0) + erfc(0)", 1.0),
+        ("sinh(asinh(0)) + acosh(1) + atanh(0)", 0.0),
+        ("2 if 1 < 2 else 3", 2.0),
+        ("2 if 0 else 3 if 1 else 4", 3.0),
+        ("1/0 if 0 > 1 else 5", 5.0),
+        ("where(1 < 2, 3, sqrt(-1))", 3.0),
+        ("1 < 2 < 3", 1.0),
+        ("1 < 3 < 2", 0.0),
+        ("1 < 2 > 0 != 5 == 5", 1.0),
+        ("1 < 2 and 2 < 3 and 3 < 4", 1.0),
+        ("1 < 2 and 2 > 3", 0.0),
+        ("1 > 2 or 2 > 3 or 3 < 4", 1.0),
+        ("1 > 2 or 2 > 3", 0.0),
+        ("not 1 > 2", 1.0),
+        ("not 1 < 2 or 3 < 4", 1.0),
+        ("not (1 < 2 or 3 < 4)", 0.0),
+        ("1 < 2 or 3 < 4 and 4 < 3", 1.0),
+        ("2*(1 < 2)", 2.0),
     ],
 )
 def test_constant(text: str, value: float) -> None:
@@ -91,13 +118,50 @@ def test_constant(text: str, value: float) -> None:
         ("'text'", 0, "not allowed"),
         ("[1, 2]", 0, "not allowed"),
         ("{1}", 0, "not allowed"),
-        ("1 if 2 else 3", 0, "where("),
-        ("1 and 2", 0, "'and' and 'or'"),
-        ("not 1", 0, "not allowed"),
-        ("1 < 2 < 3", 0, "chained"),
+        ("1 and 2", 0, "need comparisons"),
+        ("1 < 2 and theta", 10, "write x != 0"),
+        ("sign(theta) or 1 < 2", 0, "need comparisons"),
+        ("not 1", 4, "need comparisons"),
+        ("1 < (2 < 3) < 4", 5, "join two comparisons"),
+        ("1 < max(2 < 3, 2) < 4", 4, "within a chain"),
+        ("1 < (1 if theta > 2 else 3) < 4", 5, "within a chain"),
         ("1 in 2", 0, "'in' and 'is'"),
-        ("1 % 2", 2, "not allowed"),
-        ("7 // 2", 0, "not allowed"),
+        ("1 < 2 in 2", 0, "'in' and 'is'"),
+        ("1 is not 2", 0, "'in' and 'is'"),
+        ("1 % 2", 2, "write mod(x, y)"),
+        ("7 // 2", 0, "use floor(a/b)"),
+        ("theta & 2", 6, "write and"),
+        ("theta | 2", 6, "write or"),
+        ("theta @ 2", 6, "not allowed"),
+        ("~theta", 0, "not allowed"),
+        ("theta if theta", 0, "expected"),
+        ("theta if 1 else", 15, "ends where"),
+        ("theta > 1 and", 13, "ends where"),
+        ("not", 3, "ends where"),
+        ("if", 2, "ends where"),
+        ("and 1 < 2", 0, "expected"),
+        ("ln(2)", 0, "write log"),
+        ("arctan2(1, 2)", 0, "write atan2"),
+        ("Heaviside(1)", 0, "write heaviside"),
+        ("pow(1, 2)", 0, "write a**b"),
+        ("erff(1)", 0, "did you mean 'erf'"),
+        ("eval(1)", 0, "unknown function"),
+        ("heaviside(1, 2)", 0, "takes 1 argument"),
+        ("hypot(1)", 0, "takes 2 argument"),
+        ("mod(1)", 0, "takes 2 argument"),
+        ("round(1, 2)", 0, "takes 1 argument"),
+        ("log(8, 2)", 0, "takes 1 argument"),
+        ("mod(x=1, y=2)", 0, "keyword"),
+        ("floor(**theta)", 0, "keyword"),
+        ("mod + 1", 0, "write mod(...)"),
+        ("theta.floor()", 0, "only a function"),
+        ("floor.__globals__", 0, "attribute"),
+        ("(lambda: 1)()", 7, "not allowed"),
+        ("f'{theta}'", 1, "not allowed"),
+        ("await theta", 0, "not allowed"),
+        ("yield 1", 0, "expected"),
+        ("print(theta)", 0, "unknown function"),
+        ("__builtins__", 0, "unknown name"),
         ("1, 2", 0, "list of values"),
         ("(x for x in theta)", 0, "not allowed"),
         ("lambda: 1", 6, "not allowed"),
@@ -154,6 +218,9 @@ def test_constant_must_be_finite(text: str) -> None:
         "(" * 300 + "1" + ")" * 300,
         "1" + "+1" * 150,
         "sin(" * 120 + "1" + ")" * 120,
+        "not " * 120 + "1 < 2",
+        "1 if 2 else " * 120 + "3",
+        "1 < 2 and (" * 99 + "2 < 3" + ")" * 99,
     ],
 )
 def test_deep_nesting_is_refused(text: str) -> None:
@@ -165,6 +232,25 @@ def test_depth_limit_is_exact() -> None:
     assert constant("-" * (MAX_DEPTH - 1) + "1") in (1.0, -1.0)
     with pytest.raises(ExpressionError, match="deeper than 100"):
         constant("-" * MAX_DEPTH + "1")
+
+
+@pytest.mark.parametrize("word", ["and", "or", "<"])
+def test_a_long_row_of_conditions_is_no_deep_one(word: str) -> None:
+    text = f" {word} ".join(["1 < 2" if word != "<" else "1"] * 200)
+    assert constant(text) == (0.0 if word == "<" else 1.0)
+    assert len(to_statements(parse(text, ()), "y")) == 1
+
+
+def test_chains_in_a_row_do_not_explode() -> None:
+    """A side of a chain stands twice in the tree: chains within chains would double it again and again."""
+    text = "1 < x"
+    while len(text) < 1900:
+        text = f"({text})*(1 < x < 2)"
+        try:
+            tree = parse(text, ["x"])
+        except ExpressionError:
+            break
+    assert sum(1 for _ in walk(tree)) < len(text)
 
 
 def test_length_limit() -> None:
@@ -206,6 +292,12 @@ def test_declared_name_wins_over_constant() -> None:
         ("x/3", "(x / 3.0)"),
         ("0.1*x", "(0.1 * x)"),
         ("where(x > 0, a, b)", "where((x > 0.0), a, b)"),
+        ("a if x > 0 else b", "where((x > 0.0), a, b)"),
+        ("a < x < b", "((a < x) * (x < b))"),
+        ("a < x and x < b", "((a < x) * (x < b))"),
+        ("a < x or x < b", "max((a < x), (x < b))"),
+        ("not a < x", "(1.0 - (a < x))"),
+        ("mod(x, a)", "mod(x, a)"),
     ],
 )
 def test_source_for_the_engine(text: str, source: str) -> None:
@@ -248,6 +340,10 @@ FORMULAS = st.recursive(
         inner.map("({})".format),
         inner.map("-({})".format),
         inner.map("cos({})".format),
+        inner.map("erf({})".format),
+        inner.map("mod({}, 0.7)".format),
+        st.tuples(inner, inner).map("hypot({0[0]}, {0[1]})".format),
+        st.tuples(inner, inner).map("(1*(({0[0]}) < ({0[1]}) or not ({0[0]}) < 2))".format),
         st.tuples(inner.map("({})".format), st.integers(-3, 6)).map(lambda p: f"{p[0]}**{p[1]}"),
     ),
     max_leaves=12,
@@ -274,7 +370,7 @@ def test_written_source_reads_back_as_itself(text: str) -> None:
     assert to_python(parse(source, ["x", "y"])) == source
 
 
-@given(st.text(alphabet="xy019.+-*/()<>=!, esinqrt^_'\"[]{}:;\\\n\t\u03c0\u0660", max_size=60))
+@given(st.text(alphabet="xy019.+-*/()<>=!, esinqrtadofl^_'\"[]{}:;\\\n\t\u03c0\u0660", max_size=60))
 @settings(max_examples=500, deadline=None)
 def test_any_text_is_a_formula_or_refused(text: str) -> None:
     try:

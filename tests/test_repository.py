@@ -222,6 +222,19 @@ def table_rows(text: str) -> dict[str, str]:
     return dict(re.findall(r"^\| `(\w+)` \|(.*)\|$", text, re.MULTILINE))
 
 
+def test_every_function_is_documented() -> None:
+    from vibsim.expression import FUNCTIONS
+
+    text = (
+        (ROOT / "docs/experiment-file.md")
+        .read_text()
+        .partition("### Formulas")[2]
+        .partition("### ")[0]
+    )
+    documented = set(re.findall(r"`(\w+)(?:\([^`]*\))?`", text))
+    assert set(FUNCTIONS) - documented == set()
+
+
 def test_every_model_is_documented_with_its_states_and_parameters() -> None:
     rows = table_rows(section("model"))
     assert list(rows) == list(MODELS)

@@ -2,6 +2,7 @@
 
 import math
 import sys
+from fractions import Fraction
 
 import mpmath
 import numpy as np
@@ -10,15 +11,36 @@ PI = math.pi
 BEYOND = mpmath.mpf(2) ** 1024 - mpmath.mpf(2) ** 970
 """From there on the nearest double is infinite."""
 
+
+def remainder(x, y):
+    """Return ``x - floor(x/y) y`` of whole multiples of a common unit, however far apart x and y are."""
+    a, b = (Fraction(int(z.man) * (-1 if z < 0 else 1)) * Fraction(2) ** int(z.exp) for z in (x, y))
+    rest = a % b
+    with mpmath.workprec(2200):
+        return mpmath.mpf(rest.numerator) / rest.denominator
+
+
 EXACT = {
     "acos": mpmath.acos,
+    "acosh": mpmath.acosh,
     "asin": mpmath.asin,
+    "asinh": mpmath.asinh,
     "atan": mpmath.atan,
     "atan2": mpmath.atan2,
+    "atanh": mpmath.atanh,
+    "cbrt": lambda x: mpmath.sign(x) * mpmath.cbrt(abs(x)),
     "cos": mpmath.cos,
     "cosh": lambda x: mpmath.cosh(clipped(x)),
+    "erf": lambda x: mpmath.erf(clipped(x)),
+    "erfc": lambda x: mpmath.erfc(clipped(x)),
     "exp": lambda x: mpmath.exp(clipped(x)),
+    "expm1": lambda x: mpmath.expm1(clipped(x)),
+    "hypot": mpmath.hypot,
     "log": mpmath.log,
+    "log10": mpmath.log10,
+    "log1p": mpmath.log1p,
+    "log2": lambda x: mpmath.log(x, 2),
+    "mod": remainder,
     "power": lambda x, y: whole_power(x, y) if x < 0 else mpmath.exp(clipped(y * mpmath.log(x))),
     "sin": mpmath.sin,
     "sinh": lambda x: mpmath.sinh(clipped(x)),
@@ -31,12 +53,26 @@ EXACT = {
 INTERVALS = {
     "abs": [(-2, 2)],
     "acos": [(-1, 1), (0.99, 1), (-1, -0.99), (0.3, 0.4), (0.7, 0.71)],
+    "acosh": [(1, 1.01), (1, 2), (1, 100), (9e9, 1.1e10)],
     "asin": [(-1, 1), (0.99, 1), (-1e-8, 1e-8), (0.38, 0.39), (0.7, 0.71)],
     "atan": [(-1, 1), (0.41, 0.42), (2.4, 2.42), (0.99, 1.01), (-1e3, 1e3), (-1e-8, 1e-8)],
+    "asinh": [(-0.1, 0.1), (-2, 2), (-100, 100), (9e9, 1.1e10), (-2e-8, 2e-8)],
+    "atanh": [(-0.2, 0.2), (0.171, 0.172), (-1, 1), (0.3, 0.4), (0.99, 1), (-1e-8, 1e-8)],
+    "cbrt": [(-1, 1), (0.7, 1.5), (1, 8)],
+    "ceil": [(-3, 3), (-1e6, 1e6), (2.0**51, 2.0**53)],
     "cos": [(0, 1e-2), (-PI, PI), (0.5, 0.6), (3.13, 3.15), (-30, 30), (-1e5, 1e5), (1e5, 1e9)],
     "cosh": [(-1, 1), (0.3, 0.4), (-30, 30), (-712, 712), (709.7, 710.5)],
+    "erf": [(-0.6, 0.6), (0.6, 0.7), (-1, 1), (-7, 7), (-1e-8, 1e-8)],
+    "erfc": [(-0.6, 0.6), (0.6, 0.7), (-1, 1), (-7, 7), (0, 28), (26, 27.3)],
     "exp": [(-0.4, 0.4), (0.3, 0.4), (-30, 30), (-746, 710), (-746, -708), (709.7, 709.8)],
+    "expm1": [(-0.4, 0.4), (-0.14, -0.1), (0.34, 0.4), (-2, 2), (-40, 40), (709.7, 709.8)],
+    "floor": [(-3, 3), (-1e6, 1e6), (2.0**51, 2.0**53)],
+    "heaviside": [(-2, 2)],
     "log": [(0.7, 1.42), (0.999, 1.001), (1.41, 1.5), (0.7, 0.71), (0, 1e3)],
+    "log10": [(0.7, 1.42), (0.999, 1.001), (0, 10), (0, 1e3)],
+    "log1p": [(-0.3, 0.5), (-0.01, 0.01), (-1, -0.99), (0, 1e3), (-1e-8, 1e-8), (1e15, 1e17)],
+    "log2": [(0.7, 1.42), (0.999, 1.001), (0, 10), (0, 1e3)],
+    "round": [(-3, 3), (-1e6, 1e6), (2.0**51, 2.0**53)],
     "sign": [(-2, 2)],
     "sin": [(-PI / 2, PI / 2), (1.4, 1.7), (4.7, 4.72), (-30, 30), (-1e5, 1e5), (1e5, 1e9)],
     "sinh": [(-1.1, 1.1), (0.8, 1.2), (-30, 30), (-712, 712), (709.7, 710.5)],
@@ -44,6 +80,9 @@ INTERVALS = {
     "tan": [(-PI / 4, PI / 4), (-PI, PI), (1.4, 1.7), (-30, 30), (-1e5, 1e5), (1e5, 1e9)],
     "tanh": [(-0.6, 0.6), (0.5, 1.2), (-25, 25)],
 }
+
+PAIRS = ("atan2", "hypot", "max", "min", "mod", "power")
+"""The functions of two arguments."""
 
 SPECIAL = [
     *(0.0, math.ulp(0.0), sys.float_info.min, 1e-300, 1e-20, 0.5, 1.0, 2.0, 1e5, 1e22, 1e300),
@@ -116,6 +155,10 @@ def pairs(name, rng, n):
         with np.errstate(over="ignore"):
             others += [(x, np.clip(x * rng.uniform(-3, 3, n // 4), -1e308, 1e308))]
         others += [(rng.uniform(-1, 1, n // 2), rng.uniform(-1, 1, n // 2))]
+        others += [(rng.uniform(-1e6, 1e6, n // 4), rng.uniform(-3, 3, n // 4))]
+        # almost whole quotients
+        y = rng.uniform(0.1, 3.0, n // 4)
+        others += [(np.nextafter(y * rng.integers(-40, 40, n // 4), 0.0), y)]
     return tuple(np.concatenate(column) for column in zip(*others, strict=True))
 
 
@@ -125,7 +168,7 @@ def arguments(name, n):
     if name == "where":
         yes, no = pairs(name, rng, n)
         return rng.choice([0.0, 1.0, -2.0, math.nan], len(yes)), yes, no
-    return (pairs if name in ("atan2", "max", "min", "power") else single)(name, rng, n)
+    return (pairs if name in PAIRS else single)(name, rng, n)
 
 
 def exact(name, values):

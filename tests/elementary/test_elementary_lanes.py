@@ -27,6 +27,9 @@ REDUCED = 1e5
 STATED = {
     "atan2": lambda y, x: (abs(y) > 1e-99 * abs(x)) & np.isfinite(y) & np.isfinite(x),
     "cos": lambda x: abs(x) <= REDUCED,
+    "mod": lambda x, y: (
+        (abs(x) <= 1e15 * np.fmin(abs(y), 1e270)) & (abs(y) >= 1e-270) & (abs(y) <= 1e270)
+    ),
     "power": lambda x, y: np.isfinite(x) & (x > 0.0) & (abs(y) <= 1e9),
     "sin": lambda x: abs(x) <= REDUCED,
     "tan": lambda x: abs(x) <= REDUCED,
@@ -107,10 +110,11 @@ def test_primitives_of_both_lanes_agree():
         assert same(values, plain(getattr(primitives, name), (column,))).all()
 
 
-def test_all_functions_fit_into_one_kernel():
+@pytest.mark.parametrize("is_called", [False, True])
+def test_all_functions_fit_into_one_kernel(is_called):
     module = text.Module("", given=primitives.NAMES)
     for name, function in ELEMENTARY.items():
-        text.collect(module, function.full, name, {})
+        text.collect(module, function.full, name, {}, is_called=is_called)
         text.collect(module, function.fast, f"{name}_fast", {})
     assert {*ELEMENTARY, *(f"{name}_fast" for name in ELEMENTARY)} <= set(module.parts)
 

@@ -244,6 +244,13 @@ def test_members_that_fail_have_the_same_bits_in_every_lane(when, kind):
         pytest.param("-(g/L)*sign(theta)*abs(theta)**1.5", marks=pytest.mark.slow),
         pytest.param("-max(sin(theta), cos(t))*g", marks=pytest.mark.slow),
         "-g*theta/L + where(theta > 0.1, sqrt(theta), log(1 + theta**2))",
+        "-(theta if -1 < theta < 1 or not theta < 3 else erf(theta)) - hypot(t, theta)*mod(t, 1e-269*g)",
+        pytest.param("(theta < 0 and t > 0) - (theta > 0)", marks=pytest.mark.slow),
+        pytest.param("theta < 0 or theta < -1", marks=pytest.mark.slow),
+        pytest.param("-g*(heaviside(sin(theta)) - 0.5) - cbrt(theta)", marks=pytest.mark.slow),
+        pytest.param("floor(t) + ceil(theta) - round(L*theta)*atanh(t)", marks=pytest.mark.slow),
+        pytest.param("expm1(-t) - asinh(theta)*erfc(theta)", marks=pytest.mark.slow),
+        pytest.param("-log1p(theta**2)*log10(g)*log2(L)*acosh(theta)", marks=pytest.mark.slow),
     ],
 )
 def test_formulas_with_branches_and_other_functions_have_the_same_bits(acceleration):
@@ -253,6 +260,16 @@ def test_formulas_with_branches_and_other_functions_have_the_same_bits(accelerat
     plain, *others = (run(model, numbers, lane, steps=64) for lane in LANES)
     for other in others:
         assert_same_bits(plain, other)
+
+
+def test_a_condition_is_a_number_in_every_lane():
+    """As a truth value it would have no -0."""
+    model = dataclasses.replace(MODELS["pendulum"], potential_energy="-(theta < -9e9)")
+    parameters, _, dt = members(model)
+    series = np.ones((MEMBERS, 3))
+    for lane in LANES:
+        _, potential = energies(model, parameters, dt, 1, series, series, lane=lane)
+        assert np.signbit(potential).all()
 
 
 @pytest.mark.parametrize("lane", LANES)

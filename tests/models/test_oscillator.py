@@ -251,6 +251,17 @@ def test_simple_damping_is_recognised(text, kind, rate):
         "abs(v)*v*v",
         "v/abs(v)",
         "abs(v)*v/(1 + v**2)",
+        "v*heaviside(v)",
+        "v + floor(v)",
+        "c*v - ceil(v)*c*0",
+        "round(v)*v",
+        "mod(v, 2)",
+        "v*mod(v, 1)",
+        "v if v > 0 else 0",
+        "v if -1 < v < 1 else v",
+        "v*(v > 0 or v < 0)",
+        "erf(v)",
+        "hypot(v, 0)",
         "sin(v)",
         "0.1*v + tanh(v)",
     ],
@@ -285,6 +296,22 @@ def test_no_damping_is_none(text):
         ("k", False),
         ("sign(u)", False),
         ("u + (u > 1)", False),
+        ("u + heaviside(u)", False),
+        ("u + floor(u)", False),
+        ("u - ceil(u)", False),
+        ("u*round(u)", False),
+        ("mod(u, 1)", False),
+        ("u*mod(u, 1)", False),
+        ("u*mod(5, u)", False),
+        ("u if u > 0 else u", False),
+        ("u*(0 < u < 1)", False),
+        ("erf(u)", False),
+        ("cbrt(u)", False),
+        ("hypot(u, 0)", False),
+        ("u*floor(k)", True),
+        ("u*mod(k, 2)*heaviside(k)", True),
+        ("u if 1 < k < 3 and not k == 2 else 2*u", True),
+        ("u*hypot(k, 1)/erf(k)", True),
         ("where(u < 1, u, 2*u - 1)", False),
         ("where(u < 0, 0, 1)", False),
         ("u + m - 0.7", False),
@@ -318,7 +345,14 @@ def test_what_is_conservative(formulas, is_conservative):
     assert oscillator(**formulas).conservative == is_conservative
 
 
-@pytest.mark.parametrize("spring", [*SPRINGS, "k*abs(u)*u", "u/(20 + u**2)", "sinh(k*u)"])
+@pytest.mark.parametrize(
+    "spring",
+    [
+        *(*SPRINGS, "k*abs(u)*u", "u/(20 + u**2)", "sinh(k*u)"),
+        *("erf(u) + asinh(u/2)", "expm1(k*u/5)", "cbrt(u)", "mod(u, 0.5)", "k*max(u - 0.5, 0)"),
+        *("u + 2*heaviside(u - 0.8)", "floor(2*u) + ceil(u) - round(u)", "atanh(u/3)"),
+    ],
+)
 def test_slope_of_the_potential_is_the_spring(spring):
     """By the formula's own derivative: the quadrature's too is a formula."""
     model = oscillator(spring=spring)
@@ -348,7 +382,7 @@ def test_natural_frequency_is_that_of_small_oscillations(spring, stiffness):
     )
 
 
-@pytest.mark.parametrize("spring", ["u**3", "-u", "0", "sign(u)", "u**0.5 - u"])
+@pytest.mark.parametrize("spring", ["u**3", "-u", "0", "sign(u)", "floor(u)", "u**0.5 - u"])
 def test_without_small_oscillations_there_is_no_frequency(spring):
     model = oscillator(spring=spring)
     w = float(model.natural_frequency(numbers(model)))
@@ -392,6 +426,10 @@ def test_a_declared_b_is_the_users_own():
             "m u'' + c*u' + k*u = cos(2*t)",
         ),
         ({"spring": "-u"}, "m u'' - u = 0"),
+        (
+            {"spring": "u > 1", "damping": "v < 0 or v > k"},
+            "m u'' + max(u' < 0, u' > k) + (u > 1) = 0",
+        ),
         ({"exact": "cos(t)"}, "m u'' + u = F(t), with F such that u = cos(t)"),
     ],
 )
@@ -400,8 +438,10 @@ def test_equation_is_written_out(formulas, told):
 
 
 def test_no_name_is_taken_for_the_velocity_in_the_equation():
+    told = "m u'' + heaviside(u')*u' + u = 0"
+    assert oscillator(damping="heaviside(v)*v").equation == told
     model = written({"damping": "visc*v"}, ("visc",))
-    assert model.equation == "m u'' + f(u') + u = 0, f(v) = visc*v"
+    assert model.equation == "m u'' + visc*u' + u = 0"
 
 
 @pytest.mark.parametrize("field", ["spring", "damping", "force", "exact", "potential"])

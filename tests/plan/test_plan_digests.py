@@ -31,6 +31,7 @@ NOTHING = {
     "default": (", omega: 0.0", ""),
     "ladder": ("levels: [5, 6, 7]", "levels: {from: 5, to: 7}"),
     "formula": ("end: 20.0", "end: 4*5"),
+    "unit": ("end: 20.0", "end: 20e3 ms"),
 }
 
 

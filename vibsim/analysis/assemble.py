@@ -22,6 +22,7 @@ from vibsim.errors import VibsimError
 from vibsim.models import centred
 from vibsim.record import Record, Variable, attributes
 from vibsim.schemes import SCHEMES
+from vibsim.simulation.scaled import in_scales
 from vibsim.spec.series import RUNNING, asked, lean_series
 from vibsim.vocabulary import REASON_NAMES, STATUSES, TYPICAL_NORM
 
@@ -92,7 +93,7 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
         "storage": "lean" if part.lean else "series",
         "checks": definition(experiment),
     }
-    return Record(_coords(part), table, attrs)
+    return in_scales(Record(_coords(part), table, attrs), experiment)
 
 
 def compared(experiment: Experiment, lean: bool = False) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from vibsim.analysis.tableau import Pair
 from vibsim.record import Attribute, Record, Variable, attributes
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import Members, members
+from vibsim.simulation.scaled import in_scales
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
@@ -166,7 +167,7 @@ def record_of(
         "model": model.kind,
         "levels": list(levels),
     }
-    return Record(kept, variables, attrs)
+    return in_scales(Record(kept, variables, attrs), experiment)
 
 
 def _reached(rows: Sequence[Extrapolated], tolerance: float) -> Variable:

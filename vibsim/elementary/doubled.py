@@ -6,6 +6,8 @@ J.-M. Muller et al., Handbook of Floating-Point Arithmetic, 2nd ed. (2018), sect
 
 from __future__ import annotations
 
+import math
+
 _SPLIT = 134217729.0  # 2^27 + 1
 
 
@@ -39,9 +41,22 @@ def quotient(a: float, a_behind: float, b: float, b_behind: float) -> float:
 
     The larger part first; b not zero; the quotient's size between 2^-960 and 2^990.
     """
+    q, behind = quotient_parts(a, a_behind, b, b_behind)
+    return q + behind
+
+
+def quotient_parts(a: float, a_behind: float, b: float, b_behind: float) -> tuple[float, float]:
+    """Return the same quotient in two parts."""
     a, a_behind = fast_two_sum(a, a_behind)
     b, b_behind = fast_two_sum(b, b_behind)
     inverse = 1.0 / b
     q = a * inverse
     p, error = two_product(q, b)
-    return q + (((a - p) - error) + (a_behind - q * b_behind)) * inverse
+    return q, (((a - p) - error) + (a_behind - q * b_behind)) * inverse
+
+
+def root_parts(h: float, behind: float) -> tuple[float, float]:
+    """Return ``sqrt(h + behind)`` in two parts, the larger part first; 0 for h below 0."""
+    root = math.sqrt(h if h > 0.0 else 0.0)
+    p, error = two_product(root, root)
+    return root, 0.5 * (((h - p) - error) + behind) / (root if root > 0.0 else 1.0)

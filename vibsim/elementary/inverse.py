@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from vibsim.elementary.doubled import fast_two_sum, two_product, two_sum
+from vibsim.elementary.doubled import fast_two_sum, root_parts, two_product, two_sum
 from vibsim.elementary.reduction import HALF_PI, HALF_PI_REST
 
 _PI = 2.0 * HALF_PI
@@ -116,10 +116,7 @@ def cosine_from_sine(x: float) -> tuple[float, float]:
     """Return ``sqrt(1 - x^2)`` in two parts for x in 0 ... 1."""
     p, error = two_product(x, x)
     h, behind = fast_two_sum(1.0, -p)
-    root = math.sqrt(h if h > 0.0 else 0.0)
-    p, p_error = two_product(root, root)
-    left = ((h - p) - p_error) + (behind - error)
-    return root, 0.5 * left / (root if root > 0.0 else 1.0)
+    return root_parts(h, behind - error)
 
 
 def angle_of(s: float, s_behind: float, c: float, c_behind: float) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-r"""Natural logarithm, in a double and in two.
+r"""Logarithms: the natural one in a double and in two, and from the latter those to base 10 and 2 and of 1 + x.
 
 ``x = 2^k m`` with m in [sqrt(1/2), sqrt(2)), ``s = (m - 1)/(m + 1)``, ``log m = 2 artanh s`` with \|s\| <= 0.1716.
 
@@ -10,14 +10,20 @@ from __future__ import annotations
 
 import math
 
-from vibsim.elementary.doubled import fast_two_sum, two_product, two_sum
+from vibsim.elementary.doubled import fast_two_sum, quotient_parts, two_product, two_sum
 from vibsim.elementary.exponential import LN_2_1, LN_2_2, LN_2_3
-from vibsim.elementary.primitives import exponent_of, mantissa_of
+from vibsim.elementary.primitives import exponent_of, mantissa_of, two_to
 
 _SQRT_2 = math.sqrt(2.0)
 _SMALLEST_NORMAL = 2.2250738585072014e-308
 _LARGEST_DOUBLE = 1.7976931348623157e308
 _TO_NORMAL = 18014398509481984.0  # 2^54
+
+_LOG_IS_ARGUMENT = 1.0e-20
+_PER_LN_10 = float.fromhex("0x1.bcb7b1526e50ep-2")
+_PER_LN_10_BEHIND = float.fromhex("0x1.95355baaafad3p-57")
+_ONE_BY_LN_2 = float.fromhex("0x1.71547652b82fep+0")
+_ONE_BY_LN_2_BEHIND = float.fromhex("0x1.777d0ffda0d24p-56")
 
 _L3 = 0.6666666666666734
 _L5 = 0.39999999999416536
@@ -58,6 +64,36 @@ def log(x: float) -> float:
     return value if x >= 0.0 else math.nan
 
 
+def log10(x: float) -> float:
+    """Return the logarithm to base 10, error below 1 unit in the last place; -inf for zero, NaN below."""
+    return log_to_base(x, _PER_LN_10, _PER_LN_10_BEHIND)
+
+
+def log2(x: float) -> float:
+    """Return the logarithm to base 2, error below 1 unit in the last place; -inf for zero, NaN below."""
+    return log_to_base(x, _ONE_BY_LN_2, _ONE_BY_LN_2_BEHIND)
+
+
+def log1p(x: float) -> float:
+    """Return ``log(1 + x)``, error below 1 unit in the last place; -inf for -1, NaN below."""
+    u, rest = two_sum(1.0, x if (x > -1.0) & (x <= _LARGEST_DOUBLE) else 0.0)
+    value, behind = log_of_sum(u, rest, 0.0)
+    value = value + behind if abs(x) > _LOG_IS_ARGUMENT else x
+    value = math.inf if x > _LARGEST_DOUBLE else value
+    value = -math.inf if x == -1.0 else value
+    return value if x >= -1.0 else math.nan
+
+
+def log_to_base(x: float, factor: float, factor_behind: float) -> float:
+    """Return the logarithm times a factor in two parts."""
+    a, behind = log_parts(x if (x > 0.0) & (x <= _LARGEST_DOUBLE) else 1.0)
+    value, error = two_product(a, factor)
+    value = value + (error + (a * factor_behind + behind * factor))
+    value = math.inf if x > _LARGEST_DOUBLE else value
+    value = -math.inf if x == 0.0 else value
+    return value if x >= 0.0 else math.nan
+
+
 def halves(x: float) -> tuple[float, float]:
     """Return k and m with ``x = 2^k m`` and m in [sqrt(1/2), sqrt(2)), for finite x > 0."""
     tiny = x < _SMALLEST_NORMAL
@@ -79,6 +115,22 @@ def log_parts(x: float) -> tuple[float, float]:
     s = f * inverse
     p, error = two_product(s, bottom)
     s_behind = (((f - p) - error) - s * bottom_behind) * inverse
+    return log_from(k, s, s_behind)
+
+
+def log_of_sum(x: float, rest: float, doublings: float) -> tuple[float, float]:
+    """Return the logarithm of ``2^doublings (x + rest)`` in two parts, for normal x and a rest within its last bit."""
+    k, m = halves(x)
+    # where the rest is too small to count it need not be right
+    rest = rest * two_to(-100.0 if k > 100.0 else -k)
+    f = m - 1.0
+    bottom, cut = fast_two_sum(2.0, f)
+    s, s_behind = quotient_parts(f, rest, bottom, cut + rest)
+    return log_from(k + doublings, s, s_behind)
+
+
+def log_from(k: float, s: float, s_behind: float) -> tuple[float, float]:
+    """Return ``k log 2 + 2 artanh(s + s_behind)`` in two parts."""
     value, behind = artanh_doubled(s, s_behind)
     value, cut = fast_two_sum(k * LN_2_1, value)
     middle, middle_behind = two_sum(k * LN_2_2, cut)

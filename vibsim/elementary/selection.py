@@ -27,6 +27,13 @@ def sign(x: float) -> float:
     return side if x == x else x
 
 
+def heaviside(x: float) -> float:
+    """Return Heaviside's step: 0 below 0, 1/2 at 0, 1 above; NaN for NaN."""
+    value = 1.0 if x > 0.0 else 0.0
+    value = 0.5 if x == 0.0 else value
+    return value if x == x else x
+
+
 def smaller(a: float, b: float) -> float:
     """Return the smaller one, `a` where they are equal; NaN where one is NaN."""
     least = b if b < a else a

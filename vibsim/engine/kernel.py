@@ -386,6 +386,9 @@ def _with_functions(module: Module, formula: Expression, suffix: str, is_rare: b
             case Compare(_, left, right) if suffix:
                 # a comparison would hide the NaN of a fast function out of its range
                 return Binary("+", node, _nothing(Binary("+", _nothing(left), _nothing(right))))
+            case Compare():
+                # as a number: a truth value knows no -0, which the fast text would give
+                return Binary("*", Number(1.0), node)
             case Call(function, arguments):
                 if function not in ELEMENTARY:
                     raise SimulationError(

@@ -1,8 +1,9 @@
 """Formulas as text: read safely, kept as a frozen tree, written out for the engine.
 
 A formula is read with Python's grammar (``**`` binds tighter than a sign on its left, ``-x**2`` is ``-(x**2)``) and an
-allow-list of what it may hold: numbers, declared names, ``+ - * / **``, comparisons, and calls of `FUNCTIONS`. Text of
-a user is never compiled or evaluated as Python.
+allow-list of what it may hold: numbers, declared names, ``+ - * / **``, comparisons, also in chains and joined by
+``and``, ``or`` and ``not``, ``yes if condition else no``, and calls of `FUNCTIONS`. Text of a user is never compiled or
+evaluated as Python.
 """
 
 from vibsim.expression.algebra import (
@@ -18,12 +19,11 @@ from vibsim.expression.algebra import (
 )
 from vibsim.expression.arrays import values
 from vibsim.expression.derivative import derivative
+from vibsim.expression.faults import MAX_DEPTH, ExpressionError
 from vibsim.expression.integral import integral
 from vibsim.expression.parser import (
     MAX_CHARACTERS,
-    MAX_DEPTH,
     MAX_POWER,
-    ExpressionError,
     literal,
     parse,
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from vibsim.expression.derivative import STEPS
 from vibsim.expression.parser import literal
 from vibsim.expression.tree import (
     Binary,
@@ -17,6 +18,8 @@ from vibsim.expression.tree import (
 )
 
 ZERO, ONE = Number(0.0), Number(1.0)
+JUMPS = STEPS | {"mod"}
+"""Functions whose derivative is that between their jumps."""
 
 
 def put(node: Expression, name: str, what: Expression) -> Expression:
@@ -31,8 +34,8 @@ def is_zero(node: Expression) -> bool:
 
 def is_multiple(node: Expression, slope: Expression, name: str) -> bool:
     """Tell whether a formula with that derivative is a factor times `name`, whatever the parameters."""
-    jumps = (part for part in walk(node) if isinstance(part, Compare) or _is_call(part, "sign"))
-    # the derivative of a jump is 0
+    # the derivative does not tell of a jump
+    jumps = (part for part in walk(node) if is_jump(part))
     if name in names_in(slope) or any(name in names_in(part) for part in jumps):
         return False
     return _is_zero_with(node, name)
@@ -57,8 +60,9 @@ def _is_zero_with(node: Expression, name: str) -> bool:
             return False
 
 
-def _is_call(node: Expression, function: str) -> bool:
-    return isinstance(node, Call) and node.function == function
+def is_jump(node: Expression) -> bool:
+    """Tell whether the value jumps where an operand varies."""
+    return isinstance(node, Compare) or (isinstance(node, Call) and node.function in JUMPS)
 
 
 def times(left: Expression, right: Expression) -> Expression:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -23,16 +24,33 @@ _OPERATORS: Mapping[str, Callable[..., Any]] = {
     "==": np.equal,
     "!=": np.not_equal,
 }
+
+
+def _by_scipy(name: str) -> Callable[..., Any]:
+    """Return a function of SciPy, which is imported when it is called."""
+    return lambda x: getattr(import_module("scipy.special"), name)(x)
+
+
+_SAME_NAME = (
+    *("abs", "cbrt", "ceil", "cos", "cosh", "exp", "expm1", "floor", "hypot", "log", "log10"),
+    *("log1p", "log2", "mod", "sign", "sin", "sinh", "sqrt", "tan", "tanh"),
+)
 _FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "acos": np.arccos,
+    "acosh": np.arccosh,
     "asin": np.arcsin,
+    "asinh": np.arcsinh,
     "atan": np.arctan,
     "atan2": np.arctan2,
+    "atanh": np.arctanh,
+    "erf": _by_scipy("erf"),
+    "erfc": _by_scipy("erfc"),
+    "heaviside": lambda x: np.heaviside(x, 0.5),
     "max": np.maximum,
     "min": np.minimum,
+    "round": np.rint,
     "where": lambda condition, yes, no: np.where(condition != 0.0, yes, no),
-    **{name: getattr(np, name) for name in ("abs", "cos", "cosh", "exp", "log", "sign")},
-    **{name: getattr(np, name) for name in ("sin", "sinh", "sqrt", "tan", "tanh")},
+    **{name: getattr(np, name) for name in _SAME_NAME},
 }
 
 

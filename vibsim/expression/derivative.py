@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 
 from vibsim.expression.parser import literal
@@ -16,13 +17,16 @@ from vibsim.expression.tree import (
 )
 
 ZERO, ONE, TWO = Number(0.0), Number(1.0), Number(2.0)
+PER_LN_2, PER_LN_10 = 1.4426950408889634, 0.4342944819032518
+STEPS = frozenset({"ceil", "floor", "heaviside", "round", "sign"})
+"""Functions that are constant but for jumps."""
 
 
 def derivative(node: Expression, name: str) -> Expression:
     """Return the derivative of a formula by one of its names.
 
-    Where a formula has a corner (``abs``, ``min``, ``max``, ``sign``, ``where``, a comparison) the derivative is that
-    of the branch taken; jumps count as flat.
+    Where a formula has a corner or a jump (``abs``, ``min``, ``max``, ``mod``, ``where``, a comparison, one of `STEPS`)
+    the derivative is that of the branch taken; jumps count as flat.
     """
     match node:
         case Name(own):
@@ -83,6 +87,11 @@ def _over_leg(x: Expression) -> Expression:
     return Binary("/", ONE, _call("sqrt", product))
 
 
+def _bell(x: Expression) -> Expression:
+    """Return ``2/sqrt(pi) exp(-x^2)``, the derivative of the error function."""
+    return Binary("*", Number(2.0 / math.sqrt(math.pi)), _call("exp", Negate(_square(x))))
+
+
 _OUTER: Mapping[str, Callable[[Expression, Expression], Expression]] = {
     "sin": lambda x, f: _call("cos", x),
     "cos": lambda x, f: Negate(_call("sin", x)),
@@ -96,6 +105,22 @@ _OUTER: Mapping[str, Callable[[Expression, Expression], Expression]] = {
     "asin": lambda x, f: _over_leg(x),
     "acos": lambda x, f: Negate(_over_leg(x)),
     "atan": lambda x, f: Binary("/", ONE, Binary("+", ONE, _square(x))),
+    # sqrt(1 + x**2) overflows before its inverse vanishes
+    "asinh": lambda x, f: Binary("/", ONE, _call("hypot", ONE, x)),
+    # a product of roots, which has no value below 1
+    "acosh": lambda x, f: Binary(
+        "/",
+        ONE,
+        Binary("*", _call("sqrt", Binary("-", x, ONE)), _call("sqrt", Binary("+", x, ONE))),
+    ),
+    "atanh": lambda x, f: Binary("/", ONE, Binary("*", Binary("-", ONE, x), Binary("+", ONE, x))),
+    "log10": lambda x, f: Binary("/", Number(PER_LN_10), x),
+    "log2": lambda x, f: Binary("/", Number(PER_LN_2), x),
+    "log1p": lambda x, f: Binary("/", ONE, Binary("+", ONE, x)),
+    "expm1": lambda x, f: _call("exp", x),
+    "cbrt": lambda x, f: Binary("/", Number(1.0 / 3.0), _square(f)),
+    "erf": lambda x, f: _bell(x),
+    "erfc": lambda x, f: Negate(_bell(x)),
     "sqrt": lambda x, f: Binary("/", Number(0.5), f),
     "abs": lambda x, f: _call("sign", x),
 }
@@ -106,7 +131,7 @@ def _of_call(
     node: Expression, function: str, arguments: tuple[Expression, ...], name: str
 ) -> Expression:
     inner = [derivative(argument, name) for argument in arguments]
-    if all(entry == ZERO for entry in inner) or function == "sign":
+    if all(entry == ZERO for entry in inner) or function in STEPS:
         return ZERO
     if function in _OUTER:
         return _times(_OUTER[function](arguments[0], node), inner[0])
@@ -120,6 +145,16 @@ def _of_call(
         length = Binary("+", _square(first), _square(second))
         turned = _sum("-", _times(second, inner[0]), _times(first, inner[1]))
         return _over(turned, length)
+    if function == "hypot":
+        return _sum(
+            "+",
+            _times(Binary("/", first, node), inner[0]),
+            _times(Binary("/", second, node), inner[1]),
+        )
+    if function == "mod":
+        # the whole number that mod has taken away, which a rounded quotient may miss by 1
+        taken = _call("round", Binary("/", Binary("-", first, node), second))
+        return _sum("-", inner[0], _times(taken, inner[1]))
     raise NotImplementedError(f"{function} has no derivative here")
 
 

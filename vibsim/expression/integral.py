@@ -1,18 +1,22 @@
 """Integrals of formulas, as formulas: the potential energy of a spring.
 
 The integral is taken from 0, in forms that do not cancel there: a small energy has all its digits. A sum is integrated
-term by term; a term is a constant factor times a power of x, or a function of the table below of ``a x``. Anything else
-is integrated by Gauss and Legendre's rule between 0 and x, written out as a formula: right to round-off for a function
-that is smooth there, even if it has a corner at 0.
+term by term; a term is a constant factor times a power of x, or a function of the table (`antiderivative`) of ``a x``.
+What has a corner or jumps is integrated for ``a x + b`` too, though the difference ``F(a x + b) - F(b)`` may cost a
+small energy some digits; what holds on one side of a place alone is integrated up to that place or from there. Anything
+else is integrated by Gauss and Legendre's rule between 0 and x, written out as a formula: right to round-off for a
+function that is smooth there, even if it has a corner at 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
 
+from vibsim.expression.antiderivative import BROKEN, SMOOTH, of_mod, ramp, ramp_integral
+from vibsim.expression.linear import factor_of, slope_of, start_of
 from vibsim.expression.parser import literal
 from vibsim.expression.tree import (
     Binary,
@@ -24,13 +28,14 @@ from vibsim.expression.tree import (
     Number,
     names_in,
     rebuilt,
+    walk,
 )
 
-ONE, TWO, HALF = Number(1.0), Number(2.0), Number(0.5)
+ZERO, ONE, TWO, HALF = Number(0.0), Number(1.0), Number(2.0), Number(0.5)
 POINTS = 24
 """Points of the rule: polynomials up to degree 47 are integrated exactly."""
-SMALL = 0.3
-"""Below, log cosh is a series."""
+MAX_CONDITIONS = 4
+"""Most conditions inside one that decides of a part: each of them doubles the text of the integral."""
 
 
 def integral(node: Expression, name: str) -> Expression:
@@ -69,78 +74,103 @@ def _found(node: Expression, name: str) -> Expression | None:
                 return None
             raised = Binary("**", base, Number(power + 1.0))
             return Binary("/", raised, Number(power + 1.0))
-        case Call(function, (argument,)) if function in _OF_MULTIPLE:
-            factor = _factor(argument, name)
-            if factor is None:
-                return None
-            return Binary("/", _OF_MULTIPLE[function](argument), factor)
+        case Call(function, (argument,)) if function in SMOOTH:
+            factor = factor_of(argument, name)
+            return None if factor is None else Binary("/", SMOOTH[function](argument), factor)
         case _:
-            return None
+            return _of_broken(node, name)
 
 
-def _factor(node: Expression, name: str) -> Expression | None:
-    """Return the a of a formula ``a x``; None where it is another one."""
+def _of_broken(node: Expression, name: str) -> Expression | None:
+    """Return the integral of what has a corner or jumps."""
     match node:
-        case Name(own) if own == name:
-            return ONE
-        case Negate(operand):
-            inner = _factor(operand, name)
-            return None if inner is None else Negate(inner)
-        case Binary("*", left, right) if name not in names_in(left):
-            inner = _factor(right, name)
-            return None if inner is None else _times(left, inner)
-        case Binary("*", left, right) if name not in names_in(right):
-            inner = _factor(left, name)
-            return None if inner is None else _times(right, inner)
-        case Binary("/", left, right) if name not in names_in(right):
-            inner = _factor(left, name)
-            return None if inner is None else Binary("/", inner, right)
+        case Call(function, (argument,)) if function in BROKEN:
+            return _of_linear(BROKEN[function], argument, name)
+        case Call("mod", (argument, period)) if name not in names_in(period):
+            return _of_linear(lambda x: of_mod(x, period), argument, name)
+        case Call("max" | "min" as function, (left, right)) if _is_in_one(left, right, name):
+            # max(a, b) = b + max(a - b, 0), min(a, b) = a - max(a - b, 0)
+            base, symbol = (right, "+") if function == "max" else (left, "-")
+            first = _found(base, name)
+            second = _of_linear(ramp_integral, Binary("-", left, right), name)
+            return None if first is None or second is None else Binary(symbol, first, second)
+        case Compare("<" | "<=", left, right) if _is_in_one(left, right, name):
+            return _of_linear(ramp, Binary("-", right, left), name)
+        case Compare(">" | ">=", left, right) if _is_in_one(left, right, name):
+            return _of_linear(ramp, Binary("-", left, right), name)
+        case Binary("**", Call("max", (argument, Number(0.0))), exponent):
+            more = Number((literal(exponent) or -1.0) + 1.0)
+            if more.value <= 1.0:
+                return None
+            return _of_linear(
+                lambda x: Binary("/", Binary("**", ramp(x), more), more), argument, name
+            )
+        case Call("where", (condition, yes, no)) if name not in names_in(condition):
+            first, second = _found(yes, name), _found(no, name)
+            if first is None or second is None:
+                return None
+            return Call("where", (condition, first, second))
+        case Call("where", (condition, yes, no)):
+            first = _of_part(yes, condition, 1.0, name)
+            second = _of_part(no, condition, -1.0, name)
+            return None if first is None or second is None else Binary("+", first, second)
+        case Binary("*", left, right):
+            return _of_part(left, right, 1.0, name) or _of_part(right, left, 1.0, name)
         case _:
             return None
 
 
-def _times(left: Expression, right: Expression) -> Expression:
-    return left if right == ONE else Binary("*", left, right)
+def _of_part(node: Expression, condition: Expression, side: float, name: str) -> Expression | None:
+    """Return the integral of a formula where a condition ``a x + b > 0`` holds (side 1), or where it does not (-1).
 
-
-def _of_halves(first: str, second: str) -> Callable[[Expression], Expression]:
-    """Return a function that writes ``2 first(x/2) second(x/2)``."""
-
-    def write(x: Expression) -> Expression:
-        half = Binary("*", HALF, x)
-        return Binary("*", TWO, Binary("*", Call(first, (half,)), Call(second, (half,))))
-
-    return write
-
-
-def _log_cosh(x: Expression) -> Expression:
-    """Write ``log(cosh(x))`` so that it overflows nowhere and has all its digits near 0.
-
-    It is ``|x| + log((1 + exp(-2 |x|))/2)``, and with ``z = y/(2 + y)``, ``y = sinh(x)**2``, also artanh(z).
+    On one side of the place c, where H is the integral of the formula, it is ``H(max(x, c)) - H(max(0, c))``, on the
+    other the same with ``min``.
     """
-    size = Call("abs", (x,))
-    decay = Call("exp", (Negate(Binary("*", TWO, size)),))
-    beyond = Binary("+", size, Call("log", (Binary("*", HALF, Binary("+", ONE, decay)),)))
-    y = Binary("**", Call("sinh", (x,)), TWO)
-    z = Binary("/", y, Binary("+", TWO, y))
-    square = Binary("**", z, TWO)
-    series: Expression = Binary("/", ONE, Number(13.0))
-    for k in (11.0, 9.0, 7.0, 5.0, 3.0, 1.0):
-        series = Binary("+", Binary("/", ONE, Number(k)), Binary("*", square, series))
-    return Call("where", (Compare("<", size, Number(SMALL)), Binary("*", z, series), beyond))
+    match condition:
+        case Compare("<" | "<=", left, right):
+            difference = Binary("-", right, left)
+        case Compare(">" | ">=", left, right):
+            difference = Binary("-", left, right)
+        case Call("heaviside", (argument,)):
+            difference = Binary("-", argument, ZERO)
+        case _:
+            return None
+    inside = sum(isinstance(part, Compare | Call) for part in walk(node))
+    slope = literal(slope_of(difference, name) or ZERO)
+    whole = _found(node, name) if inside <= MAX_CONDITIONS else None
+    if not slope or whole is None:
+        return None
+    place = Binary("/", Negate(start_of(difference, name)), _number(slope))
+    function = "max" if slope * side > 0.0 else "min"
+
+    def up_to(end: Expression) -> Expression:
+        limit = Call(function, (end, place))
+        return rebuilt(whole, lambda part: limit if part == Name(name) else part)
+
+    return Binary("-", up_to(Name(name)), up_to(ZERO))
 
 
-_OF_MULTIPLE: Mapping[str, Callable[[Expression], Expression]] = {
-    "sin": _of_halves("sin", "sin"),
-    "cos": lambda x: Call("sin", (x,)),
-    "exp": _of_halves("exp", "sinh"),
-    "sinh": _of_halves("sinh", "sinh"),
-    "cosh": lambda x: Call("sinh", (x,)),
-    "tanh": _log_cosh,
-    "abs": lambda x: Binary("*", HALF, Binary("*", x, Call("abs", (x,)))),
-    "sign": lambda x: Call("abs", (x,)),
-}
-"""Integral of a function of one argument ``a x`` from 0, times a."""
+def _number(value: float) -> Expression:
+    return Number(value) if value >= 0.0 else Negate(Number(-value))
+
+
+def _is_in_one(left: Expression, right: Expression, name: str) -> bool:
+    """Whether only one of two formulas has the name, so that the slopes of a difference cannot cancel."""
+    return (name in names_in(left)) != (name in names_in(right))
+
+
+def _of_linear(
+    write: Callable[[Expression], Expression], argument: Expression, name: str
+) -> Expression | None:
+    """Return the integral of a function of ``a x + b`` whose antiderivative is given; None for other arguments."""
+    factor = factor_of(argument, name)
+    if factor is not None:
+        return Binary("/", write(argument), factor)
+    factor = slope_of(argument, name)
+    if factor is None:
+        return None
+    start = write(start_of(argument, name))
+    return Binary("/", Binary("-", write(argument), start), factor)
 
 
 @cache

@@ -8,7 +8,17 @@ import re
 import warnings
 from collections.abc import Collection
 
-from vibsim.errors import VibsimError, nearest
+from vibsim.errors import nearest
+from vibsim.expression.faults import (
+    INSTEAD,
+    MAX_DEPTH,
+    OTHER_NAMES,
+    REFUSED,
+    TOO_DEEP,
+    ExpressionError,
+    place_of_fault,
+    shorten,
+)
 from vibsim.expression.tree import (
     CONSTANTS,
     FUNCTIONS,
@@ -20,10 +30,10 @@ from vibsim.expression.tree import (
     Negate,
     Number,
     children,
+    walk,
 )
 
 MAX_CHARACTERS = 2000
-MAX_DEPTH = 100
 MAX_POWER = 1024
 """Largest whole exponent: it is written out as multiplications."""
 
@@ -44,59 +54,6 @@ _COMPARE: dict[type[ast.cmpop], str] = {
 }
 _FOREIGN = re.compile(r"[^A-Za-z0-9_.+\-*/()<>=!, ]")
 _NUMBER = re.compile(r"(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
-_JOINED = re.compile(r"(?<![A-Za-z0-9_.])(\d+\.?\d*|\.\d+)(?=[A-Za-z_])(?![eE][+-]?\d)")
-"""A number that runs into a name: a forgotten ``*``."""
-_UNFINISHED = "+-*/<>=!,("
-_INSTEAD = {
-    "^": "write ** for a power",
-    "\u00d7": "write *",
-    "\u00b7": "write *",
-    "\u22c5": "write *",
-    "\u2212": "write -",
-    "\u2013": "write -",
-    "\u00f7": "write /",
-    "\u00b2": "write **2",
-    "\u00b3": "write **3",
-    "\u03c0": "write pi",
-}
-_REFUSED: dict[type[ast.AST], str] = {
-    ast.Attribute: "attribute access is not allowed",
-    ast.BoolOp: "'and' and 'or' are not allowed",
-    ast.IfExp: "'if' is not allowed; use where(condition, yes, no)",
-    ast.Tuple: "a list of values is not allowed",
-    ast.Lambda: "'lambda' is not allowed",
-    ast.Starred: "'*' is not allowed before an argument",
-    ast.NamedExpr: "':=' is not allowed",
-}
-
-
-class ExpressionError(VibsimError):
-    """A formula that is refused.
-
-    Parameters
-    ----------
-    text
-        The formula.
-    position
-        Where in `text`, from 0.
-    rule
-        What is wrong, or what was expected there.
-    hint
-        The nearest valid choice; may be empty.
-    """
-
-    def __init__(self, text: str, position: int, rule: str, hint: str = "") -> None:
-        self.text = text
-        self.position = position
-        self.rule = rule
-        self.hint = hint
-        where = f"formula '{shorten(text)}', character {position + 1}"
-        super().__init__(": ".join(part for part in (where, rule, hint) if part))
-
-
-def shorten(text: str, length: int = 60) -> str:
-    """Return `text`, cut to `length` characters."""
-    return text if len(text) <= length else text[: length - 3] + "..."
 
 
 def parse(text: str, names: Collection[str]) -> Expression:
@@ -121,7 +78,7 @@ def parse(text: str, names: Collection[str]) -> Expression:
     if foreign := _FOREIGN.search(plain):
         character = foreign.group()
         rule = f"character {character!r} is not allowed in a formula"
-        raise ExpressionError(text, foreign.start(), rule, _INSTEAD.get(character, ""))
+        raise ExpressionError(text, foreign.start(), rule, INSTEAD.get(character, ""))
     if not plain.strip():
         raise ExpressionError(text, 0, "is empty; expected a number, a name or '('")
     reader = _Reader(text, plain, frozenset(names))
@@ -146,34 +103,16 @@ class _Reader:
                 warnings.simplefilter("error")
                 return ast.parse(self.body, mode="eval").body
         except SyntaxError as error:
-            raise self.syntax(error) from None
+            raise self.at(*place_of_fault(self.body.rstrip(), error)) from None
         except (ValueError, RecursionError, MemoryError, Warning):
             raise ExpressionError(self.text, 0, "is not a formula, or nested too deeply") from None
-
-    def syntax(self, error: SyntaxError) -> ExpressionError:
-        """Say what was expected where; Python's own messages speak of programs."""
-        body = self.body.rstrip()
-        if joined := _JOINED.search(body):
-            hint = f"write {joined.group()}*{body[joined.end()]}..."
-            return self.at(joined.end(), "expected an operator", hint)
-        lonely = unpaired(body)
-        if lonely is not None:
-            return self.at(lonely, "has a parenthesis without its partner")
-        if "too many nested" in str(error.msg):
-            return self.at(0, f"must not nest deeper than {MAX_DEPTH} operations")
-        # a text that is cut short is reported at its beginning, or past its end
-        if body[-1] in _UNFINISHED:
-            return self.at(len(body), "ends where a number, a name or '(' was expected")
-        position = min(max((error.offset or 1) - 1, 0), len(body) - 1)
-        return self.at(position, "expected an operator, a number, a name or a parenthesis here")
 
     def at(self, position: int, rule: str, hint: str = "") -> ExpressionError:
         return ExpressionError(self.text, position + self.shift, rule, hint)
 
     def convert(self, node: ast.expr, depth: int) -> Expression:
         if depth >= MAX_DEPTH:
-            rule = f"must not nest deeper than {MAX_DEPTH} operations"
-            raise self.fault(node, rule, "group long sums with parentheses")
+            raise self.fault(node, TOO_DEEP, "group long sums with parentheses")
         match node:
             case ast.Constant():
                 return self.number(node)
@@ -183,13 +122,21 @@ class _Reader:
                 return Negate(self.convert(node.operand, depth + 1))
             case ast.UnaryOp(op=ast.UAdd()):
                 return self.convert(node.operand, depth + 1)
+            case ast.UnaryOp(op=ast.Not()):
+                return Binary("-", Number(1.0), self.condition(node.operand, depth + 1))
+            case ast.BoolOp():
+                return self.joined(node, depth)
+            case ast.IfExp():
+                parts = (node.test, node.body, node.orelse)
+                return Call("where", tuple(self.convert(part, depth + 1) for part in parts))
             case ast.BinOp() if type(node.op) in _BINARY:
                 return self.binary(node, depth)
             case ast.Compare():
                 return self.compare(node, depth)
             case ast.Call():
                 return self.call(node, depth)
-        what = _REFUSED.get(type(node), "this operation is not allowed")
+        kind = type(node.op) if isinstance(node, ast.BinOp) else type(node)
+        what = REFUSED.get(kind, "this operation is not allowed")
         raise self.fault(node, what, "a formula has numbers, names, + - * / ** and functions")
 
     def number(self, node: ast.Constant) -> Number:
@@ -222,13 +169,34 @@ class _Reader:
         return Binary(_BINARY[type(node.op)], left, right)
 
     def compare(self, node: ast.Compare, depth: int) -> Expression:
-        if len(node.ops) > 1:
-            raise self.fault(node, "comparisons cannot be chained")
-        operator = _COMPARE.get(type(node.ops[0]))
-        if operator is None:
+        """Read a comparison; a chained one is the product of its links."""
+        if any(type(operator) not in _COMPARE for operator in node.ops):
             raise self.fault(node, "'in' and 'is' are not allowed", "compare with < <= > >= == !=")
-        left = self.convert(node.left, depth + 1)
-        return Compare(operator, left, self.convert(node.comparators[0], depth + 1))
+        # a tree as deep as the product of the links
+        below = depth + 1 + (len(node.ops) - 1).bit_length()
+        sides = [self.convert(side, below) for side in (node.left, *node.comparators)]
+        for side, written in zip(sides[1:-1], node.comparators, strict=False):
+            # it stands in two links: chains within chains would double and double
+            if any(isinstance(part, Compare) for part in walk(side)):
+                hint = "join two comparisons with and"
+                raise self.fault(written, "a comparison within a chain of comparisons", hint)
+        signs = [_COMPARE[type(operator)] for operator in node.ops]
+        return _paired("*", list(map(Compare, signs, sides[:-1], sides[1:])))
+
+    def joined(self, node: ast.BoolOp, depth: int) -> Expression:
+        """Read ``and`` as a product, ``or`` as the largest."""
+        below = depth + (len(node.values) - 1).bit_length()
+        values = [self.condition(value, below) for value in node.values]
+        return _paired("*" if isinstance(node.op, ast.And) else "max", values)
+
+    def condition(self, node: ast.expr, depth: int) -> Expression:
+        """Read what is 1 or 0."""
+        match node:
+            case ast.Compare() | ast.BoolOp() | ast.UnaryOp(op=ast.Not()):
+                return self.convert(node, depth)
+        raise self.fault(
+            node, "'and', 'or' and 'not' need comparisons", "write x != 0 for a number"
+        )
 
     def call(self, node: ast.Call, depth: int) -> Expression:
         if not isinstance(node.func, ast.Name):
@@ -236,7 +204,9 @@ class _Reader:
         function = node.func.id
         if function not in FUNCTIONS:
             rule = f"unknown function '{shorten(function)}'"
-            raise self.fault(node, rule, nearest(function, sorted(FUNCTIONS)))
+            known = OTHER_NAMES.get(function)
+            hint = f"write {known}" if known else nearest(function, sorted(FUNCTIONS))
+            raise self.fault(node, rule, hint)
         if node.keywords:
             raise self.fault(node, f"{function} takes no arguments by keyword")
         wanted = FUNCTIONS[function][0]
@@ -245,17 +215,15 @@ class _Reader:
         return Call(function, tuple(self.convert(argument, depth + 1) for argument in node.args))
 
 
-def unpaired(text: str) -> int | None:
-    """Return where a parenthesis without its partner stands, None where there is none."""
-    opened: list[int] = []
-    for position, character in enumerate(text):
-        if character == "(":
-            opened.append(position)
-        elif character == ")" and not opened:
-            return position
-        elif character == ")":
-            opened.pop()
-    return opened[-1] if opened else None
+def _paired(operation: str, terms: list[Expression]) -> Expression:
+    """Return terms joined in pairs, so that the tree stays flat: by ``*``, or a function of two arguments."""
+    while len(terms) > 1:
+        pairs = zip(terms[::2], terms[1::2], strict=False)
+        odd = terms[len(terms) - len(terms) % 2 :]
+        terms = [
+            Binary("*", *pair) if operation == "*" else Call(operation, pair) for pair in pairs
+        ] + odd
+    return terms[0]
 
 
 def literal(node: Expression) -> float | None:

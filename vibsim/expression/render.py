@@ -12,7 +12,8 @@ from collections.abc import Callable, Mapping
 from itertools import accumulate
 
 from vibsim.elementary import ELEMENTARY
-from vibsim.expression.parser import MAX_POWER, ExpressionError, literal, parse
+from vibsim.expression.faults import ExpressionError
+from vibsim.expression.parser import MAX_POWER, literal, parse
 from vibsim.expression.tree import (
     FUNCTIONS,
     Binary,
@@ -88,6 +89,12 @@ def _value(node: Expression, values: Mapping[str, float]) -> float:
             return _power(_value(base, values), _value(exponent, values))
         case Binary(symbol, left, right) | Compare(symbol, left, right):
             return float(_OPERATORS[symbol](_value(left, values), _value(right, values)))
+        case Call("where", (condition, yes, no)):
+            # the other one need not exist
+            chosen = _value(condition, values)
+            if math.isnan(chosen):
+                raise ValueError
+            return _value(yes if chosen != 0.0 else no, values)
         case Call(function, arguments):
             found = [_value(argument, values) for argument in arguments]
             return _existing(FUNCTIONS[function][1](*found))

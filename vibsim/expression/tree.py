@@ -62,7 +62,7 @@ CONSTANTS: Mapping[str, float] = {"pi": math.pi, "e": math.e}
 """Names that stand for a number wherever a formula does not declare them otherwise."""
 
 
-_ARGUMENTS = {"atan2": 2, "max": 2, "min": 2, "where": 3}
+_ARGUMENTS = {"atan2": 2, "hypot": 2, "max": 2, "min": 2, "mod": 2, "where": 3}
 
 FUNCTIONS: Mapping[str, tuple[int, Callable[..., float]]] = {
     name: (_ARGUMENTS.get(name, 1), function.full)

@@ -11,13 +11,16 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.expression import Expression, parse
 from vibsim.models.events import Events
+
+if TYPE_CHECKING:
+    from vibsim.models.scales import Scales
 
 Floats = NDArray[np.float64]
 Numbers = Mapping[str, Any]
@@ -79,6 +82,8 @@ class FormulaField:
     description: str
     terms: Mapping[str, str] = field(default_factory=dict, hash=False)
     """Formulas with one coefficient b that may be written as ``{word: number}``."""
+    term_units: Mapping[str, str] = field(default_factory=dict, hash=False)
+    """The unit of b in each of them."""
 
 
 @dataclass(frozen=True)
@@ -139,6 +144,8 @@ class Model:
     """What a user writes as formulas."""
     written: Callable[[Mapping[str, str], tuple[str, ...]], Model] | None = None
     """The model of such formulas, by name, with declared parameters; see `vibsim.models.oscillator`."""
+    scales: Scales | None = None
+    """Its characteristic scales, where it has any."""
 
     @property
     def position(self) -> str:

@@ -31,7 +31,9 @@ from vibsim.models.base import (
     State,
     declared_parameters,
 )
+from vibsim.models.linear_scales import linear_scales
 from vibsim.models.mechanical import Forces, mechanical
+from vibsim.models.scales import Scales
 
 STATES = (State("i", "A", "current"), State("di_dt", "A s-1", "rate of change of the current"))
 PARAMETERS = (
@@ -98,9 +100,16 @@ def circuit(voltage: str, declared: tuple[str, ...], terms: frozenset[str]) -> M
         ),
         formulas=FORMULAS,
         written=written,
+        scales=_scales(forces),
         optional=("R",),
         variant=partial(circuit, voltage, declared),
     )
+
+
+def _scales(forces: Forces) -> Scales | None:
+    """Return the scales of the current, with the energy of the coil in place of that of a spring."""
+    found = linear_scales(forces)
+    return found and replace(found, energy="L*i_c**2")
 
 
 CIRCUIT = replace(written({}, ()), equation="L i'' + R i' + i/C = V'(t)")

@@ -11,7 +11,7 @@ from typing import Any
 
 from vibsim.models.base import Floats, Model, Numbers
 from vibsim.models.harmonic import motion, period
-from vibsim.models.pendulum import PARAMETERS, STATES, natural_frequency
+from vibsim.models.pendulum import PARAMETERS, SCALES, STATES, natural_frequency
 
 
 def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
@@ -42,4 +42,5 @@ LINEAR_PENDULUM = Model(
     natural_frequency=natural_frequency,
     exact=exact,
     exact_period=exact_period,
+    scales=SCALES,
 )

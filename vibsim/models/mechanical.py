@@ -35,6 +35,7 @@ from vibsim.expression import (
 from vibsim.models.base import Damping, Floats, Model, Numbers, Parameter, State
 from vibsim.models.forced import exponentials, forced_motion, is_sum_of_exponentials
 from vibsim.models.harmonic import period
+from vibsim.models.linear_scales import linear_scales
 
 STATES = (State("u", "m", "displacement"), State("v", "m s-1", "velocity"))
 
@@ -128,6 +129,7 @@ def mechanical(
         "dissipation": times(forces.damping, velocity) if forces.is_damped else None,
         "driving": times(forces.force, velocity) if forces.is_driven else None,
         "exact": linear_motion(forces, numbers),
+        "scales": linear_scales(forces),
         "exact_period": _period(forces, natural_frequency)
         if is_free and forces.is_linear
         else None,

@@ -23,13 +23,13 @@ from typing import Any
 import numpy as np
 
 from vibsim.expression import (
+    Compare,
     Expression,
     ExpressionError,
     Name,
     derivative,
     is_zero,
     minus,
-    names_in,
     parse,
     plus,
     put,
@@ -55,7 +55,12 @@ FORMULAS = (
         "spring", ("u",), "u", "force s(u) of the spring [N], positive where it pulls back"
     ),
     FormulaField(
-        "damping", ("v",), "0", "damping force f(v) [N], positive where it opposes v > 0", TERMS
+        "damping",
+        ("v",),
+        "0",
+        "damping force f(v) [N], positive where it opposes v > 0",
+        TERMS,
+        UNITS,
     ),
     FormulaField("force", ("t",), "0", "driving force F(t) [N]"),
     FormulaField("exact", ("t",), "", "exact solution u(t) [m], from which the force then follows"),
@@ -223,20 +228,17 @@ def _equation(own: Written) -> str:
     """Return the equation of motion as a user would write it."""
     terms = ["m u''"]
     if not is_zero(own.damping):
-        terms.append(to_formula(own.damping).replace("v", "u'") if _is_plain(own) else "f(u')")
-    terms.append(to_formula(own.spring))
+        terms.append(_term(put(own.damping, "v", Name("u'"))))
+    terms.append(_term(own.spring))
     sides = " + ".join(terms).replace("+ -", "- ")
     told = f"{sides} = {to_formula(own.force)}" if own.exact is None else f"{sides} = F(t)"
-    if "f(u')" in terms:
-        told += f", f(v) = {to_formula(own.damping)}"
     if own.exact is not None:
         told += f", with F such that u = {to_formula(own.exact)}"
     return told
 
 
-def _is_plain(own: Written) -> bool:
-    """Whether no other name of the damping has a v in it."""
-    return all(name == "v" or "v" not in name for name in names_in(own.damping))
+def _term(node: Expression) -> str:
+    return f"({to_formula(node)})" if isinstance(node, Compare) else to_formula(node)
 
 
 OSCILLATOR = replace(written({}, ()), equation="m u'' + f(u') + s(u) = F(t)")

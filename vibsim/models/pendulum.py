@@ -20,6 +20,7 @@ import numpy as np
 
 from vibsim.models.base import Damping, Model, Numbers, Output, Parameter, State
 from vibsim.models.elliptic import pendulum_motion, pendulum_period
+from vibsim.models.scales import Scales
 
 STATES = (
     State("theta", "rad", "angle from the downward vertical"),
@@ -39,6 +40,14 @@ DRAGGED = "theta'' = -drag abs(theta') theta' - (g/L) sin(theta)"
 WEIGHT = "-(g/L)*sin(theta)"
 WIRE = Output("wire_force", "N", "force in the wire", "m*g*cos(theta) + m*L*omega**2")
 AIR = Output("drag_force", "N", "drag force on the bob", "-m*L*drag*abs(omega)*omega")
+
+SCALES = Scales(
+    time="sqrt(L/g)",
+    position="1",
+    energy="m*g*L",
+    parameters=(("g", "1"), ("L", "1"), ("m", "1")),
+)
+"""Those in which g = L = m = 1 (A, section 1.2); the drag number is the same in all."""
 
 
 def natural_frequency(parameters: Numbers) -> Any:
@@ -78,6 +87,12 @@ def pendulum(terms: frozenset[str]) -> Model:
         linear=False,
         natural_frequency=natural_frequency,
         turn=2 * math.pi,
+        scales=replace(
+            SCALES,
+            numbers=(("alpha", DRAG.name),) if DRAG.name in terms else (),
+            parameters=(*(SCALES.parameters or ()), (DRAG.name, DRAG.name)),
+            outputs=((WIRE.name, "m*g"), (AIR.name, "m*g")),
+        ),
         optional=(DRAG.name,),
         variant=pendulum,
         **(dragged if DRAG.name in terms else free),

@@ -17,6 +17,7 @@ import numpy as np
 from vibsim.models.base import Damping, Floats, Model, Numbers, Output, Parameter
 from vibsim.models.elliptic import pendulum_motion, pendulum_period
 from vibsim.models.pendulum import STATES
+from vibsim.models.scales import Scales
 
 PARAMETERS = (
     Parameter(
@@ -35,6 +36,12 @@ PIVOT = Output(
     "pivot_force", "N", "force along the rod in the pivot", "m*g*cos(theta) + m*L*omega**2"
 )
 AIR = Output("drag_moment", "N m", "moment of the air resistance", "-drag*abs(omega)*omega")
+SCALES = Scales(
+    time="sqrt(inertia/(m*g*L))",
+    position="1",
+    energy="m*g*L",
+    outputs=(("pivot_force", "m*g"), ("drag_moment", "m*g*L")),
+)
 
 
 def natural_frequency(parameters: Numbers) -> Any:
@@ -90,6 +97,7 @@ def physical_pendulum(terms: frozenset[str]) -> Model:
         linear=False,
         natural_frequency=natural_frequency,
         turn=2 * math.pi,
+        scales=replace(SCALES, numbers=(("alpha", "drag/inertia"),)) if "drag" in terms else SCALES,
         optional=("drag",),
         variant=physical_pendulum,
         **(dragged if "drag" in terms else free),

@@ -13,6 +13,7 @@ from typing import Any
 
 from vibsim.models.base import Floats, Model, Numbers, Parameter, State
 from vibsim.models.harmonic import motion, period
+from vibsim.models.scales import Scales
 
 
 def natural_frequency(parameters: Numbers) -> Any:
@@ -47,4 +48,12 @@ SPRING = Model(
     natural_frequency=natural_frequency,
     exact=exact,
     exact_period=exact_period,
+    # B, section 10.1; without an initial position the amplitude is V/w
+    scales=Scales(
+        time="1/w",
+        position="where(u != 0, abs(u), abs(v)/w)",
+        energy="(w*u_c)**2",
+        numbers=(("beta", "v/(w*u)"),),
+        parameters=(("w", "1"),),
+    ),
 )

@@ -89,7 +89,7 @@ def extrapolated(content: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in content.items() if key not in _NOT_EXTRAPOLATED}
 
 
-_NOT_EXTRAPOLATED = ("title", "source", "checks", "published")
+_NOT_EXTRAPOLATED = ("title", "source", "checks", "published", "units")
 
 
 @cache

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _NOT_SIMULATED = (
     *("title", "source", "checks", "levels", "samples", "sweep"),
-    *("output", "tolerance", "published"),
+    *("output", "tolerance", "published", "units"),
 )
 
 

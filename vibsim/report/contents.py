@@ -21,6 +21,7 @@ from vibsim.report.data import (
     sound_pairs,
     steps_of,
     swept,
+    time_unit,
     unit,
     whole,
 )
@@ -63,7 +64,7 @@ def orders(
     measure, sweep = norm_unit(record, quantity, norm), bool(swept(record))
     columns = (
         Column("scheme"), *([Column("member")] if sweep else []), Column("level", form="integer"),
-        Column("steps", form="integer"), Column("dt", unit(record, "dt") or "s", "step"),
+        Column("steps", form="integer"), Column("dt", time_unit(record, "dt"), "step"),
         Column("difference", measure, "norm"), Column("ratio", form="order"), Column("order", form="order"),
         Column("true error", measure, "norm"), Column("floor", measure, "norm"), Column("counts"),
     )  # fmt: skip
@@ -221,7 +222,7 @@ def failures(summary: Mapping[str, Any], record: Record) -> Table | None:
         return None
     columns = (
         Column("scheme"), Column("level", form="integer"), Column("case", form="integer"), Column("member"),
-        Column("t", "s", "step"), Column("step", form="integer"), Column("error"),
+        Column("t", time_unit(record), "step"), Column("step", form="integer"), Column("error"),
     )  # fmt: skip
     rows = tuple(
         (

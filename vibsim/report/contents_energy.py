@@ -13,7 +13,7 @@ import numpy as np
 
 from vibsim.record import Record
 from vibsim.report.contents_theory import MEMBER, OF_LEVEL, everyone
-from vibsim.report.data import Floats, flags, known, steps_of, swept, unit, whole
+from vibsim.report.data import Floats, flags, known, steps_of, swept, time_unit, whole
 from vibsim.report.tables import Cell, Column, Table, Written
 
 OWN, CENTRED = "energy_deviation_max_abs", "energy_deviation_d2t_max_abs"
@@ -26,7 +26,7 @@ def velocities(record: Record) -> Table | None:
     named = "energy_drift_kind" in record
     columns = (
         Column("scheme"), *([Column("member")] if swept(record) else []), Column("level", form="integer"),
-        Column("dt", unit(record, "dt") or "s", "step"),
+        Column("dt", time_unit(record, "dt"), "step"),
         Column("max |dE|/E(0), own velocity", form="small"), Column("max |dE|/E(0), [D₂ₜu]", form="small"),
         Column("second over first", form="norm"),
         *([Column("drift of the energy, own velocity")] if named else []),

@@ -64,7 +64,7 @@ def _table(
     columns = [
         Column("scheme"),
         Column("level"),
-        Column("dt", data.unit(record, "dt") or "s", "step"),
+        Column("dt", data.time_unit(record, "dt"), "step"),
     ]
     columns += [Column(key, form="step") for key in at]
     columns += [

@@ -21,6 +21,7 @@ from vibsim.report.data import (
     formal_orders,
     known,
     swept,
+    time_unit,
     unit,
     whole,
 )
@@ -131,7 +132,7 @@ def predictions(record: Record) -> list[Table]:
     """Return what is predicted and measured of every scheme, member and level: growth; frequency and phase error."""
     if not predicted(record):
         return []
-    time = unit(record, "t") or "s"
+    time = time_unit(record)
     rate = unit(record, "theory_frequency") or f"rad/{time}"
     by_peaks = record.variable("measured_growth").attrs.get("method") == PEAKS
     peaks = (

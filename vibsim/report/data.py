@@ -97,6 +97,11 @@ def unit(record: Record, name: str) -> str:
     return pretty_unit(str(record.variable(name).attrs.get("units", "")) if name in record else "")
 
 
+def time_unit(record: Record, name: str = "t") -> str:
+    """Return the unit of times, also where `t` is a fraction of the end; empty in a scaled run."""
+    return "" if "scale_t" in record.attrs else unit(record, name) or "s"
+
+
 def pretty_unit(text: str) -> str:
     """Write a unit such as ``rad s-1`` with Unicode exponents."""
     parts = (part.rstrip("-0123456789") for part in text.split())
@@ -235,8 +240,8 @@ def floor_norm(record: Record, quantity: str, member: Member, norm: str) -> Floa
 
 def norm_unit(record: Record, quantity: str, norm: str) -> str:
     """Return the unit of a norm over time: l1 and l2 carry the time, or its root, too."""
-    time = unit(record, "t") or "s"
-    extra = {"l1": time, "l2": f"√{time}"}.get(norm, "")
+    time = time_unit(record)
+    extra = {"l1": time, "l2": f"√{time}" if time else ""}.get(norm, "")
     return f"{unit(record, f'{quantity}_difference_norm')} {extra}".strip()
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from vibsim.record import Record
 from vibsim.report import figures_frame, style
 from vibsim.report.contents_theory import MEMBER
-from vibsim.report.data import Floats, flags, known, largest, pick, times, unit, whole
+from vibsim.report.data import Floats, flags, known, largest, pick, time_unit, times, unit, whole
 from vibsim.report.panels import figure_of, panels
 from vibsim.report.style import Picture
 
@@ -67,7 +67,7 @@ def running(record: Record, case: int) -> Picture | None:
             text if usable else style.label(text, unit(record, "energy_deviation_max_abs"))
         )
     axes[0].set_title("Energy error by the velocity that it is made with")
-    axes[-1].set_xlabel(style.label("t", unit(record, "t") or "s"))
+    axes[-1].set_xlabel(style.label("t", time_unit(record)))
     return Picture(
         name=f"energy_running_{case}",
         title=f"How does the energy error grow with time? Level {level}",

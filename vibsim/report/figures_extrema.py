@@ -14,7 +14,7 @@ import numpy as np
 from vibsim.record import Record
 from vibsim.report import figures_frame, style
 from vibsim.report.choice import position
-from vibsim.report.data import Floats, Member, at, exact_periods, pick, unit, whole
+from vibsim.report.data import Floats, Member, at, exact_periods, pick, time_unit, unit, whole
 from vibsim.report.panels import figure_of, panels
 from vibsim.report.style import Picture
 
@@ -61,7 +61,7 @@ def local(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     for ax in axes:
         # amplitudes that hardly differ need long numbers
         ax.yaxis.set_label_coords(-0.115, 0.5)
-    time = unit(record, "t") or "s"
+    time = time_unit(record)
     axes[0].set_ylabel(style.label("local period", time))
     axes[1].set_ylabel(style.label("local amplitude", unit(record, f"{where}_finest")))
     axes[2].set_ylabel(style.label("peak early by", time))

@@ -15,7 +15,18 @@ from vibsim.record import Record
 from vibsim.report import style, words
 from vibsim.report.choice import position
 from vibsim.report.contents_theory import MEMBER, OF_LEVEL, everyone, omega_dt
-from vibsim.report.data import Floats, Member, at, exact_series, known, largest, times, unit, whole
+from vibsim.report.data import (
+    Floats,
+    Member,
+    at,
+    exact_series,
+    known,
+    largest,
+    time_unit,
+    times,
+    unit,
+    whole,
+)
 from vibsim.report.figures_phase import of_level
 from vibsim.report.panels import figure_of, panels
 from vibsim.report.style import Picture
@@ -87,7 +98,7 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
         f"The slowest beside the exact solution (dotted), up to {WHOLE:g} times its size"
     )
     axes[1].set_title("Size of the solution, and the predicted growth (dashed)")
-    axes[1].set_xlabel(style.label("t", unit(record, "t") or "s"))
+    axes[1].set_xlabel(style.label("t", time_unit(record)))
     # one legend for both panels
     handles, texts = axes[1].get_legend_handles_labels()
     axes[0].legend(

@@ -22,7 +22,7 @@ from vibsim.report.data import (
     formal_orders,
     norm_unit,
     steps_of,
-    unit,
+    time_unit,
     whole,
 )
 from vibsim.report.style import Picture
@@ -167,7 +167,7 @@ def _draw_norms(
     }
     found = frozenset(kind for kind, is_seen in kinds.items() if is_seen)
     _explain(ax, found)
-    ax.set_xlabel(style.label("dt", unit(record, "dt") or "s"))
+    ax.set_xlabel(style.label("dt", time_unit(record, "dt")))
     ax.set_ylabel(style.label(f"{TYPICAL_NORM} norm, {words.symbol(quantity)}", measure))
     _level_axis(ax, dt, whole(record, "level"))
     return found

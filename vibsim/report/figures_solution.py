@@ -11,7 +11,17 @@ import numpy as np
 
 from vibsim.record import Record
 from vibsim.report import style, words
-from vibsim.report.data import Floats, Member, at, exact_series, largest, times, unit, whole
+from vibsim.report.data import (
+    Floats,
+    Member,
+    at,
+    exact_series,
+    largest,
+    time_unit,
+    times,
+    unit,
+    whole,
+)
 from vibsim.report.panels import decades, explosive, figure_of, panels, stop_at_breakdown
 from vibsim.report.style import Picture
 
@@ -36,7 +46,7 @@ def solution(record: Record, quantity: str, member: Member) -> Picture:
     _draw_errors(axes[1], t, record, quantity, member)
     axes[1].set_ylabel(style.label(f"|error of {letter}|", measure))
     axes[1].set_title("Estimated beside true error" if exact else "Estimated error")
-    axes[1].set_xlabel(style.label("t", unit(record, "t") or "s"))
+    axes[1].set_xlabel(style.label("t", time_unit(record)))
     caption = (
         f"Top: the finest level, and the value extrapolated from the two finest ones with its error bar{thickness}. "
         "Bottom: the error that the difference of two levels predicts"

@@ -21,6 +21,7 @@ from vibsim.report.data import (
     power,
     sound_levels,
     sound_pairs,
+    time_unit,
     times,
     unit,
     whole,
@@ -55,7 +56,7 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
         draw_spread(axes[1], t, curves, measure)
     if ratios:
         _draw_ratios(axes[-1], t, record, quantity, member, order)
-    axes[-1].set_xlabel(style.label("t", unit(record, "t") or "s"))
+    axes[-1].set_xlabel(style.label("t", time_unit(record)))
     first = whole(record, "pair")[0]
     low = words.lowered(first)
     shrinks = (
@@ -103,7 +104,7 @@ def energy(record: Record, member: Member) -> Picture:
     axes[0].set_title("Energy deviation dE = E(t) − E(0), rescaled")
     if spread:
         draw_spread(axes[1], t, curves, measure)
-    axes[-1].set_xlabel(style.label("t", unit(record, "t") or "s"))
+    axes[-1].set_xlabel(style.label("t", time_unit(record)))
     caption = (
         f"dE{words.lowered(levels[0])} is dE on level {levels[0]}, and so on. The exact energy is constant, so dE "
         "itself is an error. "

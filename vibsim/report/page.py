@@ -18,6 +18,7 @@ from vibsim.report import (
     contents,
     contents_energy,
     contents_published,
+    contents_scales,
     contents_theory,
     contents_work,
     data,
@@ -93,6 +94,8 @@ def write(
     listed, folded = _tables(experiment, convergence, summary)
     beside = [contents.checks(summary), contents.failures(summary, convergence)]
     beside.append(members.table(convergence, position))
+    scales = contents_scales.table(experiment, convergence)
+    beside.append(scales)
     printed = contents_published.tables(experiment, convergence, summary)
     everything = [*printed, *listed, *(table for _, group in folded for table in group)]
     everything += [table for table in beside if table is not None and table not in everything]
@@ -106,6 +109,7 @@ def write(
         _replace(directory / "tables", tables)
     context = cards.context(experiment, convergence, summary, provenance) | {
         "tables": listed,
+        "scales": scales,
         "several": len(data.whole(convergence, "level")) > 1,
         "folded": folded,
         "printed": printed,

@@ -13,7 +13,7 @@ from vibsim.report import data, words
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
     from vibsim.spec.axes import Axis
-    from vibsim.spec.experiment import SchemeSpec
+    from vibsim.spec.experiment import Scaling, SchemeSpec
 
 
 def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
@@ -24,6 +24,11 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     sizes = {p.key: data.pretty_unit(p.unit) for p in model.parameters}
     units = {state.name: data.pretty_unit(state.unit) for state in model.states}
     yield "Model", f"{model.title}: {model.equation}"
+    if experiment.units:
+        yield "Units of the file", ", ".join(_units(experiment.units))
+    if experiment.scaling is not None:
+        yield "Scaled", _scaled(experiment.scaling, sizes, units)
+        sizes, units = {}, {}
     yield "Parameters", _listing("model", experiment.model.parameters, sizes, keys)
     yield "Initial values", _listing("initial", experiment.initial, units, keys)
     yield from _grid(experiment, record)
@@ -36,6 +41,25 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     if axes:
         count = words.number(len(record["case"]), "integer")
         yield "Sweep", f"{count} members. {'; '.join(map(_axis, axes))}"
+
+
+def _units(units: Mapping[str, str]) -> Iterator[str]:
+    for name, text in units.items():
+        number, _, base = text.partition(" ")
+        yield f"1 {name} = {number} {data.pretty_unit(base)}".rstrip()
+
+
+def _scaled(scaling: Scaling, sizes: Mapping[str, str], units: Mapping[str, str]) -> str:
+    """Write what the file gives, of which everything else on the page is in characteristic units."""
+    parts = (
+        _listing("model", scaling.parameters, sizes, set()),
+        _listing("initial", scaling.initial, units, set()),
+        f"end = {_plain(scaling.end)} s",
+    )
+    return (
+        f"the file has {'; '.join(parts)}; "
+        "the run is made in the scales of the table below, and every other number is dimensionless"
+    )
 
 
 def _scheme(spec: SchemeSpec, swept: set[str]) -> str:
@@ -54,7 +78,7 @@ def _option(value: str | float | bool) -> str:
 
 
 def _grid(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
-    levels, time = list(experiment.levels), data.unit(record, "dt") or "s"
+    levels, time = list(experiment.levels), data.time_unit(record, "dt")
     counts = [
         words.number(float(experiment.steps(level)), "integer") for level in (levels[0], levels[-1])
     ]

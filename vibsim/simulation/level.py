@@ -15,6 +15,7 @@ from vibsim.record import Attribute, Record, Variable, attributes
 from vibsim.simulation.derived import derived
 from vibsim.simulation.gathered import event_times, extrema, gathered, of_own_steps
 from vibsim.simulation.members import Members, members
+from vibsim.simulation.scaled import in_scales
 from vibsim.simulation.solution import Solution, has_adaptive, solve
 from vibsim.spec.series import RUNNING, asks_for_peaks, extrema_kept, is_bounded, stored_series
 
@@ -109,7 +110,7 @@ def simulate_record(
         "storage": "lean" if is_lean else "series",
     }
     coords = coordinates(model, names, group, steps, every, same_end=not experiment.end_varies)
-    return Record(coords, variables, attrs)
+    return in_scales(Record(coords, variables, attrs), experiment)
 
 
 def _of_states(model: Model) -> set[str]:

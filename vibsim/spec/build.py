@@ -25,11 +25,13 @@ from vibsim.spec.faults import Report, plain_path
 from vibsim.spec.mending import as_written, without
 from vibsim.spec.published import claims
 from vibsim.spec.published_rules import finish_published
+from vibsim.spec.scaling import Numbers, scaled
 from vibsim.spec.scheme_checks import SOLUTIONS
 from vibsim.spec.scheme_section import TOLERANCE, scheme_names, specs
 from vibsim.spec.source import Path_, Source
 from vibsim.spec.sweep_keys import Keys, targets
 from vibsim.spec.timing import time_spec
+from vibsim.spec.units import plain_numbers
 
 _LISTS = ("schemes", "checks", "published")
 _OPTIONAL = [name for name, field in Document.model_fields.items() if not field.is_required()]
@@ -61,6 +63,10 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
     time = time_spec(part.time, model, parameters, report) if part.time else None
     initial = _initial(part, model, parameters, report)
     varied = _swept(part, source, model, schemes, report)
+    numbers = Numbers(parameters, initial, time)
+    if part.scaled:
+        numbers = scaled(numbers, model, sorted(swept), report)
+        time = numbers.time
     samples = part.samples.every if isinstance(part.samples, Every) else part.samples
     shape = limits.Shape(
         base_steps=time.base_steps if time else None,
@@ -87,9 +93,12 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
         title=part.title,
         source=part.source,
         model=ModelSpec(
-            kind=model.kind, parameters=parameters, formulas=read.formulas, terms=read.terms
+            kind=model.kind,
+            parameters=dict(numbers.parameters),
+            formulas=read.formulas,
+            terms=read.terms,
         ),
-        initial=initial,
+        initial=dict(numbers.initial),
         time=time,
         levels=levels,
         schemes=tuple(schemes),
@@ -99,6 +108,8 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
         tolerance=part.tolerance,
         checks=(*checks, *claims(published, part.source)),
         published=published,
+        units=part.units,
+        scaling=numbers.scaling,
     )
     experiment._file = place.file
     return experiment
@@ -106,13 +117,13 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
 
 def _sections(source: Source, report: Report) -> Any:
     """Return the sections without fault as a `Partial`; faulty schemes and checks are None in their lists."""
-    whole = as_written(source.data, source)
+    whole, faulty = plain_numbers(as_written(source.data, source), report)
     data = {k: v for k, v in whole.items() if v is not None or k not in _OPTIONAL}
     try:
         Document.model_validate(data)
     except ValidationError as error:
-        faulty = report.add_invalid(error)
-    else:
+        faulty += report.add_invalid(error)
+    if not faulty:
         return Partial.model_validate(data)
     mended = without(data, faulty)
     try:

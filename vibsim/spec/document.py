@@ -9,6 +9,7 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    StrictBool,
     Tag,
     WithJsonSchema,
     create_model,
@@ -153,6 +154,13 @@ def _initial_schema() -> dict[str, Any]:
     return {"type": "object", "properties": properties, "additionalProperties": False}
 
 
+UNITS_SCHEMA = {
+    "type": "object",
+    "additionalProperties": {"type": ["number", "string"]},
+    "propertyNames": {"pattern": "^[^0-9\\s]+$"},
+}
+
+
 class Document(Section):
     """An experiment of vibsim: what is simulated, and what is claimed about the outcome."""
 
@@ -164,6 +172,8 @@ class Document(Section):
     """What the experiment shows, in a line."""
     source: Text | None = None
     """What the experiment comes from."""
+    units: Annotated[dict[str, str], WithJsonSchema(UNITS_SCHEMA)] = Field({})
+    """Units of the file's own, such as ``rod: 4.9 m``: every number with a unit may name them."""
     model: AnyModel
     """The equation of motion and its parameters."""
     initial: Annotated[dict[str, Number], WithJsonSchema(_initial_schema())] = Field({})
@@ -174,6 +184,8 @@ class Document(Section):
     """The levels of refinement: each halves the time step of the one before."""
     tolerance: Fraction | None = None
     """Error bound that the extrapolated solution must reach, instead of `levels`: they are then chosen."""
+    scaled: StrictBool = False
+    """Whether the run is made in the characteristic units of the model, where it has a scaled equation."""
     schemes: Annotated[tuple[AnyScheme, ...], Field(min_length=1), short(MAX_ENTRIES)]
     """The schemes, each a kind or a mapping with its options."""
     sweep: SweepSection | None = None

@@ -68,6 +68,17 @@ class TimeSpec(Section):
     """The end in natural periods, where the file gives it so: each member then has its own end."""
 
 
+class Scaling(Section):
+    """What leads back from a run in characteristic units; the numbers of the run itself are dimensionless."""
+
+    scales: Numbers
+    """The characteristic scales: ``t``, every state, ``energy``."""
+    parameters: Numbers
+    """As in the file, in the units of the model."""
+    initial: Numbers
+    end: Positive
+
+
 class SchemeSpec(Section):
     """A scheme, with every option."""
 
@@ -129,6 +140,10 @@ class Experiment(Section):
     """As written, and behind them one claim for every row of `published`."""
     published: tuple[PublishedTable, ...] = ()
     """Tables of numbers that a source printed."""
+    units: Annotated[dict[str, str], AfterValidator(FrozenDict)] = FrozenDict()
+    """Units that the file defines, in SI base units; every number is converted already."""
+    scaling: Scaling | None = None
+    """Present where the run is made in the characteristic units of the model."""
     _file: Path | None = PrivateAttr(default=None)
 
     @property
@@ -242,13 +257,14 @@ def canonical(experiment: Experiment) -> dict[str, Any]:
 
     The sections stand apart, so that a digest can take those that a job uses: ``collection``, ``name``, ``title``,
     ``source``, ``model``, ``initial``, ``time``, ``levels``, ``schemes``, ``sweep``, ``samples``, ``output``,
-    ``tolerance``, ``checks``, and ``published`` where there is any.
+    ``tolerance``, ``checks``, and ``published``, ``units`` and ``scaling`` where there is any.
     """
     data = experiment.model_dump(mode="json", exclude={"checks"})
     data["sweep"] = data["sweep"] and data["sweep"]["axes"]
     data["checks"] = [_check(check) for check in experiment.checks]
-    if not experiment.published:
-        del data["published"]
+    for name in ("published", "units", "scaling"):
+        if not getattr(experiment, name):
+            del data[name]
     return data
 
 
