@@ -18,6 +18,7 @@ import numpy as np
 
 from vibsim.models.base import Floats, Model, Numbers, Parameter, State
 from vibsim.models.events import Impact
+from vibsim.models.scales import Scales
 
 
 def natural_frequency(parameters: Numbers) -> Any:
@@ -123,5 +124,17 @@ BOUNCING_BALL = Model(
     conservative=False,
     natural_frequency=natural_frequency,
     exact=exact,
+    scales=Scales(
+        time="where(h != 0, sqrt(h/g), abs(v)/g)",
+        position="where(h != 0, h, v**2/g)",
+        energy="g*h_c",
+        numbers=(("restitution", "restitution"),),
+        parameters=(
+            ("g", "1"),
+            ("restitution", "restitution"),
+            ("eps_h", "eps_h/h_c"),
+            ("eps_v", "eps_v*t_c/h_c"),
+        ),
+    ),
     events=Impact(restitution="restitution", near="eps_h", slow="eps_v"),
 )

@@ -17,6 +17,7 @@ import numpy as np
 from vibsim.models.base import Floats, Model, Numbers, Parameter, State
 from vibsim.models.dry_friction import friction_motion, sticking_time
 from vibsim.models.events import Friction
+from vibsim.models.scales import Scales
 
 _PULL = "where(alpha == 0, (k/m)*u, (k/m)/alpha*tanh(alpha*u))"
 _X = "(alpha*u)"
@@ -82,5 +83,19 @@ SLIDING_BOX = Model(
     conservative=False,
     natural_frequency=natural_frequency,
     exact=exact,
+    # exercise 19 b; without an initial position the amplitude is V sqrt(m/k)
+    scales=Scales(
+        time="sqrt(m/k)",
+        position="where(u != 0, abs(u), abs(v)*sqrt(m/k))",
+        energy="k*u_c**2",
+        numbers=(("friction", "mu*m*g/(k*u_c)"), ("yield", "alpha*u_c")),
+        parameters=(
+            ("m", "1"),
+            ("k", "1"),
+            ("alpha", "alpha*u_c"),
+            ("mu", "mu*m*g/(k*u_c)"),
+            ("g", "1"),
+        ),
+    ),
     events=Friction(drive=f"-{_PULL}", limit="mu*g"),
 )
