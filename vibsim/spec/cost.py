@@ -22,7 +22,7 @@ EVALUATION = 0.45
 is what every step has: the scheme's arithmetic, energies, extrema."""
 ITERATED = 3.0
 """Steps with one evaluation that an implicit step takes as long as, for each evaluation of an iteration."""
-EVENTFUL = 1.5
+EVENTFUL = 2.5
 """Steps of a smooth motion that one takes as long as where an event may be."""
 WRITTEN_SECONDS = 4e-9
 """Of one byte that is made, written, sealed and flushed."""
