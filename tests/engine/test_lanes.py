@@ -27,6 +27,8 @@ DRAGGED = dataclasses.replace(
     DRIVEN,
     kind="dragged",
     acceleration="-(g/L)*sin(theta) - 0.02*omega - 0.001*omega**3 + 0.3*cos(1.7*t)",
+    dissipation="(0.02 + 0.001*omega**2)*omega**2",
+    driving="0.3*cos(1.7*t)*omega",
 )
 """A force that depends on all that it may."""
 
@@ -73,7 +75,15 @@ VARIED = [
 ]
 SMOOTH = {kind: model for kind, model in MODELS.items() if model.events is None}
 """Those with events are stepped in other lanes: `test_events`."""
-MODEL_CASES = [pytest.param(model, id=kind) for kind, model in SMOOTH.items()]
+MODEL_CASES = [
+    pytest.param(
+        model.variant(frozenset(model.optional)) if model.variant else model,
+        id=kind,
+        marks=() if kind in ("pendulum", "spring") else pytest.mark.slow,
+    )
+    for kind, model in SMOOTH.items()
+]
+"""Every smooth model with all of its terms."""
 
 
 def members(model, count=MEMBERS, seed=7):

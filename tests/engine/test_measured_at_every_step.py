@@ -17,7 +17,11 @@ KEPT = 7
 ROUND_OFF = 2.0**-52
 KINDS = [kind for kind, s in FIXED_STEP.items() if s.stepper(s.defaults()).own_velocity]
 OWN = ["rk4", "forward_euler"]
-SMOOTH = {kind: model for kind, model in MODELS.items() if model.events is None}
+EVERY = [
+    pytest.param(model, id=kind, marks=() if kind == "pendulum" else pytest.mark.slow)
+    for kind, model in MODELS.items()
+    if model.events is None
+]
 
 
 def members(model, count=6, seed=3):
@@ -62,7 +66,7 @@ def minmax(t, u):
 
 @pytest.mark.parametrize("lane", LANES)
 @pytest.mark.parametrize("kind", OWN)
-@pytest.mark.parametrize("model", SMOOTH.values(), ids=SMOOTH)
+@pytest.mark.parametrize("model", EVERY)
 def test_the_energy_by_the_centred_difference_is_that_of_all_points(model, kind, lane):
     numbers = members(model)
     runs = run(model, kind, numbers, lane)
@@ -114,7 +118,7 @@ def test_samples_of_any_stride_are_those_of_every_step(kind, every, lane):
 
 @pytest.mark.parametrize("lane", LANES)
 @pytest.mark.parametrize("kind", ["central", "rk4"])
-@pytest.mark.parametrize("model", SMOOTH.values(), ids=SMOOTH)
+@pytest.mark.parametrize("model", EVERY)
 def test_extrema_are_those_of_the_texts_program(model, kind, lane):
     numbers = members(model)
     runs = run(model, kind, numbers, lane)
