@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from vibsim import theory
 from vibsim.analysis.compare import Comparison
 from vibsim.analysis.floor import SPACING_AT_ONE
+from vibsim.analysis.known import known_values
 from vibsim.analysis.part import CENTRED, Part, energy_at_start, plain_name
 from vibsim.analysis.predicted import is_simple, natural_frequency, steppers
 from vibsim.analysis.rules import BLAME
@@ -127,18 +128,19 @@ def exact_series(part: Part, level: int, name: str) -> Floats:
     """Return the exact values at the stored times of a level, shape (scheme, case, t); NaN where they are not known."""
     record, model, plain = part.records[level], part.model, plain_name(name)
     shape = (*part.shape, len(record["t"]))
-    if plain in ("energy", "energy_deviation") and model.conservative:
-        start = energy_at_start(record)[..., None]
-        return np.broadcast_to(start if plain == "energy" else 0.0 * start, shape)
-    if model.exact is None or plain not in (model.position, model.velocity):
-        return np.full(shape, np.nan)
+    if plain == "energy" and model.conservative:
+        return np.broadcast_to(energy_at_start(record)[..., None], shape)
     n = np.arange(shape[-1]) * int(np.asarray(record.attrs["every"]).item())
     t = n * (part.group.end / steps_of(part, level))[:, None]
     initial, parameters = (
         {key: values[:, None] for key, values in table.items()}
         for table in (part.group.initial, part.group.parameters)
     )
-    return np.broadcast_to(np.asarray(model.exact(t, initial, parameters)[plain]), shape)
+    states = {} if model.exact is None else model.exact(t, initial, parameters)
+    if plain in states:
+        return np.broadcast_to(np.asarray(states[plain]), shape)
+    found = known_values(model, plain, states, t, part.group)
+    return np.full(shape, np.nan) if found is None else np.broadcast_to(found, shape)
 
 
 def _of_exact(part: Part, level: int, values: Floats) -> Floats:

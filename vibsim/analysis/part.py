@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from vibsim.analysis.belonging import check_belonging
 from vibsim.analysis.floor import SPACING_AT_ONE, solution_size
 from vibsim.analysis.grid import Grid, common_grid, take
+from vibsim.analysis.known import known_values
 from vibsim.analysis.promise import (
     Columns,
     columns_of,
@@ -125,7 +126,11 @@ class Part:
         elif self.model.conservative and plain == "energy_deviation":
             return np.zeros((1, 1, 1))
         else:
-            return None
+            t = self.grid.times(self.group.end)
+            known = known_values(self.model, plain, self.exact, t, self.group)
+            if known is None:
+                return None
+            found = known[None]
         if plain == name:
             return found
         # as the series itself, see `series`

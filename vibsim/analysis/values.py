@@ -111,6 +111,19 @@ def _of_quantity(which: str) -> Callable[[Place], Floats]:
     return take
 
 
+def _extreme(which: str, of_series: Callable[..., Floats]) -> Callable[[Place], Floats]:
+    """Return what was gathered of a state over every step; of an output, that of its samples."""
+
+    def take(p: Place) -> Floats:
+        data = p.data()
+        if data is None or f"{p.quantity}_{which}" in data or p.quantity not in data:
+            return _of_quantity(which)(p)
+        # NaN where a member has failed
+        return np.asarray(of_series(data[p.quantity], axis=-1), dtype=float)
+
+    return take
+
+
 def _max_abs(p: Place) -> Floats:
     """Return the largest absolute value: gathered as such, or from the least and the largest value."""
     data, name = p.data(), f"{p.quantity}_max_abs"
@@ -260,8 +273,8 @@ def _richardson_error(p: Place) -> Floats:
 KNOWN: Mapping[str, Callable[[Place], Any]] = {
     "end": _sample,
     "at": _sample,
-    "min": _of_quantity("min"),
-    "max": _of_quantity("max"),
+    "min": _extreme("min", np.min),
+    "max": _extreme("max", np.max),
     "max_abs": _max_abs,
     "max_abs_interior": _of_quantity("max_abs_interior"),
     "max_abs_ratio": _fall(_max_abs),

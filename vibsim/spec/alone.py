@@ -35,7 +35,11 @@ def alone(experiment: Experiment, case: int) -> Experiment:
     swept = {key: column[0].item() for key, column in columns(axes, case, case + 1).items()}
     parameters = _filled(swept, "model", experiment.model.parameters)
     model = ModelSpec(
-        kind=experiment.model.kind, parameters=parameters, formulas=experiment.model.formulas
+        kind=experiment.model.kind,
+        parameters=parameters,
+        formulas=experiment.model.formulas,
+        # a term that is 0 for this member alone stays, and with it every bit
+        terms=experiment.model.terms,
     )
     initial = _filled(swept, "initial", experiment.initial)
     if model.definition.start is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from vibsim.errors import nearest
-from vibsim.models import centred, quantities
+from vibsim.models import BUDGET, centred, has_budget, quantities
 from vibsim.spec.check_places import Ladder
 from vibsim.spec.faults import Report
 from vibsim.spec.source import Path_
@@ -73,11 +73,14 @@ def known_exactly(
     model = ladder.model
     if model is None:
         return
-    # the energy is known where it is conserved, and nowhere else
+    # the energy is known where it is conserved or the motion is known; the budget is 0 always
     name = plain(quantity or "")
-    known = model.conservative if name in ENERGIES else model.exact is not None
+    taken, done, budget = BUDGET
+    is_solved = model.exact is not None and name not in (taken, done)
+    known = is_solved or name == budget or (model.conservative and name in ENERGIES)
     if not known:
-        hint = f"{' and '.join(ENERGIES)} are" if model.conservative else ""
+        of = (*(ENERGIES if model.conservative else ()), *((budget,) if has_budget(model) else ()))
+        hint = f"{' and '.join(of)} {'is' if len(of) == 1 else 'are'}" if of else ""
         rule = f"the exact {quantity or 'solution'} of {model.kind} is not known"
         report.add(path, rule, hint, value)
 
@@ -101,12 +104,12 @@ def allowed(row: Value, ladder: Ladder, best: bool = False) -> tuple[str, ...]:
     match row.of:
         case "states":
             return states
+        case "stored":
+            return (*states, *(output.name for output in model.outputs))
         case "deviation":
             return deviations[:1]
         case "running":
             return deviations
         case "extremal":
             return (*states, *deviations)
-    if row.of == "convergent" or best:
-        return (*states, *ENERGIES, *more)
     return all_quantities(ladder)

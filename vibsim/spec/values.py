@@ -8,7 +8,9 @@ from types import MappingProxyType
 from typing import Literal
 
 AtPart = Literal["t", "step", "level", "scheme", "case"]
-Which = Literal["series", "convergent", "states", "extremal", "deviation", "running", "none"]
+Which = Literal[
+    "series", "convergent", "states", "stored", "extremal", "deviation", "running", "none"
+]
 """Which quantities a value is of: every one; those that are compared between levels; the states, of which least and
 largest value are gathered over every step; these and the energy deviations; the energy deviation alone, whose last
 point is gathered apart; the energy deviations, whose largest value so far is gathered; or none because the value
@@ -55,8 +57,8 @@ _SERIES = (
         best=True,
         needs_time=True,
     ),
-    Value("min", "smallest value over every step", "states"),
-    Value("max", "largest value over every step", "states"),
+    Value("min", "smallest value over every step; of an output, over the stored times", "stored"),
+    Value("max", "largest value over every step; of an output, over the stored times", "stored"),
     Value("max_abs", "largest absolute value over every step", "extremal"),
     Value("max_abs_interior", "the same without the last point", "deviation"),
     Value(
