@@ -73,15 +73,17 @@ VARIED = [
     for kind, scheme in FIXED_STEP.items()
     for options in (scheme.defaults(), *variants(scheme))
 ]
+SMOOTH = {kind: model for kind, model in MODELS.items() if model.events is None}
+"""Those with events are stepped in other lanes: `test_events`."""
 MODEL_CASES = [
     pytest.param(
         model.variant(frozenset(model.optional)) if model.variant else model,
         id=kind,
         marks=() if kind in ("pendulum", "spring") else pytest.mark.slow,
     )
-    for kind, model in MODELS.items()
+    for kind, model in SMOOTH.items()
 ]
-"""Every model with all of its terms."""
+"""Every smooth model with all of its terms."""
 
 
 def members(model, count=MEMBERS, seed=7):
@@ -318,7 +320,7 @@ def test_norms_are_those_of_all_points(lane):
 
 
 def test_the_kernel_contains_no_contraction_and_no_foreign_call():
-    for model, scheme, lane in itertools.product(MODELS.values(), FIXED_STEP.values(), LANES):
+    for model, scheme, lane in itertools.product(SMOOTH.values(), FIXED_STEP.values(), LANES):
         text = source(model, scheme.stepper(scheme.defaults()), lane)
         assert "fastmath" not in text
         assert "fma" not in text

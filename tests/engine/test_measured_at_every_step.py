@@ -20,6 +20,7 @@ OWN = ["rk4", "forward_euler"]
 EVERY = [
     pytest.param(model, id=kind, marks=() if kind == "pendulum" else pytest.mark.slow)
     for kind, model in MODELS.items()
+    if model.events is None
 ]
 
 

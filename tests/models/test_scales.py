@@ -31,7 +31,10 @@ def test_some_models_can_be_scaled():
 def test_the_scaled_solution_is_the_solution(model):
     """x(t) = x_c X(t/t_c), and so for the velocity, where X is the exact solution of the scaled equation."""
     for _ in range(20):
-        parameters = {row.key: RNG.uniform(0.1, 5.0) for row in model.parameters}
+        parameters = {row.key: RNG.uniform(0.1, row.maximum or 5.0) for row in model.parameters}
+        if model.kind == "sliding_box":
+            # its solution is known on the linear spring
+            parameters["alpha"] = 0.0
         x, v = (state.name for state in model.states)
         initial = {x: RNG.uniform(0.1, 2.0), v: RNG.uniform(-1.0, 1.0)}
         scale = sizes(model, parameters, initial)

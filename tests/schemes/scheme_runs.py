@@ -34,7 +34,9 @@ END = 4.0
 
 
 def suits(scheme, model):
-    return scheme.velocity_forces or not depends_on_velocity(model)
+    """Tell whether a smooth model has forces that the scheme can treat."""
+    is_smooth = model.events is None
+    return is_smooth and (scheme.velocity_forces or not depends_on_velocity(model))
 
 
 def pairs(models):

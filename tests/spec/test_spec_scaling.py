@@ -98,7 +98,8 @@ def test_sweeps_that_change_the_scales_are_refused(key):
 def test_models_without_a_scaled_equation_are_refused():
     fault = only_fault(scaled=True, model={"kind": "oscillator"}, initial={"u": 1.0})
     assert fault.rule == "the model oscillator has no scaled equation"
-    assert fault.hint == "choose from spring, pendulum, linear_pendulum"
+    able = "spring, pendulum, linear_pendulum, sliding_box, bouncing_ball"
+    assert fault.hint == f"choose from {able}"
 
 
 def test_scales_must_be_finite():

@@ -156,6 +156,11 @@ def test_the_centred_difference_is_a_quantity_beside_an_own_velocity(kind: str) 
     model = MODELS[kind]
     changes: dict[str, Any] = {"model": {"kind": kind}, "initial": {}}
     whole = build(schemes=["central", "rk4"], **changes)
+    if model.events is not None:
+        assert whole.quantities == quantities(model)
+        fault = only_fault(checks=[{"converges": centred(model)[0]}], **changes)
+        assert "across an event" in fault.rule
+        return
     assert whole.quantities == quantities(model, own_velocity=True)
     assert [scheme.own_velocity for scheme in whole.schemes] == [False, True]
     alone = build(schemes=["central"], **changes)
@@ -213,6 +218,10 @@ def test_a_value_can_be_asked_for_where_it_exists(name: str) -> None:
     if row.of != "none":
         check["quantity"] = "energy_deviation" if row.of in ("running", "deviation") else "u"
     at: dict[str, Any] = {"step": 39} if row.needs_time else {}
+    if row.needs_events:
+        assert "spring has no events" in fault_of(check).rule
+        build(checks=[check], model={"kind": "sliding_box"}, initial={"u": 1}, schemes=["rk4"])
+        return
     spring(check | {"at": at}, samples="all")
     if "step" in row.at:
         spring(check | {"at": {"step": 39}}, samples="all")

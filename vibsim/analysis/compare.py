@@ -21,6 +21,8 @@ Floats = NDArray[np.float64]
 
 ROUND_OFF_SAFETY = 10.0
 """Factor on the predicted round-off in an error bound: the prediction is an order of magnitude."""
+IRREGULAR = 2.0
+"""Factor on an error bound behind events: where they lie in a step makes the second power another at each level."""
 NOTHING_LEFT = 16.0
 """Order with which a quantity that is promised to be exact is extrapolated: the finest level then stands as it is."""
 
@@ -87,6 +89,8 @@ class Comparison:
         even = even_powers(part.experiment, self.name, part.columns)
         order = np.where(np.isinf(self.order), NOTHING_LEFT, self.order)
         value, bound = extrapolate(self.values, part.grid.levels, order, even, largest=part.lean)
+        if part.model.events is not None:
+            bound = IRREGULAR * bound
         return value, bound + ROUND_OFF_SAFETY * self.floor[..., -1:]
 
     @property

@@ -75,7 +75,7 @@ class Method:
 
     def _powers(self, quantity: str, options: Options) -> tuple[int, int]:
         p = int(self.scheme.formal_order(quantity, self.model, options))
-        return p, 2 if self.scheme.even_powers(quantity, self.model, options) else 1
+        return p, 2 if self.scheme.has_even_powers(quantity, self.model, options) else 1
 
     def _own_end(self) -> Options:
         """Return the options with which the last velocity is the scheme's own, as all others are."""

@@ -13,7 +13,13 @@ from vibsim.analysis.belonging import check_belonging
 from vibsim.analysis.floor import SPACING_AT_ONE, solution_size
 from vibsim.analysis.grid import Grid, common_grid, take
 from vibsim.analysis.known import known_values
-from vibsim.analysis.promise import Columns, columns_of, relative_floors, stability_limits
+from vibsim.analysis.promise import (
+    Columns,
+    columns_of,
+    on_the_mesh,
+    relative_floors,
+    stability_limits,
+)
 from vibsim.analysis.sensitivity import sensitivity
 from vibsim.analysis.series import laid_out, largest
 from vibsim.models import ENERGIES, Model
@@ -66,6 +72,8 @@ class Part:
     """Largest stable w dt, infinite for none, shape (s, 1 or c)."""
     adaptive: Flags
     """Whether a scheme chooses its own steps and so has no levels, shape (s,)."""
+    on_mesh: Flags
+    """Whether a scheme leaves events to the mesh, shape (s, 1 or c)."""
     growth: Floats
     """Largest position over the largest exact position, shape (s, c, l); NaN where not known."""
 
@@ -150,7 +158,8 @@ class Part:
         if plain != self.model.velocity:
             return own
         duration = self.grid.dt[0] * self.grid.steps[0]
-        rate = np.maximum(self.finest["natural_frequency"], 1.0 / duration)
+        # a motion without small oscillations has no frequency
+        rate = np.fmax(self.finest["natural_frequency"], 1.0 / duration)
         return np.asarray(np.maximum(own, sizes[self.model.position] * rate))
 
     def floor_of(self, name: str, size: Floats) -> Floats:
@@ -197,6 +206,7 @@ def part_of(experiment: Experiment, records: Mapping[int, Record]) -> Part:
         failed=by_level([records[level]["status"] for level in grid.levels]) != 0,
         stability_limit=stability_limits(experiment, columns),
         adaptive=np.array([SCHEMES[scheme.kind].adaptive for scheme in experiment.schemes]),
+        on_mesh=on_the_mesh(experiment, columns),
         growth=_growth(experiment, grid, records, exact),
     )
 

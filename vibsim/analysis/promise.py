@@ -14,7 +14,7 @@ from vibsim import plan
 from vibsim.analysis.floor import relative_floor
 from vibsim.record import Record
 from vibsim.schemes import SCHEMES, Options, Scheme
-from vibsim.schemes.base import OptionValue
+from vibsim.schemes.base import OptionValue, is_on_the_mesh
 from vibsim.theory import stability_limit
 
 if TYPE_CHECKING:
@@ -59,8 +59,15 @@ def formal_orders(experiment: Experiment, quantity: str, columns: Columns) -> Fl
 def even_powers(experiment: Experiment, quantity: str, columns: Columns) -> NDArray[np.bool_]:
     """Tell whether the error of a quantity has every second power only, shape (scheme, case)."""
     model = experiment.model.definition
-    even = _each(experiment, columns, lambda s, o: float(s.even_powers(quantity, model, o)))
+    even = _each(experiment, columns, lambda s, o: float(s.has_even_powers(quantity, model, o)))
     return np.asarray(even != 0)
+
+
+def on_the_mesh(experiment: Experiment, columns: Columns) -> NDArray[np.bool_]:
+    """Tell whether events are left to the mesh, so that no error has a regular expansion, shape (scheme, case)."""
+    if experiment.model.definition.events is None:
+        return np.zeros((len(experiment.schemes), 1), dtype=bool)
+    return np.asarray(_each(experiment, columns, lambda s, o: float(is_on_the_mesh(o))) != 0)
 
 
 def relative_floors(experiment: Experiment, steps: tuple[int, ...], columns: Columns) -> Floats:

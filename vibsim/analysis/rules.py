@@ -54,6 +54,8 @@ MOST_ABOVE = 2.0
 """A superconvergent quantity gains at most the next even power."""
 AGREEMENT = 0.25
 """Orders of differences and of errors agree within half of what separates two orders."""
+ON_MESH = 1.0
+"""Order of what is left by events that are noticed at the grid point behind them."""
 ORDINARY = 2.0
 """Order of the error that would have been seen where an exact quantity is promised."""
 LEAST_ORDER = 0.25
@@ -92,6 +94,8 @@ class Evidence:
     """Largest stable w dt, infinite where there is no limit, shape (...)."""
     span: Floats | None = None
     """w T, the length of the run in units of the inverse frequency, shape (...); None counts as long."""
+    on_mesh: Flags | None = None
+    """Whether events were left to the mesh: the error then has no expansion beyond its first power, shape (...)."""
     growth: Floats | None = None
     """Largest position over the largest exact position, shape (..., n); NaN where not known."""
 
@@ -137,17 +141,21 @@ def rules(e: Evidence, t: Trend) -> list[tuple[Flags, str]]:
     too_large, too_small = _contradicts(e, t)
     missed = too_large & (right | (wrong & _errors_stay(e, t)))
     wrong &= _errors_agree(e, t)
+    rough = np.zeros(p.shape, dtype=bool) if e.on_mesh is None else e.on_mesh
+    # the mesh leaves the power 1: any other one is the accident of where events lie between grid points
+    regular = ~rough | ((np.abs(t.order - ON_MESH) <= tol) & ~t.alternating)
     return [
         (exact & _far_from_exact(e), "wrong_limit"),
         (exact, "exact"),
         (exactly & ~at_round_off(e), "order_low"),
         (nothing | exactly, "round_off"),
-        (t.alternating, "oscillating"),
-        (missed, "wrong_limit"),
-        (right & ~too_small, "asymptotic"),
-        (wrong & ~above, "order_low"),
-        (wrong & above, "order_high"),
+        (t.alternating & ~rough, "oscillating"),
+        (missed & regular, "wrong_limit"),
+        (right & ~too_small & regular, "asymptotic"),
+        (wrong & ~above & regular, "order_low"),
+        (wrong & above & ~rough, "order_high"),
         (t.cut, "round_off"),
+        (rough, "non_smooth"),
     ]
 
 

@@ -175,5 +175,6 @@ def _response(model: Model, t: Floats, state: States, parameters: States, size: 
             change = np.max(np.abs(moved[other] - undisturbed[other]), axis=-1)
             unit = DISTURBANCE * whole[:, 0]
             response = np.divide(change, unit, out=np.ones_like(change), where=unit > 0)
-            found = np.maximum(found, response)
+            # where the exact solution is not known, nothing is told
+            found = np.fmax(found, response)
     return found

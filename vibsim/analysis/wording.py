@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from vibsim.schemes import Options
+from vibsim.schemes.base import is_on_the_mesh
 
 
 @dataclass(frozen=True)
@@ -125,6 +126,11 @@ def tell(s: Story) -> str:
                 f"The differences of {s.quantity} change their sign or swing from level to level, so "
                 "no order can be read from them."
             )
+        case "non_smooth" if is_on_the_mesh(s.options):
+            return (
+                f"Scheme {s.scheme} leaves events to the mesh, which notices them up to a step late, wherever they lie "
+                f"between two points: the error of {s.quantity} has no regular expansion in powers of dt."
+            )
         case "non_smooth":
             return f"{s.quantity} is not smooth, so its error has no regular expansion in powers of dt."
         case "too_few_levels":
@@ -150,6 +156,8 @@ def advise(s: Story) -> str:
     match s.reason:
         case "asymptotic" | "exact":
             return ""
+        case "order_low" | "non_smooth" if is_on_the_mesh(s.options):
+            return f"Set `events: located` for scheme {s.scheme}."
         case "order_low" if _starts_low(s):
             return f"Set `start: centred` for scheme {s.scheme}."
         case "pre_asymptotic" if _ends_low(s):
@@ -220,6 +228,8 @@ def _ends_low(s: Story) -> bool:
 
 
 def _cause(s: Story) -> str:
+    if is_on_the_mesh(s.options):
+        return " The likely cause is `events: mesh`: an event is noticed up to a step late."
     if _starts_low(s):
         return " The likely cause is the first step: `start: first_order` leaves its dt^2 term out."
     if _ends_low(s):

@@ -2,6 +2,7 @@
 
 from vibsim.engine.kernel import LANES
 from vibsim.engine.trajectories import (
+    EventTimes,
     Extrema,
     Gathered,
     Series,
@@ -14,6 +15,7 @@ from vibsim.engine.trajectories import (
 
 __all__ = [
     "LANES",
+    "EventTimes",
     "Extrema",
     "Gathered",
     "Series",

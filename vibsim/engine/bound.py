@@ -31,6 +31,10 @@ WORK = True
 """Whether samples are taken of the sums of the powers of damping and of driving forces."""
 STAGED = True
 """Whether a step is cut into stages (`vibsim.engine.stages`)."""
+EVENTS = True
+"""Whether the model has events (`vibsim.engine.events`)."""
+LOCATED = True
+"""Whether they are found within the step, not noticed at the grid point behind."""
 STATES = 1
 """Entries of the scheme's state."""
 SET = 4
@@ -159,4 +163,64 @@ def put_extrema(rows: Any, j: int, extrema: Any) -> None:
 
 def total(state: State) -> float:
     """Return the sum of the entries of a state, which is NaN where one of them is."""
+    _unbound()
+
+
+def drive(u: float, v: float, t: float, p: P) -> float:
+    """Return the acceleration without the friction (`vibsim.models.events.Friction`)."""
+    _unbound()
+
+
+def limit(u: float, v: float, t: float, p: P) -> float:
+    """Return the largest acceleration that friction can hold."""
+    _unbound()
+
+
+def impact_of(u: float, v: float, t: float, p: P) -> tuple[float, float, float]:
+    """Return restitution, height and speed of `vibsim.models.events.Impact`."""
+    _unbound()
+
+
+def mode_of(p: P) -> float:
+    """Return the mode of a member (`vibsim.models.events`)."""
+    _unbound()
+
+
+def start_of(p: P) -> float:
+    """Return the time at which the scheme has last started."""
+    _unbound()
+
+
+def with_mode(p: P, mode: float, start: float) -> P:
+    """Return the parameters of a member with another mode, and another time at which the scheme has started."""
+    _unbound()
+
+
+def first_mode(u: float, v: float, t: float, p: P) -> float:
+    """Return the mode at the beginning."""
+    _unbound()
+
+
+def guard(u: float, v: float, t: float, p: P) -> float:
+    """Return a number that falls below 0 at the event that ends the present mode."""
+    _unbound()
+
+
+def guard_on_mesh(u: float, v: float, t: float, p: P) -> float:
+    """Return the same for grid points."""
+    _unbound()
+
+
+def landed(u: float, v: float) -> tuple[float, float]:
+    """Return position and velocity at a located event, without their rounding."""
+    _unbound()
+
+
+def settled(u: float, v: float, t: float, before: float, p: P) -> tuple[float, float, float]:
+    """Return position, velocity and mode behind an event; `before`: position a step before, infinite if located."""
+    _unbound()
+
+
+def turning(before: float, after: float) -> float:
+    """Return 1 for an event between two modes that is a peak, -1 for a trough, 0 for neither."""
     _unbound()

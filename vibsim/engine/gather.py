@@ -209,6 +209,23 @@ def note_trough(
     stats[case, LAST_TROUGH] = u_before + 0.5 * (v_before / (v_before - v) * dt) * v_before
 
 
+def note_turning(
+    stats: Any, counts: Any, case: int, t: float, grid: float, u: float, kind: float
+) -> None:
+    """Write the peak (`kind` > 0) or the trough that an event at time `t` is, before the grid point at `grid`."""
+    if kind > 0.0:
+        stats[case, LAST_PEAK_TIME] = t
+        stats[case, LAST_PEAK_TIME_GRID] = grid
+        stats[case, LAST_PEAK] = u
+        if counts[case, PEAKS] == 0:
+            stats[case, FIRST_PEAK_TIME] = t
+            stats[case, FIRST_PEAK_TIME_GRID] = grid
+            stats[case, FIRST_PEAK] = u
+        counts[case, PEAKS] += 1
+    else:
+        stats[case, LAST_TROUGH] = u
+
+
 def bottom_of(u: float, turn: float) -> float:
     """Return the multiple of `turn` nearest to `u`; 0 where there is no turn."""
     return turn * nearest_whole(u / turn) if turn > 0.0 else 0.0

@@ -17,7 +17,7 @@ from typing import Any
 
 from vibsim import expression
 from vibsim.elementary import ELEMENTARY, primitives
-from vibsim.engine import blocks, loop, observe, rows
+from vibsim.engine import blocks, friction, impact, loop, observe, rows
 from vibsim.engine.cache import Kernel, load
 from vibsim.engine.stages import stages
 from vibsim.engine.text import Module, collect, divided, with_quotients
@@ -25,6 +25,7 @@ from vibsim.errors import SimulationError
 from vibsim.expression import Binary, Call, Compare, Expression, Name, Number
 from vibsim.models import Model, has_budget
 from vibsim.models.base import Formula, parameter_names, tree
+from vibsim.models.events import Friction, Impact
 from vibsim.schemes.base import HANDED, Stepper, handed
 
 LANES = ("plain", "scalar", "blocks")
@@ -48,6 +49,7 @@ called = entry = njit(**inner)
     + primitives.COMPILED
 )
 
+_MODE = "mode"
 _MARK = "_"
 """Behind the names of parameters in a kernel."""
 _FULL_STEP = """\
@@ -86,8 +88,12 @@ def kernel(
     Raises
     ------
     SimulationError
-        Where the kernel cannot be compiled.
+        Where the kernel cannot be compiled, or a model with events is to be stepped in blocks.
     """
+    if lane == "blocks" and model.events is not None:
+        raise SimulationError(
+            f"{model.kind} has events, at times of each member's own: no block of members has them"
+        )
     text = source(model, stepper, lane, with_gathered, with_series, with_peaks)
     return _in_lane(text, lane, _STEPPING)
 
@@ -123,6 +129,8 @@ def source(
         "STAGGERED": with_gathered and stepper.staggered,
         "WORK": with_gathered and with_series and has_budget(model),
         "STAGED": bool(stages(stepper.step)),
+        "EVENTS": model.events is not None,
+        "LOCATED": stepper.events != "mesh",
         "STATES": states,
         "SET": blocks.set_of(states, with_peaks),
         "PARAMETERS": parameters,
@@ -131,11 +139,14 @@ def source(
     module = _module(lane, settings)
     again = lane != "blocks" and bool(settings["D2T"])
     with_work = bool(settings["WORK"])
-    rare = lane == "blocks"
+    # with events a step stands at several places, and would take long to compile
+    rare = lane == "blocks" or model.events is not None
     _put_formulas(module, model, "", stepper, is_rare=rare, with_kinetic=again, with_work=with_work)
     if again:
         _put_energy_with(module, model)
     _put_start(module, stepper)
+    if model.events is not None:
+        _put_events(module, model, stepper)
     for name in ("step", "backward"):
         collect(module, getattr(stepper, name), name, {})
     if lane == "blocks":
@@ -157,7 +168,7 @@ def source(
 
 def carried(stepper: Stepper, model: Model) -> int:
     """Return how many floats the state of a scheme has, by asking for one."""
-    p: tuple[Any, ...] = (1.0,) * n_parameters(stepper, model)
+    p: tuple[Any, ...] = (1.0,) * (n_parameters(stepper, model) + n_event_numbers(model))
     p += ((0.0,) * 4,) if stepper.tabulated else ()
     start = handed(stepper.start, lambda u, v, t, p: 0.0, lambda u, v, t, p: (0.0, 0.0))
     return len(start(stepper.variant, 0.0, 0.0, 1.0, p))
@@ -166,6 +177,27 @@ def carried(stepper: Stepper, model: Model) -> int:
 def n_parameters(stepper: Stepper, model: Model) -> int:
     """Return how many parameters a member has: those of the model, and the factors of `Stepper.scaling` behind them."""
     return len(model.parameters) + (2 if stepper.scaling else 0)
+
+
+def n_event_numbers(model: Model) -> int:
+    """Return how many numbers stand between the parameters of a member and the factors behind them: mode and start."""
+    return 2 if model.events is not None else 0
+
+
+def _put_events(module: Module, model: Model, stepper: Stepper) -> None:
+    """Write what tells modes apart, and the events of the model."""
+    first = len(model.parameters)
+    count = n_parameters(stepper, model) + n_event_numbers(model)
+    places = [f"p[{i}]" for i in range(count)]
+    places[first : first + 2] = ["mode", "start"]
+    module.put("mode_of", f"@compiled\ndef mode_of(p):\n    return p[{first}]")
+    module.put("start_of", f"@compiled\ndef start_of(p):\n    return p[{first + 1}]")
+    text = f"@compiled\ndef with_mode(p, mode, start):\n    return ({', '.join(places)},)"
+    module.put("with_mode", text)
+    collect(module, stepper.step, "step", {})
+    kind = friction if isinstance(model.events, Friction) else impact
+    for name in ("first_mode", "guard", "guard_on_mesh", "landed", "settled", "turning"):
+        collect(module, getattr(kind, name), name, {})
 
 
 def _put_energy_with(module: Module, model: Model) -> None:
@@ -234,8 +266,13 @@ def _put_formulas(
     """
     put = _marked(model)
     acceleration = put(model.acceleration)
+    parts = _of_events(model, put)
+    if "drive" in parts:
+        held = Binary("*", Name(_MODE), parts["limit"]["_limit"])
+        acceleration = Binary("-", parts["drive"]["_drive"], held)
     formulas = {
         "acceleration": {"_result": acceleration},
+        **parts,
         "energies": {
             "_kinetic": put(model.kinetic_energy),
             "_potential": put(model.potential_energy),
@@ -297,11 +334,13 @@ def _put_functions(
     unpack = [f"{name}{_MARK} = p[{i}]" for i, name in enumerate(names)]
     for function, results in formulas.items():
         lines = list(unpack)
+        if model.events is not None and function in ("acceleration", "slopes"):
+            lines += [f"{_MODE} = p[{len(names)}]", f"t = t + p[{len(names) + 1}]"]
         for result, formula in results.items():
             ready = _with_functions(module, formula, suffix, is_rare)
             lines += expression.to_statements(ready, result)
             if function in scaled:
-                lines.append(f"{result} = {result} * p[{len(names)}]")
+                lines.append(f"{result} = {result} * p[{len(names) + n_event_numbers(model)}]")
         returned = ", ".join(results)
         lines.append(f"return ({returned},)" if always_tuple else f"return {returned}")
         head = f"@compiled\ndef {function}{suffix}({model.position}, {model.velocity}, t, p):\n    "
@@ -312,12 +351,29 @@ def _put_parameters(
     module: Module, model: Model, more: int = 0, *, tabulated: bool = False
 ) -> None:
     """Write what makes the parameters of a member a tuple, with `more` numbers and a table behind them."""
-    count = len(model.parameters) + more
-    values = ", ".join(f"float(parameters[case, {i}])" for i in range(count)) or "0.0"
+    first = len(model.parameters)
+    count = first + more
+    places = [f"float(parameters[case, {i}])" for i in range(count)]
+    places[first:first] = ["0.0"] * n_event_numbers(model)
+    values = ", ".join(places) or "0.0"
     if tabulated:
         values += f", parameters[case, {count}:]"
     text = f"@compiled\ndef parameters_of(parameters, case):\n    return ({values},)"
     module.put("parameters_of", text)
+
+
+def _of_events(
+    model: Model, put: Callable[[Formula], Expression]
+) -> dict[str, dict[str, Expression]]:
+    """Return the formulas of the events of a model, by function and result."""
+    match model.events:
+        case None:
+            return {}
+        case Friction(drive, limit):
+            return {"drive": {"_drive": put(drive)}, "limit": {"_limit": put(limit)}}
+        case Impact(restitution, near, slow):
+            results = {"_restitution": restitution, "_near": near, "_slow": slow}
+            return {"impact_of": {name: put(formula) for name, formula in results.items()}}
 
 
 def _with_functions(module: Module, formula: Expression, suffix: str, is_rare: bool) -> Expression:

@@ -12,6 +12,7 @@ from typing import Any
 
 from vibsim.engine.bound import (
     D2T,
+    EVENTS,
     GATHER,
     KEEP,
     SERIES,
@@ -20,11 +21,13 @@ from vibsim.engine.bound import (
     backward,
     energies,
     energy_with,
+    mode_of,
     parameters_of,
     powers,
     start,
     step,
 )
+from vibsim.engine.events import begun, passed
 from vibsim.engine.extrema import is_turned, note_turned
 from vibsim.engine.gather import (
     DISSIPATED_ROW,
@@ -109,6 +112,9 @@ def run(
             samples[DRIVEN_ROW, case, 0] = driven
         extrema = first_extrema(u, v)
         bottom = bottom_of(u, turn)
+        if EVENTS:
+            p = begun(stats, case, u, v, p)
+            last_event = -1
         state = start(variant, u, v, h, p)
         interior = 0.0
         good = 0
@@ -127,11 +133,21 @@ def run(
             if KEEP:
                 u_two_before = u_before
             u_before, v_two_before, v_before = u, v_before, v
-            u = state[0]
-            following, own = step(state, t, h, p)
+            if EVENTS:
+                u, following, own, p, passes = passed(
+                    stats, counts, case, variant, n, h, u, v_before, state, p
+                )
+                last_event = n if passes > 0 else last_event
+            else:
+                u = state[0]
+                following, own = step(state, t, h, p)
             v = own
             if n == steps:
                 v = end_velocity(end_rule, own, v_before, v_two_before, backward(state, h))
+            if EVENTS:  # noqa: SIM102
+                # a formula over points on both sides of an event, or of a member at rest, gives no velocity
+                if n - last_event < 2 or mode_of(p) == 0.0:
+                    v = own
             state = following
             # written so that NaN fails as well
             if not abs(u) + abs(v) < OVERFLOW:
@@ -141,6 +157,10 @@ def run(
             slope_before, slope = slope, own
             if STAGGERED:
                 slope = (following[0] - u_before) * (0.5 / h)
+            if EVENTS:  # noqa: SIM102
+                # events have noted themselves whether they are peaks
+                if n == last_event:
+                    slope_before = math.nan
             if GATHER:
                 kinetic, potential = energies(u, v, t, p)
                 interior = extrema[LARGEST_DEVIATION]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.engine import blocks, extrema, gather
+from vibsim.engine import blocks, events, extrema, gather
 from vibsim.engine.kernel import carried, kernel, observer
 from vibsim.engine.stages import kept_names
 from vibsim.models import Model, has_budget
@@ -77,6 +77,18 @@ class Extrema:
 
 
 @dataclass(frozen=True)
+class EventTimes:
+    """The events of members of a model that has some (`vibsim.models.events`); arrays of shape (case,)."""
+
+    event_count: Floats
+    first_event_time: Floats
+    """NaN where there was none."""
+    last_event_time: Floats
+    rest_time: Floats
+    """From when on the member was at rest to the end; NaN where it moved."""
+
+
+@dataclass(frozen=True)
 class Series:
     """What samples have beside position and velocity; arrays of shape (case, n_samples)."""
 
@@ -106,12 +118,15 @@ class Trajectories:
     series: Series | None = None
     """None where they were not asked for."""
     extrema: Extrema | None = None
+    events: EventTimes | None = None
+    """None for a smooth model, and where nothing was to be gathered."""
 
 
 def lane_for(members: int, steps: int, *, implicit: bool = False) -> str:
     """Choose the lane from the size of the work; the bits are the same in every lane.
 
-    An implicit step iterates as often as its member needs, which no vector instruction can.
+    An implicit step iterates as often as its member needs, which no vector instruction can; nor can it a step that an
+    event of the member divides, for which `implicit` stands as well.
     """
     if members * steps <= PLAIN_MEMBER_STEPS:
         return "plain"
@@ -164,11 +179,13 @@ def integrate(
     """
     members = len(dt)
     stepper = scheme.stepper_for(model, options)
-    lane = lane or lane_for(members, steps, implicit=stepper.implicit)
+    has_events = model.events is not None
+    lane = lane or lane_for(members, steps, implicit=stepper.implicit or has_events)
     run = kernel(model, stepper, lane, with_gathered, with_series, n_extrema > 0)
     rows = gather.n_sample_rows(with_series, stepper.own_velocity, has_budget(model))
     samples = np.full((rows, members, steps // every + 1), np.nan)
-    stats = np.full((members, gather.N_STATS if with_gathered else 0), np.nan)
+    columns = events.N_STATS_EVENTS if has_events else gather.N_STATS
+    stats = np.full((members, columns if with_gathered else 0), np.nan)
     columns = extrema.N_COUNTS_KEPT if n_extrema else gather.N_COUNTS
     counts = np.zeros((members, columns), dtype=np.int64)
     kept = np.full((extrema.N_KEPT, members if n_extrema else 0, n_extrema), np.nan)
@@ -191,6 +208,7 @@ def integrate(
         gathered=_name(stats, counts) if with_gathered else None,
         series=_series(samples) if with_series else None,
         extrema=_extrema(kept, counts) if n_extrema else None,
+        events=_events(stats) if has_events and with_gathered else None,
     )
 
 
@@ -305,6 +323,15 @@ def _name(stats: Floats, counts: Integers) -> Gathered:
         deviation_d2t=_storable(stats[:, gather.DEVIATION_D2T]),
         accepted_steps=np.full(len(stats), np.nan),
         force_evaluations=np.full(len(stats), np.nan),
+    )
+
+
+def _events(stats: Floats) -> EventTimes:
+    return EventTimes(
+        event_count=stats[:, events.EVENT_COUNT],
+        first_event_time=stats[:, events.FIRST_EVENT],
+        last_event_time=stats[:, events.LAST_EVENT],
+        rest_time=stats[:, events.REST_TIME],
     )
 
 

@@ -19,12 +19,14 @@ from vibsim.models.base import (
     quantities,
     tree,
 )
+from vibsim.models.bouncing_ball import BOUNCING_BALL
 from vibsim.models.circuit import CIRCUIT
 from vibsim.models.duffing import DUFFING
 from vibsim.models.linear_pendulum import LINEAR_PENDULUM
 from vibsim.models.oscillator import OSCILLATOR
 from vibsim.models.pendulum import PENDULUM
 from vibsim.models.physical_pendulum import PHYSICAL_PENDULUM
+from vibsim.models.sliding_box import SLIDING_BOX
 from vibsim.models.spring import SPRING
 from vibsim.models.vehicle import VEHICLE
 from vibsim.models.washing_machine import WASHING_MACHINE
@@ -35,8 +37,10 @@ _ALL = (
     LINEAR_PENDULUM,
     PHYSICAL_PENDULUM,
     OSCILLATOR,
+    SLIDING_BOX,
     WASHING_MACHINE,
     VEHICLE,
+    BOUNCING_BALL,
     CIRCUIT,
     DUFFING,
 )

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.expression import Expression, parse
+from vibsim.models.events import Events
 
 if TYPE_CHECKING:
     from vibsim.models.scales import Scales
@@ -34,6 +35,8 @@ class State:
     name: str
     unit: str
     long_name: str
+    minimum: float | None = None
+    """Least initial value."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,7 @@ class Parameter:
     minimum: float | None = None
     exclusive: bool = False
     """Whether `minimum` itself is refused."""
+    maximum: float | None = None
     path: str = ""
     """Where it stands in the section ``model``, if not under its name: ``damping.linear``."""
 
@@ -134,6 +138,8 @@ class Model:
     """The model with the terms of some of `optional`; this one has those of none."""
     damping: Damping | None = None
     """The damping force, where it is one of two simple kinds."""
+    events: Events | None = None
+    """Where the motion is not smooth; None where it is smooth throughout."""
     formulas: tuple[FormulaField, ...] = ()
     """What a user writes as formulas."""
     written: Callable[[Mapping[str, str], tuple[str, ...]], Model] | None = None

@@ -5,9 +5,11 @@ and F [N]; energy ``m v^2/2 + V(u)`` [J] with V the integral of s from 0. With m
 them are dimensionless.
 
 The damping f is a formula in v, linear (``b v``) or quadratic (``b |v| v``, B section 8.2), whatever way it is written:
-schemes that treat these two in their own way recognise them. Instead of the force, an exact solution u_e(t) may be
-written: the force is then ``F = m u_e'' + f(u_e') + s(u_e)`` (a manufactured solution; B, section 2.2 and exercise 9),
-and the motion starts on it.
+schemes that treat these two in their own way recognise them. Coulomb friction, ``{coulomb: b}``, holds the body where
+``|F - s| <= b`` (`vibsim.models.events`; B, section 10.3); as a formula, ``b sign(v)``, it is a force like any other.
+
+Instead of the force, an exact solution u_e(t) may be written: the force is then ``F = m u_e'' + f(u_e') + s(u_e)`` (a
+manufactured solution; B, section 2.2 and exercise 9), and the motion starts on it.
 """
 
 from __future__ import annotations
@@ -27,6 +29,7 @@ from vibsim.expression import (
     Name,
     derivative,
     is_zero,
+    minus,
     parse,
     plus,
     put,
@@ -36,11 +39,14 @@ from vibsim.expression import (
     walk,
 )
 from vibsim.models.base import Floats, FormulaField, Model, Numbers, Parameter, declared_parameters
+from vibsim.models.dry_friction import friction_motion
+from vibsim.models.events import Friction
 from vibsim.models.mechanical import Forces, mechanical
 
 MASS = Parameter("m", 1.0, "kg", "mass", minimum=0.0, exclusive=True)
-TERMS = {"linear": "b*v", "quadratic": "b*abs(v)*v"}
-UNITS = {"linear": "kg s-1", "quadratic": "kg m-1"}
+COULOMB = "coulomb"
+TERMS = {"linear": "b*v", "quadratic": "b*abs(v)*v", COULOMB: "b*sign(v)"}
+UNITS = {"linear": "kg s-1", "quadratic": "kg m-1", COULOMB: "N"}
 MAX_NODES = 20_000
 """Longest force of an exact solution, in operations and names."""
 
@@ -79,6 +85,11 @@ class Written:
         """Whether the damping is a term with the coefficient b."""
         return self.formulas.get("damping") in TERMS.values() and "b" not in self.declared
 
+    @property
+    def has_friction(self) -> bool:
+        """Whether the damping is Coulomb friction."""
+        return self.is_coefficient_given and self.formulas["damping"] == TERMS[COULOMB]
+
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """Every parameter, in the order of the engine."""
@@ -86,7 +97,8 @@ class Written:
         if self.is_coefficient_given:
             kind = next(name for name, text in TERMS.items() if text == self.formulas["damping"])
             words = f"coefficient of the {kind} damping"
-            own.append(Parameter("b", 0.0, UNITS[kind], words, path=f"damping.{kind}"))
+            least = 0.0 if kind == COULOMB else None
+            own.append(Parameter("b", 0.0, UNITS[kind], words, least, path=f"damping.{kind}"))
         return (*own, *declared_parameters(self.declared))
 
     def read(self, name: str) -> Expression:
@@ -167,8 +179,31 @@ def _written(formulas: tuple[tuple[str, str], ...], declared: tuple[str, ...]) -
         equation=_equation(own),
         formulas=FORMULAS,
         written=written,
-        **_manufactured(own),
+        **(_friction(own, forces) if own.has_friction else _manufactured(own)),
     )
+
+
+def _friction(own: Written, forces: Forces) -> dict[str, Any]:
+    """Return what is another with Coulomb friction.
+
+    Its power jumps at events, so that no sum over the points of the mesh gives its work.
+    """
+    drive = forces.over_mass(minus(forces.force, forces.spring))
+
+    def held(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
+        numbers = own.numbers(parameters)
+        stiffness = values(forces.stiffness, numbers)
+        w = np.sqrt(stiffness / numbers["m"])
+        u, v = friction_motion(t, w, numbers["b"] / stiffness, initial["u"], initial["v"])
+        return {"u": u, "v": v}
+
+    return {
+        "linear": False,
+        "dissipation": None,
+        "driving": None,
+        "exact": held if forces.is_linear and not forces.is_driven else None,
+        "events": Friction(drive=drive, limit=forces.over_mass(Name("b"))),
+    }
 
 
 def _manufactured(own: Written) -> dict[str, Any]:

@@ -49,7 +49,8 @@ def load_of(experiment: Experiment, level: int) -> Load:
     lean = is_bounded(experiment)
     trajectories = len(experiment.schemes) * experiment.members
     kinds = [SCHEMES[experiment.schemes[i].kind] for i in experiment.ladder]
-    works = [work(kind.force_evaluations, kind.explicit) for kind in kinds]
+    has_events = model.events is not None
+    works = [work(kind.force_evaluations, kind.explicit, has_events) for kind in kinds]
     return Load(
         schemes=len(experiment.schemes),
         steps=steps,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any
 
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from vibsim.expression import names_in
 from vibsim.models.base import BUDGET, Model, tree
+from vibsim.models.events import TREATMENTS, Friction
 
 OptionValue = str | float | bool
 Options = Mapping[str, OptionValue]
@@ -69,6 +70,14 @@ class Flag:
 
 AnyOption = Option | NumberOption | Flag
 
+EVENTS = Option(
+    "events",
+    TREATMENTS,
+    "where the motion is not smooth: the event is found within the step and the rest of the step begins there, or it "
+    "is left to the mesh and noticed at the grid point behind it",
+)
+"""Option of every scheme with equal steps on a model with events (`vibsim.models.events`)."""
+
 
 def no_backward(state: CarriedState, dt: float) -> float:
     """Return NaN: a scheme that carries its velocity has no use for a one-sided one."""
@@ -101,6 +110,8 @@ class Stepper:
     """Whether a step solves an equation, for which it may ask for `slopes`."""
     scaling: Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], ...]] | None = None
     """Factors of the acceleration and of the initial velocity that enters the start, from ``w dt``; None for 1."""
+    events: str = ""
+    """How it treats events, one of `EVENTS`; empty for a smooth model."""
     tabulated: bool = False
     """Whether the points are known before, and stand behind the parameters (`vibsim.simulation.adaptive`)."""
 
@@ -131,8 +142,10 @@ def handed(
 
 @cache
 def depends_on_velocity(model: Model) -> bool:
-    """Tell whether the acceleration of a model depends on the velocity."""
-    return model.velocity in names_in(tree(model, model.acceleration))
+    """Tell whether the acceleration of a model depends on the velocity; between events, where there are some."""
+    events = model.events
+    smooth = events.drive if isinstance(events, Friction) else model.acceleration
+    return model.velocity in names_in(tree(model, smooth))
 
 
 @dataclass(frozen=True)
@@ -155,6 +168,15 @@ class Orders:
     """Of the position of a linear, conservative model; None: that of any other one."""
     velocity_dependent: Orders | None = None
     """What is promised instead where the acceleration depends on the velocity; None: the same."""
+
+    def between_events(self, model: Model) -> float:
+        """Return the order of every quantity where events are located: the lower one of position and velocity.
+
+        Of these two the scheme starts anew.
+        """
+        if self.velocity_dependent is not None and depends_on_velocity(model):
+            return self.velocity_dependent.between_events(model)
+        return min(self.position, self.velocity)
 
     def of(self, quantity: str, model: Model) -> float:
         """Return the order of a quantity of a model.
@@ -210,6 +232,11 @@ def round_off(options: Options, steps: int) -> float:
     return float(UNIT_ROUND_OFF * steps**0.5)
 
 
+def is_on_the_mesh(options: Options) -> bool:
+    """Tell whether the options leave events to the mesh."""
+    return options.get(EVENTS.name) == "mesh"
+
+
 def _kind_of(model: Model) -> str:
     return model.damping.kind if model.damping else ""
 
@@ -256,8 +283,15 @@ class Scheme:
         """The options that are a choice of words."""
         return tuple(option for option in self.options if isinstance(option, Option))
 
+    def options_on(self, model: Model | None) -> tuple[AnyOption, ...]:
+        """Return every option that the scheme has on a model."""
+        has_events = model is not None and model.events is not None and not self.adaptive
+        return (*self.options, EVENTS) if has_events else self.options
+
     def treats(self, model: Model) -> bool:
-        """Tell whether the scheme can treat the forces of a model."""
+        """Tell whether the scheme can treat the forces of a model, and its events."""
+        if self.adaptive and model.events is not None:
+            return False
         return (
             self.velocity_forces
             or not depends_on_velocity(model)
@@ -265,9 +299,27 @@ class Scheme:
         )
 
     def stepper_for(self, model: Model, options: Options) -> Stepper:
-        """Return the arithmetic that the options ask for, with its treatment of the model's damping if it has one."""
-        return dict(self.damped).get(_kind_of(model), self.stepper)(options)
+        """Return the arithmetic that the options ask for, with its treatment of the model's damping if it has one.
+
+        Across an event the centred difference ``[D_2t u]`` is no velocity, and none is gathered.
+        """
+        stepper = dict(self.damped).get(_kind_of(model), self.stepper)(options)
+        if model.events is None:
+            return stepper
+        treatment = str(options.get(EVENTS.name, EVENTS.default))
+        return replace(stepper, events=treatment, own_velocity=False, staggered=False)
 
     def formal_order(self, quantity: str, model: Model, options: Options) -> float:
-        """Return the order that is promised for a quantity of a model; infinite for what is exact."""
-        return self.orders(options).of(quantity, model)
+        """Return the order that is promised for a quantity of a model; infinite for what is exact.
+
+        An event that is left to the mesh is noticed up to a step late: no order above 1 is left.
+        """
+        orders = self.orders(options)
+        if model.events is None:
+            return orders.of(quantity, model)
+        order = orders.between_events(model)
+        return min(order, 1.0) if is_on_the_mesh(options) else order
+
+    def has_even_powers(self, quantity: str, model: Model, options: Options) -> bool:
+        """Tell whether the error of a quantity expands in h^p, h^(p+2), ...; not where an event divides a step."""
+        return model.events is None and self.even_powers(quantity, model, options)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.engine import Extrema, Gathered
+from vibsim.engine import EventTimes, Extrema, Gathered
 from vibsim.models import Model, State
 from vibsim.record import Variable, attributes
 from vibsim.simulation.members import Members
@@ -66,6 +66,20 @@ def extrema(model: Model, found: Extrema) -> dict[str, Variable]:
         counted = getattr(found, f"{kind}_count")
         table[f"{kind}_count"] = Variable(dims[:2], counted, attributes(words, "1"))
     return table
+
+
+def event_times(found: EventTimes) -> dict[str, Variable]:
+    """Return the number of events, when they were, and from when on members were at rest."""
+    rows = {
+        "event_count": ("number of events, where the motion is not smooth", "1"),
+        "first_event_time": ("time of the first event", "s"),
+        "last_event_time": ("time of the last event", "s"),
+        "rest_time": ("time from which the member was at rest to the end", "s"),
+    }
+    return {
+        name: Variable(("scheme", "case"), getattr(found, name), attributes(long_name, units))
+        for name, (long_name, units) in rows.items()
+    }
 
 
 def of_own_steps(run: Gathered) -> dict[str, Variable]:

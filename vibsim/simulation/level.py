@@ -13,7 +13,7 @@ from vibsim import plan
 from vibsim.models import BUDGET, ENERGIES, Model, State, centred, has_budget
 from vibsim.record import Attribute, Record, Variable, attributes
 from vibsim.simulation.derived import derived
-from vibsim.simulation.gathered import extrema, gathered, of_own_steps
+from vibsim.simulation.gathered import event_times, extrema, gathered, of_own_steps
 from vibsim.simulation.members import Members, members
 from vibsim.simulation.reference import METHOD, reference
 from vibsim.simulation.scaled import in_scales
@@ -101,6 +101,7 @@ def simulate_record(
         **({} if is_lean else _exact(experiment, group, steps, every)),
         **gathered(model, solution.gathered, solution.last_step, group, steps, with_d2t=with_d2t),
         **(extrema(model, solution.extrema) if solution.extrema else {}),
+        **(event_times(solution.events) if solution.events else {}),
         **(of_own_steps(solution.gathered) if has_adaptive(experiment) else {}),
         **_constants(model, group, steps),
     }

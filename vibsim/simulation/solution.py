@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from vibsim import plan
 from vibsim.engine import (
+    EventTimes,
     Extrema,
     Gathered,
     Series,
@@ -42,6 +43,8 @@ class Solution:
     """Its arrays have the shape (scheme, case, t)."""
     extrema: Extrema | None
     """Its arrays have the shape (scheme, case, extremum) or (scheme, case)."""
+    events: EventTimes | None
+    """Its arrays have the shape (scheme, case); None for a smooth model."""
 
 
 def solve(
@@ -73,6 +76,7 @@ def solve(
         gathered=_each(Gathered, [row.gathered for row in rows], _stack),
         series=_each(Series, [row.series for row in rows], _stack) if with_series else None,
         extrema=_each(Extrema, [row.extrema for row in rows], _stack) if n_extrema else None,
+        events=_each(EventTimes, [row.events for row in rows], _stack) if rows[0].events else None,
     )
 
 
@@ -135,10 +139,11 @@ def _in_order(parts: list[tuple[Trajectories, NDArray[np.int64]]]) -> Trajectori
         gathered=_each(Gathered, [run.gathered for run in runs], sorted_),
         series=_each(Series, [run.series for run in runs], sorted_) if one.series else None,
         extrema=_each(Extrema, [run.extrema for run in runs], sorted_) if one.extrema else None,
+        events=_each(EventTimes, [run.events for run in runs], sorted_) if one.events else None,
     )
 
 
-Kind = TypeVar("Kind", Gathered, Series, Extrema)
+Kind = TypeVar("Kind", Gathered, Series, Extrema, EventTimes)
 
 
 def _each(kind: type[Kind], rows: list[Any], join: Any) -> Kind:

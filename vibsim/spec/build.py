@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from vibsim.errors import nearest
 from vibsim.models import MODELS, Model, quantities
 from vibsim.schemes import FIXED_STEP, SCHEMES
+from vibsim.schemes.base import EVENTS
 from vibsim.spec import limits, model_rules, sweep
 from vibsim.spec.check_places import Ladder, kinds_of
 from vibsim.spec.check_rules import finish_checks
@@ -75,7 +76,8 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
         samples=samples,
         variables=len(quantities(model)) if model else 0,
         end=varied.least_end(time) if time else None,
-        own_velocity=any(scheme.own_velocity for scheme in schemes),
+        own_velocity=(model is None or model.events is None)
+        and any(scheme.own_velocity for scheme in schemes),
     )
     limits.check(shape, report)
     _check_output(part.output, levels, report)
@@ -172,6 +174,10 @@ def _initial(
         if name not in states:
             report.add(("initial", name), "unknown state", nearest(name, states), at_key=True)
     found = {name: (part.initial or {}).get(name, 0.0) for name in states}
+    for state in model.states:
+        if state.minimum is not None and found[state.name] < state.minimum:
+            rule = f"must be at least {state.minimum:g}"
+            report.add(("initial", state.name), rule, value=found[state.name])
     for name, value in start.items():
         if name in (part.initial or {}) and not math.isclose(
             found[name], value, rel_tol=1e-12, abs_tol=1e-12
@@ -212,7 +218,8 @@ def _schemes(part: Any, model: Model | None, report: Report) -> list[SchemeSpec]
             hint = nearest(section, sorted(SCHEMES))
             report.add(("schemes", i), "unknown scheme", hint, section)
         elif section is not None:
-            several = specs(section)
+            several = specs(section, model)
+            _check_events(section, i, model, report)
             found.extend(several)
             _check_forces(several[0], i, model, report)
             _check_names(several, i, first, report)
@@ -240,11 +247,27 @@ def _check_forces(spec: SchemeSpec, i: int, model: Model | None, report: Report)
     if model is None or SCHEMES[spec.kind].treats(model):
         return
     able = [kind for kind, scheme in SCHEMES.items() if scheme.treats(model)]
+    if model.events is not None and SCHEMES[spec.kind].adaptive:
+        rule = f"cannot treat {model.kind}: it takes its own steps across events, where the motion is not smooth"
+        report.add(("schemes", i), rule, "choose from " + ", ".join(able), spec.kind)
+        return
     rule = f"cannot treat {model.kind}, whose acceleration depends on {model.velocity}"
     if SCHEMES[spec.kind].damped:
         rule += f" otherwise than by {' or '.join(kind for kind, _ in SCHEMES[spec.kind].damped)} damping"
     hint = "choose from " + ", ".join(able) if able else "no scheme can"
     report.add(("schemes", i), rule, hint, spec.kind)
+
+
+def _check_events(section: Any, i: int, model: Model | None, report: Report) -> None:
+    """Refuse a treatment of events where there are none."""
+    given = None if isinstance(section, str) else getattr(section, EVENTS.name, None)
+    is_known = model is not None and not any(f.key.split(".")[0] == "model" for f in report.faults)
+    if given is None or model is None or not is_known or model.events is not None:
+        return
+    able = [kind for kind, other in MODELS.items() if other.events is not None]
+    hint = f"models with events are {', '.join(able)}, and oscillator with damping: {{coulomb: c}}"
+    rule = f"{model.kind} has no events here: its motion is smooth"
+    report.add(("schemes", i, EVENTS.name), rule, hint, given)
 
 
 def _swept(

@@ -22,6 +22,8 @@ EVALUATION = 0.45
 is what every step has: the scheme's arithmetic, energies, extrema."""
 ITERATED = 3.0
 """Steps with one evaluation that an implicit step takes as long as, for each evaluation of an iteration."""
+EVENTFUL = 2.5
+"""Steps of a smooth motion that one takes as long as where an event may be."""
 WRITTEN_SECONDS = 4e-9
 """Of one byte that is made, written, sealed and flushed."""
 JOB_SECONDS = 0.5
@@ -79,17 +81,20 @@ COMPARED_FILE = 130_000
 """Bytes of the file of an analysis beside its data."""
 
 
-def work(force_evaluations: int, explicit: bool) -> tuple[float, float]:
+def work(force_evaluations: int, explicit: bool, has_events: bool = False) -> tuple[float, float]:
     """Return what a step of a scheme takes in explicit steps with one evaluation: as such steps, and as iterations.
 
     Parameters
     ----------
     force_evaluations
         Of a step; of an implicit scheme, of an iteration.
+    has_events
+        Whether the motion has events, so that members are stepped one by one, and each step asks for them.
     """
-    if explicit:
-        return 1.0 + EVALUATION * (force_evaluations - 1), 0.0
-    return 0.0, ITERATED * force_evaluations
+    one, iterated = 1.0 + EVALUATION * (force_evaluations - 1), 0.0
+    if not explicit:
+        one, iterated = 0.0, ITERATED * force_evaluations
+    return (0.0, EVENTFUL * (one + iterated)) if has_events else (one, iterated)
 
 
 @dataclass(frozen=True)

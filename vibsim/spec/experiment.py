@@ -189,8 +189,9 @@ class Experiment(Section):
 
     @property
     def own_velocity(self) -> bool:
-        """Whether some scheme has another velocity than the centred difference ``[D_2t u]``."""
-        return any(scheme.own_velocity for scheme in self.schemes)
+        """Whether some scheme has another velocity than the centred difference ``[D_2t u]``, without events."""
+        smooth = self.model.definition.events is None
+        return smooth and any(scheme.own_velocity for scheme in self.schemes)
 
     @property
     def quantities(self) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from vibsim.errors import Fault, InputError, nearest
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
+from vibsim.schemes.base import EVENTS
 from vibsim.spec.checks import CLASSES, At, Expect, ValueCheck
 from vibsim.spec.document import Document, Every, LevelRange, TimeSection
 from vibsim.spec.experiment import DECLARED
@@ -217,8 +218,9 @@ def known_keys(path: Path_, data: Any) -> list[str]:
         case ("sweep", *_):
             return list(_FORMS)
         case ("schemes", _):
-            options = (row.name for row in SCHEMES[value["kind"]].options)
-            return ["kind", "label", *options]
+            scheme = SCHEMES[value["kind"]]
+            options = (row.name for row in scheme.options)
+            return ["kind", "label", *options, *([] if scheme.adaptive else [EVENTS.name])]
         case ("published", _):
             return list(PublishedTable.model_fields)
         case ("published", _, "rows", _):

@@ -21,6 +21,7 @@ from vibsim.expression import (
 from vibsim.expression.integral import has_rule
 from vibsim.models import FormulaField, Model, tree
 from vibsim.models.base import Floats
+from vibsim.models.oscillator import COULOMB
 from vibsim.spec.experiment import DECLARED
 from vibsim.spec.faults import Report
 from vibsim.spec.fields import Section
@@ -86,6 +87,9 @@ def _read(section: Any, model: Model | None, report: Report) -> Read:
     if "exact" in texts and section.force is not None:
         rule = "must not be given together with exact, from which it follows"
         report.add(("model", "force"), rule, at_key=True)
+    if "exact" in texts and f"damping.{COULOMB}" in parameters:
+        rule = "must not be given together with coulomb friction, which may hold the body elsewhere"
+        report.add(("model", "exact"), rule, at_key=True)
     if any(fault.key.split(".")[0] == "model" for fault in report.faults):
         return Read(model)
     parameters |= {f"{DECLARED}.{name}": value for name, value in declared.items()}
@@ -136,6 +140,9 @@ def _term(
         report.add(("model", row.name), rule)
         return {}
     ((word, coefficient),) = given.items()
+    if word == COULOMB and coefficient < 0.0:
+        rule = "must be at least 0: friction opposes the motion"
+        report.add(("model", row.name, word), rule, value=coefficient)
     parameters[f"{row.name}.{word}"] = coefficient
     return {row.name: row.terms[word]}
 

@@ -99,6 +99,8 @@ def model_section(model: Model) -> type[Section]:
         bound: dict[str, float] = {}
         if row.minimum is not None:
             bound = {"gt": row.minimum} if row.exclusive else {"ge": row.minimum}
+        if row.maximum is not None:
+            bound["le"] = row.maximum
         description = f"{row.description} [{row.unit}]"
         number = Annotated[float, Field(**bound), FORMULA]
         fields[row.name] = (number, Field(default=row.default, description=description))

@@ -33,6 +33,8 @@ def one_of(
         return True
     if ladder.model is not None and name in centred(ladder.model) and not ladder.own_velocity:
         rule = "exists only where a scheme has another velocity than the centred difference"
+        if ladder.model.events is not None:
+            rule = "does not exist: across an event the centred difference is no velocity"
         report.add(path, rule, f"ask for {plain(name)}", name)
         return False
     known = name in all_quantities(ladder)

@@ -13,7 +13,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, StrictBool, Tag, create_model
 from pydantic_core import PydanticCustomError
 
+from vibsim.models import Model
 from vibsim.schemes import SCHEMES, AnyOption, Flag, NumberOption, Option, Scheme
+from vibsim.schemes.base import EVENTS
 from vibsim.spec.experiment import SchemeSpec
 from vibsim.spec.fields import FORMULA, Line, MadeSection, Section, number, short, tag
 from vibsim.spec.options import tolerance_name
@@ -38,6 +40,12 @@ def scheme_section(scheme: Scheme) -> type[Section]:
     for option in scheme.options:
         row = Field(default=option.default, description=option.description)
         fields[option.name] = (_type(option, scheme), row)
+    if not scheme.adaptive:
+        words = f"{EVENTS.description}; on models with events only, {EVENTS.default} when left out"
+        fields[EVENTS.name] = (
+            Literal[EVENTS.choices] | None,
+            Field(default=None, description=words),
+        )
     doc = f"{scheme.title} ({scheme.source})."
     return create_model(
         f"{class_name(scheme.kind)}Scheme", __base__=MadeSection, __doc__=doc, **fields
@@ -70,13 +78,18 @@ def has_tolerances(scheme: Scheme, option: AnyOption) -> bool:
     return scheme.adaptive and option.name == TOLERANCE and isinstance(option, NumberOption)
 
 
-def specs(section: Any) -> list[SchemeSpec]:
-    """Return the schemes that a sound entry stands for."""
+def specs(section: Any, model: Model | None) -> list[SchemeSpec]:
+    """Return the schemes that a sound entry stands for on a model."""
     if isinstance(section, str):
-        defaults = SCHEMES[section].defaults()
+        rows = SCHEMES[section].options_on(model)
+        defaults = {row.name: row.default for row in rows}
         return [SchemeSpec(name=section, kind=section, options=defaults)]
     kind, name = section.kind, section.label or section.kind
-    options = {row.name: getattr(section, row.name) for row in SCHEMES[kind].options}
+    rows = SCHEMES[kind].options_on(model)
+    given = {row.name: getattr(section, row.name) for row in rows}
+    options = {
+        row.name: row.default if given[row.name] is None else given[row.name] for row in rows
+    }
     several = options.get(TOLERANCE)
     if not isinstance(several, tuple):
         return [SchemeSpec(name=name, kind=kind, options=options)]

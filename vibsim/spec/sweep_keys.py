@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from vibsim.errors import nearest
-from vibsim.models import Model, Parameter
+from vibsim.models import Model, Parameter, State
 from vibsim.schemes import SCHEMES, AnyOption, NumberOption, Option
 from vibsim.spec.document import TimeSection
 from vibsim.spec.experiment import SchemeSpec
@@ -87,18 +87,23 @@ def targets(model: Model | None, schemes: Sequence[SchemeSpec]) -> dict[str, Tar
     found: dict[str, Target] = {}
     if model is not None:
         if model.start is None:
-            found.update((f"initial.{state.name}", Target()) for state in model.states)
+            found.update((f"initial.{state.name}", _state(state)) for state in model.states)
         found.update((f"model.{row.key}", _parameter(row)) for row in model.parameters)
     found["time.end"] = Target(_END)
     for scheme in schemes:
-        for option in SCHEMES[scheme.kind].options:
+        for option in SCHEMES[scheme.kind].options_on(model):
             found[f"schemes.{scheme.name}.{option.name}"] = _option(option)
     return found
 
 
 def _parameter(row: Parameter) -> Target:
     least = -math.inf if row.minimum is None else row.minimum
-    return Target(Bound(least, exclusive=row.exclusive))
+    most = math.inf if row.maximum is None else row.maximum
+    return Target(Bound(least, most, exclusive=row.exclusive))
+
+
+def _state(row: State) -> Target:
+    return Target(Bound(-math.inf if row.minimum is None else row.minimum))
 
 
 def _option(option: AnyOption) -> Target:

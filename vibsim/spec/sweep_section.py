@@ -16,6 +16,7 @@ from pydantic import (
 )
 
 from vibsim.schemes import SCHEMES, NumberOption, Option
+from vibsim.schemes.base import EVENTS
 from vibsim.spec.axes import RULES, Interval, Linspace, Logspace, Method, Range, Seed
 from vibsim.spec.fields import Count, Section, number, plain, tag
 
@@ -68,7 +69,8 @@ class Sample(Section):
 def _options() -> dict[str, Any]:
     """Describe the options of every scheme that take a list of words or flags, for editors."""
     words: dict[str, list[str | bool]] = {}
-    for option in (option for scheme in SCHEMES.values() for option in scheme.options):
+    every = (option for scheme in SCHEMES.values() for option in scheme.options)
+    for option in (*every, EVENTS):
         if not isinstance(option, NumberOption):
             choices = option.choices if isinstance(option, Option) else (False, True)
             words.setdefault(option.name, []).extend(choices)

@@ -58,5 +58,7 @@ def needs(row: Value, quantity: str | None, path: Path_, ladder: Ladder, report:
         report.add(path, f"the exact period of {model.kind} is not known", value=row.name)
     if row.needs_exact == "solution":
         known_exactly(quantity, row.name, path, ladder, report)
+    if row.needs_events and model.events is None:
+        report.add(path, f"{model.kind} has no events: its motion is smooth", value=row.name)
     if row.needs_linear:
         known_by_theory(row.name, path, ladder, report)

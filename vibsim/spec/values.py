@@ -40,6 +40,8 @@ class Value:
     """Whether it comes from the theory of linear models without damping."""
     fixed_step: bool = False
     """Whether it does not exist of schemes that choose their own steps."""
+    needs_events: bool = False
+    """Whether it exists only where the motion of the model is not smooth."""
 
 
 _ANYWHERE: tuple[AtPart, ...] = ("t", "step", "level", "scheme", "case")
@@ -139,6 +141,19 @@ _ENERGY = (
         "none",
     ),
 )
+_EVENTS = (
+    Value(
+        "event_count", "number of events, where the motion is not smooth", "none", needs_events=True
+    ),
+    Value("first_event_time", "time of the first event", "none", needs_events=True),
+    Value("last_event_time", "time of the last event", "none", needs_events=True),
+    Value(
+        "rest_time",
+        "time from which the body was at rest to the end",
+        "none",
+        needs_events=True,
+    ),
+)
 _COST = (
     Value("accepted_steps", "number of steps taken", "none"),
     Value(
@@ -225,7 +240,7 @@ _ERRORS = (
         fixed_step=True,
     ),
 )
-_ROWS = (*_SERIES, *_OSCILLATION, *_ENERGY, *_COST, *_ERRORS)
+_ROWS = (*_SERIES, *_OSCILLATION, *_ENERGY, *_EVENTS, *_COST, *_ERRORS)
 
 VALUES: Mapping[str, Value] = MappingProxyType({row.name: row for row in _ROWS})
 """Every value name with its meaning, as `vibsim list checks` prints it."""

@@ -1,0 +1,101 @@
+"""Verdicts where the motion is not smooth: located events pass with their order, the mesh passes nothing falsely."""
+
+from __future__ import annotations
+
+from collections import Counter
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vibsim import Experiment, analyse, simulate, verdicts
+from vibsim.vocabulary import REASON_NAMES
+
+MEMBERS = 24
+BOX = {"kind": "sliding_box", "mu": 0.05}
+ORDERS: list[Any] = ["scheme", 2, 4]
+
+
+def experiment(**changes: Any) -> Experiment:
+    return Experiment.from_dict(
+        {
+            "title": "t",
+            "model": BOX,
+            "time": {"end": 14.0},
+            "levels": {"from": 6, "to": 10},
+            "schemes": ["rk4", {"kind": "rk4", "label": "mesh", "events": "mesh"}],
+            "checks": [{"converges": "u", "order": order} for order in ORDERS],
+            **changes,
+        }
+    )
+
+
+@cache
+def reasons() -> dict[tuple[str, Any], Counter[str]]:
+    """Return how often each reason was given to random members, by scheme and expected order."""
+    sample = {"method": "random", "n": MEMBERS, "seed": 3}
+    over = {"initial.u": [-2.0, 2.0], "initial.v": [-2.0, 2.0]}
+    made = experiment(sweep={"sample": {**sample, "over": over}}, samples="common")
+    record = analyse(made, [simulate(made, level) for level in made.levels])
+    return {
+        (scheme.name, order): Counter(
+            REASON_NAMES[int(i)] for i in np.asarray(record["check_reason"])[k, s]
+        )
+        for k, order in enumerate(ORDERS)
+        for s, scheme in enumerate(made.schemes)
+    }
+
+
+def test_located_events_pass_with_the_order_of_the_scheme() -> None:
+    found = reasons()["rk4", "scheme"]
+    assert found == reasons()["rk4", 4]
+    assert found["asymptotic"] >= 0.9 * MEMBERS
+    assert set(found) <= {"asymptotic", "pre_asymptotic"}
+    # a wrong expectation is refuted, or open
+    assert reasons()["rk4", 2]["order_high"] > 0
+    assert set(reasons()["rk4", 2]) <= {"order_high", "pre_asymptotic"}
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_events_on_the_mesh_do_not_pass_by_chance(order: Any) -> None:
+    found = reasons()["mesh", order]
+    assert found["non_smooth"] >= 0.8 * MEMBERS
+    # what is not irregular is of first order
+    assert set(found) <= {"non_smooth", "asymptotic" if order == "scheme" else "order_low"}
+
+
+def test_the_verdict_says_what_to_change() -> None:
+    made = experiment(initial={"u": 1.0, "v": 0.3})
+    record = analyse(made, [simulate(made, level) for level in made.levels])
+    verdict = verdicts(made, record)[0]
+    assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "non_smooth")
+    assert "leaves events to the mesh" in verdict.text
+    assert verdict.advice == "Set `events: located` for scheme mesh."
+
+
+def test_members_whose_exact_solution_is_unknown_stand_beside_those_with_one() -> None:
+    checks = [{"converges": "u", "order": 4}, {"converges": "v", "order": 4}]
+    made = experiment(
+        initial={"u": 1.0},
+        schemes=["rk4"],
+        sweep={"model.alpha": [0.0, 0.5]},
+        checks=checks,
+        levels={"from": 7, "to": 11},
+    )
+    record = analyse(made, [simulate(made, level) for level in made.levels])
+    assert [v.status for v in verdicts(made, record)] == ["PASS", "PASS"]
+
+
+def test_a_ball_without_a_frequency_is_judged() -> None:
+    model = {"kind": "bouncing_ball", "restitution": 0.7}
+    checks = [
+        {"converges": "h", "order": "scheme", "norm": "l2"},
+        {"equal": ["rk4", "exact"], "quantity": "h", "atol": 1e-12},
+        {"value": "rest_time", "at": {"scheme": "rk4"}, "below": 1e9},
+    ]
+    made = experiment(model=model, initial={"h": 1.0}, schemes=["rk4"], checks=checks)
+    record = analyse(made, [simulate(made, level) for level in made.levels])
+    found = [(v.status, v.reason) for v in verdicts(made, record)]
+    # parabolas are exact, and no frequency tells how large an error would have been
+    assert found == [("INCONCLUSIVE", "round_off"), ("PASS", "match"), ("PASS", "match")]

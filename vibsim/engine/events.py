@@ -1,0 +1,217 @@
+"""Steps of a model with events (`vibsim.models.events`): smooth steps, divided where an event lies.
+
+Events that are *located* are found by taking the step again with another length: the length tau with which it lands on
+the event is a root, and as accurate as the scheme itself, whatever its order. There the state changes, and the scheme
+starts anew: once for the rest of the step, and once more at the grid point, since the steps of a multistep scheme must
+be equal. Events that are left to the *mesh* are noticed at the grid point behind them, and treated there.
+
+The time of a scheme begins at 0 when it starts anew. What is added to it stands behind the parameters of the member,
+after the mode, so that its forces are those of the right time and of the mode.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from vibsim.engine.bound import (
+    GATHER,
+    LOCATED,
+    P,
+    State,
+    called,
+    first_mode,
+    guard,
+    guard_on_mesh,
+    landed,
+    mode_of,
+    settled,
+    start,
+    start_of,
+    step,
+    turning,
+    with_mode,
+)
+from vibsim.engine.gather import N_STATS, note_turning
+
+# Columns of `stats` behind those of `vibsim.engine.gather`.
+EVENT_COUNT = N_STATS
+FIRST_EVENT = N_STATS + 1
+LAST_EVENT = N_STATS + 2
+REST_TIME = N_STATS + 3
+N_STATS_EVENTS = N_STATS + 4
+
+MOST_EVENTS = 256
+"""Events of a step; a member with more comes to rest until the next grid point."""
+MOST_TRIALS = 200
+"""Trials for the time of an event: every third halves the interval."""
+SHARP = 2.0**-52
+"""The time is known to this part of the step."""
+
+
+@called
+def begun(stats: Any, case: int, u: float, v: float, p: P) -> P:
+    """Return the parameters with the mode of the beginning."""
+    mode = first_mode(u, v, 0.0, p)
+    if GATHER:
+        stats[case, EVENT_COUNT] = 0.0
+        if mode == 0.0:
+            stats[case, REST_TIME] = 0.0
+    return with_mode(p, mode, 0.0)
+
+
+@called
+def passed(
+    stats: Any,
+    counts: Any,
+    case: int,
+    variant: int,
+    n: int,
+    dt: float,
+    u: float,
+    v: float,
+    state: State,
+    p: P,
+) -> tuple[float, State, float, P, int]:
+    """Return position, next state, velocity and parameters at step `n`, and how many events lie before it.
+
+    Parameters
+    ----------
+    u, v
+        Position and velocity at step n - 1.
+    state
+        At step n; what it holds of a member at rest means nothing.
+    """
+    t = n * dt
+    if mode_of(p) == 0.0:
+        ahead, own, following = u, 0.0, state
+    else:
+        ahead = state[0]
+        following, own = step(state, t - start_of(p), dt, p)
+    count = 0
+    if LOCATED:
+        if guard(ahead, own, t, p) < 0.0:
+            ahead, own, p, count = across(stats, counts, case, variant, n, dt, u, v, p)
+    else:
+        if guard_on_mesh(ahead, own, t, p) < 0.0:
+            before = mode_of(p)
+            ahead, own, mode = settled(ahead, own, t, u, p)
+            p = with_mode(p, mode, t)
+            count = 1
+            if GATHER:
+                note_event(stats, counts, case, t, t, ahead, before, mode)
+    if count > 0:
+        p = with_mode(p, mode_of(p), t)
+        following = anew(variant, ahead, own, dt, p)
+    return ahead, following, own, p, count
+
+
+@called
+def across(
+    stats: Any,
+    counts: Any,
+    case: int,
+    variant: int,
+    n: int,
+    dt: float,
+    u: float,
+    v: float,
+    p: P,
+) -> tuple[float, float, P, int]:
+    """Return position, velocity and parameters at step `n` behind all events since step n - 1, and their number."""
+    t, end = (n - 1) * dt, n * dt
+    for count in range(MOST_EVENTS):
+        left = end - t
+        ahead, own = leap(variant, u, v, t, left, p)
+        if not (left > 0.0 and guard(ahead, own, end, p) < 0.0):
+            return ahead, own, p, count
+        tau = landing(variant, u, v, t, left, p)
+        ahead, own = leap(variant, u, v, t, tau, p)
+        # the last event of a step may lie on its end
+        t = t + tau if tau < left else end
+        before = mode_of(p)
+        ahead, own = landed(ahead, own)
+        u, v, mode = settled(ahead, own, t, math.inf, p)
+        p = with_mode(p, mode, t)
+        if GATHER:
+            note_event(stats, counts, case, t, end, u, before, mode)
+    if GATHER:
+        stats[case, REST_TIME] = t
+    return u, 0.0, with_mode(p, 0.0, end), MOST_EVENTS
+
+
+@called
+def anew(variant: int, u: float, v: float, dt: float, p: P) -> State:
+    """Return the state of a scheme that starts anew, after its first step."""
+    return start(variant, u, v, dt, p)
+
+
+@called
+def leap(variant: int, u: float, v: float, t: float, dt: float, p: P) -> tuple[float, float]:
+    """Return position and velocity after one step of length `dt` from time `t`, in the present mode."""
+    if mode_of(p) == 0.0 or not dt > 0.0:
+        return u, v
+    here = with_mode(p, mode_of(p), t)
+    state = anew(variant, u, v, dt, here)
+    return state[0], step(state, dt, dt, here)[1]
+
+
+@called
+def landing(variant: int, u: float, v: float, t: float, left: float, p: P) -> float:
+    """Return the length of the step that lands on the event, at most `left`, behind which the guard is below 0.
+
+    The regula falsi in the form of Illinois, and every third time a bisection: the interval shrinks whatever the guard
+    does, and the event that is found is one. That the guard is 0 at the beginning, where an event has just been, does
+    not count.
+    """
+    low, high = 0.0, left
+    behind = guard(u, v, t, p)
+    ahead, own = leap(variant, u, v, t, left, p)
+    beyond = guard(ahead, own, t + left, p)
+    side = 0
+    for k in range(MOST_TRIALS):
+        tau = 0.5 * (low + high)
+        if k % 3 != 2 and behind > 0.0:
+            guess = high - beyond * ((high - low) / (beyond - behind))
+            # not within rounding of an end, which would say nothing
+            least = 0.25 * SHARP * left
+            guess = low + least if guess < low + least else guess
+            guess = high - least if guess > high - least else guess
+            tau = guess if low < guess < high else tau
+        if high - low <= SHARP * left or not low < tau < high:
+            break
+        ahead, own = leap(variant, u, v, t, tau, p)
+        value = guard(ahead, own, t + tau, p)
+        if value < 0.0:
+            high, beyond = tau, value
+            if side == -1:
+                behind = 0.5 * behind
+            side = -1
+        else:
+            low, behind = tau, value
+            if side == 1:
+                beyond = 0.5 * beyond
+            side = 1
+    return high
+
+
+@called
+def note_event(
+    stats: Any,
+    counts: Any,
+    case: int,
+    t: float,
+    grid: float,
+    u: float,
+    before: float,
+    after: float,
+) -> None:
+    """Write the event at time `t`, where the member came to rest there, and the peak or trough that it is."""
+    if stats[case, EVENT_COUNT] == 0.0:
+        stats[case, FIRST_EVENT] = t
+    stats[case, LAST_EVENT] = t
+    stats[case, EVENT_COUNT] += 1.0
+    stats[case, REST_TIME] = t if after == 0.0 else math.nan
+    kind = turning(before, after)
+    if kind != 0.0:
+        note_turning(stats, counts, case, t, grid, u, kind)

@@ -1,0 +1,57 @@
+"""The events of Coulomb friction (`vibsim.models.events.Friction`): where a body stops, sticks, turns and leaves.
+
+Modes: 1 and -1 for the direction in which the body slides, 0 where it sticks. A kernel of a model with friction binds
+these functions; they know the model by ``drive`` and ``limit``.
+"""
+
+from __future__ import annotations
+
+from vibsim.engine.bound import P, drive, limit, mode_of
+
+
+def slip(u: float, t: float, p: P) -> float:
+    """Return the direction in which a body at rest starts to slide; 0 where it sticks."""
+    force = drive(u, 0.0, t, p)
+    if abs(force) <= limit(u, 0.0, t, p):
+        return 0.0
+    return 1.0 if force > 0.0 else -1.0
+
+
+def first_mode(u: float, v: float, t: float, p: P) -> float:
+    """Return the mode at the beginning."""
+    if v == 0.0:
+        return slip(u, t, p)
+    return 1.0 if v > 0.0 else -1.0
+
+
+def guard(u: float, v: float, t: float, p: P) -> float:
+    """Return a number that falls below 0 at the event: the speed, or what friction can still hold."""
+    mode = mode_of(p)
+    if mode == 0.0:
+        return limit(u, 0.0, t, p) - abs(drive(u, 0.0, t, p))
+    return mode * v
+
+
+def guard_on_mesh(u: float, v: float, t: float, p: P) -> float:
+    """Return what `guard` does."""
+    return guard(u, v, t, p)
+
+
+def landed(u: float, v: float) -> tuple[float, float]:
+    """Return position and velocity at a located event, where the body is at rest."""
+    return u, 0.0
+
+
+def settled(u: float, v: float, t: float, before: float, p: P) -> tuple[float, float, float]:
+    """Return position, velocity and mode behind an event; on the mesh the velocity is what it has become."""
+    direction = slip(u, t, p)
+    if direction == 0.0 or v == 0.0:
+        return u, 0.0, direction
+    return u, v, 1.0 if v > 0.0 else -1.0
+
+
+def turning(before: float, after: float) -> float:
+    """Return 1 for a peak between two modes, -1 for a trough, 0 for neither."""
+    if before * after < 0.0:
+        return before
+    return 0.0

@@ -1,0 +1,140 @@
+r"""A ball that bounces: ``h'' = -g`` above the ground, ``v -> -restitution*v`` where it meets it, at h = 0.
+
+Without air, the speed after impact number k = 1, 2, ... is ``restitution^k v_1``, with v_1 that of the first impact,
+and the bounce behind it takes ``2 restitution^k v_1/g``: impacts follow each other as the terms of a geometric series.
+The ball lies at rest from the first impact behind which its speed would be at most eps_v. With eps_v = 0 there are
+infinitely many, all before ``t_1 + (2 v_1/g) restitution/(1 - restitution)``; there it lies too. A ball that is on the
+ground with at most the speed eps_v at t = 0 lies there.
+
+Source: vibration text (B), section 10.9, equations (115)-(117), and exercise 20. Units: g [m s-2], eps_h [m],
+eps_v [m s-1], h [m], v [m s-1]; the energy is that of a unit mass, ``v^2/2 + g h`` [m2 s-2].
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from vibsim.models.base import Floats, Model, Numbers, Parameter, State
+from vibsim.models.events import Impact
+from vibsim.models.scales import Scales
+
+
+def natural_frequency(parameters: Numbers) -> Any:
+    """Return NaN: there are no small oscillations."""
+    return parameters["g"] * np.nan
+
+
+def first_impact(initial: Numbers, parameters: Numbers) -> tuple[Any, Any]:
+    """Return time [s] and speed [m s-1] of the first impact."""
+    h, v, g = initial["h"], initial["v"], parameters["g"]
+    speed = np.sqrt(v * v + 2.0 * g * h)
+    # the sum of both where they have one sign, else the same without cancellation
+    with np.errstate(divide="ignore", invalid="ignore"):
+        time = np.where(v >= 0, (v + speed) / g, 2.0 * h / (speed - v))
+    return time, speed
+
+
+def last_impact(initial: Numbers, parameters: Numbers) -> Any:
+    """Return the number of the impact from which the ball lies at rest: 0 for the beginning, infinite for none."""
+    _, speed = first_impact(initial, parameters)
+    e, slow = parameters["restitution"], parameters["eps_v"]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        number = np.ceil(np.log(slow / speed) / np.log(e))
+        # the logarithms may miss a speed that is eps_v itself
+        number = np.where(e ** (number - 1.0) * speed <= slow, number - 1.0, number)
+    number = np.where(e == 0, 1.0, np.where(e == 1, np.inf, np.where(slow == 0, np.inf, number)))
+    number = np.where(e * speed <= slow, 1.0, number)
+    lies = (initial["h"] <= 0) & (np.abs(initial["v"]) <= slow)
+    return np.where(lies, 0.0, np.maximum(number, 1.0))
+
+
+def impact_time(number: Any, initial: Numbers, parameters: Numbers) -> Any:
+    """Return the time [s] of impact `number` = 1, 2, ..., or infinite for the limit of all; 0 for number 0."""
+    time, speed = first_impact(initial, parameters)
+    e, flight = parameters["restitution"], 2.0 * speed / parameters["g"]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bounces = number - 1.0
+        # e + e^2 + ... + e^(number - 1)
+        total = np.where(e < 1, e * -np.expm1(bounces * np.log(e)) / (1.0 - e), bounces)
+    total = np.where((e == 0) | (number <= 1), 0.0, total)
+    return np.where(number == 0, 0.0, time + flight * total)
+
+
+def rest_time(initial: Numbers, parameters: Numbers) -> Any:
+    """Return the time [s] from which the ball lies on the ground; infinite where it bounces for ever."""
+    return impact_time(last_impact(initial, parameters), initial, parameters)
+
+
+def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
+    """Return h and v at times `t`, shape (..., n_t); at the time of an impact those behind it."""
+    g, e = parameters["g"], parameters["restitution"]
+    time, speed = first_impact(initial, parameters)
+    last = last_impact(initial, parameters)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        # the sum of the bounces behind the first impact, in units of the first one over e
+        passed = (t - time) * g / (2.0 * speed)
+        left = np.where(e < 1, 1.0 - passed * (1.0 - e) / e, 1.0)
+        number = np.where(e < 1, np.floor(np.log(left) / np.log(e)), np.floor(passed)) + 1.0
+        number = np.where(left <= 0, np.inf, np.maximum(number, 1.0))
+        number = _settled(number, t, initial, parameters)
+        since = t - impact_time(number, initial, parameters)
+        rise = e**number * speed
+        h, v = since * (rise - 0.5 * g * since), rise - g * since
+    first = (t < time) & (last > 0)
+    rests = ~first & ((number >= last) | ~np.isfinite(number))
+    h = np.where(rests, 0.0, np.maximum(h, 0.0))
+    v = np.where(rests, 0.0, v)
+    # at t = 0 the initial values, also of a ball that meets the ground there
+    first = first | (t == 0)
+    fall = initial["h"] + t * (initial["v"] - 0.5 * g * t)
+    return {"h": np.where(first, fall, h), "v": np.where(first, initial["v"] - g * t, v)}
+
+
+def _settled(number: Any, t: Floats, initial: Numbers, parameters: Numbers) -> Any:
+    """Return the number of the last impact up to `t`, where logarithms may have missed it by one."""
+    sooner = impact_time(np.maximum(number, 1.0), initial, parameters) > t
+    number = np.where(sooner & (number > 1.0), number - 1.0, number)
+    later = impact_time(number + 1.0, initial, parameters) <= t
+    return np.where(later, number + 1.0, number)
+
+
+BOUNCING_BALL = Model(
+    kind="bouncing_ball",
+    title="Bouncing ball",
+    source="vibration text, section 10.9 and exercise 20",
+    equation="h'' = -g, v -> -restitution v at h = 0",
+    states=(State("h", "m", "height", minimum=0.0), State("v", "m s-1", "velocity")),
+    parameters=(
+        Parameter("g", 1.0, "m s-2", "acceleration of gravity", minimum=0.0, exclusive=True),
+        Parameter("restitution", 0.8, "1", "coefficient of restitution", minimum=0.0, maximum=1.0),
+        Parameter(
+            "eps_h", 0.0, "m", "height of the ground where events are left to the mesh", minimum=0.0
+        ),
+        Parameter(
+            "eps_v", 1e-3, "m s-1", "speed after an impact at which the ball rests", minimum=0.0
+        ),
+    ),
+    acceleration="-g",
+    kinetic_energy="0.5*v**2",
+    potential_energy="g*h",
+    energy_unit="m2 s-2",
+    linear=False,
+    conservative=False,
+    natural_frequency=natural_frequency,
+    exact=exact,
+    scales=Scales(
+        time="where(h != 0, sqrt(h/g), abs(v)/g)",
+        position="where(h != 0, h, v**2/g)",
+        energy="g*h_c",
+        numbers=(("restitution", "restitution"),),
+        parameters=(
+            ("g", "1"),
+            ("restitution", "restitution"),
+            ("eps_h", "eps_h/h_c"),
+            ("eps_v", "eps_v*t_c/h_c"),
+        ),
+    ),
+    events=Impact(restitution="restitution", near="eps_h", slow="eps_v"),
+)

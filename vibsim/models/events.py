@@ -1,0 +1,51 @@
+r"""Events: where a motion is not smooth, as data of a model; between two of them the force is a smooth one.
+
+A motion with events is a sequence of smooth pieces, each in a *mode*, a number that does not change within the piece.
+An event ends a piece: there the state may jump, and the next mode is chosen. Steps see the smooth force of their mode
+only, never a jump (`vibsim.engine.events`).
+
+- Friction, Coulomb's law (vibration text (B), section 10.3): with the acceleration ``drive`` by all other forces, and
+  ``limit`` the largest that friction can hold, a body that slides in the direction ``mode`` = 1 or -1 has the
+  acceleration ``drive - mode*limit``, until its velocity vanishes. There it sticks (mode 0) where
+  ``|drive| <= limit``: it stays where it is until the drive exceeds the limit. Otherwise it slides on, along the drive.
+- Impact on the ground (B, section 10.9): in flight (mode 1) until the height vanishes; there the velocity v becomes
+  ``-restitution*v``, and the body comes to rest for ever (mode 0) where that is at most `eps_v`.
+
+Source: vibration text (B), sections 10.3 and 10.9; E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary
+Differential Equations I, section II.6 (discontinuous equations).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from vibsim.expression import Expression
+
+Formula = str | Expression
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Coulomb friction; both formulas are accelerations, in the position, ``t`` and the parameters."""
+
+    drive: Formula
+    """By all forces but the friction."""
+    limit: Formula
+    """The largest that friction can hold, at least 0."""
+
+
+@dataclass(frozen=True)
+class Impact:
+    """Impact on the ground, at the position 0; formulas in the parameters."""
+
+    restitution: Formula
+    """Speed after an impact over the speed before it."""
+    near: Formula
+    """On the mesh: the height below which a body that falls is on the ground."""
+    slow: Formula
+    """The largest speed after an impact with which it stays there."""
+
+
+Events = Friction | Impact
+TREATMENTS = ("located", "mesh")
+"""How a scheme treats events: found within the step, or noticed at the grid point behind them."""
