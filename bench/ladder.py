@@ -65,7 +65,7 @@ def _product(arithmetic: str, theta: Floats, end: float, ladder: str) -> Solve:
     method = Method(MODELS["pendulum"], scheme, options)
     initial = np.stack([theta, np.zeros(members)], axis=-1)
     one = np.ones(members)
-    start = Start(np.ones((members, 3)), initial, end * one, one)
+    start = Start(np.ones((members, len(MODELS["pendulum"].parameters))), initial, end * one, one)
     steps = _steps(ladder)
     # compiled, as the other solvers are: left alone, so little work would run uncompiled
     lane = "scalar" if members == 1 else "blocks"

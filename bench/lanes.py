@@ -124,7 +124,10 @@ def _lane(lane: str, schemes: dict[str, Scheme], small: bool) -> tuple[list[str]
 def _cost(scheme: Scheme, lane: str, members: int, steps: int, gathers: bool) -> float:
     """Return the CPU time of a member-step in ns."""
     theta = np.linspace(0.1, 2.5, members) if members > 1 else np.ones(1)
-    parameters, initial = np.ones((members, 3)), np.stack([theta, np.zeros(members)], axis=-1)
+    parameters, initial = (
+        np.ones((members, len(MODELS["pendulum"].parameters))),
+        np.stack([theta, np.zeros(members)], axis=-1),
+    )
     dt = np.full(members, END / steps)
     began = time.thread_time()
     integrate(

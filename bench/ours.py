@@ -31,7 +31,7 @@ def step(
         MODELS["pendulum"],
         scheme,
         options,
-        np.ones((members, 3)),
+        np.ones((members, len(MODELS["pendulum"].parameters))),
         np.stack([theta, np.zeros(members)], axis=-1),
         np.full(members, end / steps),
         steps,

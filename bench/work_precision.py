@@ -181,7 +181,7 @@ def by_engine(kind: str, task: Task, steps: int) -> Floats:
         MODELS["pendulum"],
         scheme,
         scheme.defaults(),
-        np.ones((1, 3)),
+        np.ones((1, len(MODELS["pendulum"].parameters))),
         np.array([[1.0, 0.0]]),
         np.array([task.end / steps]),
         steps,

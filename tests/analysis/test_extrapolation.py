@@ -33,13 +33,15 @@ def method(model: str = "pendulum", **options: str) -> Method:
     return Method(MODELS[model], scheme, {**scheme.defaults(), "end_velocity": "kick", **options})
 
 
-def start(theta: Any, omega: Any = 0.0, end: Any = 20.0, g: Any = 1.0) -> Start:
+def start(
+    theta: Any, omega: Any = 0.0, end: Any = 20.0, g: Any = 1.0, parameters: int = 4
+) -> Start:
     theta, omega, end, g = np.broadcast_arrays(
         np.atleast_1d(np.asarray(theta, dtype=float)), omega, end, g
     )
     ones = np.ones(len(theta))
     return Start(
-        np.stack([g * ones, ones, ones], -1), np.stack([theta, omega * ones], -1),
+        np.stack([g * ones, ones, ones, 0.0 * ones], -1)[:, :parameters], np.stack([theta, omega * ones], -1),
         end * ones, np.sqrt(g) * ones,
     )  # fmt: skip
 
@@ -143,7 +145,12 @@ def batches(seed: int, count: int) -> Iterator[tuple[Method, Start, tuple[int, .
         theta = np.where(rng.random(cases) < 0.2, near, rng.uniform(0.05, 3.0, cases))
         g = 10.0 ** rng.uniform(-0.5, 1.0, cases)
         omega = np.where(rng.random(cases) < 0.3, rng.uniform(-2.5, 2.5, cases), 0.0) * np.sqrt(g)
-        yield of, start(theta, omega, phase / np.sqrt(g), g), steps, points
+        yield (
+            of,
+            start(theta, omega, phase / np.sqrt(g), g, len(of.model.parameters)),
+            steps,
+            points,
+        )
         count -= 1
 
 

@@ -21,7 +21,7 @@ from vibsim.engine import integrate
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
 scheme = SCHEMES["central"]
-runs = integrate(MODELS["pendulum"], scheme, scheme.defaults(), np.ones((1, 3)), np.array([[1.0, 0.0]]),
+runs = integrate(MODELS["pendulum"], scheme, scheme.defaults(), np.ones((1, 4)), np.array([[1.0, 0.0]]),
                  np.array([20.0 / 64]), 64, 1, lane="scalar")
 print(repr(float(runs.position[0, -1])))
 """
@@ -142,6 +142,6 @@ def test_a_tableau_of_numbers_can(lane):
     options = {**CENTRAL.defaults(), "arithmetic": "increment"}
     stepper = dataclasses.replace(CENTRAL.stepper(options), step=step_with_tuple)
     scheme = dataclasses.replace(CENTRAL, stepper=lambda options: stepper)
-    numbers = (np.ones((1, 3)), np.array([[1.0, 0.0]]), np.array([0.1]), 64, 1)
+    numbers = (np.ones((1, 4)), np.array([[1.0, 0.0]]), np.array([0.1]), 64, 1)
     one, other = (integrate(PENDULUM, s, options, *numbers, lane=lane) for s in (scheme, CENTRAL))
     np.testing.assert_array_equal(one.position, other.position)

@@ -20,7 +20,7 @@ def run(kind, level, *, theta=1.0, omega=0.0, end=20.0, g=1.0, **options):
         MODELS[kind],
         CENTRAL,
         {**CENTRAL.defaults(), **options},
-        np.array([[g, 1.0, 1.0]]),
+        np.array([[g, 1.0, 1.0, 0.0][: len(MODELS[kind].parameters)]]),
         np.array([[theta, omega]]),
         np.array([end / steps]),
         steps,

@@ -425,7 +425,7 @@ def test_iterates_that_stay_on_one_side_of_the_solution_are_led_to_it():
         pendulum,
         SCHEMES["generalized_alpha"],
         {"rho_inf": 0.0},
-        np.array([[100.0, 1.0, 1.0]]),
+        np.array([[100.0, 1.0, 1.0, 0.0]]),
         np.array([[1.0, 0.3]]),
         np.array([0.25]),
         400,

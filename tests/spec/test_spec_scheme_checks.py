@@ -141,11 +141,13 @@ def test_what_is_exact_must_be_known(monkeypatch: pytest.MonkeyPatch) -> None:
     def check(quantity: str) -> list[dict[str, Any]]:
         return [{"equal": ["rk4", "exact"], "quantity": quantity}]
 
-    change_model(monkeypatch, exact=None)
+    edge = "-(g/L)*theta + 0*abs(theta)"
+    build(checks=check("theta"), schemes=["rk4"])
+    change_model(monkeypatch, exact=None, acceleration=edge)
     rk4 = {"schemes": ["rk4"]}
     assert "the exact theta" in only_fault(checks=check("theta"), **rk4).rule
     build(checks=check("energy"), **rk4)
-    change_model(monkeypatch, exact=None, conservative=False)
+    change_model(monkeypatch, exact=None, conservative=False, acceleration=edge)
     assert "the exact energy" in only_fault(checks=check("energy"), **rk4).rule
     fault = only_fault(checks=[{"conserves": "energy"}], **rk4)
     assert fault.rule == "the energy of pendulum is not conserved"

@@ -258,7 +258,7 @@ def test_texts_are_no_quantities() -> None:
     assert fault.rule == "unknown choice"
 
 
-@pytest.mark.parametrize("text", ["2 pi", "2pi", "2 sin(1)", "1 if 2 else 3", "2 e"])
+@pytest.mark.parametrize("text", ["2 pi", "2pi", "2 sin(1)", "1 for 2 in 3", "2 e"])
 def test_a_forgotten_operator_is_no_unit(text: str) -> None:
     assert split(text) is None
     assert "constant formula" in only_fault(**pendulum(L=text)).rule
@@ -346,7 +346,7 @@ def test_any_unit_is_read_or_refused(text: str) -> None:
         assert finite(meaning(text).factor) >= 0.0
     except UnitError as error:
         rule = error.rule
-    assert rule or factors(text)
+    assert rule or text == "1" or factors(text)
 
 
 PIECES = ("3", "1e9", "-", "m", "s", "kg", "rod", "deg", "^", "**", "/", "*", " ", "2", "-2", "(", ")",

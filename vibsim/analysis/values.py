@@ -116,7 +116,8 @@ def _extreme(which: str, of_series: Callable[..., Floats]) -> Callable[[Place], 
 
     def take(p: Place) -> Floats:
         data = p.data()
-        if data is None or f"{p.quantity}_{which}" in data or p.quantity not in data:
+        outputs = {output.name for output in p.part.model.outputs}
+        if data is None or p.quantity not in outputs or p.quantity not in data:
             return _of_quantity(which)(p)
         # NaN where a member has failed
         return np.asarray(of_series(data[p.quantity], axis=-1), dtype=float)

@@ -176,8 +176,13 @@ def integrate(
     ------
     SimulationError
         Where the kernel cannot be compiled.
+    ValueError
+        Where there are not as many parameters as the model has.
     """
     members = len(dt)
+    if parameters.shape != (members, len(model.parameters)):
+        shape = (members, len(model.parameters))
+        raise ValueError(f"parameters must have the shape {shape}, have {parameters.shape}")
     stepper = scheme.stepper_for(model, options)
     has_events = model.events is not None
     lane = lane or lane_for(members, steps, implicit=stepper.implicit or has_events)

@@ -20,6 +20,8 @@ from vibsim.expression.tree import (
 ZERO, ONE = Number(0.0), Number(1.0)
 JUMPS = STEPS | {"mod"}
 """Functions whose derivative is that between their jumps."""
+EDGES = JUMPS | {"abs", "max", "min", "where"}
+"""Functions with corners or jumps."""
 
 
 def put(node: Expression, name: str, what: Expression) -> Expression:
@@ -63,6 +65,14 @@ def _is_zero_with(node: Expression, name: str) -> bool:
 def is_jump(node: Expression) -> bool:
     """Tell whether the value jumps where an operand varies."""
     return isinstance(node, Compare) or (isinstance(node, Call) and node.function in JUMPS)
+
+
+def is_smooth(node: Expression) -> bool:
+    """Tell whether nothing in a formula has a corner or a jump."""
+    return not any(
+        isinstance(part, Compare) or (isinstance(part, Call) and part.function in EDGES)
+        for part in walk(node)
+    )
 
 
 def times(left: Expression, right: Expression) -> Expression:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.expression import Expression, parse
+from vibsim.expression import Expression, is_smooth, parse
 from vibsim.models.events import Events
 
 if TYPE_CHECKING:
@@ -172,6 +172,12 @@ def declared_parameters(names: Iterable[str]) -> tuple[Parameter, ...]:
         Parameter(name, 0.0, "1", f"declared parameter {name}", path=f"parameters.{name}")
         for name in names
     )
+
+
+def has_solution(model: Model) -> bool:
+    """Tell whether the motion is known: exactly, or to twelve digits since it is smooth."""
+    is_smooth_ = model.events is None and is_smooth(tree(model, model.acceleration))
+    return model.exact is not None or is_smooth_
 
 
 def parameter_names(model: Model) -> tuple[str, ...]:

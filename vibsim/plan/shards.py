@@ -42,6 +42,7 @@ def simulated(content: Mapping[str, Any]) -> dict[str, Any]:
 
 def load_of(experiment: Experiment, level: int) -> Load:
     """Return what one member of `experiment` costs at `level`."""
+    from vibsim.models import has_solution
     from vibsim.schemes import SCHEMES
     from vibsim.spec.series import extrema_kept
 
@@ -56,7 +57,7 @@ def load_of(experiment: Experiment, level: int) -> Load:
         steps=steps,
         samples=steps // sampling(experiment, level) + 1,
         series=len(_series(experiment)),
-        exact=0 if lean else len(model.states),
+        exact=len(model.states) if has_solution(model) and not lean else 0,
         work=sum(explicit for explicit, _ in works),
         iterated=sum(iterated for _, iterated in works),
         extrema=0 if lean else extrema_kept(steps, trajectories),

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim import plan
-from vibsim.models import BUDGET, ENERGIES, Model, State, centred, has_budget
+from vibsim.models import BUDGET, ENERGIES, Model, State, centred, has_budget, has_solution
 from vibsim.record import Attribute, Record, Variable, attributes
 from vibsim.simulation.derived import derived
 from vibsim.simulation.gathered import event_times, extrema, gathered, of_own_steps
@@ -229,7 +229,7 @@ def _exact(experiment: Experiment, group: Members, steps: int, every: int) -> di
     """Return the exact states, or a reference for them where they are not known and the motion is smooth."""
     model = experiment.model.definition
     if model.exact is None:
-        few = experiment.members <= MOST_REFERENCES
+        few = has_solution(model) and experiment.members <= MOST_REFERENCES
         return _computed(model, group, _numbers(steps, every) / steps) if few else {}
     t = _numbers(steps, every) * (group.end / steps)[:, None]
     exact = model.exact(

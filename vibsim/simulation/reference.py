@@ -15,8 +15,7 @@ from functools import cache, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.expression import Call, Compare, Expression, values, walk
-from vibsim.expression.algebra import JUMPS
+from vibsim.expression import values
 from vibsim.models import Model, tree
 from vibsim.simulation.members import Members
 
@@ -26,8 +25,6 @@ Force = Callable[[Floats, Floats, Floats], Floats]
 
 METHOD = "collocation at 12 Gauss points of a step, halved until two solutions agree"
 STAGES = 12
-EDGES = JUMPS | {"abs", "max", "min", "where"}
-"""Functions with corners or jumps."""
 FEWEST, MOST = 8, 2**11
 """Steps over the whole interval."""
 ITERATIONS = 60
@@ -179,14 +176,6 @@ def _stages(force: Force, u: Floats, v: Floats, t: Floats, h: Floats, a: Floats)
     return np.where(going, np.nan, a)
 
 
-def is_smooth(formula: Expression) -> bool:
-    """Tell whether nothing in a formula has a corner or a jump."""
-    return not any(
-        isinstance(part, Compare) or (isinstance(part, Call) and part.function in EDGES)
-        for part in walk(formula)
-    )
-
-
 def reference(
     model: Model, group: Members, fraction: Floats
 ) -> tuple[dict[str, Floats], dict[str, Floats]]:
@@ -195,11 +184,6 @@ def reference(
     NaN stands where the accuracy is not reached: of motions that are not smooth, or too sensitive.
     """
     names = (model.position, model.velocity)
-    if not is_smooth(tree(model, model.acceleration)):
-        shape = len(group.end), len(fraction)
-        return dict.fromkeys(names, np.full(shape, np.nan)), dict.fromkeys(
-            names, np.full(shape[0], np.nan)
-        )
     parameters = {row.name: group.parameters[row.key] for row in model.parameters}
     columns = (*(group.initial[name] for name in names), group.end, *parameters.values())
     numbers = tuple(np.ascontiguousarray(column, dtype=float).tobytes() for column in columns)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from vibsim.errors import nearest
-from vibsim.models import BUDGET, centred, has_budget, quantities
+from vibsim.models import BUDGET, centred, has_budget, has_solution, quantities
 from vibsim.spec.check_places import Ladder
 from vibsim.spec.faults import Report
 from vibsim.spec.source import Path_
@@ -76,7 +76,7 @@ def known_exactly(
     # the energy is known where it is conserved or the motion is known; the budget is 0 always
     name = plain(quantity or "")
     taken, done, budget = BUDGET
-    is_solved = name not in (taken, done)
+    is_solved = has_solution(model) and name not in (taken, done)
     known = is_solved or name == budget or (model.conservative and name in ENERGIES)
     if not known:
         of = (*(ENERGIES if model.conservative else ()), *((budget,) if has_budget(model) else ()))
@@ -112,4 +112,6 @@ def allowed(row: Value, ladder: Ladder, best: bool = False) -> tuple[str, ...]:
             return deviations
         case "extremal":
             return (*states, *deviations)
+    if best:
+        return (*states, *ENERGIES, *more)
     return all_quantities(ladder)
