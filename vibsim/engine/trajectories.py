@@ -180,9 +180,10 @@ def integrate(
         Where there are not as many parameters as the model has.
     """
     members = len(dt)
-    if parameters.shape != (members, len(model.parameters)):
-        shape = (members, len(model.parameters))
-        raise ValueError(f"parameters must have the shape {shape}, have {parameters.shape}")
+    count = len(model.parameters)
+    # what is tabulated stands behind the parameters
+    if parameters.shape[1] < count:
+        raise ValueError(f"{model.kind} has {count} parameters, not {parameters.shape[1]}")
     stepper = scheme.stepper_for(model, options)
     has_events = model.events is not None
     lane = lane or lane_for(members, steps, implicit=stepper.implicit or has_events)
