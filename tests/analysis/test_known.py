@@ -94,3 +94,11 @@ def test_terms_that_vanish_are_no_part_of_the_equation():
     alone = Experiment.from_dict(swept).alone(0)
     assert alone.model.parameters["drag"] == 0.0
     assert not alone.model.definition.conservative
+
+
+def test_the_budget_is_known_no_better_than_the_energy():
+    """Its own size is an error, relative to which nothing is round-off."""
+    _, levels, convergence = run(checks=[{"converges": "energy_budget", "order": "scheme"}])
+    energy = float(levels[9]["energy"].max())
+    floor = convergence["energy_budget_floor"].values
+    assert np.all(floor >= 1e-17 * energy)

@@ -22,7 +22,7 @@ from vibsim.analysis.promise import (
 )
 from vibsim.analysis.sensitivity import sensitivity
 from vibsim.analysis.series import laid_out, largest
-from vibsim.models import ENERGIES, Model
+from vibsim.models import BUDGET, ENERGIES, Model
 from vibsim.record import Record
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import Members, members
@@ -155,6 +155,8 @@ class Part:
         if plain in ENERGIES:
             return sizes["energy"]
         own = solution_size(values)
+        if plain in BUDGET:
+            return np.asarray(np.maximum(own, sizes["energy"]))
         if plain != self.model.velocity:
             return own
         duration = self.grid.dt[0] * self.grid.steps[0]

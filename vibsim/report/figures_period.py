@@ -90,7 +90,9 @@ def amplitude(experiment: Experiment, record: Record, along: Along) -> Picture |
     if several:
         _draw_error_bars(axes[1], record, along, found, held.error)
         leaves |= mark_members(axes[1], along, found.error)
-    below = " Bottom: its error, estimated from the two finest levels. Members that go over the top have no amplitude."
+    below = " Bottom: its error, estimated from the two finest levels."
+    if experiment.model.definition.turn is not None:
+        below += " Members that go over the top have no amplitude."
     marked = finish(axes, experiment, along)
     return Picture(
         name="amplitude",

@@ -212,7 +212,10 @@ def _tables(
     norms = [name for name in record.words("norm") if name != TYPICAL_NORM]
     found_orders = [contents.orders(record, quantity, shown) for quantity in found]
     beside = [*contents_theory.predictions(record), contents_energy.velocities(record)]
-    optional = [contents.maxima(record, shown), contents.scalars(record, shown)]
+    # what damping or a force changes says nothing of a scheme
+    conserved = experiment.model.definition.conservative
+    optional = [contents.maxima(record, shown) if conserved else None]
+    optional.append(contents.scalars(record, shown))
     optional.append(None if data.is_lean(record) else contents_work.table(experiment, record))
     if len(record["scheme"]) > gallery.FEW:
         # a row for each scheme says more than many for each
