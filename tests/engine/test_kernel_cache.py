@@ -44,6 +44,7 @@ def run_in(folder):
     return float(done.stdout)
 
 
+@pytest.mark.slow
 def test_a_kernel_is_compiled_once_and_a_damaged_one_again(tmp_path):
     assert run_in(tmp_path) == pytest.approx(0.9996677748139638, abs=1e-13)
     kept = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.suffix in {".py", ".o"}}

@@ -172,6 +172,7 @@ def test_a_member_alone_has_the_bits_it_has_among_others(model, lane):
             assert a.tobytes() == b[i : i + 1].tobytes(), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lane", LANES)
 @pytest.mark.parametrize("kind", ["central", "rk4"])
 @pytest.mark.parametrize("more", [{"with_series": False, "n_extrema": 0}, {"n_extrema": 0}])
@@ -228,6 +229,7 @@ def test_a_member_that_overflows_ends_and_the_others_go_on(lane, with_gathered):
     assert np.isfinite(runs.position[[0, 2]]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["central", "rk4"])
 @pytest.mark.parametrize("when", ["at once", "on the way", "at the end"])
 def test_members_that_fail_have_the_same_bits_in_every_lane(when, kind):
@@ -319,6 +321,7 @@ def test_norms_are_those_of_all_points(lane):
         np.testing.assert_allclose(norms[:, 1], l2, rtol=240 * 2.0**-53)
 
 
+@pytest.mark.slow
 def test_the_kernel_contains_no_contraction_and_no_foreign_call():
     for model, scheme, lane in itertools.product(SMOOTH.values(), FIXED_STEP.values(), LANES):
         text = source(model, scheme.stepper(scheme.defaults()), lane)
@@ -351,6 +354,7 @@ def test_values_beyond_all_sense_have_the_same_bits_and_raise_nothing(model):
     assert not (plain.gathered.period <= 0.0).any()
 
 
+@pytest.mark.slow
 def test_division_by_zero_is_no_error_in_any_lane():
     model = dataclasses.replace(MODELS["pendulum"], acceleration="-1/theta + L/(theta - theta)")
     numbers = members(model, 5)

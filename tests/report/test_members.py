@@ -74,6 +74,7 @@ def test_without_a_sweep_there_is_no_list():
     assert members.digits(plain) == ""
 
 
+@pytest.mark.slow
 def test_many_rows_are_written_quickly(tmp_path):
     small = samples.record(samples.experiment(sweep=SWEEP))
     count = 60_000

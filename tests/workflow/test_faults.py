@@ -49,6 +49,7 @@ def test_a_damaged_file_is_named_deleted_and_made_again(
     assert place.jobs() == []
 
 
+@pytest.mark.slow
 def test_damage_that_keeps_the_time_of_the_file_is_seen_by_whatever_reads_it(
     place: Place, finished: Place
 ) -> None:
@@ -63,6 +64,7 @@ def test_damage_that_keeps_the_time_of_the_file_is_seen_by_whatever_reads_it(
     assert place.content()["adhoc/tiny/level_07.nc"] == finished.content()["adhoc/tiny/level_07.nc"]
 
 
+@pytest.mark.slow
 def test_swapped_files_are_seen(place: Place, finished: Place) -> None:
     first, second = place.tiny / "level_06.nc", place.tiny / "level_07.nc"
     other = place.tiny / "swap"
@@ -76,6 +78,7 @@ def test_swapped_files_are_seen(place: Place, finished: Place) -> None:
     assert place.content() == finished.content()
 
 
+@pytest.mark.slow
 def test_results_without_snakemakes_records_are_not_taken_for_others(place: Place) -> None:
     """Snakemake sees no changed parameter when its records are gone; the digests in the files do."""
     import shutil
@@ -128,6 +131,7 @@ MADE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "made",
     [name if name == "analysis" else pytest.param(name, marks=pytest.mark.slow) for name in MADE],
@@ -151,6 +155,7 @@ def test_after_a_kill_the_same_command_works(
     assert not list(place.results.rglob(".*.part"))
 
 
+@pytest.mark.slow
 def test_two_runs_at_once_both_succeed_and_one_waits(tmp_path: Path, finished: Place) -> None:
     place = Place(tmp_path)
     place.file.parent.mkdir()
@@ -209,6 +214,7 @@ def test_a_failing_job_is_named_with_its_log_and_the_others_go_on(place: Place, 
     assert "other" in (place.results / "index.html").read_text()
 
 
+@pytest.mark.slow
 def test_a_failing_level_does_not_cost_those_that_share_its_job(place: Place, trap: Path) -> None:
     other = place.file.with_name("other.yaml")
     other.write_text(TEXT)

@@ -42,6 +42,7 @@ def test_exactly_what_uses_a_change_runs_again(
     assert len(found) == len(expected)
 
 
+@pytest.mark.slow
 def test_one_more_level_leaves_the_files_of_the_others_untouched(place: Place) -> None:
     # What is written anew is another file, put in the place of the old one.
     before = {path: path.stat().st_ino for path in place.tiny.glob("level_*.nc")}
@@ -58,6 +59,7 @@ def test_touching_the_file_runs_nothing(place: Place) -> None:
     assert place.jobs() == []
 
 
+@pytest.mark.slow
 def test_a_second_experiment_leaves_the_first_alone(place: Place) -> None:
     other = place.file.with_name("other.yaml")
     other.write_text(TEXT)

@@ -51,6 +51,7 @@ def shards(*numbers: int) -> set[str]:
     return {f"level_0{level}/shard_000{n}" for level in (6, 7, 8, 9) for n in numbers}
 
 
+@pytest.mark.slow
 def test_shards_are_made_by_jobs_of_several_levels_and_give_the_same_numbers(
     empty: Place, small_shards: None
 ) -> None:
@@ -74,6 +75,7 @@ def test_shards_are_made_by_jobs_of_several_levels_and_give_the_same_numbers(
             assert stored[name].tobytes() == variable.values.tobytes(), name
 
 
+@pytest.mark.slow
 def test_only_the_shard_that_was_not_full_and_the_new_ones_are_made(
     empty: Place, small_shards: None
 ) -> None:
@@ -87,6 +89,7 @@ def test_only_the_shard_that_was_not_full_and_the_new_ones_are_made(
     assert set(empty.jobs()) == finer | rest
 
 
+@pytest.mark.slow
 def test_members_added_at_the_end_are_what_is_new(empty: Place) -> None:
     write(empty, "initial.theta: [0.5, 1.0]")
     assert empty.run().returncode == 0
@@ -117,6 +120,7 @@ def test_one_member_alone_is_an_experiment_of_its_own(empty: Place) -> None:
     assert (plan["name"], plan["cases"]) == ("tiny_case_1", 1)
 
 
+@pytest.mark.slow
 def test_a_tolerance_that_a_member_does_not_reach_is_told(empty: Place) -> None:
     tolerance = "tolerance: 1e-4\noutput: best"
     text = TEXT.replace("levels: [6, 7, 8, 9]", tolerance)
