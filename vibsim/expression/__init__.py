@@ -7,8 +7,6 @@ evaluated as Python.
 """
 
 from vibsim.expression.algebra import (
-    ONE,
-    ZERO,
     is_multiple,
     is_smooth,
     is_zero,
@@ -19,7 +17,7 @@ from vibsim.expression.algebra import (
     times,
 )
 from vibsim.expression.arrays import values
-from vibsim.expression.derivative import derivative
+from vibsim.expression.derivative import ONE, ZERO, derivative
 from vibsim.expression.faults import MAX_DEPTH, ExpressionError
 from vibsim.expression.integral import integral
 from vibsim.expression.parser import (

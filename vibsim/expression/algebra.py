@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vibsim.expression.derivative import STEPS
+from vibsim.expression.derivative import ONE, STEPS, ZERO
 from vibsim.expression.parser import literal
 from vibsim.expression.tree import (
     Binary,
@@ -17,7 +17,6 @@ from vibsim.expression.tree import (
     walk,
 )
 
-ZERO, ONE = Number(0.0), Number(1.0)
 JUMPS = STEPS | {"mod"}
 """Functions whose derivative is that between their jumps."""
 EDGES = JUMPS | {"abs", "max", "min", "where"}

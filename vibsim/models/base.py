@@ -176,8 +176,9 @@ def declared_parameters(names: Iterable[str]) -> tuple[Parameter, ...]:
 
 def has_solution(model: Model) -> bool:
     """Tell whether the motion is known: exactly, or to twelve digits since it is smooth."""
-    is_smooth_ = model.events is None and is_smooth(tree(model, model.acceleration))
-    return model.exact is not None or is_smooth_
+    if model.exact is not None:
+        return True
+    return model.events is None and is_smooth(tree(model, model.acceleration))
 
 
 def parameter_names(model: Model) -> tuple[str, ...]:

@@ -80,7 +80,7 @@ def circuit(voltage: str, declared: tuple[str, ...], terms: frozenset[str]) -> M
         velocity="di_dt",
     )
     left = "L i'' + R i' + i/C" if has_resistor else "L i'' + i/C"
-    of_source = f", V = {to_formula(source)}" if is_driven else ""
+    right = f"V'(t), V = {to_formula(source)}" if is_driven else "0"
     return mechanical(
         forces,
         parameters,
@@ -88,7 +88,7 @@ def circuit(voltage: str, declared: tuple[str, ...], terms: frozenset[str]) -> M
         kind="circuit",
         title="Electric circuit of coil, resistor and capacitor",
         source="vibration text, section 10.10, equation (118)",
-        equation=f"{left} = {'V' + chr(39) + '(t)' if is_driven else '0'}{of_source}",
+        equation=f"{left} = {right}",
         kinetic_energy="0.5*L*i**2",
         potential_energy=put(read("0.5*C*di_dt**2"), "di_dt", capacitor),
         dissipation="R*i**2" if has_resistor else None,
