@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vibsim.engine import LANES, energies, extrema, integrate
+from vibsim.engine import LANES, energies, extrema, integrate, observed
 from vibsim.models import MODELS
 from vibsim.schemes import FIXED_STEP, SCHEMES
 
@@ -317,3 +317,20 @@ def test_peaks_lie_where_the_positions_turn_whenever_the_velocity_is(kind, start
     # half a step late a peak would be p^2/8 higher or lower than its parabola says, and a velocity off by p/2 more
     for height in (whole.first_peak[0], whole.last_peak[0], -whole.last_trough[0]):
         assert height == pytest.approx(np.hypot(a, b), rel=p * p / 8.0)
+
+
+@pytest.mark.parametrize("lane", ["plain", "scalar"])
+def test_formulas_that_share_parts_keep_their_values(lane):
+    """A formula behind another one must not write to its result, however many parts it works out once."""
+    model = MODELS["pendulum"]
+    parts = (
+        "sin(theta)*sin(theta) + cos(omega)*cos(omega) + exp(t)*exp(t) + sinh(theta)*sinh(theta)"
+    )
+    formulas = ("1.0 + theta", "2.0 + omega", "3.0 + t", parts, "4.0*theta", parts)
+    states = np.array([[[0.3, 0.4]], [[0.1, -0.2]]])
+    given = np.ones((1, len(model.parameters))), np.array([0.5])
+    found = observed(model, formulas, *given, 1, states, lane=lane)
+    theta, omega, t = states[0, 0], states[1, 0], np.array([0.0, 0.5])
+    whole = np.sin(theta) ** 2 + np.cos(omega) ** 2 + np.exp(t) ** 2 + np.sinh(theta) ** 2
+    wanted = [1 + theta, 2 + omega, 3 + t, whole, 4 * theta, whole]
+    np.testing.assert_allclose(found[:, 0], wanted, rtol=1e-14)

@@ -111,7 +111,7 @@ def observer(model: Model, formulas: tuple[Formula, ...], lane: str) -> Kernel:
     if count > 1:
         system.put_moves(module, count)
     put = marked(model)
-    results = {f"_{i}": put(formula) for i, formula in enumerate(formulas)}
+    results = {f"_value_{i}": put(formula) for i, formula in enumerate(formulas)}
     put_functions(module, model, "", {"observed": results}, always_tuple=True)
     put_parameters(module, model)
     collect(module, observe.run, "kernel", {})

@@ -53,7 +53,7 @@ def plane(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
         return None
     levels = whole(record, "level")
     chosen = sorted({round(x) for x in np.linspace(0, len(levels) - 1, min(MOST, len(levels)))})
-    figure, axes = _axes(len(chosen))
+    figure, axes = square_axes(len(chosen))
     size = _draw_exact(axes, record, model, case, w, t <= 1.02 * period)
     early, late = t <= t[0] + period, t >= t[-1] - PERIODS * period
     is_long = bool(t[-1] > (PERIODS + 1.0) * period)
@@ -83,11 +83,7 @@ def plane(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
         ax.set_xlabel(style.label(letter, measure))
         if n % ACROSS == 0:
             ax.set_ylabel(style.label(f"{words.symbol(model.velocity)} / w", measure))
-    handles, texts = axes[0].get_legend_handles_labels()
-    columns = figures_frame.columns(texts, FONT, 0.92 * style.WIDTH)
-    # below its upper edge there is room for one row; more stand above it
-    figure.legend(handles, texts, loc="lower left", borderaxespad=0.0, ncols=columns, fontsize=FONT,
-                  bbox_to_anchor=(0.06, 1.0 - 0.24 / float(figure.get_figheight())))  # fmt: skip
+    legend_above(figure, axes[0])
     parts_told = (
         f"Of the whole motion the first period (thin) and the last {PERIODS:g} are drawn. "
         if is_long
@@ -108,7 +104,16 @@ def _period(record: Record, case: int, w: float) -> float:
     return exact if math.isfinite(exact) else 2.0 * math.pi / w if w > 0.0 else math.nan
 
 
-def _axes(count: int) -> tuple[Any, list[Axes]]:
+def legend_above(figure: Any, ax: Axes) -> None:
+    """Write the legend of a panel above all of them."""
+    handles, texts = ax.get_legend_handles_labels()
+    columns = figures_frame.columns(texts, FONT, 0.92 * style.WIDTH)
+    # below its upper edge there is room for one row; more stand above it
+    figure.legend(handles, texts, loc="lower left", borderaxespad=0.0, ncols=columns, fontsize=FONT,
+                  bbox_to_anchor=(0.06, 1.0 - 0.24 / float(figure.get_figheight())))  # fmt: skip
+
+
+def square_axes(count: int) -> tuple[Any, list[Axes]]:
     """Return a figure with square panels in rows, and room for a legend above them."""
     rows, side, gap = -(-count // ACROSS), 2.35, 0.78
     total = rows * (side + gap) + 0.45

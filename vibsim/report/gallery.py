@@ -16,6 +16,7 @@ from vibsim.report import (
     figures_growth,
     figures_map,
     figures_order,
+    figures_path,
     figures_period,
     figures_phase,
     figures_solution,
@@ -87,7 +88,8 @@ def _of_all_schemes(
     drawn = [figures_energy.running(record, case) for case in cases]
     drawn += [figures_work.precision(experiment, record, case) for case in cases]
     drawn.append(figures_extrema.local(experiment, record, series))
-    if not data.swept(record):
+    drawn.insert(0, figures_path.path(experiment, record, series))
+    if not data.swept(record) and experiment.model.definition.coordinates == 1:
         drawn.append(figures_phase.plane(experiment, record, series))
     return [picture for picture in drawn if picture is not None]
 
