@@ -159,6 +159,11 @@ class Model:
         return len(self.states) // 2
 
     @property
+    def dimensionless(self) -> bool:
+        """Whether the states have no units, so that the time has none."""
+        return all(state.unit == "1" for state in self.states)
+
+    @property
     def accelerations(self) -> tuple[Formula, ...]:
         """The acceleration of every coordinate."""
         return (self.acceleration, *self.further_accelerations)

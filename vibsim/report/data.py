@@ -98,8 +98,9 @@ def unit(record: Record, name: str) -> str:
 
 
 def time_unit(record: Record, name: str = "t") -> str:
-    """Return the unit of times, also where `t` is a fraction of the end; empty in a scaled run."""
-    return "" if "scale_t" in record.attrs else unit(record, name) or "s"
+    """Return the unit of times, also where `t` is a fraction of the end; empty where times have none."""
+    without = {"scale_t", "time_units"} & record.attrs.keys()
+    return "" if without else unit(record, name) or "s"
 
 
 def pretty_unit(text: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -13,10 +13,13 @@ if TYPE_CHECKING:
 
 
 def in_scales(record: Record, experiment: Experiment) -> Record:
-    """Return `record` with unit 1 and ``scale_<name>`` for every scale, where the run is a scaled one."""
-    if experiment.scaling is None:
-        return record
+    """Return `record` with unit 1 and ``scale_<name>`` for every scale, where the run is a scaled one.
+
+    Of a model that is dimensionless by itself the time has no unit either.
+    """
     model = experiment.model.definition
+    if experiment.scaling is None:
+        return _timeless(record) if model.dimensionless else record
     units = {state.name: state.unit for state in model.states}
     units |= {output.name: output.unit for output in model.outputs}
     units |= {"t": "s", "energy": model.energy_unit}
@@ -26,8 +29,19 @@ def in_scales(record: Record, experiment: Experiment) -> Record:
     return Record(_plain(record.coords), _plain(record.variables), attrs)
 
 
-def _plain(table: Mapping[str, Variable]) -> dict[str, Variable]:
+def _timeless(record: Record) -> Record:
+    timed = ("s", "rad s-1")
+    attrs = {**record.attrs, "time_units": "1"}
+    return Record(_plain(record.coords, timed), _plain(record.variables, timed), attrs)
+
+
+def _plain(
+    table: Mapping[str, Variable], units: Container[str] | None = None
+) -> dict[str, Variable]:
+    """Return the variables with unit 1 in place of their own: of any, or of some units."""
     return {
-        name: replace(row, attrs={**row.attrs, "units": "1"}) if "units" in row.attrs else row
+        name: replace(row, attrs={**row.attrs, "units": "1"})
+        if "units" in row.attrs and (units is None or row.attrs["units"] in units)
+        else row
         for name, row in table.items()
     }
