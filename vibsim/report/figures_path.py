@@ -12,7 +12,7 @@ import numpy as np
 from vibsim.record import Record
 from vibsim.report import style, words
 from vibsim.report.data import Floats, Member, case_name, pick, swept, unit, whole
-from vibsim.report.figures_phase import ACROSS, MOST, legend_above, of_level, square_axes
+from vibsim.report.figures_phase import ACROSS, legend_above, of_level
 from vibsim.report.style import Picture
 
 if TYPE_CHECKING:
@@ -22,6 +22,12 @@ if TYPE_CHECKING:
 
 CUT = 1.3
 """What leaves the exact path by more than this factor is cut off."""
+FLATTEST = 0.15
+"""Least height of a frame over its width, or the other way round."""
+TALLEST = 4.5
+"""Largest height of a panel [inch]."""
+
+Points = tuple[Floats, Floats]
 
 
 def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
@@ -34,20 +40,18 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
         return None
     names = model.positions[:2]
     panels = _panels(record, shown)
-    figure, axes = square_axes(len(panels))
-    box = _draw(axes, record, names, panels)
-    if box is None:
+    curves = [_curves(record, names, members, level) for _, members, level in panels]
+    frame = _frame([points for panel in curves for _, points in panel])
+    if frame is None:
         return None
-    across, along, half = box
-    for n, (ax, (title, _, _)) in enumerate(zip(axes, panels, strict=True)):
+    figure, axes = _axes(len(panels), frame)
+    for ax, (title, _, _), panel in zip(axes, panels, curves, strict=True):
+        _draw(ax, panel)
         ax.set_title(title)
-        ax.set(xlim=(across - half, across + half), ylim=(along - half, along + half))
-        ax.set(aspect="equal")
-        ax.set_xlabel(style.label(words.symbol(names[0]), unit(record, f"{names[0]}_finest")))
-        if n % ACROSS == 0:
-            measure = unit(record, f"{names[1]}_finest")
-            ax.set_ylabel(style.label(words.symbol(names[1]), measure))
-    legend_above(figure, axes[0])
+        ax.set(xlim=frame[0], ylim=frame[1], aspect="equal")
+        ax.set_ylabel(style.label(words.symbol(names[1]), unit(record, f"{names[1]}_finest")))
+    axes[-1].set_xlabel(style.label(words.symbol(names[0]), unit(record, f"{names[0]}_finest")))
+    legend_above(figure, max(axes, key=lambda ax: len(ax.get_lines())))
     return Picture(
         name="path",
         title=f"Path: {names[1]} against {names[0]}",
@@ -62,7 +66,7 @@ def _panels(record: Record, shown: list[Member]) -> list[tuple[str, list[Member]
     levels = whole(record, "level")
     finest = len(levels) - 1
     if swept(record):
-        cases = sorted({member.case for member in shown})[:MOST]
+        cases = sorted({member.case for member in shown})[:ACROSS]
         return [
             (case_name(record, case), [m for m in shown if m.case == case], finest)
             for case in cases
@@ -71,49 +75,67 @@ def _panels(record: Record, shown: list[Member]) -> list[tuple[str, list[Member]
     return [(f"level {levels[i]}", shown, i) for i in chosen]
 
 
-def _draw(
-    axes: list[Axes],
-    record: Record,
-    names: tuple[str, ...],
-    panels: list[tuple[str, list[Member], int]],
-) -> tuple[float, float, float] | None:
-    """Draw every path; return the middle of the frame and half its side, None where nothing moves."""
-    seen: list[tuple[Floats, Floats]] = []
-    for ax, (_, members, level) in zip(axes, panels, strict=True):
-        for k, member in enumerate(members):
-            x, y = (of_level(record, name, member, level) for name in names)
-            look = style.look(k)
-            ax.plot(x, y, color=look["color"], linewidth=1.0, alpha=0.9)
-            last = np.flatnonzero(np.isfinite(x))[-1:]
-            ax.plot(x[last], y[last], color=look["color"], marker=look["marker"], markersize=5,
-                    linestyle="-", linewidth=1.3, label=style.entry(member.scheme_name))  # fmt: skip
-            seen.append((x, y))
-        exact = _exact(record, names, members[0].case)
-        if exact is not None:
-            dashed: dict[str, Any] = {"color": "black", "linestyle": (0, (4, 3)), "linewidth": 0.8}
-            ax.plot(*exact, **dashed, zorder=5, label="reference")
-            seen.insert(0, exact)
-    return _frame(seen)
+def _curves(
+    record: Record, names: tuple[str, ...], members: list[Member], level: int
+) -> list[tuple[str, Points]]:
+    """Return the curves of a panel by name: the reference first, of which the name is empty, where there is one."""
+    exact = [f"{name}_exact" for name in names]
+    found: list[tuple[str, Points]] = []
+    if all(name in record for name in exact):
+        x, y = (np.asarray(pick(record, name, case=members[0].case), dtype=float) for name in exact)
+        if np.isfinite(x).all() and np.isfinite(y).all():
+            found.append(("", (x, y)))
+    for member in members:
+        x, y = (of_level(record, name, member, level) for name in names)
+        found.append((member.scheme_name, (x, y)))
+    return found
 
 
-def _exact(record: Record, names: tuple[str, ...], case: int) -> tuple[Floats, Floats] | None:
-    """Return the exact path or the reference for it; None where there is none."""
-    if any(f"{name}_exact" not in record for name in names):
-        return None
-    x, y = (np.asarray(pick(record, f"{name}_exact", case=case), dtype=float) for name in names)
-    return (x, y) if np.isfinite(x).all() and np.isfinite(y).all() else None
+def _draw(ax: Axes, curves: list[tuple[str, Points]]) -> None:
+    """Draw the schemes from thick to thin, so that none hides another, and the reference over them."""
+    schemes = [curve for curve in curves if curve[0]]
+    for k, (name, (x, y)) in enumerate(schemes):
+        look, width = style.look(k), 1.0 + 1.8 * (len(schemes) - 1 - k) / len(schemes)
+        ax.plot(x, y, color=look["color"], linewidth=width, alpha=0.8)
+        last = np.flatnonzero(np.isfinite(x))[-1:]
+        ax.plot(x[last], y[last], color=look["color"], marker=look["marker"], markersize=5,
+                linestyle="-", linewidth=width, label=style.entry(name))  # fmt: skip
+    for x, y in (points for name, points in curves if not name):
+        dashed: dict[str, Any] = {"color": "black", "linestyle": (0, (4, 3)), "linewidth": 0.8}
+        ax.plot(x, y, **dashed, zorder=5, label="reference")
 
 
-def _frame(seen: list[tuple[Floats, Floats]]) -> tuple[float, float, float] | None:
-    """Return a square around the first path, with room for the others as far as they stay near it."""
-    x, y = (values[np.isfinite(values)] for values in seen[0])
-    if x.size == 0:
-        return None
-    across, along = 0.5 * float(np.min(x) + np.max(x)), 0.5 * float(np.min(y) + np.max(y))
-    size = 0.5 * max(float(np.ptp(x)), float(np.ptp(y)))
-    reach = [
-        float(np.nanmax(np.maximum(np.abs(x - across), np.abs(y - along)), initial=0.0))
-        for x, y in seen
-    ]
-    half = 1.08 * min(max(reach), CUT * size)
-    return (across, along, half) if half > 0.0 else None
+def _frame(seen: list[Points]) -> tuple[tuple[float, float], tuple[float, float]] | None:
+    """Return the limits of both axes: around the first path, with room for the others as far as they stay near it."""
+    middle, half = [], []
+    for axis in (0, 1):
+        first = seen[0][axis][np.isfinite(seen[0][axis])]
+        if first.size == 0:
+            return None
+        middle.append(0.5 * float(np.min(first) + np.max(first)))
+        half.append(0.5 * float(np.ptp(first)))
+    limits = []
+    for axis in (0, 1):
+        away = [np.abs(points[axis] - middle[axis]) for points in seen]
+        reach = max(float(np.max(x[np.isfinite(x)], initial=0.0)) for x in away)
+        room = max(min(reach, CUT * half[axis]), FLATTEST * max(half))
+        limits.append((middle[axis] - 1.08 * room, middle[axis] + 1.08 * room))
+    return (limits[0], limits[1]) if max(half) > 0.0 else None
+
+
+def _axes(
+    count: int, frame: tuple[tuple[float, float], tuple[float, float]]
+) -> tuple[Any, list[Axes]]:
+    """Return a figure with panels below each other, as high as the frame is beside its width, and a legend's room."""
+    (left, right), (low, high) = frame
+    wide = style.WIDTH - 1.0
+    side = min(wide * (high - low) / (right - left), TALLEST)
+    gap, above = 0.42, 0.45
+    total = count * (side + gap) + above + 0.2
+    figure = style.canvas(total)
+    axes = []
+    for i in range(count):
+        bottom = total - above - (i + 1) * (side + gap) + gap - 0.1
+        box = (0.75 / style.WIDTH, bottom / total, wide / style.WIDTH, side / total)
+        axes.append(figure.add_axes(box))
+    return figure, axes
