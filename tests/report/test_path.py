@@ -1,0 +1,76 @@
+"""The path of a body with two coordinates: what is drawn is what was computed, in a frame of its shape."""
+
+import numpy as np
+import pytest
+import samples
+
+from vibsim import simulate
+from vibsim.report import choice, data, figures_path, gallery
+
+CONTENT = {
+    "model": {"kind": "elastic_pendulum", "beta": 0.9, "Theta": 40},
+    "initial": {},
+    "time": {"end": 6.0},
+    "levels": [5, 6, 7, 8],
+    "schemes": ["central", "rk4"],
+    "checks": [{"converges": "x", "order": 2, "schemes": ["central"]}],
+}
+
+
+def drawn(**changes):
+    exp = samples.experiment(**(CONTENT | changes))
+    rec = samples.record(exp)
+    shown, _ = gallery.choose(exp, rec)
+    return exp, rec, shown, figures_path.path(exp, rec, shown)
+
+
+@pytest.fixture(scope="module")
+def levels():
+    return drawn()
+
+
+def test_every_chosen_level_has_a_panel_with_one_scale(levels):
+    _, _, _, picture = levels
+    axes = picture.figure.axes
+    assert [ax.get_title() for ax in axes] == ["level 5", "level 6", "level 8"]
+    for ax in axes:
+        assert ax.get_aspect() == 1.0
+        (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+        box = ax.get_position()
+        wide, tall = picture.figure.get_size_inches()
+        shape = (box.height * tall) / (box.width * wide)
+        assert shape == pytest.approx((high - low) / (right - left), rel=1e-9)
+
+
+def test_the_curves_are_the_levels_and_the_reference(levels):
+    exp, rec, shown, picture = levels
+    for ax, level in zip(picture.figure.axes, (5, 6, 8), strict=True):
+        lines = ax.get_lines()
+        labels = [line.get_label() for line in lines if not line.get_label().startswith("_")]
+        assert labels == ["central", "rk4", "reference"]
+        stored = simulate(exp, level)
+        every = (stored.sizes["t"] - 1) // (len(rec["t"]) - 1)
+        for i, line in enumerate((lines[0], lines[2])):
+            for name, values in zip(("x", "y"), line.get_data(), strict=True):
+                wanted = stored[name].values[i, 0, ::every]
+                np.testing.assert_allclose(values, wanted, rtol=0.0, atol=1e-13)
+        (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+        x, y = lines[-1].get_data()
+        assert left < x.min() <= x.max() < right
+        assert low < y.min() <= y.max() < high
+
+
+def test_members_of_a_sweep_have_panels_of_their_own():
+    _, rec, shown, picture = drawn(sweep={"model.gamma": [0.0, 0.5]})
+    titles = [ax.get_title() for ax in picture.figure.axes]
+    assert titles == [data.case_name(rec, case) for case in sorted({m.case for m in shown})]
+
+
+def test_a_body_at_rest_and_one_coordinate_have_no_path():
+    at_rest = {"model": {"kind": "elastic_pendulum", "Theta": 0}}
+    assert drawn(**at_rest)[-1] is None
+    one = {"model": {"kind": "pendulum"}, "initial": {"theta": 1.0}}
+    checks = [{"converges": "theta", "order": 2, "schemes": ["central"]}]
+    exp, rec, _, picture = drawn(**one, checks=checks)
+    assert picture is None
+    assert choice.position(exp) == "theta"
