@@ -52,6 +52,7 @@ from vibsim.engine.gather import (
 
 def run(
     parameters: Any,
+    table: Any,
     initial: Any,
     dt: Any,
     first: int,
@@ -73,6 +74,8 @@ def run(
     ----------
     parameters, initial, dt
         Shapes (case, n_parameters), (case, 2) with position and velocity, and (case,).
+    table
+        What formulas look up (`vibsim.engine.lookup`), shape (row, point); empty where they do not.
     steps, every
         Number of steps; a sample is stored at each multiple of `every`, which divides `steps`.
     variant
@@ -95,7 +98,7 @@ def run(
     """
     for case in range(first, stop):
         h = float(dt[case])
-        p = parameters_of(parameters, case)
+        p = parameters_of(parameters, table, case)
         u = float(initial[case, 0])
         v = float(initial[case, 1])
         energy_0 = 0.0

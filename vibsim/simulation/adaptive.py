@@ -236,7 +236,8 @@ def _right_hand_side(
 ) -> tuple[Callable[..., Any], Callable[..., Any], Callable[[], int]]:
     """Return the derivative of (u, v), that derivative's own derivative, and what counts the forces."""
     acceleration, slopes = _forces(problem.model)
-    p = problem.parameters
+    lookup = problem.model.lookup
+    p = problem.parameters if lookup is None else (*problem.parameters, lookup.table.rows)
     count = 0
 
     def right(t: float, y: Floats) -> tuple[float, float]:
