@@ -23,7 +23,7 @@ def looked_up(rows: Any, x: float) -> tuple[float, float]:
     """
     spacing = float(rows[HEADER, 1])
     way = (x - float(rows[HEADER, 0])) / spacing
-    i = min(max(int(math.floor(way)), 0), rows.shape[1] - 2)
+    i = min(max(math.floor(way), 0), rows.shape[1] - 2)
     w = way - i
     h_0, h_1 = float(rows[HEIGHTS, i]), float(rows[HEIGHTS, i + 1])
     q_0, q_1 = float(rows[BENDS, i]), float(rows[BENDS, i + 1])

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 from vibsim.expression import (
     ZERO,
@@ -77,6 +78,7 @@ def vehicle(
         force=push,
         mass=Name("m"),
     )
+    of_table: dict[str, Any] = {"lookup": lookup, "exact": None, "scales": None}
     damper = "b u' + " if "b" in terms else ""
     told = f"h(x) = {to_formula(road)}" if lookup is None else _told(lookup.table)
     return mechanical(
@@ -97,7 +99,7 @@ def vehicle(
         with_table=lambda table, is_met: vehicle(
             texts, declared, terms, Lookup(table, PLACE, is_met)
         ),
-        **({"lookup": lookup, "exact": None, "scales": None} if lookup else {}),
+        **(of_table if lookup else {}),
     )
 
 

@@ -101,7 +101,7 @@ def _formula_or(section: Any) -> Any:
 
 
 def _table_section(model: Model, field: FormulaField, names: tuple[str, str]) -> type[Section]:
-    """Return the class of ``{table: file}``, with the names of its columns under the names that they have by default."""
+    """Return the class of ``{table: file}``; `names` are the keys for the columns, and their names by default."""
     words = f"path of a table, relative to this file: {field.description}"
     fields: dict[str, Any] = {
         TABLE: (Text, Field(description=f"{words}; a .csv or a .nc file")),
