@@ -167,8 +167,8 @@ def advise(s: Story) -> str:
             return f"Set `events: located` for scheme {s.scheme}."
         case "order_low" | "non_smooth" if s.has_corners:
             return (
-                "Choose steps in `time:` that end at every point of the table: at the coarsest level, dt is its spacing "
-                "over the speed, or a whole part of that."
+                "Choose steps in `time:` that end at every point of the table: at the coarsest level, dt is its "
+                "spacing over the speed, or a whole part of that."
             )
         case "order_low" if _starts_low(s):
             return f"Set `start: centred` for scheme {s.scheme}."

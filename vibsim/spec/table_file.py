@@ -27,6 +27,8 @@ MOST_POINTS = 2**20
 EVEN = 1e-3
 """How far a place may be from where equal spacing has it, in spacings: a file may have rounded it."""
 UNIT = "m"
+MOST_LISTED = 8
+"""Files that a message lists, at most."""
 
 
 class TableError(ValueError):
@@ -75,6 +77,9 @@ def read(path: Path, keys: tuple[str, str], names: tuple[str, str]) -> tuple[Tab
         Where it is none, or cannot be read.
     """
     content = _content(path)
+    if names[0] == names[1]:
+        rule = f"must be another column than '{names[0]}', which holds the places"
+        raise TableError(keys[1], rule)
     of_kind = _from_text if path.suffix.lower() == ".csv" else _from_netcdf
     columns = of_kind(content, keys, names)
     return _table(columns, names), hashlib.sha256(content).hexdigest()
@@ -103,7 +108,11 @@ def _alike(path: Path) -> str:
         beside = [p.name for p in path.parent.iterdir() if p.suffix.lower() in ENDINGS]
     except (OSError, ValueError):
         return "there is no such folder"
-    return nearest(path.name, sorted(beside)) if beside else "there is no table in that folder"
+    if not beside:
+        return "there is no table in that folder"
+    hint = nearest(path.name, sorted(beside))
+    is_close = hint.startswith("did") or len(beside) <= MOST_LISTED
+    return hint if is_close else f"there are {len(beside)} tables in that folder"
 
 
 def _from_text(content: bytes, keys: tuple[str, str], names: tuple[str, str]) -> Columns:
@@ -163,7 +172,8 @@ def _from_netcdf(content: bytes, keys: tuple[str, str], names: tuple[str, str]) 
         with netcdf.in_memory(content) as dataset:
             found = [_variable(dataset, *pair) for pair in zip(keys, names, strict=True)]
     except (OSError, RuntimeError) as error:
-        raise TableError("table", f"the netCDF library cannot read it ({error})") from None
+        reason = getattr(error, "strerror", None) or str(error)
+        raise TableError("table", f"the netCDF library cannot read it ({reason})") from None
     place, value = found
     if len(place) != len(value):
         rule = f"'{names[0]}' has {len(place)} points, '{names[1]}' has {len(value)}"
