@@ -10,13 +10,12 @@ from typing import Any
 import netCDF4
 import numpy as np
 import pytest
+from spec_files import write
 
 from vibsim.errors import Fault, InputError
 from vibsim.models.table import Table
 from vibsim.spec import Experiment, canonical, load, restore, table_file
 from vibsim.spec.table_file import EVEN, TableError, read
-
-from spec_files import write
 
 HEIGHTS = [0.02 * (i % 7) ** 2 for i in range(101)]
 ROWS = [f"{i / 10:g},{h:g}" for i, h in enumerate(HEIGHTS)]
@@ -88,11 +87,11 @@ def test_places_may_be_rounded_but_not_moved(tmp_path: Path) -> None:
     ("rows", "rule", "hint"),
     [
         (ROWS[:40] + ROWS[41:], "line 42: 'x' must be equally spaced, but is 0.2", "0.1 apart"),
-        (ROWS[:5] + ["0.5,nan"] + ROWS[6:], "line 7: 'h' is nan, and must be finite", ""),
-        (ROWS[:5] + ["inf,1"] + ROWS[6:], "line 7: 'x' is inf, and must be finite", ""),
-        (ROWS[:5] + ["0.5,high"] + ROWS[6:], "line 7: 'high' is no number, in column 'h'", ""),
-        (ROWS[:5] + ["0.5"] + ROWS[6:], "line 7 has no value of 'h'", ""),
-        (ROWS[:5] + ["0.5,"] + ROWS[6:], "line 7: '' is no number, in column 'h'", ""),
+        ([*ROWS[:5], "0.5,nan", *ROWS[6:]], "line 7: 'h' is nan, and must be finite", ""),
+        ([*ROWS[:5], "inf,1", *ROWS[6:]], "line 7: 'x' is inf, and must be finite", ""),
+        ([*ROWS[:5], "0.5,high", *ROWS[6:]], "line 7: 'high' is no number, in column 'h'", ""),
+        ([*ROWS[:5], "0.5", *ROWS[6:]], "line 7 has no value of 'h'", ""),
+        ([*ROWS[:5], "0.5,", *ROWS[6:]], "line 7: '' is no number, in column 'h'", ""),
         (ROWS[:2], "must have at least 3 points, has 2", ""),
         ([], "must have at least 3 points, has 0", ""),
         (ROWS[:9] + ROWS[3:4] + ROWS[9:], "line 11: 'x' must increase, but is 0.8 and then", ""),
