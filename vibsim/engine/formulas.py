@@ -61,13 +61,13 @@ def put_formulas(
         Whether the powers of damping and of driving forces are needed.
     """
     put = marked(model)
-    acceleration = put(model.acceleration)
+    accelerations = [put(formula) for formula in model.accelerations]
     parts = _of_events(model, put)
     if "drive" in parts:
         held = Binary("*", Name(_MODE), parts["limit"]["_limit"])
-        acceleration = Binary("-", parts["drive"]["_drive"], held)
+        accelerations = [Binary("-", parts["drive"]["_drive"], held)]
     formulas = {
-        "acceleration": {"_result": acceleration},
+        "acceleration": {f"_result_{i}": formula for i, formula in enumerate(accelerations)},
         **parts,
         "energies": {
             "_kinetic": put(model.kinetic_energy),
@@ -76,8 +76,10 @@ def put_formulas(
     }
     if stepper.implicit:
         formulas["slopes"] = {
-            "_by_position": expression.derivative(acceleration, model.position),
-            "_by_velocity": expression.derivative(acceleration, model.velocity),
+            f"_slope_{i}_{name}": expression.derivative(formula, name)
+            for names in (model.positions, model.velocities)
+            for i, formula in enumerate(accelerations)
+            for name in names
         }
     if "damping_rate" in signature(stepper.step).parameters:
         rate = put(model.damping.rate) if model.damping else Number(0.0)
@@ -102,7 +104,7 @@ def put_energy_with(module: Module, model: Model) -> None:
     """
     potential = tree(model, model.potential_energy)
     line = "kinetic = kinetic_energy(u, v, t, p)"
-    if model.velocity in expression.names_in(potential):
+    if set(model.velocities) & set(expression.names_in(potential)):
         line = "kinetic, potential = energies(u, v, t, p)"
     head = "@compiled\ndef energy_with(u, v, t, p, potential):"
     module.put("energy_with", f"{head}\n    {line}\n    return kinetic + potential")
@@ -153,8 +155,16 @@ def put_functions(
                 lines.append(f"{result} = {result} * p[{len(names) + n_between(model)}]")
         returned = ", ".join(results)
         lines.append(f"return ({returned},)" if always_tuple else f"return {returned}")
-        head = f"@compiled\ndef {function}{suffix}({model.position}, {model.velocity}, t, p):\n    "
-        module.put(function + suffix, head + "\n    ".join(lines))
+        module.put(function + suffix, _head(model, function + suffix) + "\n    ".join(lines))
+
+
+def _head(model: Model, function: str) -> str:
+    """Return the first lines of a function, which name the states; several coordinates come as two tuples."""
+    if model.coordinates == 1:
+        return f"@compiled\ndef {function}({model.position}, {model.velocity}, t, p):\n    "
+    names = ", ".join((*model.positions, *model.velocities))
+    values = ", ".join(f"_{name}[{k}]" for name in ("u", "v") for k in range(model.coordinates))
+    return f"@compiled\ndef {function}(_u, _v, t, p):\n    {names} = {values}\n    "
 
 
 def _looking_up(module: Module, model: Model, formulas: Iterable[Expression]) -> list[str]:

@@ -15,7 +15,7 @@ from types import FunctionType
 from typing import Any
 
 from vibsim.elementary import primitives
-from vibsim.engine import blocks, friction, impact, loop, observe, rows
+from vibsim.engine import blocks, friction, gather, impact, loop, observe, rows, system
 from vibsim.engine.cache import Kernel, load
 from vibsim.engine.formulas import (
     marked,
@@ -101,6 +101,8 @@ def kernel(
         raise SimulationError(
             f"{model.kind} has events, at times of each member's own: no block of members has them"
         )
+    if lane == "blocks" and model.coordinates > 1:
+        raise SimulationError(f"{model.kind} has several coordinates: no block of members has them")
     text = source(model, stepper, lane, with_gathered, with_series, with_peaks)
     return _in_lane(text, lane, _STEPPING)
 
@@ -108,7 +110,10 @@ def kernel(
 @cache
 def observer(model: Model, formulas: tuple[Formula, ...], lane: str) -> Kernel:
     """Return the function that works out formulas of samples (`vibsim.engine.observe.run`)."""
-    module = _module(lane, {})
+    count = model.coordinates
+    module = _module(lane, {"SYSTEM": count > 1})
+    if count > 1:
+        system.put_moves(module, count)
     put = marked(model)
     results = {f"_{i}": put(formula) for i, formula in enumerate(formulas)}
     put_functions(module, model, "", {"observed": results}, always_tuple=True)
@@ -126,7 +131,9 @@ def source(
     with_peaks: bool = False,
 ) -> str:
     """Return the text of the kernel of `model` and `stepper`, without the head that says what compiles it."""
-    states, parameters = carried(stepper, model), n_parameters(stepper, model)
+    count = model.coordinates
+    states = carried(stepper, model) if count == 1 else 0
+    parameters = n_parameters(stepper, model)
     with_peaks = with_peaks and with_gathered
     settings = {
         "GATHER": with_gathered,
@@ -138,10 +145,13 @@ def source(
         "STAGED": bool(stages(stepper.step)),
         "EVENTS": model.events is not None,
         "LOCATED": stepper.events != "mesh",
+        "SYSTEM": count > 1,
+        "COORDINATES": count,
         "STATES": states,
         "SET": blocks.set_of(states, with_peaks),
         "PARAMETERS": parameters,
         **blocks.row_numbers(states, parameters, with_peaks),
+        **gather.sample_rows(count),
     }
     module = _module(lane, settings)
     again = lane != "blocks" and bool(settings["D2T"])
@@ -151,11 +161,10 @@ def source(
     put_formulas(module, model, "", stepper, is_rare=rare, with_kinetic=again, with_work=with_work)
     if again:
         put_energy_with(module, model)
-    _put_start(module, stepper)
-    if model.events is not None:
-        _put_events(module, model, stepper)
-    for name in ("step", "backward"):
-        collect(module, getattr(stepper, name), name, {})
+    if count > 1:
+        system.put_scheme(module, stepper, count)
+    else:
+        _put_scheme(module, model, stepper)
     if lane == "blocks":
         put_formulas(module, model, "_fast", stepper, with_work=with_work)
         functions = (n for n, v in stepper.step.__globals__.items() if isinstance(v, FunctionType))
@@ -195,6 +204,15 @@ def _put_events(module: Module, model: Model, stepper: Stepper) -> None:
     kind = friction if isinstance(model.events, Friction) else impact
     for name in ("first_mode", "guard", "guard_on_mesh", "landed", "settled", "turning"):
         collect(module, getattr(kind, name), name, {})
+
+
+def _put_scheme(module: Module, model: Model, stepper: Stepper) -> None:
+    """Write start, step and one-sided velocity of a scheme, and the events of the model."""
+    _put_start(module, stepper)
+    if model.events is not None:
+        _put_events(module, model, stepper)
+    for name in ("step", "backward"):
+        collect(module, getattr(stepper, name), name, {})
 
 
 def _put_start(module: Module, stepper: Stepper) -> None:
