@@ -45,13 +45,21 @@ class TableSpec(Section):
     place: Text
     value: Text
     """Names of the columns of places and values."""
-    content: Text
-    """SHA-256 of the bytes of the file."""
     numbers: Text
     """SHA-256 of the numbers (`vibsim.models.table.Table.digest`), on which results depend alone."""
     is_met: bool = False
     """Whether a step of every member ends at every point (`vibsim.models.table.Lookup.is_met`)."""
     _table: Table | None = PrivateAttr(default=None)
+    _content: str = PrivateAttr(default="")
+
+    def hold(self, table: Table, content: str) -> None:
+        """Take the numbers of the file, and the SHA-256 of its bytes, which are no part of an experiment's identity."""
+        self._table, self._content = table, content
+
+    @property
+    def content(self) -> str:
+        """SHA-256 of the bytes of the file, as it was read."""
+        return self._content
 
     @property
     def table(self) -> Table:

@@ -60,8 +60,8 @@ def table_of(row: FormulaField, section: Section, folder: Path, report: Report) 
 
 def _spec(table: Table, file: str, names: tuple[str, str], content: str) -> TableSpec:
     place, value = names
-    spec = TableSpec(file=file, place=place, value=value, content=content, numbers=table.digest)
-    spec._table = table
+    spec = TableSpec(file=file, place=place, value=value, numbers=table.digest)
+    spec.hold(table, content)
     return spec
 
 
@@ -77,13 +77,13 @@ def attach(experiment: Experiment) -> None:
     for name, spec in experiment.model.tables.items():
         keys = next(row.table for row in _fields(experiment) if row.name == name)
         try:
-            table, _ = read(folder / spec.file, keys or ("", ""), (spec.place, spec.value))
+            table, content = read(folder / spec.file, keys or ("", ""), (spec.place, spec.value))
         except TableError as error:
             raise _refusal(experiment, name, spec, error.rule, error.hint) from None
         if table.digest != spec.numbers:
             rule = "has other numbers than when the experiment was read"
             raise _refusal(experiment, name, spec, rule, "run the experiment again")
-        spec._table = table
+        spec.hold(table, content)
 
 
 def _fields(experiment: Experiment) -> tuple[FormulaField, ...]:
