@@ -79,11 +79,11 @@ class Keys:
             rule = "the end can be swept only where time has an end, and base_steps if anything"
             self.report.add(path, rule, at_key=True)
             return None
-        if self.model is not None and key in table_keys(self.model):
+        target = self.targets.get(key)
+        if target is None and self.model is not None and key in table_keys(self.model):
             rule = "cannot be swept: every member has the same formula, or the same table"
             self.report.add(path, rule, "sweep a parameter, such as " + self.example, at_key=True)
             return None
-        target = self.targets.get(key)
         broken = self.model is None or (self.lacks_scheme and key.startswith("schemes."))
         if target is None and not broken:
             alike = [name for name in self.targets if name.lower() == key.lower()]
