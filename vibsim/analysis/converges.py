@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 from vibsim import theory
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Orders, Outcome
 from vibsim.analysis.part import fastest
-from vibsim.analysis.promise import columns_of, formal_orders, options_of, stability_limits
+from vibsim.analysis.promise import (
+    columns_of,
+    formal_orders,
+    has_corners,
+    options_of,
+    stability_limits,
+)
 from vibsim.analysis.wording import Story, advise, tell
 from vibsim.record import Record
 from vibsim.schemes import SCHEMES, Options, Scheme
@@ -122,6 +128,7 @@ def _story(
         options=options,
         is_position=check.converges in experiment.model.definition.positions,
         scheme=spec.name,
+        has_corners=has_corners(experiment.model.definition),
     )
 
 

@@ -82,7 +82,7 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
         omega_dt=np.broadcast_to(part.fastest, (*shape, len(grid.levels))),
         stability_limit=np.broadcast_to(part.stability_limit, shape),
         growth=part.growth,
-        on_mesh=np.broadcast_to(part.on_mesh, shape),
+        left_to_the_mesh=np.broadcast_to(part.left_to_the_mesh, shape),
         span=np.broadcast_to(part.omega_dt[:, 0] * float(grid.steps[0]), shape),
         relative_floor=np.broadcast_to(part.relative_floor[..., 0], shape),
     )

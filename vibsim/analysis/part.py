@@ -16,7 +16,7 @@ from vibsim.analysis.known import known_values
 from vibsim.analysis.promise import (
     Columns,
     columns_of,
-    on_the_mesh,
+    left_to_the_mesh,
     relative_floors,
     stability_limits,
 )
@@ -74,8 +74,8 @@ class Part:
     """Largest stable w dt, infinite for none, shape (s, 1 or c)."""
     adaptive: Flags
     """Whether a scheme chooses its own steps and so has no levels, shape (s,)."""
-    on_mesh: Flags
-    """Whether a scheme leaves events to the mesh, shape (s, 1 or c)."""
+    left_to_the_mesh: Floats
+    """The power that is left of errors where the mesh decides what steps see, NaN elsewhere, shape (s, 1 or c)."""
     growth: Floats
     """Largest position over the largest exact position, shape (s, c, l); NaN where not known."""
 
@@ -214,7 +214,7 @@ def part_of(experiment: Experiment, records: Mapping[int, Record]) -> Part:
         failed=by_level([records[level]["status"] for level in grid.levels]) != 0,
         stability_limit=stability_limits(experiment, columns),
         adaptive=np.array([SCHEMES[scheme.kind].adaptive for scheme in experiment.schemes]),
-        on_mesh=on_the_mesh(experiment, columns),
+        left_to_the_mesh=left_to_the_mesh(experiment, columns),
         growth=_growth(experiment, grid, records, exact),
     )
 

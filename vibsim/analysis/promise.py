@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from vibsim import plan
 from vibsim.analysis.floor import relative_floor
+from vibsim.models import Model
 from vibsim.record import Record
 from vibsim.schemes import SCHEMES, Options, Scheme
-from vibsim.schemes.base import OptionValue, is_on_the_mesh
+from vibsim.schemes.base import ORDER_AT_CORNERS, OptionValue, is_on_the_mesh
 from vibsim.theory import stability_limit
 
 if TYPE_CHECKING:
@@ -63,11 +64,30 @@ def even_powers(experiment: Experiment, quantity: str, columns: Columns) -> NDAr
     return np.asarray(even != 0)
 
 
-def on_the_mesh(experiment: Experiment, columns: Columns) -> NDArray[np.bool_]:
-    """Tell whether events are left to the mesh, so that no error has a regular expansion, shape (scheme, case)."""
-    if experiment.model.definition.events is None:
-        return np.zeros((len(experiment.schemes), 1), dtype=bool)
-    return np.asarray(_each(experiment, columns, lambda s, o: float(is_on_the_mesh(o))) != 0)
+def has_corners(model: Model) -> bool:
+    """Tell whether steps have corners of a force from a table inside."""
+    return model.lookup is not None and not model.lookup.is_met
+
+
+def left_to_the_mesh(experiment: Experiment, columns: Columns) -> Floats:
+    """Return the power that is left where it depends on the mesh what a step sees, shape (scheme, case).
+
+    It is 1 where events are left to the mesh, and 2 where steps have corners of the force inside: how much of an error
+    belongs to that power is then the accident of where they lie between two points. NaN stands where errors have a
+    regular expansion.
+    """
+    model = experiment.model.definition
+    if model.events is None and not has_corners(model):
+        return np.full((len(experiment.schemes), 1), np.nan)
+    return _each(experiment, columns, lambda s, o: _left(s, o, model))
+
+
+def _left(scheme: Scheme, options: Options, model: Model) -> float:
+    if model.events is not None:
+        return 1.0 if is_on_the_mesh(options) else math.nan
+    # the error of a scheme of first order is its own
+    order = scheme.formal_order(model.position, model, options)
+    return ORDER_AT_CORNERS if order >= ORDER_AT_CORNERS else math.nan
 
 
 def relative_floors(experiment: Experiment, steps: tuple[int, ...], columns: Columns) -> Floats:

@@ -54,8 +54,6 @@ MOST_ABOVE = 2.0
 """A superconvergent quantity gains at most the next even power."""
 AGREEMENT = 0.25
 """Orders of differences and of errors agree within half of what separates two orders."""
-ON_MESH = 1.0
-"""Order of what is left by events that are noticed at the grid point behind them."""
 ORDINARY = 2.0
 """Order of the error that would have been seen where an exact quantity is promised."""
 LEAST_ORDER = 0.25
@@ -94,8 +92,9 @@ class Evidence:
     """Largest stable w dt, infinite where there is no limit, shape (...)."""
     span: Floats | None = None
     """w T, the length of the run in units of the inverse frequency, shape (...); None counts as long."""
-    on_mesh: Flags | None = None
-    """Whether events were left to the mesh: the error then has no expansion beyond its first power, shape (...)."""
+    left_to_the_mesh: Floats | None = None
+    """The one power of an error that has no expansion beyond it, since events or corners of the force are left to the
+    mesh, shape (...); NaN where the error has an expansion."""
     growth: Floats | None = None
     """Largest position over the largest exact position, shape (..., n); NaN where not known."""
 
@@ -141,9 +140,10 @@ def rules(e: Evidence, t: Trend) -> list[tuple[Flags, str]]:
     too_large, too_small = _contradicts(e, t)
     missed = too_large & (right | (wrong & _errors_stay(e, t)))
     wrong &= _errors_agree(e, t)
-    rough = np.zeros(p.shape, dtype=bool) if e.on_mesh is None else e.on_mesh
-    # the mesh leaves the power 1: any other one is the accident of where events lie between grid points
-    regular = ~rough | ((np.abs(t.order - ON_MESH) <= tol) & ~t.alternating)
+    left = np.full(p.shape, np.nan) if e.left_to_the_mesh is None else e.left_to_the_mesh
+    rough = ~np.isnan(left)
+    # any other power is the accident of where events or corners lie between grid points
+    regular = ~rough | ((np.abs(t.order - left) <= tol) & ~t.alternating)
     return [
         (exact & _far_from_exact(e), "wrong_limit"),
         (exact, "exact"),

@@ -17,8 +17,8 @@ The rules, in the order in which they apply (the first that applies decides):
 5. the order is stated with an interval. PASS where it is within the tolerance, its interval is as narrow, the series
    coincide, and nothing drifts away; ``order_low``, ``order_high`` where the interval excludes what is expected and
    holds an order that an expansion can have; else ``pre_asymptotic``, ``oscillating`` or ``round_off``;
-6. where events are left to the mesh, an error has no expansion behind its first power: a ladder that does not show that
-   power is ``non_smooth``;
+6. where events are left to the mesh, or corners of a force from a table, an error has no expansion behind its first
+   power, or the second: a ladder that does not show that power is ``non_smooth``;
 7. a settled ladder whose error against the exact solution is larger than its differences allow: ``wrong_limit``.
 """
 

@@ -37,6 +37,8 @@ class Story:
     """Options of the scheme."""
     is_position: bool
     scheme: str
+    has_corners: bool = False
+    """Whether steps have corners of a force from a table inside."""
 
 
 def number(value: float) -> str:
@@ -131,6 +133,11 @@ def tell(s: Story) -> str:
                 f"Scheme {s.scheme} leaves events to the mesh, which notices them up to a step late, wherever they lie "
                 f"between two points: the error of {s.quantity} has no regular expansion in powers of dt."
             )
+        case "non_smooth" if s.has_corners:
+            return (
+                "Between the points of its table the force is a straight line, and its corners lie within steps, at "
+                f"each level elsewhere: the error of {s.quantity} has no regular expansion in powers of dt."
+            )
         case "non_smooth":
             return f"{s.quantity} is not smooth, so its error has no regular expansion in powers of dt."
         case "too_few_levels":
@@ -158,6 +165,11 @@ def advise(s: Story) -> str:
             return ""
         case "order_low" | "non_smooth" if is_on_the_mesh(s.options):
             return f"Set `events: located` for scheme {s.scheme}."
+        case "order_low" | "non_smooth" if s.has_corners:
+            return (
+                "Choose steps in `time:` that end at every point of the table: at the coarsest level, dt is its "
+                "spacing over the speed, or a whole part of that."
+            )
         case "order_low" if _starts_low(s):
             return f"Set `start: centred` for scheme {s.scheme}."
         case "pre_asymptotic" if _ends_low(s):
@@ -230,6 +242,8 @@ def _ends_low(s: Story) -> bool:
 def _cause(s: Story) -> str:
     if is_on_the_mesh(s.options):
         return " The likely cause is `events: mesh`: an event is noticed up to a step late."
+    if s.has_corners:
+        return " The likely cause is the table: the force has corners at its points, which lie within steps."
     if _starts_low(s):
         return " The likely cause is the first step: `start: first_order` leaves its dt^2 term out."
     if _ends_low(s):

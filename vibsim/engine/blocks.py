@@ -129,6 +129,7 @@ def row_numbers(states: int, parameters: int, with_peaks: bool) -> dict[str, int
 
 def run(
     parameters: Any,
+    table: Any,
     initial: Any,
     dt: Any,
     first: int,
@@ -156,7 +157,7 @@ def run(
         # whole vectors: the lanes behind the last member repeat it and are never written
         filled = (width + VECTOR - 1) // VECTOR * VECTOR
         for j in range(filled):
-            begin(parameters, initial, dt, base + min(j, width - 1), j, variant, turn, rows)
+            begin(parameters, table, initial, dt, base + min(j, width - 1), j, variant, turn, rows)
             rows[ALIVE * LANES + j] = 1.0 if j < width else 0.0
         for j in range(width):
             samples[0, base + j, 0] = initial[base + j, 0]
@@ -217,6 +218,7 @@ def run(
 @called
 def begin(
     parameters: Any,
+    table: Any,
     initial: Any,
     dt: Any,
     case: int,
@@ -227,7 +229,7 @@ def begin(
 ) -> None:
     """Put member `case` at t = 0 into lane j."""
     h = float(dt[case])
-    p = parameters_of(parameters, case)
+    p = parameters_of(parameters, table, case)
     u = float(initial[case, 0])
     v = float(initial[case, 1])
     for i in range(PARAMETERS):

@@ -164,8 +164,8 @@ def observed(u: float, v: float, t: float, p: P) -> tuple[float, ...]:
     _unbound()
 
 
-def parameters_of(parameters: Any, case: int) -> P:
-    """Return the parameters of a member from the array of shape (case, n_parameters)."""
+def parameters_of(parameters: Any, table: Any, case: int) -> P:
+    """Return the parameters of a member from the array of shape (case, n_parameters), and the table of the model."""
     _unbound()
 
 

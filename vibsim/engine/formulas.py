@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from inspect import signature
 
 from vibsim import expression
 from vibsim.elementary import ELEMENTARY
+from vibsim.engine.lookup import looked_up
 from vibsim.engine.text import Module, collect
 from vibsim.errors import SimulationError
 from vibsim.expression import Binary, Call, Compare, Expression, Name, Number
 from vibsim.models import Model
 from vibsim.models.base import Formula, parameter_names, tree
 from vibsim.models.events import Friction, Impact
+from vibsim.models.table import BEND, HEIGHT
 from vibsim.schemes.base import Stepper
 
 _MODE = "mode"
@@ -25,9 +27,12 @@ def n_parameters(stepper: Stepper, model: Model) -> int:
     return len(model.parameters) + (2 if stepper.scaling else 0)
 
 
-def n_event_numbers(model: Model) -> int:
-    """Return how many numbers stand between the parameters of a member and the factors behind them: mode and start."""
-    return 2 if model.events is not None else 0
+def n_between(model: Model) -> int:
+    """Return how much stands between the parameters of a member and the factors behind them.
+
+    Of a model with events, mode and start; of one that looks a table up, the table.
+    """
+    return 2 if model.events is not None else 1 if model.lookup is not None else 0
 
 
 def put_formulas(
@@ -142,11 +147,12 @@ def put_functions(
         lines = list(unpack)
         if model.events is not None and function in ("acceleration", "slopes"):
             lines += [f"{_MODE} = p[{len(names)}]", f"t = t + p[{len(names) + 1}]"]
+        lines += _looking_up(module, model, results.values())
         for result, formula in results.items():
             ready = _with_functions(module, formula, suffix, is_rare)
             lines += expression.to_statements(ready, result)
             if function in scaled:
-                lines.append(f"{result} = {result} * p[{len(names) + n_event_numbers(model)}]")
+                lines.append(f"{result} = {result} * p[{len(names) + n_between(model)}]")
         returned = ", ".join(results)
         lines.append(f"return ({returned},)" if always_tuple else f"return {returned}")
         module.put(function + suffix, _head(model, function + suffix) + "\n    ".join(lines))
@@ -161,16 +167,26 @@ def _head(model: Model, function: str) -> str:
     return f"@compiled\ndef {function}(_u, _v, t, p):\n    {names} = {values}\n    "
 
 
+def _looking_up(module: Module, model: Model, formulas: Iterable[Expression]) -> list[str]:
+    """Return what a function does first whose formulas look a table up; nothing where they do not."""
+    used = {name for formula in formulas for name in expression.names_in(formula)}
+    if model.lookup is None or not used & {HEIGHT, BEND}:
+        return []
+    collect(module, looked_up, "looked_up", {})
+    place = expression.to_statements(marked(model)(model.lookup.place), "_place")
+    return [*place, f"{HEIGHT}, {BEND} = looked_up(p[{len(model.parameters)}], _place)"]
+
+
 def put_parameters(module: Module, model: Model, more: int = 0, *, tabulated: bool = False) -> None:
     """Write what makes the parameters of a member a tuple, with `more` numbers and a table behind them."""
     first = len(model.parameters)
     count = first + more
     places = [f"float(parameters[case, {i}])" for i in range(count)]
-    places[first:first] = ["0.0"] * n_event_numbers(model)
+    places[first:first] = ["0.0" if model.lookup is None else "table"] * n_between(model)
     values = ", ".join(places) or "0.0"
     if tabulated:
         values += f", parameters[case, {count}:]"
-    text = f"@compiled\ndef parameters_of(parameters, case):\n    return ({values},)"
+    text = f"@compiled\ndef parameters_of(parameters, table, case):\n    return ({values},)"
     module.put("parameters_of", text)
 
 

@@ -19,7 +19,7 @@ from vibsim.engine import blocks, friction, gather, impact, loop, observe, rows,
 from vibsim.engine.cache import Kernel, load
 from vibsim.engine.formulas import (
     marked,
-    n_event_numbers,
+    n_between,
     n_parameters,
     put_energy_with,
     put_formulas,
@@ -60,9 +60,9 @@ _FULL_STEP = """\
 def step_fast(state, t, dt, p):
     return step(state, t, dt, p)"""
 
-_STEPPING = "f2 f2 f1 i i i i i i f f3 f2 i2 f3 f1"
+_STEPPING = "f2 f2 f2 f1 i i i i i i f f3 f2 i2 f3 f1"
 """Arguments of `vibsim.engine.loop.run`, as `vibsim.engine.entry` writes them."""
-_OBSERVING = "f2 f1 i i f3 f3"
+_OBSERVING = "f2 f2 f1 i i f3 f3"
 """Arguments of `vibsim.engine.observe.run`."""
 
 
@@ -91,8 +91,12 @@ def kernel(
     Raises
     ------
     SimulationError
-        Where the kernel cannot be compiled, or a model with events is to be stepped in blocks.
+        Where the kernel cannot be compiled, or a model that has events or looks a table up is to be stepped in blocks.
     """
+    if lane == "blocks" and model.lookup is not None:
+        raise SimulationError(
+            f"{model.kind} looks a table up, at places of each member's own: no block of members does"
+        )
     if lane == "blocks" and model.events is not None:
         raise SimulationError(
             f"{model.kind} has events, at times of each member's own: no block of members has them"
@@ -180,7 +184,7 @@ def source(
 
 def carried(stepper: Stepper, model: Model) -> int:
     """Return how many floats the state of a scheme has, by asking for one."""
-    p: tuple[Any, ...] = (1.0,) * (n_parameters(stepper, model) + n_event_numbers(model))
+    p: tuple[Any, ...] = (1.0,) * (n_parameters(stepper, model) + n_between(model))
     p += ((0.0,) * 4,) if stepper.tabulated else ()
     start = handed(stepper.start, lambda u, v, t, p: 0.0, lambda u, v, t, p: (0.0, 0.0))
     return len(start(stepper.variant, 0.0, 0.0, 1.0, p))
@@ -189,7 +193,7 @@ def carried(stepper: Stepper, model: Model) -> int:
 def _put_events(module: Module, model: Model, stepper: Stepper) -> None:
     """Write what tells modes apart, and the events of the model."""
     first = len(model.parameters)
-    count = n_parameters(stepper, model) + n_event_numbers(model)
+    count = n_parameters(stepper, model) + n_between(model)
     places = [f"p[{i}]" for i in range(count)]
     places[first : first + 2] = ["mode", "start"]
     module.put("mode_of", f"@compiled\ndef mode_of(p):\n    return p[{first}]")

@@ -60,6 +60,7 @@ from vibsim.engine.gather import (
 
 def run(
     parameters: Any,
+    table: Any,
     initial: Any,
     dt: Any,
     first: int,
@@ -81,6 +82,8 @@ def run(
     ----------
     parameters, initial, dt
         Shapes (case, n_parameters), (case, state) with positions and then velocities, and (case,).
+    table
+        What formulas look up (`vibsim.engine.lookup`), shape (row, point); empty where they do not.
     steps, every
         Number of steps; a sample is stored at each multiple of `every`, which divides `steps`.
     variant
@@ -104,7 +107,7 @@ def run(
     # positions q and velocities w are tuples for several coordinates; u and v are those of the first one
     for case in range(first, stop):
         h = float(dt[case])
-        p = parameters_of(parameters, case)
+        p = parameters_of(parameters, table, case)
         if SYSTEM:
             q, w = initial_of(initial, case)
             u, v = q[0], w[0]

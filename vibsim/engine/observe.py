@@ -7,13 +7,17 @@ from typing import Any
 from vibsim.engine.bound import SYSTEM, observed, parameters_of, point_of
 
 
-def run(parameters: Any, dt: Any, every: int, first: int, samples: Any, found: Any) -> None:
+def run(
+    parameters: Any, table: Any, dt: Any, every: int, first: int, samples: Any, found: Any
+) -> None:
     """Fill `found` with the values of as many members as it has, the first of them being member `first`.
 
     Parameters
     ----------
     parameters
         Shape (case, n_parameters).
+    table
+        What formulas look up, shape (row, point); empty where they do not.
     dt, every
         Step of each member, shape (case,), and steps between samples.
     samples
@@ -23,7 +27,7 @@ def run(parameters: Any, dt: Any, every: int, first: int, samples: Any, found: A
     """
     for member in range(found.shape[1]):
         case = first + member
-        p = parameters_of(parameters, case)
+        p = parameters_of(parameters, table, case)
         for k in range(found.shape[2]):
             if SYSTEM:
                 u, v = point_of(samples, case, k)

@@ -134,7 +134,8 @@ def lane_for(members: int, steps: int, *, implicit: bool = False) -> str:
     """Choose the lane from the size of the work; the bits are the same in every lane.
 
     An implicit step iterates as often as its member needs, which no vector instruction can; nor can it a step that an
-    event of the member divides, nor the step of several coordinates, for which `implicit` stands as well.
+    event of the member divides, the step of several coordinates, or a table looked up at a place of the member, for
+    which `implicit` stands as well.
     """
     if members * steps <= PLAIN_MEMBER_STEPS:
         return "plain"
@@ -195,7 +196,7 @@ def integrate(
     stepper = scheme.stepper_for(model, options)
     has_events = model.events is not None
     count = model.coordinates
-    alone = stepper.implicit or has_events or count > 1
+    alone = stepper.implicit or has_events or count > 1 or model.lookup is not None
     lane = lane or lane_for(members, steps, implicit=alone)
     run = kernel(model, stepper, lane, with_gathered, with_series, n_extrema > 0)
     rows = gather.n_sample_rows(count, with_series, stepper.own_velocity, has_budget(model))
@@ -206,7 +207,8 @@ def integrate(
     counts = np.zeros((members, columns), dtype=np.int64)
     kept = np.full((extrema.N_KEPT, members if n_extrema else 0, n_extrema), np.nan)
     parameters = _scaled(model, stepper, parameters, dt)
-    numbers = [np.ascontiguousarray(array, dtype=float) for array in (parameters, initial, dt)]
+    arrays = (parameters, _table(model), initial, dt)
+    numbers = [np.ascontiguousarray(array, dtype=float) for array in arrays]
     scratch = (
         _scratch(model, stepper, parameters.shape[1], n_extrema > 0) if lane == "blocks" else 0
     )
@@ -243,7 +245,12 @@ def _scaled(model: Model, stepper: Stepper, parameters: Floats, dt: Floats) -> F
     return np.column_stack([parameters, *factors])
 
 
-_NOTHING = np.empty(0)
+def _table(model: Model) -> Floats:
+    """Return what formulas of the model look up, shape (row, point)."""
+    return _NO_TABLE if model.lookup is None else model.lookup.table.rows
+
+
+_NOTHING, _NO_TABLE = np.empty(0), np.empty((0, 0))
 
 
 def _aligned(size: int) -> Floats:
@@ -305,7 +312,9 @@ def observed(
     """
     samples = np.ascontiguousarray(states)
     found = np.empty((len(formulas), *samples.shape[1:]))
-    numbers = (np.ascontiguousarray(array, dtype=float) for array in (parameters, dt))
+    numbers = (
+        np.ascontiguousarray(array, dtype=float) for array in (parameters, _table(model), dt)
+    )
     run = observer(model, formulas, "plain" if lane == "plain" else "scalar")
     run(*numbers, every, 0, samples, found)
     return found

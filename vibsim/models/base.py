@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from vibsim.expression import Expression, is_smooth, parse
 from vibsim.models.events import Events
+from vibsim.models.table import Lookup, Table
 
 if TYPE_CHECKING:
     from vibsim.models.scales import Scales
@@ -84,6 +85,8 @@ class FormulaField:
     """Formulas with one coefficient b that may be written as ``{word: number}``."""
     term_units: Mapping[str, str] = field(default_factory=dict, hash=False)
     """The unit of b in each of them."""
+    table: tuple[str, str] | None = None
+    """Names that the place and the value have in a table, where one may stand instead; None where not."""
 
 
 @dataclass(frozen=True)
@@ -146,6 +149,10 @@ class Model:
     """What a user writes as formulas."""
     written: Callable[[Mapping[str, str], tuple[str, ...]], Model] | None = None
     """The model of such formulas, by name, with declared parameters; see `vibsim.models.oscillator`."""
+    with_table: Callable[[Table, bool], Model] | None = None
+    """The model with a table instead of a formula, and whether all steps meet its points (`Lookup.is_met`)."""
+    lookup: Lookup | None = None
+    """The table that the formulas look up; None where there is none."""
     scales: Scales | None = None
     """Its characteristic scales, where it has any."""
     highest_frequency: Callable[[Numbers], Any] | None = None
@@ -209,7 +216,9 @@ def has_solution(model: Model) -> bool:
     """Tell whether the motion is known: exactly, or to twelve digits since it is smooth."""
     if model.exact is not None:
         return True
-    return model.events is None and all(is_smooth(tree(model, a)) for a in model.accelerations)
+    # a table makes a force with corners, wherever its points lie
+    is_whole = model.events is None and model.lookup is None
+    return is_whole and all(is_smooth(tree(model, a)) for a in model.accelerations)
 
 
 def parameter_names(model: Model) -> tuple[str, ...]:

@@ -1,7 +1,8 @@
 r"""A vehicle on a bumpy road, ``m u'' + b u' + s(u) = -m h''(speed t) speed^2``: one wheel, a spring and a damper.
 
 Source: vibration text (B), section 10.8, equation (114). The position u [m] is that of the body relative to the road,
-whose height h [m] is a formula in the place x [m]; the vehicle moves with the constant `speed` [m s-1] from x = 0.
+whose height h [m] is a formula in the place x [m], or a table of measured heights (`vibsim.models.table`); the vehicle
+moves with the constant `speed` [m s-1] from x = 0.
 Units: m [kg], b [kg s-1], s [N]. Gravity is left out: it is a static shift of u, ``m g/k`` for a linear spring. The
 energy is that of the relative motion; the absolute motion ``u + h`` is an output.
 """
@@ -10,11 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache, partial
+from functools import cache
+from typing import Any
 
 from vibsim.expression import (
     ZERO,
     Binary,
+    Expression,
     Name,
     Number,
     derivative,
@@ -26,6 +29,7 @@ from vibsim.expression import (
 )
 from vibsim.models.base import FormulaField, Model, Output, Parameter, declared_parameters
 from vibsim.models.mechanical import Forces, mechanical
+from vibsim.models.table import BEND, HEIGHT, Lookup, Table
 
 PARAMETERS = (
     Parameter("m", 1.0, "kg", "mass of the body", minimum=0.0, exclusive=True),
@@ -36,8 +40,10 @@ FORMULAS = (
     FormulaField(
         "spring", ("u",), "u", "force s(u) of the spring [N], positive where it pulls back"
     ),
-    FormulaField("road", ("x",), "0", "height h(x) of the road [m]"),
+    FormulaField("road", ("x",), "0", "height h(x) of the road [m]", table=("x", "h")),
 )
+PLACE = Binary("*", Name("speed"), Name("t"))
+"""Where the vehicle is."""
 
 
 def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
@@ -53,30 +59,35 @@ def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
 
 
 @cache
-def vehicle(texts: tuple[str, ...], declared: tuple[str, ...], terms: frozenset[str]) -> Model:
-    """Return the vehicle, with a damper where `terms` has ``b``."""
+def vehicle(
+    texts: tuple[str, ...],
+    declared: tuple[str, ...],
+    terms: frozenset[str],
+    lookup: Lookup | None = None,
+) -> Model:
+    """Return the vehicle, with a damper where `terms` has ``b``, and on the road of a table where there is one."""
     parameters = (*PARAMETERS, *declared_parameters(declared))
     known = tuple(row.name for row in parameters)
     spring = parse(texts[0], ("u", *known))
     road = parse(texts[1], ("x", *known))
-    place = Binary("*", Name("speed"), Name("t"))
-    bend = put(derivative(derivative(road, "x"), "x"), "x", place)
+    bend, height = _of_table() if lookup else _of_formula(road)
     push = times(Number(-1.0), times(times(Name("m"), bend), parse("speed**2", known)))
-    height = put(road, "x", place)
     forces = Forces(
         spring=spring,
         damping=parse("b*v", ("v", *known)) if "b" in terms else ZERO,
         force=push,
         mass=Name("m"),
     )
+    of_table: dict[str, Any] = {"lookup": lookup, "exact": None, "scales": None}
     damper = "b u' + " if "b" in terms else ""
+    told = f"h(x) = {to_formula(road)}" if lookup is None else _told(lookup.table)
     return mechanical(
         forces,
         parameters,
         kind="vehicle",
         title="Vehicle on a bumpy road",
         source="vibration text, section 10.8, equation (114)",
-        equation=f"m u'' + {damper}{to_formula(spring)} = -m h''(speed t) speed^2, h(x) = {to_formula(road)}",
+        equation=f"m u'' + {damper}{to_formula(spring)} = -m h''(speed t) speed^2, {told}",
         outputs=(
             Output("road_height", "m", "height of the road under the wheel", height),
             Output("absolute_position", "m", "height of the body", plus(Name("u"), height)),
@@ -84,8 +95,25 @@ def vehicle(texts: tuple[str, ...], declared: tuple[str, ...], terms: frozenset[
         formulas=FORMULAS,
         written=written,
         optional=("b",),
-        variant=partial(vehicle, texts, declared),
+        variant=lambda names: vehicle(texts, declared, names, lookup),
+        with_table=lambda table, is_met: vehicle(
+            texts, declared, terms, Lookup(table, PLACE, is_met)
+        ),
+        **(of_table if lookup else {}),
     )
+
+
+def _of_formula(road: Expression) -> tuple[Expression, Expression]:
+    """Return second derivative and height of a road where the vehicle is."""
+    return put(derivative(derivative(road, "x"), "x"), "x", PLACE), put(road, "x", PLACE)
+
+
+def _of_table() -> tuple[Expression, Expression]:
+    return Name(BEND), Name(HEIGHT)
+
+
+def _told(table: Table) -> str:
+    return f"h(x) from a table of {table.points} points, {table.spacing:g} m apart"
 
 
 VEHICLE = replace(written({}, ()), equation="m u'' + b u' + s(u) = -m h''(speed t) speed^2")

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from vibsim.plan import code
 from vibsim.plan.batches import batches
 from vibsim.plan.jobs import LevelJob, Plan
-from vibsim.plan.shards import digest_of, is_bounded, level_jobs, load_of
+from vibsim.plan.shards import digest_of, in_numbers, is_bounded, level_jobs, load_of
 from vibsim.plan.versions import DRAWING, NUMERICAL, versions
 from vibsim.spec.cost import analysis_disk, analysis_memory
 
@@ -47,6 +47,7 @@ def build(experiment: Experiment) -> Plan:
         report=_report(content, analysis),
         content=content,
         versions=versions(NUMERICAL),
+        inputs=tuple((t.file, t.content) for t in experiment.model.tables.values()),
     )
 
 
@@ -106,7 +107,7 @@ def _extrapolation(content: Mapping[str, Any], levels: tuple[LevelJob, ...]) -> 
         {
             "job": "extrapolate",
             "levels": _digests(levels),
-            "experiment": extrapolated(content),
+            "experiment": in_numbers(extrapolated(content)),
             "code": _extrapolation_code(),
             "versions": versions(NUMERICAL),
         }

@@ -1,7 +1,7 @@
 """Plans kept on disk, so that a hundred experiment files do not slow the start.
 
-An entry is keyed by the bytes of the experiment file and by the code of the whole package. An entry
-that does not fit, or is damaged, is built again.
+An entry is keyed by the bytes of the experiment file and by the code of the whole package, and it knows the bytes of
+every table that the file names. An entry that does not fit, or is damaged, is built again.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from vibsim.plan import code
 from vibsim.plan.choose import Choice
 from vibsim.plan.jobs import Plan, from_json, to_json
 from vibsim.plan.versions import DRAWING, NUMERICAL, versions
-from vibsim.spec.content import read_bytes
+from vibsim.spec.content import MOST_BYTES, content_of, read_bytes
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
@@ -48,12 +48,14 @@ def load(choice: Choice, results: Path | None = None, resolve: Resolver | None =
     key = _key(choice)
     entry = _entry(choice, results) if results else None
     if entry and key and (text := _read(entry, key)):
-        return from_json(text, _word(choice))
+        kept = from_json(text, _word(choice))
+        if _has_inputs(kept, choice):
+            return kept
     from vibsim.plan.build import build
 
     plan = replace(build(_experiment(choice, resolve)), file=_word(choice))
     # A file that changed while it was read is not kept under the digest of the old bytes.
-    if entry and key and key == _key(choice):
+    if entry and key and key == _key(choice) and _has_inputs(plan, choice):
         _write(entry, key, to_json(plan))
     return plan
 
@@ -111,6 +113,18 @@ def _key(choice: Choice) -> str:
         content,
     )
     return _sha256(b"\0".join(p if isinstance(p, bytes) else p.encode() for p in parts))
+
+
+def _has_inputs(plan: Plan, choice: Choice) -> bool:
+    """Tell whether every table is the file that the plan was made from."""
+    for path, digest in plan.inputs:
+        try:
+            content = content_of(choice.file.parent / path, MOST_BYTES)
+        except (OSError, ValueError):
+            return False
+        if _sha256(content) != digest:
+            return False
+    return True
 
 
 def _word(choice: Choice) -> str:

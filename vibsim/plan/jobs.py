@@ -92,6 +92,8 @@ class Plan:
     """The experiment in its normal form, JSON-able."""
     versions: dict[str, str]
     """Versions of the libraries that the numbers depend on."""
+    inputs: tuple[tuple[str, str], ...] = ()
+    """Every other file that the experiment was read from: its path from there, and the SHA-256 of its bytes."""
     file: str = ""
     """Where the experiment was read, as a command line names it; no digest depends on it."""
 
@@ -191,5 +193,6 @@ def from_json(text: str, file: str) -> Plan:
         Batch(**{**batch, "levels": tuple(batch["levels"])}) for batch in data["batches"]
     )
     schemes = tuple(data["schemes"])
-    whole = {**data, "levels": levels, "batches": batches, "schemes": schemes, "file": file}
-    return Plan(**whole)
+    inputs = tuple((path, digest) for path, digest in data["inputs"])
+    lists = {"levels": levels, "batches": batches, "schemes": schemes, "inputs": inputs}
+    return Plan(**{**data, **lists, "file": file})

@@ -40,6 +40,15 @@ def simulated(content: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in content.items() if key not in _NOT_SIMULATED}
 
 
+def in_numbers(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a part of an experiment in normal form with the numbers of its tables alone, wherever they stand."""
+    model = content["model"]
+    if "tables" not in model:
+        return dict(content)
+    tables = {name: table["numbers"] for name, table in model["tables"].items()}
+    return {**content, "model": {**model, "tables": tables}}
+
+
 def load_of(experiment: Experiment, level: int) -> Load:
     """Return what one member of `experiment` costs at `level`."""
     from vibsim.models import has_solution
@@ -132,7 +141,7 @@ def _level(
         {
             "job": "simulate",
             "experiment": [experiment.collection, experiment.name],
-            "uses": simulated(content),
+            "uses": in_numbers(simulated(content)),
             "level": level,
             "steps": load.steps,
             "every": every,

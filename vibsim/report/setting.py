@@ -14,7 +14,7 @@ from vibsim.vocabulary import HIGHEST
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
     from vibsim.spec.axes import Axis
-    from vibsim.spec.experiment import Scaling, SchemeSpec
+    from vibsim.spec.experiment import Scaling, SchemeSpec, TableSpec
 
 
 def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
@@ -25,6 +25,7 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     sizes = {p.key: data.pretty_unit(p.unit) for p in model.parameters}
     units = {state.name: data.pretty_unit(state.unit) for state in model.states}
     yield "Model", f"{model.title}: {model.equation}"
+    yield from (("Table", _table(name, spec)) for name, spec in experiment.model.tables.items())
     if experiment.units:
         yield "Units of the file", ", ".join(_units(experiment.units))
     if experiment.scaling is not None:
@@ -48,6 +49,16 @@ def _units(units: Mapping[str, str]) -> Iterator[str]:
     for name, text in units.items():
         number, _, base = text.partition(" ")
         yield f"1 {name} = {number} {data.pretty_unit(base)}".rstrip()
+
+
+def _table(name: str, spec: TableSpec) -> str:
+    """Write where a table stands, and whether steps end at its points."""
+    told = (
+        "no step has one of its points inside"
+        if spec.is_met
+        else "steps have its points inside, where the force has corners"
+    )
+    return f"{name} from {spec.file}, columns {spec.place} and {spec.value}; {told}"
 
 
 def _scaled(scaling: Scaling, sizes: Mapping[str, str], units: Mapping[str, str]) -> str:

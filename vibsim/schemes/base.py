@@ -217,6 +217,8 @@ class Orders:
         }.get(quantity, energy)
 
 
+ORDER_AT_CORNERS = 2.0
+"""Order that is left where the slope of the force jumps within a step, and of a sum of its power over such steps."""
 ORDER_OF_WORK = 4.0
 """Order of the sum by which the work of forces is found (`vibsim.simulation.budget`)."""
 
@@ -321,14 +323,27 @@ class Scheme:
     def formal_order(self, quantity: str, model: Model, options: Options) -> float:
         """Return the order that is promised for a quantity of a model; infinite for what is exact.
 
-        An event that is left to the mesh is noticed up to a step late: no order above 1 is left.
+        An event that is left to the mesh is noticed up to a step late: no order above 1 is left. A corner of the force
+        that a step does not see leaves 2 (`ORDER_AT_CORNERS`).
         """
         orders = self.orders(options)
         if model.events is None:
-            return orders.of(quantity, model)
+            order = orders.of(quantity, model)
+            # the power of the force has its corners, whatever the steps do; that of damping has none
+            is_kept = self._sees_corners(model) and quantity not in BUDGET[1:]
+            return order if model.lookup is None or is_kept else min(order, ORDER_AT_CORNERS)
         order = orders.between_events(model)
         return min(order, 1.0) if is_on_the_mesh(options) else order
 
     def has_even_powers(self, quantity: str, model: Model, options: Options) -> bool:
-        """Tell whether the error of a quantity expands in h^p, h^(p+2), ...; not where an event divides a step."""
-        return model.events is None and self.even_powers(quantity, model, options)
+        """Tell whether the error of a quantity expands in h^p, h^(p+2), ...
+
+        It does not where an event divides a step, or a corner of the force.
+        """
+        is_smooth = model.events is None and self._sees_corners(model)
+        return is_smooth and self.even_powers(quantity, model, options)
+
+    def _sees_corners(self, model: Model) -> bool:
+        """Tell whether every step has a smooth force: between two corners, and without a look back across one."""
+        is_multistep = self.family == "multistep"
+        return model.lookup is None or (model.lookup.is_met and not is_multistep)

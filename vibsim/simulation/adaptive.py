@@ -263,7 +263,9 @@ def _right_hand_side(
 ) -> tuple[Callable[..., Any], Callable[..., Any], Callable[[], int]]:
     """Return the derivative of (u, v), that derivative's own derivative, and what counts the forces."""
     acceleration, slopes = _forces(problem.model)
-    p, half = problem.parameters, problem.model.coordinates
+    half, lookup = problem.model.coordinates, problem.model.lookup
+    # what is looked up stands behind the parameters (`vibsim.engine.formulas`)
+    p: tuple[Any, ...] = (*problem.parameters, *([lookup.table.rows] if lookup else []))
     evaluations = 0
 
     def halves(y: Floats) -> tuple[Any, Any]:

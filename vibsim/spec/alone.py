@@ -12,6 +12,7 @@ from vibsim.spec.experiment import Experiment, ModelSpec, SchemeSpec, TimeSpec
 from vibsim.spec.fields import FrozenDict
 from vibsim.spec.options import as_option
 from vibsim.spec.published import PublishedTable, claims
+from vibsim.spec.table_rules import met_again
 
 
 def alone(experiment: Experiment, case: int) -> Experiment:
@@ -38,6 +39,7 @@ def alone(experiment: Experiment, case: int) -> Experiment:
         kind=experiment.model.kind,
         parameters=parameters,
         formulas=experiment.model.formulas,
+        tables=experiment.model.tables,
         # a term that is 0 for this member alone stays, and with it every bit
         terms=experiment.model.terms,
     )
@@ -47,7 +49,7 @@ def alone(experiment: Experiment, case: int) -> Experiment:
         initial = FrozenDict({name: float(value) for name, value in here})
     end = swept.get("time.end", float(experiment.natural_end(parameters)))
     published = _published(experiment, case, end)
-    return experiment.model_copy(
+    found = experiment.model_copy(
         update={
             "name": f"{experiment.name}_case_{case}",
             "model": model,
@@ -59,6 +61,7 @@ def alone(experiment: Experiment, case: int) -> Experiment:
             "published": published,
         }
     )
+    return met_again(found)
 
 
 def _filled(swept: dict[str, Any], section: str, values: Mapping[str, Any]) -> FrozenDict:

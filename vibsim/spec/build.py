@@ -15,7 +15,7 @@ from vibsim.errors import nearest
 from vibsim.models import MODELS, Model, quantities
 from vibsim.schemes import FIXED_STEP, SCHEMES
 from vibsim.schemes.base import EVENTS, VECTOR
-from vibsim.spec import limits, model_rules, sweep
+from vibsim.spec import limits, model_rules, sweep, table_rules
 from vibsim.spec.check_places import Ladder, kinds_of
 from vibsim.spec.check_rules import finish_checks
 from vibsim.spec.checks import ConvergesCheck
@@ -56,13 +56,16 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
     """
     part = _sections(source, report)
     swept = frozenset(_keys(source.data.get("sweep")))
-    read = model_rules.read(part.model, _model(source), swept, report)
+    folder = place.file.parent if place.file else Path()
+    read = model_rules.read(part.model, _model(source), swept, folder, report)
     model, parameters = read.model, read.parameters
     levels = _levels(part, source, report)
     schemes = _schemes(part, model, report)
     time = time_spec(part.time, model, parameters, report) if part.time else None
     initial = _initial(part, model, parameters, report)
     varied = _swept(part, source, model, schemes, report)
+    if time is not None and varied.is_whole:
+        _check_tables(read, time, varied, report)
     numbers = Numbers(parameters, initial, time)
     if part.scaled:
         numbers = scaled(numbers, model, sorted(swept), report)
@@ -97,6 +100,7 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
             kind=model.kind,
             parameters=dict(numbers.parameters),
             formulas=read.formulas,
+            tables=read.tables,
             terms=read.terms,
         ),
         initial=dict(numbers.initial),
@@ -113,7 +117,18 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
         scaling=numbers.scaling,
     )
     experiment._file = place.file
-    return experiment
+    return table_rules.met_again(experiment)
+
+
+def _check_tables(
+    read: model_rules.Read, time: TimeSpec, varied: sweep.Swept, report: Report
+) -> None:
+    """Check that every table is long enough for every member."""
+    if read.model is None or not read.tables or not read.parameters:
+        return
+    runs = table_rules.Runs(read.model, read.parameters, time, varied.axes, 0)
+    for name in read.tables:
+        table_rules.check_length(runs, name, report)
 
 
 def _sections(source: Source, report: Report) -> Any:

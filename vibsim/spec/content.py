@@ -1,4 +1,4 @@
-"""The bytes of an experiment file, never more of them than are allowed; imports no reader of YAML."""
+"""The bytes of a user's files, never more of them than are allowed; imports no reader of YAML."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ from pathlib import Path
 from vibsim.errors import Fault, InputError
 
 MAX_BYTES = 2**20
+"""Of an experiment file."""
+MOST_BYTES = 2**26
+"""Of a table beside it."""
 
 
 def read_bytes(path: Path) -> bytes:
@@ -20,7 +23,7 @@ def read_bytes(path: Path) -> bytes:
         When it cannot be read, is no regular file (a pipe, a device, a folder) or is too large.
     """
     try:
-        content = _read(path)
+        content = content_of(path, MAX_BYTES)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise _refusal(path, f"cannot be read ({reason})") from None
@@ -29,14 +32,23 @@ def read_bytes(path: Path) -> bytes:
     return content
 
 
-def _read(path: Path) -> bytes:
+def content_of(path: Path, most: int) -> bytes:
+    """Return the content of the file at `path`, of a longer one `most` bytes and one more.
+
+    Raises
+    ------
+    OSError
+        When it cannot be read.
+    ValueError
+        When it is no regular file.
+    """
     # Without O_NONBLOCK, opening a pipe waits for its writer.
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     try:
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
             raise ValueError("not a regular file")
         with os.fdopen(descriptor, "rb", closefd=False) as stream:
-            return stream.read(MAX_BYTES + 1)
+            return stream.read(most + 1)
     finally:
         os.close(descriptor)
 

@@ -9,7 +9,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, PrivateAttr, StrictBool
 
+from vibsim.errors import VibsimError
 from vibsim.models import MODELS, Model, natural_end, quantities
+from vibsim.models.table import Table
 from vibsim.schemes import SCHEMES
 from vibsim.spec.axes import Axis
 from vibsim.spec.checks import Check
@@ -35,6 +37,38 @@ DECLARED = "parameters"
 """The key of the section ``model`` under which a file declares the names of its formulas."""
 
 
+class TableSpec(Section):
+    """A table in place of a formula: where it stands, and which numbers it had when the experiment was read."""
+
+    file: Text
+    """Path of the file, relative to the folder of the experiment file."""
+    place: Text
+    value: Text
+    """Names of the columns of places and values."""
+    numbers: Text
+    """SHA-256 of the numbers (`vibsim.models.table.Table.digest`), on which results depend alone."""
+    is_met: bool = False
+    """Whether a step of every member ends at every point (`vibsim.models.table.Lookup.is_met`)."""
+    _table: Table | None = PrivateAttr(default=None)
+    _content: str = PrivateAttr(default="")
+
+    def hold(self, table: Table, content: str) -> None:
+        """Take the numbers of the file, and the SHA-256 of its bytes, which are no part of an experiment's identity."""
+        self._table, self._content = table, content
+
+    @property
+    def content(self) -> str:
+        """SHA-256 of the bytes of the file, as it was read."""
+        return self._content
+
+    @property
+    def table(self) -> Table:
+        """The numbers, which `vibsim.spec.table_rules.attach` puts there."""
+        if self._table is None:
+            raise VibsimError(f"the table {self.file} was not read")
+        return self._table
+
+
 class ModelSpec(Section):
     """The model, with every parameter."""
 
@@ -43,6 +77,8 @@ class ModelSpec(Section):
     """By the place of each in the section: ``m``, ``damping.linear``, ``parameters.k``."""
     formulas: Annotated[dict[str, str], AfterValidator(FrozenDict)] = FrozenDict()
     """What the file writes as formulas, by the names of `vibsim.models.Model.formulas`."""
+    tables: Annotated[dict[str, TableSpec], AfterValidator(FrozenDict)] = FrozenDict()
+    """Tables that stand in place of formulas, by the same names."""
     terms: tuple[Text, ...] = ()
     """Which of `vibsim.models.Model.optional` the equation has: those that are not 0, or are swept."""
 
@@ -54,6 +90,9 @@ class ModelSpec(Section):
             declared = (key.partition(".") for key in self.parameters)
             names = (name for section, _, name in declared if section == DECLARED)
             model = model.written(self.formulas, tuple(names))
+        for own in self.tables.values():
+            if model.with_table is not None:
+                model = model.with_table(own.table, own.is_met)
         return model.variant(frozenset(self.terms)) if model.variant is not None else model
 
 
@@ -265,16 +304,28 @@ def canonical(experiment: Experiment) -> dict[str, Any]:
     for name in ("published", "units", "scaling"):
         if not getattr(experiment, name):
             del data[name]
+    if not experiment.model.tables:
+        del data["model"]["tables"]
     return data
 
 
 def restore(content: Mapping[str, Any], file: Path | None = None) -> Experiment:
-    """Return the experiment that `content`, made by `canonical`, describes; `file` is where it was read, if known."""
+    """Return the experiment that `content`, made by `canonical`, describes; `file` is where it was read, if known.
+
+    Raises
+    ------
+    InputError
+        Where a table of it cannot be read, or has other numbers than it had.
+    """
     data = dict(content)
     data["sweep"] = data["sweep"] and {"axes": data["sweep"]}
     data["checks"] = [_without_kind(check) for check in data["checks"]]
     experiment = Experiment.model_validate(data)
     experiment._file = file
+    if experiment.model.tables:
+        from vibsim.spec.table_rules import attach
+
+        attach(experiment)
     return experiment
 
 

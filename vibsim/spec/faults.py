@@ -15,6 +15,7 @@ from vibsim.spec.checks import CLASSES, At, Expect, ValueCheck
 from vibsim.spec.document import Document, Every, LevelRange, TimeSection
 from vibsim.spec.experiment import DECLARED
 from vibsim.spec.fields import Section
+from vibsim.spec.model_section import TABLE
 from vibsim.spec.published import PublishedAt, PublishedRow, PublishedTable
 from vibsim.spec.source import MAX_FAULTS, Path_, Source, dotted
 from vibsim.spec.sweep_section import Sample
@@ -205,8 +206,9 @@ def known_keys(path: Path_, data: Any) -> list[str]:
             names += [row.name for row in model.formulas]
             return ["kind", *names, *([DECLARED] if model.formulas else [])]
         case ("model", name):
-            rows = {row.name: row.terms for row in MODELS[data["model"]["kind"]].formulas}
-            return list(rows.get(str(name), {}))
+            rows = {row.name: row for row in MODELS[data["model"]["kind"]].formulas}
+            row = rows.get(str(name))
+            return [*row.terms, *((TABLE, *row.table) if row.table else ())] if row else []
         case ("time",):
             return list(TimeSection.model_fields)
         case ("levels",):

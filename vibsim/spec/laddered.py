@@ -16,6 +16,7 @@ from vibsim.spec.fields import MAX_LEVEL
 from vibsim.spec.published_rules import finish_published
 from vibsim.spec.source import Source
 from vibsim.spec.sweep import Swept
+from vibsim.spec.table_rules import met_again
 
 
 def with_levels(experiment: Experiment, levels: Sequence[int]) -> Experiment:
@@ -50,7 +51,7 @@ def with_levels(experiment: Experiment, levels: Sequence[int]) -> Experiment:
     finish_checks((_as_written(check) for check in experiment.written), ladder, report)
     finish_published(experiment.published, (), ladder, report)
     report.raise_any()
-    return experiment.model_copy(update={"levels": tuple(levels)})
+    return met_again(experiment.model_copy(update={"levels": tuple(levels)}))
 
 
 def _as_written(check: Check) -> Check:

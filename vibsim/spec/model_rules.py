@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,11 +23,13 @@ from vibsim.expression.integral import has_rule
 from vibsim.models import FormulaField, Model, tree
 from vibsim.models.base import Floats
 from vibsim.models.oscillator import COULOMB
-from vibsim.spec.experiment import DECLARED
+from vibsim.spec.experiment import DECLARED, TableSpec
 from vibsim.spec.faults import Report
 from vibsim.spec.fields import Section
-from vibsim.spec.model_section import name_fault
+from vibsim.spec.model_section import TABLE, name_fault
 from vibsim.spec.source import Path_
+from vibsim.spec.table_file import ENDINGS
+from vibsim.spec.table_rules import table_of
 
 AMPLITUDES = (-6, 8)
 """Powers of 2, from and to, of the amplitudes at which a potential energy is compared with its spring."""
@@ -44,11 +47,14 @@ class Read:
     """The equation of motion; that of the defaults where a formula is at fault, None where even the kind is."""
     parameters: dict[str, float] = field(default_factory=dict)
     formulas: dict[str, str] = field(default_factory=dict)
+    tables: dict[str, TableSpec] = field(default_factory=dict)
     terms: tuple[str, ...] = ()
     """Which of `Model.optional` the equation has."""
 
 
-def read(section: Any, model: Model | None, swept: Collection[str], report: Report) -> Read:
+def read(
+    section: Any, model: Model | None, swept: Collection[str], folder: Path, report: Report
+) -> Read:
     """Check the section of a `model` of the registry, and fill in what it leaves out.
 
     Parameters
@@ -57,8 +63,10 @@ def read(section: Any, model: Model | None, swept: Collection[str], report: Repo
         As pydantic read it; None where that found a fault.
     swept
         Dotted keys that the file sweeps.
+    folder
+        Where the paths of tables begin.
     """
-    found = _read(section, model, report)
+    found = _read(section, model, folder, report)
     if found.model is None or found.model.variant is None or not found.parameters:
         return found
     terms = tuple(
@@ -69,7 +77,7 @@ def read(section: Any, model: Model | None, swept: Collection[str], report: Repo
     return replace(found, model=found.model.variant(frozenset(terms)), terms=terms)
 
 
-def _read(section: Any, model: Model | None, report: Report) -> Read:
+def _read(section: Any, model: Model | None, folder: Path, report: Report) -> Read:
     if section is None or model is None:
         return Read(model)
     parameters = {row.name: getattr(section, row.name) for row in model.parameters}
@@ -77,10 +85,14 @@ def _read(section: Any, model: Model | None, report: Report) -> Read:
         return Read(model, parameters)
     declared = _declared(section, model, report)
     texts: dict[str, str] = {}
+    tables: dict[str, TableSpec] = {}
     for row in model.formulas:
         value = getattr(section, row.name)
         path: Path_ = ("model", row.name)
-        if isinstance(value, Section):
+        if isinstance(value, Section) and row.table is not None:
+            table = table_of(row, value, folder, report)
+            tables |= {row.name: table} if table is not None else {}
+        elif isinstance(value, Section):
             texts |= _term(row, value, declared, parameters, report)
         elif value is not None and _is_sound(value, row, model, declared, path, report):
             texts[row.name] = value.strip()
@@ -95,6 +107,9 @@ def _read(section: Any, model: Model | None, report: Report) -> Read:
     parameters |= {f"{DECLARED}.{name}": value for name, value in declared.items()}
     try:
         found = model.written(texts, tuple(declared))
+        for spec in tables.values():
+            assert found.with_table is not None
+            found = found.with_table(spec.table, False)
     except ExpressionError as error:
         report.add(("model", "exact"), error.rule, error.hint, error.text)
         return Read(model)
@@ -106,7 +121,7 @@ def _read(section: Any, model: Model | None, report: Report) -> Read:
             return Read(model)
     if any(row.name == "spring" for row in model.formulas):
         _check_potential(found, parameters, texts, report)
-    return Read(found, parameters, texts)
+    return Read(found, parameters, texts, tables)
 
 
 def _declared(section: Any, model: Model, report: Report) -> dict[str, float]:
@@ -114,7 +129,7 @@ def _declared(section: Any, model: Model, report: Report) -> dict[str, float]:
     taken = {state.name: f"the {state.long_name}" for state in model.states}
     taken |= {"t": "the time"}
     taken |= {row.name: f"the {row.description} of the model" for row in model.parameters}
-    if any(isinstance(getattr(section, row.name), Section) for row in model.formulas):
+    if any(row.terms and isinstance(getattr(section, row.name), Section) for row in model.formulas):
         taken["b"] = "the coefficient of the damping"
     found = {}
     for name, value in section.parameters.items():
@@ -164,7 +179,9 @@ def _is_sound(
         rule = f"{error.rule}{place}"
         if error.rule.startswith("unknown name"):
             rule += f"; it may name {', '.join(row.names)} and parameters"
-        report.add(path, rule, error.hint, text)
+        is_file = row.table is not None and text.lower().endswith(ENDINGS)
+        hint = f"for a table write {{{TABLE}: {text}}}" if is_file else error.hint
+        report.add(path, rule, hint, text)
         return False
     try:
         for part in walk(read_tree):

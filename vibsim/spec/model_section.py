@@ -21,10 +21,12 @@ from pydantic_core import PydanticCustomError
 
 from vibsim.expression import FUNCTIONS
 from vibsim.models import FormulaField, Model
-from vibsim.spec.fields import FORMULA, MadeSection, Number, Section, tag
+from vibsim.spec.fields import FORMULA, MadeSection, Number, Section, Text, tag
 from vibsim.spec.scheme_section import class_name
 
 MAX_DECLARED = 50
+TABLE = "table"
+"""The key of the path of a table."""
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
@@ -77,6 +79,8 @@ def _shape(value: Any) -> str:
 
 
 def _formula_type(model: Model, field: FormulaField) -> Any:
+    if field.table is not None:
+        return _formula_or(_table_section(model, field, field.table))
     if not field.terms:
         return FormulaText
     fields: dict[str, Any] = {
@@ -86,10 +90,27 @@ def _formula_type(model: Model, field: FormulaField) -> Any:
     section = create_model(
         f"{class_name(model.kind)}{class_name(field.name)}", __base__=MadeSection, **fields
     )
+    return _formula_or(section)
+
+
+def _formula_or(section: Any) -> Any:
     return Annotated[
         Annotated[FormulaText, Tag(tag("formula"))] | Annotated[section, Tag(tag("term"))],
         Discriminator(_shape),
     ]
+
+
+def _table_section(model: Model, field: FormulaField, names: tuple[str, str]) -> type[Section]:
+    """Return the class of ``{table: file}``; `names` are the keys for the columns, and their names by default."""
+    words = f"path of a table, relative to this file: {field.description}"
+    fields: dict[str, Any] = {
+        TABLE: (Text, Field(description=f"{words}; a .csv or a .nc file")),
+    }
+    for name, what in zip(names, ("places", "values"), strict=True):
+        told = f"name of the column of {what} in the table, or of the variable"
+        fields[name] = (Text, Field(default=name, description=told))
+    title = f"{class_name(model.kind)}{class_name(field.name)}Table"
+    return create_model(title, __base__=MadeSection, **fields)
 
 
 def model_section(model: Model) -> type[Section]:

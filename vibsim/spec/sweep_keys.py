@@ -12,6 +12,7 @@ from vibsim.schemes import SCHEMES, AnyOption, NumberOption, Option
 from vibsim.spec.document import TimeSection
 from vibsim.spec.experiment import SchemeSpec
 from vibsim.spec.faults import Report
+from vibsim.spec.model_section import TABLE
 from vibsim.spec.source import Path_
 
 _STEPS = "step counts cannot be swept: every member has the same steps"
@@ -58,6 +59,11 @@ class Keys:
     report: Report
     seen: dict[str, Path_] = field(default_factory=dict)
 
+    @property
+    def example(self) -> str:
+        """A parameter of the model that can be swept."""
+        return next(key for key in self.targets if key.startswith("model."))
+
     def find(self, key: str, path: Path_) -> Target | None:
         """Return what `key` at `path` stands for; None, and a fault, where it cannot be swept."""
         first = self.seen.setdefault(key, path)
@@ -74,6 +80,10 @@ class Keys:
             self.report.add(path, rule, at_key=True)
             return None
         target = self.targets.get(key)
+        if target is None and self.model is not None and key in table_keys(self.model):
+            rule = "cannot be swept: every member has the same formula, or the same table"
+            self.report.add(path, rule, "sweep a parameter, such as " + self.example, at_key=True)
+            return None
         broken = self.model is None or (self.lacks_scheme and key.startswith("schemes."))
         if target is None and not broken:
             alike = [name for name in self.targets if name.lower() == key.lower()]
@@ -94,6 +104,12 @@ def targets(model: Model | None, schemes: Sequence[SchemeSpec]) -> dict[str, Tar
         for option in SCHEMES[scheme.kind].options_on(model):
             found[f"schemes.{scheme.name}.{option.name}"] = _option(option)
     return found
+
+
+def table_keys(model: Model) -> set[str]:
+    """Name every formula that may be a table, and the keys of that, by dotted key."""
+    tables = ((f"model.{row.name}", row.table) for row in model.formulas if row.table)
+    return {key for name, row in tables for key in (name, *(f"{name}.{k}" for k in (TABLE, *row)))}
 
 
 def _parameter(row: Parameter) -> Target:

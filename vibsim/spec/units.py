@@ -19,6 +19,7 @@ from vibsim.spec.axes import RULES
 from vibsim.spec.experiment import DECLARED
 from vibsim.spec.faults import Report
 from vibsim.spec.fields import FORMULA_NOTE, MAX_FORMULAS
+from vibsim.spec.model_section import TABLE
 from vibsim.spec.source import Path_
 from vibsim.spec.unit_text import NAME, UnitError, factors, split
 
@@ -209,6 +210,8 @@ def _wanted(model: Model | None) -> Callable[[str], str | None]:
         for row in model.formulas:
             units |= {f"model.{row.name}.{word}": unit for word, unit in row.term_units.items()}
         formulas = {f"model.{row.name}" for row in model.formulas}
+        tables = [(f"model.{row.name}", row.table) for row in model.formulas if row.table]
+        formulas |= {f"{key}.{name}" for key, names in tables for name in (TABLE, *names)}
 
     def wanted(key: str) -> str | None:
         if key.startswith("schemes.") or key == "model.kind" or key in formulas:

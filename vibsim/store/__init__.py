@@ -1,8 +1,8 @@
 """Everything that vibsim writes to disk and reads back: whole, as it was written, or not at all.
 
 Every file appears under its name in one step, carries a digest of its own bytes and the digest of
-the job that made it. This package alone opens netCDF files, and it imports netCDF4 only then; reading
-a summary imports not even numpy.
+the job that made it. The netCDF library is imported only when such a file is opened (`vibsim.netcdf`);
+reading a summary imports not even numpy.
 """
 
 from __future__ import annotations

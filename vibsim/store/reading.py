@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim import netcdf
 from vibsim.errors import DamagedFileError
 from vibsim.record import Attribute, Record, Variable
 from vibsim.store import identity, seal
@@ -55,10 +56,8 @@ def opened(path: Path, digest: str | None) -> Iterator[Any]:
     StaleFileError
         When it is another job's.
     """
-    import netCDF4
-
     with naming(path):
-        dataset = netCDF4.Dataset(path, "r")
+        dataset = netcdf.opened(path)
     try:
         with naming(path):
             dataset.set_auto_maskandscale(False)

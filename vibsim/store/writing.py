@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim import __version__
+from vibsim import __version__, netcdf
 from vibsim.record import Attribute, Record, Variable
 from vibsim.store import seal
 from vibsim.store.atomic import replacing
@@ -83,10 +83,8 @@ def write_parts(
     ValueError
         As `write`, and where the parts do not belong together or are not `cases` members.
     """
-    import netCDF4
-
     with replacing(path) as temporary:
-        with netCDF4.Dataset(temporary, "w", format="NETCDF4") as dataset:
+        with netcdf.create(temporary) as dataset:
             dataset.set_fill_off()
             start, part = 0, None
             for number, part in enumerate(parts):

@@ -1,0 +1,45 @@
+"""The road of the catalogue: its heights are those of its formula, and the motion that its file claims is SciPy's."""
+
+from __future__ import annotations
+
+from math import pi, sin
+from pathlib import Path
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from vibsim.spec import load
+
+FOLDER = Path(__file__).parents[1] / "configs" / "vibration_text"
+ROAD = FOLDER / "bumpy_road.csv"
+
+
+def height(x: float) -> float:
+    swell = 0.03 * sin(2 * pi * x / 40)
+    washboard = 0.012 * sin(2 * pi * x / 1.6) if 20 <= x <= 36 else 0.0
+    bump = 0.08 * sin(pi * (x - 50) / 2) ** 2 if 50 <= x <= 52 else 0.0
+    return swell + washboard + bump
+
+
+def test_the_heights_are_those_of_the_formula() -> None:
+    x, h = np.loadtxt(ROAD, delimiter=",", skiprows=3).T
+    assert x.tolist() == [i / 10 for i in range(801)]
+    assert np.abs(h - [height(place) for place in x]).max() < 0.51e-4
+
+
+def test_the_claimed_end_is_that_of_another_solver() -> None:
+    _, h = np.loadtxt(ROAD, delimiter=",", skiprows=3).T
+    q = np.empty(801)
+    q[1:-1] = (h[:-2] - 2 * h[1:-1] + h[2:]) / 0.1**2
+    q[0], q[-1] = q[1], q[-2]
+    y = np.zeros(2)
+    for i in range(800):
+
+        def right(t: float, y: np.ndarray, i: int = i) -> tuple[float, float]:
+            bend = q[i] + (80 * t - i) * (q[i + 1] - q[i])
+            return y[1], -bend * 8.0**2 - (80 * y[1] + 600 * y[0]) / 60
+
+        span = (i / 80, (i + 1) / 80)
+        y = solve_ivp(right, span, y, method="DOP853", rtol=3e-14, atol=1e-16).y[:, -1]
+    (claim,) = (c for c in load(FOLDER / "bumpy_road.yaml").checks if c.id == "by_another_solver")
+    assert abs(claim.measured.equals - y[0]) < 1e-9 * abs(y[0])

@@ -1,0 +1,97 @@
+"""The code of the page on Python, and what it says of memory."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+
+from vibsim import Experiment, simulate
+from vibsim.cli import main
+from vibsim.plan import Choice, load
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "python.md"
+LONG_RUN = ROOT / "configs" / "vibration_text" / "long_run.yaml"
+PROBE = r"""
+import re, sys
+from pathlib import Path
+from vibsim.cli import main
+assert main(sys.argv[1:]) == 0
+print("peak", re.search(r"VmHWM:\s*(\d+) kB", Path("/proc/self/status").read_text())[1])
+"""
+
+
+def test_the_code_of_the_page_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    blocks = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(), re.DOTALL | re.MULTILINE)
+    assert len(blocks) == 7
+    monkeypatch.chdir(tmp_path)
+    assert main(["simulate", str(LONG_RUN), "--level", "7", "--results", "results"]) == 0
+    capsys.readouterr()
+    names: dict[str, object] = {}
+    for i, block in enumerate(blocks):
+        exec(compile(block, f"{PAGE.name}, block {i + 1}", "exec"), names)
+    out = capsys.readouterr().out
+    assert "PASS u converges" in out or "PASS PASS in 2 of 2 results" in out
+    drawn = [line for line in out.splitlines() if line.endswith("*")]
+    assert len(drawn) == 50
+    assert drawn[0] == f"{0.0:10.2f} {' ' * 60}*"
+    assert float(re.findall(r"largest error (\S+)", out)[0]) < 1e-7
+    for file in ("forced.svg", "damped.svg"):
+        assert (tmp_path / file).stat().st_size > 10_000
+
+
+def test_a_finer_level_stores_no_more() -> None:
+    plan = load(Choice("vibration_text", LONG_RUN))
+    compiled = [level for level in plan.levels if level.level >= 2]
+    assert [level.steps // level.every for level in plan.levels] == [16384] * 8
+    assert len({level.bytes for level in plan.levels}) == 1
+    assert len({level.memory for level in compiled}) == 1
+
+
+@pytest.mark.slow
+def test_a_finer_level_takes_no_more_memory(tmp_path: Path) -> None:
+    """Level 11 takes 512 times the steps of level 2; a solution that is kept whole would be 268 MB more."""
+    text = LONG_RUN.read_text().replace("to: 7}", "to: 11}")
+    file = tmp_path / "longer.yaml"
+    file.write_text(text)
+    peaks = {}
+    for level in ("2", "11"):
+        words = ["simulate", str(file), "--level", level, "--out", str(tmp_path / f"{level}.nc")]
+        command = [sys.executable, "-c", PROBE, *words, "--results", str(tmp_path)]
+        # the first run compiles what both use
+        for _ in range(2):
+            done = subprocess.run(command, capture_output=True, text=True, check=True)
+        peaks[level] = int(re.findall(r"peak (\d+)", done.stdout)[0])
+    assert peaks["11"] < 1.03 * peaks["2"]
+    # they differ in how the level is written in their provenance
+    sizes = [(tmp_path / f"{level}.nc").stat().st_size for level in peaks]
+    assert abs(sizes[0] - sizes[1]) < 100
+    with netCDF4.Dataset(tmp_path / "11.nc") as fine, netCDF4.Dataset(tmp_path / "2.nc") as coarse:
+        assert np.array_equal(fine["t"][:], coarse["t"][:])
+
+
+def test_what_is_stored_is_part_of_the_whole() -> None:
+    """The stored values are those of a run that stores every step, to the last bit."""
+    short = {
+        "title": "t",
+        "model": {"kind": "oscillator", "damping": {"linear": 0.002}},
+        "initial": {"u": 1.0},
+        "time": {"end": 20.0, "base_steps": 64},
+        "levels": [0, 3],
+        "schemes": ["central"],
+    }
+    whole = simulate(Experiment.from_dict({**short, "samples": "all"}), 3)
+    part = simulate(Experiment.from_dict({**short, "samples": "common"}), 3)
+    assert np.array_equal(part["u"].values, whole["u"].values[..., ::8])
+    single = [name for name in whole if "t" not in whole[name].dims]
+    assert {"period", "u_max", "energy_deviation_max_abs"} <= set(single), single
+    for name in single:
+        assert np.array_equal(part[name].values, whole[name].values, equal_nan=True), name

@@ -1,0 +1,203 @@
+"""Tables of an experiment: read where the section names them, and held to what every member asks of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.errors import Fault, InputError
+from vibsim.expression import values
+from vibsim.models import FormulaField, Model, natural_end, tree
+from vibsim.models.table import Table
+from vibsim.spec.axes import Axis
+from vibsim.spec.columns import columns
+from vibsim.spec.experiment import Experiment, ModelSpec, TableSpec, TimeSpec
+from vibsim.spec.faults import Report
+from vibsim.spec.fields import FrozenDict, Section
+from vibsim.spec.model_section import TABLE
+from vibsim.spec.table_file import TableError, read
+
+Floats = NDArray[np.float64]
+
+CHUNK = 2**16
+"""Members that are looked at together."""
+SLACK = 1e-6
+"""What is no difference between two places, in spacings of the table or in steps: rounding."""
+LISTED = 3
+"""Most swept numbers of a member that a message names."""
+
+
+def table_of(row: FormulaField, section: Section, folder: Path, report: Report) -> TableSpec | None:
+    """Return the table that stands in place of a formula; None, and a fault, where it cannot be had.
+
+    Parameters
+    ----------
+    section
+        As pydantic read it: the path, and the names of the columns.
+    folder
+        That of the experiment file.
+    """
+    assert row.table is not None
+    written: str = getattr(section, TABLE)
+    names = (getattr(section, row.table[0]), getattr(section, row.table[1]))
+    if Path(written).is_absolute():
+        rule = "must be a path relative to the folder of the experiment file"
+        report.add(("model", row.name, TABLE), rule, value=written)
+        return None
+    try:
+        table, content = read(folder / written, row.table, names)
+    except TableError as error:
+        value = written if error.key == TABLE else names[row.table.index(error.key)]
+        report.add(("model", row.name, error.key), error.rule, error.hint, value)
+        return None
+    return _spec(table, written, names, content)
+
+
+def _spec(table: Table, file: str, names: tuple[str, str], content: str) -> TableSpec:
+    place, value = names
+    spec = TableSpec(file=file, place=place, value=value, numbers=table.digest)
+    spec.hold(table, content)
+    return spec
+
+
+def attach(experiment: Experiment) -> None:
+    """Read the tables of an experiment that was kept without their numbers.
+
+    Raises
+    ------
+    InputError
+        Where one cannot be read, or has other numbers than it had.
+    """
+    folder = experiment.file.parent if experiment.file else Path()
+    for name, spec in experiment.model.tables.items():
+        keys = next(row.table for row in _fields(experiment) if row.name == name)
+        try:
+            table, content = read(folder / spec.file, keys or ("", ""), (spec.place, spec.value))
+        except TableError as error:
+            raise _refusal(experiment, name, spec, error.rule, error.hint) from None
+        if table.digest != spec.numbers:
+            rule = "has other numbers than when the experiment was read"
+            raise _refusal(experiment, name, spec, rule, "run the experiment again")
+        spec.hold(table, content)
+
+
+def _fields(experiment: Experiment) -> tuple[FormulaField, ...]:
+    from vibsim.models import MODELS
+
+    return MODELS[experiment.model.kind].formulas
+
+
+def _refusal(
+    experiment: Experiment, name: str, spec: TableSpec, rule: str, hint: str
+) -> InputError:
+    file = str(experiment.file or experiment.name)
+    return InputError([Fault(file, 0, f"model.{name}.{TABLE}", spec.file, rule, hint)])
+
+
+@dataclass(frozen=True)
+class Runs:
+    """The numbers of all members, as far as tables must know them."""
+
+    model: Model
+    parameters: Mapping[str, float]
+    time: TimeSpec
+    axes: Sequence[Axis]
+    level: int
+    """The coarsest one."""
+
+    def members(self) -> Iterator[tuple[dict[str, Any], Floats]]:
+        """Yield parts of the members that differ in what matters: their swept numbers, and their ends."""
+        axes = [axis for axis in self.axes if any(map(_matters, axis.keys))]
+        count = int(np.prod([axis.count for axis in axes], dtype=object))
+        for start in range(0, count, CHUNK):
+            stop = min(start + CHUNK, count)
+            found = {k: v for k, v in columns(axes, start, stop).items() if _matters(k)}
+            end = found.get("time.end", np.full(stop - start, self.time.end))
+            if self.time.periods is not None:
+                own = natural_end(self.model, self.time.periods, self._parameters(found))
+                end = np.broadcast_to(own, end.shape)
+            yield found, end
+
+    def place(self, found: Mapping[str, Any], t: Floats) -> Floats:
+        """Return the places at times t, of members with some numbers swept."""
+        assert self.model.lookup is not None
+        given = self._parameters(found)
+        numbers = {row.name: given[row.key] for row in self.model.parameters}
+        formula = tree(self.model, self.model.lookup.place)
+        return np.broadcast_to(values(formula, {**numbers, "t": t}), t.shape)
+
+    def _parameters(self, found: Mapping[str, Any]) -> dict[str, Any]:
+        return {key: found.get(f"model.{key}", x) for key, x in self.parameters.items()}
+
+
+def _matters(key: str) -> bool:
+    return key.startswith("model.") or key == "time.end"
+
+
+def check_length(runs: Runs, name: str, report: Report) -> None:
+    """Refuse a table that ends before a member does."""
+    assert runs.model.lookup is not None
+    table = runs.model.lookup.table
+    most, who = -np.inf, ""
+    for found, end in runs.members():
+        places = runs.place(found, end)
+        i = int(np.argmax(places))
+        if places[i] > most:
+            most = float(places[i])
+            swept = [f"{key} = {column[i]:.10g}" for key, column in found.items()]
+            who = ", ".join(swept[:LISTED])
+    if most > table.last + SLACK * table.spacing:
+        count = int(np.ceil((most - table.first) / table.spacing - SLACK)) + 1
+        rule = f"the table ends at {table.last:.10g} m, but the motion comes to {most:.10g} m"
+        hint = f"it must have at least {count} points, not {table.points}"
+        report.add(("model", name, TABLE), f"{rule}{f' ({who})' if who else ''}", hint)
+
+
+def is_met(runs: Runs) -> bool:
+    """Tell whether a step of every member ends at every point of the table, at every level.
+
+    It does where the way of a step at the coarsest level is a whole part of the spacing, and the table has a point at
+    the start.
+    """
+    assert runs.model.lookup is not None
+    table, steps = runs.model.lookup.table, runs.time.base_steps << runs.level
+    for found, end in runs.members():
+        way = runs.place(found, end / steps)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            per_spacing, start = table.spacing / way, table.first / way
+            rest = table.points * np.abs(per_spacing - np.round(per_spacing))
+            misses = (per_spacing < 0.5) | ~(rest <= SLACK) | ~(_rest(start) <= SLACK)
+        # who does not move meets no corner
+        if np.any(misses & (way != 0.0)):
+            return False
+    return True
+
+
+def _rest(x: Floats) -> Floats:
+    return np.abs(x - np.round(x))
+
+
+def met_again(experiment: Experiment) -> Experiment:
+    """Return `experiment` with what its tables say of its steps, whose members or levels were others before."""
+    if not experiment.model.tables:
+        return experiment
+    model = experiment.model
+    runs = Runs(
+        model.definition,
+        model.parameters,
+        experiment.time,
+        experiment.sweep.axes if experiment.sweep else (),
+        experiment.levels[0] if experiment.levels else 0,
+    )
+    return experiment.model_copy(update={"model": with_met(model, is_met(runs))})
+
+
+def with_met(model: ModelSpec, met: bool) -> ModelSpec:
+    """Return a model whose tables say whether their points are met."""
+    tables = {name: spec.model_copy(update={"is_met": met}) for name, spec in model.tables.items()}
+    return model.model_copy(update={"tables": FrozenDict(tables)})
