@@ -114,13 +114,14 @@ def run(model, numbers, lane, *, steps=240, every=8, scheme=CENTRAL, options=Non
 
 
 def arrays(run):
-    """Yield every array of a run with its name."""
+    """Yield every array of a run with its name; members come first in each."""
     for field in dataclasses.fields(run):
         value = getattr(run, field.name)
         if dataclasses.is_dataclass(value):
             yield from arrays(value)
         elif value is not None:
-            yield field.name, np.ascontiguousarray(value)
+            members_first = np.moveaxis(value, 1, 0) if field.name == "states" else value
+            yield field.name, np.ascontiguousarray(members_first)
 
 
 def assert_same_bits(one, other):

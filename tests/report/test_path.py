@@ -32,7 +32,7 @@ def levels():
 def test_every_chosen_level_has_a_panel_with_one_scale(levels):
     _, _, _, picture = levels
     axes = picture.figure.axes
-    assert [ax.get_title() for ax in axes] == ["level 5", "level 6", "level 8"]
+    assert [ax.get_title() for ax in axes] == ["level 5", "level 7", "level 8"]
     for ax in axes:
         assert ax.get_aspect() == 1.0
         (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
@@ -43,8 +43,8 @@ def test_every_chosen_level_has_a_panel_with_one_scale(levels):
 
 
 def test_the_curves_are_the_levels_and_the_reference(levels):
-    exp, rec, shown, picture = levels
-    for ax, level in zip(picture.figure.axes, (5, 6, 8), strict=True):
+    exp, rec, _, picture = levels
+    for ax, level in zip(picture.figure.axes, (5, 7, 8), strict=True):
         lines = ax.get_lines()
         labels = [line.get_label() for line in lines if not line.get_label().startswith("_")]
         assert labels == ["central", "rk4", "reference"]
@@ -71,6 +71,6 @@ def test_a_body_at_rest_and_one_coordinate_have_no_path():
     assert drawn(**at_rest)[-1] is None
     one = {"model": {"kind": "pendulum"}, "initial": {"theta": 1.0}}
     checks = [{"converges": "theta", "order": 2, "schemes": ["central"]}]
-    exp, rec, _, picture = drawn(**one, checks=checks)
+    exp, _, _, picture = drawn(**one, checks=checks)
     assert picture is None
     assert choice.position(exp) == "theta"

@@ -65,7 +65,7 @@ def sensitivity(
         return np.ones(len(t))
     parameters = {name: values[:, None] for name, values in group.parameters.items()}
     initial = {name: values[:, None] for name, values in group.initial.items()}
-    if not model.conservative:
+    if not model.conservative or model.coordinates > 1:
         return _tried(model, t, initial, parameters)
     found, doubtful = _linear(model, t, initial, parameters, known)
     if doubtful.any():
