@@ -78,3 +78,7 @@ def jsonable(value: Any) -> Any:
     if isinstance(value, Sequence) and not isinstance(value, str):
         return [jsonable(entry) for entry in value]
     return value
+
+
+HIGHEST = "highest_omega_dt"
+"""Name of the highest angular frequency of small oscillations times the step, where it is not that of a period."""

@@ -7,8 +7,9 @@ import sys
 import numpy as np
 import pytest
 
+from vibsim.elementary import ELEMENTARY
 from vibsim.engine import LANES, integrate
-from vibsim.engine.kernel import ELEMENTARY, kernel, source
+from vibsim.engine.kernel import kernel, source
 from vibsim.errors import SimulationError
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
@@ -108,7 +109,7 @@ def test_a_cache_that_cannot_be_written_is_named(monkeypatch, tmp_path):
 
 
 def test_a_function_that_the_engine_does_not_have_is_named(monkeypatch):
-    monkeypatch.setattr("vibsim.engine.kernel.ELEMENTARY", {"sin": ELEMENTARY["sin"]})
+    monkeypatch.setattr("vibsim.engine.formulas.ELEMENTARY", {"sin": ELEMENTARY["sin"]})
     model = dataclasses.replace(PENDULUM, acceleration="-(g/L)*tanh(theta)")
     with pytest.raises(SimulationError, match=r"no function tanh; it has sin"):
         source(model, CENTRAL.stepper(CENTRAL.defaults()))

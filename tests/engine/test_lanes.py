@@ -290,16 +290,14 @@ def test_energies_of_samples_are_those_that_were_gathered(lane):
     model = MODELS["pendulum"]
     numbers = members(model)
     runs = run(model, numbers, lane, every=1)
-    kinetic, potential = energies(
-        model, numbers[0], numbers[2], 1, runs.position, runs.velocity, lane=lane
-    )
+    kinetic, potential = energies(model, numbers[0], numbers[2], 1, runs.states, lane=lane)
     energy = kinetic + potential
     deviation = np.abs(energy - energy[:, :1])
     assert np.array_equal(np.max(deviation, axis=1), runs.gathered.deviation)
     assert np.array_equal(np.max(deviation[:, :-1], axis=1), runs.gathered.deviation_interior)
     for series, low_high in (
-        (runs.position, runs.gathered.position_range),
-        (runs.velocity, runs.gathered.velocity_range),
+        (runs.position, runs.gathered.ranges[:, 0]),
+        (runs.velocity, runs.gathered.ranges[:, 1]),
     ):
         assert np.array_equal(np.min(series, axis=1), low_high[:, 0])
         assert np.array_equal(np.max(series, axis=1), low_high[:, 1])
@@ -311,8 +309,8 @@ def test_norms_are_those_of_all_points(lane):
     numbers = members(model)
     runs = run(model, numbers, lane, every=1)
     for series, norms in (
-        (runs.position, runs.gathered.position_norms),
-        (runs.velocity, runs.gathered.velocity_norms),
+        (runs.position, runs.gathered.norms[:, 0]),
+        (runs.velocity, runs.gathered.norms[:, 1]),
     ):
         l1 = numbers[2] * np.sum(np.abs(series), axis=1)
         l2 = np.sqrt(numbers[2] * np.sum(series**2, axis=1))

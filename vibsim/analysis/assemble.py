@@ -24,7 +24,7 @@ from vibsim.record import Record, Variable, attributes
 from vibsim.schemes import SCHEMES
 from vibsim.simulation.scaled import in_scales
 from vibsim.spec.series import RUNNING, asked, lean_series
-from vibsim.vocabulary import REASON_NAMES, STATUSES, TYPICAL_NORM
+from vibsim.vocabulary import HIGHEST, REASON_NAMES, STATUSES, TYPICAL_NORM
 
 if TYPE_CHECKING:
     import xarray
@@ -191,6 +191,7 @@ _LEAN = frozenset(
         "status",
         "failure_time",
         "omega_dt",
+        HIGHEST,
         "period",
         "amplitude",
         "energy_deviation_max_abs",

@@ -154,10 +154,12 @@ class Comparison:
 
 def comparisons(part: Part, names: tuple[str, ...]) -> Mapping[str, Comparison]:
     """Compare quantities between the levels of a part."""
-    position = part.model.position
-    values = {name: part.series(name) for name in dict.fromkeys((position, *names))}
+    positions = part.model.positions
+    values = {name: part.series(name) for name in dict.fromkeys((*positions, *names))}
     sizes = {"energy": _energy_size(part)}
-    sizes[position] = part.size(position, values[position], sizes)
+    # what is rounded in one coordinate is felt by the others
+    whole = [part.size(name, values[name], sizes) for name in positions]
+    sizes |= {name: np.asarray(np.maximum.reduce(whole)) for name in positions}
     found = {}
     for name in names:
         scale = part.size(name, values[name], sizes)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim import theory
-from vibsim.analysis.evidence import omega_dt
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Orders, Outcome
+from vibsim.analysis.part import fastest
 from vibsim.analysis.promise import columns_of, formal_orders, options_of, stability_limits
 from vibsim.analysis.wording import Story, advise, tell
 from vibsim.record import Record
@@ -102,7 +102,7 @@ def _story(
     limits = stability_limits(experiment, columns)[scheme]
     at = levels.index(culprit) if culprit >= 0 else None
     options = options_of(experiment, columns, scheme, case)
-    p = float("nan") if at is None else float(omega_dt(record)[case, at])
+    p = float("nan") if at is None else float(fastest(record)[case, at])
     return Story(
         quantity=check.converges,
         reason=reason,
@@ -120,7 +120,7 @@ def _story(
         growth=_growth(record, SCHEMES[spec.kind], options, p, (scheme, case, at)),
         limit=float(limits[case if len(limits) > 1 else 0]),
         options=options,
-        is_position=check.converges == experiment.model.definition.position,
+        is_position=check.converges in experiment.model.definition.positions,
         scheme=spec.name,
     )
 

@@ -14,18 +14,12 @@ from vibsim.analysis.rules import Evidence
 from vibsim.analysis.series import largest
 from vibsim.analysis.verdict import Judgement, judge
 from vibsim.models import ENERGIES
-from vibsim.record import Record
 from vibsim.vocabulary import TOLERANCE
 
 if TYPE_CHECKING:
     from vibsim.spec.checks import ConvergesCheck
 
 Floats = NDArray[np.float64]
-
-
-def omega_dt(record: Record) -> Floats:
-    """Return w dt of a convergence Record, shape (case, level)."""
-    return np.asarray(record["omega_dt"], dtype=np.float64)
 
 
 def judgement(q: Comparison, norm: str) -> Judgement:
@@ -85,7 +79,7 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
         size=in_norm(size),
         failed=part.failed,
         applicable=(exists | np.any(part.failed, axis=-1)) & ~part.adaptive[:, None],
-        omega_dt=np.broadcast_to(part.omega_dt, (*shape, len(grid.levels))),
+        omega_dt=np.broadcast_to(part.fastest, (*shape, len(grid.levels))),
         stability_limit=np.broadcast_to(part.stability_limit, shape),
         growth=part.growth,
         on_mesh=np.broadcast_to(part.on_mesh, shape),

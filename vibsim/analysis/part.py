@@ -26,7 +26,7 @@ from vibsim.models import BUDGET, ENERGIES, Model
 from vibsim.record import Record
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import Members, members
-from vibsim.vocabulary import NORMS, TYPICAL_NORM
+from vibsim.vocabulary import HIGHEST, NORMS, TYPICAL_NORM
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
@@ -64,6 +64,8 @@ class Part:
     """Predicted round-off relative to the solution, shape (s, 1 or c, l)."""
     omega_dt: Floats
     """w dt, shape (c, l)."""
+    fastest: Floats
+    """The same of the highest frequency, which a step has to resolve."""
     failed: Flags
     """Whether a level broke down, shape (s, c, l)."""
     group: Members
@@ -157,12 +159,15 @@ class Part:
         own = solution_size(values)
         if plain in BUDGET:
             return np.asarray(np.maximum(own, sizes["energy"]))
-        if plain != self.model.velocity:
+        if plain in self.model.positions:
+            return np.asarray(np.maximum(own, sizes.get(plain, own)))
+        if plain not in self.model.velocities:
             return own
         duration = self.grid.dt[0] * self.grid.steps[0]
         # a motion without small oscillations has no frequency
         rate = np.fmax(self.finest["natural_frequency"], 1.0 / duration)
-        return np.asarray(np.maximum(own, sizes[self.model.position] * rate))
+        position = self.model.positions[self.model.velocities.index(plain)]
+        return np.asarray(np.maximum(own, sizes[position] * rate))
 
     def floor_of(self, name: str, size: Floats) -> Floats:
         """Return the predicted round-off of a quantity of a size, shape (s, c, l).
@@ -204,6 +209,7 @@ def part_of(experiment: Experiment, records: Mapping[int, Record]) -> Part:
         magnified=sensitivity(experiment, t, group, exact if lean else None),
         relative_floor=relative_floors(experiment, grid.steps, columns),
         omega_dt=by_level([records[level]["omega_dt"] for level in grid.levels]),
+        fastest=by_level([fastest(records[level]) for level in grid.levels]),
         group=group,
         failed=by_level([records[level]["status"] for level in grid.levels]) != 0,
         stability_limit=stability_limits(experiment, columns),
@@ -216,6 +222,11 @@ def part_of(experiment: Experiment, records: Mapping[int, Record]) -> Part:
 def by_level(values: list[Floats]) -> Floats:
     """Return arrays side by side along a new last dimension, which is the outermost one in memory."""
     return np.moveaxis(np.stack([np.asarray(row, dtype=np.float64) for row in values]), 0, -1)
+
+
+def fastest(record: Record) -> Floats:
+    """Return the highest angular frequency of small oscillations times the step."""
+    return np.asarray(record[HIGHEST if HIGHEST in record else "omega_dt"], dtype=np.float64)
 
 
 def energy_at_start(record: Record) -> Floats:

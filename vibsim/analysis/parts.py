@@ -17,6 +17,7 @@ from vibsim import plan
 from vibsim.analysis.assemble import analyse_records
 from vibsim.analysis.reached import is_bound
 from vibsim.record import Record, Variable
+from vibsim.vocabulary import HIGHEST
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
@@ -87,7 +88,7 @@ def _read(
         yield {level: read(start, stop) for level, read in readers.items()}
 
 
-_DECISIVE = ("status", "failure_time", "last_step", "omega_dt", "measured_growth")
+_DECISIVE = ("status", "failure_time", "last_step", "omega_dt", HIGHEST, "measured_growth")
 
 
 def kept(parts: Iterable[Record], thin: list[Record]) -> Iterator[Record]:

@@ -117,7 +117,7 @@ def _advise(experiment: Experiment, scheme: int, state: str) -> str:
         "take such members into an experiment of their own, whose pilot tries them",
         f"give finer `levels:` than {levels[0]} to {levels[-1]} in place of `tolerance:`",
     ]
-    is_velocity = state == experiment.model.definition.velocity
+    is_velocity = state in experiment.model.definition.velocities
     if is_velocity and options.get("end_velocity", "kick") != "kick":
         ways.insert(0, f"set `end_velocity: kick` for scheme {name}")
     if options.get("arithmetic", "compensated") != "compensated":

@@ -484,7 +484,7 @@ def finish(
     """Write what was gathered of a member that has arrived, or that failed after step `good`."""
     if GATHER:
         note_extrema(
-            stats, case, extrema_in(rows, j), rows[INTERIOR * LANES + j], rows[DT * LANES + j]
+            stats, case, 0, extrema_in(rows, j), rows[INTERIOR * LANES + j], rows[DT * LANES + j]
         )
     if D2T:
         note_d2t(stats, samples, case, good, every, rows[LARGEST_D2T * LANES + j])

@@ -11,8 +11,8 @@ from typing import Any, NoReturn, TypeVar
 
 F = TypeVar("F")
 
-State = tuple[float, ...]
-"""The state of a scheme, as many floats as it carries."""
+State = tuple[Any, ...]
+"""The state of a scheme, as many floats as it carries; of several coordinates, tuples of them."""
 P = tuple[float, ...]
 """The parameters of a member."""
 
@@ -35,6 +35,9 @@ EVENTS = True
 """Whether the model has events (`vibsim.engine.events`)."""
 LOCATED = True
 """Whether they are found within the step, not noticed at the grid point behind."""
+SYSTEM = False
+"""Whether there are several coordinates: a position and a velocity are then tuples."""
+COORDINATES = 1
 STATES = 1
 """Entries of the scheme's state."""
 SET = 4
@@ -69,7 +72,7 @@ def start(variant: int, u: float, v: float, dt: float, p: P) -> State:
     _unbound()
 
 
-def step(state: State, t: float, dt: float, p: P) -> tuple[State, float]:
+def step(state: State, t: float, dt: float, p: P) -> tuple[State, Any]:
     """Return the next state, and the velocity at the present time (`vibsim.schemes.base.Stepper.step`)."""
     _unbound()
 
@@ -98,6 +101,36 @@ def kept_in(rows: Any, j: int) -> tuple[float, ...]:
 
 def backward(state: State, dt: float) -> float:
     """Return the one-sided velocity at the present time (`vibsim.schemes.base.Stepper.backward`)."""
+    _unbound()
+
+
+def initial_of(values: Any, k: int) -> tuple[Any, Any]:
+    """Return all positions and all velocities of member k."""
+    _unbound()
+
+
+def point_of(values: Any, case: int, k: int) -> tuple[Any, Any]:
+    """Return all positions and all velocities of a member at sample k."""
+    _unbound()
+
+
+def size_of(u: Any, v: Any) -> float:
+    """Return the sum of the absolute values of all positions and velocities."""
+    _unbound()
+
+
+def first_further(u: Any, v: Any) -> Any:
+    """Return `vibsim.engine.gather.first_extrema` of every coordinate but the first."""
+    _unbound()
+
+
+def next_further(further: Any, u: Any, v: Any) -> Any:
+    """Return `vibsim.engine.gather.next_extrema` of every coordinate but the first."""
+    _unbound()
+
+
+def note_further(stats: Any, case: int, further: Any, dt: float) -> None:
+    """Write the extrema and norms of every coordinate but the first."""
     _unbound()
 
 

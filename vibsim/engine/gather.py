@@ -59,7 +59,7 @@ LAST_STEP = 2
 N_COUNTS = 3
 
 
-# Rows of `samples` behind position and velocity, where series are kept of more.
+# Rows of `samples` behind position and velocity of one coordinate, where series are kept of more.
 RUNNING_ROW = 2
 VELOCITY_D2T_ROW = 3
 RUNNING_D2T_ROW = 4
@@ -67,22 +67,36 @@ DISSIPATED_ROW = 5
 DRIVEN_ROW = 6
 
 
-def n_sample_rows(with_series: bool, own_velocity: bool, with_work: bool) -> int:
+def sample_rows(coordinates: int) -> dict[str, int]:
+    """Return the numbers of these rows, by their names here, behind all positions and all velocities."""
+    running = 2 * coordinates
+    names = ("RUNNING_D2T_ROW", "DISSIPATED_ROW", "DRIVEN_ROW")
+    behind = {name: running + 1 + coordinates + i for i, name in enumerate(names)}
+    return {"RUNNING_ROW": running, "VELOCITY_D2T_ROW": running + 1, **behind}
+
+
+def n_sample_rows(coordinates: int, with_series: bool, own_velocity: bool, with_work: bool) -> int:
     """Return how many rows samples have; one that a scheme has no use for stays NaN where others stand behind it."""
+    rows = sample_rows(coordinates)
     if not with_series:
-        return 2
-    return 7 if with_work else 5 if own_velocity else 3
+        return rows["RUNNING_ROW"]
+    if with_work:
+        return rows["DRIVEN_ROW"] + 1
+    return rows["RUNNING_D2T_ROW" if own_velocity else "RUNNING_ROW"] + 1
 
 
-def end_velocity(
-    end_rule: int, own: float, v_before: float, v_two_before: float, backward: float
-) -> float:
+def end_velocity(end_rule: int, own: Any, v_before: Any, v_two_before: Any, backward: Any) -> Any:
     """Return the velocity at the last point by one of `vibsim.schemes.base.END_RULES`."""
     if end_rule == 1:
         return 2.0 * v_before - v_two_before
     if end_rule == 2:
         return backward
     return own
+
+
+def centred_difference(ahead: Any, before: Any, rate: float) -> Any:
+    """Return ``[D_2t u]``, with ``rate = 1/(2 dt)``."""
+    return (ahead - before) * rate
 
 
 def larger(size: float, largest: float) -> float:
@@ -101,7 +115,8 @@ def note_d2t(stats: Any, samples: Any, case: int, good: int, every: int, largest
     stats[case, DEVIATION_D2T] = value
     if SERIES:  # noqa: SIM102
         if good % every == 0:
-            samples[VELOCITY_D2T_ROW, case, good // every] = math.nan
+            for row in range(VELOCITY_D2T_ROW, RUNNING_D2T_ROW):
+                samples[row, case, good // every] = math.nan
             samples[RUNNING_D2T_ROW, case, good // every] = value
 
 
@@ -127,22 +142,25 @@ def next_extrema(extrema: Extrema, u: float, v: float, deviation: float) -> Extr
     )
 
 
-def note_extrema(stats: Any, case: int, extrema: Extrema, interior: float, dt: float) -> None:
+def note_extrema(
+    stats: Any, case: int, first: int, extrema: Extrema, interior: float, dt: float
+) -> None:
     """Write the extrema and norms of a member that has arrived, and its largest deviation without the last point.
 
-    ``l1 = dt sum |u|``, ``l2 = sqrt(dt sum u^2)`` over every point from t = 0 on (B, section 4.4).
+    ``l1 = dt sum |u|``, ``l2 = sqrt(dt sum u^2)`` over every point from t = 0 on (B, section 4.4). Columns count from
+    `first`: those of each further coordinate stand behind all of the one before.
     """
     u_min, u_max, v_min, v_max, largest, u_sum, u_squares, v_sum, v_squares = extrema
-    stats[case, POSITION_MIN] = u_min
-    stats[case, POSITION_MAX] = u_max
-    stats[case, VELOCITY_MIN] = v_min
-    stats[case, VELOCITY_MAX] = v_max
-    stats[case, DEVIATION] = largest
-    stats[case, DEVIATION_INTERIOR] = interior
-    stats[case, POSITION_L1] = dt * u_sum
-    stats[case, POSITION_L2] = math.sqrt(dt * u_squares)
-    stats[case, VELOCITY_L1] = dt * v_sum
-    stats[case, VELOCITY_L2] = math.sqrt(dt * v_squares)
+    stats[case, first + POSITION_MIN] = u_min
+    stats[case, first + POSITION_MAX] = u_max
+    stats[case, first + VELOCITY_MIN] = v_min
+    stats[case, first + VELOCITY_MAX] = v_max
+    stats[case, first + DEVIATION] = largest
+    stats[case, first + DEVIATION_INTERIOR] = interior
+    stats[case, first + POSITION_L1] = dt * u_sum
+    stats[case, first + POSITION_L2] = math.sqrt(dt * u_squares)
+    stats[case, first + VELOCITY_L1] = dt * v_sum
+    stats[case, first + VELOCITY_L2] = math.sqrt(dt * v_squares)
 
 
 def is_event(turn: float, bottom: float, v_before: float, u: float, v: float) -> bool:

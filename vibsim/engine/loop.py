@@ -11,19 +11,26 @@ import math
 from typing import Any
 
 from vibsim.engine.bound import (
+    COORDINATES,
     D2T,
     EVENTS,
     GATHER,
     KEEP,
     SERIES,
     STAGGERED,
+    SYSTEM,
     WORK,
     backward,
     energies,
     energy_with,
+    first_further,
+    initial_of,
     mode_of,
+    next_further,
+    note_further,
     parameters_of,
     powers,
+    size_of,
     start,
     step,
 )
@@ -39,6 +46,7 @@ from vibsim.engine.gather import (
     RUNNING_ROW,
     VELOCITY_D2T_ROW,
     bottom_of,
+    centred_difference,
     end_velocity,
     first_extrema,
     is_event,
@@ -72,7 +80,7 @@ def run(
     Parameters
     ----------
     parameters, initial, dt
-        Shapes (case, n_parameters), (case, 2) with position and velocity, and (case,).
+        Shapes (case, n_parameters), (case, state) with positions and then velocities, and (case,).
     steps, every
         Number of steps; a sample is stored at each multiple of `every`, which divides `steps`.
     variant
@@ -82,7 +90,7 @@ def run(
     turn
         Angle of a whole turn; 0 where the position is no angle.
     samples
-        Shape (rows, case, n_samples), filled with NaN: position, velocity, and the rows of `vibsim.engine.gather`.
+        Shape (rows, case, n_samples), filled with NaN: positions, velocities, and the rows of `vibsim.engine.gather`.
     stats
         Shape (case, `N_STATS`), filled with NaN: columns of `vibsim.engine.gather`.
     counts
@@ -93,21 +101,30 @@ def run(
     rows
         Scratch of `vibsim.engine.blocks`, which this loop does without.
     """
+    # positions q and velocities w are tuples for several coordinates; u and v are those of the first one
     for case in range(first, stop):
         h = float(dt[case])
         p = parameters_of(parameters, case)
-        u = float(initial[case, 0])
-        v = float(initial[case, 1])
+        if SYSTEM:
+            q, w = initial_of(initial, case)
+            u, v = q[0], w[0]
+            further = first_further(q, w)
+            for i in range(COORDINATES):
+                samples[i, case, 0] = q[i]
+                samples[COORDINATES + i, case, 0] = w[i]
+        else:
+            q = u = float(initial[case, 0])
+            w = v = float(initial[case, 1])
+            samples[0, case, 0] = u
+            samples[1, case, 0] = v
         energy_0 = 0.0
         if GATHER:
-            kinetic, potential = energies(u, v, 0.0, p)
+            kinetic, potential = energies(q, w, 0.0, p)
             energy_0 = kinetic + potential
-        samples[0, case, 0] = u
-        samples[1, case, 0] = v
         if SERIES:
             samples[RUNNING_ROW, case, 0] = 0.0
         if WORK:
-            dissipated, driven = powers(u, v, 0.0, p)
+            dissipated, driven = powers(q, w, 0.0, p)
             samples[DISSIPATED_ROW, case, 0] = dissipated
             samples[DRIVEN_ROW, case, 0] = driven
         extrema = first_extrema(u, v)
@@ -115,79 +132,97 @@ def run(
         if EVENTS:
             p = begun(stats, case, u, v, p)
             last_event = -1
-        state = start(variant, u, v, h, p)
+        state = start(variant, q, w, h, p)
         interior = 0.0
         good = 0
         sample = 1
         due = every
-        v_before = slope = v
+        q_before, w_before, slope = q, w, v
         if STAGGERED:
             slope = math.nan
         if D2T:
             rate = 0.5 / h
-            velocity_d2t = pending = largest_d2t = 0.0
+            pending = largest_d2t = 0.0
         if KEEP:
             u_before = u
         for n in range(1, steps + 1):
             t = n * h
             if KEEP:
                 u_two_before = u_before
-            u_before, v_two_before, v_before = u, v_before, v
+            u_before, q_before, w_two_before, w_before = u, q, w_before, w
             if EVENTS:
-                u, following, own, p, passes = passed(
-                    stats, counts, case, variant, n, h, u, v_before, state, p
+                q, following, own, p, passes = passed(
+                    stats, counts, case, variant, n, h, q, w_before, state, p
                 )
                 last_event = n if passes > 0 else last_event
             else:
-                u = state[0]
+                q = state[0]
                 following, own = step(state, t, h, p)
-            v = own
+            w = own
             if n == steps:
-                v = end_velocity(end_rule, own, v_before, v_two_before, backward(state, h))
+                w = end_velocity(end_rule, own, w_before, w_two_before, backward(state, h))
             if EVENTS:  # noqa: SIM102
                 # a formula over points on both sides of an event, or of a member at rest, gives no velocity
                 if n - last_event < 2 or mode_of(p) == 0.0:
-                    v = own
+                    w = own
             state = following
+            # the scheme's own velocity: an end formula would move a peak in the last step
+            if SYSTEM:
+                size, u, v, own = size_of(q, w), q[0], w[0], own[0]  # type: ignore[index]
+            else:
+                size, u, v = abs(q) + abs(w), q, w
             # written so that NaN fails as well
-            if not abs(u) + abs(v) < OVERFLOW:
+            if not size < OVERFLOW:
                 break
             good = n
-            # the scheme's own velocity: an end formula would move a peak in the last step
             slope_before, slope = slope, own
             if STAGGERED:
-                slope = (following[0] - u_before) * (0.5 / h)
+                if SYSTEM:  # noqa: SIM108
+                    slope = (following[0][0] - u_before) * (0.5 / h)
+                else:
+                    slope = (following[0] - u_before) * (0.5 / h)
             if EVENTS:  # noqa: SIM102
                 # events have noted themselves whether they are peaks
                 if n == last_event:
                     slope_before = math.nan
             if GATHER:
-                kinetic, potential = energies(u, v, t, p)
+                kinetic, potential = energies(q, w, t, p)
                 interior = extrema[LARGEST_DEVIATION]
                 extrema = next_extrema(extrema, u, v, (kinetic + potential) - energy_0)
+                if SYSTEM:
+                    further = next_further(further, q, w)
                 if is_event(turn, bottom, slope_before, u, slope):
                     bottom = note_events(
                         stats, counts, case, t, h, turn, bottom, u_before, slope_before, u, slope
                     )
             if WORK:
-                taken, put = powers(u, v, t, p)
+                taken, put = powers(q, w, t, p)
                 dissipated += taken
                 driven += put
             if D2T:
                 # that of the point before counts now that this one is sound, since it rests on it
                 largest_d2t = larger(pending, largest_d2t)
-                velocity_d2t = (following[0] - u_before) * rate
-                pending = abs(energy_with(u, velocity_d2t, t, p, potential) - energy_0)
+                velocity_d2t = centred_difference(following[0], q_before, rate)
+                pending = abs(energy_with(q, velocity_d2t, t, p, potential) - energy_0)
             if KEEP:  # noqa: SIM102
                 if is_turned(u_two_before, u_before, u):
                     note_turned(kept, counts, case, n - 1, h, u_two_before, u_before, u)
             if n == due:
-                samples[0, case, sample] = u
-                samples[1, case, sample] = v
+                if SYSTEM:
+                    for i in range(COORDINATES):
+                        samples[i, case, sample] = q[i]
+                        samples[COORDINATES + i, case, sample] = w[i]
+                else:
+                    samples[0, case, sample] = u
+                    samples[1, case, sample] = v
                 if SERIES:
                     samples[RUNNING_ROW, case, sample] = extrema[LARGEST_DEVIATION]
                     if D2T:
-                        samples[VELOCITY_D2T_ROW, case, sample] = velocity_d2t
+                        if SYSTEM:
+                            for i in range(COORDINATES):
+                                samples[VELOCITY_D2T_ROW + i, case, sample] = velocity_d2t[i]
+                        else:
+                            samples[VELOCITY_D2T_ROW, case, sample] = velocity_d2t
                         samples[RUNNING_D2T_ROW, case, sample] = larger(pending, largest_d2t)
                     if WORK:
                         samples[DISSIPATED_ROW, case, sample] = dissipated
@@ -196,9 +231,10 @@ def run(
                 due += every
         if GATHER:
             # of a member that failed, all points came before the last one
-            note_extrema(
-                stats, case, extrema, interior if good == steps else extrema[LARGEST_DEVIATION], h
-            )
+            interior = interior if good == steps else extrema[LARGEST_DEVIATION]
+            note_extrema(stats, case, 0, extrema, interior, h)
+            if SYSTEM:
+                note_further(stats, case, further, h)
         if D2T:
             note_d2t(stats, samples, case, good, every, largest_d2t)
         counts[case, LAST_STEP] = good

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from vibsim.engine.bound import observed, parameters_of
+from vibsim.engine.bound import SYSTEM, observed, parameters_of, point_of
 
 
 def run(parameters: Any, dt: Any, every: int, first: int, samples: Any, found: Any) -> None:
@@ -17,7 +17,7 @@ def run(parameters: Any, dt: Any, every: int, first: int, samples: Any, found: A
     dt, every
         Step of each member, shape (case,), and steps between samples.
     samples
-        Position and velocity, shape (2, case, n_samples).
+        All positions and all velocities, shape (state, case, n_samples).
     found
         A row of each formula, shape (formula, members, n_samples); NaN where the samples are.
     """
@@ -25,8 +25,11 @@ def run(parameters: Any, dt: Any, every: int, first: int, samples: Any, found: A
         case = first + member
         p = parameters_of(parameters, case)
         for k in range(found.shape[2]):
-            u = float(samples[0, case, k])
-            v = float(samples[1, case, k])
+            if SYSTEM:
+                u, v = point_of(samples, case, k)
+            else:
+                u = float(samples[0, case, k])
+                v = float(samples[1, case, k])
             values = observed(u, v, (k * every) * float(dt[case]), p)
             for i in range(found.shape[0]):
                 found[i, member, k] = values[i]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -29,12 +29,10 @@ TASK = 16 * blocks.LANES
 class Gathered:
     """What one scheme had at every step of every member; arrays of shape (case,) unless stated."""
 
-    position_range: Floats
-    """Least and largest position, shape (case, 2)."""
-    velocity_range: Floats
-    position_norms: Floats
-    """``dt sum |u|`` and ``sqrt(dt sum u^2)`` over every point, shape (case, 2)."""
-    velocity_norms: Floats
+    ranges: Floats
+    """Least and largest value of every state, shape (case, state, 2)."""
+    norms: Floats
+    """``dt sum |u|`` and ``sqrt(dt sum u^2)`` over every point of every state, shape (case, state, 2)."""
     deviation: Floats
     """Largest absolute energy deviation."""
     deviation_interior: Floats
@@ -94,8 +92,9 @@ class Series:
 
     deviation_running: Floats
     """Largest absolute energy deviation at every step so far."""
-    velocity_d2t: Floats
-    """``[D_2t u]``; NaN at either end, and of a scheme whose own velocity it is."""
+    velocities_d2t: Floats
+    """``[D_2t u]`` of every coordinate, shape (case, coordinate, n_samples); NaN at either end, and of a
+    scheme whose own velocity it is."""
     deviation_d2t_running: Floats
     """Largest absolute deviation of the energy with that velocity so far; at the end that of the point before."""
     dissipated: Floats | None
@@ -108,9 +107,8 @@ class Series:
 class Trajectories:
     """What one scheme computed for every member."""
 
-    position: Floats
-    """Shape (case, n_samples); NaN from where a member failed."""
-    velocity: Floats
+    states: Floats
+    """In the order of `Model.states`, shape (state, case, n_samples); NaN from where a member failed."""
     last_step: Integers
     """Last step with finite values, shape (case,): the number of steps where nothing failed."""
     gathered: Gathered | None
@@ -121,12 +119,22 @@ class Trajectories:
     events: EventTimes | None = None
     """None for a smooth model, and where nothing was to be gathered."""
 
+    @property
+    def position(self) -> Floats:
+        """Position of the first coordinate, shape (case, n_samples)."""
+        return np.asarray(self.states[0])
+
+    @property
+    def velocity(self) -> Floats:
+        """Velocity of the first coordinate."""
+        return np.asarray(self.states[len(self.states) // 2])
+
 
 def lane_for(members: int, steps: int, *, implicit: bool = False) -> str:
     """Choose the lane from the size of the work; the bits are the same in every lane.
 
     An implicit step iterates as often as its member needs, which no vector instruction can; nor can it a step that an
-    event of the member divides, for which `implicit` stands as well.
+    event of the member divides, nor the step of several coordinates, for which `implicit` stands as well.
     """
     if members * steps <= PLAIN_MEMBER_STEPS:
         return "plain"
@@ -156,7 +164,7 @@ def integrate(
     parameters
         In the order of `model.parameters`, shape (case, n_parameters).
     initial
-        Position and velocity, shape (case, 2).
+        All positions and then all velocities, shape (case, state).
     dt
         Step of each member, shape (case,).
     steps, every
@@ -180,17 +188,19 @@ def integrate(
         Where there are not as many parameters as the model has.
     """
     members = len(dt)
-    count = len(model.parameters)
     # what is tabulated stands behind the parameters
-    if parameters.shape[1] < count:
-        raise ValueError(f"{model.kind} has {count} parameters, not {parameters.shape[1]}")
+    if parameters.shape[1] < len(model.parameters):
+        known = len(model.parameters)
+        raise ValueError(f"{model.kind} has {known} parameters, not {parameters.shape[1]}")
     stepper = scheme.stepper_for(model, options)
     has_events = model.events is not None
-    lane = lane or lane_for(members, steps, implicit=stepper.implicit or has_events)
+    count = model.coordinates
+    alone = stepper.implicit or has_events or count > 1
+    lane = lane or lane_for(members, steps, implicit=alone)
     run = kernel(model, stepper, lane, with_gathered, with_series, n_extrema > 0)
-    rows = gather.n_sample_rows(with_series, stepper.own_velocity, has_budget(model))
+    rows = gather.n_sample_rows(count, with_series, stepper.own_velocity, has_budget(model))
     samples = np.full((rows, members, steps // every + 1), np.nan)
-    columns = events.N_STATS_EVENTS if has_events else gather.N_STATS
+    columns = events.N_STATS_EVENTS if has_events else count * gather.N_STATS
     stats = np.full((members, columns if with_gathered else 0), np.nan)
     columns = extrema.N_COUNTS_KEPT if n_extrema else gather.N_COUNTS
     counts = np.zeros((members, columns), dtype=np.int64)
@@ -208,11 +218,10 @@ def integrate(
 
     _share(task, range(0, members, TASK) if threads > 1 else range(1), threads)
     return Trajectories(
-        position=samples[0],
-        velocity=samples[1],
+        states=samples[: 2 * count],
         last_step=counts[:, gather.LAST_STEP],
-        gathered=_name(stats, counts) if with_gathered else None,
-        series=_series(samples) if with_series else None,
+        gathered=_name(stats, counts, count) if with_gathered else None,
+        series=_series(samples, count, has_budget(model)) if with_series else None,
         extrema=_extrema(kept, counts) if n_extrema else None,
         events=_events(stats) if has_events and with_gathered else None,
     )
@@ -262,16 +271,13 @@ def energies(
     parameters: Floats,
     dt: Floats,
     every: int,
-    position: Floats,
-    velocity: Floats,
+    states: Floats,
     *,
     lane: str,
 ) -> tuple[Floats, Floats]:
     """Return kinetic and potential energy at the samples of `integrate`, shape (case, n_samples); see `observed`."""
     formulas = (model.kinetic_energy, model.potential_energy)
-    kinetic, potential = observed(
-        model, formulas, parameters, dt, every, position, velocity, lane=lane
-    )
+    kinetic, potential = observed(model, formulas, parameters, dt, every, states, lane=lane)
     return kinetic, potential
 
 
@@ -281,27 +287,41 @@ def observed(
     parameters: Floats,
     dt: Floats,
     every: int,
-    position: Floats,
-    velocity: Floats,
+    states: Floats,
     *,
     lane: str,
 ) -> Floats:
     """Return formulas of a model at the samples of `integrate`, shape (formula, case, n_samples).
+
+    Parameters
+    ----------
+    states
+        As `Trajectories.states`.
 
     Raises
     ------
     SimulationError
         Where the kernel cannot be compiled.
     """
-    samples = np.stack([position, velocity])
-    found = np.empty((len(formulas), *position.shape))
+    samples = np.ascontiguousarray(states)
+    found = np.empty((len(formulas), *samples.shape[1:]))
     numbers = (np.ascontiguousarray(array, dtype=float) for array in (parameters, dt))
     run = observer(model, formulas, "plain" if lane == "plain" else "scalar")
     run(*numbers, every, 0, samples, found)
     return found
 
 
-def _name(stats: Floats, counts: Integers) -> Gathered:
+def _columns(coordinates: int, position: Sequence[int], velocity: Sequence[int]) -> Integers:
+    """Return the columns of what is gathered of every state, shape (state, number)."""
+    firsts = gather.N_STATS * np.arange(coordinates)[:, None]
+    return np.concatenate([firsts + np.array(position), firsts + np.array(velocity)])
+
+
+_RANGES = (gather.POSITION_MIN, gather.POSITION_MAX), (gather.VELOCITY_MIN, gather.VELOCITY_MAX)
+_NORMS = (gather.POSITION_L1, gather.POSITION_L2), (gather.VELOCITY_L1, gather.VELOCITY_L2)
+
+
+def _name(stats: Floats, counts: Integers, coordinates: int) -> Gathered:
     peaks, turns = counts[:, gather.PEAKS] - 1, counts[:, gather.TURNS] - 1
     spinning = turns > 0
     swinging = (peaks > 0) & ~spinning
@@ -314,10 +334,8 @@ def _name(stats: Floats, counts: Integers) -> Gathered:
     of_peak = mean_time(gather.FIRST_PEAK_TIME, gather.LAST_PEAK_TIME, peaks)
     on_grid = mean_time(gather.FIRST_PEAK_TIME_GRID, gather.LAST_PEAK_TIME_GRID, peaks)
     return Gathered(
-        position_range=stats[:, [gather.POSITION_MIN, gather.POSITION_MAX]],
-        velocity_range=stats[:, [gather.VELOCITY_MIN, gather.VELOCITY_MAX]],
-        position_norms=stats[:, [gather.POSITION_L1, gather.POSITION_L2]],
-        velocity_norms=stats[:, [gather.VELOCITY_L1, gather.VELOCITY_L2]],
+        ranges=stats[:, _columns(coordinates, *_RANGES)],
+        norms=stats[:, _columns(coordinates, *_NORMS)],
         deviation=stats[:, gather.DEVIATION],
         deviation_interior=stats[:, gather.DEVIATION_INTERIOR],
         period=np.where(spinning, of_turn, of_peak),
@@ -341,19 +359,21 @@ def _events(stats: Floats) -> EventTimes:
     )
 
 
-def _series(samples: Floats) -> Series:
+def _series(samples: Floats, coordinates: int, with_work: bool) -> Series:
+    rows = gather.sample_rows(coordinates)
     nothing = np.broadcast_to(np.nan, samples.shape[1:])
 
     def row(number: int) -> Floats:
         return samples[number] if number < len(samples) else nothing
 
-    with_work = len(samples) > gather.DRIVEN_ROW
+    first = rows["VELOCITY_D2T_ROW"]
+    velocities = [row(first + i) for i in range(coordinates)]
     return Series(
-        deviation_running=row(gather.RUNNING_ROW),
-        velocity_d2t=row(gather.VELOCITY_D2T_ROW),
-        deviation_d2t_running=_storable(row(gather.RUNNING_D2T_ROW)),
-        dissipated=samples[gather.DISSIPATED_ROW] if with_work else None,
-        driven=samples[gather.DRIVEN_ROW] if with_work else None,
+        deviation_running=row(rows["RUNNING_ROW"]),
+        velocities_d2t=np.stack(velocities, 1) if coordinates > 1 else velocities[0][:, None],
+        deviation_d2t_running=_storable(row(rows["RUNNING_D2T_ROW"])),
+        dissipated=samples[rows["DISSIPATED_ROW"]] if with_work else None,
+        driven=samples[rows["DRIVEN_ROW"]] if with_work else None,
     )
 
 

@@ -146,10 +146,12 @@ def _of_call(
         turned = _sum("-", _times(second, inner[0]), _times(first, inner[1]))
         return _over(turned, length)
     if function == "hypot":
+        # 0 where both are 0, as that of abs
+        length = Binary("+", node, Compare("==", node, ZERO))
         return _sum(
             "+",
-            _times(Binary("/", first, node), inner[0]),
-            _times(Binary("/", second, node), inner[1]),
+            _times(Binary("/", first, length), inner[0]),
+            _times(Binary("/", second, length), inner[1]),
         )
     if function == "mod":
         # the whole number that mod has taken away, which a rounded quotient may miss by 1

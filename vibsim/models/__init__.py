@@ -23,6 +23,7 @@ from vibsim.models.base import (
 from vibsim.models.bouncing_ball import BOUNCING_BALL
 from vibsim.models.circuit import CIRCUIT
 from vibsim.models.duffing import DUFFING
+from vibsim.models.elastic_pendulum import ELASTIC_PENDULUM
 from vibsim.models.linear_pendulum import LINEAR_PENDULUM
 from vibsim.models.oscillator import OSCILLATOR
 from vibsim.models.pendulum import PENDULUM
@@ -44,6 +45,7 @@ _ALL = (
     BOUNCING_BALL,
     CIRCUIT,
     DUFFING,
+    ELASTIC_PENDULUM,
 )
 MODELS: Mapping[str, Model] = MappingProxyType({model.kind: model for model in _ALL})
 

@@ -94,30 +94,32 @@ class Damping:
     """``rate*v`` or ``rate*abs(v)*v``."""
     rate: Formula
     """In the parameters."""
-    undamped: Formula
-    """The acceleration without it."""
 
 
 @dataclass(frozen=True)
 class Model:
-    """An equation of motion ``position'' = acceleration(position, velocity, t)``."""
+    """An equation of motion ``position'' = acceleration(position, velocity, t)``, of one coordinate or of several.
+
+    Of several coordinates, position and velocity are the first one's where a number is measured of one alone: peaks,
+    periods and turns.
+    """
 
     kind: str
     title: str
     source: str
     equation: str
-    states: tuple[State, State]
-    """Position and velocity."""
+    states: tuple[State, ...]
+    """Position and velocity; of several coordinates all positions, then all velocities."""
     parameters: tuple[Parameter, ...]
     acceleration: Formula
-    """In the state names, ``t`` and the parameters."""
+    """Of the first coordinate, in the state names, ``t`` and the parameters."""
     kinetic_energy: Formula
     potential_energy: Formula
     energy_unit: str
     linear: bool
     conservative: bool
     natural_frequency: Callable[[Numbers], Any]
-    """Angular frequency of small oscillations [rad per unit of time], from the parameters."""
+    """Angular frequency of small oscillations [rad per unit of time], from the parameters; of several, of a period."""
     turn: float | None = None
     """The angle after which the position repeats; None where it does not."""
     exact: Callable[[Floats, Numbers, Numbers], dict[str, Floats]] | None = None
@@ -146,16 +148,40 @@ class Model:
     """The model of such formulas, by name, with declared parameters; see `vibsim.models.oscillator`."""
     scales: Scales | None = None
     """Its characteristic scales, where it has any."""
+    highest_frequency: Callable[[Numbers], Any] | None = None
+    """The highest angular frequency of small oscillations, which a step has to resolve; None: the natural one."""
+    further_accelerations: tuple[Formula, ...] = ()
+    """Of the coordinates behind the first one."""
+
+    @property
+    def coordinates(self) -> int:
+        """Number of coordinates."""
+        return len(self.states) // 2
+
+    @property
+    def accelerations(self) -> tuple[Formula, ...]:
+        """The acceleration of every coordinate."""
+        return (self.acceleration, *self.further_accelerations)
+
+    @property
+    def positions(self) -> tuple[str, ...]:
+        """Names of the positions."""
+        return tuple(state.name for state in self.states[: self.coordinates])
+
+    @property
+    def velocities(self) -> tuple[str, ...]:
+        """Names of the velocities."""
+        return tuple(state.name for state in self.states[self.coordinates :])
 
     @property
     def position(self) -> str:
-        """Name of the position."""
+        """Name of the position, of the first coordinate."""
         return self.states[0].name
 
     @property
     def velocity(self) -> str:
-        """Name of the velocity."""
-        return self.states[1].name
+        """Name of the velocity, of the first coordinate."""
+        return self.states[self.coordinates].name
 
 
 @cache
@@ -178,7 +204,7 @@ def has_solution(model: Model) -> bool:
     """Tell whether the motion is known: exactly, or to twelve digits since it is smooth."""
     if model.exact is not None:
         return True
-    return model.events is None and is_smooth(tree(model, model.acceleration))
+    return model.events is None and all(is_smooth(tree(model, a)) for a in model.accelerations)
 
 
 def parameter_names(model: Model) -> tuple[str, ...]:
@@ -215,6 +241,6 @@ def quantities(model: Model, own_velocity: bool = False) -> tuple[str, ...]:
     return (*(state.name for state in model.states), *ENERGIES, *budget, *outputs, *more)
 
 
-def centred(model: Model) -> tuple[str, str, str]:
-    """Name the centred difference of the position, ``[D_2t u]``, the energy with it as velocity, and its deviation."""
-    return (f"{model.velocity}_d2t", "energy_d2t", "energy_deviation_d2t")
+def centred(model: Model) -> tuple[str, ...]:
+    """Name the centred differences of the positions, ``[D_2t u]``, the energy by these velocities, its deviation."""
+    return (*(f"{name}_d2t" for name in model.velocities), "energy_d2t", "energy_deviation_d2t")

@@ -113,7 +113,6 @@ def mechanical(
         Whatever else `Model` has: it takes the place of what follows from the forces.
     """
     known = forces.known_damping
-    undamped = forces.over_mass(minus(forces.force, forces.spring))
     acceleration = forces.over_mass(minus(minus(forces.force, forces.damping), forces.spring))
     velocity = Name(forces.velocity)
     kinetic = times(times(Number(0.5), forces.mass), Binary("**", velocity, Number(2.0)))
@@ -139,7 +138,6 @@ def mechanical(
         facts["damping"] = Damping(
             kind="linear" if word == "linear" else "quadratic",
             rate=forces.over_mass(rate),
-            undamped=undamped,
         )
     return Model(
         kind=kind,

@@ -17,7 +17,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -25,9 +24,7 @@ import numpy as np
 from vibsim.expression import (
     Compare,
     Expression,
-    ExpressionError,
     Name,
-    derivative,
     is_zero,
     minus,
     parse,
@@ -36,19 +33,17 @@ from vibsim.expression import (
     times,
     to_formula,
     values,
-    walk,
 )
 from vibsim.models.base import Floats, FormulaField, Model, Numbers, Parameter, declared_parameters
 from vibsim.models.dry_friction import friction_motion
 from vibsim.models.events import Friction
+from vibsim.models.manufactured import Manufactured
 from vibsim.models.mechanical import Forces, mechanical
 
 MASS = Parameter("m", 1.0, "kg", "mass", minimum=0.0, exclusive=True)
 COULOMB = "coulomb"
 TERMS = {"linear": "b*v", "quadratic": "b*abs(v)*v", COULOMB: "b*sign(v)"}
 UNITS = {"linear": "kg s-1", "quadratic": "kg m-1", COULOMB: "N"}
-MAX_NODES = 20_000
-"""Longest force of an exact solution, in operations and names."""
 
 FORMULAS = (
     FormulaField(
@@ -122,28 +117,25 @@ class Written:
         return self.read("damping")
 
     @cached_property
-    def exact(self) -> Expression | None:
+    def manufactured(self) -> Manufactured | None:
         """The exact solution u(t), where it is written."""
-        return self.read("exact") if "exact" in self.formulas else None
+        if "exact" not in self.formulas:
+            return None
+        return Manufactured(
+            positions=(self.read("exact"),),
+            texts=(self.formulas["exact"],),
+            names=("u", "v"),
+            parameters=self.parameters,
+        )
 
     @cached_property
     def force(self) -> Expression:
         """The force F(t), as written or that of the exact solution."""
-        if self.exact is None:
+        motion = self.manufactured
+        if motion is None:
             return self.read("force")
-        speed = derivative(self.exact, "t")
-        self.refuse_long(speed, MAX_NODES // 10)
-        inertia = times(Name("m"), derivative(speed, "t"))
-        rest = plus(put(self.damping, "v", speed), put(self.spring, "u", self.exact))
-        self.refuse_long(inertia, MAX_NODES)
-        self.refuse_long(rest, MAX_NODES)
-        return plus(inertia, rest)
-
-    def refuse_long(self, node: Expression, most: int) -> None:
-        """Refuse an exact solution whose derivatives are too long to be worked with."""
-        if sum(1 for _ in islice(walk(node), most + 1)) > most:
-            rule = "its derivatives are too long to be written out as a force"
-            raise ExpressionError(self.formulas["exact"], 0, rule, "write a simpler formula")
+        inertia = times(Name("m"), motion.accelerations[0])
+        return plus(inertia, motion.along(plus(self.damping, self.spring)))
 
 
 def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
@@ -208,20 +200,8 @@ def _friction(own: Written, forces: Forces) -> dict[str, Any]:
 
 def _manufactured(own: Written) -> dict[str, Any]:
     """Return the exact solution that is written, and the start that it demands; nothing where there is none."""
-    if own.exact is None:
-        return {}
-    position, velocity = own.exact, derivative(own.exact, "t")
-
-    def manufactured(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
-        numbers = {**own.numbers(parameters), "t": t}
-        shape = np.broadcast_shapes(*(np.shape(value) for value in numbers.values()))
-        found = {"u": values(position, numbers), "v": values(velocity, numbers)}
-        return {name: np.broadcast_to(x, shape) for name, x in found.items()}
-
-    def start(parameters: Numbers) -> dict[str, Any]:
-        return manufactured(np.asarray(0.0), {}, parameters)
-
-    return {"exact": manufactured, "start": start}
+    motion = own.manufactured
+    return {} if motion is None else {"exact": motion.exact, "start": motion.start}
 
 
 def _equation(own: Written) -> str:
@@ -231,9 +211,9 @@ def _equation(own: Written) -> str:
         terms.append(_term(put(own.damping, "v", Name("u'"))))
     terms.append(_term(own.spring))
     sides = " + ".join(terms).replace("+ -", "- ")
-    told = f"{sides} = {to_formula(own.force)}" if own.exact is None else f"{sides} = F(t)"
-    if own.exact is not None:
-        told += f", with F such that u = {to_formula(own.exact)}"
+    told = f"{sides} = {to_formula(own.force)}" if own.manufactured is None else f"{sides} = F(t)"
+    if own.manufactured is not None:
+        told += f", with F such that u = {to_formula(own.read('exact'))}"
     return told
 
 

@@ -70,7 +70,7 @@ def pendulum(terms: frozenset[str]) -> Model:
         "equation": DRAGGED,
         "acceleration": f"-drag*abs(omega)*omega + ({WEIGHT})",
         "conservative": False,
-        "damping": Damping("quadratic", "drag", WEIGHT),
+        "damping": Damping("quadratic", "drag"),
         "dissipation": "m*L**2*drag*abs(omega)*omega**2",
         "outputs": (WIRE, AIR),
     }

@@ -81,7 +81,7 @@ def physical_pendulum(terms: frozenset[str]) -> Model:
         "equation": DRAGGED,
         "acceleration": f"-(drag/inertia)*abs(omega)*omega + ({WEIGHT})",
         "conservative": False,
-        "damping": Damping("quadratic", "drag/inertia", WEIGHT),
+        "damping": Damping("quadratic", "drag/inertia"),
         "dissipation": "drag*abs(omega)*omega**2",
         "outputs": (PIVOT, AIR),
     }

@@ -9,6 +9,7 @@ import numpy as np
 
 from vibsim.record import Record
 from vibsim.report import data, words
+from vibsim.vocabulary import HIGHEST
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
@@ -102,9 +103,11 @@ def _grid(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
         else f"{named}: {counts[0]} steps, dt = {sizes[0]} {time}",
     )
     if "omega_dt" in record:
-        product = np.asarray(record["omega_dt"], dtype=np.float64)
-        largest = float(product[np.isfinite(product)].max(initial=0.0))
-        yield "w dt", f"at most {words.number(largest)} (natural frequency times step)"
+        which = {"omega_dt": "natural frequency", HIGHEST: "highest frequency"}
+        for name in (name for name in which if name in record):
+            product = np.asarray(record[name], dtype=np.float64)
+            largest = float(product[np.isfinite(product)].max(initial=0.0))
+            yield "w dt", f"at most {words.number(largest)} ({which[name]} times step)"
 
 
 def _listing(

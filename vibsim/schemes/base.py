@@ -126,6 +126,8 @@ class Stepper:
     functions of time."""
     tabulated: bool = False
     """Whether the points are known before, and stand behind the parameters (`vibsim.simulation.adaptive`)."""
+    whole: bool = False
+    """Whether its functions are written for all coordinates of a model with several; else they are written out."""
 
 
 END_RULES = ("own", "extrapolate", "backward")
@@ -156,8 +158,9 @@ def handed(
 def depends_on_velocity(model: Model) -> bool:
     """Tell whether the acceleration of a model depends on the velocity; between events, where there are some."""
     events = model.events
-    smooth = events.drive if isinstance(events, Friction) else model.acceleration
-    return model.velocity in names_in(tree(model, smooth))
+    smooth = (events.drive,) if isinstance(events, Friction) else model.accelerations
+    named = {name for formula in smooth for name in names_in(tree(model, formula))}
+    return not named.isdisjoint(model.velocities)
 
 
 @dataclass(frozen=True)
@@ -208,18 +211,19 @@ class Orders:
         energy_d2t = min(energy, 2.0) if given is None else given
         velocity_d2t = min(position, 2.0) if self.velocity_d2t is None else self.velocity_d2t
         of_both = min(position, self.velocity)
+        moving = set(model.velocities)
         outputs = {
-            row.name: of_both if model.velocity in names_in(tree(model, row.formula)) else position
+            row.name: position if moving.isdisjoint(names_in(tree(model, row.formula))) else of_both
             for row in model.outputs
         }
         return {
             **outputs,
             **dict.fromkeys(BUDGET, min(of_both, ORDER_OF_WORK)),
-            model.position: position,
-            model.velocity: self.velocity,
+            **dict.fromkeys(model.positions, position),
+            **dict.fromkeys(model.velocities, self.velocity),
             "kinetic_energy": self.velocity,
             "potential_energy": position,
-            f"{model.velocity}_d2t": velocity_d2t,
+            **dict.fromkeys((f"{name}_d2t" for name in model.velocities), velocity_d2t),
             "energy_d2t": energy_d2t,
             "energy_deviation_d2t": energy_d2t,
         }.get(quantity, energy)

@@ -183,7 +183,7 @@ def even_powers(quantity: str, model: Model, options: Options) -> bool:
 
     The start must be centred and the damping smooth; whatever has the velocity in it needs a centred one at the end.
     """
-    centred_end = quantity == model.position or options["end_velocity"] == "kick"
+    centred_end = quantity in model.positions or options["end_velocity"] == "kick"
     centred_damping = model.damping is None or model.damping.kind == "linear"
     return options["start"] != "first_order" and centred_end and centred_damping
 

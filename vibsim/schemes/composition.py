@@ -230,7 +230,7 @@ def _is_centred(options: Options) -> bool:
 
 def _even_powers(quantity: str, model: Model, options: Options) -> bool:
     """Tell whether a quantity has even powers only: all that the positions of the centred scheme decide."""
-    decided = quantity in (model.position, "potential_energy") or quantity.endswith("_d2t")
+    decided = quantity in (*model.positions, "potential_energy") or quantity.endswith("_d2t")
     return decided and _is_centred(options) and not depends_on_velocity(model)
 
 

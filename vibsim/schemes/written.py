@@ -22,7 +22,7 @@ from vibsim.expression import constant
 def written(
     text: str,
     formulas: Mapping[str, str] | None = None,
-    functions: Mapping[str, Callable[..., Any]] | None = None,
+    functions: Mapping[str, Any] | None = None,
 ) -> FunctionType:
     """Return the function that `text` defines; the same one for the same text.
 
@@ -34,7 +34,7 @@ def written(
         Names of numbers that the text uses, and their formulas. Two functions of one scheme that share a name share
         its formula.
     functions
-        Names of functions that the text calls.
+        Names of functions that the text calls, or of `math`.
     """
     return _written(text, tuple((formulas or {}).items()), tuple(sorted((functions or {}).items())))
 
@@ -43,7 +43,7 @@ def written(
 def _written(
     text: str,
     formulas: tuple[tuple[str, str], ...],
-    functions: tuple[tuple[str, Callable[..., Any]], ...],
+    functions: tuple[tuple[str, Any], ...],
 ) -> FunctionType:
     values = {name: constant(formula) for name, formula in formulas}
     digest = hashlib.sha256(f"{text}{formulas}".encode()).hexdigest()[:16]

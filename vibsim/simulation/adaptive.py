@@ -34,6 +34,7 @@ from vibsim.engine.gather import OVERFLOW
 from vibsim.engine.kernel import kernel
 from vibsim.models import Model
 from vibsim.schemes.base import Acceleration, CarriedState, Options, Scheme, Stepper
+from vibsim.schemes.written import written
 from vibsim.spec.cost import PLAIN_MEMBER_STEPS
 
 Floats = NDArray[np.float64]
@@ -57,19 +58,22 @@ class Problem:
     kind: str
     tolerance: float
     parameters: tuple[float, ...]
-    initial: tuple[float, float]
+    initial: tuple[float, ...]
+    """All positions and then all velocities."""
     end: float
 
     @property
-    def scale(self) -> tuple[float, float]:
-        """Sizes of position and velocity that the absolute tolerances are relative to."""
-        u, v = self.initial
+    def scale(self) -> tuple[float, ...]:
+        """Sizes of positions and velocities that the absolute tolerances are relative to."""
+        count = self.model.coordinates
         named = {row.key: x for row, x in zip(self.model.parameters, self.parameters, strict=True)}
         w = float(self.model.natural_frequency(named))
         if not (w > 0.0 and math.isfinite(w)):
             w = 2.0 * math.pi / self.end
-        size = max(abs(u), abs(v) / w) or 1.0
-        return size, w * size
+        places = (abs(u) for u in self.initial[:count])
+        speeds = (abs(v) / w for v in self.initial[count:])
+        size = max(*places, *speeds) or 1.0
+        return (size,) * count + (w * size,) * count
 
 
 @dataclass(frozen=True)
@@ -82,6 +86,7 @@ class Run:
     """The dense output of every step: SciPy's functions of time."""
     force_evaluations: int
     """Evaluations of the acceleration, with those for the error estimates and for the dense output."""
+    states: int = 2
 
     @property
     def accepted_steps(self) -> int:
@@ -89,8 +94,8 @@ class Run:
         return len(self.pieces)
 
     def at(self, t: Floats) -> Floats:
-        """Return position and velocity at ascending times, shape (2, n_t); NaN behind the last step."""
-        found = np.full((2, len(t)), np.nan)
+        """Return the states at ascending times, shape (state, n_t); NaN behind the last step."""
+        found = np.full((self.states, len(t)), np.nan)
         which = np.searchsorted(self.times, t, side="left") - 1
         first = np.searchsorted(which, np.arange(len(self.pieces) + 1))
         for piece, start, stop in zip(self.pieces, first[:-1], first[1:], strict=True):
@@ -116,6 +121,27 @@ def step_tabulated(
 
 TABULATED = Stepper(start=start_tabulated, step=step_tabulated, own_velocity=False, tabulated=True)
 """Steps along a table of points that stands behind the parameters, and ends with one more point."""
+
+
+@cache
+def along_a_table(coordinates: int) -> Stepper:
+    """Return what goes along a table of points: of several coordinates all positions, then all velocities of each."""
+    if coordinates == 1:
+        return TABULATED
+    place = ", ".join(f"float(p[-1][first + {k}])" for k in range(coordinates))
+    speed = ", ".join(f"float(p[-1][first + {k}])" for k in range(coordinates, 2 * coordinates))
+    behind = place.replace("first", f"first + {2 * coordinates}")
+    start = (
+        "def start_tabulated(variant, u, v, dt, p, acceleration):\n"
+        f"    first = {2 * coordinates}\n"
+        f"    return ({place}), 1.0\n"
+    )
+    step = (
+        "def step_tabulated(state, t, dt, p, acceleration):\n"
+        f"    first = {2 * coordinates} * int(state[1])\n"
+        f"    return (({behind}), state[1] + 1.0), ({speed})\n"
+    )
+    return replace(TABULATED, start=written(start), step=written(step), whole=True)
 
 
 def pieces(where: NDArray[np.int64], steps: int) -> Iterator[NDArray[np.int64]]:
@@ -144,7 +170,8 @@ def integrate(
     A member whose integration fails, or that grows beyond what can be stored, ends there, and the others go on.
     """
     members = len(dt)
-    table = np.zeros((members, steps + 2, 2))
+    states = len(model.states)
+    table = np.zeros((members, steps + 2, states))
     done = np.empty((2, members))
     for i in range(members):
         problem = Problem(
@@ -152,7 +179,7 @@ def integrate(
             kind=scheme.kind,
             tolerance=float(options["tolerance"]),
             parameters=tuple(parameters[i].tolist()),
-            initial=(float(initial[i, 0]), float(initial[i, 1])),
+            initial=tuple(initial[i].tolist()),
             end=steps * float(dt[i]),
         )
         run = solved(problem)
@@ -163,7 +190,7 @@ def integrate(
         done[:, i] = run.accepted_steps, run.force_evaluations
     found = gather_over(
         model,
-        replace(scheme, stepper=lambda options: TABULATED),
+        replace(scheme, stepper=lambda options: along_a_table(model.coordinates), damped=()),
         options,
         np.concatenate([parameters, table.reshape(members, -1)], axis=1),
         initial,
@@ -211,7 +238,7 @@ def solve(problem: Problem) -> Run:
             if going and solver.status != "failed":
                 found.append(solver.dense_output())
                 times.append(float(solver.t))
-    return Run(times, found, count())
+    return Run(times, found, count(), len(problem.initial))
 
 
 def _solver(problem: Problem, right: Any, jacobian: Any) -> Any:
@@ -236,24 +263,31 @@ def _right_hand_side(
 ) -> tuple[Callable[..., Any], Callable[..., Any], Callable[[], int]]:
     """Return the derivative of (u, v), that derivative's own derivative, and what counts the forces."""
     acceleration, slopes = _forces(problem.model)
-    p = problem.parameters
-    count = 0
+    p, half = problem.parameters, problem.model.coordinates
+    evaluations = 0
 
-    def right(t: float, y: Floats) -> tuple[float, float]:
-        nonlocal count
-        count += 1
-        u, v = y.tolist()
-        return v, acceleration(u, v, float(t), p)
+    def halves(y: Floats) -> tuple[Any, Any]:
+        numbers = tuple(y.tolist())
+        return (numbers[0], numbers[1]) if half == 1 else (numbers[:half], numbers[half:])
+
+    def right(t: float, y: Floats) -> tuple[float, ...]:
+        nonlocal evaluations
+        evaluations += 1
+        u, v = halves(y)
+        a: Any = acceleration(u, v, float(t), p)
+        return (v, a) if half == 1 else (*v, *a)
 
     def jacobian(t: float, y: Floats) -> Floats:
-        u, v = y.tolist()
-        return np.array([(0.0, 1.0), slopes(u, v, float(t), p)])
+        u, v = halves(y)
+        by_u, by_v = np.reshape(slopes(u, v, float(t), p), (2, half, half))
+        return np.block([[np.zeros((half, half)), np.eye(half)], [by_u, by_v]])
 
-    return right, jacobian, lambda: count
+    return right, jacobian, lambda: evaluations
 
 
 @cache
 def _forces(model: Model) -> tuple[Callable[..., float], Callable[..., tuple[float, float]]]:
     """Return the acceleration of a model and its slopes, as plain functions of (u, v, t, p)."""
-    plain: Any = kernel(model, replace(TABULATED, implicit=True), "plain", False)
+    stepper = replace(along_a_table(model.coordinates), implicit=True)
+    plain: Any = kernel(model, stepper, "plain", False)
     return plain.__globals__["acceleration"], plain.__globals__["slopes"]

@@ -31,40 +31,25 @@ class Samples:
     dt: Floats
     """Shape (case,)."""
     every: int
-    position: Floats
-    """Shape (case, t), as all series."""
-    velocity: Floats
-    velocity_d2t: Floats | None
-    """The centred difference; None where it was not asked for."""
+    states: Floats
+    """In the order of `Model.states`, shape (state, case, t)."""
+    velocities_d2t: Floats | None
+    """The centred differences, shape (case, coordinate, t); None where they were not asked for."""
     dissipated: Floats | None
-    """Sum of the power of damping over every point so far."""
+    """Sum of the power of damping over every point so far, shape (case, t)."""
     driven: Floats | None
     lane: str
 
-    def energies(self, velocity: Floats) -> tuple[Floats, Floats]:
-        """Return kinetic and potential energy with that velocity."""
-        return energies(
-            self.model,
-            self.parameters,
-            self.dt,
-            self.every,
-            self.position,
-            velocity,
-            lane=self.lane,
-        )
+    def energies(self, velocities: Floats) -> tuple[Floats, Floats]:
+        """Return kinetic and potential energy with those velocities, shape (coordinate, case, t)."""
+        states = np.concatenate([self.states[: self.model.coordinates], velocities])
+        numbers = self.parameters, self.dt, self.every
+        return energies(self.model, *numbers, states, lane=self.lane)
 
     def values(self, formulas: tuple[Formula, ...]) -> Floats:
         """Return the values of formulas, shape (formula, case, t)."""
-        return observed(
-            self.model,
-            formulas,
-            self.parameters,
-            self.dt,
-            self.every,
-            self.position,
-            self.velocity,
-            lane=self.lane,
-        )
+        numbers = self.parameters, self.dt, self.every
+        return observed(self.model, formulas, *numbers, self.states, lane=self.lane)
 
 
 def derived(
@@ -87,8 +72,9 @@ def derived(
     dict
         Name to series, shape (scheme, case, t); and ``energy_initial``, shape (scheme, case).
     """
-    found = {name: np.empty(solution.position.shape) for name in wanted}
-    found["energy_initial"] = np.empty(solution.position.shape[:2])
+    shape = (solution.states.shape[0], *solution.states.shape[2:])
+    found = {name: np.empty(shape) for name in wanted}
+    found["energy_initial"] = np.empty(shape[:2])
     names = frozenset(found)
     for s, part, samples in _pieces(model, group, solution, steps, every):
         for name, values in _series(samples, names).items():
@@ -100,7 +86,7 @@ def _pieces(
     model: Model, group: Members, solution: Solution, steps: int, every: int
 ) -> Iterator[tuple[int, slice, Samples]]:
     """Yield the samples of some members of a scheme, with the number of the scheme and the place of the members."""
-    schemes, cases, times = solution.position.shape
+    schemes, _, cases, times = solution.states.shape
     parameters = np.stack([group.parameters[p.key] for p in model.parameters], axis=-1)
     lane = lane_for(cases, schemes * times)
     piece = max(PIECE // times, 1)
@@ -116,9 +102,8 @@ def _pieces(
                     parameters=parameters[part],
                     dt=group.end[part] / steps,
                     every=every,
-                    position=solution.position[s, part],
-                    velocity=solution.velocity[s, part],
-                    velocity_d2t=series.velocity_d2t[s, part] if series else None,
+                    states=solution.states[s, :, part],
+                    velocities_d2t=series.velocities_d2t[s, part] if series else None,
                     dissipated=_part(series.dissipated, s, part) if series else None,
                     driven=_part(series.driven, s, part) if series else None,
                     lane=lane,
@@ -132,7 +117,7 @@ def _part(values: Floats | None, scheme: int, part: slice) -> Floats | None:
 
 def _series(samples: Samples, wanted: frozenset[str]) -> dict[str, Floats]:
     """Return those of the series that are wanted, each of shape (case, t)."""
-    kinetic, potential = samples.energies(samples.velocity)
+    kinetic, potential = samples.energies(samples.states[samples.model.coordinates :])
     energy = kinetic + potential
     start = energy[:, :1]
     found = {
@@ -142,7 +127,7 @@ def _series(samples: Samples, wanted: frozenset[str]) -> dict[str, Floats]:
         "energy_deviation": energy - start,
         "energy_initial": energy[:, 0],
     }
-    _, energy_d2t, deviation_d2t = centred(samples.model)
+    *_, energy_d2t, deviation_d2t = centred(samples.model)
     if wanted & {energy_d2t, deviation_d2t}:
         found[energy_d2t] = _energy_d2t(samples)
         found[deviation_d2t] = found[energy_d2t] - start
@@ -159,11 +144,11 @@ def _series(samples: Samples, wanted: frozenset[str]) -> dict[str, Floats]:
 
 def _energy_d2t(samples: Samples) -> Floats:
     """Return the energy with ``[D_2t u]`` as the velocity; NaN where there is none or it overflows."""
-    velocity = samples.velocity_d2t
-    assert velocity is not None
-    if np.isnan(velocity).all():
-        return np.full(velocity.shape, np.nan)
-    kinetic, potential = samples.energies(velocity)
+    velocities = samples.velocities_d2t
+    assert velocities is not None
+    if np.isnan(velocities).all():
+        return np.full(samples.states.shape[1:], np.nan)
+    kinetic, potential = samples.energies(np.moveaxis(velocities, 1, 0))
     energy = kinetic + potential
     return np.where(np.isfinite(energy), energy, np.nan)
 
@@ -193,10 +178,12 @@ def work(samples: Samples) -> tuple[Floats, Floats]:
 
 def rate(model: Model, formula: Expression) -> Expression:
     """Return how fast a formula changes along a motion of the model."""
+    speeds = (Name(velocity) for velocity in model.velocities)
+    pushes = (tree(model, acceleration) for acceleration in model.accelerations)
     ways: Mapping[str, Expression] = {
         "t": Number(1.0),
-        model.position: Name(model.velocity),
-        model.velocity: tree(model, model.acceleration),
+        **dict(zip(model.positions, speeds, strict=True)),
+        **dict(zip(model.velocities, pushes, strict=True)),
     }
     total: Expression = Number(0.0)
     for name, speed in ways.items():

@@ -34,7 +34,7 @@ def gathered(
     Parameters
     ----------
     run, last_step
-        Arrays of shape (scheme, case) or (scheme, case, 2).
+        Arrays of shape (scheme, case) or (scheme, case, state, 2).
     with_d2t
         Whether the energy by ``[D_2t u]`` has a place in the file.
     """
@@ -101,14 +101,12 @@ def of_own_steps(run: Gathered) -> dict[str, Variable]:
 def _extremes(model: Model, run: Gathered) -> Rows:
     energy = model.energy_unit
     words = "largest absolute energy deviation over every step"
-    ranges = (run.position_range, run.velocity_range)
-    norms = (run.position_norms, run.velocity_norms)
     rows: Rows = {}
-    for state, low_high, sums in zip(model.states, ranges, norms, strict=True):
-        rows[f"{state.name}_min"] = low_high[..., 0], _over_steps("least", state)
-        rows[f"{state.name}_max"] = low_high[..., 1], _over_steps("largest", state)
+    for k, state in enumerate(model.states):
+        rows[f"{state.name}_min"] = run.ranges[..., k, 0], _over_steps("least", state)
+        rows[f"{state.name}_max"] = run.ranges[..., k, 1], _over_steps("largest", state)
         for i, name in enumerate(("l1", "l2")):
-            rows[f"{state.name}_{name}"] = sums[..., i], _norm_of(name, state)
+            rows[f"{state.name}_{name}"] = run.norms[..., k, i], _norm_of(name, state)
     rows["energy_deviation_max_abs"] = run.deviation, attributes(words, energy)
     rows["energy_deviation_max_abs_interior"] = (
         run.deviation_interior,

@@ -19,6 +19,7 @@ from vibsim.simulation.reference import METHOD, reference
 from vibsim.simulation.scaled import in_scales
 from vibsim.simulation.solution import Solution, has_adaptive, solve
 from vibsim.spec.series import RUNNING, asks_for_peaks, extrema_kept, is_bounded, stored_series
+from vibsim.vocabulary import HIGHEST
 
 if TYPE_CHECKING:
     import xarray
@@ -193,16 +194,16 @@ def _series(
     wanted: Iterable[str],
 ) -> dict[str, Variable]:
     names = list(wanted)
-    position, velocity = model.states
     table = {
-        position.name: Variable(SERIES, solution.position, _of(position)),
-        velocity.name: Variable(SERIES, solution.velocity, _of(velocity)),
+        state.name: Variable(SERIES, solution.states[:, k], _of(state))
+        for k, state in enumerate(model.states)
     }
     if solution.series is not None:
-        words = f"{velocity.long_name} by [D_2t u], the centred difference of the position"
-        table[centred(model)[0]] = Variable(
-            SERIES, solution.series.velocity_d2t, attributes(words, velocity.unit)
-        )
+        velocities = model.states[model.coordinates :]
+        for k, (name, velocity) in enumerate(zip(centred(model), velocities, strict=False)):
+            words = f"{velocity.long_name} by [D_2t u], the centred difference of the position"
+            values = solution.series.velocities_d2t[:, :, k]
+            table[name] = Variable(SERIES, values, attributes(words, velocity.unit))
         for name, values in (
             ("energy_deviation", solution.series.deviation_running),
             ("energy_deviation_d2t", solution.series.deviation_d2t_running),
@@ -273,6 +274,12 @@ def _constants(model: Model, group: Members, steps: int) -> dict[str, Variable]:
             attributes("angular frequency of small oscillations times the time step", "1"),
         ),
     }
+    if model.highest_frequency is not None:
+        highest = np.broadcast_to(model.highest_frequency(group.parameters), group.end.shape)
+        table[HIGHEST] = (
+            highest * (group.end / steps),
+            attributes("highest angular frequency of small oscillations times the time step", "1"),
+        )
     if model.exact_period is not None:
         period = model.exact_period(group.initial, group.parameters)
         table["exact_period"] = (np.asarray(period, dtype=float), attributes("exact period", "s"))

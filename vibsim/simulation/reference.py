@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from vibsim.simulation.members import Members
 
 Floats = NDArray[np.float64]
 Force = Callable[[Floats, Floats, Floats], Floats]
-"""The acceleration from position, velocity and time, arrays that broadcast to (stage, case)."""
+"""The accelerations, shape (coordinate, stage, case), from positions and velocities of that shape and from times."""
 
 METHOD = "collocation at 12 Gauss points of a step, halved until two solutions agree"
 STAGES = 12
@@ -57,27 +57,29 @@ class Tableau:
 
 @dataclass(frozen=True)
 class Solved:
-    """A solution by steps: states at their starts, shape (step, case), and accelerations, shape (step, stage, case)."""
+    """A solution by steps: states at their starts, and accelerations at the stages."""
 
     end: Floats
     position: Floats
+    """Shape (step, coordinate, case)."""
     velocity: Floats
     acceleration: Floats
+    """Shape (step, coordinate, stage, case)."""
 
-    def at(self, fraction: Floats) -> tuple[Floats, Floats]:
-        """Return position and velocity at fractions of the end time, shape (case, time)."""
+    def at(self, fraction: Floats) -> Floats:
+        """Return all positions and then all velocities at fractions of the end time, shape (state, case, time)."""
         steps = len(self.position)
         place = fraction * steps
         step = np.minimum(place.astype(np.int64), steps - 1)
         first, second = integrals(place - step)
         h = self.end / steps
-        u = self.position[step] + h * (place - step)[:, None] * self.velocity[step]
+        u = self.position[step] + h * (place - step)[:, None, None] * self.velocity[step]
         v = self.velocity[step].copy()
         for j in range(STAGES):
-            a = self.acceleration[step, j]
-            v += h * (first[:, j, None] * a)
-            u += h * h * (second[:, j, None] * a)
-        return u.T, v.T
+            a = self.acceleration[step, :, j]
+            v += h * (first[:, j, None, None] * a)
+            u += h * h * (second[:, j, None, None] * a)
+        return np.moveaxis(np.concatenate([u, v], axis=1), 0, -1)
 
 
 @cache
@@ -117,35 +119,39 @@ def tableau() -> Tableau:
 
 
 def _sum(coefficients: Floats, a: Floats) -> Floats:
-    """Return ``coefficients @ a``, summed in an order that does not depend on the number of members."""
-    if a.shape[1] == 1:
+    """Return ``coefficients @ a`` over the stages, summed in an order that does not depend on the number of members."""
+    if a.shape[-1] == 1:
         # numpy adds up one column in another order than several
-        return _sum(coefficients, np.repeat(a, 2, axis=1))[:, :1]
-    return np.asarray(np.add.reduce(coefficients[:, :, None] * a, axis=1))
+        return _sum(coefficients, np.repeat(a, 2, axis=-1))[..., :1]
+    return np.asarray(np.add.reduce(coefficients[:, :, None] * a[:, None], axis=2))
 
 
-def solve(force: Force, start: tuple[Floats, Floats], end: Floats, steps: int) -> Solved:
+def solve(force: Force, start: Floats, end: Floats, steps: int) -> Solved:
     """Take equal steps to the end time of each member; NaN from where the iteration does not end.
 
     Parameters
     ----------
-    start, end
-        Positions and velocities at t = 0, and end times, shape (case,).
+    start
+        All positions and then all velocities at t = 0, shape (state, case).
+    end
+        End times, shape (case,).
     """
     of = tableau()
     whole_first, whole_second = integrals(np.ones(1))
     ahead = _basis(1.0 + of.c)
     h = end / steps
-    u, v = start[0].copy(), start[1].copy()
-    lost = np.zeros((2, len(end)))
-    shape = (steps, len(end))
-    kept = Solved(end, np.empty(shape), np.empty(shape), np.empty((steps, STAGES, len(end))))
-    a = np.broadcast_to(force(u, v, 0.0 * end), (STAGES, len(end)))
+    u, v = np.array(np.split(start, 2))
+    count = len(u)
+    lost = np.zeros((2, count, len(end)))
+    shape = (steps, count, len(end))
+    stages = (count, STAGES, len(end))
+    kept = Solved(end, np.empty(shape), np.empty(shape), np.empty((steps, *stages)))
+    a = np.broadcast_to(force(u[:, None], v[:, None], 0.0 * end), stages)
     for n in range(steps):
         a = _stages(force, u, v, (n + of.c[:, None]) * h, h, a)
         kept.position[n], kept.velocity[n], kept.acceleration[n] = u, v, a
         # the rounding of each sum is carried along
-        changes = h * v + h * h * _sum(whole_second, a)[0], h * _sum(whole_first, a)[0]
+        changes = h * v + h * h * _sum(whole_second, a)[:, 0], h * _sum(whole_first, a)[:, 0]
         u, lost[0] = _added(u, changes[0], lost[0])
         v, lost[1] = _added(v, changes[1], lost[1])
         a = _sum(ahead, a)
@@ -159,15 +165,15 @@ def _added(total: Floats, change: Floats, lost: Floats) -> tuple[Floats, Floats]
 
 
 def _stages(force: Force, u: Floats, v: Floats, t: Floats, h: Floats, a: Floats) -> Floats:
-    """Return the accelerations at the stages, shape (stage, case), from a guess; NaN where no iteration ends."""
+    """Return the accelerations at the stages, shape (coordinate, stage, case), from a guess; NaN for no end."""
     of = tableau()
     going = np.ones(len(h), dtype=bool)
-    straight = u + of.c[:, None] * h * v
+    straight = u[:, None] + of.c[:, None] * h * v[:, None]
     for _ in range(ITERATIONS):
-        y = v + h * _sum(of.first, a)
+        y = v[:, None] + h * _sum(of.first, a)
         found = np.broadcast_to(force(straight + h * h * _sum(of.second, a), y, t), a.shape)
-        change = np.max(np.abs(found - a), axis=0)
-        size = np.max(np.abs(found) + np.abs(y) / h, axis=0)
+        change = np.max(np.abs(found - a), axis=(0, 1))
+        size = np.max(np.abs(found) + np.abs(y) / h, axis=(0, 1))
         # a member that has come to rest in its last digits keeps them, whatever the others do
         a = np.where(going, found, a)
         going = going & ~(change <= SMALL * size)
@@ -183,15 +189,14 @@ def reference(
 
     NaN stands where the accuracy is not reached: of motions that are not smooth, or too sensitive.
     """
-    names = (model.position, model.velocity)
+    names = [state.name for state in model.states]
     parameters = {row.name: group.parameters[row.key] for row in model.parameters}
     columns = (*(group.initial[name] for name in names), group.end, *parameters.values())
     numbers = tuple(np.ascontiguousarray(column, dtype=float).tobytes() for column in columns)
     chosen, bounds = _chosen(model, numbers)
-    series = np.full((2, len(group.end), len(fraction)), np.nan)
+    series = np.full((len(names), len(group.end), len(fraction)), np.nan)
     for members, solved in chosen:
-        for row, found in zip(series, solved.at(fraction), strict=True):
-            row[members] = found
+        series[:, members] = solved.at(fraction)
     return dict(zip(names, series, strict=True)), dict(zip(names, bounds, strict=True))
 
 
@@ -199,24 +204,21 @@ def reference(
 def _chosen(
     model: Model, numbers: tuple[bytes, ...]
 ) -> tuple[list[tuple[NDArray[np.int64], Solved]], Floats]:
-    """Return the solutions that were accepted, each with its members, and the bounds, shape (2, case)."""
-    u, v, end, *rest = (np.frombuffer(column) for column in numbers)
+    """Return the solutions that were accepted, each with its members, and the bounds, shape (state, case)."""
+    states = len(model.states)
+    columns = [np.frombuffer(column) for column in numbers]
+    start, end, rest = np.array(columns[:states]), columns[states], columns[states + 1 :]
     names = [row.name for row in model.parameters]
-    formula = tree(model, model.acceleration)
     times = np.arange(COMPARED + 1) / COMPARED
-    bounds = np.full((2, len(end)), np.nan)
+    bounds = np.full((states, len(end)), np.nan)
     accepted = []
     left, steps = np.arange(len(end)), FEWEST
     before, gap, slow = None, np.full(len(end), np.inf), np.zeros(len(end), dtype=np.int64)
     with np.errstate(all="ignore"):
         while len(left) and steps <= MOST:
             own = dict(zip(names, (column[left] for column in rest), strict=True))
-
-            def force(x: Floats, y: Floats, t: Floats, own: dict[str, Floats] = own) -> Floats:
-                return values(formula, {**own, model.position: x, model.velocity: y, "t": t})
-
-            solved = solve(force, (u[left], v[left]), end[left], steps)
-            now = np.stack(solved.at(times))
+            solved = solve(partial(_force, model, own), start[:, left], end[left], steps)
+            now = solved.at(times)
             if before is not None:
                 size = np.max(np.abs(now), axis=-1)
                 error = np.max(np.abs(now - before), axis=-1)
@@ -235,10 +237,22 @@ def _chosen(
     return accepted, bounds
 
 
+def _force(model: Model, parameters: dict[str, Floats], u: Floats, v: Floats, t: Floats) -> Floats:
+    """Return the accelerations of a model; see `Force`."""
+    numbers = {
+        **parameters,
+        **dict(zip(model.positions, u, strict=True)),
+        **dict(zip(model.velocities, v, strict=True)),
+        "t": t,
+    }
+    found = (values(tree(model, formula), numbers) for formula in model.accelerations)
+    return np.stack([np.broadcast_to(a, np.broadcast_shapes(u.shape[1:], t.shape)) for a in found])
+
+
 def _of(solved: Solved, members: NDArray[np.bool_]) -> Solved:
     return Solved(
         solved.end[members],
-        solved.position[:, members],
-        solved.velocity[:, members],
-        solved.acceleration[:, :, members],
+        solved.position[..., members],
+        solved.velocity[..., members],
+        solved.acceleration[..., members],
     )

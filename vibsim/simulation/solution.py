@@ -32,15 +32,14 @@ Floats = NDArray[np.float64]
 class Solution:
     """What was computed, stacked over the schemes."""
 
-    position: Floats
-    """Shape (scheme, case, t)."""
-    velocity: Floats
+    states: Floats
+    """In the order of `Model.states`, shape (scheme, state, case, t)."""
     last_step: NDArray[np.int64]
     """Shape (scheme, case)."""
     gathered: Gathered
-    """Its arrays have the shape (scheme, case) or (scheme, case, 2)."""
+    """Its arrays have the shape (scheme, case) or (scheme, case, state, 2)."""
     series: Series | None
-    """Its arrays have the shape (scheme, case, t)."""
+    """Its arrays have the shape (scheme, case, t) or (scheme, case, coordinate, t)."""
     extrema: Extrema | None
     """Its arrays have the shape (scheme, case, extremum) or (scheme, case)."""
     events: EventTimes | None
@@ -70,8 +69,7 @@ def solve(
         for i in range(len(experiment.schemes))
     ]
     return Solution(
-        position=_stack(row.position for row in rows),
-        velocity=_stack(row.velocity for row in rows),
+        states=_stack(row.states for row in rows),
         last_step=_stack(row.last_step for row in rows),
         gathered=_each(Gathered, [row.gathered for row in rows], _stack),
         series=_each(Series, [row.series for row in rows], _stack) if with_series else None,
@@ -130,11 +128,13 @@ def _in_order(parts: list[tuple[Trajectories, NDArray[np.int64]]]) -> Trajectori
     def sorted_(arrays: Iterable[Any]) -> NDArray[Any]:
         return np.asarray(np.concatenate(list(arrays))[order])
 
+    def sorted_rows(arrays: Iterable[Any]) -> NDArray[Any]:
+        return np.asarray(np.concatenate(list(arrays), axis=1)[:, order])
+
     runs = [run for run, _ in parts]
     one = runs[0]
     return Trajectories(
-        position=sorted_(run.position for run in runs),
-        velocity=sorted_(run.velocity for run in runs),
+        states=sorted_rows(run.states for run in runs),
         last_step=sorted_(run.last_step for run in runs),
         gathered=_each(Gathered, [run.gathered for run in runs], sorted_),
         series=_each(Series, [run.series for run in runs], sorted_) if one.series else None,

@@ -102,8 +102,10 @@ def _checks(
     kept.extend(claims(published, experiment.source))
     if kept:
         return tuple(kept)
-    position = experiment.model.definition.position
-    return (ConvergesCheck(id="check_1", converges=position),)
+    positions = experiment.model.definition.positions
+    return tuple(
+        ConvergesCheck(id=f"check_{i}", converges=name) for i, name in enumerate(positions, 1)
+    )
 
 
 def case_of(check: Measurement) -> int | None:

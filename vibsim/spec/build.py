@@ -81,6 +81,7 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
     )
     limits.check(shape, report)
     _check_output(part.output, levels, report)
+    _check_extrapolated(part, model, report)
     ladder = _ladder(part, source, model, schemes, shape, time, varied)
     checks = _checks(part, model, ladder, report)
     published = finish_published(part.published, _ids(part), ladder, report)
@@ -182,7 +183,7 @@ def _initial(
         if name in (part.initial or {}) and not math.isclose(
             found[name], value, rel_tol=1e-12, abs_tol=1e-12
         ):
-            rule = f"must be {value:.15g}, where the exact solution starts, or be left out"
+            rule = f"must be {value:.15g}, where the motion starts, or be left out"
             report.add(("initial", name), rule)
         found[name] = float(value)
     return found
@@ -327,8 +328,19 @@ def _all_known(part: Any) -> bool:
 def _checks(part: Any, model: Model | None, ladder: Ladder, report: Report) -> tuple[Any, ...]:
     checks = list(part.checks)
     if not checks and not part.published and model is not None:
-        checks = [ConvergesCheck(converges=model.position)]
+        checks = [ConvergesCheck(converges=name) for name in model.positions]
     return finish_checks(checks, ladder, report)
+
+
+def _check_extrapolated(part: Any, model: Model | None, report: Report) -> None:
+    """Refuse to extrapolate the whole motion of several coordinates."""
+    if model is None or model.coordinates == 1:
+        return
+    rule = f"extrapolates a motion of one coordinate, {model.kind} has {model.coordinates}"
+    if part.tolerance is not None:
+        report.add(("tolerance",), rule, "give levels", part.tolerance)
+    if part.output == "best":
+        report.add(("output",), rule, "choose from levels", part.output)
 
 
 def _ids(part: Any) -> list[str]:

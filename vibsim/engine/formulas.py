@@ -1,0 +1,226 @@
+"""The text of a model's formulas: acceleration, energies, powers and the like as functions of ``(u, v, t, p)``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from inspect import signature
+
+from vibsim import expression
+from vibsim.elementary import ELEMENTARY
+from vibsim.engine.text import Module, collect
+from vibsim.errors import SimulationError
+from vibsim.expression import Binary, Call, Compare, Expression, Name, Number
+from vibsim.models import Model
+from vibsim.models.base import Formula, parameter_names, tree
+from vibsim.models.events import Friction, Impact
+from vibsim.schemes.base import Stepper
+
+_MODE = "mode"
+_MARK = "_"
+"""Behind the names of parameters in a kernel."""
+
+
+def n_parameters(stepper: Stepper, model: Model) -> int:
+    """Return how many parameters a member has: those of the model, and the factors of `Stepper.scaling` behind them."""
+    return len(model.parameters) + (2 if stepper.scaling else 0)
+
+
+def n_event_numbers(model: Model) -> int:
+    """Return how many numbers stand between the parameters of a member and the factors behind them: mode and start."""
+    return 2 if model.events is not None else 0
+
+
+def put_formulas(
+    module: Module,
+    model: Model,
+    suffix: str,
+    stepper: Stepper,
+    *,
+    is_rare: bool = False,
+    with_kinetic: bool = False,
+    with_work: bool = False,
+) -> None:
+    """Write the model's acceleration and energies as functions of ``(u, v, t, p)``, and what they call.
+
+    Parameters
+    ----------
+    suffix
+        ``_fast`` for formulas without branches.
+    is_rare
+        Whether they are seldom needed, so that elementary functions are not compiled into them.
+    stepper
+        For whom: an implicit one needs derivatives too, one with `Stepper.scaling` a factor.
+    with_kinetic
+        Whether the kinetic energy is needed for itself.
+    with_work
+        Whether the powers of damping and of driving forces are needed.
+    """
+    put = marked(model)
+    accelerations = [put(formula) for formula in model.accelerations]
+    parts = _of_events(model, put)
+    if "drive" in parts:
+        held = Binary("*", Name(_MODE), parts["limit"]["_limit"])
+        accelerations = [Binary("-", parts["drive"]["_drive"], held)]
+    formulas = {
+        "acceleration": {f"_result_{i}": formula for i, formula in enumerate(accelerations)},
+        **parts,
+        "energies": {
+            "_kinetic": put(model.kinetic_energy),
+            "_potential": put(model.potential_energy),
+        },
+    }
+    if stepper.implicit:
+        formulas["slopes"] = {
+            f"_slope_{i}_{name}": expression.derivative(formula, name)
+            for names in (model.positions, model.velocities)
+            for i, formula in enumerate(accelerations)
+            for name in names
+        }
+    if "damping_rate" in signature(stepper.step).parameters:
+        rate = put(model.damping.rate) if model.damping else Number(0.0)
+        formulas["damping_rate"] = {"_rate": rate}
+    if with_kinetic:
+        formulas["kinetic_energy"] = {"_kinetic": formulas["energies"]["_kinetic"]}
+    if with_work:
+        formulas["powers"] = {
+            "_dissipation": put(model.dissipation or "0.0"),
+            "_driving": put(model.driving or "0.0"),
+        }
+    is_scaled = stepper.scaling is not None
+    scaled = ("acceleration", "slopes") if is_scaled else ()
+    put_functions(module, model, suffix, formulas, is_rare=is_rare, scaled=scaled)
+    put_parameters(module, model, 2 if is_scaled else 0, tabulated=stepper.tabulated)
+
+
+def put_energy_with(module: Module, model: Model) -> None:
+    """Write the energy at another velocity, for which a potential energy is known unless it depends on that.
+
+    Uncompiled, nobody else would see that it is the same again.
+    """
+    potential = tree(model, model.potential_energy)
+    line = "kinetic = kinetic_energy(u, v, t, p)"
+    if set(model.velocities) & set(expression.names_in(potential)):
+        line = "kinetic, potential = energies(u, v, t, p)"
+    head = "@compiled\ndef energy_with(u, v, t, p, potential):"
+    module.put("energy_with", f"{head}\n    {line}\n    return kinetic + potential")
+
+
+def marked(model: Model) -> Callable[[Formula], Expression]:
+    """Return what reads a formula, its parameters marked so that no name of a user is one of the kernel's text."""
+    with_marks: dict[Expression, Expression] = {
+        Name(name): Name(name + _MARK) for name in parameter_names(model)
+    }
+
+    def put(formula: Formula) -> Expression:
+        return expression.rebuilt(tree(model, formula), lambda node: with_marks.get(node, node))
+
+    return put
+
+
+def put_functions(
+    module: Module,
+    model: Model,
+    suffix: str,
+    formulas: Mapping[str, Mapping[str, Expression]],
+    *,
+    is_rare: bool = False,
+    scaled: Collection[str] = (),
+    always_tuple: bool = False,
+) -> None:
+    """Write functions of ``(u, v, t, p)``, each with the formulas of its results by their names.
+
+    Parameters
+    ----------
+    scaled
+        Functions whose results are multiplied by a factor that stands behind the parameters.
+    always_tuple
+        Whether a function with one result returns a tuple too.
+    """
+    names = parameter_names(model)
+    unpack = [f"{name}{_MARK} = p[{i}]" for i, name in enumerate(names)]
+    for function, results in formulas.items():
+        lines = list(unpack)
+        if model.events is not None and function in ("acceleration", "slopes"):
+            lines += [f"{_MODE} = p[{len(names)}]", f"t = t + p[{len(names) + 1}]"]
+        for result, formula in results.items():
+            ready = _with_functions(module, formula, suffix, is_rare)
+            lines += expression.to_statements(ready, result)
+            if function in scaled:
+                lines.append(f"{result} = {result} * p[{len(names) + n_event_numbers(model)}]")
+        returned = ", ".join(results)
+        lines.append(f"return ({returned},)" if always_tuple else f"return {returned}")
+        module.put(function + suffix, _head(model, function + suffix) + "\n    ".join(lines))
+
+
+def _head(model: Model, function: str) -> str:
+    """Return the first lines of a function, which name the states; several coordinates come as two tuples."""
+    if model.coordinates == 1:
+        return f"@compiled\ndef {function}({model.position}, {model.velocity}, t, p):\n    "
+    names = ", ".join((*model.positions, *model.velocities))
+    values = ", ".join(f"_{name}[{k}]" for name in ("u", "v") for k in range(model.coordinates))
+    return f"@compiled\ndef {function}(_u, _v, t, p):\n    {names} = {values}\n    "
+
+
+def put_parameters(module: Module, model: Model, more: int = 0, *, tabulated: bool = False) -> None:
+    """Write what makes the parameters of a member a tuple, with `more` numbers and a table behind them."""
+    first = len(model.parameters)
+    count = first + more
+    places = [f"float(parameters[case, {i}])" for i in range(count)]
+    places[first:first] = ["0.0"] * n_event_numbers(model)
+    values = ", ".join(places) or "0.0"
+    if tabulated:
+        values += f", parameters[case, {count}:]"
+    text = f"@compiled\ndef parameters_of(parameters, case):\n    return ({values},)"
+    module.put("parameters_of", text)
+
+
+def _of_events(
+    model: Model, put: Callable[[Formula], Expression]
+) -> dict[str, dict[str, Expression]]:
+    """Return the formulas of the events of a model, by function and result."""
+    match model.events:
+        case None:
+            return {}
+        case Friction(drive, limit):
+            return {"drive": {"_drive": put(drive)}, "limit": {"_limit": put(limit)}}
+        case Impact(restitution, near, slow):
+            results = {"_restitution": restitution, "_near": near, "_slow": slow}
+            return {"impact_of": {name: put(formula) for name, formula in results.items()}}
+
+
+def _with_functions(module: Module, formula: Expression, suffix: str, is_rare: bool) -> Expression:
+    """Collect the functions that a formula calls, and call them by their names in the kernel."""
+
+    def bind(node: Expression) -> Expression:
+        match node:
+            case Binary("**", base, exponent) if not _is_whole(exponent):
+                return bind(Call("power", (base, exponent)))
+            case Compare(_, left, right) if suffix:
+                # a comparison would hide the NaN of a fast function out of its range
+                return Binary("+", node, _nothing(Binary("+", _nothing(left), _nothing(right))))
+            case Compare():
+                # as a number: a truth value knows no -0, which the fast text would give
+                return Binary("*", Number(1.0), node)
+            case Call(function, arguments):
+                if function not in ELEMENTARY:
+                    raise SimulationError(
+                        f"the engine has no function {function}; it has " + ", ".join(ELEMENTARY)
+                    )
+                texts = ELEMENTARY[function]
+                text = texts.fast if suffix else texts.full
+                collect(module, text, function + suffix, {}, is_called=is_rare)
+                return Call(function + suffix, arguments)
+            case _:
+                return node
+
+    return expression.rebuilt(formula, bind)
+
+
+def _is_whole(exponent: Expression) -> bool:
+    value = expression.literal(exponent)
+    return value is not None and value.is_integer()
+
+
+def _nothing(node: Expression) -> Expression:
+    """Return an expression that is 0, or NaN where `node` is not finite."""
+    return Binary("-", node, node)

@@ -1,0 +1,206 @@
+r"""The elastic pendulum: a body on an elastic wire, in the plane; dimensionless.
+
+``x'' = -beta T x/L``, ``y'' = beta (T (1 - y)/L - 1)``, less the drag ``(gamma/beta) |v| v``, with the length of the
+wire ``L = sqrt(x^2 + (1 - y)^2)`` and its pull over the weight, ``T = (L - beta)/(1 - beta)``. The body rests at the
+origin, where L = T = 1; the pivot is at (0, 1). Length is scaled by that of the wire at rest, ``L_0 + m g/k``, time by
+``sqrt(L_0/g)``; ``beta = L_0/(L_0 + m g/k)``, and ``gamma = rho C_D A L_0/(2 m)`` for a drag ``rho C_D A |v| v/2``.
+
+The body starts without velocity from where the wire makes the angle Theta and is longer by epsilon than at rest:
+``x = (1 + epsilon) sin Theta``, ``y = 1 - (1 + epsilon) cos Theta``. Small swings have the frequency ``sqrt(beta)``
+(not 1: `errata`), stretching ``sqrt(beta/(1 - beta))``: as beta tends to 1 a step has to resolve the latter, which the
+time of a swing does not show.
+
+With ``L - 1 = (x^2 + y (y - 2))/(L + 1)``, which loses nothing by cancellation, ``T = 1 + (L - 1)/(1 - beta)`` keeps
+its digits for beta near 1, and the body rests exactly. The limit 1/L that the text proposes there is wrong: L
+depends on beta (`errata`).
+
+The forces of a manufactured solution (exercise 23 asks for a test of the drag) are those with which ``exact_x`` and
+``exact_y``, formulas in t, solve the equations.
+
+With Theta = 0 and no drag the body moves up and down only: ``y = -epsilon cos(sqrt(beta/(1 - beta)) t)`` exactly, since
+the wire pulls for ``|epsilon| < 1`` as a spring does.
+
+Source: vibration text (B), section 10.7, equations (106)-(112), and exercises 22 and 23.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache, partial
+from typing import Any
+
+import numpy as np
+
+from vibsim.expression import Name, parse, plus, times
+from vibsim.models.base import (
+    Damping,
+    Floats,
+    FormulaField,
+    Model,
+    Numbers,
+    Output,
+    Parameter,
+    State,
+    declared_parameters,
+)
+from vibsim.models.harmonic import motion
+from vibsim.models.manufactured import Manufactured
+
+STATES = (
+    State("x", "1", "horizontal position"),
+    State("y", "1", "height above the place of rest"),
+    State("vx", "1", "horizontal velocity"),
+    State("vy", "1", "vertical velocity"),
+)
+BETA = Parameter(
+    "beta",
+    0.9,
+    "1",
+    "length of the wire without load over that at rest; towards 1 the wire is stiff",
+    minimum=0.0,
+    exclusive=True,
+    maximum=1.0 - 2.0**-20,
+)
+ANGLE = Parameter(
+    "Theta", 30.0, "degree", "initial angle of the wire", minimum=-180.0, maximum=180.0
+)
+STRETCH = Parameter(
+    "epsilon",
+    0.0,
+    "1",
+    "initial stretch of the wire beyond its length at rest",
+    minimum=-1.0,
+    exclusive=True,
+)
+DRAG = Parameter("gamma", 0.0, "1", "coefficient of the drag", minimum=0.0)
+FORMULAS = (
+    FormulaField(
+        "exact_x",
+        ("t",),
+        "0",
+        "exact solution x(t), from which forces then follow; the motion starts on it, without Theta and epsilon",
+    ),
+    FormulaField("exact_y", ("t",), "0", "exact solution y(t) beside exact_x"),
+)
+
+LENGTH = "sqrt(x**2 + (1.0 - y)**2)"
+BEYOND = f"((x**2 + y*(y - 2.0))/({LENGTH} + 1.0))"
+PULL = f"(1.0 + {BEYOND}/(1.0 - beta))"
+SPEED = "hypot(vx, vy)"
+ACROSS = f"-beta*{PULL}*x/{LENGTH}"
+UPWARD = f"beta*({PULL}*(1.0 - y)/{LENGTH} - 1.0)"
+OUTPUTS = (
+    Output("angle", "degree", "angle of the wire with the vertical", "180.0/pi*atan2(x, 1.0 - y)"),
+    Output("wire_length", "1", "length of the wire over that at rest", LENGTH),
+    Output("wire_force", "1", "pull of the wire over the weight", PULL),
+)
+AIR = Output("drag_force", "1", "drag over the weight", f"(gamma/beta**2)*{SPEED}**2")
+EQUATION = "x'' = -beta T x/L{}, y'' = beta (T (1 - y)/L - 1){}, T = (L - beta)/(1 - beta), L = sqrt(x^2 + (1 - y)^2)"
+
+
+def natural_frequency(parameters: Numbers) -> Any:
+    """Return the angular frequency of small swings, ``sqrt(beta)``."""
+    return np.sqrt(parameters["beta"])
+
+
+def highest_frequency(parameters: Numbers) -> Any:
+    """Return the higher one of the angular frequencies of small swings and of stretching, ``sqrt(beta/(1 - beta))``."""
+    beta = parameters["beta"]
+    return np.sqrt(beta / (1.0 - beta))
+
+
+def start(parameters: Numbers) -> dict[str, Any]:
+    """Return the initial position, B (109) and (111), and no velocity."""
+    angle, length = np.deg2rad(parameters["Theta"]), 1.0 + np.asarray(parameters["epsilon"])
+    zero = np.zeros(np.broadcast_shapes(np.shape(angle), np.shape(length)))
+    # 1 - (1 + epsilon) cos(Theta), without the rounding of 1 + epsilon where Theta is 0
+    lifted = 2.0 * length * np.sin(0.5 * angle) ** 2 - parameters["epsilon"]
+    return {"x": length * np.sin(angle), "y": lifted + zero, "vx": zero, "vy": zero}
+
+
+def vertical_motion(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
+    """Return the exact motion straight up and down without drag (exercise 22c); NaN off the vertical."""
+    y, vy = motion(t, highest_frequency(parameters), initial["y"], initial["vy"])
+    is_vertical = (np.asarray(initial["x"]) == 0.0) & (np.asarray(initial["vx"]) == 0.0)
+    zero = np.where(is_vertical, 0.0, np.nan) + 0.0 * y
+    return {"x": zero, "y": y + zero, "vx": zero, "vy": vy + zero}
+
+
+def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
+    """Return the elastic pendulum that hangs straight down, or that follows a manufactured solution.
+
+    Raises
+    ------
+    ExpressionError
+        Where a formula names something else than its field allows, or has derivatives that are too long.
+    """
+    return elastic_pendulum(tuple(sorted(formulas.items())), declared, frozenset())
+
+
+@cache
+def elastic_pendulum(
+    texts: tuple[tuple[str, str], ...], declared: tuple[str, ...], terms: frozenset[str]
+) -> Model:
+    """Return the elastic pendulum, with drag where `terms` has ``gamma``, off the vertical where it has ``Theta``."""
+    is_dragged, formulas = "gamma" in terms, dict(texts)
+    own = (BETA, DRAG) if formulas else (BETA, ANGLE, STRETCH, DRAG)
+    parameters = (*own, *declared_parameters(declared))
+    known = tuple(row.name for row in parameters)
+    names = (*(state.name for state in STATES), *known)
+    drags = [f" - (gamma/beta)*{SPEED}*{name}" if is_dragged else "" for name in ("vx", "vy")]
+    forces = [parse(text + drag, names) for text, drag in zip((ACROSS, UPWARD), drags, strict=True)]
+    followed = Manufactured(
+        positions=tuple(
+            parse(formulas.get(field.name, field.default), ("t", *known)) for field in FORMULAS
+        ),
+        texts=tuple(formulas.values()),
+        names=tuple(state.name for state in STATES),
+        parameters=parameters,
+    )
+    more: dict[str, Any] = {"start": start}
+    if formulas:
+        pushes = followed.forces(forces)
+        forces = [plus(force, push) for force, push in zip(forces, pushes, strict=True)]
+        powers = (times(push, Name(v)) for push, v in zip(pushes, ("vx", "vy"), strict=True))
+        more = {"exact": followed.exact, "start": followed.start, "driving": plus(*powers)}
+    elif not terms:
+        more["exact"] = vertical_motion
+    if is_dragged:
+        more["damping"] = Damping("quadratic", "gamma/beta")
+        more["dissipation"] = f"(gamma/beta)*{SPEED}**3"
+    return Model(
+        kind="elastic_pendulum",
+        title="Elastic pendulum",
+        source="vibration text, section 10.7, equations (106)-(112), and exercises 22 and 23",
+        equation=_equation(is_dragged, formulas),
+        states=STATES,
+        parameters=parameters,
+        acceleration=forces[0],
+        further_accelerations=(forces[1],),
+        kinetic_energy="0.5*(vx**2 + vy**2)",
+        potential_energy=f"beta*({BEYOND}*(1.0 + 0.5*{BEYOND}/(1.0 - beta)) + y)",
+        energy_unit="1",
+        linear=False,
+        conservative=not is_dragged and not formulas,
+        natural_frequency=natural_frequency,
+        highest_frequency=highest_frequency,
+        outputs=(*OUTPUTS, AIR) if is_dragged else OUTPUTS,
+        formulas=FORMULAS,
+        written=written,
+        optional=("gamma",) if formulas else ("Theta", "gamma"),
+        variant=partial(elastic_pendulum, texts, declared),
+        **more,
+    )
+
+
+def _equation(is_dragged: bool, formulas: Mapping[str, str]) -> str:
+    drags = [f" - (gamma/beta) |v| {name}'" if is_dragged else "" for name in ("x", "y")]
+    pushes = (" + F_x(t)", " + F_y(t)") if formulas else ("", "")
+    told = EQUATION.format(*(drag + push for drag, push in zip(drags, pushes, strict=True)))
+    given = (f"{name.removeprefix('exact_')} = {text}" for name, text in formulas.items())
+    return f"{told}, with F such that {', '.join(given)}" if formulas else told
+
+
+ELASTIC_PENDULUM = replace(written({}, ()), equation=_equation(is_dragged=True, formulas={}))
+"""The pendulum that hangs straight down, under the equation of all."""

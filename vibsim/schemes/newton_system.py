@@ -1,0 +1,133 @@
+r"""Newton's method for the equations that a step of an implicit scheme leaves, of several coordinates.
+
+`vibsim.schemes.newton` has one coordinate; here the unknowns are the accelerations of all of them at one or two stages,
+``x_i = a(U_i, V_i, t_i)`` with ``U_i = u_i + sum_j d_u_ij x_j`` and V_i likewise. The matrix of Newton's method,
+``1 - (d_u_ij da/du + d_v_ij da/dv)``, differs from the unit matrix by O(dt^2), or O(dt) where the force depends on the
+velocity: it is eliminated without a search for pivots. A pivot that vanishes ends the member, as does an iteration
+without an end: never a value that does not solve the equations. It stops as `vibsim.schemes.newton` does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from functools import cache
+from itertools import product
+from typing import Any
+
+from vibsim.schemes.newton import LEAST, MOST_TOGETHER, STALLED, TOLERANCE, alone
+from vibsim.schemes.written import written
+
+_NUMBERS = {
+    "LEAST": repr(LEAST),
+    "STALLED": repr(STALLED),
+    "TOLERANCE": repr(TOLERANCE),
+}
+
+
+@cache
+def solver(coordinates: int, stages: int) -> Callable[..., Any]:
+    """Return what `vibsim.schemes.newton.solved` (one stage) or `solved_together` (two) is for several coordinates.
+
+    Positions, velocities and accelerations are tuples, as long as there are coordinates; `slopes` returns the
+    derivatives of every acceleration by every position, row by row, and then those by every velocity.
+    """
+    several = stages > 1
+    guesses = ("x", "y") if several else ("x",)
+    name = f"solved_{'together_' if several else ''}{coordinates}"
+    found = [f"({', '.join(f'x_{i}_{c}' for c in range(coordinates))})" for i in range(stages)]
+    done = ", ".join(found)
+    lines = [
+        "@alone",
+        f"def {name}({', '.join(guesses)}, u, d_u, v, d_v, t, p, acceleration, slopes):",
+        *(
+            f"    x_{i}_{c} = {guesses[i]}[{c}]"
+            for i, c in product(range(stages), range(coordinates))
+        ),
+        "    before = 0.0",
+        f"    for k in range({MOST_TOGETHER}):",
+        *(f"        {line}" for line in _iteration(coordinates, stages)),
+        "        rate = change / before if k else 1.0",
+        "        # `not >`, so that NaN ends it as well",
+        "        if not change * rate > TOLERANCE * scale + LEAST:",
+        f"            return {done}",
+        "        if k and not change > STALLED * scale + LEAST and not rate < 0.5:",
+        f"            return {done}",
+        "        before = change",
+        *(f"    x_{i}_{c} = math.nan" for i, c in product(range(stages), range(coordinates))),
+        f"    return {done}",
+    ]
+    return written("\n".join(lines) + "\n", _NUMBERS, {"alone": alone, "math": math})
+
+
+def _iteration(coordinates: int, stages: int) -> Iterator[str]:
+    """Yield the lines of one iteration, which change the unknowns and set `change` and `scale`."""
+    terms = []
+    for i in range(stages):
+        yield from _stage(i, coordinates, stages)
+        for c in range(coordinates):
+            terms.append(f"abs(force_{i}[{c}])")
+            for e in range(coordinates):
+                by_u, by_v = _slopes(i, c, e, coordinates)
+                terms += [f"abs({by_u} * place_{i}[{e}])", f"abs({by_v} * speed_{i}[{e}])"]
+    unknowns = [f"{i}_{c}" for i, c in product(range(stages), range(coordinates))]
+    for row, (i, c) in enumerate(product(range(stages), range(coordinates))):
+        yield f"r_{row} = x_{i}_{c} - force_{i}[{c}]"
+        for column, (j, e) in enumerate(product(range(stages), range(coordinates))):
+            by_u, by_v = _slopes(i, c, e, coordinates)
+            entry = (
+                f"({by_u} * {_entry('d_u', i, j, stages)} + {by_v} * {_entry('d_v', i, j, stages)})"
+            )
+            yield f"m_{row}_{column} = {'1.0 - ' if row == column else '-'}{entry}"
+    yield from elimination(len(unknowns))
+    yield from (f"x_{name} = x_{name} - r_{row}" for row, name in enumerate(unknowns))
+    yield "change = abs(r_0)"
+    yield from (
+        f"change = abs(r_{row}) if abs(r_{row}) > change else change"
+        for row in range(1, len(unknowns))
+    )
+    # a change that is no number is one in the sum as well
+    yield (
+        "change = change + ((" + " + ".join(f"r_{row}" for row in range(len(unknowns))) + ") * 0.0)"
+    )
+    yield f"scale = {' + '.join(terms)}"
+
+
+def _stage(i: int, coordinates: int, stages: int) -> Iterator[str]:
+    """Yield the lines that evaluate the force and its slopes at stage i."""
+    for name, known, weights in (("place", "u", "d_u"), ("speed", "v", "d_v")):
+        entries = []
+        for c in range(coordinates):
+            own = f"{known}[{i}][{c}]" if stages > 1 else f"{known}[{c}]"
+            reach = " + ".join(
+                f"{_entry(weights, i, j, stages)} * x_{j}_{c}" for j in range(stages)
+            )
+            entries.append(f"{own} + ({reach})")
+        yield f"{name}_{i} = ({', '.join(entries)})"
+    time = f"t[{i}]" if stages > 1 else "t"
+    yield f"force_{i} = acceleration(place_{i}, speed_{i}, {time}, p)"
+    yield f"slopes_{i} = slopes(place_{i}, speed_{i}, {time}, p)"
+
+
+def _entry(name: str, i: int, j: int, stages: int) -> str:
+    return f"{name}[{i * stages + j}]" if stages > 1 else name
+
+
+def _slopes(i: int, row: int, column: int, coordinates: int) -> tuple[str, str]:
+    """Name the derivatives of an acceleration at stage i by a position and by a velocity."""
+    place = row * coordinates + column
+    return f"slopes_{i}[{place}]", f"slopes_{i}[{coordinates**2 + place}]"
+
+
+def elimination(size: int) -> Iterator[str]:
+    """Yield the lines that solve ``m x = r`` for ``m_0_0, m_0_1, ...``; the solution stands in ``r_0, ...`` then."""
+    for k in range(size):
+        for row in range(k + 1, size):
+            yield f"factor = m_{row}_{k} / m_{k}_{k}"
+            yield from (
+                f"m_{row}_{j} = m_{row}_{j} - factor * m_{k}_{j}" for j in range(k + 1, size)
+            )
+            yield f"r_{row} = r_{row} - factor * r_{k}"
+    for row in reversed(range(size)):
+        rest = "".join(f" - m_{row}_{j} * r_{j}" for j in range(row + 1, size))
+        yield f"r_{row} = (r_{row}{rest}) / m_{row}_{row}"
