@@ -33,6 +33,8 @@ KNOWN = 12
 """Power of dt from which on nothing is known of a residual: twice that of any scheme at these degrees."""
 STEPS = 4
 """Steps that a polynomial must be followed for: more than any scheme carries points."""
+ROUNDED = 1e-13
+"""Size of a term that is none: some schemes state their coefficients to 16 decimals."""
 OF = ("position", "velocity", "state")
 CAUSES = ("differences", "force", "damping")
 """Of `Forces`, in their order."""
@@ -64,7 +66,9 @@ class Miss:
 
 def applies(model: Model) -> bool:
     """Tell whether the acceleration of a model can be worked out in exact numbers, and never jumps."""
-    return model.events is None and is_rational(restoring(model))
+    if model.events is not None or model.coordinates > 1:
+        return False
+    return is_rational(restoring(model))
 
 
 def _refuse(model: Model) -> None:
@@ -131,16 +135,21 @@ def _step(course: Course) -> tuple[Laurent, ...]:
 
 def _residual(course: Course, off: Off) -> Residual | None:
     """Return the first term of the first number of a state that is off; its power from a point, the rest in symbols."""
-    found = ((i, x, x.leading) for i, x in enumerate(off(course)))
-    index, number, term = next((row for row in found if row[2] is not None), (0, None, None))
-    if number is None or term is None:
+    found = ((i, x, _power(x)) for i, x in enumerate(off(course)))
+    index, number, power = next((row for row in found if row[2] is not None), (0, None, None))
+    if number is None or power is None:
         return None
-    power, lost = term[0], KNOWN - number.end
-    setting = symbols(course.stepper, course.model, course.degree, power + 1 + lost)
-    exact = off(replace(course, setting=setting))[index].leading
-    if exact is None or exact[0] != power:
-        raise ArithmeticError(f"a residual of power {power} at a point is {exact} in symbols")
-    return Residual(OF[min(index, 2)], power, _readable(exact[1]))
+    known = power + 1 + (KNOWN - number.end)
+    setting = symbols(course.stepper, course.model, course.degree, known)
+    exact = off(replace(course, setting=setting))[index].at(power)
+    return Residual(OF[min(index, 2)], power, _readable(exact))
+
+
+def _power(number: Laurent) -> int | None:
+    """Return the power of the first term that is no rounding of a scheme's coefficients."""
+    value = number.field.value
+    powers = range(number.first, number.end)
+    return next((k for k in powers if abs(value(number.at(k))) > ROUNDED), None)
 
 
 def fitted_force(stepper: Stepper, model: Model, degree: int) -> Any:
