@@ -100,8 +100,8 @@ def known_in_exact_numbers(value: str, path: Path_, ladder: Ladder, report: Repo
     model = ladder.model
     if model is not None and not applies(model):
         rule = (
-            f"{value} is known where the acceleration of one coordinate consists of + - * /, whole powers and abs, "
-            f"without events; that of {model.kind} here does not"
+            "is known of one coordinate without events, with an acceleration of + - * /, whole powers and abs; "
+            f"that of {model.kind} here is another one"
         )
         report.add(path, rule, value=value)
 
