@@ -44,7 +44,7 @@ class ModelSpec(Section):
     formulas: Annotated[dict[str, str], AfterValidator(FrozenDict)] = FrozenDict()
     """What the file writes as formulas, by the names of `vibsim.models.Model.formulas`."""
     terms: tuple[Text, ...] = ()
-    """Which of `vibsim.models.Model.optional` the equation has: those that are not 0, or are swept."""
+    """Which of `vibsim.models.Model.optional` the equation has: those that are not neutral, or are swept."""
 
     @property
     def definition(self) -> Model:
