@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -13,13 +14,17 @@ from vibsim.models import MODELS
 
 @dataclass(frozen=True)
 class Case:
-    """A model with numbers, and its acceleration as a function of (u, v, t) that shares nothing with it."""
+    """A model with numbers, and its acceleration as a function of (u, v, t) that shares nothing with it.
+
+    Of several coordinates u, v and the acceleration are tuples.
+    """
 
     kind: str
-    acceleration: Callable[[float, float, float], float]
+    acceleration: Callable[..., Any]
     numbers: dict[str, float] = field(default_factory=dict)
     """Parameters by their places in the section, where they differ from the defaults."""
-    initial: tuple[float, float] = (0.7, 0.4)
+    initial: tuple[float, ...] = (0.7, 0.4)
+    """All positions, then all velocities."""
     end: float = 2.0
     formulas: dict[str, str] = field(default_factory=dict)
     declared: tuple[str, ...] = ()
@@ -40,10 +45,24 @@ class Case:
     def start(self):
         return dict(zip((s.name for s in self.model.states), self.initial, strict=True))
 
+    @property
+    def coordinates(self):
+        return len(self.initial) // 2
+
+    def accelerations(self, state, t):
+        """The acceleration of every coordinate."""
+        if self.coordinates == 1:
+            return (self.acceleration(*state, t),)
+        return self.acceleration(state[: self.coordinates], state[self.coordinates :], t)
+
+    def states(self, count=12):
+        """Places and velocities of all kinds."""
+        return np.random.default_rng(5).uniform(-1.3, 1.3, (count, len(self.initial)))
+
     def reference(self, t):
-        """Position and velocity at times t, by SciPy at its smallest tolerance."""
+        """The states at times t, by SciPy at its smallest tolerance."""
         found = solve_ivp(
-            lambda t, y: (y[1], self.acceleration(y[0], y[1], t)),
+            lambda t, y: (*y[self.coordinates :], *self.accelerations(y, t)),
             (0.0, max(self.end, t[-1])),
             self.initial,
             method="DOP853",
@@ -60,6 +79,24 @@ class Case:
         if any(option.name == "end_velocity" for option in scheme.options):
             options = {**options, "end_velocity": "kick"}
         return integrate(self.model, scheme, options, *arrays, steps, 1, lane=lane, **more)
+
+
+def elastic(u, v, t, beta, gamma=0.0, push=lambda t: (0.0, 0.0)):
+    """B (106)-(108), and the drag of exercise 23 by its scale in the errata."""
+    (x, y), speed = u, math.hypot(*v)
+    length = math.sqrt(x * x + (y - 1.0) ** 2)
+    pull = beta / (1.0 - beta) * (1.0 - beta / length)
+    forces = -pull * x, -pull * (y - 1.0) - beta
+    return tuple(
+        f - gamma / beta * speed * w + p for f, w, p in zip(forces, v, push(t), strict=True)
+    )
+
+
+def followed(t, beta, gamma):
+    """The forces with which ``x = 0.3 sin 2t, y = 0.1 t^2`` is a solution, by its derivatives written out."""
+    place, speed = (0.3 * math.sin(2 * t), 0.1 * t * t), (0.6 * math.cos(2 * t), 0.2 * t)
+    wanted = -1.2 * math.sin(2 * t), 0.2
+    return tuple(a - f for a, f in zip(wanted, elastic(place, speed, t, beta, gamma), strict=True))
 
 
 # the velocity keeps its sign where there is drag, whose second derivative jumps with it
@@ -150,5 +187,30 @@ CASES = {
         "duffing",
         lambda u, v, t: 0.3 * math.cos(1.2 * t) - 0.2 * v + u - u**3,
         {"delta": 0.2, "alpha": -1.0, "beta": 1.0, "gamma": 0.3, "omega": 1.2},
+    ),
+    "elastic_pendulum": Case(
+        "elastic_pendulum",
+        lambda u, v, t: elastic(u, v, t, 0.8),
+        {"beta": 0.8, "Theta": 40.0, "epsilon": 0.1},
+        initial=(0.7, 0.2, 0.1, -0.3),
+    ),
+    "elastic_pendulum-vertical": Case(
+        "elastic_pendulum",
+        lambda u, v, t: elastic(u, v, t, 0.8),
+        {"beta": 0.8, "Theta": 0.0, "epsilon": 0.2},
+        initial=(0.0, -0.2, 0.0, 0.3),
+    ),
+    "elastic_pendulum-drag": Case(
+        "elastic_pendulum",
+        lambda u, v, t: elastic(u, v, t, 0.7, 0.4),
+        {"beta": 0.7, "Theta": 20.0, "gamma": 0.4},
+        initial=(0.7, 0.2, 0.5, -0.3),
+    ),
+    "elastic_pendulum-followed": Case(
+        "elastic_pendulum",
+        lambda u, v, t: elastic(u, v, t, 0.7, 0.4, lambda t: followed(t, 0.7, 0.4)),
+        {"beta": 0.7, "gamma": 0.4},
+        formulas={"exact_x": "0.3*sin(2*t)", "exact_y": "0.1*t**2"},
+        initial=(0.0, 0.0, 0.6, 0.0),
     ),
 }

@@ -11,25 +11,31 @@ EVERY = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 
 
 def formula(model, formula):
-    """Return the formula as a function of (u, v, t, parameters)."""
+    """Return the formula as a function of (states, t, parameters)."""
     read = tree(model, formula)
+    names = [state.name for state in model.states]
 
-    def value(u, v, t, parameters):
-        return evaluate(read, {model.position: u, model.velocity: v, "t": t, **parameters})
+    def value(states, t, parameters):
+        return evaluate(read, {**dict(zip(names, states, strict=True)), "t": t, **parameters})
 
     return value
 
 
 def random_parameters(model):
-    return {p.name: (p.minimum or 0.0) + float(RNG.uniform(0.2, 5.0)) for p in model.parameters}
+    return {p.name: random_parameter(p) for p in model.parameters}
+
+
+def random_parameter(p):
+    if p.maximum is not None and p.minimum is not None:
+        return float(RNG.uniform(0.2, 0.8) * (p.maximum - p.minimum) + p.minimum)
+    return (p.minimum or 0.0) + float(RNG.uniform(0.2, 5.0))
 
 
 def random_members(model, count=20):
     for _ in range(count):
-        initial = dict(
-            zip((model.position, model.velocity), RNG.uniform(-2.5, 2.5, 2), strict=True)
-        )
-        yield {name: float(value) for name, value in initial.items()}, random_parameters(model)
+        values = RNG.uniform(-2.5, 2.5, len(model.states))
+        initial = {state.name: float(x) for state, x in zip(model.states, values, strict=True)}
+        yield initial, random_parameters(model)
 
 
 @EVERY
@@ -37,43 +43,50 @@ def test_energy_is_conserved_by_the_acceleration(model):
     """``dE/dt = E_u v + E_v a``, by central differences of the energy formulas."""
     if not model.conservative:
         return
-    acceleration = formula(model, model.acceleration)
+    accelerations = [formula(model, text) for text in model.accelerations]
     parts = [formula(model, text) for text in (model.kinetic_energy, model.potential_energy)]
     step = 1e-5
     for initial, parameters in random_members(model):
-        u, v = initial.values()
+        states = np.array(list(initial.values()))
 
-        def energy(u, v, parameters=parameters):
-            return sum(part(u, v, 0.0, parameters) for part in parts)
+        def energy(states, parameters=parameters):
+            return sum(part(states, 0.0, parameters) for part in parts)
 
-        rate = (energy(u + step, v) - energy(u - step, v)) / (2 * step) * v
-        rate += (
-            (energy(u, v + step) - energy(u, v - step))
-            / (2 * step)
-            * acceleration(u, v, 0.0, parameters)
+        velocities = states[model.coordinates :]
+        ways = [*velocities, *(a(states, 0.0, parameters) for a in accelerations)]
+        asides = step * np.eye(len(states))
+        rate = sum(
+            (energy(states + aside) - energy(states - aside)) / (2 * step) * way
+            for aside, way in zip(asides, ways, strict=True)
         )
-        assert rate == pytest.approx(0.0, abs=1e-7 * (1 + abs(energy(u, v)) * (1 + abs(v))))
+        speed = 1 + max(abs(velocities))
+        assert rate == pytest.approx(0.0, abs=1e-7 * (1 + abs(energy(states)) * speed))
 
 
 @EVERY
 def test_exact_solution_obeys_the_equation(model):
     if model.exact is None or model.events is not None:
         return  # see tests/models/test_events_exact.py
-    acceleration = formula(model, model.acceleration)
+    accelerations = [formula(model, text) for text in model.accelerations]
     step = 1e-4
     for initial, parameters in random_members(model):
+        if model.coordinates > 1:
+            # what is known is one coordinate alone
+            initial |= {"x": 0.0, "vx": 0.0}
+            initial |= {name: 0.2 * initial[name] for name in ("y", "vy")}
         start = model.exact(np.zeros(1), initial, parameters)
         for name, value in initial.items():
             assert start[name][0] == pytest.approx(value, abs=1e-12 * (1 + abs(value)))
         middle = float(RNG.uniform(0, 5))
         motion = model.exact(middle + step * np.array([-1.0, 0.0, 1.0]), initial, parameters)
-        u, v = motion[model.position], motion[model.velocity]
-        scale = 1 + np.max(np.abs(v)) + abs(acceleration(u[1], v[1], middle, parameters))
-        w = 1 + float(model.natural_frequency(parameters))
-        assert (u[2] - u[0]) / (2 * step) == pytest.approx(v[1], abs=1e-7 * scale * w**2)
-        assert (v[2] - v[0]) / (2 * step) == pytest.approx(
-            acceleration(u[1], v[1], middle, parameters), abs=1e-6 * scale * w**3
-        )
+        at = [motion[state.name][1] for state in model.states]
+        w = 1 + float((model.highest_frequency or model.natural_frequency)(parameters))
+        for i, acceleration in enumerate(accelerations):
+            u, v = motion[model.positions[i]], motion[model.velocities[i]]
+            a = acceleration(at, middle, parameters)
+            scale = 1 + np.max(np.abs(v)) + abs(a)
+            assert (u[2] - u[0]) / (2 * step) == pytest.approx(v[1], abs=1e-7 * scale * w**2)
+            assert (v[2] - v[0]) / (2 * step) == pytest.approx(a, abs=1e-6 * scale * w**3)
 
 
 @EVERY
@@ -98,15 +111,12 @@ def test_exact_solution_repeats_after_the_exact_period(model):
 def test_natural_frequency_is_that_of_small_oscillations(model):
     acceleration = formula(model, model.acceleration)
     for _, parameters in random_members(model):
+        first = np.eye(len(model.states))[0]
         if np.isnan(model.natural_frequency(parameters)):
-            assert acceleration(1.0, 0.0, 0.0, parameters) == acceleration(
-                0.0, 0.0, 0.0, parameters
-            )
+            assert acceleration(first, 0.0, parameters) == acceleration(0 * first, 0.0, parameters)
             continue
-        stiffness = (
-            -(acceleration(1e-6, 0.0, 0.0, parameters) - acceleration(-1e-6, 0.0, 0.0, parameters))
-            / 2e-6
-        )
+        ahead, back = (acceleration(x * first, 0.0, parameters) for x in (1e-6, -1e-6))
+        stiffness = -(ahead - back) / 2e-6
         assert float(model.natural_frequency(parameters)) ** 2 == pytest.approx(stiffness, rel=1e-6)
 
 

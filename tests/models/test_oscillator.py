@@ -220,9 +220,9 @@ def test_simple_damping_is_recognised(text, kind, rate):
     model = oscillator(damping=text)
     assert model.damping.kind == kind
     at = {"m": 1.7, "k": 2.3, "c": 0.4, "u": 0.3, "v": -1.2, "t": 0.0}
-    whole, rest, over_mass = (
+    rest, whole, over_mass = (
         float(values(tree(model, formula), at))
-        for formula in (model.acceleration, model.damping.rate)
+        for formula in (oscillator().acceleration, model.acceleration, model.damping.rate)
     )
     force = over_mass * at["v"] * (abs(at["v"]) if kind == "quadratic" else 1.0)
     assert rest - force == pytest.approx(whole, rel=1e-14)

@@ -120,10 +120,12 @@ def start(parameters: Numbers) -> dict[str, Any]:
 
 
 def vertical_motion(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
-    """Return the exact motion straight up and down without drag (exercise 22c); NaN off the vertical."""
-    y, vy = motion(t, highest_frequency(parameters), initial["y"], initial["vy"])
+    """Return the exact motion straight up and down without drag (exercise 22c); NaN of any other, and at the pivot."""
+    w = highest_frequency(parameters)
+    y, vy = motion(t, w, initial["y"], initial["vy"])
     is_vertical = (np.asarray(initial["x"]) == 0.0) & (np.asarray(initial["vx"]) == 0.0)
-    zero = np.where(is_vertical, 0.0, np.nan) + 0.0 * y
+    stays_below = np.hypot(initial["y"], initial["vy"] / w) < 1.0
+    zero = np.where(is_vertical & stays_below, 0.0, np.nan) + 0.0 * y
     return {"x": zero, "y": y + zero, "vx": zero, "vy": vy + zero}
 
 

@@ -248,13 +248,18 @@ def round_off(options: Options, steps: int) -> float:
     return float(UNIT_ROUND_OFF * steps**0.5)
 
 
+VECTOR = "vector "
+"""Before a kind of damping: that of a model with several coordinates."""
+
+
 def is_on_the_mesh(options: Options) -> bool:
     """Tell whether the options leave events to the mesh."""
     return options.get(EVENTS.name) == "mesh"
 
 
 def _kind_of(model: Model) -> str:
-    return model.damping.kind if model.damping else ""
+    kind = model.damping.kind if model.damping else ""
+    return f"{VECTOR}{kind}" if kind and model.coordinates > 1 else kind
 
 
 @dataclass(frozen=True)

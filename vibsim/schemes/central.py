@@ -20,6 +20,7 @@ Compensated summation: E. Hairer, C. Lubich and G. Wanner, Geometric Numerical I
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -30,6 +31,7 @@ from numpy.typing import NDArray
 from vibsim.models.base import Model
 from vibsim.schemes.base import (
     UNIT_ROUND_OFF,
+    VECTOR,
     Acceleration,
     Flag,
     Function,
@@ -188,6 +190,22 @@ def even_powers(quantity: str, model: Model, options: Options) -> bool:
     return options["start"] != "first_order" and centred_end and centred_damping
 
 
+def _damped(quadratic: Treatment) -> tuple[tuple[str, Callable[[Options], Stepper]], ...]:
+    """Return how every kind of damping is treated, given the treatment of a quadratic one of one coordinate.
+
+    The geometric mean ``|v^(n-1/2)| v^(n+1/2)`` of several coordinates is off by ``dt/2 (|v| v' - |v|' v)``, which
+    vanishes where v' is parallel to v only: there the quadratic damping is centred.
+    """
+    linear = partial(stepper, treatment=LINEAR)
+    centred = partial(stepper, treatment=ROOT)
+    return (
+        ("linear", linear),
+        ("quadratic", partial(stepper, treatment=quadratic)),
+        (f"{VECTOR}linear", linear),
+        (f"{VECTOR}quadratic", centred),
+    )
+
+
 _OPTIONS = (
     Option(
         "start",
@@ -229,10 +247,7 @@ CENTRAL = Scheme(
     symplectic=True,
     symmetric=True,
     velocity_forces=False,
-    damped=(
-        ("linear", partial(stepper, treatment=LINEAR)),
-        ("quadratic", partial(stepper, treatment=GEOMETRIC)),
-    ),
+    damped=_damped(GEOMETRIC),
 )
 
 
@@ -259,10 +274,7 @@ CENTRAL_QUADRATIC_ROOT = replace(
     source="vibration text, section 8.2",
     options=_OPTIONS,
     orders=orders_of_second,
-    damped=(
-        ("linear", partial(stepper, treatment=LINEAR)),
-        ("quadratic", partial(stepper, treatment=ROOT)),
-    ),
+    damped=_damped(ROOT),
 )
 CENTRAL_BACKWARD_DAMPING = replace(
     CENTRAL,

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from vibsim.errors import nearest
 from vibsim.models import MODELS, Model, quantities
 from vibsim.schemes import FIXED_STEP, SCHEMES
-from vibsim.schemes.base import EVENTS
+from vibsim.schemes.base import EVENTS, VECTOR
 from vibsim.spec import limits, model_rules, sweep
 from vibsim.spec.check_places import Ladder, kinds_of
 from vibsim.spec.check_rules import finish_checks
@@ -253,8 +253,9 @@ def _check_forces(spec: SchemeSpec, i: int, model: Model | None, report: Report)
         report.add(("schemes", i), rule, "choose from " + ", ".join(able), spec.kind)
         return
     rule = f"cannot treat {model.kind}, whose acceleration depends on {model.velocity}"
-    if SCHEMES[spec.kind].damped:
-        rule += f" otherwise than by {' or '.join(kind for kind, _ in SCHEMES[spec.kind].damped)} damping"
+    damped = [kind for kind, _ in SCHEMES[spec.kind].damped if not kind.startswith(VECTOR)]
+    if damped:
+        rule += f" otherwise than by {' or '.join(damped)} damping"
     hint = "choose from " + ", ".join(able) if able else "no scheme can"
     report.add(("schemes", i), rule, hint, spec.kind)
 
