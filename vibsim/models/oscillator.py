@@ -158,7 +158,7 @@ def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
         Where a formula names something else than its field allows, or an exact solution has derivatives that are too
         long.
     """
-    return _written(tuple(sorted(formulas.items())), declared)
+    return _written(tuple(sorted(formulas.items())), declared, True)
 
 
 def _variant(
@@ -169,7 +169,7 @@ def _variant(
 
 @cache
 def _written(
-    formulas: tuple[tuple[str, str], ...], declared: tuple[str, ...], with_mass: bool = True
+    formulas: tuple[tuple[str, str], ...], declared: tuple[str, ...], with_mass: bool
 ) -> Model:
     own = Written(dict(formulas), declared, with_mass)
     forces = Forces(
