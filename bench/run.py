@@ -27,7 +27,7 @@ MEASURED = ROOT / "bench" / "measured.json"
 PAGE = ROOT / "docs" / "benchmarks.md"
 PARTS = (
     *("one_member", "many_members", "same_error", "same_error_many", "pipeline", "jobs"),
-    *("work_precision", "lanes", "cost", "scale", "storage"),
+    *("work_precision", "lanes", "formulas", "cost", "scale", "storage"),
 )
 
 
@@ -89,7 +89,8 @@ def page(known: dict[str, Any]) -> str:
         "# Benchmarks",
         "",
         "Written by `make bench`. Times are medians of interleaved runs (A B C A B C ...); a ratio is of two medians "
-        "unless it says otherwise. Nothing else ran on the machine. What could not be measured says why.",
+        "unless it says otherwise. Nothing else ran on the machine unless a part says so. "
+        "What could not be measured says why.",
         "",
         *(f"{text}\n" for text in machines[:1]),
     ]

@@ -57,6 +57,11 @@ TARGETS = (
         note="numpy has a vector sine of its own by now: it takes 11 ns, the engine 1.4",
     ),
     Target(
+        "formulas: time over the same model built in, the largest of both lanes",
+        "formulas.ratio",
+        1.2,
+    ),
+    Target(
         "one trajectory at 1e-10: increment ladder, times faster than DOP853",
         "single.increment_faster_than_dop853",
         100.0,

@@ -103,3 +103,13 @@ def limits(part: Part) -> Floats:
         for options, where in steppers(part, i):
             found[i, where] = limit_of(SCHEMES[scheme.kind], options)
     return found
+
+
+def exact_degrees(part: Part) -> Floats:
+    """Return the highest degree of polynomials that each scheme reproduces on the model, shape (scheme, case)."""
+    found = np.full(part.shape, np.nan)
+    for i, scheme in enumerate(part.experiment.schemes):
+        for options, where in steppers(part, i):
+            stepper = SCHEMES[scheme.kind].stepper_for(part.model, options)
+            found[i, where] = theory.exact_degree(stepper, part.model)
+    return found

@@ -23,6 +23,7 @@ Flags = NDArray[np.bool_]
 FROM_THEORY = frozenset(
     {
         "stability_limit",
+        "exact_degree",
         "predicted_growth_per_period",
         "predicted_frequency",
         "predicted_phase_error",

@@ -298,6 +298,7 @@ KNOWN: Mapping[str, Callable[[Place], Any]] = {
     "growth_per_period": _at_level(oscillation.growth_per_period),
     "predicted_growth_per_period": _at_level(predicted.growth_per_period),
     "stability_limit": lambda p: predicted.limits(p.part),
+    "exact_degree": lambda p: predicted.exact_degrees(p.part),
     "relative_energy_error": _over_initial(_gathered("energy_deviation_max_abs")),
     "relative_energy_error_d2t": _over_initial(_energy_error_d2t),
     "event_count": _gathered("event_count"),

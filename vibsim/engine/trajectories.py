@@ -240,7 +240,7 @@ def _scaled(model: Model, stepper: Stepper, parameters: Floats, dt: Floats) -> F
     """Put the factors of `Stepper.scaling` behind the parameters of every member."""
     if stepper.scaling is None:
         return parameters
-    named = {row.name: parameters[:, i] for i, row in enumerate(model.parameters)}
+    named = {row.key: parameters[:, i] for i, row in enumerate(model.parameters)}
     factors = stepper.scaling(np.broadcast_to(model.natural_frequency(named), dt.shape) * dt)
     return np.column_stack([parameters, *factors])
 

@@ -52,6 +52,8 @@ class Parameter:
     exclusive: bool = False
     """Whether `minimum` itself is refused."""
     maximum: float | None = None
+    neutral: float = 0.0
+    """Value at which its term is no part of the equation, of those in `Model.optional`: 1 of a factor."""
     path: str = ""
     """Where it stands in the section ``model``, if not under its name: ``damping.linear``."""
 
@@ -138,9 +140,10 @@ class Model:
     start: Callable[[Numbers], dict[str, Any]] | None = None
     """Initial values that the parameters already give, as arrays that broadcast; None where a user gives them."""
     optional: tuple[str, ...] = ()
-    """Parameters with a term of their own, which is no part of the equation where they are 0 and are not swept."""
+    """Parameters with a term of their own, which is no part of the equation where they are neutral (0, or a factor 1)
+    and are not swept."""
     variant: Callable[[frozenset[str]], Model] | None = None
-    """The model with the terms of some of `optional`; this one has those of none."""
+    """The model with the terms of some of `optional`; this one has those of none, but a mass."""
     damping: Damping | None = None
     """The damping force, where it is one of two simple kinds."""
     events: Events | None = None

@@ -16,12 +16,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from typing import Any
 
 import numpy as np
 
 from vibsim.expression import (
+    ONE,
     Compare,
     Expression,
     Name,
@@ -40,7 +41,7 @@ from vibsim.models.events import Friction
 from vibsim.models.manufactured import Manufactured
 from vibsim.models.mechanical import Forces, mechanical
 
-MASS = Parameter("m", 1.0, "kg", "mass", minimum=0.0, exclusive=True)
+MASS = Parameter("m", 1.0, "kg", "mass", minimum=0.0, exclusive=True, neutral=1.0)
 COULOMB = "coulomb"
 TERMS = {"linear": "b*v", "quadratic": "b*abs(v)*v", COULOMB: "b*sign(v)"}
 UNITS = {"linear": "kg s-1", "quadratic": "kg m-1", COULOMB: "N"}
@@ -74,6 +75,13 @@ class Written:
 
     formulas: Mapping[str, str]
     declared: tuple[str, ...]
+    with_mass: bool = True
+    """Whether the mass is in the equation as a parameter; else it is the number 1."""
+
+    @property
+    def mass(self) -> Expression:
+        """The mass in the equation."""
+        return Name(MASS.name) if self.with_mass else ONE
 
     @property
     def is_coefficient_given(self) -> bool:
@@ -134,14 +142,15 @@ class Written:
         motion = self.manufactured
         if motion is None:
             return self.read("force")
-        inertia = times(Name("m"), motion.accelerations[0])
+        inertia = times(self.mass, motion.accelerations[0])
         return plus(inertia, motion.along(plus(self.damping, self.spring)))
 
 
 def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
     """Return the model of formulas by the names of `FORMULAS`, with declared parameters.
 
-    Equal formulas give the same model.
+    Equal formulas give the same model. It has a mass in its equation; its variant without that term is for the mass 1:
+    the same bits in fewer operations.
 
     Raises
     ------
@@ -149,17 +158,25 @@ def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
         Where a formula names something else than its field allows, or an exact solution has derivatives that are too
         long.
     """
-    return _written(tuple(sorted(formulas.items())), declared)
+    return _written(tuple(sorted(formulas.items())), declared, True)
+
+
+def _variant(
+    formulas: tuple[tuple[str, str], ...], declared: tuple[str, ...], terms: frozenset[str]
+) -> Model:
+    return _written(formulas, declared, MASS.name in terms)
 
 
 @cache
-def _written(formulas: tuple[tuple[str, str], ...], declared: tuple[str, ...]) -> Model:
-    own = Written(dict(formulas), declared)
+def _written(
+    formulas: tuple[tuple[str, str], ...], declared: tuple[str, ...], with_mass: bool
+) -> Model:
+    own = Written(dict(formulas), declared, with_mass)
     forces = Forces(
         spring=own.read("spring"),
         damping=own.damping,
         force=own.force,
-        mass=Name("m"),
+        mass=own.mass,
         potential=own.read("potential") if "potential" in own.formulas else None,
     )
     return mechanical(
@@ -171,6 +188,8 @@ def _written(formulas: tuple[tuple[str, str], ...], declared: tuple[str, ...]) -
         equation=_equation(own),
         formulas=FORMULAS,
         written=written,
+        optional=(MASS.name,),
+        variant=partial(_variant, formulas, declared),
         **(_friction(own, forces) if own.has_friction else _manufactured(own)),
     )
 
@@ -206,7 +225,7 @@ def _manufactured(own: Written) -> dict[str, Any]:
 
 def _equation(own: Written) -> str:
     """Return the equation of motion as a user would write it."""
-    terms = ["m u''"]
+    terms = ["m u''" if own.with_mass else "u''"]
     if not is_zero(own.damping):
         terms.append(_term(put(own.damping, "v", Name("u'"))))
     terms.append(_term(own.spring))

@@ -16,6 +16,7 @@ from vibsim.report import (
     cards,
     choice,
     contents,
+    contents_degrees,
     contents_energy,
     contents_published,
     contents_scales,
@@ -211,7 +212,8 @@ def _tables(
     schemes = contents_theory.schemes(experiment, record)
     norms = [name for name in record.words("norm") if name != TYPICAL_NORM]
     found_orders = [contents.orders(record, quantity, shown) for quantity in found]
-    beside = [*contents_theory.predictions(record), contents_energy.velocities(record)]
+    beside = [contents_degrees.table(experiment), *contents_theory.predictions(record)]
+    beside.append(contents_energy.velocities(record))
     # what damping or a force changes says nothing of a scheme
     conserved = experiment.model.definition.conservative
     optional = [contents.maxima(record, shown) if conserved else None]

@@ -84,6 +84,15 @@ def no_backward(state: CarriedState, dt: float) -> float:
     return math.nan * dt
 
 
+Function = Callable[[Any], Any]
+"""Of time."""
+
+
+def position_and_velocity(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
+    """Return ``(u, v)``."""
+    return u(t), v(t)
+
+
 @dataclass(frozen=True)
 class Stepper:
     """The arithmetic of a scheme: functions on the carried state of one member, and how it starts and ends.
@@ -112,6 +121,9 @@ class Stepper:
     """Factors of the acceleration and of the initial velocity that enters the start, from ``w dt``; None for 1."""
     events: str = ""
     """How it treats events, one of `EVENTS`; empty for a smooth model."""
+    carried: Callable[..., CarriedState] = position_and_velocity
+    """``carried(u, v, a, t, dt)``: the state at time t of a motion with that position, velocity and acceleration,
+    functions of time."""
     tabulated: bool = False
     """Whether the points are known before, and stand behind the parameters (`vibsim.simulation.adaptive`)."""
     whole: bool = False

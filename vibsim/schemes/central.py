@@ -34,6 +34,7 @@ from vibsim.schemes.base import (
     VECTOR,
     Acceleration,
     Flag,
+    Function,
     Option,
     Options,
     Orders,
@@ -60,6 +61,11 @@ def start_three_term(
     return u + dt * v + kick, u
 
 
+def with_point_behind(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
+    """Return u^n and u^(n-1)."""
+    return u(t), u(t - dt)
+
+
 def backward_three_term(state: tuple[float, float], dt: float) -> float:
     """Return ``(u^n - u^(n-1))/dt``: B, section 2.1."""
     u, behind = state
@@ -73,6 +79,11 @@ def start_increment(
     kick = 0.0 if variant else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
     d = dt * v + kick
     return u + d, d
+
+
+def with_increment(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
+    """Return u^n and the increment u^n - u^(n-1)."""
+    return u(t), u(t) - u(t - dt)
 
 
 def backward_increment(state: tuple[float, float], dt: float) -> float:
@@ -95,17 +106,24 @@ def start_compensated(
     return ahead, d, u_rest, d_rest
 
 
+def with_rests(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
+    """Return u^n, the increment, and no rounding errors."""
+    increment = u(t) - u(t - dt)
+    nothing = increment - increment
+    return u(t), increment, nothing, nothing
+
+
 def backward_compensated(state: tuple[float, float, float, float], dt: float) -> float:
     """Return ``(u^n - u^(n-1))/dt``."""
     return state[1] / dt
 
 
-_ENDINGS: dict[str, tuple[Any, Any]] = {
-    "compensated": (start_compensated, backward_compensated),
-    "increment": (start_increment, backward_increment),
-    "three_term": (start_three_term, backward_three_term),
+_ENDINGS: dict[str, tuple[Any, Any, Any]] = {
+    "compensated": (start_compensated, backward_compensated, with_rests),
+    "increment": (start_increment, backward_increment, with_increment),
+    "three_term": (start_three_term, backward_three_term, with_point_behind),
 }
-"""Start and one-sided velocity of every arithmetic; its step is that of `vibsim.schemes.central_steps`."""
+"""Start, one-sided velocity and state of every arithmetic; its step is that of `vibsim.schemes.central_steps`."""
 
 
 def corrected(p: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -133,7 +151,7 @@ def stepper(options: Options, treatment: Treatment = UNDAMPED) -> Stepper:
     without damping ``(u^(N+1) - u^(N-1))/(2 dt) = (u^N - u^(N-1))/dt + dt a^N/2``.
     """
     arithmetic = str(options["arithmetic"])
-    start, backward = _ENDINGS[arithmetic]
+    start, backward, carried = _ENDINGS[arithmetic]
     return Stepper(
         start,
         step(arithmetic, treatment),
@@ -142,6 +160,7 @@ def stepper(options: Options, treatment: Treatment = UNDAMPED) -> Stepper:
         end=_ENDS[str(options["end_velocity"])],
         own_velocity=False,
         scaling=corrected if options.get("frequency_correction") else None,
+        carried=carried,
     )
 
 

@@ -28,6 +28,7 @@ from typing import Any
 from vibsim.models.base import Model
 from vibsim.schemes.base import (
     Acceleration,
+    Function,
     Option,
     Options,
     Orders,
@@ -197,6 +198,16 @@ def start_position_first(
     return u_1, ahead + dt * acceleration(u_1, ahead, dt, p)
 
 
+def with_slope_behind(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
+    """Return u and ``(u^n - u^(n-1))/dt``: what the velocity of `EULER_CROMER` is."""
+    return u(t), (u(t) - u(t - dt)) / dt
+
+
+def with_slope_ahead(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
+    """Return u and ``(u^(n+1) - u^n)/dt``: what the velocity of `EULER_CROMER_U_FIRST` is."""
+    return u(t), (u(t + dt) - u(t)) / dt
+
+
 _STARTS = ("first_order", "centred")
 
 _DRAGGED = Orders(position=1, velocity=1, energy=1, energy_linear=1)
@@ -229,6 +240,7 @@ def _euler_cromer(
     source: str,
     substeps: Substeps,
     start: Callable[..., tuple[float, float]],
+    carried: Callable[..., tuple[float, float]],
     *,
     velocity_forces: bool,
 ) -> Scheme:
@@ -236,7 +248,9 @@ def _euler_cromer(
 
     def stepper(options: Options) -> Stepper:
         variant = _STARTS.index(str(options["start"]))
-        return Stepper(start, substep_function(substeps), variant=variant, staggered=True)
+        return Stepper(
+            start, substep_function(substeps), variant=variant, staggered=True, carried=carried
+        )
 
     return Scheme(
         kind=kind,
@@ -267,6 +281,7 @@ EULER_CROMER = _euler_cromer(
     "vibration text, section 7.1, equations (53)-(54), and section 8.8",
     ((KICK, "1"), (DRIFT, "1")),
     start_velocity_first,
+    with_slope_behind,
     velocity_forces=True,
 )
 EULER_CROMER_U_FIRST = _euler_cromer(
@@ -275,6 +290,7 @@ EULER_CROMER_U_FIRST = _euler_cromer(
     "vibration text, section 7.1, equations (51)-(52)",
     ((DRIFT, "1"), (KICK, "1")),
     start_position_first,
+    with_slope_ahead,
     velocity_forces=False,
 )
 

@@ -17,7 +17,16 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from vibsim.schemes.base import Acceleration, Options, Orders, Scheme, Slopes, Stepper, always
+from vibsim.schemes.base import (
+    Acceleration,
+    Function,
+    Options,
+    Orders,
+    Scheme,
+    Slopes,
+    Stepper,
+    always,
+)
 from vibsim.schemes.newton import solved
 from vibsim.schemes.one_step import self_starting
 
@@ -58,6 +67,11 @@ def start_bdf2(
     return ahead, speed, u, v
 
 
+def with_points_behind(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
+    """Return u and v at t, and one step before."""
+    return u(t), v(t), u(t - dt), v(t - dt)
+
+
 def step_bdf2(
     state: Four, t: float, dt: float, p: Any, acceleration: Acceleration, slopes: Slopes
 ) -> tuple[Four, float]:
@@ -75,7 +89,7 @@ def step_bdf2(
 
 _BACKWARD_EULER = self_starting(step_backward_euler, implicit=True)
 _CRANK_NICOLSON = self_starting(step_crank_nicolson, implicit=True)
-_BDF2 = Stepper(start_bdf2, step_bdf2, implicit=True)
+_BDF2 = Stepper(start_bdf2, step_bdf2, implicit=True, carried=with_points_behind)
 
 
 def _backward_euler(options: Options) -> Stepper:

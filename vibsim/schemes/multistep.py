@@ -18,9 +18,10 @@ Source: E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Eq
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
-from vibsim.schemes.base import Acceleration, Options, Orders, Scheme, Stepper
+from vibsim.schemes.base import Acceleration, Function, Options, Orders, Scheme, Stepper
 from vibsim.schemes.runge_kutta import HEUN, RK3
 from vibsim.schemes.written import weighted, written
 
@@ -69,6 +70,17 @@ def start_three(
     return u_1, v_1, v, a_0, v_before, a_before
 
 
+@cache
+def with_slopes_behind(points: int) -> Callable[..., Any]:
+    """Return what gives u and v at t, then v and a at so many points behind, the latest first."""
+
+    def carried(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
+        behind = [t - (j + 1.0) * dt for j in range(points)]
+        return u(t), v(t), *(slope(time) for time in behind for slope in (v, a))
+
+    return carried
+
+
 def _scheme(
     kind: str,
     title: str,
@@ -78,7 +90,9 @@ def _scheme(
     orders: Orders,
 ) -> Scheme:
     def stepper(options: Options) -> Stepper:
-        return Stepper(start, adams_bashforth(weights))
+        return Stepper(
+            start, adams_bashforth(weights), carried=with_slopes_behind(len(weights) - 1)
+        )
 
     return Scheme(
         kind=kind,

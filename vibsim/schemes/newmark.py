@@ -32,6 +32,7 @@ from functools import cache
 from vibsim.models.base import Model
 from vibsim.schemes.base import NumberOption, Options, Orders, Scheme, Stepper
 from vibsim.schemes.newton import solved
+from vibsim.schemes.one_step import with_acceleration
 from vibsim.schemes.written import written
 
 _STEP = """\
@@ -80,7 +81,7 @@ def _stepper(beta: str, gamma: str, alpha_m: str = "0", alpha_f: str = "0") -> S
     text = _STEP.format(**(_AVERAGED if is_averaged else _ALONE))
     step = written(text, formulas, {"solved": solved})
     start = written(_START, functions={"step_newmark": step})
-    return Stepper(start, step, implicit=True)
+    return Stepper(start, step, implicit=True, carried=with_acceleration)
 
 
 def _newmark(options: Options) -> Stepper:

@@ -9,8 +9,13 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from vibsim.schemes.base import HANDED, Stepper
+from vibsim.schemes.base import HANDED, Function, Stepper, position_and_velocity
 from vibsim.schemes.written import written
+
+
+def with_acceleration(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
+    """Return ``(u, v, a)``."""
+    return u(t), v(t), a(t)
 
 
 def self_starting(
@@ -32,4 +37,5 @@ def self_starting(
         "    return following\n",
         functions={step.__name__: step},
     )
-    return Stepper(start, step, implicit=implicit)
+    carried = with_acceleration if carries_acceleration else position_and_velocity
+    return Stepper(start, step, implicit=implicit, carried=carried)

@@ -80,7 +80,7 @@ class ModelSpec(Section):
     tables: Annotated[dict[str, TableSpec], AfterValidator(FrozenDict)] = FrozenDict()
     """Tables that stand in place of formulas, by the same names."""
     terms: tuple[Text, ...] = ()
-    """Which of `vibsim.models.Model.optional` the equation has: those that are not 0, or are swept."""
+    """Which of `vibsim.models.Model.optional` the equation has: those that are not neutral, or are swept."""
 
     @property
     def definition(self) -> Model:

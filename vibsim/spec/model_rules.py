@@ -69,10 +69,11 @@ def read(
     found = _read(section, model, folder, report)
     if found.model is None or found.model.variant is None or not found.parameters:
         return found
+    neutral = {row.name: row.neutral for row in found.model.parameters}
     terms = tuple(
         name
         for name in found.model.optional
-        if found.parameters[name] != 0.0 or f"model.{name}" in swept
+        if found.parameters[name] != neutral[name] or f"model.{name}" in swept
     )
     return replace(found, model=found.model.variant(frozenset(terms)), terms=terms)
 

@@ -93,6 +93,19 @@ def known_by_theory(value: str, path: Path_, ladder: Ladder, report: Report) -> 
         report.add(path, rule, value=value)
 
 
+def known_in_exact_numbers(value: str, path: Path_, ladder: Ladder, report: Report) -> None:
+    """Check that the acceleration of the model can be worked out in exact numbers."""
+    from vibsim.theory.degrees import applies
+
+    model = ladder.model
+    if model is not None and not applies(model):
+        rule = (
+            "is known of one coordinate without events, with an acceleration of + - * /, whole powers and abs; "
+            f"that of {model.kind} here is another one"
+        )
+        report.add(path, rule, value=value)
+
+
 def allowed(row: Value, ladder: Ladder, best: bool = False) -> tuple[str, ...]:
     """Name the quantities that `row` can be of; `best`: of the extrapolated solution."""
     model = ladder.model

@@ -5,7 +5,13 @@ from __future__ import annotations
 from vibsim.errors import nearest
 from vibsim.spec.check_places import Ladder
 from vibsim.spec.faults import Report
-from vibsim.spec.quantity_rules import allowed, known_by_theory, known_exactly, one_of
+from vibsim.spec.quantity_rules import (
+    allowed,
+    known_by_theory,
+    known_exactly,
+    known_in_exact_numbers,
+    one_of,
+)
 from vibsim.spec.source import Path_
 from vibsim.spec.values import VALUES, Value
 
@@ -60,5 +66,7 @@ def needs(row: Value, quantity: str | None, path: Path_, ladder: Ladder, report:
         known_exactly(quantity, row.name, path, ladder, report)
     if row.needs_events and model.events is None:
         report.add(path, f"{model.kind} has no events: its motion is smooth", value=row.name)
+    if row.needs_rational:
+        known_in_exact_numbers(row.name, path, ladder, report)
     if row.needs_linear:
         known_by_theory(row.name, path, ladder, report)

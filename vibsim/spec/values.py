@@ -40,6 +40,8 @@ class Value:
     """Whether it comes from the theory of linear models without damping."""
     fixed_step: bool = False
     """Whether it does not exist of schemes that choose their own steps."""
+    needs_rational: bool = False
+    """Whether the acceleration must be worked out in exact numbers (`vibsim.theory.degrees`)."""
     needs_events: bool = False
     """Whether it exists only where the motion of the model is not smooth."""
 
@@ -167,6 +169,14 @@ _COST = (
         "none",
         _NO_LEVEL,
         fixed_step=True,
+    ),
+    Value(
+        "exact_degree",
+        "highest degree up to which the scheme reproduces polynomials in t as solutions of the model, 8 at most",
+        "none",
+        _NO_LEVEL,
+        fixed_step=True,
+        needs_rational=True,
     ),
 )
 _ERRORS = (

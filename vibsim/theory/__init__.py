@@ -1,10 +1,11 @@
-"""What theory predicts of a scheme, from its own step on the linear problem ``u'' + w^2 u = 0``.
+"""What theory predicts of a scheme from its own step, by one piece of code for every scheme.
 
-One piece of code for every scheme: `vibsim.theory.units` lets its functions run on unit vectors, and all else follows
-from the matrix that comes out.
+On the linear problem ``u'' + w^2 u = 0``, `vibsim.theory.units` lets its functions run on unit vectors, and all else
+follows from the matrix that comes out. On polynomials, `vibsim.theory.polynomial` lets them run on exact series.
 """
 
 from vibsim.theory.amplification import Amplification, amplification
+from vibsim.theory.degrees import Miss, Residual, exact_degree, fitted_force, miss, reproduces
 from vibsim.theory.discrete import discrete
 from vibsim.theory.roots import (
     Roots,
@@ -23,16 +24,22 @@ from vibsim.theory.stability import stability_limit
 
 __all__ = [
     "Amplification",
+    "Miss",
+    "Residual",
     "Roots",
     "amplification",
     "discrete",
     "dominant",
+    "exact_degree",
+    "fitted_force",
     "frequency_ratio",
     "growth",
     "growth_per_period",
     "log_growth",
+    "miss",
     "numerical_frequency",
     "phase_error_per_period",
+    "reproduces",
     "roots",
     "rounding_bound",
     "spectral_radius",

@@ -7,7 +7,7 @@ whether a correction is nothing. SymPy is imported on first use.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -97,19 +97,35 @@ def exact_steps(stepper: Stepper) -> UnitSteps:
     ValueError
         Where a coefficient is not algebraic.
     """
-    from sympy import QQ, Pow, Rational, field
+    from sympy import field
 
-    formulas = reads(stepper)
-    expressions = {
-        formula: exact(formula, lambda x: Rational(x.numerator, x.denominator), lambda x, y: x**y)
-        for formula in formulas
-    }
-    roots = sorted({power for value in expressions.values() for power in value.atoms(Pow)}, key=str)
-    domain = QQ.algebraic_field(*roots) if roots else QQ
+    domain, elements = coefficients(stepper)
     fractions, p = field("p", domain)
     numbers = {
-        formula: Exact(fractions.ground_new(domain.from_sympy(value.expand())), float(value))
-        for formula, value in expressions.items()
+        formula: Exact(fractions.ground_new(element), float(domain.to_sympy(element)))
+        for formula, element in elements.items()
     }
     zero = Exact(fractions.zero, 0.0)
     return unit_steps(stepper, Exact(p, _AT), zero, numbers.__getitem__)
+
+
+@lru_cache(maxsize=64)
+def coefficients(stepper: Stepper) -> tuple[Any, Mapping[str, Any]]:
+    """Return the least field with all coefficients of a scheme, and the element of it that each formula is.
+
+    Raises
+    ------
+    ValueError
+        Where a coefficient is not algebraic.
+    """
+    from sympy import QQ, Pow, Rational
+
+    expressions = {
+        formula: exact(formula, lambda x: Rational(x.numerator, x.denominator), lambda x, y: x**y)
+        for formula in reads(stepper)
+    }
+    roots = sorted({power for value in expressions.values() for power in value.atoms(Pow)}, key=str)
+    domain = QQ.algebraic_field(*roots) if roots else QQ
+    return domain, {
+        formula: domain.from_sympy(value.expand()) for formula, value in expressions.items()
+    }

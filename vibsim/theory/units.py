@@ -8,14 +8,15 @@ The functions of the scheme itself run, on numbers that have ``+ - * /``, ``abs`
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
 from fractions import Fraction
 from functools import lru_cache
-from types import FunctionType
+from types import FunctionType, MappingProxyType
 from typing import Any
 
+from vibsim.elementary import ELEMENTARY
 from vibsim.expression import Binary, Call, Expression, Name, Negate, Number, parse
 from vibsim.schemes.base import Stepper, handed
 from vibsim.schemes.written import exact_names
@@ -24,6 +25,8 @@ Reader = Callable[[str], Any]
 """Makes a number of the formula of a coefficient."""
 
 _DIGITS = 60
+_ROOT = ELEMENTARY["sqrt"].full
+"""The one elementary function that steps call; no coefficients are in it."""
 
 
 @dataclass(frozen=True)
@@ -101,8 +104,20 @@ def unit_steps(
     )
 
 
-def rebound(function: Callable[..., Any], read: Reader) -> Callable[..., Any]:
-    """Return a function whose named coefficients are numbers made by `read`, in all that it calls as well."""
+def rebound(
+    function: Callable[..., Any],
+    read: Reader,
+    others: Mapping[Callable[..., Any], Callable[..., Any]] = MappingProxyType({}),
+) -> Callable[..., Any]:
+    """Return a function whose named coefficients are numbers made by `read`, in all that it calls as well.
+
+    Parameters
+    ----------
+    others
+        What takes the place of functions that it calls.
+    """
+    if function in others:
+        return others[function]
     if not isinstance(function, FunctionType):
         return function
     formulas = exact_names(function)
@@ -111,7 +126,7 @@ def rebound(function: Callable[..., Any], read: Reader) -> Callable[..., Any]:
         if name in formulas:
             known[name] = read(formulas[name])
         elif isinstance(known.get(name), FunctionType):
-            known[name] = rebound(known[name], read)
+            known[name] = rebound(known[name], read, others)
     copy = FunctionType(
         function.__code__, known, function.__name__, function.__defaults__, function.__closure__
     )
@@ -123,7 +138,7 @@ def reads(stepper: Stepper) -> set[str]:
     """Return the formulas of all coefficients of a scheme."""
     found: set[str] = set()
     for function in (stepper.start, stepper.step, stepper.backward):
-        rebound(function, lambda formula: found.add(formula))
+        rebound(function, lambda formula: found.add(formula), {_ROOT: _ROOT})
     return found
 
 

@@ -1,0 +1,208 @@
+r"""Which polynomials a scheme reproduces exactly, and why it does not reproduce the next one.
+
+A polynomial is reproduced where the positions that the scheme computes lie on it for any time step. Whatever else
+follows from the functions of the scheme itself, in exact numbers (`vibsim.theory.polynomial`):
+
+- the *first step* is what its start makes of the initial values, less the state that moves along the polynomial;
+- a *step* begins on that state, at any time t, and its residual is what it then is off by;
+- the *cause* of a step's residual is the first of these in which it is there: the motion without forces, so that the
+  scheme's differences or sums are at fault; with the forces on a body at rest, whose argument is then wrong within
+  the step; with damping.
+
+That holds as long as the velocity does not change its sign where a formula has its absolute value.
+
+Source: vibration text (B), sections 2.2 and 8.5, problem 1 and exercise 9; `errata`, 8.5 and exercise 1 e.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+from vibsim.models.base import Model
+from vibsim.schemes.base import Stepper
+from vibsim.theory.laurent import Laurent
+from vibsim.theory.polynomial import Course, Forces, numbers, symbols
+from vibsim.theory.rational import is_rational, restoring
+
+HIGHEST = 8
+"""Degree at which the search ends."""
+KNOWN = 12
+"""Power of dt from which on nothing is known of a residual: twice that of any scheme at these degrees."""
+STEPS = 4
+"""Steps that a polynomial must be followed for: more than any scheme carries points."""
+ROUNDED = 1e-13
+"""Size of a term that is none: some schemes state their coefficients to 16 decimals."""
+OF = ("position", "velocity", "state")
+CAUSES = ("differences", "force", "damping")
+"""Of `Forces`, in their order."""
+
+
+@dataclass(frozen=True)
+class Residual:
+    """The first term of what a scheme is off by, ``coefficient dt^power``, computed less exact."""
+
+    of: str
+    """``position``; where that is exact, ``velocity`` or else ``state``, for what lies behind these two."""
+    power: int
+    coefficient: Any
+    """Of SymPy, in the symbols t, c_0, c_1, ..., the parameters of the model and w_0, its natural frequency."""
+
+
+@dataclass(frozen=True)
+class Miss:
+    """Why polynomials of a degree are not reproduced."""
+
+    degree: int
+    start: Residual | None
+    """Of the first step; None where it is exact."""
+    step: Residual | None
+    """Of every further step."""
+    cause: str
+    """Of the residual of a step: one of `CAUSES`; empty where it is exact."""
+
+
+def applies(model: Model) -> bool:
+    """Tell whether the acceleration of a model can be worked out in exact numbers, and never jumps."""
+    if model.events is not None or model.coordinates > 1:
+        return False
+    return is_rational(restoring(model))
+
+
+def _refuse(model: Model) -> None:
+    if not applies(model):
+        raise ValueError(f"the acceleration of {model.kind} has more than + - * /, powers and abs")
+
+
+def reproduces(stepper: Stepper, model: Model, degree: int) -> bool:
+    """Tell whether a scheme reproduces polynomials of a degree, as solutions of a model with a force for them.
+
+    Parameters
+    ----------
+    stepper
+        The arithmetic of the scheme on that model (`vibsim.schemes.Scheme.stepper_for`).
+
+    Raises
+    ------
+    ValueError
+        Where the formulas of the model are no rational ones (`applies`).
+    """
+    _refuse(model)
+    return _follows(Course(stepper, model, degree, numbers(stepper, model, degree, KNOWN)))
+
+
+@lru_cache(maxsize=256)
+def exact_degree(stepper: Stepper, model: Model) -> int:
+    """Return the highest degree up to which polynomials are reproduced, -1 for none, `HIGHEST` for all tried."""
+    missed = (d for d in range(HIGHEST + 1) if not reproduces(stepper, model, d))
+    return next(missed, HIGHEST + 1) - 1
+
+
+@lru_cache(maxsize=256)
+def miss(stepper: Stepper, model: Model, degree: int) -> Miss:
+    """Return what the first step and every further one are off by, on polynomials of a degree."""
+    _refuse(model)
+    course = Course(stepper, model, degree, numbers(stepper, model, degree, KNOWN))
+    first, step = (_residual(course, off) for off in (_first, _step))
+    return Miss(degree, first, step, _cause(course) if step is not None else "")
+
+
+def _follows(course: Course) -> bool:
+    """Tell whether the computed positions lie on the polynomial."""
+    state, t = course.start(), course.dt
+    for _ in range(STEPS):
+        if (state[0] - course.solution(0, t)).leading is not None:
+            return False
+        state, t = course.step(state, t), t + course.dt
+    return True
+
+
+Off = Callable[[Course], tuple[Laurent, ...]]
+
+
+def _first(course: Course) -> tuple[Laurent, ...]:
+    """Return what the state at step 1 is off by."""
+    return _less(course.start(), course.state(course.dt))
+
+
+def _step(course: Course) -> tuple[Laurent, ...]:
+    """Return what a step from the polynomial at time t is off by."""
+    t = course.setting.named("t")
+    return _less(course.step(course.state(t), t), course.state(t + course.dt))
+
+
+def _residual(course: Course, off: Off) -> Residual | None:
+    """Return the first term of the first number of a state that is off; its power from a point, the rest in symbols."""
+    found = ((i, x, _power(x)) for i, x in enumerate(off(course)))
+    index, number, power = next((row for row in found if row[2] is not None), (0, None, None))
+    if number is None or power is None:
+        return None
+    known = power + 1 + (KNOWN - number.end)
+    setting = symbols(course.stepper, course.model, course.degree, known)
+    exact = off(replace(course, setting=setting))[index].at(power)
+    return Residual(OF[min(index, 2)], power, _readable(exact))
+
+
+def _power(number: Laurent) -> int | None:
+    """Return the power of the first term that is no rounding of a scheme's coefficients."""
+    value = number.field.value
+    powers = range(number.first, number.end)
+    return next((k for k in powers if abs(value(number.at(k))) > ROUNDED), None)
+
+
+def fitted_force(stepper: Stepper, model: Model, degree: int) -> Any:
+    """Return what must be added to the acceleration of every step, but not of the start, to reproduce polynomials.
+
+    Of centred differences with quadratic damping by the geometric mean and degree 2 it is ``-b c_2^2 dt^2/m``: the
+    force F^n is reduced by ``b c_2^2 dt^2`` for n >= 1, and F^0 stays (`errata`, 8.5).
+
+    Returns
+    -------
+    An expression of SymPy in dt and the symbols of `Residual`.
+
+    Raises
+    ------
+    ValueError
+        Where no such force does it.
+    """
+    _refuse(model)
+    course = Course(stepper, model, degree, symbols(stepper, model, degree, KNOWN))
+    one = course.setting.field.constant(1.0)
+    before, ahead = (_step(replace(course, fitted=x))[0] for x in (one - one, one))
+    fitted = -before / (ahead - before)
+    fits = replace(course, fitted=fitted)
+    if any(x.leading is not None for x in (*_first(course), *_step(fits))) or _ends_late(fitted):
+        raise ValueError(f"no force at the inner points makes degree {degree} exact")
+    return _polynomial(fitted)
+
+
+def _ends_late(number: Laurent) -> bool:
+    """Tell whether a series goes on in the second half of what is known of it."""
+    half = [number.at(k) for k in range(number.end // 2, number.end)]
+    return any(half)
+
+
+def _polynomial(number: Laurent) -> Any:
+    from sympy import Symbol
+
+    dt = Symbol("dt")
+    return sum(number.at(k).as_expr() * dt**k for k in range(number.first, number.end))
+
+
+def _readable(element: Any) -> Any:
+    from sympy import factor
+
+    return factor(element.as_expr())
+
+
+def _less(state: tuple[Any, ...], exact: tuple[Any, ...]) -> tuple[Laurent, ...]:
+    return tuple(a - b for a, b in zip(state, exact, strict=True))
+
+
+def _cause(course: Course) -> str:
+    for forces in Forces:
+        if any(x.leading is not None for x in _step(replace(course, forces=forces))):
+            return CAUSES[forces]
+    return ""
