@@ -279,9 +279,9 @@ def test_a_condition_is_a_number_in_every_lane():
     """As a truth value it would have no -0."""
     model = dataclasses.replace(MODELS["pendulum"], potential_energy="-(theta < -9e9)")
     parameters, _, dt = members(model)
-    series = np.ones((MEMBERS, 3))
+    states = np.ones((2, MEMBERS, 3))
     for lane in LANES:
-        _, potential = energies(model, parameters, dt, 1, series, series, lane=lane)
+        _, potential = energies(model, parameters, dt, 1, states, lane=lane)
         assert np.signbit(potential).all()
 
 
