@@ -60,7 +60,7 @@ BETA = Parameter(
     "length of the wire without load over that at rest; towards 1 the wire is stiff",
     minimum=0.0,
     exclusive=True,
-    maximum=1.0 - 2.0**-20,
+    maximum=0.999999,
 )
 ANGLE = Parameter(
     "Theta", 30.0, "degree", "initial angle of the wire", minimum=-180.0, maximum=180.0

@@ -356,7 +356,7 @@ def _check_extrapolated(part: Any, model: Model | None, report: Report) -> None:
     if part.tolerance is not None:
         report.add(("tolerance",), rule, "give levels", part.tolerance)
     if part.output == "best":
-        report.add(("output",), rule, "choose from levels", part.output)
+        report.add(("output",), rule, "choose from verdict", part.output)
 
 
 def _ids(part: Any) -> list[str]:

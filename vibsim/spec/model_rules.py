@@ -112,17 +112,35 @@ def _read(section: Any, model: Model | None, folder: Path, report: Report) -> Re
             assert found.with_table is not None
             found = found.with_table(spec.table, False)
     except ExpressionError as error:
-        report.add(("model", "exact"), error.rule, error.hint, error.text)
+        report.add(("model", _exact_of(texts)), error.rule, error.hint, error.text)
         return Read(model)
+    parameters = _of_the_equation(section, found, parameters, report)
     start = found.start(parameters) if found.start else {}
     for name, value in start.items():
         if not np.isfinite(value):
             rule = f"must have a finite value at t = 0, where {name} is {value:g}"
-            report.add(("model", "exact"), rule, value=texts["exact"])
+            exact = _exact_of(texts)
+            report.add(("model", exact), rule, value=texts.get(exact))
             return Read(model)
     if any(row.name == "spring" for row in model.formulas):
         _check_potential(found, parameters, texts, report)
     return Read(found, parameters, texts, tables)
+
+
+def _exact_of(texts: Mapping[str, str]) -> str:
+    """Return the field of the exact solution that is written, the first one of several."""
+    return next((name for name in texts if name.startswith("exact")), "exact")
+
+
+def _of_the_equation(
+    section: Any, found: Model, parameters: Mapping[str, float], report: Report
+) -> dict[str, float]:
+    """Return the parameters that the model of some formulas has, and refuse others that are given."""
+    keys = {row.key for row in found.parameters}
+    for name in sorted(section.model_fields_set & (parameters.keys() - keys)):
+        rule = "has no meaning beside an exact solution, on which the motion starts"
+        report.add(("model", name), rule, "leave it out", parameters[name], at_key=True)
+    return {key: value for key, value in parameters.items() if key in keys}
 
 
 def _declared(section: Any, model: Model, report: Report) -> dict[str, float]:
