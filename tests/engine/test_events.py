@@ -1,12 +1,12 @@
 """Steps that events divide: where they are, what rests afterwards, in every lane, with every parameter."""
 
-import dataclasses
 import math
 
 import event_runs as runs_of
 import numpy as np
 import pytest
 from event_runs import BALL, BOX, DRIVEN, TREATMENTS, numbers_of
+from same_bits import arrays, assert_same_bits
 
 from vibsim.engine import integrate
 from vibsim.engine.events import MOST_EVENTS
@@ -18,21 +18,6 @@ from vibsim.models.sliding_box import rest_time as sticking_time
 from vibsim.schemes import FIXED_STEP
 
 KINDS = ["central", "rk4", "ab3", "crank_nicolson", "generalized_alpha", "velocity_verlet"]
-
-
-def arrays(run):
-    """Yield every array of a run with its name."""
-    for field in dataclasses.fields(run):
-        value = getattr(run, field.name)
-        if dataclasses.is_dataclass(value):
-            yield from arrays(value)
-        elif value is not None:
-            yield field.name, np.ascontiguousarray(value)
-
-
-def assert_same_bits(one, other):
-    for (name, a), (_, b) in zip(arrays(one), arrays(other), strict=True):
-        assert a.tobytes() == b.tobytes(), name
 
 
 def several(model, count=9, seed=5):

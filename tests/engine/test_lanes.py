@@ -6,6 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
+from same_bits import arrays, assert_same_bits
 
 from vibsim.engine import LANES, energies, integrate, lane_for
 from vibsim.engine.kernel import source
@@ -111,22 +112,6 @@ def run(model, numbers, lane, *, steps=240, every=8, scheme=CENTRAL, options=Non
     options = options or scheme.defaults()
     more = {"with_series": True, "n_extrema": 5, **more}
     return integrate(model, scheme, options, *numbers, steps, every, lane=lane, **more)
-
-
-def arrays(run):
-    """Yield every array of a run with its name; members come first in each."""
-    for field in dataclasses.fields(run):
-        value = getattr(run, field.name)
-        if dataclasses.is_dataclass(value):
-            yield from arrays(value)
-        elif value is not None:
-            members_first = np.moveaxis(value, 1, 0) if field.name == "states" else value
-            yield field.name, np.ascontiguousarray(members_first)
-
-
-def assert_same_bits(one, other):
-    for (name, a), (_, b) in zip(arrays(one), arrays(other), strict=True):
-        assert a.tobytes() == b.tobytes(), name
 
 
 @pytest.mark.parametrize(
