@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis.series import safe_ratio
-from vibsim.analysis.window import QUIET, Trend
+from vibsim.analysis.cut import LOG2, QUIET
+from vibsim.analysis.window import HIDDEN, OF_SCATTER, SETTLED, SINGLE_WIDTH, Trend
 from vibsim.vocabulary import TOLERANCE
 
 Floats = NDArray[np.float64]
@@ -58,6 +59,10 @@ ON_MESH = 1.0
 """Order of what is left by events that are noticed at the grid point behind them."""
 ORDINARY = 2.0
 """Order of the error that would have been seen where an exact quantity is promised."""
+VOUCHED = 0.04
+"""Mismatch of errors that leaves no room for a tenth of a lower power, which makes 0.05."""
+VOUCHED_FADING = 0.6
+"""What the errors show besides h^p falls at least to this part of itself per level when it is a higher power."""
 LEAST_ORDER = 0.25
 """No stated order is taken for less when errors are predicted: half the least that an expansion has, 1/2."""
 
@@ -98,6 +103,10 @@ class Evidence:
     """Whether events were left to the mesh: the error then has no expansion beyond its first power, shape (...)."""
     growth: Floats | None = None
     """Largest position over the largest exact position, shape (..., n); NaN where not known."""
+    ceiling: Floats | None = None
+    """The most that round-off can be in any arithmetic, at every level in the same norm, shape (..., n)."""
+    error_scatter: Floats | None = None
+    """Signed scatter of the errors of successive levels, shape (..., n-1), of three levels; NaN where not known."""
 
 
 def breakdown(e: Evidence, shape: tuple[int, ...]) -> tuple[Flags, Flags, Flags]:
@@ -122,17 +131,14 @@ def rules(e: Evidence, t: Trend) -> list[tuple[Flags, str]]:
     p = np.where(exactly, ORDINARY, e.order)
     nothing = t.count == 0
     exact = (exactly | nothing) & _truly_exact(e)
-    near = (np.abs(t.order - p) <= tol) & (t.width <= tol)
-    several = t.count > 1
-    together = np.abs(t.scatter) <= np.where(several, COINCIDENT, SINGLE)
-    right = near & (t.scatter >= 0) & together
-    right &= ~t.gap & ~t.drifting & ~_leaving(t, p)
+    right = _right(e, t, p)
     excluded = (t.high < p - tol) | (t.low > p + tol)
-    pure = several & (np.abs(t.scatter) <= PURE) & (np.abs(t.change) <= PURE)
-    wrong = excluded & (pure | _plausible(t, p, tol)) & ~_on_the_way(t, p, tol)
+    wrong = excluded & (_pure(t) | _plausible(t, p, tol)) & ~_on_the_way(t, p, tol)
     wrong &= ~t.gap & ~t.turning & ~(t.scatter_before > UNRELATED)
     above = t.order > p
     # a lower power may hide below or emerge from a higher one, not the other way round
+    several = t.count > 1
+    together = np.abs(t.scatter) <= np.where(several, COINCIDENT, SINGLE)
     wrong &= np.where(
         above,
         together & (t.width <= NARROW) & ~t.drifting & ~_leaving(t, p),
@@ -157,6 +163,48 @@ def rules(e: Evidence, t: Trend) -> list[tuple[Flags, str]]:
         (t.cut, "round_off"),
         (rough, "non_smooth"),
     ]
+
+
+def _right(e: Evidence, t: Trend, p: Floats) -> Flags:
+    """Say where the order is p, surely enough to say so.
+
+    The last two local orders, or their limit with its interval, are within the tolerance; the curves coincide; and no
+    lower power can be hiding: what is left besides h^p fades, or is less than a tenth of a lower power would make.
+    """
+    several, tol = t.count > 1, e.tolerance
+    both = several & (np.abs(t.local - p) <= tol) & (np.abs(t.local - t.change - p) <= tol)
+    near = (np.abs(t.order - p) <= tol) & ((t.width <= tol) | both)
+    together = np.abs(t.scatter) <= np.where(several, COINCIDENT, SINGLE)
+    mismatch = np.hypot(t.scatter, LOG2 * (t.local - p))
+    clear = (mismatch <= HIDDEN) | (several & t.fading)
+    # one order alone: two terms of one shape tell from a power by nothing but the number
+    own = np.abs(t.local - p) <= np.maximum(SINGLE_WIDTH, OF_SCATTER * np.abs(t.scatter) / LOG2)
+    clear = np.where(several, clear, (clear & own) | _errors_vouch(e, p))
+    right = near & together & clear & ~np.signbit(t.scatter)
+    return np.asarray(right & ~t.gap & ~t.drifting & ~_leaving(t, p))
+
+
+def _pure(t: Trend) -> Flags:
+    """Say where a ladder is one pure power, whatever the power."""
+    return np.asarray((t.count > 1) & (np.abs(t.scatter) <= PURE) & (np.abs(t.change) <= PURE))
+
+
+def _errors_vouch(e: Evidence, p: Floats) -> Flags:
+    """Say of three levels where the true errors leave no room for another power beside h^p.
+
+    They have two ratios where the differences have one, and show a lower power more than these. A tenth of h^(p-1)
+    at the finest level makes the mismatch 0.05, a tenth of h^(p+1) 0.1.
+    """
+    if e.error is None or e.error_scatter is None or len(e.levels) != 3:
+        return np.zeros(p.shape, dtype=bool)
+    gaps = np.diff(np.array(e.levels))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = np.log2(safe_ratio(e.error[..., :-1], e.error[..., 1:])) / gaps
+    mismatch = np.hypot(e.error_scatter, LOG2 * (found - p[..., None]))
+    finer, coarser = mismatch[..., 1], mismatch[..., 0]
+    fades = (finer <= VOUCHED_FADING * coarser) & (finer <= SETTLED)
+    known = e.error[..., -1] > EXCESS * _accuracy(e)
+    return np.asarray(known & ((finer <= VOUCHED) | fades))
 
 
 def _leaving(t: Trend, p: Floats) -> Flags:
@@ -247,7 +295,10 @@ def _contradicts(e: Evidence, t: Trend) -> tuple[Flags, Flags]:
     difference, error = _pick(e.difference, finer - 1), _pick(e.error, finer)
     most, least = (
         difference / np.expm1(np.maximum(order, LEAST_ORDER) * gap * np.log(2.0))
-        for order in (t.low, t.high)
+        for order in (
+            np.minimum(t.order, t.local) - t.width,
+            np.maximum(t.order, t.local) + t.width,
+        )
     )
     too_large = np.nan_to_num(error, nan=0.0) > EXCESS * most + _accuracy(e)
     return too_large, np.asarray(error < least / EXCESS - _accuracy(e))
@@ -259,7 +310,7 @@ def _errors_stay(e: Evidence, t: Trend) -> Flags:
         return np.zeros(e.order.shape, dtype=bool)
     gap = np.diff(np.array(e.levels))[t.last + 1]
     fall = safe_ratio(_pick(e.error, t.last + 1), _pick(e.error, t.last + 2))
-    return np.asarray(fall < np.exp2(0.5 * np.maximum(t.low, 0.0) * gap))
+    return np.asarray(fall < np.exp2(0.5 * np.maximum(t.local - t.width, 0.0) * gap))
 
 
 def _errors_agree(e: Evidence, t: Trend) -> Flags:

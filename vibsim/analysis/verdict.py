@@ -87,7 +87,7 @@ def judge(evidence: Evidence) -> Judgement:
         nothing = np.full(shape, -1)
         nan = np.full(shape, np.nan)
         return _decide(cases, culprit, orders, nan, nan, nan, nothing, nothing)
-    found = trend(orders, e.scatter, e.difference, e.floor, BLAME, e.tolerance)
+    found = trend(orders, e.scatter, e.difference, e.floor, BLAME, e.tolerance, e.ceiling)
     cases += rules(e, found)
     # the order of noise is none
     stated = sound & (found.count > 0) & ~(np.isinf(e.order) & at_round_off(e))

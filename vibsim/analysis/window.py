@@ -4,6 +4,10 @@ r"""The window of a ladder: which of its local orders count, where they settle, 
 over time) approach each other, both like ``x_k = |b| h^(q-p)/|a|``. So the *change* of the order and the *scatter* of
 the triples (`series.scatter`) measure what is left of the next power, and the trend of the scatter says whether it
 fades (the first power takes over) or grows (a lower power emerges, or noise).
+
+The interval of an order is empirical: it is the correction to the last local order that the next power would need,
+times the factor that makes intervals of random ladders with known truth contain the true order in 95 % of them
+(``tests/analysis/synthetic.py``; the factors come from one half of these ladders and are tested on the other).
 """
 
 from __future__ import annotations
@@ -13,27 +17,44 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.analysis.cut import LOG2, LOUD, QUIET, SHOWS, before_round_off, noise_share
+
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 
 FADING = 0.75
 """The scatter fades when it falls at least to this part of itself per level (1/2 and 1/4 are usual)."""
-QUIET = 0.01
-"""Scatter or change of the order too small to read a trend from."""
-SHOWS = 3.0
-"""Noise changes an order by no more than so many times its scatter (over log 2)."""
-UNRELATED_FIRST = 0.1
-"""A first triple with more scatter has no trend before it that could vouch for it: suspect differences spoil it."""
-FLAT_FIRST = 0.25
-"""The same for a first triple with a lower order, half the least that an expansion has: noise does not fall with dt."""
 GROWS = 1.3
 """The scatter drifts when it grows by more per level; a power lower by 1/2 makes it grow by 2^0.5."""
-LOUD = 10.0
-"""Round-off may be so many times its predicted floor, an order of magnitude, and move the order accordingly."""
-LEAST_WIDTH = 1e-3
-"""Half the width of an interval at least: what is assumed of the powers beyond the next one carries no more digits."""
-LOG2 = float(np.log(2.0))
+READABLE = 1e-5
+"""Less scatter, or less than `PARALLEL` of the change of the order, comes from series of one shape and tells no trend."""
+PARALLEL = 0.05
+SLOWEST, FASTEST = 0.8, 0.1
+"""Factors per level between which changes of the order fade when they come from a power of the expansion."""
+ALIKE = 0.15
+"""Scatter and order tell of the same power where their factors differ by no more."""
+LEAST_WIDTH = 1e-6
+"""Half the width of an interval at least: the digits that reports show."""
+OF_CHANGE = 2.0
+"""Half the width of an interval over the last changes of the order: 95 % of ladders whose trend is not known."""
+OF_SETTLED = 0.45
+"""The same where scatter and three orders tell of one next power, which is then taken off."""
+OF_FADING = 1.3
+"""The same where three orders of series of one shape do."""
+OF_SCATTER = 3.0
+"""Half the width of the interval of a single order over its scatter / log 2: shapes at an angle of 18 degrees."""
+SINGLE_WIDTH = 2e-3
+"""Half the width of the interval of a single order at least."""
+SETTLED = 0.15
+"""Largest mismatch of a settled order: a second term of a tenth of the first makes 0.2 for neighbouring powers."""
+HIDDEN = 0.015
+"""A tenth of h^(p-1), or of h^(p-2), beside h^p makes at least this mismatch: 0.0167 for p = 2, 0.015 for p = 4.
+
+With more, a ladder of which no trend is known may be on the way to a lower order.
+"""
+NEXT = 2.0
+"""The powers of an expansion are at most so far apart: an order that has not settled may become one so far away."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +73,10 @@ class Trend:
     """The order: the limit of the local orders where they settle, else the last one."""
     width: Floats
     """Half the width of its interval."""
+    low: Floats
+    """Lower end of the interval; lower by `NEXT` where a lower power may be hiding."""
+    high: Floats
+    """Upper end of the interval; higher by `NEXT` where the orders have not settled."""
     local: Floats
     """The last local order."""
     change: Floats
@@ -70,16 +95,8 @@ class Trend:
     """Whether a triple of the window has no order: differences vanish that should not."""
     noisy: Flags
     """Whether round-off explains changes of the order as large as the last one."""
-
-    @property
-    def low(self) -> Floats:
-        """Lower end of the interval."""
-        return np.asarray(np.minimum(self.order, self.local) - self.width)
-
-    @property
-    def high(self) -> Floats:
-        """Upper end of the interval."""
-        return np.asarray(np.maximum(self.order, self.local) + self.width)
+    fading: Flags
+    """Whether what is left of the next power fades from triple to triple."""
 
 
 def trend(
@@ -89,6 +106,7 @@ def trend(
     floor: Floats,
     blame: float,
     tolerance: float,
+    ceiling: Floats | None = None,
 ) -> Trend:
     """Find the window of every ladder.
 
@@ -104,23 +122,28 @@ def trend(
         Differences up to so many times the floor are suspect.
     tolerance
         How far from the stated order the local orders of a window may be.
+    ceiling
+        The most round-off that any arithmetic makes at every level, shape (..., m+2); the floor where None.
     """
-    with np.errstate(invalid="ignore", over="ignore"):
-        noise = _noise(difference, floor)
-        clean = _before_round_off(orders, scatter, noise, 1.0 / blame)
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        noise = noise_share(difference, floor)
+        possible = noise if ceiling is None else noise_share(difference, ceiling)
+        clean = before_round_off(orders, scatter, difference, noise, possible, 1.0 / blame)
         count = np.sum(clean, axis=-1)
         last = np.maximum(count - 1, 0)
         local, spread, rest = (_at(x, last) for x in (orders, scatter, noise))
         several = count > 1
+        before = np.where(several, _at(scatter, last - 1), 0.0)
         change = np.where(several, local - _at(orders, last - 1), 0.0)
         earlier = np.where(count > 2, _at(orders, last - 1) - _at(orders, last - 2), np.nan)
-        fade = _fade(spread, _at(scatter, last - 1), change, earlier)
-        tail = np.where(fade < 1, change * fade / (1 - np.minimum(fade, FADING)), 0.0)
-        width = np.where(several, _width(spread, change, tail, fade), np.abs(spread) / LOG2)
-        rounded = np.minimum(rest, SHOWS * np.abs(spread)) / LOG2
-        width = np.maximum(width, np.maximum(rounded, LEAST_WIDTH))
-        settles = several & (fade <= FADING) & (np.abs(tail) <= tolerance)
-        order = np.where(settles, local + tail, local)
+        tail, width = _settling(np.abs(spread), np.abs(before), change, earlier, several)
+        width = np.maximum(width, np.minimum(rest, SHOWS * np.abs(spread)) / LOG2)
+        order = local + tail
+        mismatch = np.hypot(spread, LOG2 * np.maximum(np.abs(change), np.abs(tail)))
+        fading = several & (mismatch <= FADING * np.hypot(before, LOG2 * np.nan_to_num(earlier)))
+        fading |= several & (np.abs(spread) <= FADING * np.abs(before)) & (np.abs(tail) <= tolerance)
+        hiding = (mismatch > HIDDEN) & ~fading
+        open_ = (mismatch > SETTLED) | np.signbit(spread)
         unexplained = np.abs(spread) > 3 * rest
         return Trend(
             count=count,
@@ -129,71 +152,52 @@ def trend(
             cut=count < orders.shape[-1],
             order=order,
             width=width,
+            low=order - width - np.where(open_ | hiding, NEXT, 0.0),
+            high=order + width + np.where(open_, NEXT, 0.0),
             local=local,
             change=change,
             scatter=spread,
-            scatter_before=np.where(several, np.abs(_at(scatter, last - 1)), 0.0),
+            scatter_before=np.abs(before),
             drifting=several
-            & (np.abs(spread) > GROWS * np.abs(_at(scatter, last - 1)))
+            & (np.abs(spread) > GROWS * np.abs(before))
             & (np.abs(spread) > QUIET)
             & unexplained,
             alternating=_alternating(scatter, last, several, change, earlier, tolerance),
             turning=(np.abs(change) > np.abs(earlier)) & (np.abs(change) > 5 * QUIET),
             gap=np.any(clean & np.isnan(orders), axis=-1),
             noisy=np.abs(change) <= np.minimum(LOUD * rest, SHOWS * np.abs(spread)) / LOG2,
+            fading=fading,
         )
 
 
-def _noise(difference: Floats, floor: Floats) -> Floats:
-    """Return floor over difference for the finer pair of every triple, shape (..., m)."""
-    pairs = floor[..., 1:-1] + floor[..., 2:]
-    finer = difference[..., 1:]
-    return np.where(finer > 0, pairs / np.where(finer > 0, finer, 1.0), np.inf)
+def _settling(
+    spread: Floats, before: Floats, change: Floats, earlier: Floats, several: Flags
+) -> tuple[Floats, Floats]:
+    """Return what the last order still lacks of its limit, and half the width of the interval of that limit.
 
-
-def _before_round_off(orders: Floats, scatter: Floats, noise: Floats, suspect: float) -> Flags:
-    """Say of every triple whether it stands before the first one that round-off spoils.
-
-    Spoiled is a triple whose finer differences are all suspect and that does not continue the trend: less
-    proportional than the one before, its order changed by more than before, or its differences of opposite sign.
-    Noise that changes an order shows in the scatter as well: a change larger than that is no noise.
+    Where x falls by the factor f per level, so does the change of the order, and f/(1 - f) times the last change is
+    still to come. f is read from the scatter, and where there are three orders from their changes. If both tell the
+    same, the correction is good to `OF_SETTLED` of the last change; if not, the changes are accidents of the levels,
+    and the interval is as wide as they are.
     """
-    size = np.abs(scatter)
-    spoiled = np.isnan(orders) | np.isnan(scatter) | (scatter < 0)
-    spoiled[..., 0] |= (size[..., 0] > UNRELATED_FIRST) | (orders[..., 0] < FLAT_FIRST)
-    change = np.abs(np.diff(orders, axis=-1))
-    for i in range(1, orders.shape[-1]):
-        usual = np.maximum(QUIET, change[..., i - 2]) if i > 1 else 5 * QUIET
-        worse = size[..., i] > np.maximum(QUIET, size[..., i - 1])
-        by_noise = change[..., i - 1] <= SHOWS * size[..., i] / LOG2
-        spoiled[..., i] |= (worse | (change[..., i - 1] > usual)) & by_noise
-    # what rises out of the floor again on a finer level was no floor
-    spoiled &= np.minimum.accumulate(noise[..., ::-1], axis=-1)[..., ::-1] >= suspect
-    return ~np.logical_or.accumulate(spoiled, axis=-1)
-
-
-def _fade(spread: Floats, before: Floats, change: Floats, earlier: Floats) -> Floats:
-    """Return the factor per level by which the next power fades; 1 where it does not, or is not known to.
-
-    Read from the scatter, and from the changes of the order; the slower of the two counts.
-    """
-    small, large = np.abs(spread), np.abs(before)
-    of_scatter = np.where(large > 0, small / np.where(large > 0, large, 1.0), 1.0)
-    quiet = np.maximum(small, large) <= 1e-6
+    of_scatter = np.where(before > 0, spread / np.where(before > 0, before, 1.0), 1.0)
     of_change = np.where(np.abs(earlier) > 0, change / np.where(earlier == 0, 1.0, earlier), np.nan)
-    readable = np.isfinite(of_change) & (np.abs(earlier) > QUIET / 10)
-    swings = np.where(of_change < 0, np.abs(of_change), of_change)
-    slower = np.where(quiet, swings, np.maximum(of_scatter, swings))
-    # proportional series without a third order to tell the trend: the slowest usual rate
-    alone = np.where(quiet, 0.5, of_scatter)
-    return np.asarray(np.minimum(np.where(readable, slower, alone), 1.0))
-
-
-def _width(spread: Floats, change: Floats, tail: Floats, fade: Floats) -> Floats:
-    """Return half the width of the interval of an order read from several triples."""
-    fading = np.maximum(np.maximum(np.abs(change), np.abs(tail)), spread**2 / LOG2)
-    staying = np.maximum(3 * np.abs(change), np.minimum(np.abs(spread) / LOG2, 2.0))
-    return np.where(fade <= FADING, fading, staying)
+    generic = np.maximum(spread, before) > READABLE
+    generic &= spread > PARALLEL * LOG2 * np.abs(change)
+    steady = (of_change > FASTEST) & (of_change < SLOWEST)
+    settled = steady & generic & (np.abs(of_change - of_scatter) <= ALIKE) & (of_scatter <= FADING)
+    alone = steady & ~generic
+    fades = settled | (generic & (of_scatter <= FADING) & np.isnan(earlier))
+    f = np.where(fades, of_scatter, np.where(alone, of_change, 0.0))
+    tail = np.where(several, change * f / (1.0 - np.minimum(f, SLOWEST)), 0.0)
+    largest = np.fmax(np.abs(change), np.abs(earlier))
+    width = np.where(
+        settled,
+        OF_SETTLED * np.abs(change),
+        np.where(alone, OF_FADING * largest, OF_CHANGE * np.maximum(largest, spread / 3)),
+    )
+    single = np.maximum(OF_SCATTER * spread / LOG2, SINGLE_WIDTH)
+    return tail, np.maximum(np.where(several, width, single), LEAST_WIDTH)
 
 
 def _alternating(
@@ -206,7 +210,8 @@ def _alternating(
 ) -> Flags:
     """Say where differences alternate in sign, or orders swing without settling."""
     now = _at(scatter, last)
-    signs = (now < 0) & np.where(several, _at(scatter, last - 1) < 0, now > -0.5)
+    opposite = np.signbit(now)
+    signs = opposite & np.where(several, np.signbit(_at(scatter, last - 1)), now > -0.5)
     swings = change * earlier < 0
     wide = (np.abs(change) > tolerance) & (np.abs(change) > 0.5 * np.abs(earlier))
     return signs | (swings & wide)
