@@ -26,7 +26,7 @@ END = 2.0
 """End time; w = 1."""
 POINTS = 64
 """Intervals of the common grid at most."""
-CLEAN = 0.01
+CLEAN = 0.03
 DOMINANT = 0.1
 TOLERANCE = 0.1
 COINCIDES = 0.01

@@ -22,6 +22,8 @@ Flags = NDArray[np.bool_]
 
 QUIET = 0.01
 """Scatter or change of the order too small to read a trend from."""
+AUDIBLE = 0.003
+"""Scatter above which noise is looked for."""
 SHOWS = 3.0
 """Noise changes an order by no more than so many times its scatter (over log 2)."""
 UNRELATED_FIRST = 0.1
@@ -76,10 +78,10 @@ def before_round_off(
     suspect
         From this share of predicted noise on a triple is suspect.
     """
-    spoiled = _breaks_the_trend(orders, scatter)
+    incoherent = np.signbit(scatter) | (np.abs(scatter) > INCOHERENT) | np.isnan(scatter)
+    spoiled = _breaks_the_trend(orders, scatter, incoherent)
     # what rises out of the floor again on a finer level was no floor
     spoiled &= _from_here_on(noise) >= suspect
-    incoherent = np.signbit(scatter) | (np.abs(scatter) > INCOHERENT) | np.isnan(scatter)
     onset = _onset(orders, scatter, incoherent)
     share = possible / np.fmax(np.fmin(np.abs(scatter), 1.0), SINGLE_NUMBER)
     spoiled |= onset & (_from_here_on(share) * LOUD >= 1.0)
@@ -92,12 +94,13 @@ def _from_here_on(values: Floats) -> Floats:
     return np.minimum.accumulate(values[..., ::-1], axis=-1)[..., ::-1]
 
 
-def _breaks_the_trend(orders: Floats, scatter: Floats) -> Flags:
+def _breaks_the_trend(orders: Floats, scatter: Floats, incoherent: Flags) -> Flags:
     """Say of every triple whether it does not continue the trend.
 
     It is less proportional than the one before, its order has changed by more than before, or its differences are of
     opposite sign. Noise that changes an order shows in the scatter as well: a change larger than that is no noise,
-    unless the series are single numbers, which have no scatter.
+    unless the series are single numbers, which have no scatter. And a scatter that rises less steeply than that of any
+    lower power may rise is no noise.
     """
     size = np.abs(scatter)
     breaks = np.isnan(orders) | np.isnan(scatter) | np.signbit(scatter)
@@ -105,8 +108,10 @@ def _breaks_the_trend(orders: Floats, scatter: Floats) -> Flags:
     change = np.abs(np.diff(orders, axis=-1))
     for i in range(1, orders.shape[-1]):
         usual = np.maximum(QUIET, change[..., i - 2]) if i > 1 else 5 * QUIET
-        worse = size[..., i] > np.maximum(QUIET, size[..., i - 1])
+        worse = size[..., i] > np.maximum(AUDIBLE, size[..., i - 1])
         by_noise = change[..., i - 1] <= SHOWS * size[..., i] / LOG2
+        steep = size[..., i] > np.exp2(orders[..., i - 1] - 0.5) * size[..., i - 1]
+        by_noise &= steep | incoherent[..., i]
         by_noise |= np.maximum(size[..., i], size[..., i - 1]) < SINGLE_NUMBER
         breaks[..., i] |= (worse | (change[..., i - 1] > usual)) & by_noise
     return breaks
@@ -125,7 +130,7 @@ def _onset(orders: Floats, scatter: Floats, incoherent: Flags) -> Flags:
     with np.errstate(over="ignore", invalid="ignore"):
         most = STEEP * np.exp2(np.clip(orders - 0.5, 0.5, 64.0))
     for i in range(count - 1, 0, -1):
-        rises = (size[..., i] > QUIET) & (size[..., i] > size[..., i - 1])
+        rises = (size[..., i] > AUDIBLE) & (size[..., i] > size[..., i - 1])
         steep = size[..., i] > most[..., i - 1] * size[..., i - 1]
         follows = begins[..., i + 1] if i + 1 < count else np.ones(rises.shape, dtype=bool)
         noisy_next = to_the_end[..., i + 1] if i + 1 < count else np.zeros(rises.shape, dtype=bool)

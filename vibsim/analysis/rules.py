@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vibsim.analysis.series import safe_ratio
 from vibsim.analysis.cut import LOG2, QUIET
-from vibsim.analysis.window import HIDDEN, OF_SCATTER, SETTLED, SINGLE_WIDTH, Trend
+from vibsim.analysis.window import EMERGING, GROWS, HIDDEN, OF_SCATTER, SETTLED, SINGLE_WIDTH, Trend
 from vibsim.vocabulary import TOLERANCE
 
 Floats = NDArray[np.float64]
@@ -59,6 +59,8 @@ ON_MESH = 1.0
 """Order of what is left by events that are noticed at the grid point behind them."""
 ORDINARY = 2.0
 """Order of the error that would have been seen where an exact quantity is promised."""
+LEAVES = 0.05
+"""Orders of true errors may be so far from p: a tenth of h^(p-1) beside h^p makes 0.07."""
 VOUCHED = 0.04
 """Mismatch of errors that leaves no room for a tenth of a lower power, which makes 0.05."""
 VOUCHED_FADING = 0.6
@@ -124,6 +126,16 @@ def breakdown(e: Evidence, shape: tuple[int, ...]) -> tuple[Flags, Flags, Flags]
     return broken, beyond, (last > BLOWN_UP) & ~(last < 0.5 * before)
 
 
+def error_orders(e: Evidence) -> Floats:
+    """Return the order of the true errors of every pair, shape (..., n-1); NaN where they are not known."""
+    if e.error is None:
+        return np.full(e.difference.shape, np.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(
+            np.log2(safe_ratio(e.error[..., :-1], e.error[..., 1:])) / np.diff(np.array(e.levels))
+        )
+
+
 def rules(e: Evidence, t: Trend) -> list[tuple[Flags, str]]:
     """Return the rules for ladders of three levels and more, first to last."""
     exactly, tol = np.isinf(e.order), e.tolerance
@@ -137,15 +149,16 @@ def rules(e: Evidence, t: Trend) -> list[tuple[Flags, str]]:
     wrong &= ~t.gap & ~t.turning & ~(t.scatter_before > UNRELATED)
     above = t.order > p
     # a lower power may hide below or emerge from a higher one, not the other way round
-    several = t.count > 1
+    several = t.several
     together = np.abs(t.scatter) <= np.where(several, COINCIDENT, SINGLE)
     wrong &= np.where(
         above,
-        together & (t.width <= NARROW) & ~t.drifting & ~_leaving(t, p),
+        together & (t.width <= np.where(several, NARROW, 0.5 * NARROW)) & ~t.drifting & ~t.hiding & ~_leaving(t, p),
         several | (np.abs(t.scatter) <= COINCIDENT),
     )
     too_large, too_small = _contradicts(e, t)
-    missed = too_large & (right | (wrong & _errors_stay(e, t)))
+    sure = several | (np.abs(t.scatter) <= HIDDEN)
+    missed = too_large & (right | (wrong & sure & _errors_stay(e, t)))
     wrong &= _errors_agree(e, t)
     rough = np.zeros(p.shape, dtype=bool) if e.on_mesh is None else e.on_mesh
     # the mesh leaves the power 1: any other one is the accident of where events lie between grid points
@@ -171,22 +184,38 @@ def _right(e: Evidence, t: Trend, p: Floats) -> Flags:
     The last two local orders, or their limit with its interval, are within the tolerance; the curves coincide; and no
     lower power can be hiding: what is left besides h^p fades, or is less than a tenth of a lower power would make.
     """
-    several, tol = t.count > 1, e.tolerance
+    several, tol = t.several, e.tolerance
     both = several & (np.abs(t.local - p) <= tol) & (np.abs(t.local - t.change - p) <= tol)
     near = (np.abs(t.order - p) <= tol) & ((t.width <= tol) | both)
     together = np.abs(t.scatter) <= np.where(several, COINCIDENT, SINGLE)
     mismatch = np.hypot(t.scatter, LOG2 * (t.local - p))
-    clear = (mismatch <= HIDDEN) | (several & t.fading)
+    before = np.hypot(t.scatter_before, LOG2 * (t.local - t.change - p))
+    grows = several & (mismatch > GROWS * before)
+    clear = mismatch <= np.where(grows, EMERGING, HIDDEN)
+    clear |= several & (t.fading | t.irregular)
     # one order alone: two terms of one shape tell from a power by nothing but the number
     own = np.abs(t.local - p) <= np.maximum(SINGLE_WIDTH, OF_SCATTER * np.abs(t.scatter) / LOG2)
     clear = np.where(several, clear, (clear & own) | _errors_vouch(e, p))
-    right = near & together & clear & ~np.signbit(t.scatter)
+    right = near & together & clear & ~np.signbit(t.scatter) & ~_errors_leave(e, t, p)
     return np.asarray(right & ~t.gap & ~t.drifting & ~_leaving(t, p))
+
+
+def _errors_leave(e: Evidence, t: Trend, p: Floats) -> Flags:
+    """Say where the true errors move away from h^p over the last levels of the window.
+
+    They show a lower power before the differences do, which are steeper.
+    """
+    if e.error is None or len(e.levels) < 4:
+        return np.zeros(p.shape, dtype=bool)
+    found = error_orders(e)
+    last, before = (np.abs(_pick(found, t.last + 1 - back) - p) for back in (0, 1))
+    known = _pick(e.error, t.last + 2) > _accuracy(e)
+    return np.asarray(known & (last > LEAVES) & (last > GROWS * before))
 
 
 def _pure(t: Trend) -> Flags:
     """Say where a ladder is one pure power, whatever the power."""
-    return np.asarray((t.count > 1) & (np.abs(t.scatter) <= PURE) & (np.abs(t.change) <= PURE))
+    return np.asarray(t.several & (np.abs(t.scatter) <= PURE) & (np.abs(t.change) <= PURE))
 
 
 def _errors_vouch(e: Evidence, p: Floats) -> Flags:
@@ -197,9 +226,7 @@ def _errors_vouch(e: Evidence, p: Floats) -> Flags:
     """
     if e.error is None or e.error_scatter is None or len(e.levels) != 3:
         return np.zeros(p.shape, dtype=bool)
-    gaps = np.diff(np.array(e.levels))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        found = np.log2(safe_ratio(e.error[..., :-1], e.error[..., 1:])) / gaps
+    found = error_orders(e)
     mismatch = np.hypot(e.error_scatter, LOG2 * (found - p[..., None]))
     finer, coarser = mismatch[..., 1], mismatch[..., 0]
     fades = (finer <= VOUCHED_FADING * coarser) & (finer <= SETTLED)
@@ -212,7 +239,7 @@ def _leaving(t: Trend, p: Floats) -> Flags:
     away = t.local - p
     before = t.local - t.change - p
     return (
-        (t.count > 1)
+        t.several
         & (away * before > 0)
         & (np.abs(away) > np.abs(before))
         & (np.abs(t.change) > MOVES)
@@ -227,7 +254,7 @@ def _plausible(t: Trend, p: Floats, tol: float) -> Flags:
     A ladder that only passes by (towards p, and away from that multiple) has not settled there. An order that is no
     whole number is believed where the series are nearly proportional only.
     """
-    several = t.count > 1
+    several = t.several
     before = t.local - t.change
     towards_p = np.abs(t.local - p) < np.abs(before - p)
     found = np.zeros(p.shape, dtype=bool)
@@ -236,12 +263,12 @@ def _plausible(t: Trend, p: Floats, tol: float) -> Flags:
         passing = several & towards_p
         passing &= np.abs(t.local - candidate) > np.abs(before - candidate) + QUIET
         # one triple tells a pure power from two proportional terms by nothing but the number
-        least = np.where(several & whole, REACH_SETTLED, REACH)
-        wide = np.where(several, t.width, np.where(whole, 2 * t.width, 0.0))
-        reach = np.maximum(wide, least)
+        least = np.where(whole, REACH_SETTLED, REACH)
+        reach = np.where(several, np.maximum(t.width, least), np.minimum(t.width, least))
         near = (np.abs(t.order - candidate) <= reach) & (np.abs(candidate - p) > tol)
-        near &= (candidate >= LEAST_CANDIDATE) & (candidate <= p + MOST_ABOVE)
-        found |= near & ~passing & (whole | (np.abs(t.scatter) <= 2 * SINGLE))
+        near &= (candidate >= LEAST_CANDIDATE) & (several | (candidate <= p + MOST_ABOVE))
+        most = np.where(several, 2 * SINGLE, HIDDEN)
+        found |= near & ~passing & (whole | (np.abs(t.scatter) <= most))
     return found
 
 
@@ -249,7 +276,7 @@ def _on_the_way(t: Trend, p: Floats, tol: float) -> Flags:
     """Say where the local orders approach p so fast that they may reach it: three last changes cover the way."""
     way = np.abs(t.local - p) - tol
     approach = np.abs(t.local - t.change - p) - np.abs(t.local - p)
-    return np.asarray((t.count > 1) & (3 * approach >= way))
+    return np.asarray(t.several & (3 * approach >= way))
 
 
 def _floor_of_pairs(e: Evidence) -> Floats:

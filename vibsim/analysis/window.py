@@ -44,8 +44,12 @@ OF_FADING = 1.3
 """The same where three orders of series of one shape do."""
 OF_SCATTER = 3.0
 """Half the width of the interval of a single order over its scatter / log 2: shapes at an angle of 18 degrees."""
+OF_ERRORS = 2.0
+"""Half the width of the interval of a single order over its distance from the order of the last true errors."""
 SINGLE_WIDTH = 2e-3
 """Half the width of the interval of a single order at least."""
+JUMP = 0.3
+"""Change of the order from one triple to the next that a scatter of `HIDDEN` at most cannot come from."""
 SETTLED = 0.15
 """Largest mismatch of a settled order: a second term of a tenth of the first makes 0.2 for neighbouring powers."""
 HIDDEN = 0.015
@@ -53,6 +57,10 @@ HIDDEN = 0.015
 
 With more, a ladder of which no trend is known may be on the way to a lower order.
 """
+EMERGING = 0.006
+"""The same for h^(p-3); with less, even a mismatch that grows from triple to triple leaves h^p alone."""
+PASSING = 0.05
+"""Orders that change by more and do not settle may be on the way from one power to another."""
 NEXT = 2.0
 """The powers of an expansion are at most so far apart: an order that has not settled may become one so far away."""
 
@@ -97,6 +105,12 @@ class Trend:
     """Whether round-off explains changes of the order as large as the last one."""
     fading: Flags
     """Whether what is left of the next power fades from triple to triple."""
+    hiding: Flags
+    """Whether a lower power may be hiding in what is left besides the first."""
+    several: Flags
+    """Whether the order rests on several triples."""
+    irregular: Flags
+    """Whether the last two changes of the order have opposite signs."""
 
 
 def trend(
@@ -107,6 +121,7 @@ def trend(
     blame: float,
     tolerance: float,
     ceiling: Floats | None = None,
+    of_errors: Floats | None = None,
 ) -> Trend:
     """Find the window of every ladder.
 
@@ -124,6 +139,8 @@ def trend(
         How far from the stated order the local orders of a window may be.
     ceiling
         The most round-off that any arithmetic makes at every level, shape (..., m+2); the floor where None.
+    of_errors
+        Order of the last two true errors of three levels, shape (...); NaN where not known.
     """
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         noise = noise_share(difference, floor)
@@ -132,18 +149,31 @@ def trend(
         count = np.sum(clean, axis=-1)
         last = np.maximum(count - 1, 0)
         local, spread, rest = (_at(x, last) for x in (orders, scatter, noise))
-        several = count > 1
+        several = (count > 1) & ~_starts_here(orders, scatter, last)
         before = np.where(several, _at(scatter, last - 1), 0.0)
         change = np.where(several, local - _at(orders, last - 1), 0.0)
-        earlier = np.where(count > 2, _at(orders, last - 1) - _at(orders, last - 2), np.nan)
+        earlier = np.where(
+            several & (count > 2), _at(orders, last - 1) - _at(orders, last - 2), np.nan
+        )
         tail, width = _settling(np.abs(spread), np.abs(before), change, earlier, several)
         width = np.maximum(width, np.minimum(rest, SHOWS * np.abs(spread)) / LOG2)
+        if of_errors is not None:
+            apart = np.where(several, 0.0, np.nan_to_num(np.abs(of_errors - local)))
+            width = np.maximum(width, OF_ERRORS * apart)
         order = local + tail
         mismatch = np.hypot(spread, LOG2 * np.maximum(np.abs(change), np.abs(tail)))
-        fading = several & (mismatch <= FADING * np.hypot(before, LOG2 * np.nan_to_num(earlier)))
-        fading |= several & (np.abs(spread) <= FADING * np.abs(before)) & (np.abs(tail) <= tolerance)
-        hiding = (mismatch > HIDDEN) & ~fading
-        open_ = (mismatch > SETTLED) | np.signbit(spread)
+        earlier_mismatch = np.hypot(before, LOG2 * np.nan_to_num(earlier))
+        fading = several & (mismatch <= FADING * earlier_mismatch)
+        fading &= (np.abs(spread) <= FADING * np.abs(before)) | (np.abs(spread) <= EMERGING)
+        fading |= (
+            several
+            & (np.abs(before) > READABLE)
+            & (np.abs(spread) <= FADING * np.abs(before))
+            & (np.abs(tail) <= tolerance)
+        )
+        grows = several & (mismatch > GROWS * earlier_mismatch)
+        hiding = ~fading & (mismatch > np.where(grows, EMERGING, HIDDEN))
+        open_ = (mismatch > SETTLED) | np.signbit(spread) | (~fading & (np.abs(change) > PASSING))
         unexplained = np.abs(spread) > 3 * rest
         return Trend(
             count=count,
@@ -167,7 +197,21 @@ def trend(
             gap=np.any(clean & np.isnan(orders), axis=-1),
             noisy=np.abs(change) <= np.minimum(LOUD * rest, SHOWS * np.abs(spread)) / LOG2,
             fading=fading,
+            hiding=hiding,
+            several=several,
+            irregular=(change * earlier < 0),
         )
+
+
+def _starts_here(orders: Floats, scatter: Floats, last: Integers) -> Flags:
+    """Say where the window begins with the last triple: it is proportional, and the one before has another order.
+
+    A power that fades would have left more in the scatter than there is. The coarser levels are of another range:
+    they have blown up, or their errors are as large as the solution.
+    """
+    size = np.abs(_at(scatter, last))
+    jump = np.abs(_at(orders, last) - _at(orders, last - 1))
+    return (jump > JUMP) & (size <= HIDDEN) & (size > READABLE)
 
 
 def _settling(
