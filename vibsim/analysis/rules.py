@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 
 from vibsim.analysis.series import safe_ratio
 from vibsim.analysis.cut import LOG2, QUIET
-from vibsim.analysis.window import EMERGING, GROWS, HIDDEN, OF_SCATTER, SETTLED, SINGLE_WIDTH, Trend
+from vibsim.analysis.window import (
+    GROWS,
+    HIDDEN,
+    OF_SCATTER,
+    SETTLED,
+    SINGLE_WIDTH,
+    Trend,
+    most_left,
+)
 from vibsim.vocabulary import TOLERANCE
 
 Floats = NDArray[np.float64]
@@ -153,7 +161,7 @@ def rules(e: Evidence, t: Trend) -> list[tuple[Flags, str]]:
     together = np.abs(t.scatter) <= np.where(several, COINCIDENT, SINGLE)
     wrong &= np.where(
         above,
-        together & (t.width <= np.where(several, NARROW, 0.5 * NARROW)) & ~t.drifting & ~t.hiding & ~_leaving(t, p),
+        together & (t.width <= np.where(several, NARROW, 0.5 * NARROW)) & ~t.drifting & ~t.hiding,
         several | (np.abs(t.scatter) <= COINCIDENT),
     )
     too_large, too_small = _contradicts(e, t)
@@ -190,8 +198,7 @@ def _right(e: Evidence, t: Trend, p: Floats) -> Flags:
     together = np.abs(t.scatter) <= np.where(several, COINCIDENT, SINGLE)
     mismatch = np.hypot(t.scatter, LOG2 * (t.local - p))
     before = np.hypot(t.scatter_before, LOG2 * (t.local - t.change - p))
-    grows = several & (mismatch > GROWS * before)
-    clear = mismatch <= np.where(grows, EMERGING, HIDDEN)
+    clear = mismatch <= most_left(p, mismatch, before, several)
     clear |= several & (t.fading | t.irregular)
     # one order alone: two terms of one shape tell from a power by nothing but the number
     own = np.abs(t.local - p) <= np.maximum(SINGLE_WIDTH, OF_SCATTER * np.abs(t.scatter) / LOG2)
@@ -256,6 +263,7 @@ def _plausible(t: Trend, p: Floats, tol: float) -> Flags:
     """
     several = t.several
     before = t.local - t.change
+    alone = np.hypot(t.scatter, LOG2 * (t.order - np.round(2.0 * t.order) / 2)) <= HIDDEN
     towards_p = np.abs(t.local - p) < np.abs(before - p)
     found = np.zeros(p.shape, dtype=bool)
     for candidate in (np.floor(2.0 * t.order) / 2, np.ceil(2.0 * t.order) / 2):
@@ -266,7 +274,7 @@ def _plausible(t: Trend, p: Floats, tol: float) -> Flags:
         least = np.where(whole, REACH_SETTLED, REACH)
         reach = np.where(several, np.maximum(t.width, least), np.minimum(t.width, least))
         near = (np.abs(t.order - candidate) <= reach) & (np.abs(candidate - p) > tol)
-        near &= (candidate >= LEAST_CANDIDATE) & (several | (candidate <= p + MOST_ABOVE))
+        near &= (candidate >= LEAST_CANDIDATE) & (several | alone | (candidate <= p + MOST_ABOVE))
         most = np.where(several, 2 * SINGLE, HIDDEN)
         found |= near & ~passing & (whole | (np.abs(t.scatter) <= most))
     return found

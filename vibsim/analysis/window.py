@@ -57,8 +57,10 @@ HIDDEN = 0.015
 
 With more, a ladder of which no trend is known may be on the way to a lower order.
 """
-EMERGING = 0.006
-"""The same for h^(p-3); with less, even a mismatch that grows from triple to triple leaves h^p alone."""
+EMERGING = 0.08
+"""A lower power that is seen to grow may be so large a part of h^p at the finest level: below a tenth, with a margin."""
+FARTHEST = 3.0
+"""A lower power is lower by no more."""
 PASSING = 0.05
 """Orders that change by more and do not settle may be on the way from one power to another."""
 NEXT = 2.0
@@ -164,15 +166,14 @@ def trend(
         mismatch = np.hypot(spread, LOG2 * np.maximum(np.abs(change), np.abs(tail)))
         earlier_mismatch = np.hypot(before, LOG2 * np.nan_to_num(earlier))
         fading = several & (mismatch <= FADING * earlier_mismatch)
-        fading &= (np.abs(spread) <= FADING * np.abs(before)) | (np.abs(spread) <= EMERGING)
+        fading &= (np.abs(spread) <= FADING * np.abs(before)) | (np.abs(spread) <= 0.5 * HIDDEN)
         fading |= (
             several
             & (np.abs(before) > READABLE)
             & (np.abs(spread) <= FADING * np.abs(before))
             & (np.abs(tail) <= tolerance)
         )
-        grows = several & (mismatch > GROWS * earlier_mismatch)
-        hiding = ~fading & (mismatch > np.where(grows, EMERGING, HIDDEN))
+        hiding = ~fading & (mismatch > most_left(order, mismatch, earlier_mismatch, several))
         open_ = (mismatch > SETTLED) | np.signbit(spread) | (~fading & (np.abs(change) > PASSING))
         unexplained = np.abs(spread) > 3 * rest
         return Trend(
@@ -201,6 +202,30 @@ def trend(
             several=several,
             irregular=(change * earlier < 0),
         )
+
+
+def most_left(order: Floats, mismatch: Floats, before: Floats, several: Flags) -> Floats:
+    """Return the largest mismatch with which h^p still stands alone, shape (...).
+
+    Of ``h^p + x h^r``, r < p, at the finest level, the last triple sees ``x (2^r - 1)/(2^p - 1) (1 - 2^(r-p))``, and the
+    one before it less by 2^(p-r). So the growth of the mismatch tells r, and its size x. Where nothing grows, r is not
+    known, and `HIDDEN` is the limit.
+
+    Parameters
+    ----------
+    order
+        p.
+    mismatch, before
+        Distance from proportional series of order p, of the last triple and the one before.
+    several
+        Whether there is one before.
+    """
+    growth = np.where(before > 0, mismatch / np.where(before > 0, before, 1.0), np.inf)
+    gap = np.clip(np.log2(np.maximum(growth, 1.0)), 0.5, FARTHEST)
+    p = np.maximum(order, 1.0)
+    lower = np.exp2(np.maximum(p - gap, 0.5)) - 1
+    seen = EMERGING * lower / (np.exp2(p) - 1) * (1 - np.exp2(-gap))
+    return np.where(several & (growth > GROWS), seen, HIDDEN)
 
 
 def _starts_here(orders: Floats, scatter: Floats, last: Integers) -> Flags:
