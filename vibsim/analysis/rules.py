@@ -57,6 +57,10 @@ REACH = 0.05
 """An order this near a multiple of 1/2 may be that multiple: a tenth of the distance between two of them."""
 REACH_SETTLED = 0.1
 """The same for a whole number that several triples support: a tenth of the distance between whole numbers."""
+OF_SINGLE = 2.0
+"""A single order may be so many times its scatter (over log 2) from the whole number that it stands for."""
+SUNK = 0.75
+"""Orders that are lower than p by more and fall leave p behind: of h^(p-1), too little h^p is left to be counted."""
 LEAST_CANDIDATE = 0.5
 """The least order that an expansion has: a solution that stays away from its limit has none."""
 MOST_ABOVE = 2.0
@@ -153,9 +157,10 @@ def rules(e: Evidence, t: Trend) -> list[tuple[Flags, str]]:
     exact = (exactly | nothing) & _truly_exact(e)
     right = _right(e, t, p)
     excluded = (t.high < p - tol) | (t.low > p + tol)
-    wrong = excluded & (_pure(t) | _plausible(t, p, tol)) & ~_on_the_way(t, p, tol)
-    wrong &= ~t.gap & ~t.turning & ~(t.scatter_before > UNRELATED)
     above = t.order > p
+    wrong = excluded & (_pure(t) | _plausible(t, p, tol)) & ~_on_the_way(t, p, tol)
+    wrong &= ~t.open | above | (t.local <= p - SUNK)
+    wrong &= ~t.gap & ~t.turning & ~(t.scatter_before > UNRELATED)
     # a lower power may hide below or emerge from a higher one, not the other way round
     several = t.several
     together = np.abs(t.scatter) <= np.where(several, COINCIDENT, SINGLE)
@@ -175,14 +180,14 @@ def rules(e: Evidence, t: Trend) -> list[tuple[Flags, str]]:
         (exact & _far_from_exact(e), "wrong_limit"),
         (exact, "exact"),
         (exactly & ~at_round_off(e), "order_low"),
-        (nothing | exactly, "round_off"),
+        (exactly | (nothing & (at_round_off(e) | ~rough)), "round_off"),
         (t.alternating & ~rough, "oscillating"),
         (missed & regular, "wrong_limit"),
         (right & ~too_small & regular, "asymptotic"),
         (wrong & ~above & regular, "order_low"),
         (wrong & above & ~rough, "order_high"),
-        (t.cut, "round_off"),
         (rough, "non_smooth"),
+        (t.cut, "round_off"),
     ]
 
 
@@ -202,7 +207,7 @@ def _right(e: Evidence, t: Trend, p: Floats) -> Flags:
     clear |= several & (t.fading | t.irregular)
     # one order alone: two terms of one shape tell from a power by nothing but the number
     own = np.abs(t.local - p) <= np.maximum(SINGLE_WIDTH, OF_SCATTER * np.abs(t.scatter) / LOG2)
-    clear = np.where(several, clear, (clear & own) | _errors_vouch(e, p))
+    clear = np.where(several, clear, own | _errors_vouch(e, p))
     right = near & together & clear & ~np.signbit(t.scatter) & ~_errors_leave(e, t, p)
     return np.asarray(right & ~t.gap & ~t.drifting & ~_leaving(t, p))
 
@@ -272,7 +277,8 @@ def _plausible(t: Trend, p: Floats, tol: float) -> Flags:
         passing &= np.abs(t.local - candidate) > np.abs(before - candidate) + QUIET
         # one triple tells a pure power from two proportional terms by nothing but the number
         least = np.where(whole, REACH_SETTLED, REACH)
-        reach = np.where(several, np.maximum(t.width, least), np.minimum(t.width, least))
+        wide = np.where(whole, OF_SINGLE * np.abs(t.scatter) / LOG2, np.minimum(t.width, REACH))
+        reach = np.where(several, np.maximum(t.width, least), np.maximum(wide, SINGLE_WIDTH))
         near = (np.abs(t.order - candidate) <= reach) & (np.abs(candidate - p) > tol)
         near &= (candidate >= LEAST_CANDIDATE) & (several | alone | (candidate <= p + MOST_ABOVE))
         most = np.where(several, 2 * SINGLE, HIDDEN)

@@ -107,6 +107,8 @@ class Trend:
     """Whether round-off explains changes of the order as large as the last one."""
     fading: Flags
     """Whether what is left of the next power fades from triple to triple."""
+    open: Flags
+    """Whether the orders have not settled."""
     hiding: Flags
     """Whether a lower power may be hiding in what is left besides the first."""
     several: Flags
@@ -163,18 +165,12 @@ def trend(
             apart = np.where(several, 0.0, np.nan_to_num(np.abs(of_errors - local)))
             width = np.maximum(width, OF_ERRORS * apart)
         order = local + tail
-        mismatch = np.hypot(spread, LOG2 * np.maximum(np.abs(change), np.abs(tail)))
-        earlier_mismatch = np.hypot(before, LOG2 * np.nan_to_num(earlier))
-        fading = several & (mismatch <= FADING * earlier_mismatch)
-        fading &= (np.abs(spread) <= FADING * np.abs(before)) | (np.abs(spread) <= 0.5 * HIDDEN)
-        fading |= (
-            several
-            & (np.abs(before) > READABLE)
-            & (np.abs(spread) <= FADING * np.abs(before))
-            & (np.abs(tail) <= tolerance)
-        )
-        hiding = ~fading & (mismatch > most_left(order, mismatch, earlier_mismatch, several))
-        open_ = (mismatch > SETTLED) | np.signbit(spread) | (~fading & (np.abs(change) > PASSING))
+        left = _left(spread, before, change, earlier, tail)
+        fading = several & _fades(left, spread, before, tail, tolerance)
+        hiding = ~fading & (left[0] > most_left(order, *left, several))
+        open_ = (left[0] > SETTLED) | np.signbit(spread) | (~fading & (np.abs(change) > PASSING))
+        # where orders fall, a higher one is behind
+        falls = several & (change < 0) & ~np.signbit(spread)
         unexplained = np.abs(spread) > 3 * rest
         return Trend(
             count=count,
@@ -184,7 +180,10 @@ def trend(
             order=order,
             width=width,
             low=order - width - np.where(open_ | hiding, NEXT, 0.0),
-            high=order + width + np.where(open_, NEXT, 0.0),
+            high=np.where(falls, np.maximum(order, local), order)
+            + width
+            + np.where(open_ & ~falls, NEXT, 0.0),
+            open=open_,
             local=local,
             change=change,
             scatter=spread,
@@ -202,6 +201,26 @@ def trend(
             several=several,
             irregular=(change * earlier < 0),
         )
+
+
+def _left(
+    spread: Floats, before: Floats, change: Floats, earlier: Floats, tail: Floats
+) -> tuple[Floats, Floats]:
+    """Return how far the last triple, and the one before, are from series of the stated order."""
+    known = tail != 0
+    last = np.where(known, np.abs(tail), np.abs(change))
+    first = np.where(known, np.abs(tail + change), np.nan_to_num(np.abs(earlier)))
+    return np.hypot(spread, LOG2 * last), np.hypot(before, LOG2 * first)
+
+
+def _fades(
+    left: tuple[Floats, Floats], spread: Floats, before: Floats, tail: Floats, tolerance: float
+) -> Flags:
+    """Say where what is left fades from triple to triple."""
+    small, large = np.abs(spread), np.abs(before)
+    by_scatter = (large > READABLE) & (small <= FADING * large)
+    whole = (left[0] <= FADING * left[1]) & (by_scatter | (small <= 0.5 * HIDDEN))
+    return np.asarray(whole | (by_scatter & (np.abs(tail) <= tolerance)))
 
 
 def most_left(order: Floats, mismatch: Floats, before: Floats, several: Flags) -> Floats:
