@@ -109,9 +109,14 @@ def test_a_floor_in_the_ladder_leaves_the_window_before_it(growth: float) -> Non
     assert REASON_NAMES[int(found.reason[0])] == "asymptotic"
     assert found.last[0] < levels[-1]
     assert np.any(np.abs(found.orders[0] - 2) > 0.5)
-    # and only the floor makes it one: without it the same ladder is no PASS
-    unknown = evidence_of(fields, levels, floor=1e-15, exact=EXACT)
-    assert STATUSES[int(judge(unknown).status[0])] != "PASS"
+    # and only the floor makes it one: without it the same ladder is no PASS, unless the data show the floor as well,
+    # by unrelated differences on five levels that do not fall; the window is the same then
+    unknown = judge(evidence_of(fields, levels, floor=1e-15, exact=EXACT))
+    if growth < 1.0:
+        assert STATUSES[int(unknown.status[0])] != "PASS"
+    else:
+        assert REASON_NAMES[int(unknown.reason[0])] == "asymptotic"
+        assert abs(unknown.last[0] - found.last[0]) <= 1
 
 
 def test_nothing_but_floor_is_round_off() -> None:
@@ -324,7 +329,9 @@ UNDECIDED = ("INCONCLUSIVE", "pre_asymptotic")
         ([1.05], [0.09], ("FAIL", "order_low")),
         ([1.3], [0.02], UNDECIDED),
         ([1.05], [0.3], UNDECIDED),
-        ([3.01], [0.03], ("FAIL", "order_high")),
+        # beside a third order, a second one of a tenth of it or more makes a scatter of 0.02
+        ([3.01], [0.01], ("FAIL", "order_high")),
+        ([3.01], [0.03], UNDECIDED),
         ([3.01], [0.12], UNDECIDED),
         ([2.02, 2.01], [0.04, 0.01], ("PASS", "asymptotic")),
         # near the order, but still changing

@@ -166,7 +166,7 @@ def rules(e: Evidence, t: Trend) -> list[tuple[Flags, str]]:
     together = np.abs(t.scatter) <= np.where(several, COINCIDENT, SINGLE)
     wrong &= np.where(
         above,
-        together & (t.width <= np.where(several, NARROW, 0.5 * NARROW)) & ~t.drifting & ~t.hiding,
+        together & (t.width <= NARROW) & ~t.drifting & ~t.hiding,
         several | (np.abs(t.scatter) <= COINCIDENT),
     )
     too_large, too_small = _contradicts(e, t)
@@ -199,7 +199,8 @@ def _right(e: Evidence, t: Trend, p: Floats) -> Flags:
     """
     several, tol = t.several, e.tolerance
     both = several & (np.abs(t.local - p) <= tol) & (np.abs(t.local - t.change - p) <= tol)
-    near = (np.abs(t.order - p) <= tol) & ((t.width <= tol) | both)
+    both |= several & t.fading & (np.abs(t.local - p) <= tol) & (np.abs(t.change) <= tol)
+    near = (np.abs(t.order - p) <= tol) & ((t.width <= tol) | both | ~several)
     together = np.abs(t.scatter) <= np.where(several, COINCIDENT, SINGLE)
     mismatch = np.hypot(t.scatter, LOG2 * (t.local - p))
     before = np.hypot(t.scatter_before, LOG2 * (t.local - t.change - p))
@@ -207,7 +208,7 @@ def _right(e: Evidence, t: Trend, p: Floats) -> Flags:
     clear |= several & (t.fading | t.irregular)
     # one order alone: two terms of one shape tell from a power by nothing but the number
     own = np.abs(t.local - p) <= np.maximum(SINGLE_WIDTH, OF_SCATTER * np.abs(t.scatter) / LOG2)
-    clear = np.where(several, clear, own | _errors_vouch(e, p))
+    clear = np.where(several, clear, own | errors_vouch(e, p))
     right = near & together & clear & ~np.signbit(t.scatter) & ~_errors_leave(e, t, p)
     return np.asarray(right & ~t.gap & ~t.drifting & ~_leaving(t, p))
 
@@ -230,7 +231,7 @@ def _pure(t: Trend) -> Flags:
     return np.asarray(t.several & (np.abs(t.scatter) <= PURE) & (np.abs(t.change) <= PURE))
 
 
-def _errors_vouch(e: Evidence, p: Floats) -> Flags:
+def errors_vouch(e: Evidence, p: Floats) -> Flags:
     """Say of three levels where the true errors leave no room for another power beside h^p.
 
     They have two ratios where the differences have one, and show a lower power more than these. A tenth of h^(p-1)

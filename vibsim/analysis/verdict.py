@@ -29,7 +29,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis.rules import BLAME, Evidence, at_round_off, breakdown, error_orders, rules
+from vibsim.analysis.rules import BLAME, Evidence, at_round_off, breakdown, error_orders, errors_vouch, rules
 from vibsim.analysis.series import order_of_ratio, safe_ratio
 from vibsim.analysis.window import trend
 from vibsim.vocabulary import REASON_NAMES, REASONS, STATUSES
@@ -87,9 +87,20 @@ def judge(evidence: Evidence) -> Judgement:
         nothing = np.full(shape, -1)
         nan = np.full(shape, np.nan)
         return _decide(cases, culprit, orders, nan, nan, nan, nothing, nothing)
-    of_errors = error_orders(e)[..., -1] if len(e.levels) == 3 else None
+    of_errors, vouched = None, None
+    if len(e.levels) == 3:
+        of_errors = error_orders(e)[..., -1]
+        vouched = errors_vouch(e, np.round(2.0 * orders[..., 0]) / 2)
     found = trend(
-        orders, e.scatter, e.difference, e.floor, BLAME, e.tolerance, e.ceiling, of_errors
+        orders,
+        e.scatter,
+        e.difference,
+        e.floor,
+        BLAME,
+        e.tolerance,
+        ceiling=e.ceiling,
+        of_errors=of_errors,
+        vouched=vouched,
     )
     cases += rules(e, found)
     # the order of noise is none

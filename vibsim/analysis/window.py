@@ -126,6 +126,7 @@ def trend(
     tolerance: float,
     ceiling: Floats | None = None,
     of_errors: Floats | None = None,
+    vouched: Flags | None = None,
 ) -> Trend:
     """Find the window of every ladder.
 
@@ -145,6 +146,8 @@ def trend(
         The most round-off that any arithmetic makes at every level, shape (..., m+2); the floor where None.
     of_errors
         Order of the last two true errors of three levels, shape (...); NaN where not known.
+    vouched
+        Where the true errors leave no room for a lower power, shape (...).
     """
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         noise = noise_share(difference, floor)
@@ -161,16 +164,19 @@ def trend(
         )
         tail, width = _settling(np.abs(spread), np.abs(before), change, earlier, several)
         width = np.maximum(width, np.minimum(rest, SHOWS * np.abs(spread)) / LOG2)
-        if of_errors is not None:
-            apart = np.where(several, 0.0, np.nan_to_num(np.abs(of_errors - local)))
-            width = np.maximum(width, OF_ERRORS * apart)
+        # what is so far away is not known to be reached
+        width = np.where(np.abs(tail) > tolerance, np.maximum(width, np.abs(tail)), width)
+        tail = np.where(np.abs(tail) > tolerance, 0.0, tail)
         order = local + tail
         left = _left(spread, before, change, earlier, tail)
         fading = several & _fades(left, spread, before, tail, tolerance)
         hiding = ~fading & (left[0] > most_left(order, *left, several))
+        if vouched is not None:
+            hiding &= several | ~vouched
         open_ = (left[0] > SETTLED) | np.signbit(spread) | (~fading & (np.abs(change) > PASSING))
         # where orders fall, a higher one is behind
         falls = several & (change < 0) & ~np.signbit(spread)
+        reach = width if of_errors is None else _with_errors(width, local, of_errors, several)
         unexplained = np.abs(spread) > 3 * rest
         return Trend(
             count=count,
@@ -179,9 +185,9 @@ def trend(
             cut=count < orders.shape[-1],
             order=order,
             width=width,
-            low=order - width - np.where(open_ | hiding, NEXT, 0.0),
+            low=order - reach - np.where(open_ | hiding, NEXT, 0.0),
             high=np.where(falls, np.maximum(order, local), order)
-            + width
+            + reach
             + np.where(open_ & ~falls, NEXT, 0.0),
             open=open_,
             local=local,
@@ -201,6 +207,12 @@ def trend(
             several=several,
             irregular=(change * earlier < 0),
         )
+
+
+def _with_errors(width: Floats, local: Floats, of_errors: Floats, several: Flags) -> Floats:
+    """Return half the width of the interval of a single order beside which the order of the errors is known."""
+    apart = OF_ERRORS * np.abs(of_errors - local)
+    return np.where(several | np.isnan(apart), width, np.maximum(width, apart))
 
 
 def _left(
