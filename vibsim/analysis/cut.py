@@ -100,7 +100,7 @@ def _breaks_the_trend(orders: Floats, scatter: Floats, incoherent: Flags) -> Fla
     It is less proportional than the one before, its order has changed by more than before, or its differences are of
     opposite sign. Noise that changes an order shows in the scatter as well: a change larger than that is no noise,
     unless the series are single numbers, which have no scatter. And a scatter that rises less steeply than that of any
-    lower power may rise is no noise.
+    lower power may rise is no noise; of single numbers, the same is true of the changes of the order.
     """
     size = np.abs(scatter)
     breaks = np.isnan(orders) | np.isnan(scatter) | np.signbit(scatter)
@@ -112,7 +112,10 @@ def _breaks_the_trend(orders: Floats, scatter: Floats, incoherent: Flags) -> Fla
         by_noise = change[..., i - 1] <= SHOWS * size[..., i] / LOG2
         steep = size[..., i] > np.exp2(orders[..., i - 1] - 0.5) * size[..., i - 1]
         by_noise &= steep | incoherent[..., i]
-        by_noise |= np.maximum(size[..., i], size[..., i - 1]) < SINGLE_NUMBER
+        number = np.maximum(size[..., i], size[..., i - 1]) < SINGLE_NUMBER
+        if i > 1:
+            number &= change[..., i - 1] > np.exp2(orders[..., i - 1] - 0.5) * change[..., i - 2]
+        by_noise |= number
         breaks[..., i] |= (worse | (change[..., i - 1] > usual)) & by_noise
     return breaks
 

@@ -71,7 +71,7 @@ ON_MESH = 1.0
 """Order of what is left by events that are noticed at the grid point behind them."""
 ORDINARY = 2.0
 """Order of the error that would have been seen where an exact quantity is promised."""
-LEAVES = 0.05
+LEAVES = 0.03
 """Orders of true errors may be so far from p: a tenth of h^(p-1) beside h^p makes 0.07."""
 VOUCHED = 0.04
 """Mismatch of errors that leaves no room for a tenth of a lower power, which makes 0.05."""
@@ -205,12 +205,12 @@ def _right(e: Evidence, t: Trend, p: Floats) -> Flags:
     mismatch = np.hypot(t.scatter, LOG2 * (t.local - p))
     before = np.hypot(t.scatter_before, LOG2 * (t.local - t.change - p))
     clear = mismatch <= most_left(p, mismatch, before, several)
-    clear |= several & (t.fading | t.irregular)
+    clear |= several & ((t.fading & ~t.slow) | t.irregular)
     # one order alone: two terms of one shape tell from a power by nothing but the number
     own = np.abs(t.local - p) <= np.maximum(SINGLE_WIDTH, OF_SCATTER * np.abs(t.scatter) / LOG2)
     clear = np.where(several, clear, own | errors_vouch(e, p))
     right = near & together & clear & ~np.signbit(t.scatter) & ~_errors_leave(e, t, p)
-    return np.asarray(right & ~t.gap & ~t.drifting & ~_leaving(t, p))
+    return np.asarray(right & ~t.gap & ~t.drifting & ~t.turning & ~_leaving(t, p))
 
 
 def _errors_leave(e: Evidence, t: Trend, p: Floats) -> Flags:

@@ -24,7 +24,7 @@ The rules, in the order in which they apply (the first that applies decides):
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +50,7 @@ class Judgement:
     order: Floats
     """The stated order; NaN where none is."""
     low: Floats
-    """Lower end of its interval."""
+    """Lower end of its interval; NaN where the orders have not settled and nothing is decided."""
     high: Floats
     """Upper end of its interval."""
     first: NDArray[np.int64]
@@ -106,7 +106,7 @@ def judge(evidence: Evidence) -> Judgement:
     # the order of noise is none
     stated = sound & (found.count > 0) & ~(np.isinf(e.order) & at_round_off(e))
     order, low, high = (np.where(stated, x, np.nan) for x in (found.order, found.low, found.high))
-    return _decide(
+    judged = _decide(
         cases,
         culprit,
         orders,
@@ -115,6 +115,11 @@ def judge(evidence: Evidence) -> Judgement:
         high,
         np.where(stated, levels[found.first], -1),
         np.where(stated, levels[found.last + 2], -1),
+    )
+    # a last estimate is no order of which one could say how surely it is known
+    guess = (judged.status == STATUSES.index("INCONCLUSIVE")) & (found.open | found.gap)
+    return replace(
+        judged, low=np.where(guess, np.nan, low), high=np.where(guess, np.nan, high)
     )
 
 

@@ -25,6 +25,8 @@ Integers = NDArray[np.int64]
 
 FADING = 0.75
 """The scatter fades when it falls at least to this part of itself per level (1/2 and 1/4 are usual)."""
+QUICK, SLOW = 0.62, 0.05
+"""What fades no faster is a power h^(p+1/2), of which more than a tenth makes the mismatch 0.06."""
 GROWS = 1.3
 """The scatter drifts when it grows by more per level; a power lower by 1/2 makes it grow by 2^0.5."""
 READABLE = 1e-5
@@ -36,7 +38,7 @@ ALIKE = 0.15
 """Scatter and order tell of the same power where their factors differ by no more."""
 LEAST_WIDTH = 1e-6
 """Half the width of an interval at least: the digits that reports show."""
-OF_CHANGE = 2.0
+OF_CHANGE = 2.1
 """Half the width of an interval over the last changes of the order: 95 % of ladders whose trend is not known."""
 OF_SETTLED = 0.45
 """The same where scatter and three orders tell of one next power, which is then taken off."""
@@ -46,7 +48,7 @@ OF_SCATTER = 3.0
 """Half the width of the interval of a single order over its scatter / log 2: shapes at an angle of 18 degrees."""
 OF_ERRORS = 2.0
 """Half the width of the interval of a single order over its distance from the order of the last true errors."""
-SINGLE_WIDTH = 2e-3
+SINGLE_WIDTH = 2e-4
 """Half the width of the interval of a single order at least."""
 JUMP = 0.3
 """Change of the order from one triple to the next that a scatter of `HIDDEN` at most cannot come from."""
@@ -100,7 +102,7 @@ class Trend:
     alternating: Flags
     """Whether differences change their sign, or orders swing, from level to level."""
     turning: Flags
-    """Whether the changes of the order grow, so that it has not settled."""
+    """Whether the changes of the order grow, or the differences turn round: it has not settled."""
     gap: Flags
     """Whether a triple of the window has no order: differences vanish that should not."""
     noisy: Flags
@@ -114,7 +116,9 @@ class Trend:
     several: Flags
     """Whether the order rests on several triples."""
     irregular: Flags
-    """Whether the last two changes of the order have opposite signs."""
+    """Whether the last two changes of the order are small and of opposite signs: accidents of the levels."""
+    slow: Flags
+    """Whether what is left is not small, and fades no faster than h^(1/2)."""
 
 
 def trend(
@@ -156,7 +160,7 @@ def trend(
         count = np.sum(clean, axis=-1)
         last = np.maximum(count - 1, 0)
         local, spread, rest = (_at(x, last) for x in (orders, scatter, noise))
-        several = (count > 1) & ~_starts_here(orders, scatter, last)
+        several = (count > 1) & ~_starts_here(orders, scatter, last, rest)
         before = np.where(several, _at(scatter, last - 1), 0.0)
         change = np.where(several, local - _at(orders, last - 1), 0.0)
         earlier = np.where(
@@ -173,9 +177,10 @@ def trend(
         hiding = ~fading & (left[0] > most_left(order, *left, several))
         if vouched is not None:
             hiding &= several | ~vouched
-        open_ = (left[0] > SETTLED) | np.signbit(spread) | (~fading & (np.abs(change) > PASSING))
+        turned = several & np.signbit(before)
+        open_ = turned | (left[0] > SETTLED) | np.signbit(spread) | (~fading & (np.abs(change) > PASSING))
         # where orders fall, a higher one is behind
-        falls = several & (change < 0) & ~np.signbit(spread)
+        falls = several & (change < 0) & ~np.signbit(spread) & ~turned
         reach = width if of_errors is None else _with_errors(width, local, of_errors, several)
         unexplained = np.abs(spread) > 3 * rest
         return Trend(
@@ -199,13 +204,17 @@ def trend(
             & (np.abs(spread) > QUIET)
             & unexplained,
             alternating=_alternating(scatter, last, several, change, earlier, tolerance),
-            turning=(np.abs(change) > np.abs(earlier)) & (np.abs(change) > 5 * QUIET),
+            turning=turned
+            | ((np.abs(change) > np.abs(earlier)) & (np.abs(change) > 5 * QUIET)),
             gap=np.any(clean & np.isnan(orders), axis=-1),
             noisy=np.abs(change) <= np.minimum(LOUD * rest, SHOWS * np.abs(spread)) / LOG2,
             fading=fading,
             hiding=hiding,
             several=several,
-            irregular=(change * earlier < 0),
+            irregular=(change * earlier < 0)
+            & (np.abs(earlier) <= tolerance)
+            & (np.abs(change) <= tolerance),
+            slow=~(left[0] <= np.maximum(QUICK * left[1], SLOW)),
         )
 
 
@@ -259,7 +268,7 @@ def most_left(order: Floats, mismatch: Floats, before: Floats, several: Flags) -
     return np.where(several & (growth > GROWS), seen, HIDDEN)
 
 
-def _starts_here(orders: Floats, scatter: Floats, last: Integers) -> Flags:
+def _starts_here(orders: Floats, scatter: Floats, last: Integers, rest: Floats) -> Flags:
     """Say where the window begins with the last triple: it is proportional, and the one before has another order.
 
     A power that fades would have left more in the scatter than there is. The coarser levels are of another range:
@@ -267,7 +276,7 @@ def _starts_here(orders: Floats, scatter: Floats, last: Integers) -> Flags:
     """
     size = np.abs(_at(scatter, last))
     jump = np.abs(_at(orders, last) - _at(orders, last - 1))
-    return (jump > JUMP) & (size <= HIDDEN) & (size > READABLE)
+    return (jump > JUMP) & (size <= HIDDEN) & (size > np.maximum(READABLE, 3 * rest))
 
 
 def _settling(
