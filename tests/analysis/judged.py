@@ -40,6 +40,7 @@ class Finding:
     order: float
     low: float
     high: float
+    levels: tuple[int, int] | None
 
 
 def experiment_of(group: Group, folder: Path, orders: tuple[float, ...]) -> vibsim.Experiment:
@@ -104,5 +105,5 @@ def findings(
             low, high = r.interval or (np.nan, np.nan)
             order = np.nan if r.order is None else r.order
             ladder = group.ladders[r.case]
-            found.append(Finding(ladder, group, formal, r.status, r.reason, order, low, high))
+            found.append(Finding(ladder, group, formal, r.status, r.reason, order, low, high, r.levels))
     return found

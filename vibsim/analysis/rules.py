@@ -59,7 +59,7 @@ REACH_SETTLED = 0.1
 """The same for a whole number that several triples support: a tenth of the distance between whole numbers."""
 OF_SINGLE = 2.0
 """A single order may be so many times its scatter (over log 2) from the whole number that it stands for."""
-SUNK = 0.75
+SUNK = 0.9
 """Orders that are lower than p by more and fall leave p behind: of h^(p-1), too little h^p is left to be counted."""
 LEAST_CANDIDATE = 0.5
 """The least order that an expansion has: a solution that stays away from its limit has none."""
@@ -162,11 +162,11 @@ def rules(e: Evidence, t: Trend) -> list[tuple[Flags, str]]:
     wrong &= ~t.open | above | (t.local <= p - SUNK)
     wrong &= ~t.gap & ~t.turning & ~(t.scatter_before > UNRELATED)
     # a lower power may hide below or emerge from a higher one, not the other way round
-    several = t.several
+    several, likely = t.several, np.round(2.0 * t.order) / 2
     together = np.abs(t.scatter) <= np.where(several, COINCIDENT, SINGLE)
     wrong &= np.where(
         above,
-        together & (t.width <= NARROW) & ~t.drifting & ~t.hiding,
+        together & (t.width <= NARROW) & ~t.drifting & ~t.hiding & _alone(e, t, likely),
         several | (np.abs(t.scatter) <= COINCIDENT),
     )
     too_large, too_small = _contradicts(e, t)
@@ -199,17 +199,12 @@ def _right(e: Evidence, t: Trend, p: Floats) -> Flags:
     """
     several, tol = t.several, e.tolerance
     both = several & (np.abs(t.local - p) <= tol) & (np.abs(t.local - t.change - p) <= tol)
+    both &= t.width <= NARROW
     both |= several & t.fading & (np.abs(t.local - p) <= tol) & (np.abs(t.change) <= tol)
     near = (np.abs(t.order - p) <= tol) & ((t.width <= tol) | both | ~several)
     together = np.abs(t.scatter) <= np.where(several, COINCIDENT, SINGLE)
-    mismatch = np.hypot(t.scatter, LOG2 * (t.local - p))
-    before = np.hypot(t.scatter_before, LOG2 * (t.local - t.change - p))
-    clear = mismatch <= most_left(p, mismatch, before, several)
-    clear |= several & ((t.fading & ~t.slow) | t.irregular)
-    # one order alone: two terms of one shape tell from a power by nothing but the number
-    own = np.abs(t.local - p) <= np.maximum(SINGLE_WIDTH, OF_SCATTER * np.abs(t.scatter) / LOG2)
-    clear = np.where(several, clear, own | errors_vouch(e, p))
-    right = near & together & clear & ~np.signbit(t.scatter) & ~_errors_leave(e, t, p)
+    clear = _alone(e, t, p)
+    right = near & together & clear & ~np.signbit(t.scatter)
     return np.asarray(right & ~t.gap & ~t.drifting & ~t.turning & ~_leaving(t, p))
 
 
@@ -229,6 +224,18 @@ def _errors_leave(e: Evidence, t: Trend, p: Floats) -> Flags:
 def _pure(t: Trend) -> Flags:
     """Say where a ladder is one pure power, whatever the power."""
     return np.asarray(t.several & (np.abs(t.scatter) <= PURE) & (np.abs(t.change) <= PURE))
+
+
+def _alone(e: Evidence, t: Trend, p: Floats) -> Flags:
+    """Say where h^p stands alone: what is left besides it fades, or is less than a tenth of a lower power would make."""
+    mismatch = np.hypot(t.scatter, LOG2 * (t.local - p))
+    before = np.hypot(t.scatter_before, LOG2 * (t.local - t.change - p))
+    clear = mismatch <= most_left(p, mismatch, before, t.several)
+    clear |= t.several & ((t.fading & ~t.slow) | t.irregular)
+    # one order alone: two terms of one shape tell from a power by nothing but the number
+    own = np.abs(t.local - p) <= np.maximum(SINGLE_WIDTH, OF_SCATTER * np.abs(t.scatter) / LOG2)
+    clear = np.where(t.several, clear, own | errors_vouch(e, p))
+    return np.asarray(clear & ~_errors_leave(e, t, p))
 
 
 def errors_vouch(e: Evidence, p: Floats) -> Flags:

@@ -50,7 +50,7 @@ class Judgement:
     order: Floats
     """The stated order; NaN where none is."""
     low: Floats
-    """Lower end of its interval; NaN where the orders have not settled and nothing is decided."""
+    """Lower end of its interval; NaN where nothing is decided."""
     high: Floats
     """Upper end of its interval."""
     first: NDArray[np.int64]
@@ -117,7 +117,7 @@ def judge(evidence: Evidence) -> Judgement:
         np.where(stated, levels[found.last + 2], -1),
     )
     # a last estimate is no order of which one could say how surely it is known
-    guess = (judged.status == STATUSES.index("INCONCLUSIVE")) & (found.open | found.gap)
+    guess = judged.status == STATUSES.index("INCONCLUSIVE")
     return replace(
         judged, low=np.where(guess, np.nan, low), high=np.where(guess, np.nan, high)
     )

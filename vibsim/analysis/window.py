@@ -40,10 +40,12 @@ LEAST_WIDTH = 1e-6
 """Half the width of an interval at least: the digits that reports show."""
 OF_CHANGE = 2.1
 """Half the width of an interval over the last changes of the order: 95 % of ladders whose trend is not known."""
-OF_SETTLED = 0.45
+OF_SETTLED = 0.42
 """The same where scatter and three orders tell of one next power, which is then taken off."""
-OF_FADING = 1.3
-"""The same where three orders of series of one shape do."""
+OF_STEADY = 0.75
+"""The same over the larger of two changes, where three orders of series of one shape do."""
+OF_FADING = 1.5
+"""The same where the scatter alone tells that the next power fades."""
 OF_SCATTER = 3.0
 """Half the width of the interval of a single order over its scatter / log 2: shapes at an angle of 18 degrees."""
 OF_ERRORS = 2.0
@@ -173,7 +175,7 @@ def trend(
         tail = np.where(np.abs(tail) > tolerance, 0.0, tail)
         order = local + tail
         left = _left(spread, before, change, earlier, tail)
-        fading = several & _fades(left, spread, before, tail, tolerance)
+        fading = several & _fades(left, spread, before, tail, change * earlier > 0, tolerance)
         hiding = ~fading & (left[0] > most_left(order, *left, several))
         if vouched is not None:
             hiding &= several | ~vouched
@@ -235,12 +237,17 @@ def _left(
 
 
 def _fades(
-    left: tuple[Floats, Floats], spread: Floats, before: Floats, tail: Floats, tolerance: float
+    left: tuple[Floats, Floats],
+    spread: Floats,
+    before: Floats,
+    tail: Floats,
+    onward: Flags,
+    tolerance: float,
 ) -> Flags:
-    """Say where what is left fades from triple to triple."""
+    """Say where what is left fades from triple to triple; `onward`: the last two changes have the same sign."""
     small, large = np.abs(spread), np.abs(before)
     by_scatter = (large > READABLE) & (small <= FADING * large)
-    whole = (left[0] <= FADING * left[1]) & (by_scatter | (small <= 0.5 * HIDDEN))
+    whole = (left[0] <= FADING * left[1]) & (by_scatter | (onward & (small <= 0.5 * HIDDEN)))
     return np.asarray(whole | (by_scatter & (np.abs(tail) <= tolerance)))
 
 
@@ -300,10 +307,11 @@ def _settling(
     f = np.where(fades, of_scatter, np.where(alone, of_change, 0.0))
     tail = np.where(several, change * f / (1.0 - np.minimum(f, SLOWEST)), 0.0)
     largest = np.fmax(np.abs(change), np.abs(earlier))
+    unknown = np.where(generic & (of_scatter <= FADING), OF_FADING, OF_CHANGE)
     width = np.where(
         settled,
         OF_SETTLED * np.abs(change),
-        np.where(alone, OF_FADING * largest, OF_CHANGE * np.maximum(largest, spread / 3)),
+        np.where(alone, OF_STEADY * largest, unknown * np.maximum(largest, spread / 3)),
     )
     single = np.maximum(OF_SCATTER * spread / LOG2, SINGLE_WIDTH)
     return tail, np.maximum(np.where(several, width, single), LEAST_WIDTH)
