@@ -93,9 +93,7 @@ def datasets_of(group: Group) -> list[xarray.Dataset]:
     return rows
 
 
-def findings(
-    group: Group, folder: Path, orders: tuple[float, ...] = ORDERS
-) -> list[Finding]:
+def findings(group: Group, folder: Path, orders: tuple[float, ...] = ORDERS) -> list[Finding]:
     """Judge every ladder of a group by every expectation."""
     experiment = experiment_of(group, folder, orders)
     convergence = vibsim.analyse(experiment, datasets_of(group))
@@ -105,5 +103,7 @@ def findings(
             low, high = r.interval or (np.nan, np.nan)
             order = np.nan if r.order is None else r.order
             ladder = group.ladders[r.case]
-            found.append(Finding(ladder, group, formal, r.status, r.reason, order, low, high, r.levels))
+            found.append(
+                Finding(ladder, group, formal, r.status, r.reason, order, low, high, r.levels)
+            )
     return found

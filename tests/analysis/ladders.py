@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis import series
+from vibsim.analysis.facts import Evidence
 from vibsim.analysis.floor import norm_of_floor
-from vibsim.analysis.rules import Evidence
 
 Floats = NDArray[np.float64]
 

@@ -1,7 +1,7 @@
 """Ladders with known truth, made from a seed: thousands of them, in families that a verdict has to tell apart.
 
-A ladder is ``u_l(t) = u(t) - sum_j c_j h_l^(p_j) e_j(t) - n_l(t)`` with ``h_l = 2^-l``; n is noise. What is true of it is
-worked out from what it was made of, never from what the analysis finds:
+A ladder is ``u_l(t) = u(t) - sum_j c_j h_l^(p_j) e_j(t) - n_l(t)`` with ``h_l = 2^-l``; n is noise. What is true of it
+is worked out from what it was made of, never from what the analysis finds:
 
 - a level is *clean* where the noise is below `CLEAN` of the largest term, and the term has the size of its power;
 - the *order* is that of the largest term on the finest clean level, where every other one is below `DOMINANT` of it

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from ladders import T, evidence_of, random_truth, shape_in_time
 
-from vibsim.analysis import rules
+from vibsim.analysis import facts
 from vibsim.analysis.verdict import judge
 from vibsim.vocabulary import NORMS, REASON_NAMES, STATUSES
 
@@ -218,7 +218,7 @@ def test_no_nan_among_the_evidence_passes(place: str) -> None:
     values = np.array(getattr(evidence, place), dtype=float)
     values[..., -1] = np.nan
     fields = {**vars(evidence), place: values}
-    assert STATUSES[int(judge(rules.Evidence(**fields)).status[0])] != "PASS"
+    assert STATUSES[int(judge(facts.Evidence(**fields)).status[0])] != "PASS"
 
 
 def test_many_ladders_at_once_are_judged_as_one_by_one() -> None:
@@ -235,7 +235,7 @@ def test_many_ladders_at_once_are_judged_as_one_by_one() -> None:
         )
         for name in (*names, "relative_floor")
     }
-    together = judge(rules.Evidence(levels=FIVE, **stacked))
+    together = judge(facts.Evidence(levels=FIVE, **stacked))
     alone = [judge(row) for row in rows]
     assert together.reason.shape == (4, 5)
     assert together.reason.ravel().tolist() == [int(one.reason[0]) for one in alone]
@@ -303,7 +303,7 @@ def from_orders(
     """Decide on a ladder of neighbouring levels from its local orders and its scatter alone."""
     difference = SMALL / np.cumprod([1.0, *(2.0**p for p in orders)])
     levels = tuple(range(6, 8 + len(orders)))
-    evidence = rules.Evidence(
+    evidence = facts.Evidence(
         levels=levels,
         difference=difference[None],
         scatter=np.array([scatter]),

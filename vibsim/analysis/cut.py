@@ -63,7 +63,12 @@ def noise_share(difference: Floats, floor: Floats) -> Floats:
 
 
 def before_round_off(
-    orders: Floats, scatter: Floats, difference: Floats, noise: Floats, possible: Floats, suspect: float
+    orders: Floats,
+    scatter: Floats,
+    difference: Floats,
+    noise: Floats,
+    possible: Floats,
+    suspect: float,
 ) -> Flags:
     """Say of every triple whether it stands before the first one that round-off spoils.
 

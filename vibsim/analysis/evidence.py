@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis.compare import Comparison
+from vibsim.analysis.facts import Evidence
 from vibsim.analysis.floor import SPACING_AT_ONE, norm_of_floor
 from vibsim.analysis.part import plain_name
-from vibsim.analysis.rules import Evidence
 from vibsim.analysis.series import largest
 from vibsim.analysis.verdict import Judgement, judge
 from vibsim.models import ENERGIES

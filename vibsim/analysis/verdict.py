@@ -8,7 +8,7 @@ The rules, in the order in which they apply (the first that applies decides):
 1. a quantity that does not exist: ``not_applicable``; a level that broke down, or w dt beyond the stability limit, or
    growth that refinement does not remove: ``unstable``, else ``non_finite``; fewer than three levels:
    ``too_few_levels``;
-2. round-off: a triple whose finer differences are all within `rules.BLAME` times the predicted floor is suspect, and
+2. round-off: a triple whose finer differences are all within `facts.BLAME` times the predicted floor is suspect, and
    it is cut off, with all finer ones, where it breaks the trend. Nothing left: ``exact`` where the differences of an
    inexact scheme would have been seen, else ``round_off``. Differences above ``BLAME * floor`` are never excused.
    Where the promise is that a quantity is exact, this alone decides: a difference above is ``order_low``;
@@ -29,8 +29,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis.rules import BLAME, Evidence, at_round_off, breakdown, error_orders, errors_vouch, rules
+from vibsim.analysis.facts import BLAME, Evidence, at_round_off, breakdown, error_orders
+from vibsim.analysis.rules import rules
 from vibsim.analysis.series import order_of_ratio, safe_ratio
+from vibsim.analysis.true_errors import errors_vouch
 from vibsim.analysis.window import trend
 from vibsim.vocabulary import REASON_NAMES, REASONS, STATUSES
 
@@ -118,9 +120,7 @@ def judge(evidence: Evidence) -> Judgement:
     )
     # a last estimate is no order of which one could say how surely it is known
     guess = judged.status == STATUSES.index("INCONCLUSIVE")
-    return replace(
-        judged, low=np.where(guess, np.nan, low), high=np.where(guess, np.nan, high)
-    )
+    return replace(judged, low=np.where(guess, np.nan, low), high=np.where(guess, np.nan, high))
 
 
 def local_orders(difference: Floats, levels: tuple[int, ...]) -> Floats:
