@@ -299,7 +299,8 @@ def _early(rng: Rng, h: Floats, points: int, kind: str) -> Recipe:
     missing = np.maximum(spoiled - np.arange(len(h)), 0.0)
     size = max(r.sizes) * 2.0 ** (-r.powers[0] * np.arange(len(h)))
     if kind == "blow_up":
-        factor = np.exp(rng.uniform(0.2, 1.5) * (2.0 ** np.minimum(missing, 4) - 1))
+        doublings = 2.0**missing - 1
+        factor = np.exp(doublings * min(rng.uniform(0.2, 1.5), 12.0 / doublings[0]))
     else:
         saturated = 10.0 ** rng.uniform(-3, -0.5) * (1 + 0.3 * rng.random(len(h)))
         shrunk = 0.8 * saturated[0] / size[spoiled]
