@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vibsim.analysis.cut import LOG2, QUIET
 from vibsim.analysis.facts import ORDINARY, Evidence, at_round_off, far_from_exact, truly_exact
-from vibsim.analysis.settling import HIDDEN, OF_SCATTER, SINGLE_WIDTH, most_left
+from vibsim.analysis.settling import GROWS, HIDDEN, OF_SCATTER, SINGLE_WIDTH, most_left
 from vibsim.analysis.true_errors import (
     contradicts,
     errors_agree,
@@ -124,6 +124,8 @@ def _alone(e: Evidence, t: Trend, p: Floats) -> Flags:
     before = np.hypot(t.scatter_before, LOG2 * (t.local - t.change - p))
     clear = mismatch <= most_left(p, mismatch, before, t.several)
     clear |= t.several & ((t.fading & ~t.slow) | t.irregular)
+    # as much as one triple alone may show, where it does not grow: the interval then reaches to a lower power
+    clear |= t.several & (mismatch <= np.minimum(SINGLE, GROWS * before))
     # one order alone: two terms of one shape tell from a power by nothing but the number
     own = np.abs(t.local - p) <= np.maximum(SINGLE_WIDTH, OF_SCATTER * np.abs(t.scatter) / LOG2)
     clear = np.where(t.several, clear, own | errors_vouch(e, p))
