@@ -12,8 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from judged import Finding, findings
+from judged import Finding, datasets_of, experiment_of, findings
 from synthetic import FAMILIES, TOLERANCE, groups
+
+from vibsim import VibsimError, analyse
 
 HELD_OUT = 2
 TUNED = (1, 3, 4)
@@ -153,3 +155,11 @@ def test_a_ladder_is_made_of_its_seed_alone() -> None:
 def test_the_tuned_half_has_the_same_rates(tmp_path: Path) -> None:
     found = judged(TUNED[0], tmp_path)
     check(found)
+
+
+@pytest.mark.parametrize("name", ["v", "u_max", "omega_dt", "first_peak"])
+def test_data_without_what_is_needed_are_refused(name: str, tmp_path: Path) -> None:
+    group = next(groups(7, 1, 2))
+    data = [level.drop_vars(name) for level in datasets_of(group)]
+    with pytest.raises(VibsimError, match=f"level {group.levels[0]}: {name} is missing"):
+        analyse(experiment_of(group, tmp_path, (2.0,)), data)
