@@ -36,11 +36,14 @@ LEAST_WIDTH = 1e-6
 """Half the width of an interval at least: the digits that reports show."""
 OF_CHANGE = 2.1
 """Half the width of an interval over the last changes of the order: 95 % of ladders whose trend is not known."""
-OF_SETTLED = 0.42
-"""The same where scatter and three orders tell of one next power, which is then taken off."""
-OF_STEADY = 0.75
+OF_SETTLED = 7.5
+"""The same where scatter and three orders tell of one next power, which is then taken off: over the last change times
+what the correction leaves out, which is the distance of the two factors and the scatter itself."""
+MOST_SETTLED = 0.6
+"""Such an interval is no wider than this part of the last change."""
+OF_STEADY = 0.5
 """The same over the larger of two changes, where three orders of series of one shape do."""
-OF_FADING = 1.5
+OF_FADING = 1.3
 """The same where the scatter alone tells that the next power fades."""
 OF_SCATTER = 3.0
 """Half the width of the interval of a single order over its scatter / log 2: shapes at an angle of 18 degrees."""
@@ -73,9 +76,9 @@ def settling(
     """Return what the last order still lacks of its limit, and half the width of the interval of that limit.
 
     Where x falls by the factor f per level, so does the change of the order, and f/(1 - f) times the last change is
-    still to come. f is read from the scatter, and where there are three orders from their changes. If both tell the
-    same, the correction is good to `OF_SETTLED` of the last change; if not, the changes are accidents of the levels,
-    and the interval is as wide as they are.
+    still to come. f is read from the scatter, and where there are three orders from their changes. If both tell nearly
+    the same, the correction is as good as they agree; if not, the changes are accidents of the levels, and the interval
+    is as wide as they are.
     """
     of_scatter = np.where(before > 0, spread / np.where(before > 0, before, 1.0), 1.0)
     of_change = np.where(np.abs(earlier) > 0, change / np.where(earlier == 0, 1.0, earlier), np.nan)
@@ -88,10 +91,11 @@ def settling(
     f = np.where(fades, of_scatter, np.where(alone, of_change, 0.0))
     tail = np.where(several, change * f / (1.0 - np.minimum(f, SLOWEST)), 0.0)
     largest = np.fmax(np.abs(change), np.abs(earlier))
+    doubt = np.abs(of_change - of_scatter) + spread
     unknown = np.where(generic & (of_scatter <= FADING), OF_FADING, OF_CHANGE)
     width = np.where(
         settled,
-        OF_SETTLED * np.abs(change),
+        np.abs(change) * np.minimum(MOST_SETTLED, OF_SETTLED * doubt),
         np.where(alone, OF_STEADY * largest, unknown * np.maximum(largest, spread / 3)),
     )
     single = np.maximum(OF_SCATTER * spread / LOG2, SINGLE_WIDTH)
