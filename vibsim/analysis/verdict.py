@@ -8,15 +8,16 @@ The rules, in the order in which they apply (the first that applies decides):
 1. a quantity that does not exist: ``not_applicable``; a level that broke down, or w dt beyond the stability limit, or
    growth that refinement does not remove: ``unstable``, else ``non_finite``; fewer than three levels:
    ``too_few_levels``;
-2. round-off: a triple whose finer differences are all within `facts.BLAME` times the predicted floor is suspect, and
-   it is cut off, with all finer ones, where it breaks the trend. Nothing left: ``exact`` where the differences of an
-   inexact scheme would have been seen, else ``round_off``. Differences above ``BLAME * floor`` are never excused.
-   Where the promise is that a quantity is exact, this alone decides: a difference above is ``order_low``;
-3. one triple left: the two difference series over time are the evidence, and must be proportional;
-4. several left: the sequence of local orders, its last change and the trend of the proportionality;
-5. the order is stated with an interval. PASS where it is within the tolerance, its interval is as narrow, the series
-   coincide, and nothing drifts away; ``order_low``, ``order_high`` where the interval excludes what is expected and
-   holds an order that an expansion can have; else ``pre_asymptotic``, ``oscillating`` or ``round_off``;
+2. round-off: `vibsim.analysis.cut` says where it begins; finer triples are cut off. Nothing left: ``exact`` where the
+   differences of an inexact scheme would have been seen, else ``round_off``. Where the promise is that a quantity is
+   exact, this alone decides: a difference above ``BLAME * floor`` is ``order_low``;
+3. one triple left: the two difference series over time are the evidence, and must be proportional; beside them the true
+   errors, where they are known;
+4. several left: the last two local orders or their limit, and what is left besides h^p, which must fade, or be too
+   small for a tenth of a lower power (`vibsim.analysis.settling`);
+5. the order is stated with an interval where something is decided. PASS where it is within the tolerance, the series
+   coincide, and it stands alone; ``order_low``, ``order_high`` where the interval excludes what is expected and holds
+   an order that an expansion can have; else ``pre_asymptotic``, ``oscillating`` or ``round_off``;
 6. where events are left to the mesh, an error has no expansion behind its first power: a ladder that does not show that
    power is ``non_smooth``;
 7. a settled ladder whose error against the exact solution is larger than its differences allow: ``wrong_limit``.
