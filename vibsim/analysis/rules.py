@@ -29,6 +29,8 @@ UNRELATED = 0.7
 """Series with so much scatter have nothing to do with each other, and a change from there says nothing."""
 SINGLE = 0.05
 """The same where one triple is the only evidence."""
+STEADY = 1.0 / 3.0
+"""Orders are steady that change by less than this part of the tolerance: three more changes do not leave it."""
 NARROW = 0.2
 """Half the width of the interval of an order that is called too high, at most."""
 PURE = 1e-3
@@ -125,7 +127,8 @@ def _alone(e: Evidence, t: Trend, p: Floats) -> Flags:
     clear = mismatch <= most_left(p, mismatch, before, t.several)
     clear |= t.several & ((t.fading & ~t.slow) | t.irregular)
     # as much as one triple alone may show, where it does not grow: the interval then reaches to a lower power
-    clear |= t.several & (mismatch <= np.minimum(SINGLE, GROWS * before))
+    steady = t.several & (np.abs(t.change) <= STEADY * e.tolerance)
+    clear |= steady & (mismatch <= np.minimum(SINGLE, GROWS * before))
     # one order alone: two terms of one shape tell from a power by nothing but the number
     own = np.abs(t.local - p) <= np.maximum(SINGLE_WIDTH, OF_SCATTER * np.abs(t.scatter) / LOG2)
     clear = np.where(t.several, clear, own | errors_vouch(e, p))
