@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis import series
+from vibsim.analysis.facts import Evidence
 from vibsim.analysis.floor import norm_of_floor
-from vibsim.analysis.rules import Evidence
 
 Floats = NDArray[np.float64]
 
@@ -55,6 +55,8 @@ def evidence_of(
     def measure(values: list[Floats]) -> Floats:
         return np.stack([series.norm(v.reshape(1, -1), norm, SPACING) for v in values], -1)
 
+    errors = [] if exact is None else [(exact - u)[None] for u in fields]
+    of_errors = [series.scatter(x, y, norm) for x, y in itertools.pairwise(errors)]
     scatter = [series.scatter(x, y, norm) for x, y in itertools.pairwise(d)]
     return Evidence(
         levels=levels,
@@ -65,6 +67,7 @@ def evidence_of(
         omega_dt=T[-1] * 2.0 ** -np.array([levels], dtype=float),
         relative_floor=floors[:, 0] / (size or 1.0),
         tolerance=tolerance,
+        error_scatter=np.stack(of_errors, -1) if of_errors and len(levels) == 3 else None,
         error=None if exact is None else measure([exact - u for u in fields]),
         size=norm_of_floor(np.array([size]), norm, len(T), SPACING),
         **more,  # type: ignore[arg-type]

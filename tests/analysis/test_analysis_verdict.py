@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from ladders import T, evidence_of, random_truth, shape_in_time
 
-from vibsim.analysis import rules
+from vibsim.analysis import facts
 from vibsim.analysis.verdict import judge
 from vibsim.vocabulary import NORMS, REASON_NAMES, STATUSES
 
@@ -109,9 +109,14 @@ def test_a_floor_in_the_ladder_leaves_the_window_before_it(growth: float) -> Non
     assert REASON_NAMES[int(found.reason[0])] == "asymptotic"
     assert found.last[0] < levels[-1]
     assert np.any(np.abs(found.orders[0] - 2) > 0.5)
-    # and only the floor makes it one: without it the same ladder is no PASS
-    unknown = evidence_of(fields, levels, floor=1e-15, exact=EXACT)
-    assert STATUSES[int(judge(unknown).status[0])] != "PASS"
+    # and only the floor makes it one: without it the same ladder is no PASS, unless the data show the floor as well,
+    # by unrelated differences on five levels that do not fall; the window is the same then
+    unknown = judge(evidence_of(fields, levels, floor=1e-15, exact=EXACT))
+    if growth < 1.0:
+        assert STATUSES[int(unknown.status[0])] != "PASS"
+    else:
+        assert REASON_NAMES[int(unknown.reason[0])] == "asymptotic"
+        assert abs(unknown.last[0] - found.last[0]) <= 1
 
 
 def test_nothing_but_floor_is_round_off() -> None:
@@ -213,7 +218,7 @@ def test_no_nan_among_the_evidence_passes(place: str) -> None:
     values = np.array(getattr(evidence, place), dtype=float)
     values[..., -1] = np.nan
     fields = {**vars(evidence), place: values}
-    assert STATUSES[int(judge(rules.Evidence(**fields)).status[0])] != "PASS"
+    assert STATUSES[int(judge(facts.Evidence(**fields)).status[0])] != "PASS"
 
 
 def test_many_ladders_at_once_are_judged_as_one_by_one() -> None:
@@ -230,7 +235,7 @@ def test_many_ladders_at_once_are_judged_as_one_by_one() -> None:
         )
         for name in (*names, "relative_floor")
     }
-    together = judge(rules.Evidence(levels=FIVE, **stacked))
+    together = judge(facts.Evidence(levels=FIVE, **stacked))
     alone = [judge(row) for row in rows]
     assert together.reason.shape == (4, 5)
     assert together.reason.ravel().tolist() == [int(one.reason[0]) for one in alone]
@@ -298,7 +303,7 @@ def from_orders(
     """Decide on a ladder of neighbouring levels from its local orders and its scatter alone."""
     difference = SMALL / np.cumprod([1.0, *(2.0**p for p in orders)])
     levels = tuple(range(6, 8 + len(orders)))
-    evidence = rules.Evidence(
+    evidence = facts.Evidence(
         levels=levels,
         difference=difference[None],
         scatter=np.array([scatter]),
@@ -324,7 +329,9 @@ UNDECIDED = ("INCONCLUSIVE", "pre_asymptotic")
         ([1.05], [0.09], ("FAIL", "order_low")),
         ([1.3], [0.02], UNDECIDED),
         ([1.05], [0.3], UNDECIDED),
-        ([3.01], [0.03], ("FAIL", "order_high")),
+        # beside a third order, a second one of a tenth of it or more makes a scatter of 0.02
+        ([3.01], [0.01], ("FAIL", "order_high")),
+        ([3.01], [0.03], UNDECIDED),
         ([3.01], [0.12], UNDECIDED),
         ([2.02, 2.01], [0.04, 0.01], ("PASS", "asymptotic")),
         # near the order, but still changing

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from vibsim import theory
 from vibsim.analysis.compare import Comparison
+from vibsim.analysis.facts import BLAME
 from vibsim.analysis.floor import SPACING_AT_ONE
 from vibsim.analysis.known import known_values
 from vibsim.analysis.part import CENTRED, Part, energy_at_start, plain_name
 from vibsim.analysis.predicted import is_simple, natural_frequency, steppers
-from vibsim.analysis.rules import BLAME
 from vibsim.models import ENERGIES
 from vibsim.schemes import SCHEMES
 

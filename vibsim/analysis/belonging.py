@@ -21,6 +21,19 @@ SAME_AT_EVERY_LEVEL = frozenset({"natural_frequency", "exact_period"})
 """What the levels hold of every member and does not depend on the step."""
 
 
+NEEDED = (
+    "omega_dt",
+    "natural_frequency",
+    "status",
+    "energy_initial",
+    "period",
+    "period_count",
+    "first_peak",
+    "last_peak",
+)
+"""What the analysis needs of every member at every level, besides the states and the extrema of the position."""
+
+
 def check_belonging(experiment: Experiment, records: Mapping[int, Record]) -> None:
     """Refuse level Records that are not those of `experiment`, or not of one and the same problem.
 
@@ -28,7 +41,8 @@ def check_belonging(experiment: Experiment, records: Mapping[int, Record]) -> No
     ------
     VibsimError
         With every fault: a level that the experiment does not have, another model, other schemes, members, numbers of
-        steps, end times or parameters than the other levels or the experiment, other values at t = 0.
+        steps, end times or parameters than the other levels or the experiment, other values at t = 0, a variable that
+        is missing.
     """
     faults = [
         f"level {level}: {fault}"
@@ -55,6 +69,13 @@ def _faults(experiment: Experiment, level: int, record: Record, other: Record) -
         return
     if not np.array_equal(record["case"], other["case"]):
         yield "other members than the finest level"
+        return
+    position = model.position
+    needed = [state.name for state in model.states]
+    needed += [f"{position}_min", f"{position}_max", *NEEDED]
+    missing = [name for name in needed if name not in record]
+    if missing:
+        yield f"{', '.join(missing)} {'are' if len(missing) > 1 else 'is'} missing"
         return
     for name in _of_members(record):
         if name not in other or not _equal(record, other, name):

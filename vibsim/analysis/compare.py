@@ -23,6 +23,8 @@ ROUND_OFF_SAFETY = 10.0
 """Factor on the predicted round-off in an error bound: the prediction is an order of magnitude."""
 IRREGULAR = 2.0
 """Factor on an error bound behind events: where they lie in a step makes the second power another at each level."""
+FEW = 3
+"""With so many levels the directions of the true errors are needed as evidence, too."""
 NOTHING_LEFT = 16.0
 """Order with which a quantity that is promised to be exact is extrapolated: the finest level then stands as it is."""
 
@@ -39,6 +41,8 @@ class InNorm:
     """Exact less computed, shape (scheme, case, level); NaN where the exact solution is not known."""
     extrapolation: Floats
     """Exact less extrapolated, shape (scheme, case)."""
+    error_scatter: Floats | None
+    """Of the errors of successive levels, shape (scheme, case, pair); None unless there are `FEW` levels and errors."""
 
 
 @dataclass(frozen=True)
@@ -115,12 +119,18 @@ class Comparison:
         levels, d = len(grid.levels), self.differences
         unknown = np.full((*shape, levels), np.nan)
         scatters = series.scatters(d, kind, grid.end_included) if len(d) > 1 else []
+        errors = self.errors if levels == FEW else None
         return InNorm(
             difference=by_level([size(x) for x in d]) if d else none,
             scatter=by_level(scatters) if scatters else none,
             error=unknown if self.errors is None else by_level([size(e) for e in self.errors]),
             extrapolation=(
                 unknown[..., 0] if self.exact is None else size(self.exact - self.extrapolation[0])
+            ),
+            error_scatter=(
+                None
+                if errors is None
+                else by_level(series.scatters(errors, kind, grid.end_included))
             ),
         )
 

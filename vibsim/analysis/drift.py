@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis.rules import BLAME
+from vibsim.analysis.facts import BLAME
 from vibsim.analysis.series import safe_ratio
 from vibsim.vocabulary import DRIFTS
 

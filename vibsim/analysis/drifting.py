@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis.drift import Drift, drift_of
+from vibsim.analysis.facts import BLAME
 from vibsim.analysis.floor import SPACING_AT_ONE, solution_size
 from vibsim.analysis.part import CENTRED, Part, energy_at_start
-from vibsim.analysis.rules import BLAME
 from vibsim.analysis.series import safe_ratio
 from vibsim.schemes import SCHEMES
 from vibsim.schemes.base import UNIT_ROUND_OFF, round_off

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis.compare import Comparison
-from vibsim.analysis.floor import norm_of_floor
+from vibsim.analysis.facts import Evidence
+from vibsim.analysis.floor import SPACING_AT_ONE, norm_of_floor
 from vibsim.analysis.part import plain_name
-from vibsim.analysis.rules import Evidence
 from vibsim.analysis.series import largest
 from vibsim.analysis.verdict import Judgement, judge
 from vibsim.models import ENERGIES
@@ -68,14 +68,18 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
     def in_norm(noise: Floats) -> Floats:
         return norm_of_floor(noise, norm, points, grid.spacing)
 
+    steps = np.array(grid.steps, dtype=np.float64)
+    worst = SPACING_AT_ONE * steps**2 * (q.scale * part.magnified)[..., None]
     return Evidence(
         levels=grid.levels,
         difference=measured.difference,
         scatter=measured.scatter,
         floor=np.moveaxis(in_norm(np.moveaxis(q.floor, -1, 0)), 0, -1),
+        ceiling=np.moveaxis(in_norm(np.moveaxis(np.maximum(worst, q.floor), -1, 0)), 0, -1),
         order=np.broadcast_to(order, shape),
         tolerance=tolerance,
         error=measured.error,
+        error_scatter=measured.error_scatter,
         size=in_norm(size),
         failed=part.failed,
         applicable=(exists | np.any(part.failed, axis=-1)) & ~part.adaptive[:, None],

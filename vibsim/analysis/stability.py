@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis import oscillation, predicted
+from vibsim.analysis.facts import BLOWN_UP
 from vibsim.analysis.part import Part
-from vibsim.analysis.rules import BLOWN_UP
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

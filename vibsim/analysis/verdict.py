@@ -8,15 +8,16 @@ The rules, in the order in which they apply (the first that applies decides):
 1. a quantity that does not exist: ``not_applicable``; a level that broke down, or w dt beyond the stability limit, or
    growth that refinement does not remove: ``unstable``, else ``non_finite``; fewer than three levels:
    ``too_few_levels``;
-2. round-off: a triple whose finer differences are all within `rules.BLAME` times the predicted floor is suspect, and
-   it is cut off, with all finer ones, where it breaks the trend. Nothing left: ``exact`` where the differences of an
-   inexact scheme would have been seen, else ``round_off``. Differences above ``BLAME * floor`` are never excused.
-   Where the promise is that a quantity is exact, this alone decides: a difference above is ``order_low``;
-3. one triple left: the two difference series over time are the evidence, and must be proportional;
-4. several left: the sequence of local orders, its last change and the trend of the proportionality;
-5. the order is stated with an interval. PASS where it is within the tolerance, its interval is as narrow, the series
-   coincide, and nothing drifts away; ``order_low``, ``order_high`` where the interval excludes what is expected and
-   holds an order that an expansion can have; else ``pre_asymptotic``, ``oscillating`` or ``round_off``;
+2. round-off: `vibsim.analysis.cut` says where it begins; finer triples are cut off. Nothing left: ``exact`` where the
+   differences of an inexact scheme would have been seen, else ``round_off``. Where the promise is that a quantity is
+   exact, this alone decides: a difference above ``BLAME * floor`` is ``order_low``;
+3. one triple left: the two difference series over time are the evidence, and must be proportional; beside them the true
+   errors, where they are known;
+4. several left: the last two local orders or their limit, and what is left besides h^p, which must fade, or be too
+   small for a tenth of a lower power (`vibsim.analysis.settling`);
+5. the order is stated with an interval where something is decided. PASS where it is within the tolerance, the series
+   coincide, and it stands alone; ``order_low``, ``order_high`` where the interval excludes what is expected and holds
+   an order that an expansion can have; else ``pre_asymptotic``, ``oscillating`` or ``round_off``;
 6. where events are left to the mesh, or corners of a force from a table, an error has no expansion behind its first
    power, or the second: a ladder that does not show that power is ``non_smooth``;
 7. a settled ladder whose error against the exact solution is larger than its differences allow: ``wrong_limit``.
@@ -24,13 +25,15 @@ The rules, in the order in which they apply (the first that applies decides):
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis.rules import BLAME, Evidence, at_round_off, breakdown, rules
+from vibsim.analysis.facts import BLAME, Evidence, at_round_off, breakdown, error_orders
+from vibsim.analysis.rules import rules
 from vibsim.analysis.series import order_of_ratio, safe_ratio
+from vibsim.analysis.true_errors import errors_vouch
 from vibsim.analysis.window import trend
 from vibsim.vocabulary import REASON_NAMES, REASONS, STATUSES
 
@@ -50,7 +53,7 @@ class Judgement:
     order: Floats
     """The stated order; NaN where none is."""
     low: Floats
-    """Lower end of its interval."""
+    """Lower end of its interval; NaN where nothing is decided."""
     high: Floats
     """Upper end of its interval."""
     first: NDArray[np.int64]
@@ -87,12 +90,26 @@ def judge(evidence: Evidence) -> Judgement:
         nothing = np.full(shape, -1)
         nan = np.full(shape, np.nan)
         return _decide(cases, culprit, orders, nan, nan, nan, nothing, nothing)
-    found = trend(orders, e.scatter, e.difference, e.floor, BLAME, e.tolerance)
+    of_errors, vouched = None, None
+    if len(e.levels) == 3:
+        of_errors = error_orders(e)[..., -1]
+        vouched = errors_vouch(e, np.round(2.0 * orders[..., 0]) / 2)
+    found = trend(
+        orders,
+        e.scatter,
+        e.difference,
+        e.floor,
+        BLAME,
+        e.tolerance,
+        ceiling=e.ceiling,
+        of_errors=of_errors,
+        vouched=vouched,
+    )
     cases += rules(e, found)
     # the order of noise is none
     stated = sound & (found.count > 0) & ~(np.isinf(e.order) & at_round_off(e))
     order, low, high = (np.where(stated, x, np.nan) for x in (found.order, found.low, found.high))
-    return _decide(
+    judged = _decide(
         cases,
         culprit,
         orders,
@@ -102,6 +119,9 @@ def judge(evidence: Evidence) -> Judgement:
         np.where(stated, levels[found.first], -1),
         np.where(stated, levels[found.last + 2], -1),
     )
+    # a last estimate is no order of which one could say how surely it is known
+    guess = judged.status == STATUSES.index("INCONCLUSIVE")
+    return replace(judged, low=np.where(guess, np.nan, low), high=np.where(guess, np.nan, high))
 
 
 def local_orders(difference: Floats, levels: tuple[int, ...]) -> Floats:

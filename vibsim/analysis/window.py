@@ -4,6 +4,8 @@ r"""The window of a ladder: which of its local orders count, where they settle, 
 over time) approach each other, both like ``x_k = |b| h^(q-p)/|a|``. So the *change* of the order and the *scatter* of
 the triples (`series.scatter`) measure what is left of the next power, and the trend of the scatter says whether it
 fades (the first power takes over) or grows (a lower power emerges, or noise).
+
+What is left, and the interval, are worked out in `vibsim.analysis.settling`.
 """
 
 from __future__ import annotations
@@ -13,27 +15,27 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.analysis.cut import LOG2, LOUD, QUIET, SHOWS, before_round_off, noise_share
+from vibsim.analysis.settling import (
+    GROWS,
+    HIDDEN,
+    JUMP,
+    NEXT,
+    PASSING,
+    QUICK,
+    READABLE,
+    SETTLED,
+    SLOW,
+    fades,
+    left,
+    most_left,
+    settling,
+    with_errors,
+)
+
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
-
-FADING = 0.75
-"""The scatter fades when it falls at least to this part of itself per level (1/2 and 1/4 are usual)."""
-QUIET = 0.01
-"""Scatter or change of the order too small to read a trend from."""
-SHOWS = 3.0
-"""Noise changes an order by no more than so many times its scatter (over log 2)."""
-UNRELATED_FIRST = 0.1
-"""A first triple with more scatter has no trend before it that could vouch for it: suspect differences spoil it."""
-FLAT_FIRST = 0.25
-"""The same for a first triple with a lower order, half the least that an expansion has: noise does not fall with dt."""
-GROWS = 1.3
-"""The scatter drifts when it grows by more per level; a power lower by 1/2 makes it grow by 2^0.5."""
-LOUD = 10.0
-"""Round-off may be so many times its predicted floor, an order of magnitude, and move the order accordingly."""
-LEAST_WIDTH = 1e-3
-"""Half the width of an interval at least: what is assumed of the powers beyond the next one carries no more digits."""
-LOG2 = float(np.log(2.0))
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,10 @@ class Trend:
     """The order: the limit of the local orders where they settle, else the last one."""
     width: Floats
     """Half the width of its interval."""
+    low: Floats
+    """Lower end of the interval; lower by `NEXT` where a lower power may be hiding."""
+    high: Floats
+    """Upper end of the interval; higher by `NEXT` where the orders have not settled."""
     local: Floats
     """The last local order."""
     change: Floats
@@ -65,21 +71,23 @@ class Trend:
     alternating: Flags
     """Whether differences change their sign, or orders swing, from level to level."""
     turning: Flags
-    """Whether the changes of the order grow, so that it has not settled."""
+    """Whether the changes of the order grow, or the differences turn round: it has not settled."""
     gap: Flags
     """Whether a triple of the window has no order: differences vanish that should not."""
     noisy: Flags
     """Whether round-off explains changes of the order as large as the last one."""
-
-    @property
-    def low(self) -> Floats:
-        """Lower end of the interval."""
-        return np.asarray(np.minimum(self.order, self.local) - self.width)
-
-    @property
-    def high(self) -> Floats:
-        """Upper end of the interval."""
-        return np.asarray(np.maximum(self.order, self.local) + self.width)
+    fading: Flags
+    """Whether what is left of the next power fades from triple to triple."""
+    open: Flags
+    """Whether the orders have not settled."""
+    hiding: Flags
+    """Whether a lower power may be hiding in what is left besides the first."""
+    several: Flags
+    """Whether the order rests on several triples."""
+    irregular: Flags
+    """Whether the last two changes of the order are small and of opposite signs: accidents of the levels."""
+    slow: Flags
+    """Whether what is left is not small, and fades no faster than h^(1/2)."""
 
 
 def trend(
@@ -89,6 +97,9 @@ def trend(
     floor: Floats,
     blame: float,
     tolerance: float,
+    ceiling: Floats | None = None,
+    of_errors: Floats | None = None,
+    vouched: Flags | None = None,
 ) -> Trend:
     """Find the window of every ladder.
 
@@ -104,23 +115,47 @@ def trend(
         Differences up to so many times the floor are suspect.
     tolerance
         How far from the stated order the local orders of a window may be.
+    ceiling
+        The most round-off that any arithmetic makes at every level, shape (..., m+2); the floor where None.
+    of_errors
+        Order of the last two true errors of three levels, shape (...); NaN where not known.
+    vouched
+        Where the true errors leave no room for a lower power, shape (...).
     """
-    with np.errstate(invalid="ignore", over="ignore"):
-        noise = _noise(difference, floor)
-        clean = _before_round_off(orders, scatter, noise, 1.0 / blame)
+    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+        noise = noise_share(difference, floor)
+        possible = noise if ceiling is None else noise_share(difference, ceiling)
+        clean = before_round_off(orders, scatter, difference, noise, possible, 1.0 / blame)
         count = np.sum(clean, axis=-1)
         last = np.maximum(count - 1, 0)
         local, spread, rest = (_at(x, last) for x in (orders, scatter, noise))
-        several = count > 1
+        several = (count > 1) & ~_starts_here(orders, scatter, last, rest)
+        before = np.where(several, _at(scatter, last - 1), 0.0)
         change = np.where(several, local - _at(orders, last - 1), 0.0)
-        earlier = np.where(count > 2, _at(orders, last - 1) - _at(orders, last - 2), np.nan)
-        fade = _fade(spread, _at(scatter, last - 1), change, earlier)
-        tail = np.where(fade < 1, change * fade / (1 - np.minimum(fade, FADING)), 0.0)
-        width = np.where(several, _width(spread, change, tail, fade), np.abs(spread) / LOG2)
-        rounded = np.minimum(rest, SHOWS * np.abs(spread)) / LOG2
-        width = np.maximum(width, np.maximum(rounded, LEAST_WIDTH))
-        settles = several & (fade <= FADING) & (np.abs(tail) <= tolerance)
-        order = np.where(settles, local + tail, local)
+        earlier = np.where(
+            several & (count > 2), _at(orders, last - 1) - _at(orders, last - 2), np.nan
+        )
+        tail, width = settling(np.abs(spread), np.abs(before), change, earlier, several)
+        width = np.maximum(width, np.minimum(rest, SHOWS * np.abs(spread)) / LOG2)
+        # what is so far away is not known to be reached
+        width = np.where(np.abs(tail) > tolerance, np.maximum(width, np.abs(tail)), width)
+        tail = np.where(np.abs(tail) > tolerance, 0.0, tail)
+        order = local + tail
+        beside = left(spread, before, change, earlier, tail)
+        fading = several & fades(beside, spread, before, tail, change * earlier > 0, tolerance)
+        hiding = ~fading & (beside[0] > most_left(order, *beside, several))
+        if vouched is not None:
+            hiding &= several | ~vouched
+        turned = several & np.signbit(before)
+        open_ = (
+            turned
+            | (beside[0] > SETTLED)
+            | np.signbit(spread)
+            | (~fading & (np.abs(change) > PASSING))
+        )
+        # where orders fall, a higher one is behind
+        falls = several & (change < 0) & ~np.signbit(spread) & ~turned
+        reach = width if of_errors is None else with_errors(width, local, of_errors, several)
         unexplained = np.abs(spread) > 3 * rest
         return Trend(
             count=count,
@@ -129,71 +164,42 @@ def trend(
             cut=count < orders.shape[-1],
             order=order,
             width=width,
+            low=order - reach - np.where(open_ | hiding, NEXT, 0.0),
+            high=np.where(falls, np.maximum(order, local), order)
+            + reach
+            + np.where(open_ & ~falls, NEXT, 0.0),
+            open=open_,
             local=local,
             change=change,
             scatter=spread,
-            scatter_before=np.where(several, np.abs(_at(scatter, last - 1)), 0.0),
+            scatter_before=np.abs(before),
             drifting=several
-            & (np.abs(spread) > GROWS * np.abs(_at(scatter, last - 1)))
+            & (np.abs(spread) > GROWS * np.abs(before))
             & (np.abs(spread) > QUIET)
             & unexplained,
             alternating=_alternating(scatter, last, several, change, earlier, tolerance),
-            turning=(np.abs(change) > np.abs(earlier)) & (np.abs(change) > 5 * QUIET),
+            turning=turned | ((np.abs(change) > np.abs(earlier)) & (np.abs(change) > 5 * QUIET)),
             gap=np.any(clean & np.isnan(orders), axis=-1),
             noisy=np.abs(change) <= np.minimum(LOUD * rest, SHOWS * np.abs(spread)) / LOG2,
+            fading=fading,
+            hiding=hiding,
+            several=several,
+            irregular=(change * earlier < 0)
+            & (np.abs(earlier) <= tolerance)
+            & (np.abs(change) <= tolerance),
+            slow=~(beside[0] <= np.maximum(QUICK * beside[1], SLOW)),
         )
 
 
-def _noise(difference: Floats, floor: Floats) -> Floats:
-    """Return floor over difference for the finer pair of every triple, shape (..., m)."""
-    pairs = floor[..., 1:-1] + floor[..., 2:]
-    finer = difference[..., 1:]
-    return np.where(finer > 0, pairs / np.where(finer > 0, finer, 1.0), np.inf)
+def _starts_here(orders: Floats, scatter: Floats, last: Integers, rest: Floats) -> Flags:
+    """Say where the window begins with the last triple: it is proportional, and the one before has another order.
 
-
-def _before_round_off(orders: Floats, scatter: Floats, noise: Floats, suspect: float) -> Flags:
-    """Say of every triple whether it stands before the first one that round-off spoils.
-
-    Spoiled is a triple whose finer differences are all suspect and that does not continue the trend: less
-    proportional than the one before, its order changed by more than before, or its differences of opposite sign.
-    Noise that changes an order shows in the scatter as well: a change larger than that is no noise.
+    A power that fades would have left more in the scatter than there is. The coarser levels are of another range:
+    they have blown up, or their errors are as large as the solution.
     """
-    size = np.abs(scatter)
-    spoiled = np.isnan(orders) | np.isnan(scatter) | (scatter < 0)
-    spoiled[..., 0] |= (size[..., 0] > UNRELATED_FIRST) | (orders[..., 0] < FLAT_FIRST)
-    change = np.abs(np.diff(orders, axis=-1))
-    for i in range(1, orders.shape[-1]):
-        usual = np.maximum(QUIET, change[..., i - 2]) if i > 1 else 5 * QUIET
-        worse = size[..., i] > np.maximum(QUIET, size[..., i - 1])
-        by_noise = change[..., i - 1] <= SHOWS * size[..., i] / LOG2
-        spoiled[..., i] |= (worse | (change[..., i - 1] > usual)) & by_noise
-    # what rises out of the floor again on a finer level was no floor
-    spoiled &= np.minimum.accumulate(noise[..., ::-1], axis=-1)[..., ::-1] >= suspect
-    return ~np.logical_or.accumulate(spoiled, axis=-1)
-
-
-def _fade(spread: Floats, before: Floats, change: Floats, earlier: Floats) -> Floats:
-    """Return the factor per level by which the next power fades; 1 where it does not, or is not known to.
-
-    Read from the scatter, and from the changes of the order; the slower of the two counts.
-    """
-    small, large = np.abs(spread), np.abs(before)
-    of_scatter = np.where(large > 0, small / np.where(large > 0, large, 1.0), 1.0)
-    quiet = np.maximum(small, large) <= 1e-6
-    of_change = np.where(np.abs(earlier) > 0, change / np.where(earlier == 0, 1.0, earlier), np.nan)
-    readable = np.isfinite(of_change) & (np.abs(earlier) > QUIET / 10)
-    swings = np.where(of_change < 0, np.abs(of_change), of_change)
-    slower = np.where(quiet, swings, np.maximum(of_scatter, swings))
-    # proportional series without a third order to tell the trend: the slowest usual rate
-    alone = np.where(quiet, 0.5, of_scatter)
-    return np.asarray(np.minimum(np.where(readable, slower, alone), 1.0))
-
-
-def _width(spread: Floats, change: Floats, tail: Floats, fade: Floats) -> Floats:
-    """Return half the width of the interval of an order read from several triples."""
-    fading = np.maximum(np.maximum(np.abs(change), np.abs(tail)), spread**2 / LOG2)
-    staying = np.maximum(3 * np.abs(change), np.minimum(np.abs(spread) / LOG2, 2.0))
-    return np.where(fade <= FADING, fading, staying)
+    size = np.abs(_at(scatter, last))
+    jump = np.abs(_at(orders, last) - _at(orders, last - 1))
+    return (jump > JUMP) & (size <= HIDDEN) & (size > np.maximum(READABLE, 3 * rest))
 
 
 def _alternating(
@@ -206,7 +212,8 @@ def _alternating(
 ) -> Flags:
     """Say where differences alternate in sign, or orders swing without settling."""
     now = _at(scatter, last)
-    signs = (now < 0) & np.where(several, _at(scatter, last - 1) < 0, now > -0.5)
+    opposite = np.signbit(now)
+    signs = opposite & np.where(several, np.signbit(_at(scatter, last - 1)), now > -0.5)
     swings = change * earlier < 0
     wide = (np.abs(change) > tolerance) & (np.abs(change) > 0.5 * np.abs(earlier))
     return signs | (swings & wide)

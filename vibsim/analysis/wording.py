@@ -84,7 +84,9 @@ def _measured(s: Story) -> str:
     """Return the stated order with its interval and levels; empty where there is none."""
     if math.isnan(s.order):
         return ""
-    return f"order {s.order:.3f} (between {s.low:.3f} and {s.high:.3f}) on levels {s.first} to {s.last}"
+    known = math.isfinite(s.low) and math.isfinite(s.high)
+    between = f" (between {s.low:.3f} and {s.high:.3f})" if known else ""
+    return f"order {s.order:.3f}{between} on levels {s.first} to {s.last}"
 
 
 def tell(s: Story) -> str:

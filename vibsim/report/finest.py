@@ -48,7 +48,7 @@ class Error:
     estimate: Floats
     low: Floats
     high: Floats
-    """Estimate with the ends of the interval of the order; NaN where no order is stated."""
+    """Estimate with the ends of the interval of the order; NaN where no interval is stated."""
 
     @property
     def is_known(self) -> bool:

@@ -1,0 +1,158 @@
+r"""Where round-off begins in a ladder: the triples before it, from the predicted floor and from the data.
+
+Noise is told from an error by its shape. The differences of an error are proportional over time; a lower power that
+emerges turns them once and leaves them proportional again. Noise differs from level to level, so that its differences
+have nothing to do with each other, and it does not fall. Three floors are told apart by how much evidence they take:
+
+- *predicted*: up to `blame` times what the scheme predicts for its arithmetic. One triple that breaks the trend is
+  evidence enough;
+- *possible*: up to `LOUD` times eps N^2, more than double precision makes of N steps in any arithmetic. It is fitted:
+  the scatter must rise faster than any lower power can make it (`STEEP`), up to the finest level;
+- *unexplained*: any size. The finest `PLATEAU` triples must show unrelated differences that do not fall. A single bad
+  level cannot look like that.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+QUIET = 0.01
+"""Scatter or change of the order too small to read a trend from."""
+AUDIBLE = 0.003
+"""Scatter above which noise is looked for."""
+SHOWS = 3.0
+"""Noise changes an order by no more than so many times its scatter (over log 2)."""
+UNRELATED_FIRST = 0.1
+"""A first triple with more scatter has no trend before it that could vouch for it: suspect differences spoil it."""
+FLAT_FIRST = 0.25
+"""The same for a first triple with a lower order, half the least that an expansion has: noise does not fall with dt."""
+LOUD = 10.0
+"""Round-off may be so many times its predicted floor, an order of magnitude, and move the order accordingly."""
+STEEP = 1.1
+"""Scatter that rises by more than so many times 2^(p - 1/2) per level is no power h^(1/2) or higher under h^p."""
+INCOHERENT = 0.5
+"""Differences with more scatter, or opposite to each other, are not those of one error."""
+PLATEAU = 3
+"""So many triples, of five levels, show a floor that nothing explains."""
+VOUCHED = 2
+"""So many triples before it must be those of an error."""
+STAYS = 0.5
+"""A floor does not fall below this part of itself."""
+SINGLE_NUMBER = 1e-9
+"""Series with less scatter are multiples of one another, such as a single number, and cannot show noise by it."""
+LOG2 = float(np.log(2.0))
+
+
+def noise_share(difference: Floats, floor: Floats) -> Floats:
+    """Return floor over difference for the finer pair of every triple, shape (..., m).
+
+    Parameters
+    ----------
+    difference
+        Norms of the differences, shape (..., m+1).
+    floor
+        Round-off at every level, shape (..., m+2).
+    """
+    pairs = floor[..., 1:-1] + floor[..., 2:]
+    finer = difference[..., 1:]
+    return np.where(finer > 0, pairs / np.where(finer > 0, finer, 1.0), np.inf)
+
+
+def before_round_off(
+    orders: Floats,
+    scatter: Floats,
+    difference: Floats,
+    noise: Floats,
+    possible: Floats,
+    suspect: float,
+) -> Flags:
+    """Say of every triple whether it stands before the first one that round-off spoils.
+
+    Parameters
+    ----------
+    orders, scatter
+        Local order and signed scatter of every triple, shape (..., m).
+    difference
+        Norms of the differences, shape (..., m+1).
+    noise, possible
+        Predicted and possible floor over the finer difference (`noise_share`), shape (..., m).
+    suspect
+        From this share of predicted noise on a triple is suspect.
+    """
+    incoherent = np.signbit(scatter) | (np.abs(scatter) > INCOHERENT) | np.isnan(scatter)
+    spoiled = _breaks_the_trend(orders, scatter, incoherent)
+    # what rises out of the floor again on a finer level was no floor
+    spoiled &= _from_here_on(noise) >= suspect
+    onset = _onset(orders, scatter, incoherent)
+    share = possible / np.fmax(np.fmin(np.abs(scatter), 1.0), SINGLE_NUMBER)
+    spoiled |= onset & (_from_here_on(share) * LOUD >= 1.0)
+    spoiled[..., VOUCHED:] |= (onset & _plateau(incoherent, difference)[..., None])[..., VOUCHED:]
+    return ~np.logical_or.accumulate(spoiled, axis=-1)
+
+
+def _from_here_on(values: Floats) -> Floats:
+    """Return the least value of a triple and all finer ones."""
+    return np.minimum.accumulate(values[..., ::-1], axis=-1)[..., ::-1]
+
+
+def _breaks_the_trend(orders: Floats, scatter: Floats, incoherent: Flags) -> Flags:
+    """Say of every triple whether it does not continue the trend.
+
+    It is less proportional than the one before, its order has changed by more than before, or its differences are of
+    opposite sign. Noise that changes an order shows in the scatter as well: a change larger than that is no noise,
+    unless the series are single numbers, which have no scatter. And a scatter that rises less steeply than that of any
+    lower power may rise is no noise; of single numbers, the same is true of the changes of the order.
+    """
+    size = np.abs(scatter)
+    breaks = np.isnan(orders) | np.isnan(scatter) | np.signbit(scatter)
+    breaks[..., 0] |= (size[..., 0] > UNRELATED_FIRST) | (orders[..., 0] < FLAT_FIRST)
+    change = np.abs(np.diff(orders, axis=-1))
+    for i in range(1, orders.shape[-1]):
+        usual = np.maximum(QUIET, change[..., i - 2]) if i > 1 else 5 * QUIET
+        worse = size[..., i] > np.maximum(AUDIBLE, size[..., i - 1])
+        by_noise = change[..., i - 1] <= SHOWS * size[..., i] / LOG2
+        steep = size[..., i] > np.exp2(orders[..., i - 1] - 0.5) * size[..., i - 1]
+        by_noise &= steep | incoherent[..., i]
+        number = np.maximum(size[..., i], size[..., i - 1]) < SINGLE_NUMBER
+        if i > 1:
+            number &= change[..., i - 1] > np.exp2(orders[..., i - 1] - 0.5) * change[..., i - 2]
+        by_noise |= number
+        breaks[..., i] |= (worse | (change[..., i - 1] > usual)) & by_noise
+    return breaks
+
+
+def _onset(orders: Floats, scatter: Floats, incoherent: Flags) -> Flags:
+    """Say of every triple whether noise begins there by the data alone, and stays to the finest level.
+
+    It begins with an incoherent triple, or one whose scatter has risen too steeply for a power, and reaches back over
+    the triples on which the scatter rises to it. What follows must be incoherent.
+    """
+    size, count = np.abs(scatter), orders.shape[-1]
+    begins = incoherent.copy()
+    to_the_end = np.logical_and.accumulate(incoherent[..., ::-1], axis=-1)[..., ::-1]
+    begins &= to_the_end
+    with np.errstate(over="ignore", invalid="ignore"):
+        most = STEEP * np.exp2(np.clip(orders - 0.5, 0.5, 64.0))
+    for i in range(count - 1, 0, -1):
+        rises = (size[..., i] > AUDIBLE) & (size[..., i] > size[..., i - 1])
+        steep = size[..., i] > most[..., i - 1] * size[..., i - 1]
+        follows = begins[..., i + 1] if i + 1 < count else np.ones(rises.shape, dtype=bool)
+        noisy_next = to_the_end[..., i + 1] if i + 1 < count else np.zeros(rises.shape, dtype=bool)
+        begins[..., i] |= rises & follows & (steep | noisy_next | begins[..., i])
+    return begins
+
+
+def _plateau(incoherent: Flags, difference: Floats) -> Flags:
+    """Say of every ladder whether its finest differences are unrelated and do not fall."""
+    if incoherent.shape[-1] < PLATEAU:
+        return np.zeros(incoherent.shape[:-1], dtype=bool)
+    last = difference[..., -PLATEAU:]
+    return np.asarray(
+        np.all(incoherent[..., -PLATEAU:], axis=-1)
+        & (last[..., -1] >= STAYS * last[..., 0])
+        & (last[..., -1] > 0)
+    )

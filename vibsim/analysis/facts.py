@@ -1,0 +1,136 @@
+"""The numbers of ladders that a verdict rests on, and what they say before any order is read.
+
+Leading dimensions ``...`` are ladders (scheme, case); n is the number of levels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.analysis.series import safe_ratio
+from vibsim.vocabulary import TOLERANCE
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+BLAME = 100.0
+"""Round-off may be blamed for a difference up to so many times its predicted floor, an order of magnitude."""
+TINY = 1e-10
+"""Differences of a scheme that is exact are no larger part of the solution."""
+VISIBLE = 1e4
+"""An ordinary error, (w dt)^p at the coarsest level, this many times above the blamed floor would have been seen."""
+BLOWN_UP = 10.0
+"""A solution so many times larger than the exact one has grown."""
+EXACT_ACCURACY = 1e-12
+"""An exact solution is trusted to this part of its size."""
+ORDINARY = 2.0
+"""Order of the error that would have been seen where an exact quantity is promised."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """The numbers of ladders that a verdict rests on."""
+
+    levels: tuple[int, ...]
+    """The n levels, strictly increasing."""
+    difference: Floats
+    """Norms of the differences, shape (..., n-1)."""
+    scatter: Floats
+    """Signed scatter of the triples in the same norm (`series.scatter`), shape (..., n-2)."""
+    floor: Floats
+    """Predicted round-off at every level in the same norm, shape (..., n)."""
+    order: Floats
+    """The order p that is expected, infinite for what is to be exact, shape (...)."""
+    omega_dt: Floats
+    """w dt, shape (..., n)."""
+    size: Floats
+    """Norm of the solution, shape (...)."""
+    relative_floor: Floats
+    """Predicted round-off relative to the solution at the coarsest level, shape (...)."""
+    tolerance: float = TOLERANCE
+    """How far from p an order may be."""
+    error: Floats | None = None
+    """Norms of the true errors, shape (..., n); NaN where the exact solution is not known."""
+    failed: Flags | None = None
+    """Whether a member broke down, shape (..., n)."""
+    applicable: Flags | None = None
+    """Whether the quantity exists, shape (...)."""
+    stability_limit: Floats | None = None
+    """Largest stable w dt, infinite where there is no limit, shape (...)."""
+    span: Floats | None = None
+    """w T, the length of the run in units of the inverse frequency, shape (...); None counts as long."""
+    left_to_the_mesh: Floats | None = None
+    """The one power of an error that has no expansion beyond it, since events or corners of the force are left to the
+    mesh, shape (...); NaN where the error has an expansion."""
+    growth: Floats | None = None
+    """Largest position over the largest exact position, shape (..., n); NaN where not known."""
+    ceiling: Floats | None = None
+    """The most that round-off can be in any arithmetic, at every level in the same norm, shape (..., n)."""
+    error_scatter: Floats | None = None
+    """Signed scatter of the errors of successive levels, shape (..., n-1), of three levels; NaN where not known."""
+
+
+def breakdown(e: Evidence, shape: tuple[int, ...]) -> tuple[Flags, Flags, Flags]:
+    """Say of every level whether it broke down or is beyond the limit, and of every ladder whether it grows."""
+    none = np.zeros((*shape, len(e.levels)), dtype=bool)
+    broken = none if e.failed is None else none | e.failed
+    beyond = none
+    if e.stability_limit is not None:
+        # at the limit itself a scheme may still be stable, and w dt carries rounding
+        beyond = none | (e.omega_dt > e.stability_limit[..., None] * (1 + 1e-9))
+    if e.growth is None:
+        return broken, beyond, np.zeros(shape, dtype=bool)
+    last = e.growth[..., -1]
+    before = e.growth[..., -2] if len(e.levels) > 1 else last
+    return broken, beyond, (last > BLOWN_UP) & ~(last < 0.5 * before)
+
+
+def error_orders(e: Evidence) -> Floats:
+    """Return the order of the true errors of every pair, shape (..., n-1); NaN where they are not known."""
+    if e.error is None:
+        return np.full(e.difference.shape, np.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(
+            np.log2(safe_ratio(e.error[..., :-1], e.error[..., 1:])) / np.diff(np.array(e.levels))
+        )
+
+
+def floor_of_pairs(e: Evidence) -> Floats:
+    """Return the predicted round-off of the differences, shape (..., n-1)."""
+    return np.asarray(e.floor[..., :-1] + e.floor[..., 1:])
+
+
+def at_round_off(e: Evidence) -> Flags:
+    """Say where all differences may be round-off."""
+    return np.asarray(np.all(e.difference <= BLAME * floor_of_pairs(e), axis=-1))
+
+
+def truly_exact(e: Evidence) -> Flags:
+    """Say where all differences are round-off although an ordinary error would have been seen."""
+    # what a short run has accumulated is smaller by (w T)^2
+    power = np.where(np.isinf(e.order), ORDINARY, e.order)
+    ordinary = np.minimum(e.omega_dt[..., 0], 1.0) ** power
+    if e.span is not None:
+        ordinary = ordinary * np.minimum(e.span, 1.0) ** 2
+    tiny = np.all(e.difference <= TINY * e.size[..., None], axis=-1)
+    return np.asarray(at_round_off(e) & tiny & (ordinary >= VISIBLE * BLAME * e.relative_floor))
+
+
+def accuracy(e: Evidence) -> Floats:
+    """Return how well the finest error is known, shape (...)."""
+    return np.asarray(BLAME * e.floor[..., -1] + EXACT_ACCURACY * e.size)
+
+
+def far_from_exact(e: Evidence) -> Flags:
+    """Say where the finest level is further from the exact solution than that is known."""
+    if e.error is None:
+        return np.zeros(e.order.shape, dtype=bool)
+    return np.asarray(np.nan_to_num(e.error[..., -1], nan=0.0) > accuracy(e))
+
+
+def pick(values: Floats, index: NDArray[np.int64]) -> Floats:
+    """Return one entry of the last axis for each ladder."""
+    return np.take_along_axis(values, index[..., None], axis=-1)[..., 0]

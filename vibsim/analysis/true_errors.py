@@ -1,0 +1,109 @@
+"""What the true errors say of an order, where the exact solution is known.
+
+They fall with the same power as the differences, and show a lower power before the differences do, which are steeper.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.analysis.cut import LOG2
+from vibsim.analysis.facts import Evidence, accuracy, error_orders, pick
+from vibsim.analysis.series import safe_ratio
+from vibsim.analysis.settling import GROWS, SETTLED
+from vibsim.analysis.window import Trend
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+EXCESS = 1.5
+"""An error so many times the one that the differences allow, or so many times smaller, contradicts them."""
+AGREEMENT = 0.25
+"""Orders of differences and of errors agree within half of what separates two orders."""
+LEAVES = 0.03
+"""Orders of true errors may be so far from p: a tenth of h^(p-1) beside h^p makes 0.07."""
+VOUCHED = 0.04
+"""Mismatch of errors that leaves no room for a tenth of a lower power, which makes 0.05."""
+VOUCHED_FADING = 0.6
+"""What the errors show besides h^p falls at least to this part of itself per level when it is a higher power."""
+LEAST_ORDER = 0.25
+"""No stated order is taken for less when errors are predicted: half the least that an expansion has, 1/2."""
+
+
+def errors_leave(e: Evidence, t: Trend, p: Floats) -> Flags:
+    """Say where the true errors move away from h^p over the last levels of the window.
+
+    They show a lower power before the differences do, which are steeper.
+    """
+    if e.error is None or len(e.levels) < 4:
+        return np.zeros(p.shape, dtype=bool)
+    found = error_orders(e)
+    last, before = (np.abs(pick(found, t.last + 1 - back) - p) for back in (0, 1))
+    known = pick(e.error, t.last + 2) > accuracy(e)
+    return np.asarray(known & (last > LEAVES) & (last > GROWS * before))
+
+
+def errors_vouch(e: Evidence, p: Floats) -> Flags:
+    """Say of three levels where the true errors leave no room for another power beside h^p.
+
+    They have two ratios where the differences have one, and show a lower power more than these. A tenth of h^(p-1)
+    at the finest level makes the mismatch 0.05, a tenth of h^(p+1) 0.1.
+    """
+    if e.error is None or e.error_scatter is None or len(e.levels) != 3:
+        return np.zeros(p.shape, dtype=bool)
+    found = error_orders(e)
+    mismatch = np.hypot(e.error_scatter, LOG2 * (found - p[..., None]))
+    finer, coarser = mismatch[..., 1], mismatch[..., 0]
+    fades = (finer <= VOUCHED_FADING * coarser) & (finer <= SETTLED)
+    known = e.error[..., -1] > EXCESS * accuracy(e)
+    return np.asarray(known & ((finer <= VOUCHED) | fades))
+
+
+def contradicts(e: Evidence, t: Trend) -> tuple[Flags, Flags]:
+    """Say where the error at the last level of the window is larger, or smaller, than its difference allows.
+
+    Larger: the limit is another one. Smaller: the differences are not those of the power that they look like.
+    """
+    if e.error is None:
+        return np.zeros(e.order.shape, dtype=bool), np.zeros(e.order.shape, dtype=bool)
+    finer = t.last + 2
+    gap = np.diff(np.array(e.levels))[finer - 1]
+    difference, error = pick(e.difference, finer - 1), pick(e.error, finer)
+    most, least = (
+        difference / np.expm1(np.maximum(order, LEAST_ORDER) * gap * np.log(2.0))
+        for order in (
+            np.minimum(t.order, t.local) - t.width,
+            np.maximum(t.order, t.local) + t.width,
+        )
+    )
+    too_large = np.nan_to_num(error, nan=0.0) > EXCESS * most + accuracy(e)
+    return too_large, np.asarray(error < least / EXCESS - accuracy(e))
+
+
+def errors_stay(e: Evidence, t: Trend) -> Flags:
+    """Say where the errors fall at less than half the stated order over the last two levels of the window."""
+    if e.error is None:
+        return np.zeros(e.order.shape, dtype=bool)
+    gap = np.diff(np.array(e.levels))[t.last + 1]
+    fall = safe_ratio(pick(e.error, t.last + 1), pick(e.error, t.last + 2))
+    return np.asarray(fall < np.exp2(0.5 * np.maximum(t.local - t.width, 0.0) * gap))
+
+
+def errors_agree(e: Evidence, t: Trend) -> Flags:
+    """Say where the errors fall with the stated order too, over the last three levels of the window.
+
+    Two terms of one size can look like another power in a few differences, but not in the errors at the same time.
+    Without an exact solution there is nothing to compare.
+    """
+    agree = np.ones(e.order.shape, dtype=bool)
+    if e.error is None:
+        return agree
+    levels = np.array(e.levels, dtype=np.float64)
+    for back in (0, 1):
+        coarse, fine = t.last + 1 - back, t.last + 2 - back
+        ratio = safe_ratio(pick(e.error, coarse), pick(e.error, fine))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found = np.log2(ratio) / (levels[fine] - levels[coarse])
+        agree &= ~np.isfinite(found) | (np.abs(found - t.order) <= np.maximum(AGREEMENT, t.width))
+    return agree
