@@ -40,6 +40,8 @@ RESOLVED = 1e-3
 """A relative difference below says that the steps see the motion."""
 SMALL = 2.0**-51
 """A change of the accelerations is none that is smaller relative to them and to the velocities over a step."""
+STALLED = 2.0**-30
+"""Largest change that may be taken for round-off once changes no longer fall: forces magnify that of the positions."""
 ROUND_OFF = 16.0 * 2.0**-52
 """Relative bound of the rounding errors, beside one that grows with the root of the number of steps."""
 
@@ -167,7 +169,7 @@ def _added(total: Floats, change: Floats, lost: Floats) -> tuple[Floats, Floats]
 def _stages(force: Force, u: Floats, v: Floats, t: Floats, h: Floats, a: Floats) -> Floats:
     """Return the accelerations at the stages, shape (coordinate, stage, case), from a guess; NaN for no end."""
     of = tableau()
-    going = np.ones(len(h), dtype=bool)
+    going, before = np.ones(len(h), dtype=bool), np.full(len(h), np.inf)
     straight = u[:, None] + of.c[:, None] * h * v[:, None]
     for _ in range(ITERATIONS):
         y = v[:, None] + h * _sum(of.first, a)
@@ -176,9 +178,10 @@ def _stages(force: Force, u: Floats, v: Floats, t: Floats, h: Floats, a: Floats)
         size = np.max(np.abs(found) + np.abs(y) / h, axis=(0, 1))
         # a member that has come to rest in its last digits keeps them, whatever the others do
         a = np.where(going, found, a)
-        going = going & ~(change <= SMALL * size)
-        if not going.any():
-            return a
+        stalled = (change <= STALLED * size) & ~(change < 0.5 * before)
+        going, before = going & ~(change <= SMALL * size) & ~stalled, change
+        if not (going & np.isfinite(change)).any():
+            break
     return np.where(going, np.nan, a)
 
 
