@@ -12,7 +12,8 @@ from subprocess import run
 import pytest
 
 from vibsim.plan import Plan
-from vibsim.spec import cost
+from vibsim.plan.shards import load_of
+from vibsim.spec import cost, from_dict
 
 Plans = Callable[..., Plan]
 NO_SWEEP = "schemes: [central]"
@@ -171,6 +172,30 @@ def test_more_evaluations_take_more_time_and_so_smaller_shards() -> None:
         assert one.shard >= other.shard
     assert loads[0].shard == cost.Load(1, 2**10, 17, 3).shard
     assert loads[0].shard > loads[-1].shard
+
+
+def test_members_that_are_stepped_one_by_one_take_more_time_and_so_smaller_shards() -> None:
+    for explicit, alone in itertools.product((True, False), (cost.COUPLED, cost.EVENTFUL)):
+        free, bound = (cost.work(1, explicit, factor) for factor in (None, alone))
+        loads = [cost.Load(1, 2**10, 17, 3, work=w, iterated=i) for w, i in (free, bound)]
+        assert loads[0].seconds(2**16) < loads[1].seconds(2**16)
+        assert loads[0].shard >= loads[1].shard
+
+
+@pytest.mark.parametrize(
+    ("kind", "factor"), [("elastic_pendulum", cost.COUPLED), ("pendulum", 0.0)]
+)
+def test_several_coordinates_are_stepped_one_by_one(kind: str, factor: float) -> None:
+    content = {
+        "title": "t",
+        "source": "s",
+        "model": {"kind": kind},
+        "time": {"end": 1.0},
+        "levels": [5, 6, 7],
+        "schemes": ["central"],
+    }
+    load = load_of(from_dict(content, name="n", collection="c"), 7)
+    assert (load.work, load.iterated) == ((0.0, factor) if factor else (1.0, 0.0))
 
 
 def test_every_file_is_made_by_one_job(plan_of: Plans, small_shards: None) -> None:

@@ -18,9 +18,10 @@ from vibsim.plan import code
 from vibsim.plan.cases import columns, sampling
 from vibsim.plan.jobs import LevelJob, ShardJob, shard_path
 from vibsim.plan.versions import NUMERICAL, versions
-from vibsim.spec.cost import Load, work
+from vibsim.spec.cost import COUPLED, EVENTFUL, Load, work
 
 if TYPE_CHECKING:
+    from vibsim.models import Model
     from vibsim.spec import Experiment
 
 _NOT_SIMULATED = (
@@ -49,6 +50,13 @@ def in_numbers(content: Mapping[str, Any]) -> dict[str, Any]:
     return {**content, "model": {**model, "tables": tables}}
 
 
+def _alone(model: Model) -> float | None:
+    """Return what a step takes of a model whose members are stepped one by one (`vibsim.spec.cost.work`)."""
+    if model.events is not None:
+        return EVENTFUL
+    return COUPLED if model.coordinates > 1 or model.lookup is not None else None
+
+
 def load_of(experiment: Experiment, level: int) -> Load:
     """Return what one member of `experiment` costs at `level`."""
     from vibsim.models import has_solution
@@ -59,8 +67,7 @@ def load_of(experiment: Experiment, level: int) -> Load:
     lean = is_bounded(experiment)
     trajectories = len(experiment.schemes) * experiment.members
     kinds = [SCHEMES[experiment.schemes[i].kind] for i in experiment.ladder]
-    has_events = model.events is not None
-    works = [work(kind.force_evaluations, kind.explicit, has_events) for kind in kinds]
+    works = [work(kind.force_evaluations, kind.explicit, _alone(model)) for kind in kinds]
     return Load(
         schemes=len(experiment.schemes),
         steps=steps,

@@ -24,6 +24,8 @@ ITERATED = 3.0
 """Steps with one evaluation that an implicit step takes as long as, for each evaluation of an iteration."""
 EVENTFUL = 2.5
 """Steps of a smooth motion that one takes as long as where an event may be."""
+COUPLED = 2.0
+"""Steps of one coordinate that one of several takes as long as, and one with a force from a table."""
 WRITTEN_SECONDS = 4e-9
 """Of one byte that is made, written, sealed and flushed."""
 JOB_SECONDS = 0.5
@@ -81,20 +83,21 @@ COMPARED_FILE = 130_000
 """Bytes of the file of an analysis beside its data."""
 
 
-def work(force_evaluations: int, explicit: bool, has_events: bool = False) -> tuple[float, float]:
+def work(force_evaluations: int, explicit: bool, alone: float | None = None) -> tuple[float, float]:
     """Return what a step of a scheme takes in explicit steps with one evaluation: as such steps, and as iterations.
 
     Parameters
     ----------
     force_evaluations
         Of a step; of an implicit scheme, of an iteration.
-    has_events
-        Whether the motion has events, so that members are stepped one by one, and each step asks for them.
+    alone
+        Where members are stepped one by one whatever the scheme: how many steps of one coordinate without events a step
+        takes as long as, `EVENTFUL` or `COUPLED`.
     """
     one, iterated = 1.0 + EVALUATION * (force_evaluations - 1), 0.0
     if not explicit:
         one, iterated = 0.0, ITERATED * force_evaluations
-    return (0.0, EVENTFUL * (one + iterated)) if has_events else (one, iterated)
+    return (one, iterated) if alone is None else (0.0, alone * (one + iterated))
 
 
 @dataclass(frozen=True)
