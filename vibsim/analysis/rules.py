@@ -123,7 +123,8 @@ def _alone(e: Evidence, t: Trend, p: Floats) -> Flags:
     """Say where h^p stands alone: what is left fades, or is less than a tenth of a lower power would make."""
     mismatch = np.hypot(t.scatter, LOG2 * (t.local - p))
     before = np.hypot(t.scatter_before, LOG2 * (t.local - t.change - p))
-    clear = mismatch <= most_left(p, mismatch, before, t.several)
+    # what round-off may have made does not tell of a lower power that grows
+    clear = mismatch <= most_left(p, mismatch, before, t.several & (mismatch > t.noise))
     clear |= t.several & ((t.fading & ~t.slow) | t.irregular)
     # as much as one triple alone may show, where it does not grow: the interval then reaches to a lower power
     steady = t.several & (np.abs(t.change) <= STEADY * e.tolerance)

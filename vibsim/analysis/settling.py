@@ -147,7 +147,7 @@ def most_left(order: Floats, mismatch: Floats, before: Floats, several: Flags) -
     mismatch, before
         Distance from proportional series of order p, of the last triple and the one before.
     several
-        Whether there is one before.
+        Whether there is one before, and what is left is more than round-off.
     """
     growth = np.where(before > 0, mismatch / np.where(before > 0, before, 1.0), np.inf)
     gap = np.clip(np.log2(np.maximum(growth, 1.0)), 0.5, FARTHEST)

@@ -80,6 +80,8 @@ class Trend:
     """Whether what is left of the next power fades from triple to triple."""
     open: Flags
     """Whether the orders have not settled."""
+    noise: Floats
+    """How much of the last triple the predicted round-off may be."""
     hiding: Flags
     """Whether a lower power may be hiding in what is left besides the first."""
     several: Flags
@@ -143,7 +145,9 @@ def trend(
         order = local + tail
         beside = left(spread, before, change, earlier, tail)
         fading = several & fades(beside, spread, before, tail, change * earlier > 0, tolerance)
-        hiding = ~fading & (beside[0] > most_left(order, *beside, several))
+        # what round-off may have made does not tell of a lower power that grows
+        grown = several & (beside[0] > rest)
+        hiding = ~fading & (beside[0] > most_left(order, *beside, grown))
         if vouched is not None:
             hiding &= several | ~vouched
         turned = several & np.signbit(before)
@@ -182,6 +186,7 @@ def trend(
             gap=np.any(clean & np.isnan(orders), axis=-1),
             noisy=np.abs(change) <= np.minimum(LOUD * rest, SHOWS * np.abs(spread)) / LOG2,
             fading=fading,
+            noise=rest,
             hiding=hiding,
             several=several,
             irregular=(change * earlier < 0)

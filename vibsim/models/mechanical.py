@@ -167,7 +167,9 @@ def _natural_frequency(
         stiffness = values(forces.stiffness, {**named, forces.position: 0.0})
         with np.errstate(invalid="ignore"):
             ratio = stiffness / values(forces.mass, named)
-            return np.sqrt(np.where(ratio > 0.0, ratio, np.nan))
+            found = np.sqrt(np.where(ratio > 0.0, ratio, np.nan))
+        # of numbers alone it is one number, whatever the shape of the parameters
+        return np.broadcast_to(found, np.broadcast_shapes(*(np.shape(x) for x in named.values())))
 
     return natural_frequency
 

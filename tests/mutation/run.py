@@ -1,0 +1,174 @@
+"""``make mutation``: seed every fault into a copy of the package, and write down which checks notice it.
+
+Each copy runs the battery (`battery.py`). A fault is caught where a check that passes without it passes no longer, or
+where the program stops. What the plain rule "the last ratio is near 2^p" would have seen stands beside it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from faults import FAULTS, Fault
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+PAGE = ROOT / "docs" / "mutation.md"
+SECONDS = 300
+"""A battery that takes longer has a fault that does not end."""
+
+Report = dict[str, dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a fault."""
+
+    fault: Fault
+    caught: tuple[str, ...]
+    """Kind of check and reason, the most frequent first; empty where nothing noticed it."""
+    plain: bool
+    """Whether the plain rule would have seen it."""
+
+
+def seeded(fault: Fault, folder: Path) -> None:
+    """Copy the package into `folder` with a fault in it.
+
+    Raises
+    ------
+    ValueError
+        Where its text does not stand once in its file.
+    """
+    shutil.copytree(ROOT / "vibsim", folder / "vibsim", ignore=shutil.ignore_patterns("__pycache__"))
+    file = folder / "vibsim" / fault.file
+    text = file.read_text()
+    if text.count(fault.right) != 1:
+        raise ValueError(f"{fault.name}: {fault.right!r} does not stand once in {fault.file}")
+    file.write_text(text.replace(fault.right, fault.wrong))
+
+
+def battery(folder: Path) -> Report:
+    """Run the battery with the package in `folder`."""
+    path = {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
+    try:
+        done = subprocess.run(
+            [sys.executable, str(HERE / "battery.py")],
+            env={**os.environ, **path},
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            timeout=SECONDS,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return {"all": {"error": "no end"}}
+    if done.returncode:
+        return {"all": {"error": done.stderr.strip().splitlines()[-1][:200]}}
+    found: Report = json.loads(done.stdout)
+    return found
+
+
+def noticed(before: Report, after: Report) -> tuple[str, ...]:
+    """Return what notices a fault: check and reason of every verdict that passed before and passes no longer."""
+    seen: Counter[str] = Counter()
+    for name, report in after.items():
+        if "error" in report:
+            seen[f"stops: {report['error'].partition(':')[0]}"] += 1
+            continue
+        for check, results in before[name]["verdicts"].items():
+            for old, new in zip(results, report["verdicts"][check], strict=True):
+                if " PASS " in old and " PASS " not in new:
+                    seen[f"{check.split()[-1]}: {new.split()[-1]}"] += 1
+    return tuple(what for what, _ in seen.most_common())
+
+
+def seen_plainly(before: Report, after: Report) -> bool:
+    """Tell whether a ratio that was near 2^p is so no longer."""
+    return any(
+        report.get("plain", {}).get(key) is False
+        for name, found in before.items()
+        for key, near in found["plain"].items()
+        if near and (report := after.get(name, {}))
+    )
+
+
+def outcome(fault: Fault, before: Report) -> Outcome:
+    """Seed a fault, and run the battery with it."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        seeded(fault, folder)
+        after = battery(folder)
+    return Outcome(fault, noticed(before, after), seen_plainly(before, after))
+
+
+def page(outcomes: list[Outcome]) -> str:
+    """Write the page about all faults."""
+    caught = [o for o in outcomes if o.caught]
+    missed = [o for o in caught if not o.plain]
+    nothing = [o for o in outcomes if not o.caught]
+    rows = [
+        f"| {o.fault.name} | {o.fault.place} | {'; '.join(o.caught[:3]) or '**nothing**'} | {'sees it' if o.plain else 'misses it'} |"
+        for o in outcomes
+    ]
+    unseen = "\n".join(f"- {o.fault.name} ({o.fault.place})" for o in nothing)
+    return f"""# Mutation test
+
+`make mutation` seeds one fault at a time into a copy of the package and runs a battery of small experiments with it (`tests/mutation`). A fault is caught where a check
+that passes without it passes no longer. The last column says what the plain rule "the last ratio of differences is within half an order of 2^p" would have said
+of the same runs.
+
+{len(outcomes)} faults; caught: {len(caught)}; of these the plain rule misses {len(missed)}; nothing catches {len(nothing)}.
+
+| fault | in | caught by, and how (the three most frequent) | plain ratio |
+|---|---|---|---|
+{chr(10).join(rows)}
+
+## What nothing catches
+
+{unseen or 'Every fault was caught.'}
+"""
+
+
+def main() -> int:
+    """Run all faults, or those whose names have a word, and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("word", nargs="?", default="", help="only faults whose name has it; writes no page")
+    parser.add_argument("--cores", type=int, default=os.cpu_count() or 1)
+    given = parser.parse_args()
+    before = battery(ROOT)
+    wrong = [f"{n}: {r['error']}" for n, r in before.items() if "error" in r]
+    wrong += [
+        f"{name}, {check}: {result}"
+        for name, report in before.items()
+        for check, results in report.get("verdicts", {}).items()
+        for result in results
+        if " PASS " not in result
+    ]
+    if wrong:
+        print("the battery does not pass without a fault:", *wrong, sep="\n  ", file=sys.stderr)
+        return 1
+    chosen = [fault for fault in FAULTS if given.word in fault.name]
+    with ThreadPoolExecutor(given.cores) as pool:
+        outcomes = []
+        for found in pool.map(lambda fault: outcome(fault, before), chosen):
+            outcomes.append(found)
+            told = "; ".join(found.caught[:2]) or "NOTHING"
+            print(f"{found.fault.name:50} {told:60} plain: {found.plain}", flush=True)
+    if not given.word:
+        PAGE.write_text(page(outcomes))
+        print(f"written: {PAGE.relative_to(ROOT)}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
