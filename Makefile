@@ -4,7 +4,7 @@ BIN := .venv/bin
 
 .DEFAULT_GOAL := run
 CATALOGUE := $(filter-out scale,$(notdir $(wildcard configs/*)))
-.PHONY: run catalogue test test-slow lint bench scale clean help set-up-run set-up-dev
+.PHONY: run catalogue test test-slow lint bench mutation scale clean help set-up-run set-up-dev
 
 run: set-up-run  ## run the default experiments and write results/index.html (this is what plain `make` does)
 	@$(BIN)/vibsim run
@@ -26,6 +26,9 @@ lint: set-up-dev  ## check style, types, layers, workflow and generated files
 
 bench: set-up-run  ## measure everything against C and other solvers, 10 minutes (PARTS="jobs storage" for some of it)
 	$(BIN)/python bench/run.py $(PARTS)
+
+mutation: set-up-run  ## seed faults, see which checks catch them, and write docs/mutation.md, 10 minutes
+	$(BIN)/python tests/mutation/seeding.py
 
 catalogue: set-up-run  ## run every experiment but those of scale: the source texts, section by section
 	$(BIN)/vibsim run $(CATALOGUE)

@@ -8,7 +8,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent / "mutation"))
 
-import run
+import seeding
 from faults import FAULTS
 
 ROOT = Path(__file__).parents[1]
@@ -38,27 +38,37 @@ def test_the_page_tells_of_every_fault():
 
 
 def test_what_notices_a_fault_is_what_passes_no_longer():
-    before = {"a": {"verdicts": {"check_1 converges": ["x: PASS asymptotic", "y: FAIL order_low"]}, "plain": {"u, x": True}}}
-    after = {"a": {"verdicts": {"check_1 converges": ["x: FAIL wrong_limit", "y: FAIL order_low"]}, "plain": {"u, x": False}}}
-    assert run.noticed(before, after) == ("converges: wrong_limit",)
-    assert run.seen_plainly(before, after)
-    assert run.noticed(before, before) == ()
-    assert not run.seen_plainly(before, before)
-    assert run.noticed(before, {"all": {"error": "ValueError: no"}}) == ("stops: ValueError",)
+    before = {
+        "a": {
+            "verdicts": {"check_1 converges": ["x: PASS asymptotic", "y: FAIL order_low"]},
+            "plain": {"u, x": True},
+        }
+    }
+    after = {
+        "a": {
+            "verdicts": {"check_1 converges": ["x: FAIL wrong_limit", "y: FAIL order_low"]},
+            "plain": {"u, x": False},
+        }
+    }
+    assert seeding.noticed(before, after) == ("converges: wrong_limit",)
+    assert seeding.seen_plainly(before, after)
+    assert seeding.noticed(before, before) == ()
+    assert not seeding.seen_plainly(before, before)
+    assert seeding.noticed(before, {"all": {"error": "ValueError: no"}}) == ("stops: ValueError",)
 
 
 def test_a_text_that_does_not_stand_once_is_no_fault(tmp_path):
     from dataclasses import replace
 
     with pytest.raises(ValueError, match="does not stand once"):
-        run.seeded(replace(FAULTS[0], right="no such text"), tmp_path)
+        seeding.seeded(replace(FAULTS[0], right="no such text"), tmp_path)
 
 
 @pytest.mark.slow
 def test_the_battery_passes_without_a_fault_and_catches_one_of_every_kind():
-    before = run.battery(ROOT)
+    before = seeding.battery(ROOT)
     results = [r for report in before.values() for rs in report["verdicts"].values() for r in rs]
     assert all(" PASS " in result for result in results)
     for name in ("weight with the wrong sign", "sign in AB3", "common grid off by one"):
         (fault,) = (fault for fault in FAULTS if fault.name == name)
-        assert run.outcome(fault, before).caught
+        assert seeding.outcome(fault, before).caught

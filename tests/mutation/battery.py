@@ -12,17 +12,23 @@ from typing import Any
 
 CONVERGE = [
     *({"converges": q, "order": "scheme"} for q in ("theta", "omega")),
-    {"converges": "energy_deviation", "order": "scheme", "schemes": ["central", "yoshida4", "crank_nicolson"]},
+    {
+        "converges": "energy_deviation",
+        "order": "scheme",
+        "schemes": ["central", "yoshida4", "crank_nicolson"],
+    },
     {"converges": "theta", "order": "scheme", "norm": "linf"},
 ]
 LEVELS = {"from": 5, "to": 10}
 L2_BY_HAND = 0.007418752779801702
-"""Of the centred recurrence on u'' + 6.25 u = 0, u(0) = 1, u'(0) = 0.4, T = 4, 64 steps, over every second point, those of level 5."""
+"""Of the centred recurrence on u'' + 6.25 u = 0, u(0) = 1, u'(0) = 0.4, T = 4, 64 steps, at the points of level 5."""
 MACHINE_AT_END = 0.09613350695636094
 """u(4) of the machine below, from its equation by SciPy's DOP853."""
 
 
-def _of(model: dict[str, Any], end: float, schemes: list[Any], checks: list[Any], **more: Any) -> dict[str, Any]:  # fmt: skip # noqa: E501
+def _of(
+    model: dict[str, Any], end: float, schemes: list[Any], checks: list[Any], **more: Any
+) -> dict[str, Any]:
     return {
         "title": "A battery", "source": "none", "model": model, "time": {"end": end}, "levels": LEVELS,
         "schemes": schemes, "checks": checks, **more,
@@ -39,80 +45,170 @@ EXPERIMENTS = {
         {"kind": "pendulum", "g": 2.0, "L": 1.3, "m": 0.7},
         8.0,
         [
-            {"kind": "central", "end_velocity": "kick"}, "rk4", "crank_nicolson", "euler_cromer", "ab2", "ab3",
-            "bdf2", "yoshida4", "pefrl", "rkn4", "newmark", "gauss4",
+            {"kind": "central", "end_velocity": "kick"},
+            "rk4",
+            "crank_nicolson",
+            "euler_cromer",
+            "ab2",
+            "ab3",
+            "bdf2",
+            "yoshida4",
+            "pefrl",
+            "rkn4",
+            "newmark",
+            "gauss4",
             {"kind": "central", "label": "increment", "arithmetic": "increment"},
         ],
         [
             *CONVERGE,
-            {"value": "error_estimate_defect", "quantity": "theta", "at": {"scheme": "central", "level": 5}, "below": 0.05},
-            {"value": "period_error", "at": {"scheme": "rk4", "level": 10}, "equals": 0.0, "atol": 1e-6},
+            {
+                "value": "error_estimate_defect",
+                "quantity": "theta",
+                "at": {"scheme": "central", "level": 5},
+                "below": 0.05,
+            },
+            {
+                "value": "period_error",
+                "at": {"scheme": "rk4", "level": 10},
+                "equals": 0.0,
+                "atol": 1e-6,
+            },
             {"equal": ["central", "increment"], "quantity": "theta", "level": 10, "atol": 1e-11},
         ],
         initial={"theta": 1.2, "omega": 0.3},
     ),
     "samples": _of(
-        {"kind": "pendulum", "L": 1.3}, 4.0, ["central", "rk4"], _each(("theta",)),
-        initial={"theta": 1.2}, samples={"every": 4},
+        {"kind": "pendulum", "L": 1.3},
+        4.0,
+        ["central", "rk4"],
+        _each(("theta",)),
+        initial={"theta": 1.2},
+        samples={"every": 4},
     ),
     "spring": _of(
-        {"kind": "spring", "w": 2.5}, 4.0, ["central", "rk4", "crank_nicolson"],
+        {"kind": "spring", "w": 2.5},
+        4.0,
+        ["central", "rk4", "crank_nicolson"],
         [
             *_each(("u", "v", ENERGY)),
             {"equal": ["central", "discrete"], "quantity": "u", "level": 8, "atol": 1e-12},
             {"equal": ["crank_nicolson", "discrete"], "quantity": "u", "level": 8, "atol": 1e-12},
             {"equal": ["rk4", "discrete"], "quantity": "u", "level": 8, "atol": 1e-12},
-            {"value": "error_l2", "quantity": "u", "at": {"scheme": "central", "level": 6}, "equals": L2_BY_HAND, "rtol": 1e-3},
+            {
+                "value": "error_l2",
+                "quantity": "u",
+                "at": {"scheme": "central", "level": 6},
+                "equals": L2_BY_HAND,
+                "rtol": 1e-3,
+            },
         ],
         initial={"u": 1.0, "v": 0.4},
     ),
     "drag": _of(
-        {"kind": "pendulum", "L": 1.3, "drag": 0.4}, 4.0,
-        [{"kind": "central", "end_velocity": "kick"}, "central_quadratic_root", "rk2", "crank_nicolson"],
-        [*_each(("theta", "energy_budget"))], initial={"theta": 2.2},
+        {"kind": "pendulum", "L": 1.3, "drag": 0.4},
+        4.0,
+        [
+            {"kind": "central", "end_velocity": "kick"},
+            "central_quadratic_root",
+            "rk2",
+            "crank_nicolson",
+        ],
+        [*_each(("theta", "energy_budget"))],
+        initial={"theta": 2.2},
     ),
     "manufactured": _of(
-        {"kind": "oscillator", "m": 1.7, "spring": "2*u + u**3", "damping": {"quadratic": 0.3}, "exact": "1 + sin(0.7*t) + 0.3*t"},
-        2.0, ["central", "central_quadratic_root", "rk2"],
+        {
+            "kind": "oscillator",
+            "m": 1.7,
+            "spring": "2*u + u**3",
+            "damping": {"quadratic": 0.3},
+            "exact": "1 + sin(0.7*t) + 0.3*t",
+        },
+        2.0,
+        ["central", "central_quadratic_root", "rk2"],
         [*_each(("u",)), *_each(("energy_budget",), schemes=["central", "central_quadratic_root"])],
     ),
     "linear": _of(
-        {"kind": "oscillator", "m": 1.7, "spring": "2*u", "damping": {"linear": 0.3}, "force": "cos(1.3*t)"},
-        4.0, ["central", "rk4", "crank_nicolson", "ab3"], _each(("u", "v", "energy_budget")),
+        {
+            "kind": "oscillator",
+            "m": 1.7,
+            "spring": "2*u",
+            "damping": {"linear": 0.3},
+            "force": "cos(1.3*t)",
+        },
+        4.0,
+        ["central", "rk4", "crank_nicolson", "ab3"],
+        _each(("u", "v", "energy_budget")),
         initial={"u": 0.5, "v": 0.2},
     ),
     "machine": _of(
-        {"kind": "washing_machine", "m": 1.4, "k": 3.0, "b": 0.2, "unbalance": 0.5, "speed": 1.7}, 4.0,
+        {"kind": "washing_machine", "m": 1.4, "k": 3.0, "b": 0.2, "unbalance": 0.5, "speed": 1.7},
+        4.0,
         ["central", "rk4"],
         [
             *_each(("u", "energy_budget")),
-            {"value": "end", "quantity": "u", "at": {"scheme": "rk4", "level": 10}, "equals": MACHINE_AT_END, "atol": 1e-7},
+            {
+                "value": "end",
+                "quantity": "u",
+                "at": {"scheme": "rk4", "level": 10},
+                "equals": MACHINE_AT_END,
+                "atol": 1e-7,
+            },
         ],
     ),
     "elastic": _of(
-        {"kind": "elastic_pendulum", "beta": 0.8, "Theta": 30, "gamma": 0.2}, 3.0, ["central", "rk4", "gauss4"],
+        {"kind": "elastic_pendulum", "beta": 0.8, "Theta": 30, "gamma": 0.2},
+        3.0,
+        ["central", "rk4", "gauss4"],
         _each(("x", "y", "energy_budget")),
     ),
     "vertical": _of(
-        {"kind": "elastic_pendulum", "beta": 0.8, "Theta": 0, "epsilon": 0.2}, 3.0, ["central", "rk4"], _each(("y",))
+        {"kind": "elastic_pendulum", "beta": 0.8, "Theta": 0, "epsilon": 0.2},
+        3.0,
+        ["central", "rk4"],
+        _each(("y",)),
     ),
     "followed": _of(
-        {"kind": "elastic_pendulum", "beta": 0.8, "gamma": 0.5, "exact_x": "0.4*sin(1.3*t)", "exact_y": "0.2*cos(t)**2"},
-        3.0, ["central", "rk4"], _each(("x", "y", "energy_budget")),
+        {
+            "kind": "elastic_pendulum",
+            "beta": 0.8,
+            "gamma": 0.5,
+            "exact_x": "0.4*sin(1.3*t)",
+            "exact_y": "0.2*cos(t)**2",
+        },
+        3.0,
+        ["central", "rk4"],
+        _each(("x", "y", "energy_budget")),
     ),
     "box": _of(
-        {"kind": "sliding_box", "mu": 0.15}, 8.0, ["central", "rk4"], _each(("u",)), initial={"u": 1.0},
+        {"kind": "sliding_box", "mu": 0.15},
+        8.0,
+        ["central", "rk4"],
+        _each(("u",)),
+        initial={"u": 1.0},
     ),
     "ball": _of(
-        {"kind": "bouncing_ball", "g": 2.0, "restitution": 0.7}, 4.0, ["rk4", "velocity_verlet"],
+        {"kind": "bouncing_ball", "g": 2.0, "restitution": 0.7},
+        4.0,
+        ["rk4", "velocity_verlet"],
         [
             # impacts at 1, 2.4 and 3.38
-            {"value": "last_event_time", "at": {"scheme": "rk4", "level": 8}, "equals": 3.38, "atol": 1e-9},
-            {"value": "error_linf", "quantity": "h", "at": {"scheme": "velocity_verlet", "level": 8}, "below": 1e-9},
+            {
+                "value": "last_event_time",
+                "at": {"scheme": "rk4", "level": 8},
+                "equals": 3.38,
+                "atol": 1e-9,
+            },
+            {
+                "value": "error_linf",
+                "quantity": "h",
+                "at": {"scheme": "velocity_verlet", "level": 8},
+                "below": 1e-9,
+            },
         ],
         initial={"h": 1.0},
     ),
-}  # fmt: skip
+}
 
 
 def run(name: str) -> dict[str, Any]:
@@ -124,7 +220,9 @@ def run(name: str) -> dict[str, Any]:
     told = {}
     for check, verdict in zip(experiment.checks, verdicts(experiment, found), strict=True):
         kind = check.value if check.kind == "value" else check.kind
-        told[f"{verdict.id} {kind}"] = [f"{r.scheme}: {r.status} {r.reason}" for r in verdict.results]
+        told[f"{verdict.id} {kind}"] = [
+            f"{r.scheme}: {r.status} {r.reason}" for r in verdict.results
+        ]
     return {"verdicts": told, "plain": _plain(experiment, found)}
 
 
@@ -138,10 +236,14 @@ def _plain(experiment: Any, found: Any) -> dict[str, bool]:
             continue
         for i, scheme in enumerate(experiment.schemes):
             options = experiment.scheme_options(i)
-            order = SCHEMES[scheme.kind].formal_order(check.converges, experiment.model.definition, options)
+            order = SCHEMES[scheme.kind].formal_order(
+                check.converges, experiment.model.definition, options
+            )
             norms = found[f"{check.converges}_difference_norm"].sel(norm="l2").values[i, 0]
             ratio = math.log2(norms[-2] / norms[-1]) if min(norms[-2:]) > 0 else math.nan
-            near[f"{check.converges}, {scheme.name}"] = math.isinf(order) or abs(ratio - order) < 0.5
+            near[f"{check.converges}, {scheme.name}"] = (
+                math.isinf(order) or abs(ratio - order) < 0.5
+            )
     return near
 
 

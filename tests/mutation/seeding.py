@@ -49,7 +49,9 @@ def seeded(fault: Fault, folder: Path) -> None:
     ValueError
         Where its text does not stand once in its file.
     """
-    shutil.copytree(ROOT / "vibsim", folder / "vibsim", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(
+        ROOT / "vibsim", folder / "vibsim", ignore=shutil.ignore_patterns("__pycache__")
+    )
     file = folder / "vibsim" / fault.file
     text = file.read_text()
     if text.count(fault.right) != 1:
@@ -111,23 +113,27 @@ def outcome(fault: Fault, before: Report) -> Outcome:
     return Outcome(fault, noticed(before, after), seen_plainly(before, after))
 
 
+def _row(o: Outcome) -> str:
+    told = "; ".join(o.caught[:3]) or "**nothing**"
+    plain = "sees it" if o.plain else "misses it"
+    return f"| {o.fault.name} | {o.fault.place} | {told} | {plain} |"
+
+
 def page(outcomes: list[Outcome]) -> str:
     """Write the page about all faults."""
     caught = [o for o in outcomes if o.caught]
     missed = [o for o in caught if not o.plain]
     nothing = [o for o in outcomes if not o.caught]
-    rows = [
-        f"| {o.fault.name} | {o.fault.place} | {'; '.join(o.caught[:3]) or '**nothing**'} | {'sees it' if o.plain else 'misses it'} |"
-        for o in outcomes
-    ]
+    rows = [_row(o) for o in outcomes]
     unseen = "\n".join(f"- {o.fault.name} ({o.fault.place})" for o in nothing)
+    counts = f"{len(outcomes)} faults; caught: {len(caught)}; of these the plain rule misses {len(missed)}"
     return f"""# Mutation test
 
-`make mutation` seeds one fault at a time into a copy of the package and runs a battery of small experiments with it (`tests/mutation`). A fault is caught where a check
-that passes without it passes no longer. The last column says what the plain rule "the last ratio of differences is within half an order of 2^p" would have said
-of the same runs.
+`make mutation` seeds one fault at a time into a copy of the package and runs a battery of small experiments with it
+(`tests/mutation`). A fault is caught where a check that passes without it passes no longer. The last column says what
+the plain rule "the last ratio of differences is within half an order of 2^p" would have said of the same runs.
 
-{len(outcomes)} faults; caught: {len(caught)}; of these the plain rule misses {len(missed)}; nothing catches {len(nothing)}.
+{counts}; nothing catches {len(nothing)}.
 
 | fault | in | caught by, and how (the three most frequent) | plain ratio |
 |---|---|---|---|
@@ -135,14 +141,16 @@ of the same runs.
 
 ## What nothing catches
 
-{unseen or 'Every fault was caught.'}
+{unseen or "Every fault was caught."}
 """
 
 
 def main() -> int:
     """Run all faults, or those whose names have a word, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("word", nargs="?", default="", help="only faults whose name has it; writes no page")
+    parser.add_argument(
+        "word", nargs="?", default="", help="only faults whose name has it; writes no page"
+    )
     parser.add_argument("--cores", type=int, default=os.cpu_count() or 1)
     given = parser.parse_args()
     before = battery(ROOT)
