@@ -241,3 +241,10 @@ def test_quadratic_damping_across_the_motion_is_centred():
         )
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.05)
     assert np.log2(errors[1] / errors[2]) == pytest.approx(2.0, abs=0.05)
+
+
+@pytest.mark.parametrize("initial", [(0.5, 0.2), (0.5, 0.2, 0.3), (0.5,) * 6])
+def test_every_state_has_an_initial_value(initial):
+    """Compiled code would read what stands beside."""
+    with pytest.raises(ValueError, match=r"have the shape \(1, 4\)"):
+        run(ELASTIC, "rk4", initial)

@@ -186,13 +186,18 @@ def integrate(
     SimulationError
         Where the kernel cannot be compiled.
     ValueError
-        Where there are not as many parameters as the model has.
+        Where there are not as many parameters as the model has, or not an initial value of every state.
     """
     members = len(dt)
     # what is tabulated stands behind the parameters
     if parameters.shape[1] < len(model.parameters):
         known = len(model.parameters)
         raise ValueError(f"{model.kind} has {known} parameters, not {parameters.shape[1]}")
+    if initial.shape != (members, len(model.states)):
+        wanted = (members, len(model.states))
+        raise ValueError(
+            f"initial values of {model.kind} have the shape {wanted}, not {initial.shape}"
+        )
     stepper = scheme.stepper_for(model, options)
     has_events = model.events is not None
     count = model.coordinates
