@@ -97,7 +97,7 @@ class _Writer:
         self.wanted = returns
         self.result: Kind | None = None
         self.before: list[ast.stmt] = []
-        self.hoisted = 0
+        self.hoisted: dict[ast.Call, str] = {}
         self.of_calls: dict[ast.AST, Kind] = {}
 
     def block(self, lines: Sequence[ast.stmt]) -> list[ast.stmt]:
@@ -271,13 +271,11 @@ class _Writer:
 
     def once(self, call: ast.Call) -> ast.expr:
         """Work out a call before the statement in which its components stand; return the name of its result."""
-        name = getattr(call, "vibsim_name", None)
+        name = self.hoisted.get(call)
         if name is None:
-            name = f"vector_{self.hoisted}"
-            self.hoisted += 1
+            name = self.hoisted[call] = f"vector_{len(self.hoisted)}"
             found = self.written(call)
             self.before.append(ast.Assign([ast.Name(name, ast.Store())], found, lineno=call.lineno))
-            call.vibsim_name = name  # type: ignore[attr-defined]
         return ast.Name(name, ast.Load())
 
     def vector(self, node: ast.expr) -> ast.expr:

@@ -53,7 +53,7 @@ def plane(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
         return None
     levels = whole(record, "level")
     chosen = sorted({round(x) for x in np.linspace(0, len(levels) - 1, min(MOST, len(levels)))})
-    figure, axes = square_axes(len(chosen))
+    figure, axes = _axes(len(chosen))
     size = _draw_exact(axes, record, model, case, w, t <= 1.02 * period)
     early, late = t <= t[0] + period, t >= t[-1] - PERIODS * period
     is_long = bool(t[-1] > (PERIODS + 1.0) * period)
@@ -113,7 +113,7 @@ def legend_above(figure: Any, ax: Axes) -> None:
                   bbox_to_anchor=(0.06, 1.0 - 0.24 / float(figure.get_figheight())))  # fmt: skip
 
 
-def square_axes(count: int) -> tuple[Any, list[Axes]]:
+def _axes(count: int) -> tuple[Any, list[Axes]]:
     """Return a figure with square panels in rows, and room for a legend above them."""
     rows, side, gap = -(-count // ACROSS), 2.35, 0.78
     total = rows * (side + gap) + 0.45
