@@ -11,7 +11,22 @@ from vibsim.models import MODELS
 from vibsim.models.oscillator import written
 from vibsim.models.scales import dimensionless, scaled_parameters, scales
 
-SCALED = [model for model in MODELS.values() if model.scales and model.scales.parameters]
+FORMULAS = {
+    "oscillator": {"spring": "k*u"},
+    "vehicle": {"spring": "k*u", "road": "A*sin(phi*x)"},
+    "circuit": {"voltage": "A*sin(phi*t)"},
+}
+
+
+def ready(model):
+    """Return a model with formulas that can be scaled, where it takes any."""
+    return model.written(FORMULAS[model.kind], ("k", "A", "phi")) if model.written else model
+
+
+READY = [
+    ready(model) for model in MODELS.values() if model.written is None or model.kind in FORMULAS
+]
+SCALED = [model for model in READY if model.scales and model.scales.parameters]
 RNG = np.random.default_rng(3)
 
 
@@ -24,7 +39,8 @@ def numbers(model, parameters, initial):
 
 
 def test_some_models_can_be_scaled():
-    assert {model.kind for model in SCALED} >= {"pendulum", "linear_pendulum", "spring"}
+    dimensionless_already = {model.kind for model in MODELS.values() if model.dimensionless}
+    assert {model.kind for model in SCALED} == set(MODELS) - dimensionless_already
 
 
 @pytest.mark.parametrize("model", SCALED, ids=lambda model: model.kind)
@@ -32,6 +48,7 @@ def test_the_scaled_solution_is_the_solution(model):
     """x(t) = x_c X(t/t_c), and so for the velocity, where X is the exact solution of the scaled equation."""
     for _ in range(20):
         parameters = {row.key: RNG.uniform(0.1, row.maximum or 5.0) for row in model.parameters}
+        parameters |= dict.fromkeys(set(model.optional) - {"m"}, 0.0)
         if model.kind == "sliding_box":
             # its solution is known on the linear spring
             parameters["alpha"] = 0.0
@@ -48,6 +65,7 @@ def test_the_scaled_solution_is_the_solution(model):
         scaled = model.exact(t / scale["t"], start, plain)
         for name in (x, v):
             assert found[name] == pytest.approx(scale[name] * scaled[name], rel=1e-9, abs=1e-9)
+        assert np.all(np.isfinite(found[x]))
 
 
 @pytest.mark.parametrize("model", SCALED, ids=lambda model: model.kind)
@@ -183,7 +201,8 @@ def test_physical_pendulum():
 def test_circuit():
     """t_c = sqrt(L C), and the energy of the coil."""
     found = sizes(MODELS["circuit"], {"L": 2.0, "R": 0.0, "C": 0.5}, {"i": 3.0, "di_dt": 0.0})
-    assert found == {"t": 1.0, "i": 3.0, "di_dt": 3.0, "energy": 18.0}
+    volts = {"capacitor_voltage": 6.0, "source_voltage": 6.0}
+    assert found == {"t": 1.0, "i": 3.0, "di_dt": 3.0, "energy": 18.0} | volts
 
 
 def test_washing_machine():
@@ -192,3 +211,20 @@ def test_washing_machine():
     initial = {"u": 0.0, "v": 0.0}
     assert sizes(MODELS["washing_machine"], parameters, initial)["u"] == pytest.approx(0.3 * 16 / 8)
     assert numbers(MODELS["washing_machine"], parameters, initial)["gamma"] == pytest.approx(2.0)
+
+
+def test_scaled_parameters_of_the_driven_oscillator():
+    """B, equation (85): of m, b, k, A, phi, two are left, beta and gamma."""
+    model = oscillator(spring="k*u", damping="b*abs(v)*v", force="A*sin(phi*t)")
+    found = scaled_parameters(model, VALUES, INITIAL)
+    plain = {key: float(value) for key, value in found.items()}
+    assert (plain["m"], plain["parameters.k"], plain["parameters.A"]) == (1.0, 1.0, 1.0)
+    assert plain["parameters.b"] / 2 == pytest.approx(0.5 * 0.7 / (2 * 2 * 3))
+    assert plain["parameters.phi"] == pytest.approx(1.1 * math.sqrt(2 / 3))
+
+
+def test_a_number_in_the_place_of_a_parameter_is_named():
+    model = oscillator(spring="k*u", force="A*sin(phi*t) + 2*t")
+    assert "A*sin(phi*t) + 2*t has a number" in model.scales.refusal
+    with pytest.raises(ValueError, match="no scaled equation"):
+        scaled_parameters(model, VALUES, INITIAL)

@@ -13,6 +13,26 @@ from vibsim.simulation import simulate_record
 from vibsim.spec import canonical, restore
 
 PENDULUM = {"kind": "pendulum", "g": "9.8 m/s^2", "L": "4.9 m", "m": "2 kg"}
+BODY = {"kind": "physical_pendulum", "inertia": 3, "m": 2, "g": 9.8, "L": 0.7}
+DUFFING = {"kind": "duffing", "delta": 0.1, "gamma": 0.3, "omega": 1.2}
+DRIVEN = {
+    "kind": "oscillator",
+    "m": 2,
+    "spring": "k*u",
+    "force": "A*sin(phi*t)",
+    "parameters": {"k": 3, "A": 0.5, "phi": 1.1, "d": 0.3},
+}
+FREE = {"kind": "oscillator", "m": 2, "spring": "k*u", "parameters": {"k": 3}}
+MADE = {**FREE, "parameters": {"k": 3, "A": 0.5, "phi": 2}}
+ROAD = {
+    "kind": "vehicle",
+    "m": 2,
+    "speed": 3,
+    "spring": "k*u",
+    "road": "h*sin(2*pi*x/wave)",
+    "parameters": {"k": 4, "h": 0.1, "wave": 12},
+}
+VOLTS = {"V": 0.5, "w": 1.5}
 STATES = {"theta": 1.0, "omega": 0.3}
 
 
@@ -53,13 +73,30 @@ def test_dimensionless_numbers_and_what_leads_back():
         ({**PENDULUM, "kind": "linear_pendulum"}, STATES),
         ({"kind": "spring", "w": 2.5}, {"u": 0.3, "v": 0.1}),
         ({"kind": "spring", "w": 2.5}, {"u": 0.0, "v": 0.1}),
+        ({**BODY, "drag": 0.0}, STATES),
+        ({**BODY, "drag": 0.4}, STATES),
+        ({"kind": "washing_machine", "m": 3, "k": 5, "b": 0.7, "unbalance": 0.2, "speed": 2}, {}),
+        ({**DUFFING, "alpha": -2, "beta": 0.5}, {"u": 0.3, "v": 0.1}),
+        ({**DUFFING, "alpha": 3, "beta": -0.2}, {"u": 0.3, "v": 0.1}),
+        ({**DRIVEN, "damping": {"quadratic": 0.4}}, {"u": 0.3, "v": 0.1}),
+        ({**DRIVEN, "damping": {"linear": 0.4}, "m": 1}, {"u": 0.3, "v": 0.1}),
+        ({**FREE, "damping": {"coulomb": 0.1}}, {"u": 0.3, "v": 0.1}),
+        ({**DRIVEN, "damping": "d*v**3", "force": "A*exp(-phi*t)"}, {"u": 0.3, "v": 0.1}),
+        ({**MADE, "exact": "A*cos(phi*t)"}, {}),
+        ({**ROAD, "b": 0.3}, {"u": 0.0, "v": 0.0}),
+        ({"kind": "circuit", "L": 2, "R": 0.3, "C": 0.1}, {"i": 0.3, "di_dt": 0.1}),
+        (
+            {"kind": "circuit", "L": 2, "C": 0.1, "voltage": "V*sin(w*t)", "parameters": VOLTS},
+            {"i": 0.3, "di_dt": 0.1},
+        ),
     ],
 )
 def test_the_scaled_run_leads_back_to_the_plain_one(model, initial):
-    plain, scaled = pair(model=model, initial=initial)
+    plain, scaled = pair(model=model, initial=initial, schemes=["rk4"])
     records = [simulate_record(experiment, 6) for experiment in (plain, scaled)]
     outputs = [row.name for row in plain.model.definition.outputs]
-    for name in ("t", *initial, "energy", *outputs):
+    states = [state.name for state in plain.model.definition.states]
+    for name in ("t", *states, "energy", *outputs):
         factor = records[1].attrs[f"scale_{name}"]
         assert records[0][name] == pytest.approx(factor * records[1][name], rel=1e-12, abs=1e-12)
         assert records[1].variable(name).attrs["units"] == "1"
@@ -96,10 +133,16 @@ def test_sweeps_that_change_the_scales_are_refused(key):
 
 
 def test_models_without_a_scaled_equation_are_refused():
+    named = "the model oscillator has no scaled equation: "
     fault = only_fault(scaled=True, model={"kind": "oscillator"}, initial={"u": 1.0})
-    assert fault.rule == "the model oscillator has no scaled equation"
-    able = "spring, pendulum, linear_pendulum, sliding_box, bouncing_ball"
-    assert fault.hint == f"choose from {able}"
+    assert fault.rule.startswith(f"{named}u has a number in the place of a parameter")
+    assert fault.hint == "write k*u, say, with k under parameters"
+    cubic = {"kind": "oscillator", "spring": "k*u**3", "parameters": {"k": 2}}
+    fault = only_fault(scaled=True, model=cubic, initial={"u": 1.0})
+    assert fault.rule == f"{named}its spring is not linear"
+    wire = {"kind": "elastic_pendulum", "beta": 0.9, "Theta": 10}
+    fault = only_fault(scaled=True, model=wire, initial={})
+    assert fault.rule.endswith("it is dimensionless already")
 
 
 def test_scales_must_be_finite():

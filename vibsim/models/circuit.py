@@ -100,7 +100,7 @@ def circuit(voltage: str, declared: tuple[str, ...], terms: frozenset[str]) -> M
         ),
         formulas=FORMULAS,
         written=written,
-        scales=_scales(forces),
+        scales=_scales,
         optional=("R",),
         variant=partial(circuit, voltage, declared),
     )
@@ -109,7 +109,9 @@ def circuit(voltage: str, declared: tuple[str, ...], terms: frozenset[str]) -> M
 def _scales(forces: Forces) -> Scales | None:
     """Return the scales of the current, with the energy of the coil in place of that of a spring."""
     found = linear_scales(forces)
-    return found and replace(found, energy="L*i_c**2")
+    voltage = "L*i_c/t_c"
+    outputs = ("capacitor_voltage", voltage), ("source_voltage", voltage)
+    return found and replace(found, energy="L*i_c**2", outputs=outputs)
 
 
 CIRCUIT = replace(written({}, ()), equation="L i'' + R i' + i/C = V'(t)")

@@ -19,6 +19,7 @@ from vibsim.expression import ZERO, parse
 from vibsim.models.base import Model, Numbers, Parameter
 from vibsim.models.cubic import motion, period
 from vibsim.models.mechanical import Forces, mechanical
+from vibsim.models.scales import Scales
 
 PARAMETERS = (
     Parameter("delta", 0.0, "s-1", "coefficient of the damping", minimum=0.0),
@@ -27,6 +28,18 @@ PARAMETERS = (
     Parameter("gamma", 0.0, "m s-2", "amplitude of the driving force"),
     Parameter("omega", 1.0, "rad s-1", "angular frequency of the driving force", minimum=0.0),
 )
+SCALES = Scales(
+    time="1/sqrt(abs(alpha))",
+    position="sqrt(abs(alpha/beta))",
+    energy="(u_c/t_c)**2",
+    numbers=(
+        ("damping", "delta*t_c"),
+        ("force", "gamma*t_c**2/u_c"),
+        ("frequency", "omega*t_c"),
+    ),
+    parameters=(("alpha", "sign(alpha)"), ("beta", "sign(beta)")),
+)
+"""In them alpha and beta are 1 or -1."""
 TERMS = {"delta": "delta*v", "gamma": "gamma*cos(omega*t)"}
 
 
@@ -68,6 +81,7 @@ def duffing(terms: frozenset[str]) -> Model:
         source="Kovacic and Brennan, The Duffing Equation, chapter 2",
         equation=f"u'' + {left}alpha u + beta u^3 = {right}",
         natural_frequency=natural_frequency,
+        scales=lambda _: SCALES,
         optional=tuple(TERMS),
         variant=duffing,
         **more,

@@ -2,11 +2,14 @@
 
 ``t_c = sqrt(m/k)``; ``u_c = A/k`` under a force ``A sin(phi t)``, else the initial amplitude; ``E_c = k u_c^2``. With
 them ``u'' + 2 beta |u'| u' + u = sin(gamma t)``, equation (85): ``beta = b u_c/(2 m) = A b/(2 m k)`` and
-``gamma = phi t_c``; of linear damping, ``u'' + 2 beta u' + u``, it is ``beta = b t_c/(2 m) = b/(2 sqrt(m k))``.
+``gamma = phi t_c``; of linear damping, ``u'' + 2 beta u' + u``, it is ``beta = b t_c/(2 m) = b/(2 sqrt(m k))``. The
+parameters of the scaled equation follow from their dimensions (`vibsim.models.dimensions`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from vibsim.expression import (
@@ -20,12 +23,14 @@ from vibsim.expression import (
     Negate,
     Number,
     derivative,
+    is_zero,
     literal,
     names_in,
     over,
     times,
 )
-from vibsim.models.base import Formula
+from vibsim.models.base import Formula, Parameter
+from vibsim.models.dimensions import DimensionError, Powers, over_scales, powers
 from vibsim.models.scales import T_C, X_C, Scales
 
 if TYPE_CHECKING:
@@ -55,6 +60,56 @@ def linear_scales(forces: Forces) -> Scales | None:
         numbers.append(("gamma", times(driven[1], T_C)))
     energy = times(k, Binary("**", X_C, TWO))
     return Scales(Call("sqrt", (over(m, k),)), size, energy, tuple(numbers))
+
+
+def with_scaled_run(
+    scales: Scales,
+    forces: Forces,
+    parameters: tuple[Parameter, ...],
+    given: Mapping[str, Powers],
+) -> Scales:
+    """Return the scales with the parameters of the scaled equation, or why there are none.
+
+    Parameters
+    ----------
+    scales
+        Its parameters, where it has any, are taken as they are.
+    given
+        The powers of mass, position and time that some parameters have; those of the others follow from the forces.
+    """
+    known = {forces.position: (0, 1, 0), forces.velocity: (0, 1, -1), "t": (0, 0, 1), **given}
+    known |= dict.fromkeys(names_in(forces.mass), (1, 0, 0))
+    terms = tuple(
+        term for term in (forces.spring, forces.damping, forces.force) if not is_zero(term)
+    )
+    try:
+        found = powers(terms, known, tuple(row.name for row in parameters))
+    except DimensionError as error:
+        rule = (
+            f"{error} has a number in the place of a parameter: its terms cannot have one dimension"
+        )
+        return replace(scales, refusal=rule)
+    units = forces.mass, X_C, T_C
+    exactly = _exactly(forces) | dict(scales.parameters or ())
+    scaled = (
+        (row.key, exactly.get(row.name) or over_scales(row.name, found[row.name], units))
+        for row in parameters
+    )
+    return replace(scales, parameters=tuple(scaled))
+
+
+def _exactly(forces: Forces) -> dict[str, Formula]:
+    """Return what the scales make 1, or -1, and should not come out of a quotient with a rounding error."""
+    found: dict[str, Formula] = dict.fromkeys(names_in(forces.mass), ONE)
+    if not forces.is_linear:
+        return found
+    match forces.stiffness:
+        case Name(name) | Binary("/", Number(1.0), Name(name)):
+            found[name] = ONE
+    driven = amplitude_and_frequency(forces.force)
+    if driven is not None and isinstance(driven[0], Name):
+        found[driven[0].name] = Call("sign", (driven[0],))
+    return found
 
 
 def amplitude_and_frequency(force: Expression) -> tuple[Expression, Expression] | None:

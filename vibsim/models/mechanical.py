@@ -6,7 +6,7 @@ everything else that follows from them; it may say more about itself than follow
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -33,9 +33,11 @@ from vibsim.expression import (
     values,
 )
 from vibsim.models.base import Damping, Floats, Model, Numbers, Parameter, State
+from vibsim.models.dimensions import Powers
 from vibsim.models.forced import exponentials, forced_motion, is_sum_of_exponentials
 from vibsim.models.harmonic import period
-from vibsim.models.linear_scales import linear_scales
+from vibsim.models.linear_scales import linear_scales, with_scaled_run
+from vibsim.models.scales import Scales
 
 STATES = (State("u", "m", "displacement"), State("v", "m s-1", "velocity"))
 
@@ -101,6 +103,8 @@ def mechanical(
     title: str,
     source: str,
     equation: str,
+    scales: Callable[[Forces], Scales | None] = linear_scales,
+    powers: Mapping[str, Powers] | None = None,
     **more: Any,
 ) -> Model:
     """Return the model of some forces.
@@ -109,6 +113,10 @@ def mechanical(
     ----------
     parameters
         Every parameter, in the order of the engine.
+    scales
+        From the forces, where they are others than those of a linear spring.
+    powers
+        The powers of mass, position and time of parameters, where the forces alone do not tell them.
     more
         Whatever else `Model` has: it takes the place of what follows from the forces.
     """
@@ -118,6 +126,7 @@ def mechanical(
     kinetic = times(times(Number(0.5), forces.mass), Binary("**", velocity, Number(2.0)))
     numbers = _by_name(parameters)
     natural_frequency = _natural_frequency(forces, numbers)
+    own = scales(forces)
     is_free = not forces.is_driven and not forces.is_damped
     facts: dict[str, Any] = {
         "potential_energy": forces.potential or integral(forces.spring, forces.position),
@@ -128,7 +137,7 @@ def mechanical(
         "dissipation": times(forces.damping, velocity) if forces.is_damped else None,
         "driving": times(forces.force, velocity) if forces.is_driven else None,
         "exact": linear_motion(forces, numbers),
-        "scales": linear_scales(forces),
+        "scales": own and with_scaled_run(own, forces, parameters, powers or {}),
         "exact_period": _period(forces, natural_frequency)
         if is_free and forces.is_linear
         else None,

@@ -40,8 +40,18 @@ SCALES = Scales(
     time="sqrt(inertia/(m*g*L))",
     position="1",
     energy="m*g*L",
+    numbers=(("kappa", "m*L**2/inertia"),),
+    parameters=(
+        ("inertia", "1"),
+        ("m", "m*L**2/inertia"),
+        ("g", "inertia/(m*L**2)"),
+        ("L", "1"),
+        ("drag", "drag/inertia"),
+    ),
     outputs=(("pivot_force", "m*g"), ("drag_moment", "m*g*L")),
 )
+"""In them inertia and L are 1, and ``m = 1/g``."""
+ALPHA = ("alpha", "drag/inertia")
 
 
 def natural_frequency(parameters: Numbers) -> Any:
@@ -97,7 +107,7 @@ def physical_pendulum(terms: frozenset[str]) -> Model:
         linear=False,
         natural_frequency=natural_frequency,
         turn=2 * math.pi,
-        scales=replace(SCALES, numbers=(("alpha", "drag/inertia"),)) if "drag" in terms else SCALES,
+        scales=replace(SCALES, numbers=(*SCALES.numbers, ALPHA)) if "drag" in terms else SCALES,
         optional=("drag",),
         variant=physical_pendulum,
         **(dragged if "drag" in terms else free),

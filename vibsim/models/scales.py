@@ -34,6 +34,8 @@ class Scales:
     """Dimensionless numbers by name."""
     parameters: tuple[tuple[str, Formula], ...] | None = None
     """The parameters of the scaled equation, by key; None where a run cannot be made in these scales."""
+    refusal: str = ""
+    """Why not, where that is so of some formulas only."""
     outputs: tuple[tuple[str, Formula], ...] = ()
     """Scales of the model's outputs."""
 

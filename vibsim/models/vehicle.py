@@ -28,7 +28,9 @@ from vibsim.expression import (
     to_formula,
 )
 from vibsim.models.base import FormulaField, Model, Output, Parameter, declared_parameters
+from vibsim.models.linear_scales import linear_scales
 from vibsim.models.mechanical import Forces, mechanical
+from vibsim.models.scales import Scales
 from vibsim.models.table import BEND, HEIGHT, Lookup, Table
 
 PARAMETERS = (
@@ -78,7 +80,7 @@ def vehicle(
         force=push,
         mass=Name("m"),
     )
-    of_table: dict[str, Any] = {"lookup": lookup, "exact": None, "scales": None}
+    of_table: dict[str, Any] = {"lookup": lookup, "exact": None}
     damper = "b u' + " if "b" in terms else ""
     told = f"h(x) = {to_formula(road)}" if lookup is None else _told(lookup.table)
     return mechanical(
@@ -94,6 +96,8 @@ def vehicle(
         ),
         formulas=FORMULAS,
         written=written,
+        scales=_no_scales if lookup else _scales,
+        powers={"speed": (0, 1, -1)},
         optional=("b",),
         variant=lambda names: vehicle(texts, declared, names, lookup),
         with_table=lambda table, is_met: vehicle(
@@ -114,6 +118,15 @@ def _of_table() -> tuple[Expression, Expression]:
 
 def _told(table: Table) -> str:
     return f"h(x) from a table of {table.points} points, {table.spacing:g} m apart"
+
+
+def _scales(forces: Forces) -> Scales | None:
+    found = linear_scales(forces)
+    return found and replace(found, outputs=(("road_height", "u_c"), ("absolute_position", "u_c")))
+
+
+def _no_scales(_: Forces) -> None:
+    """A table has numbers with units: there is no scaled equation with the same table."""
 
 
 VEHICLE = replace(written({}, ()), equation="m u'' + b u' + s(u) = -m h''(speed t) speed^2")

@@ -17,7 +17,9 @@ import numpy as np
 
 from vibsim.expression import parse
 from vibsim.models.base import Floats, Model, Numbers, Output, Parameter
+from vibsim.models.linear_scales import linear_scales
 from vibsim.models.mechanical import Forces, mechanical
+from vibsim.models.scales import Scales
 
 PARAMETERS = (
     Parameter("m", 1.0, "kg", "mass", minimum=0.0, exclusive=True),
@@ -57,9 +59,15 @@ def washing_machine(terms: frozenset[str]) -> Model:
         title="Washing machine with an unbalance",
         source="vibration text, section 10.4",
         equation=f"m u'' + {term}k u = unbalance speed^2 cos(speed t)",
+        scales=_scales,
         outputs=(Output("floor_force", "N", "force on the floor beside the weight", transmitted),),
         **more,
     )
+
+
+def _scales(forces: Forces) -> Scales | None:
+    found = linear_scales(forces)
+    return found and replace(found, outputs=(("floor_force", "k*u_c"),))
 
 
 WASHING_MACHINE = replace(

@@ -44,9 +44,8 @@ def scaled(given: Numbers, model: Model | None, swept: Iterable[str], report: Re
     if model is None or given.time is None or not given.parameters:
         return given
     if model.scales is None or model.scales.parameters is None:
-        able = [row.kind for row in MODELS.values() if row.scales and row.scales.parameters]
-        rule = f"the model {model.kind} has no scaled equation"
-        report.add(("scaled",), rule, "choose from " + ", ".join(able), at_key=True)
+        rule, hint = _refusal(model)
+        report.add(("scaled",), rule, hint, at_key=True)
         return given
     rows = {row.name: float(row.value) for row in scales(model, given.parameters, given.initial)}
     if not all(math.isfinite(value) and value > 0.0 for value in rows.values()):
@@ -70,3 +69,16 @@ def scaled(given: Numbers, model: Model | None, swept: Iterable[str], report: Re
     )
     changed: dict[str, Any] = {"end": end}
     return Numbers(parameters, initial, given.time.model_copy(update=changed), kept)
+
+
+def _refusal(model: Model) -> tuple[str, str]:
+    """Return why a model has no scaled equation, and what helps."""
+    rule = f"the model {model.kind} has no scaled equation"
+    if model.dimensionless:
+        return f"{rule}: it is dimensionless already", "leave it out"
+    if model.scales is not None and model.scales.refusal:
+        return f"{rule}: {model.scales.refusal}", "write k*u, say, with k under parameters"
+    if model.formulas:
+        return f"{rule}: its spring is not linear", "write spring: k*u, with k under parameters"
+    able = [row.kind for row in MODELS.values() if row.scales and row.scales.parameters]
+    return rule, "choose from " + ", ".join(able)
