@@ -79,7 +79,7 @@ EXPERIMENTS = {
     ),
     "samples": _of(
         {"kind": "pendulum", "L": 1.3},
-        4.0,
+        4.1,
         ["central", "rk4"],
         _each(("theta",)),
         initial={"theta": 1.2},
@@ -182,9 +182,18 @@ EXPERIMENTS = {
     ),
     "box": _of(
         {"kind": "sliding_box", "mu": 0.15},
-        8.0,
+        12.0,
         ["central", "rk4"],
-        _each(("u",)),
+        [
+            *_each(("u",)),
+            # at rest after three half swings: 1, -0.7, 0.4, -0.1
+            {
+                "value": "rest_time",
+                "at": {"scheme": "rk4", "level": 10},
+                "equals": 3 * math.pi,
+                "atol": 1e-6,
+            },
+        ],
         initial={"u": 1.0},
     ),
     "ball": _of(
