@@ -45,11 +45,13 @@ def draw(
         ax.axhline(order, color="black", linestyle=(0, (4, 3)), linewidth=1.0, zorder=1)
     sound: list[Floats] = []
     stated = False
+    seen = [_above_noise(record, quantity, Member(s, case, x)) for s, x in enumerate(schemes)]
     for s, scheme in enumerate(schemes):
-        member = Member(s, case, scheme)
-        above = sound_pairs(record, quantity, member)
+        member, good = Member(s, case, scheme), seen[s]
+        if any(map(any, seen)) and not any(good):
+            # beside orders, those of noise would be taken for some
+            continue
         local = at(record, name, member, norm=norm)
-        good = [all(above[i : i + 2]) for i in range(local.size)]
         sound.append(local[good] if any(good) else local)
         ax.plot(
             triples,
@@ -114,6 +116,12 @@ def draw_each(
     ax.set_ylim(len(chosen) - 0.4, -0.6)
     ax.set_xlabel(f"order of {words.symbol(quantity)} ({TYPICAL_NORM})")
     return settled
+
+
+def _above_noise(record: Record, quantity: str, member: Member) -> list[bool]:
+    """Say of every triple of levels whether its differences stand above round-off."""
+    above = sound_pairs(record, quantity, member)
+    return [all(above[i : i + 2]) for i in range(len(whole(record, "triple")))]
 
 
 def _draw_stated(ax: Axes, record: Record, quantity: str, member: Member, norm: int) -> bool:

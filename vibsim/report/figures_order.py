@@ -104,7 +104,7 @@ def _caption(kinds: frozenset[str], is_settled: bool | None, many: bool = False)
         parts.append(
             "Right: the order that three successive levels give, drawn at the coarsest of the three; it should "
             "settle inside a grey band; orders beyond the frame come from levels that are too coarse, within "
-            "round-off, or of runs that grow without bound."
+            "round-off, or of runs that grow without bound. A scheme that differs by round-off alone has none."
         )
     if is_settled and not many:
         parts.append("The bar is the stated order with its interval, over the levels it rests on.")

@@ -18,6 +18,7 @@ from vibsim.report import (
     contents,
     contents_degrees,
     contents_energy,
+    contents_events,
     contents_published,
     contents_scales,
     contents_theory,
@@ -213,7 +214,7 @@ def _tables(
     norms = [name for name in record.words("norm") if name != TYPICAL_NORM]
     found_orders = [contents.orders(record, quantity, shown) for quantity in found]
     beside = [contents_degrees.table(experiment), *contents_theory.predictions(record)]
-    beside.append(contents_energy.velocities(record))
+    beside += [contents_energy.velocities(record), contents_events.table(record)]
     # what damping or a force changes says nothing of a scheme
     conserved = experiment.model.definition.conservative
     optional = [contents.maxima(record, shown) if conserved else None]

@@ -118,7 +118,9 @@ def _grid(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
         for name in (name for name in which if name in record):
             product = np.asarray(record[name], dtype=np.float64)
             largest = float(product[np.isfinite(product)].max(initial=0.0))
-            yield "w dt", f"at most {words.number(largest)} ({which[name]} times step)"
+            # a ball in free fall has no frequency
+            if largest > 0.0:
+                yield "w dt", f"at most {words.number(largest)} ({which[name]} times step)"
 
 
 def _listing(
@@ -134,7 +136,8 @@ def _listing(
 
 
 def _plain(value: Any) -> str:
-    return f"{value:.10g}" if isinstance(value, float) else str(value)
+    # 0.0 in place of -0.0, which a formula may give
+    return f"{value + 0.0:.10g}" if isinstance(value, float) else str(value)
 
 
 def _axis(axis: Axis) -> str:
