@@ -1,17 +1,8 @@
 """The engine: from (model, scheme, numbers) to trajectories."""
 
 from vibsim.engine.kernel import LANES
-from vibsim.engine.trajectories import (
-    EventTimes,
-    Extrema,
-    Gathered,
-    Series,
-    Trajectories,
-    energies,
-    integrate,
-    lane_for,
-    observed,
-)
+from vibsim.engine.results import EventTimes, Extrema, Gathered, Series, Trajectories
+from vibsim.engine.trajectories import energies, integrate, lane_for, observed
 
 __all__ = [
     "LANES",

@@ -1,0 +1,210 @@
+"""What the integration of a scheme gives, and its making from the arrays that kernels fill."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.engine import events, extrema, gather
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """What one scheme had at every step of every member; arrays of shape (case,) unless stated."""
+
+    ranges: Floats
+    """Least and largest value of every state, shape (case, state, 2)."""
+    norms: Floats
+    """``dt sum |u|`` and ``sqrt(dt sum u^2)`` over every point of every state, shape (case, state, 2)."""
+    deviation: Floats
+    """Largest absolute energy deviation."""
+    deviation_interior: Floats
+    """The same without the last point."""
+    period: Floats
+    """Mean time between peaks, or of a turn for a member that goes over the top; NaN below one period."""
+    period_grid: Floats
+    """Mean time between peaks at grid points; NaN where there are none."""
+    period_count: Integers
+    first_peak: Floats
+    last_peak: Floats
+    last_trough: Floats
+    deviation_d2t: Floats
+    """Largest absolute deviation of the energy by ``[D_2t u]``, n = 1, ..., N-1; NaN where that is the own velocity."""
+    accepted_steps: Floats
+    """Of a scheme that chooses its own steps; NaN of any other one."""
+    force_evaluations: Floats
+
+
+@dataclass(frozen=True)
+class Extrema:
+    """Local extrema of the position (`vibsim.engine.extrema`); the first of each kind in order of time, NaN behind.
+
+    Arrays have the shape (case, extremum), the counts (case,).
+    """
+
+    peak_time: Floats
+    """Of the parabola through three points."""
+    peak: Floats
+    peak_time_grid: Floats
+    """Of the highest point."""
+    peak_grid: Floats
+    trough_time: Floats
+    trough: Floats
+    trough_time_grid: Floats
+    trough_grid: Floats
+    peak_count: Integers
+    """All peaks, those for which there was no room among them."""
+    trough_count: Integers
+
+
+@dataclass(frozen=True)
+class EventTimes:
+    """The events of members of a model that has some (`vibsim.models.events`); arrays of shape (case,)."""
+
+    event_count: Floats
+    first_event_time: Floats
+    """NaN where there was none."""
+    last_event_time: Floats
+    rest_time: Floats
+    """From when on the member was at rest to the end; NaN where it moved."""
+
+
+@dataclass(frozen=True)
+class Series:
+    """What samples have beside position and velocity; arrays of shape (case, n_samples)."""
+
+    deviation_running: Floats
+    """Largest absolute energy deviation at every step so far."""
+    velocities_d2t: Floats
+    """``[D_2t u]`` of every coordinate, shape (case, coordinate, n_samples); NaN at either end, and of a
+    scheme whose own velocity it is."""
+    deviation_d2t_running: Floats
+    """Largest absolute deviation of the energy with that velocity so far; at the end that of the point before."""
+    dissipated: Floats | None
+    """Sum of the power that damping takes, over every point so far; None of a model without such forces."""
+    driven: Floats | None
+    """Sum of the power that driving forces put in."""
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """What one scheme computed for every member."""
+
+    states: Floats
+    """In the order of `Model.states`, shape (state, case, n_samples); NaN from where a member failed."""
+    last_step: Integers
+    """Last step with finite values, shape (case,): the number of steps where nothing failed."""
+    gathered: Gathered | None
+    """None where nothing was to be gathered."""
+    series: Series | None = None
+    """None where they were not asked for."""
+    extrema: Extrema | None = None
+    events: EventTimes | None = None
+    """None for a smooth model, and where nothing was to be gathered."""
+
+    @property
+    def position(self) -> Floats:
+        """Position of the first coordinate, shape (case, n_samples)."""
+        return np.asarray(self.states[0])
+
+    @property
+    def velocity(self) -> Floats:
+        """Velocity of the first coordinate."""
+        return np.asarray(self.states[len(self.states) // 2])
+
+
+def _columns(coordinates: int, position: Sequence[int], velocity: Sequence[int]) -> Integers:
+    """Return the columns of what is gathered of every state, shape (state, number)."""
+    firsts = gather.N_STATS * np.arange(coordinates)[:, None]
+    return np.concatenate([firsts + np.array(position), firsts + np.array(velocity)])
+
+
+_RANGES = (gather.POSITION_MIN, gather.POSITION_MAX), (gather.VELOCITY_MIN, gather.VELOCITY_MAX)
+_NORMS = (gather.POSITION_L1, gather.POSITION_L2), (gather.VELOCITY_L1, gather.VELOCITY_L2)
+
+
+def gathered_of(stats: Floats, counts: Integers, coordinates: int) -> Gathered:
+    """Name what a kernel gathered: shapes (case, column of `vibsim.engine.gather`)."""
+    peaks, turns = counts[:, gather.PEAKS] - 1, counts[:, gather.TURNS] - 1
+    spinning = turns > 0
+    swinging = (peaks > 0) & ~spinning
+
+    def mean_time(first: int, last: int, intervals: Integers) -> Floats:
+        span = np.where(intervals > 0, stats[:, last] - stats[:, first], np.nan)
+        return np.asarray(span / np.maximum(intervals, 1))
+
+    of_turn = mean_time(gather.FIRST_TURN_TIME, gather.LAST_TURN_TIME, turns)
+    of_peak = mean_time(gather.FIRST_PEAK_TIME, gather.LAST_PEAK_TIME, peaks)
+    on_grid = mean_time(gather.FIRST_PEAK_TIME_GRID, gather.LAST_PEAK_TIME_GRID, peaks)
+    return Gathered(
+        ranges=stats[:, _columns(coordinates, *_RANGES)],
+        norms=stats[:, _columns(coordinates, *_NORMS)],
+        deviation=stats[:, gather.DEVIATION],
+        deviation_interior=stats[:, gather.DEVIATION_INTERIOR],
+        period=np.where(spinning, of_turn, of_peak),
+        period_grid=np.where(swinging, on_grid, np.nan),
+        period_count=np.where(spinning, turns, np.where(swinging, peaks, 0)),
+        first_peak=stats[:, gather.FIRST_PEAK],
+        last_peak=stats[:, gather.LAST_PEAK],
+        last_trough=stats[:, gather.LAST_TROUGH],
+        deviation_d2t=_storable(stats[:, gather.DEVIATION_D2T]),
+        accepted_steps=np.full(len(stats), np.nan),
+        force_evaluations=np.full(len(stats), np.nan),
+    )
+
+
+def events_of(stats: Floats) -> EventTimes:
+    """Name what a kernel gathered of events."""
+    return EventTimes(
+        event_count=stats[:, events.EVENT_COUNT],
+        first_event_time=stats[:, events.FIRST_EVENT],
+        last_event_time=stats[:, events.LAST_EVENT],
+        rest_time=stats[:, events.REST_TIME],
+    )
+
+
+def series_of(samples: Floats, coordinates: int, with_work: bool) -> Series:
+    """Name the rows of samples behind the states: shape (row, case, n_samples)."""
+    rows = gather.sample_rows(coordinates)
+    nothing = np.broadcast_to(np.nan, samples.shape[1:])
+
+    def row(number: int) -> Floats:
+        return samples[number] if number < len(samples) else nothing
+
+    first = rows["VELOCITY_D2T_ROW"]
+    velocities = [row(first + i) for i in range(coordinates)]
+    return Series(
+        deviation_running=row(rows["RUNNING_ROW"]),
+        velocities_d2t=np.stack(velocities, 1) if coordinates > 1 else velocities[0][:, None],
+        deviation_d2t_running=_storable(row(rows["RUNNING_D2T_ROW"])),
+        dissipated=samples[rows["DISSIPATED_ROW"]] if with_work else None,
+        driven=samples[rows["DRIVEN_ROW"]] if with_work else None,
+    )
+
+
+def _storable(energy: Floats) -> Floats:
+    """Return NaN for an energy that is too large: ``[D_2t u]`` may be so where neither point has failed."""
+    return np.where(np.isfinite(energy), energy, np.nan)
+
+
+def extrema_of(kept: Floats, counts: Integers) -> Extrema:
+    """Name what a kernel kept of every peak and trough: shape (row, case, extremum)."""
+    trough = kept[extrema.OF_A_KIND :]
+    return Extrema(
+        peak_time=kept[extrema.TIME],
+        peak=kept[extrema.HEIGHT],
+        peak_time_grid=kept[extrema.TIME_GRID],
+        peak_grid=kept[extrema.HEIGHT_GRID],
+        trough_time=trough[extrema.TIME],
+        trough=trough[extrema.HEIGHT],
+        trough_time_grid=trough[extrema.TIME_GRID],
+        trough_grid=trough[extrema.HEIGHT_GRID],
+        peak_count=counts[:, extrema.PEAK_COUNT],
+        trough_count=counts[:, extrema.TROUGH_COUNT],
+    )
