@@ -15,6 +15,7 @@ from vibsim.report import (
     contents,
     contents_published,
     data,
+    evidence,
     reasons,
     setting,
     words,
@@ -133,6 +134,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         "more": _more(check),
         "where": _where(check),
         "alone": _alone(check),
+        "picture": evidence.picture(experiment, record, asserted, check),
     }
 
 

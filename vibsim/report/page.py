@@ -141,6 +141,7 @@ def environment() -> Environment:
         lstrip_blocks=True,
     )
     made.filters["code"] = _code
+    made.filters["drawn"] = _markup
     return made
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal
@@ -139,6 +140,10 @@ class ConvergesCheck(Section):
         return self.converges
 
 
+DEFAULT_RTOL, DEFAULT_ATOL = 1e-9, 1e-12
+"""Tolerance of ``equals`` where a check gives none."""
+
+
 class ValueCheck(Section):
     """A number of the outcome equals, is below or is above a given one."""
 
@@ -161,6 +166,16 @@ class ValueCheck(Section):
     """Relative tolerance of `equals`."""
     atol: NonNegative | None = None
     """Absolute tolerance of `equals`."""
+
+    @property
+    def allowed(self) -> float:
+        """How far the number may be from `equals`; NaN where the check has a border."""
+        if self.equals is None:
+            return math.nan
+        plain = self.rtol is None and self.atol is None
+        rtol = DEFAULT_RTOL if plain else self.rtol or 0.0
+        atol = DEFAULT_ATOL if plain else self.atol or 0.0
+        return atol + rtol * abs(self.equals)
 
     @property
     def measured(self) -> ValueCheck:
