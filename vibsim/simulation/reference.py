@@ -8,15 +8,17 @@ kernels: formulas are evaluated by numpy. What is left between the last two solu
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.models import Model
 from vibsim.simulation.collocation import Floats
+from vibsim.simulation.kept import digest_of, kept
 from vibsim.simulation.members import Members
 from vibsim.simulation.pieces import ENDLESS, SLIDING, Pieces, Plan, planned, walk_pieces
 from vibsim.simulation.sides import Sides, sides
@@ -78,13 +80,36 @@ def reference(
 
 @lru_cache(maxsize=8)
 def choose(model: Model, numbers: tuple[bytes, ...]) -> Chosen:
-    """Return the solutions that are accepted.
+    """Return the solutions that are accepted, computed now or before (`vibsim.simulation.kept`).
 
     Parameters
     ----------
     numbers
         The initial values, the end times and the parameters of all members, in the order of the model.
     """
+    arrays = kept(digest_of(model, numbers), lambda: _arrays(computed(model, numbers)))
+    count = sum(name.startswith("members_") for name in arrays)
+    parts = tuple((arrays[f"members_{i}"], _solution(arrays, i)) for i in range(count))
+    return Chosen(parts, arrays["bounds"])
+
+
+def _arrays(chosen: Chosen) -> dict[str, NDArray[Any]]:
+    """Return the arrays of solutions by names."""
+    found: dict[str, NDArray[Any]] = {"bounds": chosen.bounds}
+    for i, (members, solved) in enumerate(chosen.parts):
+        found[f"members_{i}"] = members
+        for field in fields(solved):
+            found[f"{field.name}_{i}"] = getattr(solved, field.name)
+    return found
+
+
+def _solution(arrays: Mapping[str, NDArray[Any]], index: int) -> Solution:
+    kind = Pieces if f"begin_{index}" in arrays else Solved
+    return kind(**{field.name: arrays[f"{field.name}_{index}"] for field in fields(kind)})
+
+
+def computed(model: Model, numbers: tuple[bytes, ...]) -> Chosen:
+    """Compute the solutions of some members; see `choose`."""
     states = len(model.states)
     columns = [np.frombuffer(column) for column in numbers]
     start, end, rest = np.array(columns[:states]), columns[states], columns[states + 1 :]
