@@ -3,7 +3,8 @@
 An entry is named by the digest of all that its numbers depend on: the model, the numbers of its members, the code that
 computes it, the libraries and the processor. It is the arrays and behind them their SHA-256, written aside and then put
 into its place. One that is damaged, or no entry at all, is computed again. Jobs that want the same reference at the
-same time wait for the first one to compute it. The folder holds a bounded number of bytes; what was used last stays longest.
+same time wait for the first one to compute it. The folder holds a bounded number of bytes; what was used last stays
+longest.
 """
 
 from __future__ import annotations
@@ -145,7 +146,7 @@ def digest_of(model: Model, numbers: tuple[bytes, ...]) -> str:
 
 def _about(model: Model) -> Iterator[bytes]:
     """Yield what a motion depends on of a model, beside the numbers of its members."""
-    names = [row.name for row in (*model.states, *model.parameters)]
+    names = [row.name for row in model.states], [row.name for row in model.parameters]
     formulas: list[Expression] = [tree(model, row) for row in model.accelerations]
     if model.lookup is not None:
         formulas.append(tree(model, model.lookup.place))
