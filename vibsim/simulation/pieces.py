@@ -51,6 +51,8 @@ CLOSE = 0.02
 TRIES, MOST_TRIES = 5, 12
 OPEN, SLIDING, ENDLESS = range(3)
 """Nothing is against an end; a force holds the member at a jump; there are more corners than can be gone through."""
+LINEAR = 1e-9
+"""A quantity is linear in time that is half-way at half the time, to so much of its change."""
 TIED = 1e-12
 """A switch is at a border to so much of its largest value in the step before."""
 
@@ -72,6 +74,8 @@ class Walk:
     """Where the members are; arrays that change as they go on."""
 
     sides: Sides
+    timed: tuple[int, ...]
+    """The switches that look at the time alone."""
     end: Floats
     longest: Floats
     plan: Plan | None
@@ -215,7 +219,7 @@ def _begin(sides: Sides, start: Floats, end: Floats, longest: Floats, plan: Plan
     whole = np.zeros(cases, dtype=np.int64)
     no = np.zeros(cases, dtype=bool)
     walk = Walk(
-        sides=sides, end=end, longest=longest, plan=plan,
+        sides=sides, timed=sides.timed, end=end, longest=longest, plan=plan,
         t=np.zeros(cases), u=u, v=v, lost=np.zeros((2, *u.shape)), t_lost=np.zeros(cases),
         modes=np.zeros((switches, cases)), edge=np.full((switches, cases), np.nan),
         h=np.zeros(cases), last=no.copy(), aim=whole - 1, goal=np.zeros(cases),
@@ -287,6 +291,26 @@ def _next_length(walk: Walk, who: Ints) -> None:
     last = (h >= rest * (1.0 - 1e-6)) & (walk.aim[who] < 0)
     walk.last[who] = last
     walk.h[who] = np.where(last, rest, h)
+    _meet_known(walk, who[walk.planned[who] == 0])
+
+
+def _meet_known(walk: Walk, who: Ints) -> None:
+    """Let steps end where a switch that is linear in time will leave its mode: that is known before."""
+    sides, modes, t = walk.sides.of(who), _of(walk.modes, who), walk.t[who]
+    for k in walk.timed if len(who) else ():
+        h = walk.h[who]
+        still = _of(walk.u, who), _of(walk.v, who)
+        q, half, ahead = (sides.quantity(k, modes, *still, t + x * h) for x in (0.0, 0.5, 1.0))
+        rate = ahead - q
+        linear = (np.abs(half - q - 0.5 * rate) <= LINEAR * np.abs(rate)) & (rate != 0.0)
+        low = modes[k] if sides.whole[k] else np.where(modes[k] < 0.0, -np.inf, 0.0)
+        high = low + 1.0 if sides.whole[k] else np.where(modes[k] < 0.0, 0.0, np.inf)
+        goal = np.where(rate > 0.0, high, low)
+        x = (goal - q) / rate
+        meets = linear & (x > AT_ONCE) & (x < 1.0)
+        now = who[meets]
+        walk.h[now] = (x * h)[meets]
+        walk.aim[now], walk.goal[now], walk.last[now] = k, goal[meets], False
 
 
 def _try(walk: Walk, who: Ints) -> Step:

@@ -167,11 +167,12 @@ def _accepted(refined: _Refined) -> Chosen:
             relative = np.max(error / np.where(size > 0.0, size, 1.0), axis=0)
             gain = gap / relative
             slow = np.where((gain < SLOW) & (relative < RESOLVED), slow + 1, 0)
-            is_there = (relative <= SETTLED) | ((relative <= ACCURATE) & (gain < SLOW))
+            rounding = ROUND_OFF * (1.0 + 0.25 * _most_steps(solved, steps) ** 0.5)
+            settled = relative <= np.maximum(rounding, SETTLED)
+            is_there = settled | ((relative <= ACCURATE) & (gain < SLOW))
             if is_there.any():
                 accepted.append((left[is_there], solved.of(is_there)))
-                rounding = ROUND_OFF * (1.0 + 0.25 * _most_steps(solved, steps) ** 0.5) * size
-                bounds[:, left[is_there]] = (error + rounding)[:, is_there]
+                bounds[:, left[is_there]] = (error + rounding * size)[:, is_there]
             goes_on &= ~is_there & (slow < 2)
             gap = relative
         refined.keep(goes_on)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.expression import Binary, Expression, Number, Switch, held, values
+from vibsim.expression import Binary, Expression, Number, Switch, held, names_in, values
 from vibsim.models import Model, tree
 from vibsim.models.table import BEND, Lookup
 from vibsim.simulation.collocation import Floats, Force
@@ -37,6 +37,16 @@ class Sides:
     def whole(self) -> NDArray[np.bool_]:
         """Which switches change at every whole number, shape (switch,)."""
         return np.array([switch.whole for switch in self.switches], dtype=bool)
+
+    @property
+    def timed(self) -> tuple[int, ...]:
+        """Which switches look at the time alone; a change of a mode is no motion."""
+        moving = {state.name for state in self.model.states} | {BEND}
+        return tuple(
+            k
+            for k, switch in enumerate(self.switches)
+            if moving.isdisjoint(names_in(switch.quantity))
+        )
 
     def of(self, members: NDArray[Any]) -> Sides:
         """Return the same of some members."""
