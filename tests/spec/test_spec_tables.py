@@ -184,10 +184,9 @@ def test_a_table_cannot_be_swept(tmp_path: Path, key: str) -> None:
     assert fault.rule.startswith("cannot be swept: every member has the same")
 
 
-def test_no_reference_and_no_scales(tmp_path: Path) -> None:
+def test_a_reference_and_no_scales(tmp_path: Path) -> None:
     table(tmp_path, ROWS)
-    more = "checks: [{value: error_l2, quantity: u, below: 1}]\n"
-    assert "is not known" in only_fault(tmp_path, more=more).rule
+    road(tmp_path, more="checks: [{value: error_l2, quantity: u, below: 1}]\n")
     assert "no scaled equation" in only_fault(tmp_path, more="scaled: true\n").rule
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from vibsim.analysis import series
 from vibsim.analysis.belonging import SAME_AT_EVERY_LEVEL
 from vibsim.analysis.compare import Comparison, comparisons
+from vibsim.analysis.corners import corner_variables, switches_of
 from vibsim.analysis.evidence import judgement
 from vibsim.analysis.measured import definition, flags, measured
 from vibsim.analysis.motion import motion
@@ -82,6 +83,8 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
         if not part.lean:
             table |= over_time(q)
     table |= _scalars(part) | measured(part, found) | motion(part, found)
+    if switches_of(part.model):
+        table |= corner_variables(part.corners)
     if experiment.tolerance is not None:
         table |= bounds(part)
     if not part.lean:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim import theory
+from vibsim.analysis.corners import words_of
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Orders, Outcome
 from vibsim.analysis.part import fastest
 from vibsim.analysis.promise import (
@@ -18,7 +19,7 @@ from vibsim.analysis.promise import (
     options_of,
     stability_limits,
 )
-from vibsim.analysis.wording import Story, advise, tell
+from vibsim.analysis.wording import Corner, Story, advise, tell
 from vibsim.record import Record
 from vibsim.schemes import SCHEMES, Options, Scheme
 from vibsim.spec.about import schemes_of
@@ -129,6 +130,18 @@ def _story(
         is_position=check.converges in experiment.model.definition.positions,
         scheme=spec.name,
         has_corners=has_corners(experiment.model.definition),
+        corner=_corner(experiment, record, scheme, case),
+    )
+
+
+def _corner(experiment: Experiment, record: Record, scheme: int, case: int) -> Corner | None:
+    """Return the first corner of the force within a step, None where there is none."""
+    if "corner_switch" not in record or record["corner_switch"][scheme, case] < 0:
+        return None
+    return Corner(
+        words_of(experiment.model.definition, int(record["corner_switch"][scheme, case])),
+        float(record["corner_time"][scheme, case]),
+        float(record["corner_power"][scheme, case]),
     )
 
 

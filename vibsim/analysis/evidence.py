@@ -87,6 +87,7 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
         stability_limit=np.broadcast_to(part.stability_limit, shape),
         growth=part.growth,
         left_to_the_mesh=np.broadcast_to(part.left_to_the_mesh, shape),
+        corner=part.corners.power,
         span=np.broadcast_to(part.omega_dt[:, 0] * float(grid.steps[0]), shape),
         relative_floor=np.broadcast_to(part.relative_floor[..., 0], shape),
     )

@@ -65,6 +65,9 @@ class Evidence:
     left_to_the_mesh: Floats | None = None
     """The one power of an error that has no expansion beyond it, since events or corners of the force are left to the
     mesh, shape (...); NaN where the error has an expansion."""
+    corner: Floats | None = None
+    """The highest power of an error that stays regular where a step has a corner of the force inside, shape (...); NaN
+    where none has."""
     growth: Floats | None = None
     """Largest position over the largest exact position, shape (..., n); NaN where not known."""
     ceiling: Floats | None = None

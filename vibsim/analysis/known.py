@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from vibsim.expression import values
 from vibsim.models import BUDGET, Model, tree
 from vibsim.models.base import Formula
+from vibsim.models.table import BEND, HEIGHT
 from vibsim.simulation.members import Members
 
 Floats = NDArray[np.float64]
@@ -43,6 +44,9 @@ def known_values(
     formulas = formulas_of(model)
     parameters = {row.name: group.parameters[row.key][:, None] for row in model.parameters}
     numbers = {**parameters, **states, "t": t}
+    if model.lookup is not None:
+        place = np.broadcast_to(values(tree(model, model.lookup.place), numbers), t.shape)
+        numbers |= zip((HEIGHT, BEND), model.lookup.table.read(place), strict=True)
 
     def of(formula: Formula) -> Floats:
         return np.broadcast_to(values(tree(model, formula), numbers), t.shape)

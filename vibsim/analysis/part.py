@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis.belonging import check_belonging
+from vibsim.analysis.corners import Corners, corners_of
 from vibsim.analysis.floor import SPACING_AT_ONE, solution_size
 from vibsim.analysis.grid import Grid, common_grid, take
 from vibsim.analysis.known import known_values
@@ -76,6 +77,8 @@ class Part:
     """Whether a scheme chooses its own steps and so has no levels, shape (s,)."""
     left_to_the_mesh: Floats
     """The power that is left of errors where the mesh decides what steps see, NaN elsewhere, shape (s, 1 or c)."""
+    corners: Corners
+    """Where the force has its first corner within a step."""
     growth: Floats
     """Largest position over the largest exact position, shape (s, c, l); NaN where not known."""
 
@@ -215,6 +218,7 @@ def part_of(experiment: Experiment, records: Mapping[int, Record]) -> Part:
         stability_limit=stability_limits(experiment, columns),
         adaptive=np.array([SCHEMES[scheme.kind].adaptive for scheme in experiment.schemes]),
         left_to_the_mesh=left_to_the_mesh(experiment, columns),
+        corners=corners_of(experiment.model.definition, finest, group, grid.dt[0]),
         growth=_growth(experiment, grid, records, exact),
     )
 

@@ -49,6 +49,8 @@ SUNK = 0.9
 """Orders that are lower than p by more and fall leave p behind: of h^(p-1), too little h^p is left to be counted."""
 LEAST_CANDIDATE = 0.5
 """The least order that an expansion has: a solution that stays away from its limit has none."""
+BELOW_CORNER = 0.25
+"""An order further below the power that a corner leaves is not the corner's: half the distance of two orders."""
 MOST_ABOVE = 2.0
 """A superconvergent quantity gains at most the next even power."""
 
@@ -82,15 +84,17 @@ def rules(e: Evidence, t: Trend) -> list[tuple[Flags, str]]:
     rough = ~np.isnan(left)
     # any other power is the accident of where events or corners lie between grid points
     regular = ~rough | ((np.abs(t.order - left) <= tol) & ~t.alternating)
+    kinked, deeper = _kinked(e, t, p)
     return [
         (exact & far_from_exact(e), "wrong_limit"),
         (exact, "exact"),
         (exactly & ~at_round_off(e), "order_low"),
         (exactly | (nothing & (at_round_off(e) | ~rough)), "round_off"),
-        (t.alternating & ~rough, "oscillating"),
+        (t.alternating & ~rough & ~kinked, "oscillating"),
         (missed & regular, "wrong_limit"),
         (right & ~too_small & regular, "asymptotic"),
-        (wrong & ~above & regular, "order_low"),
+        (wrong & ~above & regular & (~kinked | deeper), "order_low"),
+        (kinked, "non_smooth"),
         (wrong & above & ~rough, "order_high"),
         (rough, "non_smooth"),
         (t.cut, "round_off"),
@@ -112,6 +116,20 @@ def _right(e: Evidence, t: Trend, p: Floats) -> Flags:
     clear = _alone(e, t, p)
     right = near & together & clear & ~np.signbit(t.scatter)
     return np.asarray(right & ~t.gap & ~t.drifting & ~t.turning & ~_leaving(t, p))
+
+
+def _kinked(e: Evidence, t: Trend, p: Floats) -> tuple[Flags, Flags]:
+    """Say where a corner of the force within a step explains an order below p, and where it is lower than that.
+
+    A corner leaves all powers up to its own: a ladder that settles lower has another cause.
+    """
+    if e.corner is None:
+        nothing = np.zeros(p.shape, dtype=bool)
+        return nothing, nothing
+    low = (t.order < p - e.tolerance) | (t.local < p - e.tolerance)
+    low |= t.several & (t.local - t.change < p - e.tolerance)
+    kinked = ~np.isnan(e.corner) & (p >= e.corner) & (low | t.alternating)
+    return kinked, np.asarray(t.order < e.corner - np.maximum(e.tolerance, BELOW_CORNER))
 
 
 def _pure(t: Trend) -> Flags:

@@ -19,7 +19,9 @@ The rules, in the order in which they apply (the first that applies decides):
    coincide, and it stands alone; ``order_low``, ``order_high`` where the interval excludes what is expected and holds
    an order that an expansion can have; else ``pre_asymptotic``, ``oscillating`` or ``round_off``;
 6. where events are left to the mesh, or corners of a force from a table, an error has no expansion behind its first
-   power, or the second: a ladder that does not show that power is ``non_smooth``;
+   power, or the second: a ladder that does not show that power is ``non_smooth``. So is one that is lower than
+   expected where the motion meets another corner of the force within a step (`vibsim.analysis.corners`), but for one
+   that settles below the power which that corner leaves;
 7. a settled ladder whose error against the exact solution is larger than its differences allow: ``wrong_limit``.
 """
 

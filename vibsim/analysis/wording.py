@@ -10,6 +10,17 @@ from vibsim.schemes.base import is_on_the_mesh
 
 
 @dataclass(frozen=True)
+class Corner:
+    """The first corner of the force within a step."""
+
+    words: str
+    """What happens there."""
+    time: float
+    power: float
+    """The highest power of dt that it leaves regular."""
+
+
+@dataclass(frozen=True)
 class Story:
     """What a sentence on a convergence verdict needs to know about the member that decided it."""
 
@@ -39,6 +50,8 @@ class Story:
     scheme: str
     has_corners: bool = False
     """Whether steps have corners of a force from a table inside."""
+    corner: Corner | None = None
+    """The first other corner of the force within a step."""
 
 
 def number(value: float) -> str:
@@ -140,6 +153,8 @@ def tell(s: Story) -> str:
                 "Between the points of its table the force is a straight line, and its corners lie within steps, at "
                 f"each level elsewhere: the error of {s.quantity} has no regular expansion in powers of dt."
             )
+        case "non_smooth" if s.corner:
+            return _cornered(s, s.corner)
         case "non_smooth":
             return f"{s.quantity} is not smooth, so its error has no regular expansion in powers of dt."
         case "too_few_levels":
@@ -171,6 +186,11 @@ def advise(s: Story) -> str:
             return (
                 "Choose steps in `time:` that end at every point of the table: at the coarsest level, dt is its "
                 "spacing over the speed, or a whole part of that."
+            )
+        case "non_smooth" if s.corner:
+            return (
+                f"End the time interval before t = {s.corner.time:.4g}, where order {number(s.expected)} can be seen, "
+                f"or take a scheme of order {_below(s.corner)}."
             )
         case "order_low" if _starts_low(s):
             return f"Set `start: centred` for scheme {s.scheme}."
@@ -254,6 +274,22 @@ def _cause(s: Story) -> str:
             "formula of lower order."
         )
     return ""
+
+
+def _cornered(s: Story, corner: Corner) -> str:
+    measured = _measured(s)
+    so_far = f"; the last estimate is {measured}" if measured else ""
+    jump = {1.0: "the force jumps", 2.0: "the force has a corner"}
+    what = jump.get(corner.power, "a derivative of the force jumps")
+    return (
+        f"At t = {corner.time:.4g}, within a step, {corner.words}, where {what}: an error of order "
+        f"{number(corner.power)} is left that depends on where in the step that lies, so that {s.quantity} does not "
+        f"show order {number(s.expected)}{so_far}."
+    )
+
+
+def _below(corner: Corner) -> str:
+    return f"{number(corner.power - 1.0)} at most" if corner.power > 1.0 else "1"
 
 
 def _unstable(s: Story) -> str:

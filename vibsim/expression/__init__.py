@@ -33,6 +33,7 @@ from vibsim.expression.render import (
     to_python,
     to_statements,
 )
+from vibsim.expression.switches import Switch, held
 from vibsim.expression.tree import (
     CONSTANTS,
     FUNCTIONS,
@@ -64,9 +65,11 @@ __all__ = [
     "Name",
     "Negate",
     "Number",
+    "Switch",
     "constant",
     "derivative",
     "evaluate",
+    "held",
     "integral",
     "is_multiple",
     "is_smooth",

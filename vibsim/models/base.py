@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.expression import Expression, is_smooth, parse
+from vibsim.expression import Expression, parse
 from vibsim.models.events import Events
 from vibsim.models.table import Lookup, Table
 
@@ -216,12 +216,11 @@ def declared_parameters(names: Iterable[str]) -> tuple[Parameter, ...]:
 
 
 def has_solution(model: Model) -> bool:
-    """Tell whether the motion is known: exactly, or to twelve digits since it is smooth."""
-    if model.exact is not None:
-        return True
-    # a table makes a force with corners, wherever its points lie
-    is_whole = model.events is None and model.lookup is None
-    return is_whole and all(is_smooth(tree(model, a)) for a in model.accelerations)
+    """Tell whether the motion is known: exactly, or to twelve digits by a reference that stops at every corner.
+
+    Of a single motion the reference may not exist (`vibsim.simulation.reference`): its numbers are then NaN.
+    """
+    return model.exact is not None or model.events is None
 
 
 def parameter_names(model: Model) -> tuple[str, ...]:

@@ -73,7 +73,8 @@ REASONS = {
     ),
     "non_smooth": Reason(
         "The problem is not smooth, so its error has no regular expansion in powers of dt.",
-        "Location of the events, or an expected order that takes the kink into account.",
+        "Location of the events, an interval that ends before the corner of the force, or an expected order that takes "
+        "it into account.",
     ),
     "too_few_levels": Reason(
         "An order cannot be judged from two levels: one difference has nothing to be compared with.",

@@ -15,7 +15,7 @@ from vibsim.record import Attribute, Record, Variable, attributes
 from vibsim.simulation.derived import derived
 from vibsim.simulation.gathered import event_times, extrema, gathered, of_own_steps
 from vibsim.simulation.members import Members, members
-from vibsim.simulation.reference import METHOD, reference
+from vibsim.simulation.reference import method, reference
 from vibsim.simulation.scaled import in_scales
 from vibsim.simulation.solution import Solution, has_adaptive, solve
 from vibsim.spec.series import RUNNING, asks_for_peaks, extrema_kept, is_bounded, stored_series
@@ -227,7 +227,7 @@ def _of(state: State) -> dict[str, Any]:
 
 
 def _exact(experiment: Experiment, group: Members, steps: int, every: int) -> dict[str, Variable]:
-    """Return the exact states, or a reference for them where they are not known and the motion is smooth."""
+    """Return the exact states, or a reference for them where they are not known."""
     model = experiment.model.definition
     if model.exact is None:
         few = has_solution(model) and experiment.members <= MOST_REFERENCES
@@ -255,7 +255,7 @@ def _computed(model: Model, group: Members, fraction: NDArray[np.float64]) -> di
     table = {}
     for state in model.states:
         words = f"{state.long_name} of the reference solution"
-        attrs = attributes(words, state.unit, method=METHOD)
+        attrs = attributes(words, state.unit, method=method(model))
         table[f"{state.name}_exact"] = Variable(("case", "t"), series[state.name], attrs)
         attrs = attributes(f"bound of the error of the {words}", state.unit)
         table[f"{state.name}_exact_error"] = Variable(("case",), bounds[state.name], attrs)

@@ -1,0 +1,138 @@
+"""Verdicts where the motion meets corners of the force within steps: the power that each leaves, and the place."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vibsim import Experiment, Verdict, analyse, simulate, verdicts
+from vibsim.analysis.corners import switches_of, words_of
+from vibsim.schemes import FIXED_STEP, SCHEMES
+
+QUADRATIC = {"kind": "oscillator", "damping": {"quadratic": 0.5}}
+
+
+def experiment(schemes: list[Any], **changes: Any) -> Experiment:
+    content = {
+        "title": "t",
+        "model": QUADRATIC,
+        "initial": {"u": 1.0},
+        "time": {"end": 20.0},
+        "levels": [8, 9, 10, 11, 12],
+        "schemes": schemes,
+        "samples": "common",
+        "checks": [
+            {"id": name, "converges": "u", "order": "scheme", "schemes": [name]} for name in schemes
+        ],
+        **changes,
+    }
+    return Experiment.from_dict(content)
+
+
+def judged(made: Experiment) -> list[Verdict]:
+    return list(verdicts(made, analyse(made, [simulate(made, level) for level in made.levels])))
+
+
+TREATED = [
+    kind for kind in FIXED_STEP if SCHEMES[kind].treats(experiment(["rk4"]).model.definition)
+]
+
+
+@pytest.mark.slow
+def test_every_scheme_on_quadratic_damping() -> None:
+    """Orders up to 3 show; a higher one does not, and the place of the first turn is named."""
+    made = experiment(TREATED)
+    model = made.model.definition
+    for kind, verdict in zip(TREATED, judged(made), strict=True):
+        scheme = SCHEMES[kind]
+        if scheme.formal_order("u", model, scheme.defaults()) <= 3.0:
+            assert (verdict.status, verdict.reason) == ("PASS", "asymptotic"), verdict.text
+        else:
+            assert verdict.status == "INCONCLUSIVE"
+            # the finest levels of gauss4 reach round-off
+            assert verdict.reason in ("non_smooth", "round_off")
+
+
+@pytest.mark.parametrize("scheme", ["rk4", "gauss4"])
+def test_the_place_of_the_corner_is_named(scheme: str) -> None:
+    (verdict,) = judged(experiment([scheme], levels=[6, 7, 8, 9]))
+    assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "non_smooth")
+    assert "At t = 3.22" in verdict.text
+    assert "the velocity v passes zero" in verdict.text
+    assert "order 3 is left" in verdict.text
+    assert "before t = 3.22" in verdict.advice
+
+
+def test_before_the_first_turn_the_order_is_that_of_the_scheme() -> None:
+    made = experiment(["rk4"], time={"end": 3.0}, levels=[5, 6, 7, 8])
+    record = analyse(made, [simulate(made, level) for level in made.levels])
+    assert np.isnan(record["corner_time"]).all()
+    assert [(v.status, v.reason) for v in verdicts(made, record)] == [("PASS", "asymptotic")]
+
+
+def test_an_order_below_that_of_the_corner_is_not_excused() -> None:
+    """A second-order scheme of which the fourth order is expected: the corner of quadratic damping leaves the third."""
+    check = {"converges": "u", "order": 4, "schemes": ["rk2"]}
+    (verdict,) = judged(experiment(["rk2"], checks=[check], levels=[8, 9, 10, 11]))
+    assert (verdict.status, verdict.reason) == ("FAIL", "order_low")
+
+
+def corner(model: dict[str, Any], **changes: Any) -> tuple[float, float, str]:
+    """Return time, power and words of the first corner."""
+    made = experiment(
+        ["velocity_verlet" if "damping" not in model else "rk4"], model={"kind": "oscillator", **model},
+        checks=[], levels=[7, 10], **changes,
+    )  # fmt: skip
+    record = analyse(made, [simulate(made, level) for level in made.levels])
+    index = int(record["corner_switch"][0, 0])
+    words = words_of(made.model.definition, index) if index >= 0 else ""
+    return float(record["corner_time"][0, 0]), float(record["corner_power"][0, 0]), words
+
+
+@pytest.mark.parametrize(
+    ("model", "time", "power", "words"),
+    [
+        ({"damping": "0.1*abs(v)*v"}, math.pi, 3.0, "the velocity v passes zero"),
+        ({"damping": "v*v*abs(v)*v/99"}, math.pi, 5.0, "the velocity v passes zero"),
+        ({"spring": "u + abs(u)/1000"}, math.pi / 2, 2.0, "u passes zero"),
+        ({"spring": "u + sign(u)/1000"}, math.pi / 2, 1.0, "u passes zero"),
+        ({"spring": "u + max(u - 0.5, 0)/1000"}, math.pi / 3, 2.0, "u - 0.5 passes zero"),
+        ({"force": "heaviside(t - 3.01)"}, 3.01, 1.0, "t - 3.01 passes zero"),
+        ({"force": "max(t - 3.01, 0)**3"}, 3.01, 4.0, "t - 3.01 passes zero"),
+        ({"force": "mod(t, 1.7)/9"}, 1.7, 1.0, "t/1.7 passes a whole number"),
+        ({"force": "1 if mod(t, 1.7) < 0.9 else 0"}, 0.9, 1.0, "a condition in the formula"),
+        ({"spring": "u + max(u - 2, 0)"}, math.nan, math.nan, ""),
+        # a grid point of the coarsest level
+        ({"force": "heaviside(t - 5)"}, math.nan, math.nan, ""),
+        # both sides are the same
+        ({"spring": "u + max(u, 0) + min(u, 0)"}, math.nan, math.nan, ""),
+    ],
+)
+def test_the_power_that_a_corner_leaves(
+    model: dict[str, Any], time: float, power: float, words: str
+) -> None:
+    found = corner(model)
+    assert found[0] == pytest.approx(time, abs=0.02, nan_ok=True)
+    assert found[1] == pytest.approx(power, nan_ok=True)
+    assert words in found[2]
+
+
+def test_a_smooth_force_has_no_corners() -> None:
+    made = experiment(["rk4"], model={"kind": "oscillator", "spring": "sin(u)"}, levels=[4, 5])
+    assert not switches_of(made.model.definition)
+    assert "corner_time" not in analyse(made, [simulate(made, level) for level in made.levels])
+
+
+def test_members_of_a_sweep_have_their_own_corner() -> None:
+    sweep = {"initial.v": [-0.5, 0.0, 0.5, -2.0]}
+    made = experiment(["rk4"], sweep=sweep, checks=[], levels=[7, 9], time={"end": 2.5})
+    record = analyse(made, [simulate(made, level) for level in made.levels])
+    times = record["corner_time"].values[0]
+    assert np.isnan(times).tolist() == [True, True, False, False]
+    assert 0.3 < times[2] < 0.5
+    for case in range(4):
+        alone = analyse(made.alone(case), [simulate(made.alone(case), lv) for lv in made.levels])
+        assert alone["corner_time"].values[0, 0] == pytest.approx(times[case], nan_ok=True)
