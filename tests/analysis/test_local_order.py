@@ -219,6 +219,7 @@ def test_a_stop_left_to_the_mesh_lowers_the_order_behind_it() -> None:
     assert np.abs(located - 2.0).max() < 0.15
     assert np.abs(located[:, :-1] - 2.0).max() < 0.1
     assert np.abs(on_mesh[:, before] - 2.0).max() < 0.05
-    # where the stop lies in a step is another part of it at each level: only the mean over levels is of order 1
-    assert np.ptp(on_mesh[:, behind].mean(axis=1)) > 1.0
-    assert np.abs(on_mesh[:, behind].mean(axis=0) - 1.0).max() < 0.6
+    # where the stop lies in a step is another part of it at each level, so that the order behind it is an accident
+    found = on_mesh[:, behind].mean(axis=1)
+    assert found.min() < 0.5
+    assert np.ptp(found) > 1.0
