@@ -17,7 +17,9 @@ H = np.full(1, T[1])
 
 
 def cosine(t: Any, w: float = W) -> Any:
-    return template(*(x[None] for x in (np.cos(w * t), -w * np.sin(w * t), -(w**2) * np.cos(w * t))), H)
+    return template(
+        *(x[None] for x in (np.cos(w * t), -w * np.sin(w * t), -(w**2) * np.cos(w * t))), H
+    )
 
 
 def told(u: Any, v: Any = None, of: Any = None, period: float = 1.0) -> Any:
@@ -105,7 +107,9 @@ def test_a_shift_of_more_than_a_period_is_followed() -> None:
 
 
 def test_what_does_not_oscillate_has_no_parts() -> None:
-    turning = template(*(x[None] for x in (T + 0.1 * np.sin(T), 1 + 0.1 * np.cos(T), -0.1 * np.sin(T))), H)
+    turning = template(
+        *(x[None] for x in (T + 0.1 * np.sin(T), 1 + 0.1 * np.cos(T), -0.1 * np.sin(T))), H
+    )
     time, factor = told(T, np.ones_like(T), turning)
     assert np.isnan(time).all()
     assert np.isnan(factor).all()
@@ -132,7 +136,10 @@ def test_a_row_has_the_same_bits_alone_and_among_others() -> None:
     v = np.gradient(u, T, axis=-1)
     period = np.array([1.0, 1.0, 0.9, 1.1])
     h = np.repeat(H, 4)
-    of = template(*(np.tile(x, (4, 1)) for x in (np.cos(W * T), -W * np.sin(W * T), -(W**2) * np.cos(W * T))), h)
+    of = template(
+        *(np.tile(x, (4, 1)) for x in (np.cos(W * T), -W * np.sin(W * T), -(W**2) * np.cos(W * T))),
+        h,
+    )
     stride = strides(period, h, len(T))
     together = shift(u, v, of, period, stride)
     for i in range(4):

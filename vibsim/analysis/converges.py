@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from vibsim import theory
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Orders, Outcome
 from vibsim.analysis.part import fastest
+from vibsim.analysis.parts_told import parts_in_words
 from vibsim.analysis.promise import (
     columns_of,
     formal_orders,
@@ -129,6 +130,7 @@ def _story(
         is_position=check.converges in experiment.model.definition.positions,
         scheme=spec.name,
         has_corners=has_corners(experiment.model.definition),
+        parts=parts_in_words(experiment.model.definition, record, check.converges, scheme, case),
     )
 
 

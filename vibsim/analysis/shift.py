@@ -4,9 +4,9 @@ Around every time t, in a window of one to two periods, the computed position is
 
     u_h(s)  =  c + exp(alpha(s)) U(s + phi(s)),      alpha and phi linear in s,
 
-by Newton's method on the conditions that what is left is orthogonal to 1, U, s U, U' and s U'. So ``phi(t)`` is the time
-by which the computed motion is early (negative: late), and ``exp(alpha(t)) - 1`` the part by which its amplitude is
-too large; to first order the error is ``a u + phi u'``. Shifts are not linearised: a shift by phi is no change of the
+by Newton's method on the conditions that what is left is orthogonal to 1, U, s U, U' and s U'. So ``phi(t)`` is the
+time by which the computed motion is early (negative: late), and ``exp(alpha(t)) - 1`` the part by which its amplitude
+is too large; to first order the error is ``a u + phi u'``. Shifts are not linearised: a shift by phi is no change of the
 amplitude by phi^2, as it would be in first-order terms. Both may change with time: a frequency that is wrong, and an
 exponential growth, are met exactly, so that the one does not leak into the other. On ``u'' + w^2 u = 0`` every scheme
 whose solution is ``A exp(lambda t) cos(w~ t + theta)`` leaves nothing. The constant takes what a scheme gets wrong of
@@ -173,7 +173,7 @@ def _inside(guess: Floats, spacing: Floats) -> tuple[Indices, Indices]:
 
 def _turns(velocity: Floats) -> NDArray[np.bool_]:
     """Say where the motion turns within a window: only then it oscillates."""
-    return (np.min(velocity, axis=-1) < 0) & (np.max(velocity, axis=-1) > 0)
+    return np.asarray((np.min(velocity, axis=-1) < 0) & (np.max(velocity, axis=-1) > 0))
 
 
 def _spread(values: Floats) -> Floats:
@@ -189,7 +189,9 @@ def _solved(basis: list[Floats], left: Floats, weight: Floats) -> list[Floats]:
     """
     n = len(basis)
     weighted = [weight * row for row in basis]
-    matrix = [[total(weighted[i] * basis[j]) if j >= i else None for j in range(n)] for i in range(n)]
+    matrix = [
+        [total(weighted[i] * basis[j]) if j >= i else None for j in range(n)] for i in range(n)
+    ]
     a: list[list[Floats]] = [
         [np.asarray(matrix[min(i, j)][max(i, j)]) for j in range(n)] for i in range(n)
     ]
