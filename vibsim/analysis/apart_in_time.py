@@ -32,7 +32,7 @@ LONG_NAMES = {
     PHASE: "time by which {} is early",
     AMPLITUDE: "part by which the amplitude of {} is too large",
 }
-ALWAYS = 2**16
+ALWAYS = 2**14
 """Samples of all schemes, members and levels up to which the parts are looked at without being asked for."""
 
 Make = Callable[..., "Comparison"]

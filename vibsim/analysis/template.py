@@ -35,15 +35,15 @@ class Template:
         return self.spacing[:, None] * np.arange(self.position.shape[-1])
 
     def at(self, place: Floats) -> tuple[Floats, Floats]:
-        """Return position and velocity at places in units of the spacing, shape (r, ...); beyond the ends as well."""
-        last = self.coefficients.shape[-1] - 1
-        cell = np.clip(np.floor(np.nan_to_num(place)), 0, last).astype(np.int64)
+        """Return position and velocity at places, in units of the spacing, shape (..., r, n); beyond the ends as well."""
+        cells = self.coefficients.shape[-1]
+        cell = np.clip(np.floor(np.nan_to_num(place)), 0, cells - 1)
         y = place - cell
-        rows = np.arange(len(place)).reshape(-1, *[1] * (place.ndim - 1))
-        c = [row[rows, cell] for row in self.coefficients]
+        flat = cell.astype(np.int64) + cells * np.arange(len(self.spacing))[:, None]
+        c = [row.ravel().take(flat) for row in self.coefficients]
         position = c[0] + y * (c[1] + y * (c[2] + y * (c[3] + y * (c[4] + y * c[5]))))
         slope = c[1] + y * (2 * c[2] + y * (3 * c[3] + y * (4 * c[4] + y * (5 * c[5]))))
-        return position, slope / self.spacing.reshape(-1, *[1] * (place.ndim - 1))
+        return position, slope / self.spacing[:, None]
 
 
 def template(position: Floats, velocity: Floats, acceleration: Floats, spacing: Floats) -> Template:
