@@ -41,12 +41,13 @@ Make = Callable[..., "Comparison"]
 def wanted(part: Part, names: tuple[str, ...]) -> tuple[str, ...]:
     """Return those of `names` that are parts, and of a small experiment the parts of every position.
 
-    They let a verdict on the position say which of the two is wrong.
+    They are made of the states, and let a verdict on the position say which of the two is wrong.
     """
     asked = [name for name in names if is_error_part(name)]
     schemes, cases = part.shape
     size = schemes * cases * len(part.grid.t) * len(part.grid.levels)
     small = not part.lean and len(part.grid.levels) > 2 and size <= ALWAYS
+    small &= {*part.model.positions, *part.model.velocities} <= {*names}
     more = part.model.positions if small and has_error_parts(part.model) else ()
     return tuple(
         dict.fromkeys([*asked, *(name + end for name in more for end in (PHASE, AMPLITUDE))])

@@ -35,7 +35,7 @@ class Template:
         return self.spacing[:, None] * np.arange(self.position.shape[-1])
 
     def at(self, place: Floats) -> tuple[Floats, Floats]:
-        """Return position and velocity at places, in units of the spacing, shape (..., r, n); beyond the ends as well."""
+        """Return position and velocity at places in units of the spacing, shape (..., r, n), also beyond the ends."""
         cells = self.coefficients.shape[-1]
         cell = np.clip(np.floor(np.nan_to_num(place)), 0, cells - 1)
         y = place - cell

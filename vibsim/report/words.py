@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
+from vibsim.models.error_parts import AMPLITUDE, PHASE, is_error_part, whole_of
 from vibsim.report.style import power
 
 SYMBOLS = {
@@ -32,8 +33,15 @@ CENTRED = "_d2t"
 """Ends the name of a quantity that is made with the centred difference ``[D_2t u]`` of the position."""
 
 
+PARTS = {PHASE: "phase error of {}", AMPLITUDE: "amplitude error of {}"}
+"""Of a part of a position's error, by the end of its name."""
+
+
 def symbol(quantity: str) -> str:
     """Return the letter of a quantity; its name where it has none."""
+    if is_error_part(quantity):
+        whole = whole_of(quantity)
+        return PARTS[quantity.removeprefix(whole)].format(SYMBOLS.get(whole, whole))
     plain = quantity.removesuffix(CENTRED)
     letter = SYMBOLS.get(plain, plain)
     return letter if plain == quantity else f"{letter} by [D₂ₜu]"
@@ -41,6 +49,8 @@ def symbol(quantity: str) -> str:
 
 def name(quantity: str) -> str:
     """Return a quantity in words."""
+    if is_error_part(quantity):
+        return f"the {symbol(quantity)}"
     plain = quantity.removesuffix(CENTRED)
     text = NAMES.get(plain, plain)
     return text if plain == quantity else f"{text} by the centred difference [D₂ₜu]"
