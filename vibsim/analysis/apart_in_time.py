@@ -91,11 +91,16 @@ def parts_of_errors(
 
 
 def _order(part: Part, name: str) -> Floats:
-    """Return the order by which a part is rescaled: that of the first check which names one, else the position's."""
+    """Return the order by which a part is rescaled: that of the first check which expects one, else the position's.
+
+    A claim that is known to be false, and a check that is to fail, expect none.
+    """
     order = formal_orders(part.experiment, name, part.columns).copy()
     for check in reversed(part.experiment.checks):
         inner = check.measured
         if inner.kind != "converges" or inner.converges != name or inner.order == "scheme":
+            continue
+        if inner.expect.status != "PASS" or (check.kind == "claim" and not check.holds):
             continue
         for s, scheme in enumerate(part.experiment.schemes):
             if inner.schemes is None or scheme.name in inner.schemes:

@@ -87,7 +87,7 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
     ]
     return Picture(
         name=f"differences_{quantity}_{member.stem}",
-        title=f"Do the levels agree? {letter}, {member.title}",
+        title=f"Do the levels agree? {words.title(quantity)}, {member.title}",
         caption=" ".join(part for part in parts if part),
         alt=f"Rescaled level differences of {words.name(quantity)} against time for {member.title}"
         + (", with the ratio of successive differences" if ratios else "")
@@ -196,7 +196,6 @@ def _draw_ratios(
     ax: Axes, t: Floats, record: Record, quantity: str, member: Member, order: float
 ) -> None:
     levels, count = whole(record, "level"), len(whole(record, "triple"))
-    above = sound_pairs(record, quantity, member)
     good = _good(record, quantity, member)
     chosen = _few(good)
     drawn: list[Floats] = []
@@ -218,7 +217,7 @@ def _draw_ratios(
     if not drawn:
         note = (
             "no ratio means anything: the runs grow without bound, or break down"
-            if any(above) or set(lost) != {figures_frame.ROUND_OFF}
+            if set(lost) != {figures_frame.ROUND_OFF}
             else "nothing to divide: every difference is within round-off, or zero"
         )
         ax.text(0.5, 0.7, note, transform=ax.transAxes, ha="center", color=style.GREY)
