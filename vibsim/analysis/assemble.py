@@ -16,11 +16,13 @@ from vibsim.analysis.evidence import judgement
 from vibsim.analysis.measured import definition, flags, measured
 from vibsim.analysis.motion import motion
 from vibsim.analysis.part import CENTRED, Part, part_of
+from vibsim.analysis.parts_told import at_start
 from vibsim.analysis.reached import bounds
 from vibsim.analysis.tables import SERIES, Table, numbers, over_time, precision_of
 from vibsim.analysis.work import work_precision
 from vibsim.errors import VibsimError
 from vibsim.models import centred
+from vibsim.models.error_parts import is_error_part
 from vibsim.record import Record, Variable, attributes
 from vibsim.schemes import SCHEMES
 from vibsim.simulation.scaled import in_scales
@@ -78,8 +80,12 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
     part = part_of(experiment, records)
     found = comparisons(part, compared(experiment, part.lean) + _centred(part))
     table: Table = {}
+    asked_for = asked(experiment)
     for q in found.values():
-        table |= numbers(q) | _verdict(q)
+        if is_error_part(q.name) and q.name not in asked_for:
+            table |= _verdict(q) | at_start(q)
+            continue
+        table |= numbers(q) | _verdict(q) | at_start(q)
         if not part.lean:
             table |= over_time(q)
     table |= _scalars(part) | measured(part, found) | motion(part, found)
@@ -102,7 +108,7 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
 def compared(experiment: Experiment, lean: bool = False) -> tuple[str, ...]:
     """Name the quantities that are compared between levels: states, energy, and what a check asks for."""
     if lean:
-        return lean_series(experiment)
+        return tuple(dict.fromkeys([*lean_series(experiment), *asked(experiment)]))
     states = (state.name for state in experiment.model.definition.states)
     return tuple(dict.fromkeys([*states, "energy", "energy_deviation", *asked(experiment)]))
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis import series
+from vibsim.analysis.apart_in_time import parts_of_errors, wanted
 from vibsim.analysis.floor import solution_size
 from vibsim.analysis.part import Part, by_level, energy_at_start
 from vibsim.analysis.promise import even_powers, formal_orders
@@ -165,12 +166,14 @@ class Comparison:
 def comparisons(part: Part, names: tuple[str, ...]) -> Mapping[str, Comparison]:
     """Compare quantities between the levels of a part."""
     positions = part.model.positions
+    apart = wanted(part, names)
+    names = tuple(name for name in names if name not in apart)
     values = {name: part.series(name) for name in dict.fromkeys((*positions, *names))}
     sizes = {"energy": _energy_size(part)}
     # what is rounded in one coordinate is felt by the others
     whole = [part.size(name, values[name], sizes) for name in positions]
     sizes |= {name: np.asarray(np.maximum.reduce(whole)) for name in positions}
-    found = {}
+    found: dict[str, Comparison] = {}
     for name in names:
         scale = part.size(name, values[name], sizes)
         attrs = part.finest.variables[name].attrs if name in part.finest else {}
@@ -185,7 +188,7 @@ def comparisons(part: Part, names: tuple[str, ...]) -> Mapping[str, Comparison]:
             floor=part.floor_of(name, scale * part.magnified),
             scale=scale,
         )
-    return found
+    return found | parts_of_errors(part, found, apart, Comparison)
 
 
 def _energy_size(part: Part) -> Floats:

@@ -12,6 +12,7 @@ from vibsim import theory
 from vibsim.analysis.corners import words_of
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Orders, Outcome
 from vibsim.analysis.part import fastest
+from vibsim.analysis.parts_told import parts_in_words
 from vibsim.analysis.promise import (
     columns_of,
     formal_orders,
@@ -131,6 +132,7 @@ def _story(
         scheme=spec.name,
         has_corners=has_corners(experiment.model.definition),
         corner=_corner(experiment, record, scheme, case),
+        parts=parts_in_words(experiment.model.definition, record, check.converges, scheme, case),
     )
 
 

@@ -14,6 +14,7 @@ from vibsim.analysis.part import plain_name
 from vibsim.analysis.series import largest
 from vibsim.analysis.verdict import Judgement, judge
 from vibsim.models import ENERGIES
+from vibsim.models.error_parts import is_error_part
 from vibsim.vocabulary import TOLERANCE
 
 if TYPE_CHECKING:
@@ -61,8 +62,8 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
     grid, shape = part.grid, part.shape
     points = len(grid.t)
     size, exists = _size(q.values[-1])
-    if plain_name(q.name) in ENERGIES:
-        # what is left of an energy is known no better than the energy
+    if plain_name(q.name) in ENERGIES or is_error_part(q.name):
+        # what is left of an energy is known no better than the energy, and a part of an error no better than the motion
         size = q.scale
 
     def in_norm(noise: Floats) -> Floats:

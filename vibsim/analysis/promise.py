@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from vibsim import plan
 from vibsim.analysis.floor import relative_floor
 from vibsim.models import Model
+from vibsim.models.error_parts import whole_of
 from vibsim.record import Record
 from vibsim.schemes import SCHEMES, Options, Scheme
 from vibsim.schemes.base import ORDER_AT_CORNERS, OptionValue, is_on_the_mesh
@@ -50,17 +51,17 @@ def options_of(experiment: Experiment, columns: Columns, scheme: int, case: int)
 def formal_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floats:
     """Return the order that every scheme promises for a quantity, shape (scheme, case).
 
-    It is infinite for what is exact, and NaN for a scheme that chooses its own steps. Where no option is swept there is
-    one case for all, here and below.
+    It is infinite for what is exact, and NaN for a scheme that chooses its own steps; of a part of an error it is that
+    of the position. Where no option is swept there is one case for all, here and below.
     """
-    model = experiment.model.definition
-    return _each(experiment, columns, lambda s, o: float(s.formal_order(quantity, model, o)))
+    model, of = experiment.model.definition, whole_of(quantity)
+    return _each(experiment, columns, lambda s, o: float(s.formal_order(of, model, o)))
 
 
 def even_powers(experiment: Experiment, quantity: str, columns: Columns) -> NDArray[np.bool_]:
     """Tell whether the error of a quantity has every second power only, shape (scheme, case)."""
-    model = experiment.model.definition
-    even = _each(experiment, columns, lambda s, o: float(s.has_even_powers(quantity, model, o)))
+    model, of = experiment.model.definition, whole_of(quantity)
+    even = _each(experiment, columns, lambda s, o: float(s.has_even_powers(of, model, o)))
     return np.asarray(even != 0)
 
 

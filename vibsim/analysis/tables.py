@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from vibsim.analysis import series
 from vibsim.analysis.compare import Comparison
+from vibsim.analysis.local_order import local_order, window_points
 from vibsim.analysis.part import CENTRED, by_level, plain_name
 from vibsim.analysis.promise import options_swept
+from vibsim.analysis.swing import swing
 from vibsim.models import ENERGIES
 from vibsim.record import Variable, attributes
 
@@ -115,6 +117,7 @@ def over_time(q: Comparison) -> Table:
         _pairs(q, add)
     if len(q.differences) > 1:
         _ratios(q, add)
+        _local_orders(q, add)
     return table
 
 
@@ -149,3 +152,24 @@ def _ratios(q: Comparison, add: Add) -> None:
     add("ratio", (*of_triple, "t"), np.stack(ratio, 2), words, "1")
     words = "least-squares factor between successive differences"
     add("proportionality", of_triple, by_level(factor), words, "1")
+
+
+WINDOW = 0.5
+"""Length of the window of a local order, in periods."""
+
+
+def _local_orders(q: Comparison, add: Add) -> None:
+    """Add the order of every triple as a function of time, with its interval, in single precision."""
+    grid = q.part.grid
+    counts = window_points(WINDOW * swing(q.part), grid.spacing, len(grid.t))
+    floor = [q.floor[..., i] + q.floor[..., i + 1] for i in range(len(q.differences))]
+    rows = [
+        local_order(
+            a, b, grid.levels[i : i + 3], (floor[i], floor[i + 1]), counts, grid.end_included
+        )
+        for i, (a, b) in enumerate(pairwise(q.differences))
+    ]
+    words = {"": "order over time", "_low": "its lower end", "_high": "its upper end"}
+    for k, (end, text) in enumerate(words.items()):
+        found = np.stack([row[k] for row in rows], 2).astype(np.float32)
+        add(f"local_order{end}", ("scheme", "case", "triple", "t"), found, text, "1")

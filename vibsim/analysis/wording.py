@@ -52,6 +52,8 @@ class Story:
     """Whether steps have corners of a force from a table inside."""
     corner: Corner | None = None
     """The first other corner of the force within a step."""
+    parts: str = ""
+    """What phase and amplitude of the error say of it (`vibsim.analysis.parts_told`)."""
 
 
 def number(value: float) -> str:
@@ -121,7 +123,7 @@ def tell(s: Story) -> str:
             )
         case "order_low" | "order_high":
             word = "slower" if s.reason == "order_low" else "faster"
-            return f"{s.quantity} converges {word} than {promised}: with {measured}.{_cause(s)}"
+            return f"{s.quantity} converges {word} than {promised}: with {measured}.{_cause(s)}{s.parts}"
         case "wrong_limit":
             return (
                 f"The levels of {s.quantity} approach each other, but not the exact solution: the "
@@ -171,7 +173,7 @@ def tell(s: Story) -> str:
         case "not_applicable":
             return f"{s.quantity} does not exist here, so there is nothing to judge."
     so_far = f": the last estimate is {measured}" if measured else ""
-    return f"The step is still too coarse to tell the order of {s.quantity}{so_far}."
+    return f"The step is still too coarse to tell the order of {s.quantity}{so_far}.{s.parts}"
 
 
 def advise(s: Story) -> str:

@@ -50,7 +50,7 @@ def _measured(check: Measurement) -> str:
 def _converges(check: ConvergesCheck) -> str:
     order = "the order of its scheme" if check.order == "scheme" else f"order {check.order:g}"
     only = f", {_listed('scheme', check.schemes)}" if check.schemes else ""
-    text = f"{words.symbol(check.converges)} converges with {order} ± {check.tolerance:g} ({check.norm} norm{only})"
+    text = f"{words.title(check.converges)} converges with {order} ± {check.tolerance:g} ({check.norm} norm{only})"
     if check.expect.status == "PASS":
         return text
     why = f" ({check.expect.reason})" if check.expect.reason else ""
@@ -60,10 +60,10 @@ def _converges(check: ConvergesCheck) -> str:
 def subject(check: Measurement) -> str:
     """Return what is measured, and where, without what is expected of a number or of a difference."""
     if check.kind == "equal":
-        return f"{words.symbol(check.quantity)} by {check.first}{_where(check)}"
+        return f"{words.title(check.quantity)} by {check.first}{_where(check)}"
     if check.kind != "value":
         return _measured(check)
-    of = f" of {words.symbol(check.quantity)}" if check.quantity else ""
+    of = f" of {words.title(check.quantity)}" if check.quantity else ""
     places = ((key, getattr(check.at, key)) for key in ("t", "step", "level", "scheme", "case"))
     where = ", ".join(f"{key} {value}" for key, value in places if value is not None)
     return f"{words.spoken(check.value)}{of}{f' at {where}' if where else ''}"
@@ -117,7 +117,7 @@ def _equal(check: EqualCheck) -> str:
     known = {"exact": "the exact solution", "discrete": "the exact solution of its own steps"}
     other = known.get(check.second, check.second)
     within = "round-off" if check.atol is None else words.readable(f"{check.atol:g}")
-    letter = words.symbol(check.quantity)
+    letter = words.title(check.quantity)
     return f"{letter} by {check.first} equals that of {other} to {within}{_where(check)}"
 
 

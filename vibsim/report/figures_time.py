@@ -12,7 +12,7 @@ import numpy as np
 
 from vibsim.analysis.series import gap_ratio, rescaling, target_ratio
 from vibsim.record import Record
-from vibsim.report import figures_frame, style, words
+from vibsim.report import figures_frame, panels_order, style, words
 from vibsim.report.data import (
     Floats,
     Member,
@@ -49,13 +49,23 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
     letter, measure = words.symbol(quantity), unit(record, f"{quantity}_difference")
     curves = differences(record, quantity, member)
     spread, ratios = comparable(curves), len(whole(record, "triple")) > 0
-    axes = panels([2.4, *([1.3] if spread else []), *([1.5] if ratios else [])])
+    orders = ratios and panels_order.has_order(record, quantity, member)
+    heights = [
+        2.4,
+        *([1.3] if spread else []),
+        *([1.5] if ratios else []),
+        *([1.5] if orders else []),
+    ]
+    axes = panels(heights)
     draw_curves(axes[0], t, curves, f"rescaled difference of {letter}", measure)
     axes[0].set_title("Rescaled differences between successive levels")
     if spread:
         draw_spread(axes[1], t, curves, measure)
     if ratios:
-        _draw_ratios(axes[-1], t, record, quantity, member, order)
+        _draw_ratios(axes[-2 if orders else -1], t, record, quantity, member, order)
+    if orders:
+        good = _good(record, quantity, member)
+        panels_order.draw_orders(axes[-1], t, record, quantity, member, good, _few(good))
     axes[-1].set_xlabel(style.label("t", time_unit(record)))
     first = whole(record, "pair")[0]
     low = words.lowered(first)
@@ -69,17 +79,19 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
         "Then the spread: how far each curve is from the finest one above round-off."
         if spread
         else "",
-        "Bottom: the ratio of successive differences; it should settle at the dashed line. Near a zero crossing a "
+        "Below it: the ratio of successive differences; it should settle at the dashed line. Near a zero crossing a "
         "ratio of two small numbers means nothing: it is left out."
         if ratios
         else "",
+        panels_order.CAPTION if orders else "",
     ]
     return Picture(
         name=f"differences_{quantity}_{member.stem}",
-        title=f"Do the levels agree? {letter}, {member.title}",
+        title=f"Do the levels agree? {words.title(quantity)}, {member.title}",
         caption=" ".join(part for part in parts if part),
         alt=f"Rescaled level differences of {words.name(quantity)} against time for {member.title}"
-        + (", with the ratio of successive differences" if ratios else ""),
+        + (", with the ratio of successive differences" if ratios else "")
+        + (" and the order over time" if orders else ""),
         figure=figure_of(axes[0]),
     )
 
@@ -174,12 +186,17 @@ def _few(sound: list[bool]) -> list[int]:
     return [*kept, *lost]
 
 
+def _good(record: Record, quantity: str, member: Member) -> list[bool]:
+    """Say of every triple whether both of its differences stand above round-off."""
+    above = sound_pairs(record, quantity, member)
+    return [all(above[i : i + 2]) for i in range(len(whole(record, "triple")))]
+
+
 def _draw_ratios(
     ax: Axes, t: Floats, record: Record, quantity: str, member: Member, order: float
 ) -> None:
     levels, count = whole(record, "level"), len(whole(record, "triple"))
-    above = sound_pairs(record, quantity, member)
-    good = [all(above[i : i + 2]) for i in range(count)]
+    good = _good(record, quantity, member)
     chosen = _few(good)
     drawn: list[Floats] = []
     lost = [_lost(record, quantity, member, [i, i + 1, i + 2]) for i in range(count)]
@@ -200,7 +217,7 @@ def _draw_ratios(
     if not drawn:
         note = (
             "no ratio means anything: the runs grow without bound, or break down"
-            if any(above) or set(lost) != {figures_frame.ROUND_OFF}
+            if set(lost) != {figures_frame.ROUND_OFF}
             else "nothing to divide: every difference is within round-off, or zero"
         )
         ax.text(0.5, 0.7, note, transform=ax.transAxes, ha="center", color=style.GREY)

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
+from vibsim.models.error_parts import AMPLITUDE, PHASE, is_error_part, whole_of
 from vibsim.report.style import power
 
 SYMBOLS = {
@@ -32,8 +33,25 @@ CENTRED = "_d2t"
 """Ends the name of a quantity that is made with the centred difference ``[D_2t u]`` of the position."""
 
 
+PARTS = {PHASE: ("φ({})", "phase error of {}"), AMPLITUDE: ("a({})", "amplitude error of {}")}
+"""Of a part of a position's error, by the end of its name: letter and words."""
+
+
+def _part(quantity: str, form: int) -> str:
+    """Write a part of a position's error as a letter (0) or in words (1)."""
+    whole = whole_of(quantity)
+    return PARTS[quantity.removeprefix(whole)][form].format(SYMBOLS.get(whole, whole))
+
+
+def title(quantity: str) -> str:
+    """Return a quantity as it stands in the title of a figure, and in a sentence: its letter, or a part in words."""
+    return _part(quantity, 1) if is_error_part(quantity) else symbol(quantity)
+
+
 def symbol(quantity: str) -> str:
     """Return the letter of a quantity; its name where it has none."""
+    if is_error_part(quantity):
+        return _part(quantity, 0)
     plain = quantity.removesuffix(CENTRED)
     letter = SYMBOLS.get(plain, plain)
     return letter if plain == quantity else f"{letter} by [D₂ₜu]"
@@ -41,6 +59,8 @@ def symbol(quantity: str) -> str:
 
 def name(quantity: str) -> str:
     """Return a quantity in words."""
+    if is_error_part(quantity):
+        return f"the {_part(quantity, 1)}, {_part(quantity, 0)}"
     plain = quantity.removesuffix(CENTRED)
     text = NAMES.get(plain, plain)
     return text if plain == quantity else f"{text} by the centred difference [D₂ₜu]"
@@ -79,7 +99,7 @@ def told(check: Mapping[str, Any], field: str = "text") -> str:
     claim, mark, measured = text.rpartition(_MEASURED)
     parts = measured.split("`")
     if quantity:
-        letter = symbol(quantity)
+        letter = title(quantity)
         parts[::2] = [re.sub(rf"\b{re.escape(quantity)}\b", letter, p) for p in parts[::2]]
     parts[::2] = map(readable, parts[::2])
     return claim + mark + "`".join(parts)

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from vibsim.errors import nearest
+from vibsim.models.error_parts import is_error_part
 from vibsim.spec.check_places import (
     Ladder,
     check_anywhere,
@@ -15,6 +16,7 @@ from vibsim.spec.check_places import (
 )
 from vibsim.spec.checks import Check, ClaimCheck, ConvergesCheck, ValueCheck
 from vibsim.spec.faults import Report
+from vibsim.spec.part_rules import known_part, promised_part
 from vibsim.spec.quantity_rules import has_quantity, known_quantity
 from vibsim.spec.scheme_check_rules import conserves, equal, stable
 from vibsim.spec.scheme_checks import ConservesCheck, EqualCheck, StableCheck
@@ -88,7 +90,10 @@ def _check(check: Check, path: Path_, ladder: Ladder, report: Report) -> None:
 
 def _converges(check: ConvergesCheck, path: Path_, ladder: Ladder, report: Report) -> None:
     known_schemes(check.schemes, path, ladder, report)
-    if known_quantity(check.converges, (*path, "converges"), ladder, report):
+    if is_error_part(check.converges):
+        known_part(check.converges, (*path, "converges"), ladder, report)
+        promised_part(check, path, report)
+    elif known_quantity(check.converges, (*path, "converges"), ladder, report):
         named = ((name, (*path, "schemes", i)) for i, name in enumerate(check.schemes or ()))
         has_quantity(check.converges, named, ladder, report)
     reason = check.expect.reason

@@ -117,7 +117,8 @@ class ConvergesCheck(Section):
     id: GivenId = ""
     """Name of the check, unique in the file; `check_1` and so on when left out."""
     converges: Text
-    """The quantity: a state, or energy, energy_deviation, kinetic_energy, potential_energy."""
+    """The quantity: a state, energy, energy_deviation, kinetic_energy, potential_energy, or the part of an error
+    `<position>_phase_error` or `<position>_amplitude_error`."""
     order: Order = "scheme"
     """The order: `scheme` for the order that the scheme promises, or a number."""
     tolerance: Positive = TOLERANCE

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from vibsim.errors import nearest
 from vibsim.models import BUDGET, centred, has_budget, has_solution, quantities
+from vibsim.models.error_parts import error_parts
 from vibsim.spec.check_places import Ladder
 from vibsim.spec.faults import Report
 from vibsim.spec.source import Path_
@@ -125,6 +126,8 @@ def allowed(row: Value, ladder: Ladder, best: bool = False) -> tuple[str, ...]:
             return deviations
         case "extremal":
             return (*states, *deviations)
+        case "convergent" if not best:
+            return (*all_quantities(ladder), *error_parts(model))
     if best:
         return (*states, *ENERGIES, *more)
     return all_quantities(ladder)

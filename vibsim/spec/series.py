@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from vibsim.models.error_parts import is_error_part
 from vibsim.spec.sampling import SMALL, is_lean
 
 if TYPE_CHECKING:
@@ -36,7 +37,9 @@ def lean_series(experiment: Experiment) -> tuple[str, ...]:
     else a check asks for.
     """
     states = (state.name for state in experiment.model.definition.states)
-    return tuple(dict.fromkeys([*states, "energy_deviation", *asked(experiment)]))
+    # parts of an error are made of the states
+    more = (name for name in asked(experiment) if not is_error_part(name))
+    return tuple(dict.fromkeys([*states, "energy_deviation", *more]))
 
 
 def running_series(experiment: Experiment) -> tuple[str, ...]:

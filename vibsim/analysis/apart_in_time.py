@@ -1,0 +1,178 @@
+r"""Phase and amplitude of a position's error as quantities of their own, compared between levels like any other.
+
+``<position>_phase_error`` is the time by which the computed motion is early, ``<position>_amplitude_error`` the part by
+which its amplitude is too large, both against one and the same motion at every level (`vibsim.analysis.shift`): the
+exact one, where it is known, else the extrapolated one. Both vanish for the exact solution. A part that is not found at
+some time, or at some level, does not exist for that scheme and member.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.analysis.part import Part
+from vibsim.analysis.promise import formal_orders
+from vibsim.analysis.shift import shift, strides
+from vibsim.analysis.swing import swing
+from vibsim.analysis.template import template
+from vibsim.expression import values
+from vibsim.models import tree
+from vibsim.models.error_parts import AMPLITUDE, PHASE, has_error_parts, is_error_part, whole_of
+
+if TYPE_CHECKING:
+    from vibsim.analysis.compare import Comparison
+
+Floats = NDArray[np.float64]
+
+LONG_NAMES = {
+    PHASE: "time by which {} is early",
+    AMPLITUDE: "part by which the amplitude of {} is too large",
+}
+ALWAYS = 2**14
+"""Samples of all schemes, members and levels up to which the parts are looked at without being asked for."""
+
+Make = Callable[..., "Comparison"]
+
+
+def wanted(part: Part, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return those of `names` that are parts, and of a small experiment the parts of every position.
+
+    They are made of the states, and let a verdict on the position say which of the two is wrong.
+    """
+    asked = [name for name in names if is_error_part(name)]
+    schemes, cases = part.shape
+    size = schemes * cases * len(part.grid.t) * len(part.grid.levels)
+    small = not part.lean and len(part.grid.levels) > 2 and size <= ALWAYS
+    small &= {*part.model.positions, *part.model.velocities} <= {*names}
+    more = part.model.positions if small and has_error_parts(part.model) else ()
+    return tuple(
+        dict.fromkeys([*asked, *(name + end for name in more for end in (PHASE, AMPLITUDE))])
+    )
+
+
+def parts_of_errors(
+    part: Part, found: Mapping[str, Comparison], names: tuple[str, ...], make: Make
+) -> dict[str, Comparison]:
+    """Compare parts of errors between levels.
+
+    Parameters
+    ----------
+    found
+        The states, compared.
+    names
+        Of the parts.
+    make
+        Makes a `Comparison` of its fields.
+    """
+    parts: dict[str, Comparison] = {}
+    for position in dict.fromkeys(map(whole_of, names)):
+        told, floors, known = _told(part, found, position)
+        for k, end in enumerate((PHASE, AMPLITUDE)):
+            name = position + end
+            if name not in names:
+                continue
+            scale = floors[k]
+            parts[name] = make(
+                part=part,
+                name=name,
+                long_name=LONG_NAMES[end].format(found[position].long_name),
+                units="s" if end == PHASE else "1",
+                values=[row[k] for row in told],
+                exact=np.zeros((1, *told[0][k].shape[1:])) if known else None,
+                order=_order(part, name),
+                floor=part.floor_of(name, scale * part.magnified),
+                scale=scale,
+            )
+    return parts
+
+
+def _order(part: Part, name: str) -> Floats:
+    """Return the order by which a part is rescaled: that of the first check which expects one, else the position's.
+
+    A claim that is known to be false, and a check that is to fail, expect none.
+    """
+    order = formal_orders(part.experiment, name, part.columns).copy()
+    for check in reversed(part.experiment.checks):
+        inner = check.measured
+        if inner.kind != "converges" or inner.converges != name or inner.order == "scheme":
+            continue
+        if inner.expect.status != "PASS" or (check.kind == "claim" and not check.holds):
+            continue
+        for s, scheme in enumerate(part.experiment.schemes):
+            if inner.schemes is None or scheme.name in inner.schemes:
+                order[s] = float(inner.order)
+    order[part.adaptive] = np.nan
+    return order
+
+
+def _told(
+    part: Part, found: Mapping[str, Comparison], position: str
+) -> tuple[list[tuple[Floats, Floats]], tuple[Floats, Floats], bool]:
+    """Return phase and amplitude at every level, the sizes their round-off is relative to, and if the truth is known.
+
+    Shapes (scheme, case, t) and (scheme, case).
+    """
+    place = part.model.positions.index(position)
+    states = [*part.model.positions, *part.model.velocities]
+    known = all(found[name].exact is not None for name in states)
+    shape = (*part.shape, len(part.grid.t))
+    truth = {name: _truth(found[name], known, shape) for name in states}
+    speed = part.model.velocities[place]
+    push = _push(part, place, truth)
+    period = np.broadcast_to(swing(part), part.shape)
+    spacing = np.broadcast_to(part.grid.spacing, part.shape)
+    u, v, a = (_rows(x) for x in (truth[position], truth[speed], push))
+    of = template(u, v, a, spacing.ravel())
+    stride = strides(period.ravel(), spacing.ravel(), shape[-1])
+    told = []
+    for level in range(len(part.grid.levels)):
+        moved, moving = (_rows(found[name].values[level]) for name in (position, speed))
+        one = shift(moved, moving, of, period.ravel(), stride)
+        told.append((one.time.reshape(shape), one.factor.reshape(shape)))
+    _all_or_none(told)
+    rest, fastest = (_least(x, stride).reshape(part.shape) for x in (u, v))
+    scale = found[position].scale
+    return told, (scale / fastest, scale / rest), known
+
+
+def _truth(q: Comparison, known: bool, shape: tuple[int, ...]) -> Floats:
+    """Return what a state should be, shape (scheme, case, t)."""
+    best = q.exact if known and q.exact is not None else q.extrapolation[0]
+    return np.broadcast_to(best, shape)
+
+
+def _rows(values: Floats) -> Floats:
+    return np.ascontiguousarray(values.reshape(-1, values.shape[-1]))
+
+
+def _push(part: Part, place: int, truth: Mapping[str, Floats]) -> Floats:
+    """Return the acceleration of a coordinate along a motion, shape (scheme, case, t)."""
+    model = part.model
+    parameters = {row.name: part.group.parameters[row.key][:, None] for row in model.parameters}
+    numbers = {**parameters, **truth, "t": part.grid.times(part.group.end)}
+    shape = next(iter(truth.values())).shape
+    return np.broadcast_to(values(tree(model, model.accelerations[place]), numbers), shape)
+
+
+def _all_or_none(told: list[tuple[Floats, Floats]]) -> None:
+    """Take a scheme and member out of all levels where a part of it is missing at one."""
+    every = np.all([np.isfinite(time).all(axis=-1) for time, _ in told], axis=0)
+    for pair in told:
+        for values_ in pair:
+            values_[~every] = np.nan
+
+
+def _least(values: Floats, stride: NDArray[np.int64]) -> Floats:
+    """Return the smallest of the largest values within pieces as long as a window, shape (r,)."""
+    found = np.full(len(values), np.nan)
+    points = values.shape[-1]
+    for row in np.flatnonzero(stride > 0).tolist():
+        length = min(int(stride[row]) * 16, points)
+        pieces = points // length
+        size = np.abs(values[row, : pieces * length]).reshape(pieces, length)
+        found[row] = np.min(np.max(size, axis=-1))
+    return np.where(found > 0, found, np.nan)
