@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis import series
+from vibsim.analysis import best, series
 from vibsim.analysis.belonging import SAME_AT_EVERY_LEVEL
 from vibsim.analysis.compare import Comparison, comparisons
 from vibsim.analysis.evidence import judgement
@@ -82,6 +82,7 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
         if not part.lean:
             table |= over_time(q)
     table |= _scalars(part) | measured(part, found) | motion(part, found)
+    table |= best.table(part, found)
     if experiment.tolerance is not None:
         table |= bounds(part)
     if not part.lean:
@@ -127,6 +128,7 @@ def _coords(part: Part) -> Table:
     ids = [check.id for check in part.experiment.checks]
     if ids:
         coords["check"] = Variable(("check",), np.array(ids), attributes("name of the check", "1"))
+    coords |= best.coordinate(part)
     steps = np.array(grid.steps, dtype=np.int64)
     coords["steps"] = Variable(("level",), steps, attributes("number of time steps", "1"))
     dims = ("level", "case") if "end" in part.finest else ("level",)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis import behaviour, values
+from vibsim.analysis import behaviour, best, values
 from vibsim.analysis.compare import Comparison
 from vibsim.analysis.evidence import judge_check
 from vibsim.analysis.part import Part
@@ -25,7 +25,12 @@ Codes = NDArray[Any]
 FIELDS: Mapping[str, tuple[str, type[np.generic], float, str]] = {
     "value": ("order", np.float64, np.nan, "number that each check measured"),
     "low": ("low", np.float64, np.nan, "lower end of the order of each check, or what it allows"),
-    "high": ("high", np.float64, np.nan, "upper end of the order of each check"),
+    "high": (
+        "high",
+        np.float64,
+        np.nan,
+        "upper end of the order of each check, or the bound of the error of an extrapolated number",
+    ),
     "first": ("first", np.int16, -1, "first level that the order rests on, -1 for none"),
     "last": ("last", np.int16, -1, "last level that the order rests on, -1 for none"),
     "culprit": ("culprit", np.int16, -1, "coarsest level that broke down, -1 for none"),
@@ -62,7 +67,7 @@ def measured(part: Part, compared: Mapping[str, Comparison]) -> dict[str, Variab
         elif inner.kind == "value":
             at = inner.at
             place = values.Place(part, compared, inner.quantity or "", at.level, at.t, at.step)
-            table["value"][i] = values.value(inner.value, place)
+            table["value"][i], table["high"][i] = best.value(inner.value, place)
         else:
             for name, found in _behaviour(part, compared, inner).items():
                 table[name][i] = found

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.analysis.best import has_limit
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
 from vibsim.analysis.wording import number
 from vibsim.record import Record
@@ -36,14 +37,28 @@ MAY_BE_INFINITE = frozenset({"exact_period"})
 """Numbers that are infinite for a sound member, on the separatrix: they do not exist there."""
 UNBOUNDED = frozenset({"stability_limit"})
 """Numbers of which infinity is a value: above every other number."""
+FEW = 3
+"""Fewer levels do not show how large an error is."""
 ROUND_OFF = 1e-13
 """A number that is no larger is rounding."""
 DEFAULT_RTOL, DEFAULT_ATOL = 1e-9, 1e-12
 """Tolerance of ``equals`` where a check gives none."""
 
 
-def valued(experiment: Experiment, record: Record, check: ValueCheck, measured: Floats) -> Outcome:
-    """Compare a measured number, shape (scheme, case), with what the check asks of it."""
+def valued(experiment: Experiment, record: Record, check: ValueCheck, index: int) -> Outcome:
+    """Compare a measured number with what the check asks of it.
+
+    A limit of several levels is compared with its bound: where the number may as well be on the other side of the
+    border, nothing is decided.
+
+    Parameters
+    ----------
+    record
+        Convergence Record.
+    index
+        Number of the check in it.
+    """
+    measured, bound = record["check_value"][index], record["check_high"][index]
     names = record.words("scheme")
     at = check.at
     schemes = list(schemes_of(experiment, check))
@@ -56,15 +71,18 @@ def valued(experiment: Experiment, record: Record, check: ValueCheck, measured: 
     infinite = np.isinf(measured) & (check.value not in UNBOUNDED)
     if check.value in MAY_BE_INFINITE:
         infinite, measured = np.zeros_like(infinite), np.where(infinite, np.nan, measured)
-    masks = [lost | infinite, np.isnan(measured), holds]
-    status = np.select(masks, [FAIL, INCONCLUSIVE, PASS], FAIL).astype(np.int8)
-    codes = [REASON_NAMES.index(name) for name in ("non_finite", "not_applicable", "match")]
+    open_ = _is_open(check, away, bound)
+    masks = [lost | infinite, np.isnan(measured), open_, holds]
+    status = np.select(masks, [FAIL, INCONCLUSIVE, INCONCLUSIVE, PASS], FAIL).astype(np.int8)
+    few = "too_few_levels" if len(record["level"]) < FEW else "pre_asymptotic"
+    codes = [REASON_NAMES.index(name) for name in ("non_finite", "not_applicable", few, "match")]
     reason = np.select(masks, codes, REASON_NAMES.index("mismatch"))
     what = f"{check.value} of {check.quantity}" if check.quantity else check.value
 
     def tell(scheme: int, case: int) -> str:
         found = float(measured[scheme, case])
-        return _tell(what, REASON_NAMES[int(reason[scheme, case])], found, rule)
+        word = REASON_NAMES[int(reason[scheme, case])]
+        return _tell(what, word, found, rule, _bound_in_words(check, float(bound[scheme, case])))
 
     return Outcome(
         schemes=[names[i] for i in schemes],
@@ -114,16 +132,33 @@ def depends_on_level(name: str) -> bool:
     return "level" in VALUES[name].at or sees_several_levels(name)
 
 
-def _tell(what: str, reason: str, found: float, rule: str) -> str:
+def _is_open(check: ValueCheck, away: Floats, bound: Floats) -> Flags:
+    """Say where the number may be on the other side of the border as well, as far as its error is known."""
+    if not has_limit(check.value, check.at.level):
+        return np.zeros(away.shape, dtype=bool)
+    return ~(np.abs(away) > bound)
+
+
+def _bound_in_words(check: ValueCheck, bound: float) -> str:
+    if not has_limit(check.value, check.at.level):
+        return ""
+    if np.isnan(bound):
+        return ", with an error that is not known: the levels do not approach each other"
+    return f", with an error of at most {bound:.2g}"
+
+
+def _tell(what: str, reason: str, found: float, rule: str, error: str) -> str:
     match reason:
         case "non_finite":
             return f"{what} means nothing here: the calculation met a number that is not finite."
         case "not_applicable":
             return f"{what} does not exist here, or was not stored."
+        case "pre_asymptotic" | "too_few_levels":
+            return f"{what} is {found:.10g}{error}: that does not tell whether it is {rule}."
     verb = "is" if reason == "match" else "is not"
     # of round-off two digits say all
     digits = 2 if reason == "match" and abs(found) <= ROUND_OFF else 10
-    return f"{what} is {found:.{digits}g}; it {verb} {rule}."
+    return f"{what} is {found:.{digits}g}{error}; it {verb} {rule}."
 
 
 def sees_several_levels(name: str) -> bool:
