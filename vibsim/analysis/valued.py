@@ -48,8 +48,7 @@ DEFAULT_RTOL, DEFAULT_ATOL = 1e-9, 1e-12
 def valued(experiment: Experiment, record: Record, check: ValueCheck, index: int) -> Outcome:
     """Compare a measured number with what the check asks of it.
 
-    A limit of several levels is compared with its bound: where the number may as well be on the other side of the
-    border, nothing is decided.
+    A limit of several levels that misses what is asked by less than its bound may be right: nothing is decided then.
 
     Parameters
     ----------
@@ -72,10 +71,10 @@ def valued(experiment: Experiment, record: Record, check: ValueCheck, index: int
     if check.value in MAY_BE_INFINITE:
         infinite, measured = np.zeros_like(infinite), np.where(infinite, np.nan, measured)
     open_ = _is_open(check, away, bound)
-    masks = [lost | infinite, np.isnan(measured), open_, holds]
-    status = np.select(masks, [FAIL, INCONCLUSIVE, INCONCLUSIVE, PASS], FAIL).astype(np.int8)
+    masks = [lost | infinite, np.isnan(measured), holds, open_]
+    status = np.select(masks, [FAIL, INCONCLUSIVE, PASS, INCONCLUSIVE], FAIL).astype(np.int8)
     few = "too_few_levels" if len(record["level"]) < FEW else "pre_asymptotic"
-    codes = [REASON_NAMES.index(name) for name in ("non_finite", "not_applicable", few, "match")]
+    codes = [REASON_NAMES.index(name) for name in ("non_finite", "not_applicable", "match", few)]
     reason = np.select(masks, codes, REASON_NAMES.index("mismatch"))
     what = f"{check.value} of {check.quantity}" if check.quantity else check.value
 
@@ -133,10 +132,10 @@ def depends_on_level(name: str) -> bool:
 
 
 def _is_open(check: ValueCheck, away: Floats, bound: Floats) -> Flags:
-    """Say where the number may be on the other side of the border as well, as far as its error is known."""
+    """Say where a number misses what is asked by no more than its error may be."""
     if not has_limit(check.value, check.at.level):
         return np.zeros(away.shape, dtype=bool)
-    return ~(np.abs(away) > bound)
+    return ~(away > bound)
 
 
 def _bound_in_words(check: ValueCheck, bound: float) -> str:
@@ -154,7 +153,7 @@ def _tell(what: str, reason: str, found: float, rule: str, error: str) -> str:
         case "not_applicable":
             return f"{what} does not exist here, or was not stored."
         case "pre_asymptotic" | "too_few_levels":
-            return f"{what} is {found:.10g}{error}: that does not tell whether it is {rule}."
+            return f"{what} is {found:.10g}{error}: it may be {rule}, or not."
     verb = "is" if reason == "match" else "is not"
     # of round-off two digits say all
     digits = 2 if reason == "match" and abs(found) <= ROUND_OFF else 10
