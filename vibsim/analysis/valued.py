@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis.best import has_limit
+from vibsim.analysis.costs import cost_in_words
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
 from vibsim.analysis.wording import number
 from vibsim.record import Record
@@ -96,7 +97,9 @@ def valued(experiment: Experiment, record: Record, check: ValueCheck, index: int
         expects_pass=True,
         quantity=check.quantity,
         tell=tell,
-        advise=lambda scheme, case: _advise(check, REASON_NAMES[int(reason[scheme, case])]),
+        advise=lambda scheme, case: _advise(
+            experiment, check, REASON_NAMES[int(reason[scheme, case])]
+        ),
         value=measured,
     )
 
@@ -108,20 +111,35 @@ _ADVICE = {
         "the number exists."
     ),
 }
-_CORRECT = "orrect the number that the check asks for."
+FINER = 2
+"""So many finer levels are advised."""
 COUNTED = frozenset({"accepted_steps", "force_evaluations"})
 """Numbers that finer levels make larger, and no more accurate."""
 
 
-def _advise(check: ValueCheck, reason: str) -> str:
+def _advise(experiment: Experiment, check: ValueCheck, reason: str) -> str:
     """Say what to change in the YAML; finer levels only where they change the number."""
+    if reason in _ADVICE:
+        return _ADVICE[reason]
+    finest = experiment.levels[-1]
+    finer = [finest + 1 + i for i in range(FINER)]
+    cost = cost_in_words(experiment, finer)
     if reason != "mismatch":
-        return _ADVICE.get(reason, "")
+        return (
+            f"Add levels {finer[0]} and {finer[1]} to `levels:` ({cost}), so that the bound of the error shrinks, or "
+            "ask for the number of one level (`at: {level: ...}`)."
+        )
+    correct = f"orrect `{_border(check)}:`, the number that the check asks for."
     if check.value in COUNTED or not depends_on_level(check.value):
-        return f"C{_CORRECT}"
-    if isinstance(check.at.level, int):
-        return f"Ask for a finer level (`at: {{level: ...}}`), or c{_CORRECT}"
-    return f"Add finer `levels:`, or c{_CORRECT}"
+        return f"C{correct}"
+    if isinstance(check.at.level, int) and check.at.level < finest:
+        return f"Ask for a finer level (`at: {{level: {finest}}}`), or c{correct}"
+    return f"Add finer `levels:` ({finer[0]} and {finer[1]} cost {cost}), or c{correct}"
+
+
+def _border(check: ValueCheck) -> str:
+    """Return the key that holds the number that the check asks for."""
+    return next(key for key in ("equals", "below", "above") if getattr(check, key) is not None)
 
 
 def depends_on_level(name: str) -> bool:
