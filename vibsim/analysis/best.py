@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vibsim.analysis import gci, values
 from vibsim.analysis.compare import Comparison
-from vibsim.analysis.limits import Limit, limit, observed_order
+from vibsim.analysis.limits import LOUD, Limit, limit, observed_order
 from vibsim.analysis.part import Part
 from vibsim.analysis.promise import even_powers, formal_orders
 from vibsim.record import Variable, attributes
@@ -34,6 +34,9 @@ MEMBER = ("scheme", "case")
 _INTERPOLATED = frozenset(
     {"period", "period_error", "amplitude", "amplitude_error", "growth_factor"}
 )
+MISSED = 0.125
+"""An extremum lies half a step from the next grid point at most: the part of w^2 dt^2 that is missed."""
+_AT_POINTS = frozenset({"min", "max", "max_abs"})
 _ON_THE_GRID = frozenset({"min", "max", "max_abs", "relative_energy_error"})
 _OF_ROOTS = frozenset(
     {"frequency", "error_of_frequency", "phase_error_per_period", "growth_per_period"}
@@ -95,11 +98,14 @@ class _Ladder:
     order: Floats
     even: NDArray[np.bool_]
     floor: Floats
+    missed: Floats
+    """What the points of the finest grid may miss of an extremum, shape (scheme, case)."""
     levels: tuple[int, ...]
 
     def limit(self) -> Limit:
         """Return the limit."""
-        return limit(self.values, self.levels, self.order, self.even, self.floor)
+        found = limit(self.values, self.levels, self.order, self.even, self.floor)
+        return replace(found, bound=found.bound + self.missed)
 
 
 def _ladder(name: str, place: values.Place) -> _Ladder:
@@ -107,7 +113,24 @@ def _ladder(name: str, place: values.Place) -> _Ladder:
     found = _at_levels(name, place)
     found[place.part.adaptive] = np.nan
     order, even = _promised(name, place)
-    return _Ladder(found, order, even, _floor(name, place, found), place.levels)
+    floor = _floor(name, place, found)
+    return _Ladder(found, order, even, floor, _missed(name, place, found, floor), place.levels)
+
+
+def _missed(name: str, place: values.Place, found: Floats, floor: Floats) -> Floats:
+    """Return how much of an extremum lies between grid points: ``w^2 dt^2/8`` of its size at most.
+
+    How much differs from level to level by accident, which no extrapolation takes away. Nothing is missed where the
+    levels have the same number.
+    """
+    nothing = np.zeros(found.shape[:-1])
+    if name not in _AT_POINTS:
+        return nothing
+    p = np.minimum(place.part.omega_dt[:, -1], 1.0)
+    apart = np.abs(np.diff(found[..., -3:], axis=-1))
+    with np.errstate(invalid="ignore"):
+        same = np.all(apart <= LOUD * floor[..., -1:], axis=-1)
+    return np.where(same, nothing, MISSED * p**2 * _scale(name, place, found))
 
 
 def best(name: str, place: values.Place) -> Best:

@@ -130,7 +130,9 @@ def _at_rest(q: Comparison, others: Mapping[str, Comparison]) -> Flags:
 
 
 def _largest(part: Part, name: str) -> Floats:
-    """Return the largest absolute value of a state over every step."""
+    """Return the largest absolute value of a state over every step; NaN where data of other programs do not tell."""
+    if f"{name}_min" not in part.finest or f"{name}_max" not in part.finest:
+        return np.full(part.shape, np.nan)
     low, high = (np.abs(np.asarray(part.finest[f"{name}_{which}"])) for which in ("min", "max"))
     return np.asarray(np.maximum(low, high))
 

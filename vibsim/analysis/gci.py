@@ -8,7 +8,7 @@ and C. J. Roy, Verification and Validation in Scientific Computing, 2010, sectio
 
 Where levels do not converge monotonically, four and more of them are fitted by ``u + c h^p`` with least squares, and
 the index is what L. Eca and M. Hoekstra (J. Comput. Phys. 262, 2014) make of the fit and its scatter; three levels get
-three times their range, as there.
+three times their range, as there. Where they do, with another order than the promised one, it is at least that.
 
 It is absolute, in the unit of the number, so that a number may be negative or pass zero; `relative` divides by the
 number where it is not near zero.
@@ -113,6 +113,9 @@ def index(values: Floats, levels: Sequence[int], order: Floats, kinds: Codes) ->
         regular = of_order(change, gap, seen, promised)
         rough = _fitted(values, levels, promised) if n > 3 else _range(values)
         exact = (kinds == ROUND_OFF) & (change == 0.0)
+        sure = _agrees(seen, promised)
+        cautious = np.fmax(regular, rough) if n > 3 else regular
+        regular = np.where(sure, regular, cautious)
         return np.where(exact, 0.0, np.where(seen > 0, regular, rough))
 
 
@@ -126,11 +129,15 @@ def of_order(change: Floats, gap: int, seen: Floats, promised: Floats) -> Floats
     seen, promised
         Observed and promised order; NaN for one that is not known.
     """
-    agrees = np.abs(seen - promised) <= AGREES * promised
+    agrees = _agrees(seen, promised)
     factor = np.where(agrees, TRUSTED, CAUTIOUS)
     capped = np.clip(np.where(np.isfinite(seen), seen, promised), LEAST_ORDER, None)
     p = np.where(agrees, promised, np.minimum(capped, promised))
     return np.asarray(factor * change / (gap_ratio(p, gap) - 1.0))
+
+
+def _agrees(seen: Floats, promised: Floats) -> Flags:
+    return np.asarray(np.abs(seen - promised) <= AGREES * promised)
 
 
 def relative(index: Floats, value: Floats, scale: Floats) -> Floats:

@@ -14,7 +14,7 @@ an accident from an order, so that nothing is believed but what was seen:
 - a change that is smaller than the one before it promises may be passing through zero, and does not count as smaller;
 - an entry that a finer row contradicts is as wrong as the contradiction says;
 - where nothing is believed, the finest level stands as it is, with an error of `SPREAD` times what the last levels
-  differ by (L. Eca and M. Hoekstra, 2014). It is unknown where they do not approach each other.
+  differ by (L. Eca and M. Hoekstra, 2014). It is unknown where they do not approach each other, if only raggedly.
 
 Round-off is added with the weights of the combination. The entry with the least bound is taken. The factors are
 calibrated: ``docs/verdicts.md``.
@@ -47,6 +47,8 @@ LEAST_PART = 0.01
 """The least part of what was taken away that is left, where one change supports the extrapolation."""
 SPREAD, SPREAD_OF_TWO = 3.0, 4.0
 """Factor on what the last three levels differ by, and two levels where there are no more."""
+RAGGED, DECLINE = 5, 0.5
+"""Of so many levels and more, changes may fall raggedly, where the last two are at most this part of those before."""
 ROUND_OFF_SAFETY = 10.0
 """Factor on the predicted round-off, which is an order of magnitude."""
 LOUD = 30.0
@@ -144,7 +146,14 @@ def _bound_of_finest(values: Floats, floor: Floats) -> Floats:
     bound = SPREAD * (np.max(recent, axis=-1) - np.min(recent, axis=-1)) + noise
     falls = np.all(np.diff(change[..., -3:], axis=-1) < 0, axis=-1)
     rounding = np.max(change[..., -2:], axis=-1) <= BLAME * floor[..., -1]
-    return np.where(falls | rounding, bound, np.nan)
+    found = np.where(falls | rounding, bound, np.nan)
+    if n < RAGGED:
+        return found
+    # an extremum over grid points falls raggedly, as the grid happens to lie
+    recent = values[..., -RAGGED:]
+    wide = SPREAD * (np.max(recent, axis=-1) - np.min(recent, axis=-1)) + noise
+    ragged = np.max(change[..., -2:], axis=-1) < DECLINE * np.max(change[..., :-2], axis=-1)
+    return np.where(ragged, np.fmin(found, wide), found)
 
 
 class _Tableau:
