@@ -97,7 +97,7 @@ def _on_high_order(s: Story) -> str:
                 "Choose another `time: end`, or start `levels:` at a finer level, so that the common times are not "
                 "turning points alone."
             )
-        case "theory":
+        case "theory" if math.isfinite(s.order):
             return f"Set `order: {number(_likely(s))}`, which the theory of scheme {s.scheme} has here."
         case "one_norm":
             return f"Measure in another `norm:`{_or_expect(s)}."
