@@ -282,7 +282,14 @@ CASES: list[tuple[dict[str, Any], str, str, str]] = [
     ),
     (by_tolerance(1e-10, **at(step=0)), "checks[0].at.step", "cannot be named", "t can"),
     (by_tolerance(1e-10, **at(t=21)), "checks[0].at.t", "must be between 0 and the end 20", ""),
-    (by_tolerance(1e-10, **value(at={"best": True})), "checks[0].at.level", "extrapolated", ""),
+    (
+        by_tolerance(
+            1e-10, **value(value="max_abs_interior", quantity="energy_deviation", at={"best": True})
+        ),
+        "checks[0].at.level",
+        "extrapolated",
+        "",
+    ),
     # samples
     ({"samples": "some"}, "samples", "unknown choice", "choose from auto, common, all"),
     ({"samples": {"every": 0}}, "samples.every", "must be at least 1", ""),
@@ -368,7 +375,12 @@ CASES: list[tuple[dict[str, Any], str, str, str]] = [
     (value(at={"level": 10}), "checks[0].at.level", "not a level of this", "nearest is 9"),
     (value(at={"level": "top"}), "checks[0].at.level", "must be a whole number", ""),
     (value(at={"level": 41}), "checks[0].at.level", "from 0 to 40", ""),
-    (value(at={"level": "best"}), "checks[0].at.level", "extrapolated", ""),
+    (
+        value(value="max_abs_interior", quantity="energy_deviation", at={"level": "best"}),
+        "checks[0].at.level",
+        "extrapolated",
+        "",
+    ),
     (value(at={"best": False}), "checks[0].at", "best must be true", ""),
     (value(at={"best": True, "level": 6}), "checks[0].at", "not both", ""),
     (value(at={"case": 1}), "checks[0].at.case", "must be at most 0", ""),

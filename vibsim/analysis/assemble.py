@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis import series
+from vibsim.analysis import best, series
 from vibsim.analysis.belonging import SAME_AT_EVERY_LEVEL
 from vibsim.analysis.compare import Comparison, comparisons
 from vibsim.analysis.corners import corner_variables, switches_of
@@ -91,6 +91,7 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
     table |= _scalars(part) | measured(part, found) | motion(part, found)
     if switches_of(part.model):
         table |= corner_variables(part.corners)
+    table |= best.table(part, found)
     if experiment.tolerance is not None:
         table |= bounds(part)
     if not part.lean:
@@ -136,6 +137,7 @@ def _coords(part: Part) -> Table:
     ids = [check.id for check in part.experiment.checks]
     if ids:
         coords["check"] = Variable(("check",), np.array(ids), attributes("name of the check", "1"))
+    coords |= best.coordinate(part)
     steps = np.array(grid.steps, dtype=np.int64)
     coords["steps"] = Variable(("level",), steps, attributes("number of time steps", "1"))
     dims = ("level", "case") if "end" in part.finest else ("level",)

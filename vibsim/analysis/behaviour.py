@@ -19,10 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis.apart import apart
+from vibsim.analysis.behaviour_advice import BROKEN, on_distance, on_drift, on_stability
 from vibsim.analysis.compare import Comparison
 from vibsim.analysis.drifting import drift_at
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
 from vibsim.analysis.part import Part
+from vibsim.analysis.promise import columns_of, stability_limits
 from vibsim.analysis.stability import growth_at
 from vibsim.analysis.wording import growth_in_words, number, vanishing_in_words
 from vibsim.record import Record
@@ -108,6 +110,13 @@ def stable(experiment: Experiment, record: Record, check: StableCheck, index: in
             told += "; the two do not agree, so the scheme is not what the theory is of"
         return told + "."
 
+    def word_of(scheme: int, case: int) -> str:
+        return REASON_NAMES[int(reason[scheme, case])]
+
+    def limit_of(scheme: int, case: int) -> float:
+        known = stability_limits(experiment, columns_of(record))[scheme]
+        return float(known[case if len(known) > 1 else 0])
+
     with np.errstate(divide="ignore", invalid="ignore"):
         size = np.abs(np.log(measured))
     return _outcome(
@@ -122,7 +131,9 @@ def stable(experiment: Experiment, record: Record, check: StableCheck, index: in
         expects_pass=check.stable,
         quantity=None,
         tell=tell,
-        advise=lambda scheme, case: _STABLE_ADVICE[int(reason[scheme, case])],
+        advise=lambda scheme, case: on_stability(
+            word_of(scheme, case), level, float(p[scheme, case]), limit_of(scheme, case)
+        ),
         value=measured,
     )
 
@@ -161,7 +172,11 @@ def conserves(experiment: Experiment, record: Record, check: ConservesCheck, ind
             f"{size:.4g} of the energy. Expected is: {check.drift}."
         )
 
-    return _valued(experiment, record, check, reason, largest, check.drift, tell, largest)
+    def advise(scheme: int, case: int) -> str:
+        found = DRIFTS[int(kind[scheme, case])]
+        return on_drift(REASON_NAMES[int(reason[scheme, case])], found, check.conserves)
+
+    return _valued(experiment, record, check, reason, largest, check.drift, tell, largest, advise)
 
 
 _DRIFT_WORDS = {
@@ -209,7 +224,12 @@ def equal(experiment: Experiment, record: Record, check: EqualCheck, index: int)
             f"{distance[scheme, case]:.4g} apart, and may be {allowed[scheme, case]:.4g}."
         )
 
-    return _valued(experiment, record, check, reason, distance, f"equal to {second}", tell, away)
+    def advise(scheme: int, case: int) -> str:
+        word = REASON_NAMES[int(reason[scheme, case])]
+        return on_distance(word, check, float(distance[scheme, case]))
+
+    words = f"equal to {second}"
+    return _valued(experiment, record, check, reason, distance, words, tell, away, advise)
 
 
 def _valued(
@@ -221,6 +241,7 @@ def _valued(
     expected: str,
     tell: Callable[[int, int], str],
     away: Floats,
+    advise: Callable[[int, int], str],
 ) -> Outcome:
     """Return the outcome of a check that expects a PASS, from its reasons."""
     statuses = {MATCH: PASS, NOT_APPLICABLE: INCONCLUSIVE, PRE_ASYMPTOTIC: INCONCLUSIVE}
@@ -239,24 +260,11 @@ def _valued(
         expects_pass=True,
         quantity=check.about,
         tell=tell,
-        advise=lambda scheme, case: _ADVICE.get(
-            "non_finite" if reason[scheme, case] == NON_FINITE else check.kind, ""
+        advise=lambda scheme, case: (
+            BROKEN if reason[scheme, case] == NON_FINITE else advise(scheme, case)
         ),
         value=value,
     )
-
-
-_STABLE_ADVICE = {
-    MATCH: "Set `stable: true`, or take coarser `levels:` where the scheme has a limit (w dt beyond it).",
-    UNSTABLE: "Take finer `levels:` (w dt within the limit of the scheme), or correct `stable:`.",
-    MISMATCH: "Look for an error in the scheme: it does not grow as its own theory says.",
-}
-"""Advice by what was measured."""
-_ADVICE = {
-    "conserves": "Lengthen the run (`time:`), take finer `levels:`, or correct `drift:`.",
-    "equal": "Compare the two in the report, give `atol:`, or correct what the check expects.",
-    "non_finite": "Start `levels:` at a finer level, or shorten `time: end`.",
-}
 
 
 def _outcome(

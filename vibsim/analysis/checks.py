@@ -91,7 +91,7 @@ def _measure(experiment: Experiment, record: Record, check: Measurement, index: 
         case "converges":
             return converges(experiment, record, check, index)
         case "value":
-            return valued(experiment, record, check, record["check_value"][index])
+            return valued(experiment, record, check, index)
         case "stable":
             return behaviour.stable(experiment, record, check, index)
         case "conserves":

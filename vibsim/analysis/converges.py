@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibsim import theory
+from vibsim.analysis.advice import advise
+from vibsim.analysis.causes import CAUSES
 from vibsim.analysis.corners import words_of
+from vibsim.analysis.costs import cost_in_words
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Orders, Outcome
 from vibsim.analysis.part import fastest
 from vibsim.analysis.parts_told import parts_in_words
 from vibsim.analysis.promise import (
+    Columns,
     columns_of,
     formal_orders,
     has_corners,
     options_of,
     stability_limits,
 )
-from vibsim.analysis.wording import Corner, Story, advise, tell
+from vibsim.analysis.wording import Corner, Story, tell
 from vibsim.record import Record
 from vibsim.schemes import SCHEMES, Options, Scheme
 from vibsim.spec.about import schemes_of
@@ -60,7 +66,8 @@ def converges(experiment: Experiment, record: Record, check: ConvergesCheck, ind
     def story(scheme: int, case: int) -> Story:
         expected = order[scheme, case if order.shape[1] > 1 else 0]
         word = REASON_NAMES[int(reason[scheme, case])]
-        return _story(experiment, record, check, of, word, float(expected), scheme, case)
+        told = _story(experiment, record, check, of, word, float(expected), scheme, case)
+        return replace(told, **_foreseen(record, index, scheme, case))
 
     expect = check.expect
     as_expected = status == STATUSES.index(expect.status)
@@ -133,6 +140,9 @@ def _story(
         has_corners=has_corners(experiment.model.definition),
         corner=_corner(experiment, record, scheme, case),
         parts=parts_in_words(experiment.model.definition, record, check.converges, scheme, case),
+        kind=spec.kind,
+        promised=_promised(experiment, check.converges, columns, scheme, case),
+        cost=partial(cost_in_words, experiment),
     )
 
 
@@ -145,6 +155,23 @@ def _corner(experiment: Experiment, record: Record, scheme: int, case: int) -> C
         float(record["corner_time"][scheme, case]),
         float(record["corner_power"][scheme, case]),
     )
+
+
+def _promised(
+    experiment: Experiment, quantity: str, columns: Columns, scheme: int, case: int
+) -> float:
+    """Return the order that the scheme of a member promises."""
+    orders = formal_orders(experiment, quantity, columns)[scheme]
+    return float(orders[case if len(orders) > 1 else 0])
+
+
+def _foreseen(record: Record, index: int, scheme: int, case: int) -> dict[str, Any]:
+    """Return what would settle the verdict on a member, or explain it."""
+    found = {
+        name: int(record[f"check_{name}"][index, scheme, case])
+        for name in ("more", "readable", "compensated", "cause")
+    }
+    return {**found, "cause": CAUSES[found["cause"]]}
 
 
 def _growth(

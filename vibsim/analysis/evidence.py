@@ -35,8 +35,12 @@ def judge_check(q: Comparison, check: ConvergesCheck) -> Judgement:
     """Judge a quantity as a check asks for it."""
     if check.order == "scheme" and check.tolerance == TOLERANCE:
         return judgement(q, check.norm)
-    order = q.order if check.order == "scheme" else np.full((1, 1), float(check.order))
-    return judge(evidence(q, check.norm, order, check.tolerance))
+    return judge(evidence(q, check.norm, order_of(q, check), check.tolerance))
+
+
+def order_of(q: Comparison, check: ConvergesCheck) -> Floats:
+    """Return the order that a check expects of a quantity, which broadcasts against (scheme, case)."""
+    return q.order if check.order == "scheme" else np.full((1, 1), float(check.order))
 
 
 def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evidence:

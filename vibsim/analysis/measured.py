@@ -9,15 +9,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis import behaviour, values
+from vibsim.analysis import behaviour, best, values
+from vibsim.analysis.causes import CAUSES, causes
 from vibsim.analysis.compare import Comparison
-from vibsim.analysis.evidence import judge_check
+from vibsim.analysis.evidence import judge_check, order_of
+from vibsim.analysis.foresight import UNKNOWN, finest_readable, more_levels
 from vibsim.analysis.part import Part
+from vibsim.analysis.verdict import Judgement
 from vibsim.record import Variable, attributes
 from vibsim.vocabulary import REASON_NAMES, STATUSES
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
+    from vibsim.spec.checks import ConvergesCheck
     from vibsim.spec.scheme_checks import ConservesCheck, EqualCheck, StableCheck
 
 Codes = NDArray[Any]
@@ -25,7 +29,12 @@ Codes = NDArray[Any]
 FIELDS: Mapping[str, tuple[str, type[np.generic], float, str]] = {
     "value": ("order", np.float64, np.nan, "number that each check measured"),
     "low": ("low", np.float64, np.nan, "lower end of the order of each check, or what it allows"),
-    "high": ("high", np.float64, np.nan, "upper end of the order of each check"),
+    "high": (
+        "high",
+        np.float64,
+        np.nan,
+        "upper end of the order of each check, or the bound of the error of an extrapolated number",
+    ),
     "first": ("first", np.int16, -1, "first level that the order rests on, -1 for none"),
     "last": ("last", np.int16, -1, "last level that the order rests on, -1 for none"),
     "culprit": ("culprit", np.int16, -1, "coarsest level that broke down, -1 for none"),
@@ -43,7 +52,15 @@ def flags(names: tuple[str, ...]) -> dict[str, Any]:
     return {"flag_values": np.arange(len(names), dtype=np.int8), "flag_meanings": " ".join(names)}
 
 
-_WORDS = {"status": STATUSES, "reason": REASON_NAMES}
+FORESEEN: Mapping[str, str] = {
+    "more": "finer levels that each check on an order probably needs, -1 unknown",
+    "readable": "finest level at which each check can read an order, -1 unknown",
+    "compensated": "the same in compensated arithmetic",
+    "cause": "why the order of each check is another one, as far as it is known",
+}
+"""Variable ``check_<name>`` of small whole numbers: what would settle a check on an order, or explain it."""
+
+_WORDS = {"status": STATUSES, "reason": REASON_NAMES, "cause": CAUSES}
 
 
 def measured(part: Part, compared: Mapping[str, Comparison]) -> dict[str, Variable]:
@@ -53,16 +70,23 @@ def measured(part: Part, compared: Mapping[str, Comparison]) -> dict[str, Variab
         name: np.full((len(checks), *part.shape), empty, dtype=kind)
         for name, (_, kind, empty, _) in FIELDS.items()
     }
+    table |= {
+        name: np.full((len(checks), *part.shape), 0 if name == "cause" else UNKNOWN, dtype=np.int8)
+        for name in FORESEEN
+    }
+    words = {name: row[3] for name, row in FIELDS.items()} | dict(FORESEEN)
     for i, check in enumerate(checks):
         inner = check.measured
         if inner.kind == "converges":
             judged = judge_check(compared[inner.converges], inner)
             for name, (of, *_) in FIELDS.items():
                 table[name][i] = getattr(judged, of)
+            for name, codes in _foreseen(compared, inner, judged).items():
+                table[name][i] = codes
         elif inner.kind == "value":
             at = inner.at
             place = values.Place(part, compared, inner.quantity or "", at.level, at.t, at.step)
-            table["value"][i] = values.value(inner.value, place)
+            table["value"][i], table["high"][i] = best.value(inner.value, place)
         else:
             for name, found in _behaviour(part, compared, inner).items():
                 table[name][i] = found
@@ -70,8 +94,22 @@ def measured(part: Part, compared: Mapping[str, Comparison]) -> dict[str, Variab
     if not checks:
         return {}
     return {
-        f"check_{name}": Variable(dims, array, attributes(FIELDS[name][3], "1") | _flags_of(name))
+        f"check_{name}": Variable(dims, array, attributes(words[name], "1") | _flags_of(name))
         for name, array in table.items()
+    }
+
+
+def _foreseen(
+    compared: Mapping[str, Comparison], check: ConvergesCheck, judged: Judgement
+) -> dict[str, Codes]:
+    """Return what would settle a check on an order, or explain it."""
+    q, norm = compared[check.converges], check.norm
+    order = order_of(q, check)
+    return {
+        "more": more_levels(q, judged, order, check.tolerance),
+        "readable": finest_readable(q, judged, norm, order),
+        "compensated": finest_readable(q, judged, norm, order, "compensated"),
+        "cause": causes(q, compared, judged, norm, order, check.tolerance),
     }
 
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis import oscillation, predicted, values
+from vibsim.analysis import best, oscillation, predicted, values
 from vibsim.analysis.compare import Comparison
 from vibsim.analysis.drifting import drift_at
 from vibsim.analysis.grid import take
@@ -167,9 +167,8 @@ def _beside(part: Part, compared: Mapping[str, Comparison]) -> Table:
             place = values.Place(part, compared, table.quantity or "", at.level, at.t, at.step)
             index = ids.index(row_id(i, j))
             for k, name in enumerate(table.beside):
-                found[index, :, k] = values.value(name, _fitting(place, name))[
-                    names.index(row.scheme)
-                ]
+                beside, _ = best.value(name, _fitting(place, name))
+                found[index, :, k] = beside[names.index(row.scheme)]
     attrs = attributes("numbers beside each row of a published table", "1")
     return {"published_beside": Variable(("check", "case", "beside"), found, attrs)}
 

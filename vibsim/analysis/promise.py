@@ -91,9 +91,25 @@ def _left(scheme: Scheme, options: Options, model: Model) -> float:
     return ORDER_AT_CORNERS if order >= ORDER_AT_CORNERS else math.nan
 
 
-def relative_floors(experiment: Experiment, steps: tuple[int, ...], columns: Columns) -> Floats:
-    """Return the predicted round-off relative to the solution, shape (scheme, case, level)."""
-    return _each(experiment, columns, lambda s, o: relative_floor(s, o, steps))
+def relative_floors(
+    experiment: Experiment, steps: tuple[int, ...], columns: Columns, arithmetic: str | None = None
+) -> Floats:
+    """Return the predicted round-off relative to the solution, shape (scheme, case, level).
+
+    Parameters
+    ----------
+    steps
+        Number of steps of every level.
+    arithmetic
+        Of schemes that have several; the one that they have where None.
+    """
+
+    def floor(scheme: Scheme, options: Options) -> Floats:
+        if arithmetic is not None and "arithmetic" in options:
+            options = {**options, "arithmetic": arithmetic}
+        return relative_floor(scheme, options, steps)
+
+    return _each(experiment, columns, floor)
 
 
 def stability_limits(experiment: Experiment, columns: Columns) -> Floats:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.analysis.best import has_limit
+from vibsim.analysis.costs import cost_in_words
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
 from vibsim.analysis.wording import number
 from vibsim.record import Record
@@ -36,14 +38,27 @@ MAY_BE_INFINITE = frozenset({"exact_period"})
 """Numbers that are infinite for a sound member, on the separatrix: they do not exist there."""
 UNBOUNDED = frozenset({"stability_limit"})
 """Numbers of which infinity is a value: above every other number."""
+FEW = 3
+"""Fewer levels do not show how large an error is."""
 ROUND_OFF = 1e-13
 """A number that is no larger is rounding."""
 DEFAULT_RTOL, DEFAULT_ATOL = 1e-9, 1e-12
 """Tolerance of ``equals`` where a check gives none."""
 
 
-def valued(experiment: Experiment, record: Record, check: ValueCheck, measured: Floats) -> Outcome:
-    """Compare a measured number, shape (scheme, case), with what the check asks of it."""
+def valued(experiment: Experiment, record: Record, check: ValueCheck, index: int) -> Outcome:
+    """Compare a measured number with what the check asks of it.
+
+    A limit of several levels that misses what is asked by less than its bound may be right: nothing is decided then.
+
+    Parameters
+    ----------
+    record
+        Convergence Record.
+    index
+        Number of the check in it.
+    """
+    measured, bound = record["check_value"][index], record["check_high"][index]
     names = record.words("scheme")
     at = check.at
     schemes = list(schemes_of(experiment, check))
@@ -56,15 +71,18 @@ def valued(experiment: Experiment, record: Record, check: ValueCheck, measured: 
     infinite = np.isinf(measured) & (check.value not in UNBOUNDED)
     if check.value in MAY_BE_INFINITE:
         infinite, measured = np.zeros_like(infinite), np.where(infinite, np.nan, measured)
-    masks = [lost | infinite, np.isnan(measured), holds]
-    status = np.select(masks, [FAIL, INCONCLUSIVE, PASS], FAIL).astype(np.int8)
-    codes = [REASON_NAMES.index(name) for name in ("non_finite", "not_applicable", "match")]
+    open_ = _is_open(check, away, bound)
+    masks = [lost | infinite, np.isnan(measured), holds, open_]
+    status = np.select(masks, [FAIL, INCONCLUSIVE, PASS, INCONCLUSIVE], FAIL).astype(np.int8)
+    few = "too_few_levels" if len(record["level"]) < FEW else "pre_asymptotic"
+    codes = [REASON_NAMES.index(name) for name in ("non_finite", "not_applicable", "match", few)]
     reason = np.select(masks, codes, REASON_NAMES.index("mismatch"))
     what = f"{check.value} of {check.quantity}" if check.quantity else check.value
 
     def tell(scheme: int, case: int) -> str:
         found = float(measured[scheme, case])
-        return _tell(what, REASON_NAMES[int(reason[scheme, case])], found, rule)
+        word = REASON_NAMES[int(reason[scheme, case])]
+        return _tell(what, word, found, rule, _bound_in_words(check, float(bound[scheme, case])))
 
     return Outcome(
         schemes=[names[i] for i in schemes],
@@ -79,7 +97,9 @@ def valued(experiment: Experiment, record: Record, check: ValueCheck, measured: 
         expects_pass=True,
         quantity=check.quantity,
         tell=tell,
-        advise=lambda scheme, case: _advise(check, REASON_NAMES[int(reason[scheme, case])]),
+        advise=lambda scheme, case: _advise(
+            experiment, check, REASON_NAMES[int(reason[scheme, case])]
+        ),
         value=measured,
     )
 
@@ -91,20 +111,35 @@ _ADVICE = {
         "the number exists."
     ),
 }
-_CORRECT = "orrect the number that the check asks for."
+FINER = 2
+"""So many finer levels are advised."""
 COUNTED = frozenset({"accepted_steps", "force_evaluations"})
 """Numbers that finer levels make larger, and no more accurate."""
 
 
-def _advise(check: ValueCheck, reason: str) -> str:
+def _advise(experiment: Experiment, check: ValueCheck, reason: str) -> str:
     """Say what to change in the YAML; finer levels only where they change the number."""
+    if reason in _ADVICE:
+        return _ADVICE[reason]
+    finest = experiment.levels[-1]
+    finer = [finest + 1 + i for i in range(FINER)]
+    cost = cost_in_words(experiment, finer)
     if reason != "mismatch":
-        return _ADVICE.get(reason, "")
+        return (
+            f"Add levels {finer[0]} and {finer[1]} to `levels:` ({cost}), so that the bound of the error shrinks, or "
+            "ask for the number of one level (`at: {level: ...}`)."
+        )
+    correct = f"orrect `{_border(check)}:`, the number that the check asks for."
     if check.value in COUNTED or not depends_on_level(check.value):
-        return f"C{_CORRECT}"
-    if isinstance(check.at.level, int):
-        return f"Ask for a finer level (`at: {{level: ...}}`), or c{_CORRECT}"
-    return f"Add finer `levels:`, or c{_CORRECT}"
+        return f"C{correct}"
+    if isinstance(check.at.level, int) and check.at.level < finest:
+        return f"Ask for a finer level (`at: {{level: {finest}}}`), or c{correct}"
+    return f"Add finer `levels:` ({finer[0]} and {finer[1]} cost {cost}), or c{correct}"
+
+
+def _border(check: ValueCheck) -> str:
+    """Return the key that holds the number that the check asks for."""
+    return next(key for key in ("equals", "below", "above") if getattr(check, key) is not None)
 
 
 def depends_on_level(name: str) -> bool:
@@ -114,16 +149,33 @@ def depends_on_level(name: str) -> bool:
     return "level" in VALUES[name].at or sees_several_levels(name)
 
 
-def _tell(what: str, reason: str, found: float, rule: str) -> str:
+def _is_open(check: ValueCheck, away: Floats, bound: Floats) -> Flags:
+    """Say where a number misses what is asked by no more than its error may be."""
+    if not has_limit(check.value, check.at.level):
+        return np.zeros(away.shape, dtype=bool)
+    return ~(away > bound)
+
+
+def _bound_in_words(check: ValueCheck, bound: float) -> str:
+    if not has_limit(check.value, check.at.level):
+        return ""
+    if np.isnan(bound):
+        return ", with an error that is not known: the levels do not approach each other"
+    return f", with an error of at most {bound:.2g}"
+
+
+def _tell(what: str, reason: str, found: float, rule: str, error: str) -> str:
     match reason:
         case "non_finite":
             return f"{what} means nothing here: the calculation met a number that is not finite."
         case "not_applicable":
             return f"{what} does not exist here, or was not stored."
+        case "pre_asymptotic" | "too_few_levels":
+            return f"{what} is {found:.10g}{error}: it may be {rule}, or not."
     verb = "is" if reason == "match" else "is not"
     # of round-off two digits say all
     digits = 2 if reason == "match" and abs(found) <= ROUND_OFF else 10
-    return f"{what} is {found:.{digits}g}; it {verb} {rule}."
+    return f"{what} is {found:.{digits}g}{error}; it {verb} {rule}."
 
 
 def sees_several_levels(name: str) -> bool:

@@ -70,15 +70,20 @@ def value(name: str, place: Place) -> Floats:
 
 def _sample(p: Place) -> Floats:
     """Return the value of a series at a time, by default the last one."""
-    if p.level == "best":
-        q, grid = p.comparison(), p.part.grid
-        index = _index(p, grid.t, grid.apart)
-        return p.missing if q is None or index is None else q.extrapolation[0][..., index]
     data = p.data()
     if data is None or p.quantity not in data:
         return p.missing
     index = _index(p, data["t"], int(np.asarray(data.attrs["every"]).item()))
     return p.missing if index is None else np.asarray(data[p.quantity][..., index], dtype=float)
+
+
+def samples(p: Place) -> list[Floats]:
+    """Return the value of a series at a common time, by default the last one, at every level."""
+    q, grid = p.comparison(), p.part.grid
+    index = _index(p, grid.t, grid.apart)
+    if q is None or index is None:
+        return [p.missing for _ in p.levels]
+    return [values[..., index] for values in q.values]
 
 
 def _index(p: Place, t: Floats, every: int) -> int | None:

@@ -1,8 +1,9 @@
-"""Verdicts in sentences that a student understands, and advice that names what to change in the YAML."""
+"""Verdicts in sentences that a student understands; what to change in the YAML is in `vibsim.analysis.advice`."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from vibsim.schemes import Options
@@ -54,6 +55,20 @@ class Story:
     """The first other corner of the force within a step."""
     parts: str = ""
     """What phase and amplitude of the error say of it (`vibsim.analysis.parts_told`)."""
+    kind: str = ""
+    """Kind of the scheme."""
+    promised: float = math.nan
+    """The order that the scheme promises."""
+    cause: str = ""
+    """Why the order is another one, one of `vibsim.analysis.causes.CAUSES`."""
+    more: int = -1
+    """Finer levels that are probably needed; -1 where that is not known, here and below."""
+    readable: int = -1
+    """Finest level at which an order can be read, ..."""
+    compensated: int = -1
+    """... and the same in compensated arithmetic."""
+    cost: Callable[[Sequence[int]], str] = lambda levels: ""
+    """What levels cost, in words."""
 
 
 def number(value: float) -> str:
@@ -165,7 +180,7 @@ def tell(s: Story) -> str:
                 f"{count} level{'s are' if count > 1 else ' is'} too few to judge the convergence of "
                 f"{s.quantity}: three are needed, four are better."
             )
-        case "not_applicable" if _is_adaptive(s):
+        case "not_applicable" if is_adaptive(s):
             return (
                 f"Scheme {s.scheme} is adaptive: it chooses its own steps, whatever the level, so an order of "
                 f"{s.quantity} does not exist."
@@ -176,106 +191,77 @@ def tell(s: Story) -> str:
     return f"The step is still too coarse to tell the order of {s.quantity}{so_far}.{s.parts}"
 
 
-def advise(s: Story) -> str:
-    """Say what to change in the YAML; empty for a PASS."""
-    arithmetic = s.options.get("arithmetic", "compensated")
-    match s.reason:
-        case "asymptotic" | "exact":
-            return ""
-        case "order_low" | "non_smooth" if is_on_the_mesh(s.options):
-            return f"Set `events: located` for scheme {s.scheme}."
-        case "order_low" | "non_smooth" if s.has_corners:
-            return (
-                "Choose steps in `time:` that end at every point of the table: at the coarsest level, dt is its "
-                "spacing over the speed, or a whole part of that."
-            )
-        case "non_smooth" if s.corner:
-            return (
-                f"End the time interval before t = {s.corner.time:.4g}, where order {number(s.expected)} can be seen, "
-                f"or take a scheme of order {_below(s.corner)}."
-            )
-        case "order_low" if _starts_low(s):
-            return f"Set `start: centred` for scheme {s.scheme}."
-        case "pre_asymptotic" if _ends_low(s):
-            return (
-                f"Add levels {_finer(s)} to `levels:`, or set `end_velocity: kick` for scheme "
-                f"{s.scheme}."
-            )
-        case "order_low" if _ends_low(s):
-            return f"Set `end_velocity: kick` for scheme {s.scheme}, or measure with `norm: linf_interior`."
-        case "order_low":
-            return f"Look for a term of lower order in scheme {s.scheme}{_or_expect(s)}."
-        case "order_high":
-            return (
-                "Try other `initial:` values or another `time: end`, where nothing cancels by "
-                f"symmetry{_or_expect(s)}."
-            )
-        case "wrong_limit":
-            return (
-                "Check `model:` and `initial:` against the equation that you mean: finer levels will "
-                "not help."
-            )
-        case "unstable":
-            level = _first_stable(s)
-            return f"Start `levels:` at {level} or finer, or shorten `time: end`."
-        case "non_finite":
-            return f"Start `levels:` at {max(s.culprit, s.levels[0]) + 1} or finer, or shorten `time: end`."
-        case "round_off" if arithmetic != "compensated":
-            return f"Set `arithmetic: compensated` for scheme {s.scheme}, or use coarser `levels:`."
-        case "round_off":
-            return f"Use coarser `levels:`, below {s.levels[0] if s.last < 0 else s.last}."
-        case "oscillating":
-            return f"Add levels {_finer(s)} to `levels:`, or measure in another `norm:`."
-        case "non_smooth":
-            return "Set `order:` to what the kink allows, or end the time interval before it."
-        case "too_few_levels":
-            missing = max(4 - len(s.levels), 1)
-            names = " and ".join(str(s.levels[-1] + 1 + i) for i in range(min(missing, 2)))
-            return f"Add level{'s' if missing > 1 else ''} {names} to `levels:`."
-        case "not_applicable" if _is_adaptive(s):
-            return "Name schemes with a fixed step (`schemes:`), or ask for its error with a `value:` check."
-        case "not_applicable":
-            return "Choose a quantity that this model and scheme have."
-    return f"Add levels {_finer(s)} to `levels:`."
-
-
-def _is_adaptive(s: Story) -> bool:
+def is_adaptive(s: Story) -> bool:
+    """Tell whether the scheme chooses its own steps."""
     return "tolerance" in s.options
 
 
-def _or_expect(s: Story) -> str:
-    likely = round(2 * s.order) / 2
-    return f", or set `order: {number(likely)}` if you expect it" if likely > 0 else ""
-
-
-def _finer(s: Story) -> str:
-    return f"{s.levels[-1] + 1} and {s.levels[-1] + 2}"
-
-
-def _starts_low(s: Story) -> bool:
+def starts_low(s: Story) -> bool:
+    """Tell whether the first step explains the order."""
     return s.options.get("start") == "first_order" and 0.5 < s.order < 1.5
 
 
-def _ends_low(s: Story) -> bool:
+def ends_low(s: Story) -> bool:
+    """Tell whether the formula for the last velocity explains the order, or may."""
     one_sided = s.options.get("end_velocity") in {"backward", "extrapolate"}
     sees_end = s.norm != "linf_interior" and not s.is_position
     backward = s.options.get("end_velocity") == "backward"
     return one_sided and sees_end and (backward or s.reason == "pre_asymptotic")
 
 
+def promises_less(s: Story) -> bool:
+    """Tell whether the scheme itself promises a lower order than the check expects."""
+    return math.isfinite(s.promised) and s.promised < s.expected - s.tolerance
+
+
+def promises_more(s: Story) -> bool:
+    """Tell whether the scheme itself promises a higher order than the check expects."""
+    return s.promised > s.expected + s.tolerance
+
+
 def _cause(s: Story) -> str:
+    if s.reason == "order_high" and promises_more(s):
+        promised = f"order {number(s.promised)}" if math.isfinite(s.promised) else "to be exact"
+        return f" Scheme {s.scheme} promises {promised} here."
+    if s.reason == "order_high":
+        return _WHY_HIGH.get(s.cause, "").format(s.quantity, s.scheme, s.norm)
     if is_on_the_mesh(s.options):
         return " The likely cause is `events: mesh`: an event is noticed up to a step late."
     if s.has_corners:
         return " The likely cause is the table: the force has corners at its points, which lie within steps."
-    if _starts_low(s):
+    if promises_less(s):
+        damping = ": it takes the damping backward" if "backward_damping" in s.kind else ""
+        return f" Scheme {s.scheme} promises no more than order {number(s.promised)} here{damping}."
+    if starts_low(s):
         return " The likely cause is the first step: `start: first_order` leaves its dt^2 term out."
-    if _ends_low(s):
+    if ends_low(s):
         return (
             f" The likely cause is the last point: `end_velocity: {s.options['end_velocity']}` is a one-sided "
             "formula of lower order."
         )
-    return ""
+    return _WHY_LOW.get(s.cause, "").format(s.quantity, s.scheme)
+
+
+_WHY_LOW = {
+    "last_point": (
+        " Without the last point the order is the expected one: what is of lower order is a formula at the end."
+    ),
+    "one_quantity": " Another state has the expected order: what is of lower order is how {0} is made, not the step.",
+    "everything": (
+        " It is so in every state and at every time, so that it is a term of the step of scheme {1}, of its start, or "
+        "of the force that it evaluates."
+    ),
+}
+_WHY_HIGH = {
+    "special_times": (
+        " All common times are turning points of {0}: most of an error is a shift in time, which does not show there. "
+        "This is no higher order."
+    ),
+    "theory": " The theory of scheme {1} has that order on this linear model, too.",
+    "one_norm": " In another norm than {2} the order is the expected one: errors cancel in this one.",
+    "one_quantity": " Another state has the expected order: the leading error vanishes in {0} alone.",
+    "everything": " It is so in every state and every norm.",
+}
 
 
 def _cornered(s: Story, corner: Corner) -> str:
@@ -290,15 +276,12 @@ def _cornered(s: Story, corner: Corner) -> str:
     )
 
 
-def _below(corner: Corner) -> str:
-    return f"{number(corner.power - 1.0)} at most" if corner.power > 1.0 else "1"
-
-
 def _unstable(s: Story) -> str:
     if math.isfinite(s.omega_dt) and s.omega_dt > s.limit:
         return (
             f"The run is unstable: at level {s.culprit}, w dt = {s.omega_dt:.4g} is beyond the limit "
-            f"{number(s.limit)} of scheme {s.scheme}{growth_in_words(*s.growth)}."
+            f"{number(s.limit)} of scheme {s.scheme}{growth_in_words(*s.growth)}; level {first_stable(s)} is the first "
+            "within it."
         )
     return (
         f"{s.quantity} is unstable: the solution grows where the exact one does not, and finer levels "
@@ -306,7 +289,7 @@ def _unstable(s: Story) -> str:
     )
 
 
-def _first_stable(s: Story) -> int:
+def first_stable(s: Story) -> int:
     """Return the coarsest level whose w dt is within the limit."""
     if not (math.isfinite(s.omega_dt) and s.omega_dt > s.limit):
         return s.levels[-1] + 1

@@ -16,6 +16,7 @@ from vibsim.report import (
     cards,
     choice,
     contents,
+    contents_best,
     contents_degrees,
     contents_energy,
     contents_events,
@@ -218,7 +219,8 @@ def _tables(
     beside += [contents_energy.velocities(record), contents_events.table(record)]
     # what damping or a force changes says nothing of a scheme
     conserved = experiment.model.definition.conservative
-    optional = [contents.maxima(record, shown) if conserved else None]
+    optional = [contents_best.table(record, shown)]
+    optional.append(contents.maxima(record, shown) if conserved else None)
     optional.append(contents.scalars(record, shown))
     optional.append(None if data.is_lean(record) else contents_work.table(experiment, record))
     if len(record["scheme"]) > gallery.FEW:

@@ -31,7 +31,8 @@ class Value:
     finer_levels: int = 0
     """How many finer levels a level must have beside it."""
     best: bool = False
-    """Whether it also exists for the Richardson-extrapolated solution, ``level: best``."""
+    """Whether it also exists at ``level: best``: as the limit of the numbers of all levels, or of the extrapolated
+    solution."""
     needs_time: bool = False
     """Whether ``t`` or ``step`` must be given."""
     needs_exact: Exact | None = None
@@ -59,9 +60,19 @@ _SERIES = (
         best=True,
         needs_time=True,
     ),
-    Value("min", "smallest value over every step; of an output, over the stored times", "stored"),
-    Value("max", "largest value over every step; of an output, over the stored times", "stored"),
-    Value("max_abs", "largest absolute value over every step", "extremal"),
+    Value(
+        "min",
+        "smallest value over every step; of an output, over the stored times",
+        "stored",
+        best=True,
+    ),
+    Value(
+        "max",
+        "largest value over every step; of an output, over the stored times",
+        "stored",
+        best=True,
+    ),
+    Value("max_abs", "largest absolute value over every step", "extremal", best=True),
     Value("max_abs_interior", "the same without the last point", "deviation"),
     Value(
         "max_abs_ratio",
@@ -86,16 +97,23 @@ _SERIES = (
     Value("relative_running_max", "the same, over |E(0)|", "running", _ANYWHERE),
 )
 _OSCILLATION = (
-    Value("period", "period, from interpolated peaks", "none"),
+    Value("period", "period, from interpolated peaks", "none", best=True),
     Value("period_grid", "period, from peaks at grid points", "none"),
     Value("exact_period", "period of the exact solution", "none", ("case",), needs_exact="period"),
-    Value("period_error", "period over the exact period, less one", "none", needs_exact="period"),
-    Value("frequency", "angular frequency of the computed motion", "none"),
+    Value(
+        "period_error",
+        "period over the exact period, less one",
+        "none",
+        needs_exact="period",
+        best=True,
+    ),
+    Value("frequency", "angular frequency of the computed motion", "none", best=True),
     Value(
         "error_of_frequency",
         "angular frequency over that of the exact solution, less one",
         "none",
         needs_exact="period",
+        best=True,
     ),
     Value(
         "predicted_frequency",
@@ -109,6 +127,7 @@ _OSCILLATION = (
         "time by which the peaks come early, per period; negative where they come late",
         "none",
         needs_exact="period",
+        best=True,
     ),
     Value(
         "predicted_phase_error",
@@ -123,10 +142,12 @@ _OSCILLATION = (
         "none",
         needs_exact="period",
     ),
-    Value("amplitude", "half the height from the last trough to the last peak", "none"),
-    Value("amplitude_error", "last amplitude over the first one, less one", "none"),
-    Value("growth_factor", "last peak over the first peak", "none"),
-    Value("growth_per_period", "factor by which the amplitude grows in a period", "none"),
+    Value("amplitude", "half the height from the last trough to the last peak", "none", best=True),
+    Value("amplitude_error", "last amplitude over the first one, less one", "none", best=True),
+    Value("growth_factor", "last peak over the first peak", "none", best=True),
+    Value(
+        "growth_per_period", "factor by which the amplitude grows in a period", "none", best=True
+    ),
     Value(
         "predicted_growth_per_period",
         "the same by the theory of the scheme",
@@ -136,7 +157,7 @@ _OSCILLATION = (
     ),
 )
 _ENERGY = (
-    Value("relative_energy_error", "max |E(t) - E(0)| / |E(0)| over every step", "none"),
+    Value("relative_energy_error", "max |E(t) - E(0)| / |E(0)| over every step", "none", best=True),
     Value(
         "relative_energy_error_d2t",
         "the same with the centred difference of the position as velocity, without the end points",
@@ -254,3 +275,6 @@ _ROWS = (*_SERIES, *_OSCILLATION, *_ENERGY, *_EVENTS, *_COST, *_ERRORS)
 
 VALUES: Mapping[str, Value] = MappingProxyType({row.name: row for row in _ROWS})
 """Every value name with its meaning, as `vibsim list checks` prints it."""
+
+HAVE_LIMITS = frozenset(row.name for row in _ROWS if row.best and row.of != "convergent")
+"""What ``level: best`` takes as the limit of the numbers of all levels; else it is of the extrapolated solution."""

@@ -1,0 +1,209 @@
+"""Advice: every verdict that is not a PASS ends with a sentence that names a key of the experiment file."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from level_records import experiment, level_records, standard_error
+
+from vibsim.analysis import analyse_records, verdicts
+from vibsim.analysis.advice import advise
+from vibsim.analysis.causes import CAUSES
+from vibsim.analysis.wording import Story, tell
+from vibsim.record import Record, Variable
+from vibsim.spec.checks import MEASURED
+from vibsim.vocabulary import DRIFTS, REASON_NAMES, REASONS, STATUSES
+
+SCHEMA = Path(__file__).parents[2] / "workflow/schemas/experiment.schema.json"
+GOOD = {name for name, status in REASONS.items() if status == "PASS"}
+KINDS: dict[str, dict[str, Any]] = {
+    "converges": {"converges": "theta"},
+    "value": {"value": "period", "equals": 1.0},
+    "best": {"value": "period", "equals": 1.0, "at": {"level": "best"}},
+    "stable": {"stable": True},
+    "conserves": {"conserves": "energy"},
+    "equal": {"equal": ["central", "exact"], "quantity": "theta"},
+}
+MAKES = {
+    "converges": set(REASON_NAMES) - {"match", "mismatch"},
+    "value": {"match", "mismatch", "non_finite", "not_applicable"},
+    "best": {"mismatch", "non_finite", "not_applicable", "pre_asymptotic"},
+    "stable": {"match", "mismatch", "unstable"},
+    "conserves": {"match", "mismatch", "non_finite", "not_applicable", "pre_asymptotic"},
+    "equal": {"match", "mismatch", "non_finite", "not_applicable"},
+}
+"""What a kind of check can find."""
+
+
+def keys(node: Any) -> Iterator[str]:
+    """Yield every key that the schema knows."""
+    if isinstance(node, dict):
+        for name, inner in node.items():
+            if name == "properties":
+                yield from inner
+            yield from keys(inner)
+    elif isinstance(node, list):
+        for inner in node:
+            yield from keys(inner)
+
+
+KEYS = set(keys(json.loads(SCHEMA.read_text())))
+OPTIONS = {"end_velocity", "arithmetic", "start", "events", "kind"}
+"""Options of schemes, which the schema has in other places."""
+
+
+def assert_specific(text: str) -> None:
+    """Check that a sentence names a key of an experiment file, and only such."""
+    assert text, "no advice"
+    assert text.endswith("."), text
+    named = [part for part in text.split("`")[1::2] if ":" in part]
+    words = {word for part in named for word in re.findall(r"([a-z_]+):", part)}
+    assert words, text
+    assert words <= KEYS | OPTIONS, (text, words - KEYS)
+    assert "nan" not in re.findall(r"[a-z]+", text), text
+    assert text.count("`") % 2 == 0
+
+
+@cache
+def analysed(check: str) -> tuple[Any, Record]:
+    """Return the experiment with a check, which is given as JSON, and what the analysis makes of it."""
+    exp = experiment(checks=[json.loads(check)])
+    return exp, analyse_records(exp, level_records(exp, standard_error))
+
+
+def changed(record: Record, **values: Any) -> Record:
+    """Return the Record with other numbers of its check."""
+    table = dict(record.variables)
+    for name, value in values.items():
+        row = table[f"check_{name}"]
+        found = np.full_like(row.values, value)
+        table[f"check_{name}"] = Variable(row.dims, found, row.attrs)
+    return Record(record.coords, table, record.attrs)
+
+
+def made(kind: str, reason: str, **more: Any) -> tuple[Any, Record]:
+    """Return an experiment and the Record of an analysis that found a reason."""
+    exp, record = analysed(json.dumps(KINDS[kind] | more))
+    code = REASON_NAMES.index(reason)
+    status = STATUSES.index(REASONS[reason])
+    broken = {"non_finite"} if kind != "converges" else set()
+    if reason in broken:
+        row = record.variable("status")
+        table = {
+            **record.variables,
+            "status": Variable(row.dims, np.ones_like(row.values), row.attrs),
+        }
+        record = Record(record.coords, table, record.attrs)
+    if kind in {"converges", "stable"}:
+        return exp, changed(record, reason=code, status=status)
+    numbers = {
+        "match": {"value": 1.0, "low": 2.0, "first": DRIFTS.index("none")},
+        "mismatch": {"value": 3.0, "low": 2.0, "first": DRIFTS.index("linear"), "high": 0.1},
+        "not_applicable": {"value": np.nan, "first": DRIFTS.index("unclear")},
+        "pre_asymptotic": {"value": 3.0, "first": DRIFTS.index("unclear"), "high": 9.0},
+        "non_finite": {},
+    }
+    return exp, changed(record, **numbers[reason])
+
+
+@pytest.mark.parametrize(
+    ("kind", "reason"),
+    [(kind, reason) for kind, found in MAKES.items() for reason in sorted(found)],
+)
+@pytest.mark.parametrize("holds", [None, True, False])
+def test_every_reason_of_every_kind_of_check_ends_with_advice(
+    kind: str, reason: str, holds: bool | None
+) -> None:
+    exp, record = made(kind, reason)
+    if holds is not None:
+        claim = {"claim": "it is so", "that": KINDS[kind], "holds": holds}
+        exp = experiment(checks=[claim])
+    (found,) = verdicts(exp, record)
+    measured = found.results[0].reason
+    assert measured == reason
+    if found.status == "PASS":
+        assert found.advice == ""
+    else:
+        assert_specific(found.advice)
+
+
+def test_every_reason_occurs() -> None:
+    assert set().union(*MAKES.values()) == set(REASON_NAMES)
+
+
+@pytest.mark.parametrize("expect", [{"status": "FAIL"}, {"status": "FAIL", "reason": "unstable"}])
+def test_an_expectation_that_is_not_met_ends_with_advice(expect: dict[str, str]) -> None:
+    for reason in sorted(MAKES["converges"]):
+        (found,) = verdicts(*made("converges", reason, expect=expect))
+        assert bool(found.advice) == (found.status != "PASS")
+        if found.advice:
+            assert_specific(found.advice)
+
+
+def story(**changes: Any) -> Story:
+    plain: dict[str, Any] = {
+        "quantity": "theta",
+        "reason": "order_low",
+        "order": 1.02,
+        "low": 0.9,
+        "high": 1.1,
+        "first": 4,
+        "last": 7,
+        "expected": 2.0,
+        "tolerance": 0.1,
+        "norm": "l2",
+        "levels": (4, 5, 6, 7),
+        "culprit": -1,
+        "omega_dt": float("nan"),
+        "growth": (float("nan"), float("nan")),
+        "limit": 2.0,
+        "options": {"start": "centred", "end_velocity": "kick", "arithmetic": "compensated"},
+        "is_position": True,
+        "scheme": "mine",
+        "kind": "central",
+        "promised": 2.0,
+        "cost": lambda levels: f"{len(levels)} levels",
+    }
+    return Story(**{**plain, **changes})
+
+
+@pytest.mark.parametrize("reason", sorted(set(REASON_NAMES) - GOOD))
+@pytest.mark.parametrize("cause", CAUSES)
+@pytest.mark.parametrize("order", [1.02, 4.0, float("nan"), 0.1])
+def test_every_cause_ends_with_advice(reason: str, cause: str, order: float) -> None:
+    for more in (
+        {},
+        {"expected": np.inf, "promised": np.inf},
+        {"promised": 1.0},
+        {"promised": 4.0},
+    ):
+        for options in ({}, {"arithmetic": "three_term"}, {"tolerance": 1e-6}, {"events": "mesh"}):
+            one = story(reason=reason, cause=cause, order=order, options=options, **more)
+            assert_specific(advise(one))
+            assert tell(one).endswith(".")
+
+
+def test_what_is_predicted_is_told_with_its_cost() -> None:
+    few = advise(story(reason="too_few_levels", levels=(4, 5)))
+    assert few == "Add levels 6 and 7 to `levels:` (2 levels)."
+    early = advise(story(reason="pre_asymptotic", more=3))
+    assert early.startswith("Add levels 8 to 10 to `levels:` (3 levels); 3 more are probably")
+    assert "cannot be told" in advise(story(reason="pre_asymptotic"))
+    noise = story(
+        reason="round_off", readable=6, compensated=20, options={"arithmetic": "three_term"}
+    )
+    assert "up to level 20" in advise(noise)
+    assert "such as 3 to 6" in advise(noise)
+    assert "central" in advise(story(promised=1.0, kind="central_backward_damping"))
+    assert "backward" in tell(story(promised=1.0, kind="central_backward_damping"))
+
+
+def test_no_kind_of_check_is_left_out() -> None:
+    assert set(KINDS) - {"best"} == set(MEASURED)

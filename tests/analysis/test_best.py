@@ -1,0 +1,183 @@
+"""The most accurate values that a ladder holds, against numbers that are known otherwise."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vibsim.analysis import Verdict, analyse_parts, analyse_records, joined, verdicts
+from vibsim.analysis.best import scalars
+from vibsim.analysis.gci import CLASSES
+from vibsim.analysis.part import part_of
+from vibsim.record import Record
+from vibsim.simulation import simulate_record
+from vibsim.spec import Experiment
+from vibsim.spec.values import HAVE_LIMITS, VALUES
+
+PENDULUM = {"model": {"kind": "pendulum"}, "initial": {"theta": 1.0}, "time": {"end": 40.0}}
+SPRING = {"model": {"kind": "spring", "w": "2*pi"}, "initial": {"u": 1.0}, "time": {"end": 10.3}}
+CIRCUIT = {
+    "model": {"kind": "circuit", "L": 2.0, "R": 0.4, "C": 0.5, "voltage": "1.5"},
+    "initial": {"i": 0.0, "di_dt": 0.75},
+    "time": {"end": 12.0},
+}
+LEVELS = [7, 8, 9, 10, 11]
+
+
+def analysed(*checks: dict[str, Any], **data: Any) -> tuple[Experiment, Record]:
+    given = {"title": "test", "levels": LEVELS, "schemes": ["central"], "checks": list(checks)}
+    experiment = Experiment.from_dict({**given, **data})
+    records = {level: simulate_record(experiment, level) for level in experiment.levels}
+    return experiment, analyse_records(experiment, records)
+
+
+def best(record: Record, name: str) -> tuple[float, float]:
+    return float(record[f"{name}_richardson"][0, 0]), float(
+        record[f"{name}_richardson_error"][0, 0]
+    )
+
+
+def judged(*checks: dict[str, Any], **data: Any) -> list[Verdict]:
+    return verdicts(*analysed(*checks, **data))
+
+
+@pytest.mark.parametrize("scheme", ["central", "rk4", "euler_cromer", "velocity_verlet", "heun"])
+@pytest.mark.parametrize("theta", [0.1, 1.0, 2.5])
+def test_the_period_of_the_pendulum_is_within_its_bound(scheme: str, theta: float) -> None:
+    """Against the complete elliptic integral."""
+    _, record = analysed(**(PENDULUM | {"schemes": [scheme], "initial": {"theta": theta}}))
+    exact = float(record["exact_period"][0])
+    value, bound = best(record, "period")
+    assert abs(value - exact) <= bound < 1e-2 * exact
+    finest = float(record["period"][0, 0, -1])
+    if scheme in {"central", "euler_cromer", "velocity_verlet"}:
+        assert abs(value - exact) < 0.02 * abs(finest - exact)
+
+
+def test_numbers_of_the_spring() -> None:
+    """Against cos(w t) and -w sin(w t)."""
+    w = 2 * math.pi
+    exact = {
+        "frequency": w,
+        "growth_per_period": 1.0,
+        "relative_energy_error": 0.0,
+        "u_end": math.cos(w * 10.3),
+        "v_end": -w * math.sin(w * 10.3),
+        "v_max": w,
+        "v_min": -w,
+    }
+    for scheme in ("central", "rk4"):
+        _, record = analysed(**(SPRING | {"schemes": [scheme]}))
+        for name, number in exact.items():
+            value, bound = best(record, name)
+            assert abs(value - number) <= bound, (scheme, name)
+            assert bound < 0.01 * max(abs(number), 1.0)
+
+
+def test_numbers_of_the_circuit() -> None:
+    """i(t) = a exp(-R t/(2 L)) sin(w t), written down by hand; its first peak is its largest value."""
+    inductance, resistance, capacity, first = 2.0, 0.4, 0.5, 0.75
+    decay = resistance / (2 * inductance)
+    w = math.sqrt(1 / (inductance * capacity) - decay**2)
+    t = np.linspace(0.0, 12.0, 2_000_001)
+    i = first / w * np.exp(-decay * t) * np.sin(w * t)
+    _, record = analysed(**CIRCUIT)
+    for name, number in (("i_end", i[-1]), ("i_max", i.max())):
+        value, bound = best(record, name)
+        assert abs(value - number) <= bound < 2e-3, name
+    value, bound = best(record, "i_end")
+    assert abs(value - i[-1]) < 1e-8
+
+
+def test_what_is_stored_says_how_it_was_found() -> None:
+    experiment, record = analysed(**PENDULUM)
+    names = record.words("scalar")
+    assert {"period", "amplitude", "frequency", "theta_end", "omega_max", "wire_force_max"} <= set(
+        names
+    )
+    k = names.index("period")
+    assert int(record["scalar_last"][k, 0, 0]) == 11
+    assert CLASSES[int(record["scalar_convergence"][k, 0, 0])] == "monotone"
+    assert record["scalar_order"][k, 0, 0] == pytest.approx(2.0, abs=0.05)
+    finest = record["period"][0, 0, -1]
+    assert record["scalar_finest"][k, 0, 0] == finest
+    change = abs(record["period"][0, 0, -1] - record["period"][0, 0, -2])
+    assert record["period_gci"][0, 0] == pytest.approx(1.25 * change / 3)
+    assert record["scalar_gci"][k, 0, 0] == pytest.approx(1.25 * change / 3 / finest)
+    units = record.variable("omega_end_richardson").attrs["units"]
+    assert units == experiment.model.definition.states[1].unit
+    # a maximum of rest: known to rounding
+    assert CLASSES[int(record["scalar_convergence"][names.index("theta_max"), 0, 0])] == "round_off"
+
+
+def test_every_value_that_exists_at_best_has_a_limit_or_is_of_the_solution() -> None:
+    assert {name for name in HAVE_LIMITS if not VALUES[name].best} == set()
+    rest = {name for name, value in VALUES.items() if value.best} - HAVE_LIMITS
+    assert rest == {"error_l1", "error_l2", "error_linf", "error_linf_interior"}
+
+
+def test_checks_compare_the_limit_and_tell_its_bound() -> None:
+    at = {"level": "best"}
+    exact = float(analysed(**PENDULUM)[1]["exact_period"][0])
+    finest = {"value": "period", "equals": exact, "atol": 2e-5}
+    right = finest | {"at": at, "atol": 1e-6}
+    near = {"value": "period", "at": at, "below": exact - 1e-7}
+    wrong = {"value": "period", "at": at, "equals": exact + 1e-4, "atol": 1e-5}
+    found = judged(finest, right, near, wrong, **PENDULUM)
+    assert [v.status for v in found] == ["FAIL", "PASS", "INCONCLUSIVE", "FAIL"]
+    assert [v.reason for v in found[1:]] == ["match", "pre_asymptotic", "mismatch"]
+    assert "with an error of at most" in found[1].text
+    assert "`levels:`" in found[2].advice
+
+
+def test_one_level_bounds_nothing() -> None:
+    checks = [{"value": "period", "at": {"best": True}, "below": x} for x in (6.0, 7.0)]
+    found = judged(*checks, **(PENDULUM | {"levels": [9]}))
+    assert [(v.status, v.reason) for v in found] == [
+        ("INCONCLUSIVE", "too_few_levels"),
+        ("PASS", "match"),
+    ]
+    assert "error that is not known" in found[0].text
+
+
+def test_a_scheme_that_chooses_its_own_steps_has_no_limits() -> None:
+    schemes = ["central", {"kind": "dop853", "tolerance": 1e-6}]
+    _, record = analysed(**(PENDULUM | {"schemes": schemes}))
+    assert np.isnan(record["period_richardson"][1]).all()
+    assert np.isfinite(record["period_richardson"][0]).all()
+
+
+def test_a_large_sweep_keeps_period_and_amplitude_only() -> None:
+    sweep = {"initial.theta": {"linspace": [0.1, 2.0, 5]}}
+    experiment, record = analysed(**(PENDULUM | {"sweep": sweep}))
+    records = {level: simulate_record(experiment, level) for level in experiment.levels}
+    lean = {
+        level: Record(row.coords, row.variables, {**row.attrs, "storage": "lean"})
+        for level, row in records.items()
+    }
+    part = part_of(experiment, lean)
+    assert [row.variable for row in scalars(part)] == ["period", "amplitude"]
+    thin = analyse_records(experiment, lean)
+    kept = {name for name in thin.variables if "gci" in name or name.startswith("scalar_")}
+    assert kept == set()
+    np.testing.assert_array_equal(thin["period_richardson"], record["period_richardson"])
+    assert "scalar" not in thin.coords
+
+
+def test_members_are_the_same_in_parts() -> None:
+    data = PENDULUM | {"sweep": {"initial.theta": [0.3, 1.0, 3.0, 2.0]}}
+    experiment, whole = analysed(**data)
+
+    readers = {level: partial(simulate_record, experiment, level) for level in experiment.levels}
+    parts = joined(list(analyse_parts(experiment, readers, size=1)))
+    for name in (
+        "period_richardson",
+        "theta_end_richardson_error",
+        "scalar_order",
+        "omega_max_gci",
+    ):
+        np.testing.assert_array_equal(parts[name], whole[name])
