@@ -15,6 +15,7 @@ import numpy as np
 
 from vibsim import plan
 from vibsim.analysis.assemble import analyse_records
+from vibsim.analysis.parts_told import is_told
 from vibsim.analysis.reached import is_bound
 from vibsim.record import Record, Variable
 from vibsim.vocabulary import HIGHEST
@@ -91,12 +92,14 @@ def _read(
 _DECISIVE = ("status", "failure_time", "last_step", "omega_dt", HIGHEST, "measured_growth")
 
 
+def _is_kept(name: str) -> bool:
+    return name in _DECISIVE or name.startswith("check_") or is_bound(name) or is_told(name)
+
+
 def kept(parts: Iterable[Record], thin: list[Record]) -> Iterator[Record]:
     """Pass parts on, and keep of each in `thin` what `verdicts` and `summarise` need of it."""
     for part in parts:
-        names = [
-            n for n in part.variables if n in _DECISIVE or n.startswith("check_") or is_bound(n)
-        ]
+        names = [n for n in part.variables if _is_kept(n)]
         thin.append(Record(part.coords, {n: part.variables[n] for n in names}, part.attrs))
         yield part
 

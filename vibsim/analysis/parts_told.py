@@ -37,6 +37,11 @@ def at_start(q: Comparison) -> dict[str, Variable]:
     return {f"{q.name}_at_start": Variable(("scheme", "case"), chosen, attrs)}
 
 
+def is_told(name: str) -> bool:
+    """Tell whether a variable of the convergence Record is one that `parts_in_words` reads."""
+    return name.endswith((f"{PHASE}_order", f"{AMPLITUDE}_order", f"{PHASE}_at_start"))
+
+
 def parts_in_words(model: Model, record: Record, quantity: str, scheme: int, case: int) -> str:
     """Say of which order phase and amplitude are where they differ; empty where they do not, or it is not known.
 
