@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from vibsim.analysis import analyse_records
 from vibsim.analysis.gci import CLASSES, classify, index, of_order, relative
+from vibsim.simulation import simulate_record
+from vibsim.spec import Experiment
 
 LEVELS = (4, 5, 6)
 
@@ -119,3 +122,26 @@ def test_a_fit_covers_noisy_levels() -> None:
 def test_numbers_that_are_equal_have_no_index() -> None:
     assert of(1.0, 1.0, 1.0) == 0.0
     assert of(1.0, 1.0, 1.0, 1.0) == 0.0
+
+
+def test_a_series_has_an_index_at_every_time_that_does_not_vanish_with_the_difference() -> None:
+    """Pendulum: it bounds the true error of the finest level, at the times at which the levels cross as well."""
+    experiment = Experiment.from_dict(
+        {
+            "title": "test",
+            "model": {"kind": "pendulum"},
+            "initial": {"theta": 1.0},
+            "time": {"end": 20.0},
+            "levels": [6, 7, 8, 9],
+            "schemes": ["central"],
+        }
+    )
+    records = {level: simulate_record(experiment, level) for level in experiment.levels}
+    record = analyse_records(experiment, records)
+    found = record["theta_gci"][0, 0]
+    error = np.abs(record["theta_exact"][0] - record["theta_finest"][0, 0])
+    assert np.all(found >= error)
+    norm = record.words("norm").index("l2")
+    difference = record["theta_difference_norm"][0, 0, -1, norm]
+    assert record["theta_gci_norm"][0, 0, norm] == pytest.approx(1.25 * difference / 3)
+    assert record["theta_gci_norm"][0, 0, norm] >= record["theta_error_norm"][0, 0, -1, norm]

@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 
 from vibsim.analysis import series
 from vibsim.analysis.compare import Comparison
+from vibsim.analysis.gci import of_order
+from vibsim.analysis.limits import ORDINARY
 from vibsim.analysis.local_order import local_order, window_points
 from vibsim.analysis.part import CENTRED, by_level, plain_name
 from vibsim.analysis.promise import options_swept
 from vibsim.analysis.swing import swing
 from vibsim.models import ENERGIES
 from vibsim.record import Variable, attributes
+from vibsim.vocabulary import TYPICAL_NORM
 
 Floats = NDArray[np.float64]
 Table = dict[str, Variable]
@@ -77,7 +80,29 @@ def numbers(q: Comparison) -> Table:
         )
     if levels > 2:
         _triples(q, add)
+    if levels > 1 and not part.lean:
+        words = _IN_NORM.format("grid convergence index of the finest level")
+        rows = [_index(q, norm, q.in_norm(norm).difference[..., -1]) for norm in part.norms]
+        add("gci_norm", ("scheme", "case", "norm"), np.stack(rows, axis=-1), words, q.units)
     return table
+
+
+def _index(q: Comparison, norm: str, change: Floats) -> Floats:
+    """Return the grid convergence index of a change between the finest two levels, by the order in a norm.
+
+    Parameters
+    ----------
+    change
+        Shape (scheme, case), or (scheme, case, t).
+    """
+    levels = q.part.grid.levels
+    promised = np.where(np.isfinite(q.order), q.order, ORDINARY)
+    seen = np.full(q.part.shape, np.nan)
+    if len(levels) > 2:
+        seen = q.observed_orders(norm)[..., -1]
+    if change.ndim > seen.ndim:
+        promised, seen = promised[..., None], seen[..., None]
+    return of_order(change, levels[-1] - levels[-2], seen, promised)
 
 
 def _triples(q: Comparison, add: Add) -> None:
@@ -127,6 +152,10 @@ def _pairs(q: Comparison, add: Add) -> None:
     unknown = [np.full_like(x, np.nan) for x in d]
     rescaled = [x * series.rescaling(p, levels[: i + 2]) for i, x in enumerate(d)]
     errors = unknown if q.errors is None else q.errors[:-1]
+    # where a difference passes zero, the error does not
+    around = np.where(np.isfinite(d[-1]), series.local_scale(d[-1]), np.nan)
+    words = "grid convergence index of the finest level"
+    add("gci", SERIES, _index(q, TYPICAL_NORM, around), words, q.units)
     add("difference", dims, np.stack(d, 2), "level minus next level", q.units)
     add("rescaled", dims, np.stack(rescaled, 2), "difference, rescaled", q.units)
     add("error_estimate", dims, np.stack(estimates(q), 2), "estimated error", q.units)

@@ -75,12 +75,16 @@ PARTS = 3
 RESULT = 100
 """Bytes that an analysis keeps of each scheme and member until its end."""
 
-COMPARED = (80, 190)
+COMPARED = (116, 190)
 """Bytes that an analysis writes of a scheme and member: once, and for each level; two norms, and no series."""
-COMPARED_SERIES = (-80, 184)
+COMPARED_SERIES = (-48, 184)
 """Bytes beside these of a scheme, member and sample, where an analysis writes series."""
+COMPARED_NUMBERS = 785
+"""Bytes beside these of a scheme and member: the limits of numbers (`vibsim.analysis.best`)."""
 COMPARED_FILE = 130_000
 """Bytes of the file of an analysis beside its data."""
+COMPARED_SERIES_FILE = 60_000
+"""Bytes beside these where an analysis writes series."""
 
 
 def work(force_evaluations: int, explicit: bool, alone: float | None = None) -> tuple[float, float]:
@@ -208,5 +212,6 @@ def analysis_disk(loads: Sequence[Load], members: int, is_lean: bool) -> int:
     if not is_lean:
         once, each = COMPARED_SERIES
         size += loads[0].samples * (once + each * len(loads))
-        size += EXTREMUM * len(loads) * max(load.extrema for load in loads)
-    return loads[0].schemes * members * size + COMPARED_FILE
+        size += EXTREMUM * len(loads) * max(load.extrema for load in loads) + COMPARED_NUMBERS
+    file = COMPARED_FILE + (0 if is_lean else COMPARED_SERIES_FILE)
+    return loads[0].schemes * members * size + file

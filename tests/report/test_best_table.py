@@ -1,0 +1,106 @@
+"""The table of best values: both error bars, told apart, and rounded to what is known."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+
+import numpy as np
+import pytest
+import samples
+
+from vibsim.analysis import analyse_records
+from vibsim.record import Record
+from vibsim.report import choice, contents_best
+from vibsim.report.tables import to_csv, to_latex
+from vibsim.simulation import simulate_record
+
+
+def table(exp: object) -> tuple[Record, contents_best.Table]:
+    record = samples.record(exp)
+    found = contents_best.table(record, choice.members(record, "theta"))
+    assert found is not None
+    return record, found
+
+
+def rows(found: contents_best.Table) -> dict[str, dict[str, str]]:
+    return {row["number"]: row for row in csv.DictReader(io.StringIO(to_csv(found)))}
+
+
+def test_every_number_is_that_of_the_record() -> None:
+    record, found = table(samples.plain())
+    row = rows(found)["period [s]"]
+    assert float(row["finest level"]) == record["period"][0, 0, -1]
+    assert float(row["best value"]) == record["period_richardson"][0, 0]
+    assert float(row["bound"]) == record["period_richardson_error"][0, 0]
+    assert float(row["GCI"]) == record["period_gci"][0, 0]
+    exact = float(record["exact_period"][0])
+    assert float(row["true error"]) == abs(float(row["best value"]) - exact)
+    assert float(row["true error"]) <= float(row["bound"])
+    assert row["convergence"] == "monotone"
+    assert re.fullmatch(r"\d+ to 9", row["levels"])
+    end = rows(found)["θ at the end [rad]"]
+    assert float(end["true error"]) == abs(float(end["best value"]) - record["theta_exact"][0, -1])
+
+
+def test_values_are_read_with_the_digits_that_are_known() -> None:
+    _, found = table(samples.plain())
+    read = next(row for row in found.text_rows() if row[0] == "period [s]")
+    place = [column.header for column in found.columns].index("best value")
+    assert re.fullmatch(r"6\.6999\d{3,4}", read[place])
+    assert read[place + 1].startswith("1.3·10")
+
+
+def test_what_is_unknown_is_said() -> None:
+    record, _ = table(samples.plain())
+    bound = record.variables["period_richardson_error"]
+    bound.values[...] = np.nan
+    found = contents_best.table(record, choice.members(record, "theta"))
+    assert found is not None
+    assert any("unknown" in row for row in found.text_rows())
+    assert rows(found)["period [s]"]["bound"] == ""
+
+
+def test_one_level_has_no_table_and_a_sweep_names_its_members() -> None:
+    exp = samples.plain(levels=[9])
+    record = samples.record(exp)
+    assert contents_best.table(record, choice.members(record, "theta")) is None
+    _, found = table(samples.swept(4))
+    assert "member" in [column.header for column in found.columns]
+
+
+def test_a_lean_record_has_period_and_amplitude() -> None:
+    exp = samples.swept(4)
+    levels = {level: simulate_record(exp, level) for level in exp.levels}
+    lean = {
+        level: Record(row.coords, row.variables, {**row.attrs, "storage": "lean"})
+        for level, row in levels.items()
+    }
+    record = analyse_records(exp, lean)
+    found = contents_best.table(record, choice.members(record, "theta"))
+    assert found is not None
+    assert {row[0] for row in found.rows} == {"period [s]", "amplitude [rad]"}
+    assert not {"GCI", "order"} & {column.header for column in found.columns}
+
+
+def test_latex_has_every_row() -> None:
+    _, found = table(samples.several())
+    text = to_latex(found)
+    assert text.count(r"\\") == len(found.rows) + 1
+    assert "nan" not in text
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (6.69997481, 1.3e-6, "6.6999748"),
+        (-0.958786, 3.6e-4, "−0.95879"),
+        (123.456, 20.0, "123"),
+        (0.0, 1e-3, "0.0000"),
+        (1.0, 0.0, "1"),
+        (1.0, float("nan"), "1"),
+    ],
+)
+def test_rounding(value: float, error: float, text: str) -> None:
+    assert contents_best._rounded(value, error).text == text
