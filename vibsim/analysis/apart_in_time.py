@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from vibsim.analysis.compare import Comparison
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 LONG_NAMES = {
     PHASE: "time by which {} is early",
@@ -82,7 +83,7 @@ def parts_of_errors(
                 long_name=LONG_NAMES[end].format(found[position].long_name),
                 units="s" if end == PHASE else "1",
                 values=[row[k] for row in told],
-                exact=np.zeros((1, *told[0][k].shape[1:])) if known else None,
+                exact=_nothing(known, told[0][k].shape) if known.any() else None,
                 order=_order(part, name),
                 floor=part.floor_of(name, scale * part.magnified),
                 scale=scale,
@@ -111,15 +112,15 @@ def _order(part: Part, name: str) -> Floats:
 
 def _told(
     part: Part, found: Mapping[str, Comparison], position: str
-) -> tuple[list[tuple[Floats, Floats]], tuple[Floats, Floats], bool]:
+) -> tuple[list[tuple[Floats, Floats]], tuple[Floats, Floats], Flags]:
     """Return phase and amplitude at every level, the sizes their round-off is relative to, and if the truth is known.
 
-    Shapes (scheme, case, t) and (scheme, case).
+    Shapes (scheme, case, t), (scheme, case) and (case,).
     """
     place = part.model.positions.index(position)
     states = [*part.model.positions, *part.model.velocities]
-    known = all(found[name].exact is not None for name in states)
     shape = (*part.shape, len(part.grid.t))
+    known = np.all([_is_known(found[name], shape) for name in states], axis=0)
     truth = {name: _truth(found[name], known, shape) for name in states}
     speed = part.model.velocities[place]
     push = _push(part, place, truth)
@@ -139,10 +140,24 @@ def _told(
     return told, (scale / fastest, scale / rest), known
 
 
-def _truth(q: Comparison, known: bool, shape: tuple[int, ...]) -> Floats:
-    """Return what a state should be, shape (scheme, case, t)."""
-    best = q.exact if known and q.exact is not None else q.extrapolation[0]
-    return np.broadcast_to(best, shape)
+def _is_known(q: Comparison, shape: tuple[int, ...]) -> Flags:
+    """Tell of which members the true values of a state are known, shape (case,)."""
+    if q.exact is None:
+        return np.zeros(shape[1], dtype=bool)
+    return np.asarray(np.isfinite(np.broadcast_to(q.exact, shape)).all(axis=(0, 2)))
+
+
+def _truth(q: Comparison, known: Flags, shape: tuple[int, ...]) -> Floats:
+    """Return what a state should be, shape (scheme, case, t): the true values, or what the levels extrapolate to."""
+    if q.exact is not None and known.all():
+        return np.broadcast_to(q.exact, shape)
+    best = np.broadcast_to(q.extrapolation[0], shape)
+    return best if q.exact is None else np.where(known[:, None], q.exact, best)
+
+
+def _nothing(known: Flags, shape: tuple[int, ...]) -> Floats:
+    """Return 0, the true value of a part, of members whose truth is known, and NaN of others; shape (1, case, t)."""
+    return np.broadcast_to(np.where(known, 0.0, np.nan)[None, :, None], (1, *shape[1:]))
 
 
 def _rows(values: Floats) -> Floats:
