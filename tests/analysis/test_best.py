@@ -181,3 +181,10 @@ def test_members_are_the_same_in_parts() -> None:
         "omega_max_gci",
     ):
         np.testing.assert_array_equal(parts[name], whole[name])
+
+
+def test_bounds_of_numbers_by_peaks_know_nothing_of_the_rounding_of_roots() -> None:
+    """The recurrence is for linear models: elsewhere eps/(w dt)^2 does not enter."""
+    _, record = analysed(**(PENDULUM | {"levels": [13, 14, 15, 16], "samples": "common"}))
+    assert best(record, "growth_per_period")[1] < 1e-6
+    assert best(record, "frequency")[1] < 1e-9

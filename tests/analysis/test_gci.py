@@ -122,6 +122,7 @@ def test_a_fit_covers_noisy_levels() -> None:
 def test_numbers_that_are_equal_have_no_index() -> None:
     assert of(1.0, 1.0, 1.0) == 0.0
     assert of(1.0, 1.0, 1.0, 1.0) == 0.0
+    assert of(1.3, 1.1, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0) == 0.0
 
 
 def test_a_series_has_an_index_at_every_time_that_does_not_vanish_with_the_difference() -> None:

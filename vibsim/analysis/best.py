@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis import gci, values
+from vibsim.analysis import gci, oscillation, values
 from vibsim.analysis.compare import Comparison
 from vibsim.analysis.limits import LOUD, Limit, limit, observed_order
 from vibsim.analysis.part import Part
@@ -179,7 +179,7 @@ def _floor(name: str, place: values.Place, found: Floats) -> Floats:
     if comparison is not None and name in ("end", "at"):
         return comparison.floor
     relative = part.relative_floor * part.magnified[:, None]
-    if name in _OF_ROOTS:
+    if name in _OF_ROOTS and oscillation.has_recurrence(part, place.levels[-1]):
         relative = relative / np.minimum(part.omega_dt, 1.0) ** 2
     size = _scale(name, place, found)
     return np.broadcast_to(relative * size[..., None], found.shape)

@@ -185,4 +185,4 @@ def _fitted(values: Floats, levels: Sequence[int], promised: Floats) -> Floats:
         )
         better = sigma < least
         least, index = np.where(better, sigma, least), np.where(better, now, index)
-    return np.asarray(index)
+    return np.where(typical > 0, index, 0.0 * typical)

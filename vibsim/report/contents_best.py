@@ -80,13 +80,15 @@ def _rows(record: Record, shown: Sequence[Member], several: bool) -> Iterator[tu
             bound = float(at(record, f"{name}_richardson_error", member))
             if not math.isfinite(value):
                 continue
+            finest = _finest(record, name, k, member)
+            known = bound if math.isfinite(bound) else _float(finest[1])
             who = [member.scheme_name, *([member.case_name] if several else [])]
             exact = _exact(record, name, member)
             yield (
                 _name(record, name),
                 *who,
-                *_finest(record, name, k, member),
-                _rounded(value, bound),
+                *finest,
+                _rounded(value, known),
                 Written(bound, "unknown") if math.isnan(bound) else _error(bound),
                 _error(abs(value - exact)),
                 *_approach(record, k, member),
