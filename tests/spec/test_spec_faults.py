@@ -15,7 +15,7 @@ from vibsim.errors import InputError
 from vibsim.models import MODELS, quantities
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import simulate_record
-from vibsim.spec import VALUES, Experiment
+from vibsim.spec import VALUES, Experiment, quantity_rules
 from vibsim.spec import build as building
 
 LAPTOP = {"levels": [6, 7, 8, 9]}
@@ -461,9 +461,9 @@ def test_nothing_is_compared_with_an_exact_value_that_is_not_known(
     kind = "linear_pendulum" if VALUES[name].needs_linear else "pendulum"
     changes = check(value=name, below=1, **of) | {"model": {"kind": kind}}
     build(**changes)
-    # a smooth motion would be computed where it is not known exactly
-    edge = {"acceleration": "-(g/L)*theta + 0*abs(theta)"} if lost == "exact" else {}
-    change_model(monkeypatch, kind, **{lost: None}, **edge)
+    # a motion without events would be computed where it is not known exactly
+    monkeypatch.setattr(quantity_rules, "has_solution", lambda model: model.exact is not None)
+    change_model(monkeypatch, kind, **{lost: None})
     if (VALUES[name].needs_exact == "period") != (lost == "exact_period"):
         build(**changes)
         return
@@ -474,10 +474,10 @@ def test_nothing_is_compared_with_an_exact_value_that_is_not_known(
 
 def test_the_energy_is_known_exactly_where_it_is_conserved(monkeypatch: pytest.MonkeyPatch) -> None:
     changes = value(value="error_l2", quantity="energy")
-    edge = "-(g/L)*theta + 0*abs(theta)"
-    change_model(monkeypatch, exact=None, acceleration=edge)
+    monkeypatch.setattr(quantity_rules, "has_solution", lambda model: model.exact is not None)
+    change_model(monkeypatch, exact=None)
     build(**changes)
-    change_model(monkeypatch, conservative=False, exact=None, acceleration=edge)
+    change_model(monkeypatch, conservative=False, exact=None)
     assert only_fault(**changes).rule == "the exact energy of pendulum is not known"
 
 

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from vibsim.engine.cache import folder
 from vibsim.expression import Expression
 from vibsim.models import Model, tree
-from vibsim.plan.code import used_by
+from vibsim.plan.code import of_folder
 from vibsim.plan.versions import versions
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -160,7 +160,7 @@ def _surroundings() -> tuple[bytes, ...]:
     # numpy chooses its functions by the processor
     able = sorted(name for name, has in _features().items() if has)
     libraries = sorted(versions(("numpy", "scipy")).items())
-    code = used_by("vibsim.simulation.reference")
+    code = "".join(of_folder(f"vibsim.{room}") for room in ("expression", "models", "simulation"))
     return code.encode(), repr((libraries, platform.machine(), able)).encode()
 
 

@@ -2,7 +2,7 @@ r"""A reference solution to about twelve digits, of models whose exact solution 
 
 Collocation (`vibsim.simulation.collocation`), and the step halved until two solutions agree. Smooth forces take equal
 steps (`vibsim.simulation.smooth`); forces with corners or jumps are smooth from one to the next, and each of these
-pieces has equal steps of its own (`vibsim.simulation.pieces`). It shares no arithmetic with the schemes and their
+pieces has equal steps of its own (`vibsim.simulation.walking`). It shares no arithmetic with the schemes and their
 kernels: formulas are evaluated by numpy. What is left between the last two solutions bounds the error of the last one.
 """
 
@@ -20,9 +20,10 @@ from vibsim.models import Model
 from vibsim.simulation.collocation import Floats
 from vibsim.simulation.kept import digest_of, kept
 from vibsim.simulation.members import Members
-from vibsim.simulation.pieces import ENDLESS, SLIDING, Pieces, Plan, planned, walk_pieces
+from vibsim.simulation.pieces import Pieces, Plan, planned
 from vibsim.simulation.sides import Sides, sides
 from vibsim.simulation.smooth import Solved, solve
+from vibsim.simulation.walking import ENDLESS, SLIDING, walk_pieces
 
 METHOD = "collocation at 12 Gauss points of a step, halved until two solutions agree"
 PIECEWISE = f"{METHOD}; a step ends at every corner of the force"

@@ -1,4 +1,4 @@
-"""The forces of a model on one side of each of their corners, for the reference (`vibsim.simulation.pieces`).
+"""The forces of a model on one side of each of their corners, for the reference (`vibsim.simulation.walking`).
 
 Formulas are evaluated by numpy with the modes of their switches held (`vibsim.expression.switches`). The points of a
 table are one more switch, whose mode is the number of the point before the present place.
