@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Codes = NDArray[np.int8]
 
-CAUSES = ("", "last_point", "one_quantity", "everything", "special_times", "one_norm", "theory")
+CAUSES = ("none", "last_point", "one_quantity", "everything", "special_times", "one_norm", "theory")
 """What was found; files hold a position here."""
 NONE, LAST_POINT, ONE_QUANTITY, EVERYTHING, SPECIAL_TIMES, ONE_NORM, THEORY = range(len(CAUSES))
 

@@ -59,7 +59,7 @@ class Story:
     """Kind of the scheme."""
     promised: float = math.nan
     """The order that the scheme promises."""
-    cause: str = ""
+    cause: str = "none"
     """Why the order is another one, one of `vibsim.analysis.causes.CAUSES`."""
     more: int = -1
     """Finer levels that are probably needed; -1 where that is not known, here and below."""

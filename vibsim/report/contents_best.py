@@ -154,7 +154,7 @@ def _exact(record: Record, name: str, member: Member) -> float:
         return float(exact_periods(record)[member.case])
     quantity, _, which = name.rpartition("_")
     # a coarse grid need not end at the end
-    if which != "end" or not record.attrs.get("end_included"):
+    is_there = which == "end" and record.attrs.get("end_included")
+    if not is_there or f"{quantity}_exact" not in record:
         return math.nan
-    series = exact_series(record, quantity, member)
-    return float(series[-1]) if len(series) else math.nan
+    return float(exact_series(record, quantity, member)[-1])
