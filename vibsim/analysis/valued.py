@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from vibsim.analysis.best import has_limit
 from vibsim.analysis.costs import cost_in_words
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
+from vibsim.analysis.value_units import unit_of
 from vibsim.analysis.wording import number
 from vibsim.record import Record
 from vibsim.spec.about import schemes_of
+from vibsim.spec.values import VALUES
 from vibsim.vocabulary import REASON_NAMES
 
 if TYPE_CHECKING:
@@ -42,8 +44,6 @@ FEW = 3
 """Fewer levels do not show how large an error is."""
 ROUND_OFF = 1e-13
 """A number that is no larger is rounding."""
-DEFAULT_RTOL, DEFAULT_ATOL = 1e-9, 1e-12
-"""Tolerance of ``equals`` where a check gives none."""
 
 
 def valued(experiment: Experiment, record: Record, check: ValueCheck, index: int) -> Outcome:
@@ -78,11 +78,13 @@ def valued(experiment: Experiment, record: Record, check: ValueCheck, index: int
     codes = [REASON_NAMES.index(name) for name in ("non_finite", "not_applicable", "match", few)]
     reason = np.select(masks, codes, REASON_NAMES.index("mismatch"))
     what = f"{check.value} of {check.quantity}" if check.quantity else check.value
+    unit = f" {measure}" if (measure := unit_of(experiment, record, check)) else ""
 
     def tell(scheme: int, case: int) -> str:
         found = float(measured[scheme, case])
         word = REASON_NAMES[int(reason[scheme, case])]
-        return _tell(what, word, found, rule, _bound_in_words(check, float(bound[scheme, case])))
+        error = _bound_in_words(check, float(bound[scheme, case]))
+        return _tell(what, word, found, rule, f"{unit}{error}")
 
     return Outcome(
         schemes=[names[i] for i in schemes],
@@ -113,6 +115,8 @@ _ADVICE = {
 }
 FINER = 2
 """So many finer levels are advised."""
+HALF = 0.5
+"""Counted numbers are equal, or apart by more."""
 COUNTED = frozenset({"accepted_steps", "force_evaluations"})
 """Numbers that finer levels make larger, and no more accurate."""
 
@@ -144,8 +148,6 @@ def _border(check: ValueCheck) -> str:
 
 def depends_on_level(name: str) -> bool:
     """Say whether a number is another at another level, or rests on the whole ladder."""
-    from vibsim.spec.values import VALUES
-
     return "level" in VALUES[name].at or sees_several_levels(name)
 
 
@@ -180,8 +182,6 @@ def _tell(what: str, reason: str, found: float, rule: str, error: str) -> str:
 
 def sees_several_levels(name: str) -> bool:
     """Say whether a number rests on more than one level: on finer ones, or on the whole ladder."""
-    from vibsim.spec.values import VALUES
-
     row = VALUES[name]
     return row.finer_levels > 0 or (row.of == "convergent" and "level" not in row.at)
 
@@ -204,9 +204,7 @@ def _compare(check: ValueCheck, measured: Floats) -> tuple[Flags, Floats, str]:
     if check.above is not None:
         return measured > check.above, check.above - measured, f"above {number(check.above)}"
     wanted = float("nan") if check.equals is None else check.equals
-    plain = check.rtol is None and check.atol is None
-    rtol = DEFAULT_RTOL if plain else check.rtol or 0.0
-    atol = DEFAULT_ATOL if plain else check.atol or 0.0
-    allowed = atol + rtol * abs(wanted)
-    away = np.asarray(np.abs(measured - wanted))
-    return away <= allowed, away - allowed, f"equal to {wanted!r} within {number(allowed)}"
+    away, allowed = np.asarray(np.abs(measured - wanted)), check.allowed
+    is_counted = VALUES[check.value].measure == "count" and allowed < HALF
+    rule = f"{wanted:.15g}" if is_counted else f"{wanted!r} within {number(allowed)}"
+    return away <= allowed, away - allowed, f"equal to {rule}"

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from shlex import quote
 from typing import TYPE_CHECKING, Any
 
+from vibsim.analysis.value_units import unit_of
 from vibsim.plan.versions import DRAWING, versions
 from vibsim.record import Record
 from vibsim.report import (
@@ -110,6 +111,11 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         value=measured.value if measured and measured.kind == "value" else "",
         levels=len(data.whole(record, "level")),
     )
+    unit = (
+        data.pretty_unit(unit_of(experiment, record, measured)).replace("sqrt(s)", "√s")
+        if measured and measured.kind == "value"
+        else ""
+    )
     if asserted:
         heading = assertions.heading(asserted)
     elif check["kind"] == BY_TOLERANCE:
@@ -130,7 +136,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         "advice": words.told(check, "advice"),
         "expected": words.readable(words.expectation(check.get("expected"))),
         "factor": _factor(check),
-        "results": _results(record, check),
+        "results": _results(record, check, unit),
         "more": _more(check),
         "where": _where(check),
         "alone": _alone(check),
@@ -153,7 +159,8 @@ def _factor(check: Mapping[str, Any]) -> str:
     return words.ratio(decisive.get("order")) if settled else ""
 
 
-def _results(record: Record, check: Mapping[str, Any]) -> Table | None:
+def _results(record: Record, check: Mapping[str, Any], unit: str) -> Table | None:
+    """Return the table of what was measured, with the unit of its numbers."""
     results: Sequence[Mapping[str, Any]] = check.get("results") or []
     if not results:
         return None
@@ -168,7 +175,7 @@ def _results(record: Record, check: Mapping[str, Any]) -> Table | None:
     )
     # how far apart two solutions are has no digits worth reading, a number that a check names may have
     form = "small" if check.get("kind") == "equal" else "value"
-    columns += [Column("value", form=form)] if valued else []
+    columns += [Column("value", unit, form)] if valued else []
     rows = [tuple(_cells(record, r, sweep, measured, valued)) for r in results]
     return Table(f"results_{check['id']}", "Measured", tuple(columns), tuple(rows))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -206,6 +207,17 @@ def _stamp(experiment: Experiment, record: Record, member: Member) -> str:
     return thumbnail.draw(t, figures_time.differences(record, quantity, member))
 
 
+LONG_HEADING = 90
+"""Letters of a caption of which a heading has the first words only."""
+
+
+def _heading(caption: str) -> str:
+    """Return what stands above a table that is folded away."""
+    if len(caption) <= LONG_HEADING:
+        return caption
+    return re.split(r"[:;(]", caption, maxsplit=1)[0].strip()
+
+
 def _tables(
     experiment: Experiment, record: Record, summary: Mapping[str, Any]
 ) -> tuple[list[Table], list[tuple[str, list[Table]]]]:
@@ -233,7 +245,9 @@ def _tables(
     # the first table is what the page is about; a long one after it would push the figures away
     long = [table for table in listed[1:] if len(table.rows) > LONG]
     listed = [table for table in listed if table not in long]
-    folded = [(table.caption, [table]) for table in [*long, *order[kept:]] if table is not None]
+    folded = [
+        (_heading(table.caption), [table]) for table in [*long, *order[kept:]] if table is not None
+    ]
     other = [contents.orders(record, quantity, shown, norm) for quantity in found for norm in norms]
     if other:
         folded.append(("Norms and orders in the other norms", other))

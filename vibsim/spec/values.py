@@ -16,6 +16,9 @@ largest value are gathered over every step; these and the energy deviations; the
 point is gathered apart; the energy deviations, whose largest value so far is gathered; or none because the value
 belongs to the motion as a whole."""
 Exact = Literal["solution", "period"]
+Measure = Literal["none", "count", "quantity", "l1", "l2", "time", "frequency", "position"]
+"""What a number is measured in: a plain number; one that is counted; the unit of its quantity, times that of the time
+or its root in norms over time; the unit of the time, of an angle over it, or of the position."""
 
 
 @dataclass(frozen=True)
@@ -45,13 +48,22 @@ class Value:
     """Whether the acceleration must be worked out in exact numbers (`vibsim.theory.degrees`)."""
     needs_events: bool = False
     """Whether it exists only where the motion of the model is not smooth."""
+    measure: Measure = "none"
+    """What it is measured in."""
 
 
 _ANYWHERE: tuple[AtPart, ...] = ("t", "step", "level", "scheme", "case")
 _NO_LEVEL: tuple[AtPart, ...] = ("scheme", "case")
 
 _SERIES = (
-    Value("end", "value at the last time, or at `t` or `step`", "series", _ANYWHERE, best=True),
+    Value(
+        "end",
+        "value at the last time, or at `t` or `step`",
+        "series",
+        _ANYWHERE,
+        best=True,
+        measure="quantity",
+    ),
     Value(
         "at",
         "value at the time `t` or after `step` steps",
@@ -59,21 +71,35 @@ _SERIES = (
         _ANYWHERE,
         best=True,
         needs_time=True,
+        measure="quantity",
     ),
     Value(
         "min",
         "smallest value over every step; of an output, over the stored times",
         "stored",
         best=True,
+        measure="quantity",
     ),
     Value(
         "max",
         "largest value over every step; of an output, over the stored times",
         "stored",
         best=True,
+        measure="quantity",
     ),
-    Value("max_abs", "largest absolute value over every step", "extremal", best=True),
-    Value("max_abs_interior", "the same without the last point", "deviation"),
+    Value(
+        "max_abs",
+        "largest absolute value over every step",
+        "extremal",
+        best=True,
+        measure="quantity",
+    ),
+    Value(
+        "max_abs_interior",
+        "the same without the last point",
+        "deviation",
+        measure="quantity",
+    ),
     Value(
         "max_abs_ratio",
         "largest absolute value over every step, over that of the next finer level",
@@ -93,13 +119,32 @@ _SERIES = (
         "largest absolute value over every step up to `t` or `step`, or the end",
         "running",
         _ANYWHERE,
+        measure="quantity",
     ),
     Value("relative_running_max", "the same, over |E(0)|", "running", _ANYWHERE),
 )
 _OSCILLATION = (
-    Value("period", "period, from interpolated peaks", "none", best=True),
-    Value("period_grid", "period, from peaks at grid points", "none"),
-    Value("exact_period", "period of the exact solution", "none", ("case",), needs_exact="period"),
+    Value(
+        "period",
+        "period, from interpolated peaks",
+        "none",
+        best=True,
+        measure="time",
+    ),
+    Value(
+        "period_grid",
+        "period, from peaks at grid points",
+        "none",
+        measure="time",
+    ),
+    Value(
+        "exact_period",
+        "period of the exact solution",
+        "none",
+        ("case",),
+        needs_exact="period",
+        measure="time",
+    ),
     Value(
         "period_error",
         "period over the exact period, less one",
@@ -107,7 +152,13 @@ _OSCILLATION = (
         needs_exact="period",
         best=True,
     ),
-    Value("frequency", "angular frequency of the computed motion", "none", best=True),
+    Value(
+        "frequency",
+        "angular frequency of the computed motion",
+        "none",
+        best=True,
+        measure="frequency",
+    ),
     Value(
         "error_of_frequency",
         "angular frequency over that of the exact solution, less one",
@@ -121,6 +172,7 @@ _OSCILLATION = (
         "none",
         needs_linear=True,
         fixed_step=True,
+        measure="frequency",
     ),
     Value(
         "phase_error_per_period",
@@ -128,6 +180,7 @@ _OSCILLATION = (
         "none",
         needs_exact="period",
         best=True,
+        measure="time",
     ),
     Value(
         "predicted_phase_error",
@@ -135,14 +188,22 @@ _OSCILLATION = (
         "none",
         needs_linear=True,
         fixed_step=True,
+        measure="time",
     ),
     Value(
         "phase_error_slope",
         "slope of the time by which a peak comes early over the number of its period",
         "none",
         needs_exact="period",
+        measure="time",
     ),
-    Value("amplitude", "half the height from the last trough to the last peak", "none", best=True),
+    Value(
+        "amplitude",
+        "half the height from the last trough to the last peak",
+        "none",
+        best=True,
+        measure="position",
+    ),
     Value("amplitude_error", "last amplitude over the first one, less one", "none", best=True),
     Value("growth_factor", "last peak over the first peak", "none", best=True),
     Value(
@@ -166,23 +227,46 @@ _ENERGY = (
 )
 _EVENTS = (
     Value(
-        "event_count", "number of events, where the motion is not smooth", "none", needs_events=True
+        "event_count",
+        "number of events, where the motion is not smooth",
+        "none",
+        needs_events=True,
+        measure="count",
     ),
-    Value("first_event_time", "time of the first event", "none", needs_events=True),
-    Value("last_event_time", "time of the last event", "none", needs_events=True),
+    Value(
+        "first_event_time",
+        "time of the first event",
+        "none",
+        needs_events=True,
+        measure="time",
+    ),
+    Value(
+        "last_event_time",
+        "time of the last event",
+        "none",
+        needs_events=True,
+        measure="time",
+    ),
     Value(
         "rest_time",
         "time from which the body was at rest to the end",
         "none",
         needs_events=True,
+        measure="time",
     ),
 )
 _COST = (
-    Value("accepted_steps", "number of steps taken", "none"),
+    Value(
+        "accepted_steps",
+        "number of steps taken",
+        "none",
+        measure="count",
+    ),
     Value(
         "force_evaluations",
         "number of evaluations of the acceleration; of an implicit scheme those of one iteration per step",
         "none",
+        measure="count",
     ),
     Value(
         "stability_limit",
@@ -198,18 +282,41 @@ _COST = (
         _NO_LEVEL,
         fixed_step=True,
         needs_rational=True,
+        measure="count",
     ),
 )
 _ERRORS = (
-    Value("error_l1", "L1 norm of the true error", "convergent", best=True, needs_exact="solution"),
-    Value("error_l2", "L2 norm of the true error", "convergent", best=True, needs_exact="solution"),
-    Value("error_linf", "largest true error", "convergent", best=True, needs_exact="solution"),
+    Value(
+        "error_l1",
+        "L1 norm of the true error",
+        "convergent",
+        best=True,
+        needs_exact="solution",
+        measure="l1",
+    ),
+    Value(
+        "error_l2",
+        "L2 norm of the true error",
+        "convergent",
+        best=True,
+        needs_exact="solution",
+        measure="l2",
+    ),
+    Value(
+        "error_linf",
+        "largest true error",
+        "convergent",
+        best=True,
+        needs_exact="solution",
+        measure="quantity",
+    ),
     Value(
         "error_linf_interior",
         "largest true error without the last point",
         "convergent",
         best=True,
         needs_exact="solution",
+        measure="quantity",
     ),
     Value(
         "error_rate",
@@ -233,6 +340,7 @@ _ERRORS = (
         "states",
         needs_linear=True,
         fixed_step=True,
+        measure="quantity",
     ),
     Value(
         "error_estimate_defect",
@@ -269,6 +377,7 @@ _ERRORS = (
         "convergent",
         _NO_LEVEL,
         fixed_step=True,
+        measure="quantity",
     ),
 )
 _ROWS = (*_SERIES, *_OSCILLATION, *_ENERGY, *_EVENTS, *_COST, *_ERRORS)

@@ -1,0 +1,75 @@
+"""Numbers of checks with their units."""
+
+from __future__ import annotations
+
+import pytest
+
+from vibsim import spec
+from vibsim.analysis import analyse_records, verdicts
+from vibsim.analysis.value_units import unit_of
+from vibsim.simulation import simulate_record
+from vibsim.spec.values import VALUES
+
+QUANTITIES = {"value": "end", "quantity": "omega", "above": -9.0}
+
+
+def run(*checks, **changes):
+    content = {
+        "title": "A swing",
+        "source": "none",
+        "model": {"kind": "pendulum", "g": 9.8, "L": 4.9},
+        "initial": {"theta": 1.0},
+        "time": {"end": 10.0},
+        "levels": [6, 7, 8],
+        "schemes": ["central"],
+        "checks": list(checks),
+    }
+    experiment = spec.from_dict(content | changes, name="swing", collection="adhoc")
+    levels = {level: simulate_record(experiment, level) for level in experiment.levels}
+    return experiment, analyse_records(experiment, levels)
+
+
+@pytest.mark.parametrize(
+    ("check", "unit"),
+    [
+        ({"value": "end", "quantity": "omega"}, "rad s-1"),
+        ({"value": "max", "quantity": "wire_force"}, "N"),
+        ({"value": "max_abs", "quantity": "energy_deviation"}, "J"),
+        ({"value": "error_linf", "quantity": "theta"}, "rad"),
+        ({"value": "error_l2", "quantity": "theta"}, "rad sqrt(s)"),
+        ({"value": "error_l1", "quantity": "energy_deviation"}, "J s"),
+        ({"value": "period"}, "s"),
+        ({"value": "frequency"}, "rad s-1"),
+        ({"value": "amplitude"}, "rad"),
+        ({"value": "relative_energy_error"}, ""),
+        ({"value": "growth_factor"}, ""),
+    ],
+)
+def test_units(check, unit):
+    experiment, record = run({**check, "above": -99.0})
+    assert unit_of(experiment, record, experiment.checks[0]) == unit
+    (verdict,) = verdicts(experiment, record)
+    number = f" is {verdict.results[0].value:.10g}"
+    told = f"{number} {unit}" if unit else number
+    assert f"{told}; it is above -99." in verdict.text
+
+
+def test_a_scaled_run_has_none():
+    experiment, record = run({"value": "period", "above": 0.0}, scaled=True)
+    assert unit_of(experiment, record, experiment.checks[0]) == ""
+
+
+def test_a_counted_number_is_equal_without_a_tolerance():
+    ball = {"kind": "bouncing_ball", "g": 2.0, "restitution": 0.5, "eps_v": 0.3}
+    bounces = {"value": "event_count", "equals": 3}
+    given = {"model": ball, "initial": {"h": 1.0}, "time": {"end": 4.0}, "schemes": ["rk4"]}
+    experiment, record = run(bounces, **given)
+    (verdict,) = verdicts(experiment, record)
+    assert verdict.text.endswith("event_count is 3; it is equal to 3.")
+
+
+def test_every_number_says_what_it_is_measured_in():
+    plain = {name for name, row in VALUES.items() if row.measure == "none"}
+    words = ("factor", "ratio", "rate", "error", "degree", "order", "limit", "defect", "relative")
+    words += ("coincidence", "fraction", "growth")
+    assert [name for name in plain if not any(word in name for word in words)] == []
