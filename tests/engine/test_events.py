@@ -92,6 +92,7 @@ def test_members_with_events_are_not_stepped_in_blocks():
     assert many.position[:5].tobytes() == few.position.tobytes()
 
 
+@pytest.mark.slow
 def test_kernels_of_smooth_models_hold_nothing_of_events():
     for model in MODELS.values():
         for scheme in FIXED_STEP.values():

@@ -139,7 +139,10 @@ def test_what_is_no_number_cannot_enter_a_kernel():
         source(PENDULUM, dataclasses.replace(stepper, step=step_with_object))
 
 
-@pytest.mark.parametrize("lane", LANES)
+@pytest.mark.parametrize(
+    "lane",
+    [pytest.param(lane, marks=pytest.mark.slow if lane == "blocks" else ()) for lane in LANES],
+)
 def test_a_tableau_of_numbers_can(lane):
     options = {**CENTRAL.defaults(), "arithmetic": "increment"}
     stepper = dataclasses.replace(CENTRAL.stepper(options), step=step_with_tuple)

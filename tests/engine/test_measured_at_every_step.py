@@ -103,7 +103,7 @@ def check_energies(model, numbers, runs):
 
 @pytest.mark.parametrize("lane", LANES)
 @pytest.mark.parametrize("every", [1, 3, 8, 60, STEPS])
-@pytest.mark.parametrize("kind", ["central", "rk4"])
+@pytest.mark.parametrize("kind", ["central", pytest.param("rk4", marks=pytest.mark.slow)])
 def test_samples_of_any_stride_are_those_of_every_step(kind, every, lane):
     # with damping, so that the work of forces is sampled as well
     model = MODELS["pendulum"].variant(frozenset({"drag"}))

@@ -42,7 +42,15 @@ def runs(model, scheme, lane):
     )
 
 
-@pytest.mark.parametrize("kind", ["central", "rk4", "euler_cromer", "crank_nicolson"])
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "central",
+        pytest.param("rk4", marks=pytest.mark.slow),
+        "euler_cromer",
+        "crank_nicolson",
+    ],
+)
 @pytest.mark.parametrize("formulas", FORMULAS, ids=lambda f: " ".join(f))
 def test_both_equations_give_the_same_bits(formulas, kind):
     scheme = FIXED_STEP[kind]

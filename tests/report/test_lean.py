@@ -32,7 +32,7 @@ def lean(record, times):
     return Record(coords, kept, {**record.attrs, "storage": "lean"})
 
 
-@pytest.mark.parametrize("times", [True, False])
+@pytest.mark.parametrize("times", [pytest.param(True, marks=pytest.mark.slow), False])
 @pytest.mark.parametrize(
     ("sweep", "figures"),
     [

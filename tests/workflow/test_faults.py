@@ -29,7 +29,7 @@ def cut(path: Path) -> None:
     ("name", "harm"),
     [
         ("level_07.nc", flip),
-        ("summary.json", cut),
+        pytest.param("summary.json", cut, marks=pytest.mark.slow),
         pytest.param("convergence.nc", flip, marks=pytest.mark.slow),
         pytest.param("convergence.nc", cut, marks=pytest.mark.slow),
         pytest.param("level_07.nc", cut, marks=pytest.mark.slow),

@@ -74,7 +74,16 @@ def test_a_second_experiment_leaves_the_first_alone(place: Place) -> None:
     assert place.jobs() == []
 
 
-@pytest.mark.parametrize("name", ["level_07.nc", "convergence.nc", "summary.json", "report.html"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "level_07.nc",
+        *(
+            pytest.param(name, marks=pytest.mark.slow)
+            for name in ("convergence.nc", "summary.json", "report.html")
+        ),
+    ],
+)
 def test_a_lost_file_comes_back_with_the_same_bytes(place: Place, name: str) -> None:
     before = place.content()
     (place.tiny / name).unlink()
@@ -82,7 +91,7 @@ def test_a_lost_file_comes_back_with_the_same_bytes(place: Place, name: str) -> 
     assert place.content() == before
 
 
-@pytest.mark.parametrize("name", ["figures", "tables"])
+@pytest.mark.parametrize("name", ["figures", pytest.param("tables", marks=pytest.mark.slow)])
 def test_a_lost_folder_comes_back(place: Place, name: str) -> None:
     folder = place.tiny / name
     before = {path.name for path in folder.iterdir()}

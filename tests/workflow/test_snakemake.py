@@ -32,6 +32,7 @@ def test_snakemake_by_hand_agrees_with_a_run(place: Place) -> None:
     assert place.jobs() == []
 
 
+@pytest.mark.slow
 def test_snakemake_by_hand_rebuilds_a_damaged_file_at_the_second_try(place: Place) -> None:
     path = place.tiny / "level_07.nc"
     path.write_bytes(path.read_bytes()[:-1])
