@@ -57,7 +57,7 @@ def test_of_a_verdict_that_is_settled_nothing_is_predicted() -> None:
     assert found.status == "PASS"
     for name in ("more", "readable", "compensated"):
         assert int(record[f"check_{name}"][0, 0, 0]) == -1
-    assert cause(record) == ""
+    assert cause(record) == "none"
 
 
 @pytest.mark.slow
