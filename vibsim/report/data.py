@@ -220,6 +220,28 @@ def sound_pairs(record: Record, quantity: str, member: Member) -> list[bool]:
     return [bool(d > ABOVE * max(floor[i], floor[i + 1])) for i, d in enumerate(differences)]
 
 
+def sound_triples(record: Record, quantity: str, member: Member) -> list[bool]:
+    """Say of every triple of levels whether its differences stand above round-off."""
+    above = sound_pairs(record, quantity, member)
+    return [all(above[i : i + 2]) for i in range(len(whole(record, "triple")))]
+
+
+def stated_order(
+    record: Record, quantity: str, member: Member, norm: int
+) -> tuple[float, float, float, float, float] | None:
+    """Return the stated order, the ends of its interval and of its window; None where no order is stated."""
+    order, low, high = (
+        float(at(record, f"{quantity}_order{end}", member, norm=norm))
+        for end in ("", "_low", "_high")
+    )
+    first, last = (
+        float(at(record, f"{quantity}_window_{end}", member)) for end in ("first", "last")
+    )
+    if not np.isfinite([order, low, high, first, last]).all() or last <= first:
+        return None
+    return order, low, high, first, last
+
+
 def sound_levels(record: Record, quantity: str, member: Member) -> list[bool]:
     """Say of every level whether its error is still seen in the difference from the next (or previous) level."""
     if not whole(record, "pair"):

@@ -22,7 +22,8 @@ from vibsim.report.data import (
     formal_order,
     is_lean,
     place_of,
-    sound_pairs,
+    sound_triples,
+    stated_order,
     time_unit,
     times,
     unit,
@@ -136,8 +137,7 @@ def _orders(
     first, last = (int(at(record, f"{quantity}_window_{end}", member)) for end in ("first", "last"))
     levels = whole(record, "level")
     expected, tolerance = asked
-    above = sound_pairs(record, quantity, member)
-    good = np.array([all(above[i : i + 2]) for i in range(len(triples))])
+    good = np.array(sound_triples(record, quantity, member))
     near = orders[good & np.isfinite(orders)] if good.any() else orders
     known = [expected - 0.5, expected + 0.5] if math.isfinite(expected) else []
     low, high = style.limits(np.clip(near, -1.0, 9.0), np.array(known), margin=0.15)
@@ -155,15 +155,9 @@ def _orders(
 
 def _draw_stated(panel: Panel, record: Record, quantity: str, member: Member, norm: int) -> None:
     """Draw the stated order with its interval over the levels of its window, where there is one."""
-    order, low, high = (
-        float(at(record, f"{quantity}_order{end}", member, norm=norm))
-        for end in ("", "_low", "_high")
-    )
-    first, last = (
-        float(at(record, f"{quantity}_window_{end}", member)) for end in ("first", "last")
-    )
-    if math.isfinite(order + low + high) and last > first:
-        panel.band(low, high, first, last, COLOUR, 0.25)
+    stated = stated_order(record, quantity, member, norm)
+    if stated is not None:
+        panel.band(*stated[1:], COLOUR, 0.25)
 
 
 def _level_ticks(levels: list[int]) -> list[tuple[float, str]]:

@@ -12,7 +12,16 @@ import numpy as np
 from vibsim.record import Record
 from vibsim.report import style, words
 from vibsim.report.choice import promises
-from vibsim.report.data import Floats, Member, at, formal_orders, pick, sound_pairs, whole
+from vibsim.report.data import (
+    Floats,
+    Member,
+    at,
+    formal_orders,
+    pick,
+    sound_triples,
+    stated_order,
+    whole,
+)
 from vibsim.vocabulary import TYPICAL_NORM
 
 if TYPE_CHECKING:
@@ -45,7 +54,7 @@ def draw(
         ax.axhline(order, color="black", linestyle=(0, (4, 3)), linewidth=1.0, zorder=1)
     sound: list[Floats] = []
     stated = False
-    seen = [_above_noise(record, quantity, Member(s, case, x)) for s, x in enumerate(schemes)]
+    seen = [sound_triples(record, quantity, Member(s, case, x)) for s, x in enumerate(schemes)]
     for s, scheme in enumerate(schemes):
         member, good = Member(s, case, scheme), seen[s]
         if any(map(any, seen)) and not any(good):
@@ -118,23 +127,12 @@ def draw_each(
     return settled
 
 
-def _above_noise(record: Record, quantity: str, member: Member) -> list[bool]:
-    """Say of every triple of levels whether its differences stand above round-off."""
-    above = sound_pairs(record, quantity, member)
-    return [all(above[i : i + 2]) for i in range(len(whole(record, "triple")))]
-
-
 def _draw_stated(ax: Axes, record: Record, quantity: str, member: Member, norm: int) -> bool:
     """Draw the stated order as a bar over the levels of its window, with its interval; say whether there is one."""
-    order = float(at(record, f"{quantity}_order", member, norm=norm))
-    low, high = (
-        float(at(record, f"{quantity}_order_{end}", member, norm=norm)) for end in ("low", "high")
-    )
-    first, last = (
-        float(at(record, f"{quantity}_window_{end}", member)) for end in ("first", "last")
-    )
-    if not np.isfinite([order, low, high, first, last]).all() or last <= first:
+    stated = stated_order(record, quantity, member, norm)
+    if stated is None:
         return False
+    order, low, high, first, last = stated
     colour = style.look(member.scheme)["color"]
     ax.fill_between(
         [first, last], [low, low], [high, high], color=colour, alpha=0.18, linewidth=0, zorder=0.5
