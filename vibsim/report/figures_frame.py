@@ -154,7 +154,6 @@ def columns(texts: list[str], size: float, room: float, handle: float = 3.4) -> 
 
 def hold_words(figure: Figure) -> None:
     """Widen a figure where words would leave it: axes keep their size, and what hangs on them its place."""
-    figure.draw_without_rendering()
     box = figure.get_tightbbox()
     width, height = (float(x) for x in figure.get_size_inches())
     left, bottom = (max(0.0, MARGIN - x) if x < 0.0 else 0.0 for x in (box.x0, box.y0))
