@@ -24,7 +24,7 @@ lint: set-up-dev  ## check style, types, layers, workflow and generated files
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/python workflow/lint.py
 
-bench: set-up-run  ## measure everything against C and other solvers, 10 minutes (PARTS="jobs storage" for some of it)
+bench: set-up-dev  ## measure everything against C and other solvers, 10 minutes (PARTS="jobs storage" for some of it)
 	$(BIN)/python bench/run.py $(PARTS)
 
 mutation: set-up-run  ## seed faults, see which checks catch them, and write docs/mutation.md, 10 minutes

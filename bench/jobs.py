@@ -43,7 +43,7 @@ IMPORTS = (
     "numpy",
     "netCDF4",
     "pydantic",
-    "numba",
+    "llvmlite.binding",
     "scipy.integrate",
     "xarray",
     "matplotlib.figure",
@@ -142,7 +142,7 @@ def kernels(folder: Path, rounds: int) -> Measured:
         figures[f"kernels.{lane}.cached"] = statistics.median(again)
     caption = (
         "The first call of a kernel in a process that has imported numpy and vibsim, seconds: with an empty cache "
-        "(import of numba, compiling, writing), and from the cache (import of what runs it, reading)."
+        "(import of LLVM, compiling, writing), and from the cache (import of LLVM, reading)."
     )
     return table(caption, ["lane", "compiled", "from the cache"], rows), figures
 

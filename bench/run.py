@@ -120,7 +120,7 @@ def machine() -> str:
     )
     packages = ", ".join(
         f"{name} {version(name)}"
-        for name in ("numpy", "numba", "scipy", "netCDF4", "xarray", "snakemake")
+        for name in ("numpy", "numba", "llvmlite", "scipy", "netCDF4", "xarray", "snakemake")
     )
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
     return (

@@ -34,7 +34,7 @@ def test_peers_are_pinned_and_hashed() -> None:
 
 
 def test_peers_have_the_versions_of_a_run() -> None:
-    found, ours_ = pins("peers"), pins("run")
+    found, ours_ = pins("peers"), pins("dev")
     shared = found.keys() & ours_.keys()
     assert {"numpy", "numba", "scipy"} <= shared
     assert {name: found[name] for name in shared} == {name: ours_[name] for name in shared}

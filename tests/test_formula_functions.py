@@ -12,6 +12,7 @@ import pytest
 
 from vibsim.elementary import ELEMENTARY, primitives
 from vibsim.engine import text as kernel_text
+from vibsim.engine.entry import bind
 from vibsim.expression import (
     FUNCTIONS,
     Call,
@@ -23,6 +24,8 @@ from vibsim.expression import (
     walk,
 )
 from vibsim.expression.integral import has_rule
+from vibsim.native.linking import link
+from vibsim.native.machine import machine_code
 
 mp = mpmath
 
@@ -126,14 +129,14 @@ def test_the_compiled_lane_has_the_bits_of_the_plain_one() -> None:
     for name, function in ELEMENTARY.items():
         kernel_text.collect(module, function.full, name, {}, is_called=True)
     lines = ["@called", "def corpus(u, k, found):"]
-    for i, text in enumerate(CORPUS):
-        lines += [f"    {line}" for line in to_statements(parse(text, ("u", "k")), f"found[{i}]")]
-    head = 'from numba import njit\ncompiled = called = njit(error_model="numpy")\n'
-    scope: dict[str, Any] = {}
-    exec(head + primitives.COMPILED + module.text + "\n".join(lines), scope)
+    for i, formula in enumerate(CORPUS):
+        statements = to_statements(parse(formula, ("u", "k")), f"found[{i}]")
+        lines += [f"    {line}" for line in statements]
+    text = module.text + "\n".join(lines)
+    corpus = bind(link(machine_code(text, "corpus", "f f f1"), "corpus"), "f f f1")
     for j, u in enumerate(PLACES):
         found = np.empty(len(CORPUS))
-        scope["corpus"](u, K, found)
+        corpus(u, K, found)
         plain = [evaluate(parse(text, ("u", "k")), {"u": u, "k": K}) for text in CORPUS]
         assert found.tolist() == plain
         np.testing.assert_allclose(

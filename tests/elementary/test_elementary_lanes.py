@@ -9,17 +9,14 @@ from elementary_arguments import arguments
 
 from vibsim.elementary import ELEMENTARY, primitives
 from vibsim.engine import text
-
-HEAD = """\
-from numba import njit
-compiled = njit(error_model="numpy", forceinline=True)
-called = njit(error_model="numpy")
-"""
+from vibsim.engine.entry import bind
+from vibsim.native.linking import link
+from vibsim.native.machine import machine_code, optimised
 
 LOOP = """
-@called
+@entry
 def loop({columns}, values):
-    for i in range(len(values)):
+    for i in range(values.shape[0]):
         values[i] = function({entries})
 """
 
@@ -38,7 +35,7 @@ STATED = {
 
 
 def compiled(function, count):
-    """Return a compiled loop over `function` of `count` arguments, out of the text that a kernel would hold."""
+    """Return the text of a loop over `function` of `count` arguments, out of what a kernel would hold."""
     module = text.Module("", given=primitives.NAMES)
     text.collect(module, function, "function", {})
     return loop_over(module.text, count)
@@ -47,14 +44,13 @@ def compiled(function, count):
 def loop_over(definition, count):
     names = [f"x_{i}" for i in range(count)]
     loop = LOOP.format(columns=", ".join(names), entries=", ".join(f"{n}[i]" for n in names))
-    namespace = {}
-    exec(HEAD + primitives.COMPILED + definition + loop, namespace)
-    return namespace["loop"]
+    return definition + loop, "f1 " * (count + 1)
 
 
 def run(loop, columns):
+    text, kinds = loop
     values = np.empty(len(columns[0]))
-    loop(*columns, values)
+    bind(link(machine_code(text, "loop", kinds), "loop"), kinds)(*columns, values)
     return values
 
 
@@ -83,7 +79,8 @@ def test_fast_and_full_plain_and_compiled(name):
 
 def assert_loop_is_vectors(loop):
     """The loop that LLVM made from it has a body on vectors of doubles, and calls nothing outside."""
-    code = "\n".join(loop.inspect_llvm().values())
+    text, kinds = loop
+    code = str(optimised(text, "loop", kinds))
     body = re.search(r"^vector\.body.*?(?=^\S+:\s)", code, re.MULTILINE | re.DOTALL)
     assert body, "the loop was not vectorised"
     assert re.search(r"store <\d+ x double>", body.group())
@@ -106,7 +103,8 @@ def test_primitives_of_both_lanes_agree():
     sizes = sizes[(sizes >= np.finfo(float).tiny) & np.isfinite(sizes)]
     stated = dict.fromkeys(primitives.NAMES, sizes) | {"two_to": np.arange(-1022.0, 1024.0)}
     for name, column in stated.items():
-        values = run(loop_over(f"\nfunction = {name}\n", 1), (column,))
+        function = f"@compiled\ndef function(x):\n    return {name}(x)\n"
+        values = run(loop_over(function, 1), (column,))
         assert same(values, plain(getattr(primitives, name), (column,))).all()
 
 
@@ -121,6 +119,5 @@ def test_all_functions_fit_into_one_kernel(is_called):
 
 def test_a_loop_with_branches_is_no_vectors():
     loop = compiled(ELEMENTARY["sin"].full, 1)
-    run(loop, arguments("sin", 100))
     with pytest.raises(AssertionError, match="not vectorised"):
         assert_loop_is_vectors(loop)

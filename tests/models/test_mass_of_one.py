@@ -60,7 +60,6 @@ def test_both_equations_give_the_same_bits(formulas, kind):
         # the damping is of a kind that only schemes for forces of any velocity take
         assert not scheme.treats(short)
         return
-    # numba takes a second for each kernel
     for lane in LANES if (kind, formulas) == ("rk4", FORMULAS[0]) else ("plain",):
         one, other = (runs(model, scheme, lane) for model in (full, short))
         np.testing.assert_array_equal(one.states, other.states)

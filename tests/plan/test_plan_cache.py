@@ -112,7 +112,7 @@ from vibsim.plan import Choice, load_all
 folder = Path(sys.argv[1])
 choices = [Choice("adhoc", p) for p in sorted(folder.glob("*.yaml"))]
 print(len(load_all(choices, folder)))
-heavy = {"numpy", "pydantic", "yaml", "netCDF4", "xarray", "numba"} & set(sys.modules)
+heavy = {"numpy", "pydantic", "yaml", "netCDF4", "xarray", "llvmlite"} & set(sys.modules)
 assert len(sys.argv) < 3 or not heavy, heavy
 """
 

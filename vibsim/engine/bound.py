@@ -1,8 +1,8 @@
 """The names that a kernel binds: what the loops call without knowing the model or the scheme.
 
 Each kernel has functions and numbers of its own under these names (`vibsim.engine.kernel`); here they only say what
-the loops may rely on. numba does not keep compiled code of functions that are handed other functions, so the loops
-know them by name. The ``_fast`` ones are the same text with elementary functions that have no branch.
+the loops may rely on. Compiled code of functions that are handed other functions could not be kept, so the loops know
+them by name. The ``_fast`` ones are the same text with elementary functions that have no branch.
 """
 
 from __future__ import annotations

@@ -1,40 +1,27 @@
 """Compiled kernels on disk: machine code under the digest of the text that it was compiled from.
 
-numba compiles a kernel once; what is kept is the object file that LLVM made of it. Loading one takes LLVM alone, 40 ms
-instead of the 0.6 s that numba takes to be imported and to get ready. A file is written once and never changed: a
-kernel of other text, another numba or another processor is another file. Jobs that want the same kernel at the same
-time wait for the first one to compile it.
+What is kept is an object file, and beside it its text, to be read by people. A file is written once and never changed:
+a kernel of other text, another compiler or another processor is another file. Jobs that want the same kernel at the
+same time wait for the first one to compile it.
 """
 
 from __future__ import annotations
 
-import ctypes
 import fcntl
 import hashlib
 import os
-import platform
-import subprocess
-import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache
 from pathlib import Path
-from typing import Any
 
-from vibsim.engine import compiler
-from vibsim.engine.entry import ENTRY, bind, entry_text
+from vibsim.engine.entry import bind
 from vibsim.errors import SimulationError
-from vibsim.plan.versions import versions
 
 Kernel = Callable[..., None]
 
-_UNREACHABLE = (
-    *("NRT_Free", "NRT_MemInfo_call_dtor", "NRT_decref", "NRT_incref", "NRT_Allocate"),
-    *("numba_do_raise", "numba_gil_ensure", "numba_gil_release", "numba_unpickle"),
-    "numba_runtime_build_excinfo_struct",
-)
-"""What numba's code calls where a Python exception is raised, which no kernel does."""
+ENTRY = "kernel"
+"""Name of the function that is called."""
 
 
 def folder() -> Path:
@@ -58,7 +45,10 @@ def load(text: str, kinds: str) -> Kernel:
     SimulationError
         Where the text cannot be compiled, or the cache folder cannot be written.
     """
-    key = "\n".join((text, kinds, versions(("numba",))["numba"], platform.python_version(), _cpu()))
+    # what only plans, analyses or draws needs no LLVM
+    from vibsim.native.linking import identity, link
+
+    key = "\n".join((text, kinds, identity()))
     name = f"kernel_{hashlib.sha256(key.encode()).hexdigest()[:24]}"
     try:
         home = folder()
@@ -67,24 +57,15 @@ def load(text: str, kinds: str) -> Kernel:
         with _lock(path.with_suffix(".lock")):
             code = _whole(path)
             if code is None:
-                module = path.with_suffix(".py")
-                _write(module, (text + entry_text(kinds)).encode())
-                code = _compile(module)
+                _write(path.with_suffix(".py"), text.encode())
+                code = _compile(text, kinds)
                 _write(path, code + hashlib.sha256(code).digest())
-            return bind(_link(code), kinds)
+            return bind(link(code, ENTRY), kinds)
     except OSError as error:
         raise SimulationError(
             f"compiled kernels cannot be kept: {error}; "
             "set VIBSIM_CACHE_DIR to a folder that can be written"
         ) from error
-
-
-@cache
-def _cpu() -> str:
-    """Name the processor and what it can do: a folder may be shared by machines of different kinds."""
-    from llvmlite import binding
-
-    return f"{binding.get_host_cpu_name()} {binding.get_host_cpu_features().flatten()}"
 
 
 def _whole(path: Path) -> bytes | None:
@@ -103,44 +84,11 @@ def _write(path: Path, content: bytes) -> None:
     Path(file.name).replace(path)
 
 
-def _compile(path: Path) -> bytes:
-    """Compile the module at `path`; return what `vibsim.engine.compiler` writes."""
-    command = [sys.executable, "-I", str(Path(compiler.__file__)), str(path), ENTRY]
-    done = subprocess.run(command, capture_output=True, check=False)
-    if done.returncode:
-        said = done.stderr.decode(errors="replace").strip()
-        raise SimulationError(f"a kernel cannot be compiled ({path}):\n{said}")
-    return done.stdout
+def _compile(text: str, kinds: str) -> bytes:
+    # what finds its kernel needs no compiler
+    from vibsim.native.machine import machine_code
 
-
-_KEPT: list[Any] = []
-"""What must live as long as the code that is called."""
-
-
-def _link(code: bytes) -> int:
-    """Load what `_compile` returned and return where its entry stands."""
-    name, _, content = code.partition(b"\n")
-    binding = _linker()
-    target = binding.Target.from_default_triple().create_target_machine()
-    engine = binding.create_mcjit_compiler(binding.parse_assembly(""), target)
-    engine.add_object_file(binding.ObjectFileRef.from_data(content))
-    engine.finalize_object()
-    _KEPT.append(engine)
-    return int(engine.get_function_address(name.decode()))
-
-
-@cache
-def _linker() -> Any:
-    """Return LLVM, ready to load code."""
-    from llvmlite import binding
-
-    binding.initialize_native_target()
-    binding.initialize_native_asmprinter()
-    abort = ctypes.cast(ctypes.CDLL(None).abort, ctypes.c_void_p).value
-    for name in _UNREACHABLE:
-        if binding.address_of_symbol(name) is None:
-            binding.add_symbol(name, abort)
-    return binding
+    return machine_code(text, ENTRY, kinds)
 
 
 @contextmanager

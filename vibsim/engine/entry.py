@@ -1,7 +1,7 @@
 """The way into compiled code: arrays as pointers and lengths, numbers as they are.
 
-`kinds` says what a function takes, a word for each argument: ``f3`` is an array of floats with three dimensions, ``i2``
-one of integers with two, ``f`` and ``i`` are a float and an integer. Arrays are C-contiguous, of 64 bits an entry.
+`kinds` says what a function takes, a word for each argument (`vibsim.native.machine_code`). Arrays are C-contiguous, of
+64 bits an entry.
 """
 
 from __future__ import annotations
@@ -10,27 +10,7 @@ import ctypes
 from collections.abc import Callable, Iterator
 from typing import Any
 
-ENTRY = "vibsim_kernel"
-"""Name of the function that is called from outside."""
-
 _TYPES = {"f": ctypes.c_double, "i": ctypes.c_int64}
-_NAMES = {"f": "float64", "i": "int64"}
-
-
-def entry_text(kinds: str) -> str:
-    """Write the function that takes pointers and lengths and calls ``kernel`` with arrays."""
-    names, types, arguments = [], [], []
-    for i, kind in enumerate(kinds.split()):
-        letter, dims = kind[0], int(kind[1:] or 0)
-        lengths = [f"n_{i}_{d}" for d in range(dims)]
-        names += [f"a_{i}", *lengths]
-        types += [f"CPointer({_NAMES[letter]})" if dims else _NAMES[letter], *["int64"] * dims]
-        shape = "".join(f"{length}, " for length in lengths)
-        arguments.append(f"carray(a_{i}, ({shape}))" if dims else f"a_{i}")
-    return (
-        f'\n@cfunc("void({", ".join(types)})", error_model="numpy")\n'
-        f"def {ENTRY}({', '.join(names)}):\n    kernel({', '.join(arguments)})\n"
-    )
 
 
 def bind(address: int, kinds: str) -> Callable[..., None]:

@@ -3,8 +3,8 @@
 A kernel is written out as one Python module that holds everything it runs: the elementary functions, the gathering,
 the scheme's functions, the model's formulas and a loop. The *plain* lane runs the loop over one member as it stands,
 which needs no compiler; the *scalar* lane compiles the same text; the *blocks* lane compiles the loop over blocks of
-members. numba compiles strictly (no contraction, no reassociation), so that all give the same bits. The text is also
-the key of the cache: a changed formula, scheme or loop is another kernel.
+members. `vibsim.native` compiles strictly (no contraction, no reassociation), so that all give the same bits. The text
+is also the key of the cache: a changed formula, scheme or loop is another kernel.
 """
 
 from __future__ import annotations
@@ -42,18 +42,6 @@ def compiled(function):
 
 called = entry = compiled
 """
-
-_COMPILED = (
-    """\
-from numba import carray, cfunc, njit
-
-inner = {"error_model": "numpy", "nogil": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-compiled = njit(forceinline=True, **inner)
-called = entry = njit(**inner)
-
-"""
-    + primitives.COMPILED
-)
 
 _FULL_STEP = """\
 @compiled
@@ -238,4 +226,4 @@ def _in_lane(text: str, lane: str, kinds: str) -> Kernel:
         exec(compile(with_quotients(_PLAIN + text), "<kernel>", "exec"), namespace)
         plain: Kernel = namespace["kernel"]
         return plain
-    return load(_COMPILED + text, kinds)
+    return load(text, kinds)

@@ -171,14 +171,14 @@ def run(
             state = following
             # the scheme's own velocity: an end formula would move a peak in the last step
             if SYSTEM:
-                size, u, v, own = size_of(q, w), q[0], w[0], own[0]  # type: ignore[index]
+                size, u, v, own_first = size_of(q, w), q[0], w[0], own[0]  # type: ignore[index]
             else:
-                size, u, v = abs(q) + abs(w), q, w
+                size, u, v, own_first = abs(q) + abs(w), q, w, own
             # written so that NaN fails as well
             if not size < OVERFLOW:
                 break
             good = n
-            slope_before, slope = slope, own
+            slope_before, slope = slope, own_first
             if STAGGERED:
                 if SYSTEM:  # noqa: SIM108
                     slope = (following[0][0] - u_before) * (0.5 / h)

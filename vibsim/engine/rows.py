@@ -56,9 +56,9 @@ def put_stages(
         lines += [
             "    for j in range(filled):",
             f"        h = rows[{rows['DT']} * {blocks.LANES} + j]",
-            f"        p, kept = parameters_in(rows, j), ({kept})",
-            f"        values = stage_{i}(states_in(rows, old, j), n * h, h, p, kept)",
-            *(f"        {places[name]} = values[{k}]" for k, name in enumerate(part.after)),
+            f"        p_{i}, state_{i} = parameters_in(rows, j), states_in(rows, old, j)",
+            f"        values_{i} = stage_{i}(state_{i}, n * h, h, p_{i}, ({kept}))",
+            *(f"        {places[name]} = values_{i}[{k}]" for k, name in enumerate(part.after)),
         ]
     enter(module, stepper.step, deepcopy(last.tree), "step_end", renamed)
     module.put("stages_of", "\n".join(["@compiled", *lines]))

@@ -6,7 +6,7 @@ import os
 import sys
 from functools import cache
 
-NUMERICAL = ("numpy", "numba", "scipy")
+NUMERICAL = ("numpy", "llvmlite", "scipy")
 DRAWING = ("matplotlib", "jinja2")
 
 

@@ -1,0 +1,299 @@
+"""Expressions as instructions of LLVM, and the variables that they read.
+
+Variables live in slots, which LLVM turns into registers; those that are given one value, once, need none. Tuples are
+their entries.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Sequence
+from typing import Any, Protocol, cast
+
+from llvmlite import ir
+
+from vibsim.native import operations
+from vibsim.native.inference import Inference, row_from
+from vibsim.native.kinds import (
+    TRUTH,
+    WHOLE,
+    Array,
+    ArrayKind,
+    Kind,
+    Number,
+    Value,
+    kind_of,
+    types_of,
+    value_of,
+    words_of,
+)
+from vibsim.native.source import arguments_of, assigned, given_at_the_top, refusal
+
+_INT = ir.IntType(32)
+
+
+class Functions(Protocol):
+    """What an expression can call."""
+
+    def call(self, builder: ir.IRBuilder, name: str, arguments: Sequence[Value]) -> Value:
+        """Call a function; return its result."""
+
+
+class Expressions:
+    """Variables and expressions of one function that is being written.
+
+    Parameters
+    ----------
+    functions
+        What it can call.
+    inference
+        The kinds within it.
+    function
+        What is written, still empty.
+    """
+
+    def __init__(self, functions: Functions, inference: Inference, function: ir.Function) -> None:
+        self.functions = functions
+        self.inference = inference
+        self.source = inference.source
+        self.node = inference.function
+        self.function = function
+        self.builder = ir.IRBuilder(function.append_basic_block("entry"))
+        self.values: dict[str, Value] = {}
+        """What has one value throughout."""
+        self.slots: dict[str, list[ir.Value]] = {}
+        counts = assigned(self.node)
+        words = iter(function.args)
+        for name, kind in zip(arguments_of(self.node), inference.arguments, strict=True):
+            value = value_of(kind, words)
+            if name in counts:
+                self._make_slot(name)
+                self.store(name, value)
+            else:
+                self.values[name] = value
+        once = {name for name in given_at_the_top(self.node) if counts[name] == 1}
+        self.single = once - self.slots.keys()
+        for name in sorted(counts.keys() - self.single - self.slots.keys()):
+            self._make_slot(name)
+
+    def blocks(self, *names: str) -> list[ir.Block]:
+        """Return new blocks of instructions."""
+        return [self.function.append_basic_block(name) for name in names]
+
+    def _make_slot(self, name: str) -> None:
+        with self.builder.goto_entry_block():
+            types = types_of(self.inference.variables[name])
+            self.slots[name] = [self.builder.alloca(word) for word in types]
+
+    def store(self, name: str, value: Value) -> None:
+        """Give a variable a value, in its slot."""
+        words = words_of(self.turned(value, self.inference.variables[name]))
+        for word, slot in zip(words, self.slots[name], strict=True):
+            self.builder.store(word, slot)
+
+    def turned(self, value: Value, kind: Kind) -> Value:
+        """Return a value as one of a wider kind."""
+        if isinstance(value, tuple):
+            return tuple([self.turned(a, b) for a, b in zip(value, cast(Any, kind), strict=True)])
+        if isinstance(value, Array):
+            return value
+        return Number(cast(str, kind), operations.turned(self.builder, value, cast(str, kind)))
+
+    def number(self, node: ast.expr) -> Number:
+        """Work out an expression that gives a number."""
+        value = self.value(node)
+        if not isinstance(value, Number):
+            raise refusal(node, f"it is a {kind_of(value)}, not a number")
+        return value
+
+    def truth(self, node: ast.expr) -> ir.Value:
+        """Work out whether an expression holds, as a bit."""
+        return operations.turned(self.builder, self.number(node), TRUTH)
+
+    def value(self, node: ast.expr) -> Value:
+        """Work out an expression.
+
+        Raises
+        ------
+        NativeError
+            Where it cannot be compiled.
+        """
+        known = self.source.constant(node, self.inference.local)
+        if known is not None:
+            return _literal(known)
+        match node:
+            case ast.Name(id=name):
+                return self._variable(node, name)
+            case ast.Tuple(elts=parts):
+                return tuple([self.value(part) for part in parts])
+            case ast.BinOp():
+                return self._binary(node)
+            case ast.UnaryOp(op=op, operand=operand):
+                return self._unary(op, self.number(operand))
+            case ast.Compare():
+                return self._compare(node)
+            case ast.BoolOp():
+                return self._bool(node)
+            case ast.IfExp(test=test, body=body, orelse=orelse):
+                return self._choose(node, test, body, orelse)
+            case ast.Subscript():
+                return self._entry(node)
+            case ast.Attribute(value=of, attr="shape"):
+                array = self.value(of)
+                if isinstance(array, Array):
+                    return tuple([Number(WHOLE, length) for length in array.lengths])
+            case ast.Call(func=func, args=arguments):
+                return self._call(node, func, [self.value(value) for value in arguments])
+        raise refusal(node, "this cannot be compiled")
+
+    def _variable(self, node: ast.Name, name: str) -> Value:
+        if name in self.values:
+            return self.values[name]
+        if name not in self.slots:
+            raise refusal(node, "it has no value here")
+        words = iter([self.builder.load(slot) for slot in self.slots[name]])
+        return value_of(self.inference.variables[name], words)
+
+    def _binary(self, node: ast.BinOp) -> Value:
+        left, right = self.value(node.left), self.value(node.right)
+        if isinstance(left, tuple) and isinstance(right, tuple):
+            return left + right
+        kind = cast(str, operations.kind_of_binary(node, node.op, kind_of(left), kind_of(right)))
+        numbers = cast(Number, left), cast(Number, right)
+        return Number(kind, operations.binary(self.builder, node.op, kind, *numbers))
+
+    def _unary(self, op: ast.unaryop, value: Number) -> Value:
+        if isinstance(op, ast.Not):
+            word = operations.turned(self.builder, value, TRUTH)
+            return Number(TRUTH, self.builder.not_(word))
+        kind = value.kind if value.kind != TRUTH else WHOLE
+        return Number(kind, operations.negated(self.builder, value))
+
+    def _compare(self, node: ast.Compare) -> Value:
+        values = [self.number(part) for part in (node.left, *node.comparators)]
+        bits = [
+            operations.compared(self.builder, op, a, b)
+            for op, a, b in zip(node.ops, values, values[1:], strict=False)
+        ]
+        result = bits[0]
+        for bit in bits[1:]:
+            result = self.builder.and_(result, bit)
+        return Number(TRUTH, result)
+
+    def _bool(self, node: ast.BoolOp) -> Value:
+        """Work out ``and`` or ``or``: what stands behind is worked out only where it decides."""
+        [end] = self.blocks("decided")
+        result: list[tuple[ir.Value, ir.Block]] = []
+        for value in node.values[:-1]:
+            bit = self.truth(value)
+            result.append((bit, self.builder.block))
+            [ahead] = self.blocks("undecided")
+            is_and = isinstance(node.op, ast.And)
+            self.builder.cbranch(bit, *((ahead, end) if is_and else (end, ahead)))
+            self.builder.position_at_end(ahead)
+        result.append((self.truth(node.values[-1]), self.builder.block))
+        self.builder.branch(end)
+        self.builder.position_at_end(end)
+        return Number(TRUTH, self._merged(result))
+
+    def _choose(self, node: ast.expr, test: ast.expr, body: ast.expr, orelse: ast.expr) -> Value:
+        kind = self.inference.kind(node)
+        bit = self.truth(test)
+        if _is_plain(body) and _is_plain(orelse):
+            pair = [words_of(self.turned(self.value(part), kind)) for part in (body, orelse)]
+            words = [self.builder.select(bit, a, b) for a, b in zip(*pair, strict=True)]
+            return value_of(kind, iter(words))
+        then, otherwise, end = self.blocks("then", "otherwise", "chosen")
+        self.builder.cbranch(bit, then, otherwise)
+        ways: list[tuple[list[ir.Value], ir.Block]] = []
+        for block, part in ((then, body), (otherwise, orelse)):
+            self.builder.position_at_end(block)
+            found = words_of(self.turned(self.value(part), kind))
+            ways.append((found, self.builder.block))
+            self.builder.branch(end)
+        self.builder.position_at_end(end)
+        columns = zip(*[found for found, _ in ways], strict=True)
+        blocks = [block for _, block in ways]
+        words = [self._merged(list(zip(column, blocks, strict=True))) for column in columns]
+        return value_of(kind, iter(words))
+
+    def _merged(self, ways: Sequence[tuple[ir.Value, ir.Block]]) -> ir.Value:
+        phi = self.builder.phi(ways[0][0].type)
+        for word, block in ways:
+            phi.add_incoming(word, block)
+        return phi
+
+    def _entry(self, node: ast.Subscript) -> Value:
+        of = self.value(node.value)
+        if isinstance(of, Array):
+            begin = row_from(node)
+            if begin is not None:
+                return self._row(of, node.slice, begin)
+            return Number(of.kind.entry, self.builder.load(self.pointer(of, node.slice)))
+        assert isinstance(of, tuple)
+        place = self.source.constant(node.slice, self.inference.local)
+        if isinstance(place, int):
+            value: Value = of[place]
+            return value
+        return self._picked(node, of)
+
+    def _picked(self, node: ast.Subscript, of: tuple[Any, ...]) -> Value:
+        """Return an entry of a tuple of numbers at a place that is known only when the code runs."""
+        kind = self.inference.kind(node)
+        if not isinstance(kind, str):
+            raise refusal(node, "only of a tuple of numbers an entry is found at run time")
+        words = [cast(Number, self.turned(value, kind)).word for value in of]
+        type_ = ir.ArrayType(words[0].type, len(words))
+        place = self.number(node.slice)
+        if all(isinstance(word, ir.Constant) for word in words):
+            name = self.builder.module.get_unique_name("numbers")
+            table = ir.GlobalVariable(self.builder.module, type_, name)
+            table.initializer = ir.Constant(type_, words)
+            table.global_constant, table.linkage = True, "internal"
+        else:
+            with self.builder.goto_entry_block():
+                table = self.builder.alloca(type_)
+            for i, word in enumerate(words):
+                self.builder.store(word, self.builder.gep(table, [_INT(0), _INT(i)], inbounds=True))
+        pointer = self.builder.gep(table, [_INT(0), place.word], inbounds=True)
+        return Number(kind, self.builder.load(pointer))
+
+    def _row(self, array: Array, place: ast.expr, begin: ast.expr) -> Array:
+        outer = place.elts[:-1] if isinstance(place, ast.Tuple) else []
+        first = ast.copy_location(ast.Tuple([*outer, begin], ast.Load()), place)
+        length = self.builder.sub(array.lengths[-1], self.number(begin).word)
+        return Array(ArrayKind(array.kind.entry, 1), self.pointer(array, first), (length,))
+
+    def pointer(self, array: Array, place: ast.expr) -> ir.Value:
+        """Return where an entry of an array stands."""
+        parts = place.elts if isinstance(place, ast.Tuple) else [place]
+        numbers = [self.number(part) for part in parts]
+        if len(numbers) != array.kind.dims or any(number.kind != WHOLE for number in numbers):
+            raise refusal(
+                place, f"an entry of an {array.kind} has as many whole numbers as it has dimensions"
+            )
+        index = numbers[0].word
+        for length, number in zip(array.lengths[1:], numbers[1:], strict=True):
+            index = self.builder.add(self.builder.mul(index, length), number.word)
+        return self.builder.gep(array.pointer, [index], inbounds=True)
+
+    def _call(self, node: ast.Call, func: ast.expr, arguments: list[Value]) -> Value:
+        if isinstance(func, ast.Name) and func.id in self.source.functions:
+            return self.functions.call(self.builder, func.id, arguments)
+        name = ast.unparse(func)
+        kind = operations.kind_of_call(node, name, [kind_of(value) for value in arguments])
+        return operations.call(self.builder, name, cast(str, kind), cast(list[Number], arguments))
+
+
+def _literal(value: Any) -> Value:
+    return tuple(map(_literal, value)) if isinstance(value, tuple) else operations.literal(value)
+
+
+def _is_plain(node: ast.expr) -> bool:
+    """Say whether an expression costs nothing and can do no harm where it is not wanted."""
+    match node:
+        case ast.Name() | ast.Constant() | ast.Attribute(value=ast.Name(id="math")):
+            return True
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            return _is_plain(operand)
+    return False

@@ -1,0 +1,246 @@
+"""Functions as instructions of LLVM: one for every set of kinds of arguments with which a function is called.
+
+A function takes the words of its arguments and returns those of its result, side by side. LLVM writes what is marked
+so into its callers, and drops what nobody calls any more.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import cast
+
+from llvmlite import ir
+
+from vibsim.native import operations
+from vibsim.native.expressions import Expressions
+from vibsim.native.inference import Inference, branches
+from vibsim.native.kinds import (
+    NOTHING,
+    WHOLE,
+    WORD,
+    Array,
+    Kind,
+    Number,
+    Value,
+    kind_of,
+    types_of,
+    value_of,
+    words_of,
+)
+from vibsim.native.source import Source, is_inline, loaded, refusal
+
+_PREFIX = "text."
+
+
+@dataclass
+class Program:
+    """Functions as instructions, each for the kinds of arguments with which it is called."""
+
+    source: Source
+    module: ir.Module = field(default_factory=lambda: ir.Module("kernel"))
+    known: dict[tuple[str, tuple[Kind, ...]], Inference] = field(default_factory=dict)
+    written: dict[tuple[str, tuple[Kind, ...]], ir.Function] = field(default_factory=dict)
+
+    def function(self, name: str, arguments: tuple[Kind, ...]) -> tuple[ir.Function, Kind]:
+        """Return a function for arguments of these kinds, and the kind of its result.
+
+        Raises
+        ------
+        NativeError
+            Where its text cannot be compiled.
+        """
+        inference = Inference.of(self.source, self.known, name, arguments)
+        result = cast(Kind, inference.result)
+        key = (name, arguments)
+        if key not in self.written:
+            takes = [word for kind in arguments for word in types_of(kind)]
+            signature = ir.FunctionType(result_type(result), takes)
+            # LLVM takes a function called `round` or `sin` for that of the C library
+            unique = self.module.get_unique_name(f"{_PREFIX}{name}")
+            function = ir.Function(self.module, signature, unique)
+            # dropped where nobody calls it any more
+            function.linkage = "linkonce_odr"
+            function.attributes.add("nounwind")
+            if is_inline(inference.function):
+                function.attributes.add("alwaysinline")
+            self.written[key] = function
+            _Statements(self, inference, function).write()
+        return self.written[key], result
+
+    def call(self, builder: ir.IRBuilder, name: str, arguments: Sequence[Value]) -> Value:
+        """Call a function; return its result."""
+        function, kind = self.function(name, tuple(map(kind_of, arguments)))
+        given = builder.call(function, [word for value in arguments for word in words_of(value)])
+        count = len(types_of(kind))
+        if count < 2:
+            return value_of(kind, iter([given] * count))
+        return value_of(kind, iter([builder.extract_value(given, i) for i in range(count)]))
+
+
+def result_type(kind: Kind) -> ir.Type:
+    """Return the type of what a function returns: nothing, a word, or several side by side."""
+    types = types_of(kind)
+    if not types:
+        return ir.VoidType()
+    return types[0] if len(types) == 1 else ir.LiteralStructType(types)
+
+
+class _Statements(Expressions):
+    """One function that is being written, statement by statement."""
+
+    def __init__(self, functions: Program, inference: Inference, function: ir.Function) -> None:
+        super().__init__(functions, inference, function)
+        self.ends: list[ir.Block] = []
+        """Where ``break`` goes, innermost last."""
+        self.repeats: list[ir.Block] = []
+        """Where ``continue`` goes."""
+
+    def write(self) -> None:
+        """Write the whole function."""
+        self._block(self.node.body)
+        if not self.builder.block.is_terminated:
+            if self.inference.result != NOTHING:
+                raise refusal(self.node, "it can end without a result")
+            self.builder.ret_void()
+
+    def _block(self, body: Sequence[ast.stmt]) -> None:
+        for statement in body:
+            if self.builder.block.is_terminated:
+                return
+            self._statement(statement)
+
+    def _statement(self, node: ast.stmt) -> None:
+        match node:
+            case ast.Assign(targets=targets, value=value):
+                given = self.value(value)
+                for target in targets:
+                    self._give(target, given)
+            case ast.AugAssign():
+                self._augment(node)
+            case ast.Return(value=value):
+                self._return(NOTHING if value is None else self.value(value))
+            case ast.If():
+                self._if(node)
+            case ast.For(target=ast.Name(id=name), iter=ast.Call(), orelse=[]):
+                self._for(node, name)
+            case ast.While(test=test, body=body, orelse=[]):
+                self._while(test, body)
+            case ast.Break():
+                self.builder.branch(self.ends[-1])
+            case ast.Continue():
+                self.builder.branch(self.repeats[-1])
+            case ast.Expr(value=value):
+                self.value(value)
+            case ast.Pass():
+                pass
+            case _:
+                raise refusal(node, "there is no such statement in a kernel")
+
+    def _give(self, target: ast.expr, value: Value) -> None:
+        match target:
+            case ast.Name(id=name) if name in self.single:
+                self.values[name] = self.turned(value, self.inference.variables[name])
+            case ast.Name(id=name):
+                self.store(name, value)
+            case ast.Tuple(elts=parts) if isinstance(value, tuple):
+                for part, of_part in zip(parts, value, strict=True):
+                    self._give(part, of_part)
+            case ast.Subscript(value=of, slice=place):
+                array = self.value(of)
+                if not isinstance(array, Array) or not isinstance(value, Number):
+                    raise refusal(target, "only an entry of an array can be given a number")
+                word = operations.turned(self.builder, value, array.kind.entry)
+                self.builder.store(word, self.pointer(array, place))
+            case _:
+                raise refusal(target, "this cannot be given a value")
+
+    def _augment(self, node: ast.AugAssign) -> None:
+        added = ast.BinOp(left=loaded(node.target), op=node.op, right=node.value)
+        self._give(node.target, self.value(ast.copy_location(added, node)))
+
+    def _return(self, value: Value) -> None:
+        kind = cast(Kind, self.inference.result)
+        words = words_of(self.turned(value, kind))
+        if not words:
+            self.builder.ret_void()
+        elif len(words) == 1:
+            self.builder.ret(words[0])
+        else:
+            result = ir.Constant(result_type(kind), ir.Undefined)
+            for i, word in enumerate(words):
+                result = self.builder.insert_value(result, word, i)
+            self.builder.ret(result)
+
+    def _if(self, node: ast.If) -> None:
+        known = branches(self.source, node, self.inference.local)
+        if known is not None:
+            self._block(known[0])
+            return
+        bit = self.truth(node.test)
+        then, otherwise, end = self.blocks("then", "otherwise", "end")
+        self.builder.cbranch(bit, then, otherwise)
+        goes_on = False
+        for block, body in ((then, node.body), (otherwise, node.orelse)):
+            self.builder.position_at_end(block)
+            self._block(body)
+            if not self.builder.block.is_terminated:
+                self.builder.branch(end)
+                goes_on = True
+        self.builder.position_at_end(end)
+        if not goes_on:
+            self.builder.unreachable()
+
+    def _for(self, node: ast.For, name: str) -> None:
+        first, stop, step = self._range(node)
+        before = self.builder.block
+        head, body, ahead, end = self.blocks("head", "body", "ahead", "end")
+        self.builder.branch(head)
+        self.builder.position_at_end(head)
+        place = self.builder.phi(WORD)
+        place.add_incoming(first, before)
+        self.builder.cbranch(
+            self.builder.icmp_signed("<" if step > 0 else ">", place, stop), body, end
+        )
+        self.builder.position_at_end(body)
+        self.store(name, Number(WHOLE, place))
+        self._loop(node.body, ahead, end)
+        self.builder.position_at_end(ahead)
+        place.add_incoming(self.builder.add(place, WORD(step), flags=["nsw"]), ahead)
+        self.builder.branch(head)
+        self.builder.position_at_end(end)
+
+    def _range(self, node: ast.For) -> tuple[ir.Value, ir.Value, int]:
+        bounds: list[ast.expr] = []
+        match node.iter:
+            case ast.Call(func=ast.Name(id="range"), args=[_] | [_, _] | [_, _, _] as bounds):
+                pass
+            case _:
+                raise refusal(node.iter, "a loop goes over a range")
+        step = self.source.constant(bounds[2], self.inference.local) if len(bounds) > 2 else 1
+        if not isinstance(step, int) or step == 0:
+            raise refusal(node.iter, "the step of a range is a whole number other than 0")
+        ends = bounds[:2] if len(bounds) > 1 else [ast.Constant(0), *bounds]
+        first, stop = (self.number(bound) for bound in ends)
+        if first.kind != WHOLE or stop.kind != WHOLE:
+            raise refusal(node.iter, "a range is between whole numbers")
+        return first.word, stop.word, step
+
+    def _while(self, test: ast.expr, statements: Sequence[ast.stmt]) -> None:
+        head, body, end = self.blocks("head", "body", "end")
+        self.builder.branch(head)
+        self.builder.position_at_end(head)
+        self.builder.cbranch(self.truth(test), body, end)
+        self.builder.position_at_end(body)
+        self._loop(statements, head, end)
+        self.builder.position_at_end(end)
+
+    def _loop(self, body: Sequence[ast.stmt], repeat: ir.Block, end: ir.Block) -> None:
+        self.ends.append(end)
+        self.repeats.append(repeat)
+        self._block(body)
+        if not self.builder.block.is_terminated:
+            self.builder.branch(repeat)
+        self.ends.pop()
+        self.repeats.pop()

@@ -1,0 +1,129 @@
+"""The module that is compiled: its functions and numbers by name, and how they are found."""
+
+from __future__ import annotations
+
+import ast
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from vibsim.errors import SimulationError
+
+INLINE = "compiled"
+"""Decorator of a function that becomes part of its callers."""
+APART = ("called", "entry")
+"""Decorators of functions that are compiled for themselves, where LLVM does not think better of it."""
+
+_NUMBERS = {"nan": math.nan, "inf": math.inf, "pi": math.pi, "e": math.e}
+
+
+class NativeError(SimulationError):
+    """Text that cannot be compiled."""
+
+
+def refusal(node: ast.AST, why: str) -> NativeError:
+    """Return the error of a part of the text: line, text, and why it is refused."""
+    line = getattr(node, "lineno", 0)
+    return NativeError(f"line {line} of the kernel: `{ast.unparse(node)}`: {why}")
+
+
+@dataclass(frozen=True)
+class Source:
+    """Functions and numbers of a module."""
+
+    functions: dict[str, ast.FunctionDef]
+    constants: dict[str, Any]
+    """Floats, whole numbers, truth values, and tuples of them."""
+
+    @classmethod
+    def read(cls, text: str) -> Source:
+        """Read the text of a module: functions with one decorator each, numbers, and ``import math``.
+
+        Raises
+        ------
+        NativeError
+            Where something else stands there.
+        """
+        functions, constants = {}, {}
+        for node in ast.parse(text).body:
+            match node:
+                case ast.FunctionDef(name=name):
+                    functions[name] = node
+                case ast.Assign(targets=[ast.Name(id=name)], value=value):
+                    constants[name] = ast.literal_eval(value)
+                case ast.Import(names=[ast.alias(name="math", asname=None)]):
+                    pass
+                case _:
+                    raise refusal(node, "a kernel has functions and numbers alone")
+        return cls(functions, constants)
+
+    def constant(self, node: ast.expr, local: frozenset[str]) -> Any:
+        """Return the value that an expression has before anything runs, None where it has none."""
+        match node:
+            case ast.Constant(value=bool() | int() | float() as value):
+                return value
+            case ast.Name(id=name) if name not in local:
+                return self.constants.get(name)
+            case ast.Attribute(value=ast.Name(id="math"), attr=name):
+                return _NUMBERS.get(name)
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                value = self.constant(operand, local)
+                return -value if isinstance(value, int | float) else None
+            case ast.BinOp(left=left, op=ast.Add() | ast.Sub() | ast.Mult() as op, right=right):
+                a, b = self.constant(left, local), self.constant(right, local)
+                if not (isinstance(a, int) and isinstance(b, int)):
+                    return None
+                return (
+                    a + b
+                    if isinstance(op, ast.Add)
+                    else a - b
+                    if isinstance(op, ast.Sub)
+                    else a * b
+                )
+        return None
+
+
+def is_inline(function: ast.FunctionDef) -> bool:
+    """Say whether a function becomes part of its callers."""
+    match function.decorator_list:
+        case [ast.Name(id=mark)] if mark == INLINE or mark in APART:
+            return mark == INLINE
+    raise refusal(function, f"it has to be marked as one of {', '.join((INLINE, *APART))}")
+
+
+def assigned(function: ast.FunctionDef) -> dict[str, int]:
+    """Return how often each name is given a value in a function."""
+    count: dict[str, int] = {}
+    for node in ast.walk(function):
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            count[node.id] = count.get(node.id, 0) + 1
+    return count
+
+
+def arguments_of(function: ast.FunctionDef) -> list[str]:
+    """Return the names of the arguments, which have no defaults."""
+    rest = function.args
+    if rest.defaults or rest.vararg or rest.kwarg or rest.kwonlyargs or rest.posonlyargs:
+        raise refusal(function, "a function takes arguments by their places alone")
+    return [argument.arg for argument in rest.args]
+
+
+def given_at_the_top(function: ast.FunctionDef) -> set[str]:
+    """Return names that are given values in statements which stand in no branch and no loop."""
+    return {
+        node.id
+        for statement in function.body
+        if isinstance(statement, ast.Assign)
+        for node in ast.walk(statement)
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+    }
+
+
+def loaded(target: ast.expr) -> ast.expr:
+    """Return what is written to, a variable or an entry, as something that is read."""
+    match target:
+        case ast.Name(id=name):
+            return ast.copy_location(ast.Name(name, ast.Load()), target)
+        case ast.Subscript(value=value, slice=place):
+            return ast.copy_location(ast.Subscript(value, place, ast.Load()), target)
+    raise refusal(target, "only a variable or an entry can be changed in place")
