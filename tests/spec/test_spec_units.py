@@ -407,5 +407,5 @@ def test_every_unit_is_documented() -> None:
 def test_a_unit_where_none_is_taken_is_called_a_unit(check: dict[str, object], key: str) -> None:
     fault = only_fault(checks=[check])
     assert fault.key == key
-    assert fault.rule.startswith("takes no unit")
+    assert fault.rule.startswith("must be a number without a unit")
     assert "number alone" in fault.hint

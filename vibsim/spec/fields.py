@@ -31,7 +31,7 @@ MAX_FORMULAS = 1000
 MAX_ENTRIES = 1000
 """Schemes or checks of one experiment."""
 NO_UNIT = {
-    "rule": "takes no unit: only model, initial, time and a sweep of these do",
+    "rule": "must be a number without a unit: only model, initial, time and a sweep of these take units",
     "hint": "write the number alone, in the unit of the table of models (of a scaled run: over its scale)",
 }
 FORMULA_NOTE = "a number, or a constant formula such as 2*pi/30"
