@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Iterator
 from functools import cache
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 from level_records import experiment, level_records, standard_error
 
+from vibsim import Experiment, analyse, simulate
 from vibsim.analysis import analyse_records, verdicts
 from vibsim.analysis.advice import advise
 from vibsim.analysis.causes import CAUSES
@@ -207,3 +209,40 @@ def test_what_is_predicted_is_told_with_its_cost() -> None:
 
 def test_no_kind_of_check_is_left_out() -> None:
     assert set(KINDS) - {"best"} == set(MEASURED)
+
+
+@pytest.mark.parametrize(
+    ("model", "words", "advised"),
+    [
+        ({"force": "1/t"}, "in its first step, and so does every finer level", "at t = 0"),
+        ({"force": "sqrt(1.7 - t)"}, "level 6 met one at t = 1.719", "before t = 1.719"),
+        # escapes; the time follows from the integral of du/sqrt(u^2 - 1 + (u^4 - 1)/2) from 1 on
+        ({"spring": "-u - u**3"}, "level 6 met one at t = 1.5", "finer levels will not help"),
+    ],
+)
+def test_finer_levels_are_not_advised_where_all_of_them_fail_alike(
+    model: dict[str, Any], words: str, advised: str
+) -> None:
+    content = {
+        "title": "t",
+        "model": {"kind": "oscillator", **model},
+        "initial": {"u": 1.0},
+        "time": {"end": 2.0},
+        "levels": [3, 4, 5, 6],
+        "schemes": ["rk4"],
+    }
+    made = Experiment.from_dict(content)
+    (verdict,) = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
+    assert verdict.reason == "non_finite"
+    assert words in verdict.text
+    assert advised in verdict.advice
+    assert "or finer" not in verdict.advice
+
+
+def test_a_failure_of_coarse_levels_alone_is_placed_and_mended_by_finer_ones() -> None:
+    nan = math.nan
+    coarse = story(reason="non_finite", culprit=4, failures=(1.25, nan, nan, nan))
+    assert "at level 4, at t = 1.25" in tell(coarse)
+    assert "Start `levels:` at 5 or finer" in advise(coarse)
+    moving = story(reason="non_finite", culprit=4, failures=(1.25, 2.5, 4.0, 9.0))
+    assert "or finer" in advise(moving)

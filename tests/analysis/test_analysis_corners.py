@@ -136,3 +136,14 @@ def test_members_of_a_sweep_have_their_own_corner() -> None:
     for case in range(4):
         alone = analyse(made.alone(case), [simulate(made.alone(case), lv) for lv in made.levels])
         assert alone["corner_time"].values[0, 0] == pytest.approx(times[case], nan_ok=True)
+
+
+def test_a_turn_with_friction_is_an_event_and_no_corner_within_a_step() -> None:
+    """Steps end where friction turns; a ladder that is too coarse is not blamed on it. The driving force may jump."""
+    box = {"kind": "sliding_box", "mu": 0.3}
+    coarse = experiment(["rk4"], model=box, initial={"u": 0.4, "v": 1.0}, levels=[3, 4, 5, 6])
+    (verdict,) = judged(coarse)
+    assert verdict.reason == "pre_asymptotic", verdict.text
+    driven = corner({"damping": {"coulomb": 0.1}, "force": "heaviside(t - 3.01)"})
+    assert driven[0] == pytest.approx(3.01, abs=0.02)
+    assert driven[2] == "t - 3.01 passes zero"

@@ -97,5 +97,18 @@ def test_a_ball_without_a_frequency_is_judged() -> None:
     made = experiment(model=model, initial={"h": 1.0}, schemes=["rk4"], checks=checks)
     record = analyse(made, [simulate(made, level) for level in made.levels])
     found = [(v.status, v.reason) for v in verdicts(made, record)]
-    # parabolas are exact, and no frequency tells how large an error would have been
-    assert found == [("INCONCLUSIVE", "round_off"), ("PASS", "match"), ("PASS", "match")]
+    # parabolas are exact, and the ball moves by its whole height: an error would have been seen
+    assert found == [("PASS", "exact"), ("PASS", "match"), ("PASS", "match")]
+
+
+def test_the_treatment_of_events_can_be_swept_on_a_scheme_without_other_words() -> None:
+    ball = {"kind": "bouncing_ball", "restitution": 0.5}
+    sweep = {"schemes.rk4.events": ["located", "mesh"], "model.restitution": [0.0, 0.5]}
+    checks = [{"value": "rest_time", "above": 0.0}]
+    made = experiment(
+        model=ball, initial={"h": 1.0}, schemes=["rk4"], sweep=sweep, checks=checks, levels=[5, 6]
+    )
+    record = analyse(made, [simulate(made, level) for level in made.levels])
+    assert record["schemes_rk4_events"].values.tolist() == ["located"] * 2 + ["mesh"] * 2
+    (verdict,) = verdicts(made, record)
+    assert verdict.status == "PASS"

@@ -6,6 +6,7 @@ import pytest
 
 from vibsim import spec
 from vibsim.analysis import analyse_records, verdicts
+from vibsim.analysis.parts import joined, kept
 from vibsim.analysis.value_units import unit_of
 from vibsim.simulation import simulate_record
 from vibsim.spec.values import VALUES
@@ -73,3 +74,23 @@ def test_every_number_says_what_it_is_measured_in():
     words = ("factor", "ratio", "rate", "error", "degree", "order", "limit", "defect", "relative")
     words += ("coincidence", "fraction", "growth")
     assert [name for name in plain if not any(word in name for word in words)] == []
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"sweep": {"initial.theta": [0.5, 1.0, 1.5]}},
+        # the first turn is a corner of the drag
+        {"model": {"kind": "pendulum", "drag": 0.4}, "schemes": ["rk4"], "levels": [5, 6, 7, 8]},
+    ],
+)
+def test_what_a_run_keeps_of_its_parts_tells_the_same(changes):
+    """The commands judge what is left of each part of a sweep, Python the whole."""
+    checks = {"converges": "theta", "order": "scheme"}, {"value": "period", "above": 0.0}
+    experiment, record = run(*checks, QUANTITIES, **changes)
+    thin = []
+    assert list(kept([record], thin)) == [record]
+    whole, left = (list(verdicts(experiment, row)) for row in (record, joined(thin)))
+    assert [(v.text, v.advice) for v in left] == [(v.text, v.advice) for v in whole]
+    assert "rad s-1" in whole[2].text

@@ -351,6 +351,7 @@ def test_what_is_conservative(formulas, is_conservative):
         *(*SPRINGS, "k*abs(u)*u", "u/(20 + u**2)", "sinh(k*u)"),
         *("erf(u) + asinh(u/2)", "expm1(k*u/5)", "cbrt(u)", "mod(u, 0.5)", "k*max(u - 0.5, 0)"),
         *("u + 2*heaviside(u - 0.8)", "floor(2*u) + ceil(u) - round(u)", "atanh(u/3)"),
+        *("atan(k*u)", "e**u - 1", "2**(-u/3)", "u/sqrt(1 + u**2)", "u*log1p(u**2)"),
     ],
 )
 def test_slope_of_the_potential_is_the_spring(spring):
@@ -361,6 +362,28 @@ def test_slope_of_the_potential_is_the_spring(spring):
     u = np.array([-2.1, -0.7, -1e-3, 1e-3, 0.2, 0.9, 1.9])
     force = values(parse(spring, ("u", *known)), {**known, "u": u})
     np.testing.assert_allclose(values(slope, {**known, "u": u}), force, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("spring", "energy"),
+    [
+        # two springs across the motion, of length 0.7 at rest: B, section 10.7, seen from the side
+        ("4*u*(1 - 0.7/hypot(0.7, u))", lambda u: 2 * (u**2 / (mpmath.hypot(u, 0.7) + 0.7)) ** 2),
+        ("u/sqrt(1 + u**2)", lambda u: u**2 / (mpmath.sqrt(1 + u**2) + 1)),
+        ("u/(1 + u**2)", lambda u: mpmath.log1p(u**2) / 2),
+        ("atan(u)", lambda u: u * mpmath.atan(u) - mpmath.log1p(u**2) / 2),
+        ("2**u - 1", lambda u: mpmath.expm1(u * mpmath.log(2)) / mpmath.log(2) - u),
+        ("u*log1p(u**2)", lambda u: ((1 + u**2) * mpmath.log1p(u**2) - u**2) / 2),
+    ],
+)
+def test_springs_with_poles_beside_the_axis_have_their_energy(spring, energy):
+    """From small amplitudes, where a difference would cancel, to large ones, where a plain rule fails."""
+    model = oscillator(spring=spring)
+    found = tree(model, model.potential_energy)
+    with mpmath.workdps(40):
+        for u in (1e-3, -0.3, 1.0, 20.0, -100.0):
+            right = float(energy(mpmath.mpf(u)))
+            assert float(values(found, {"u": u})) == pytest.approx(right, rel=2e-12), u
 
 
 def test_a_written_potential_is_taken():

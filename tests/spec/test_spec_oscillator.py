@@ -450,3 +450,35 @@ def test_a_declared_name_wins_over_a_constant() -> None:
     data = simulate(one, 9)
     exact = np.cos(6 * 5.0)
     assert float(data.u.to_numpy().ravel()[-1]) == pytest.approx(exact, abs=1e-4)
+
+
+def test_no_damping_is_called_none() -> None:
+    """As the other words for a damping; schemes for forces of the position alone take it."""
+    made = oscillator({"schemes": ["velocity_verlet"]}, damping="none")
+    assert made.model == oscillator({"schemes": ["velocity_verlet"]}).model
+    declared = oscillator(damping="none*v", parameters={"none": 0.1})
+    assert not declared.model.definition.conservative
+
+
+@pytest.mark.parametrize(
+    ("model", "key", "rule", "hint"),
+    [
+        ({"damping": 0.3}, "model.damping", "does not depend on v", "write (0.3)*v"),
+        (
+            {"damping": "c", "parameters": {"c": 1}},
+            "model.damping",
+            "does not depend on v",
+            "write (c)*v",
+        ),
+        ({"spring": None}, "model.spring", "must be a formula, or a number", "leave the key out"),
+        ({"spring": "u/0"}, "model.spring", "a constant in it has no finite value", ""),
+        ({"force": "t/(2 - 2)"}, "model.force", "a constant in it has no finite value", ""),
+    ],
+)
+def test_what_is_likely_a_slip_is_refused(
+    model: dict[str, Any], key: str, rule: str, hint: str
+) -> None:
+    fault = only_fault(**_sections(None, model))
+    assert fault.key == key
+    assert rule in fault.rule
+    assert hint in fault.hint

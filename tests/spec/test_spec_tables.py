@@ -270,3 +270,13 @@ def test_between_the_points() -> None:
         assert q == pytest.approx(np.interp(place, x, one.bends), abs=1e-10)
         if left == np.floor((place + step - one.first) / one.spacing):
             assert (h[0] - 2 * h[1] + h[2]) / step**2 == pytest.approx(q, abs=1e-6)
+
+
+def test_a_scaled_run_is_refused_for_its_table_and_not_for_its_spring(tmp_path: Path) -> None:
+    table(tmp_path, ROWS)
+    fault = only_fault(
+        tmp_path, "{table: road.csv}, spring: k*u, parameters: {k: 4}", "scaled: true\n"
+    )
+    assert fault.key == "scaled"
+    assert "table" in fault.rule
+    assert "spring" not in fault.rule

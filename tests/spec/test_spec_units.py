@@ -392,3 +392,20 @@ def test_every_unit_is_documented() -> None:
     names = [line.split(" = ")[0] for line in DEFINITIONS.splitlines() if "offset" not in line]
     assert len(names) > 30
     assert [name for name in names if name.rstrip("-") not in told and name[-1] != "-"] == []
+
+
+@pytest.mark.parametrize(
+    ("check", "key"),
+    [
+        ({"value": "end", "quantity": "theta", "equals": "1 rad"}, "checks[0].equals"),
+        (
+            {"value": "at", "quantity": "theta", "at": {"t": "20 s"}, "below": 1},
+            "checks[0].at.t",
+        ),
+    ],
+)
+def test_a_unit_where_none_is_taken_is_called_a_unit(check: dict[str, object], key: str) -> None:
+    fault = only_fault(checks=[check])
+    assert fault.key == key
+    assert fault.rule.startswith("must be a number without a unit")
+    assert "number alone" in fault.hint

@@ -53,6 +53,16 @@ def advise(s: Story) -> str:
             return (
                 f"Start `levels:` at {level} or finer{_priced(s, [level])}, or shorten `time: end`."
             )
+        case "non_finite" if s.singular == 0.0:
+            return (
+                "Check the formulas of `model:` at t = 0, and `initial:`: something has no finite value there (a "
+                "quotient of two zeros takes its limit by a condition, sin(t)/t if t > 0 else 1)."
+            )
+        case "non_finite" if not math.isnan(s.singular):
+            return (
+                f"End the time interval (`time: end`) before t = {s.singular:.4g}, or check the formulas of `model:`: "
+                "finer levels will not help where the motion escapes, or a formula has no finite value."
+            )
         case "non_finite":
             level = max(s.culprit, s.levels[0]) + 1
             return (

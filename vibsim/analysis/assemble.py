@@ -23,6 +23,7 @@ from vibsim.analysis.work import work_precision
 from vibsim.errors import VibsimError
 from vibsim.models import centred
 from vibsim.models.error_parts import is_error_part
+from vibsim.models.events import TREATMENTS
 from vibsim.record import Record, Variable, attributes
 from vibsim.schemes import SCHEMES
 from vibsim.simulation.scaled import in_scales
@@ -152,7 +153,7 @@ def _widened(part: Part, variable: Variable) -> Variable:
         return variable
     schemes = (SCHEMES[scheme.kind] for scheme in part.experiment.schemes)
     words = [choice for scheme in schemes for option in scheme.words for choice in option.choices]
-    width = max(map(len, words))
+    width = max(map(len, (*words, *TREATMENTS)))
     return Variable(variable.dims, variable.values.astype(f"U{width}"), variable.attrs)
 
 

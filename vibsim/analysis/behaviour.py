@@ -167,9 +167,10 @@ def conserves(experiment: Experiment, record: Record, check: ConservesCheck, ind
         speed = (
             "" if not per else f", {_RATES.get(DRIFTS[int(kind[scheme, case])], '')}".format(per)
         )
+        most = f"it is at most {size:.4g} of the energy" if np.isfinite(size) else "the energy is 0"
         return (
-            f"The error of {check.conserves} {told}{speed if np.isfinite(per) else ''}; it is at most "
-            f"{size:.4g} of the energy. Expected is: {check.drift}."
+            f"The error of {check.conserves} {told}{speed if np.isfinite(per) else ''}; {most}. "
+            f"Expected is: {check.drift}."
         )
 
     def advise(scheme: int, case: int) -> str:
@@ -216,6 +217,11 @@ def equal(experiment: Experiment, record: Record, check: EqualCheck, index: int)
     def tell(scheme: int, case: int) -> str:
         if reason[scheme, case] == NON_FINITE:
             return f"{check.quantity} means nothing here: the calculation met a number that is not finite."
+        if reason[scheme, case] == NOT_APPLICABLE and np.isfinite(distance[scheme, case]):
+            return (
+                f"{check.quantity} of scheme {check.first} and {second} are at most "
+                f"{distance[scheme, case]:.4g} apart; what rounding may make of that is not known here."
+            )
         if reason[scheme, case] == NOT_APPLICABLE:
             return f"{check.quantity} and {second} cannot be compared here, or were not stored."
         verb = "equals" if reason[scheme, case] == MATCH else "differs from"

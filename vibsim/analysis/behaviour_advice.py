@@ -57,6 +57,8 @@ def on_drift(reason: str, drift: str, quantity: str) -> str:
 
 def on_distance(reason: str, check: EqualCheck, distance: float) -> str:
     """Say what to change where two solutions are not as near to each other as a check expects."""
+    if reason == "not_applicable" and math.isfinite(distance):
+        return f"Give `atol:`, above {distance:.2g} if so much is right."
     if reason == "not_applicable":
         return "Name in `equal:` a scheme or a solution that exists here, or another `quantity:`."
     loose = f"give `atol:` above {distance:.2g} if so much is right"

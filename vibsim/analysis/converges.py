@@ -143,7 +143,19 @@ def _story(
         kind=spec.kind,
         promised=_promised(experiment, check.converges, columns, scheme, case),
         cost=partial(cost_in_words, experiment),
+        failures=_failures(record, scheme, case),
     )
+
+
+def _failures(record: Record, scheme: int, case: int) -> tuple[float, ...]:
+    """Return when each level broke down; see `Story.failures`. Data of other programs need not say it."""
+    if "failure_time" not in record:
+        return ()
+    broken = record["status"][scheme, case] != 0
+    times = np.asarray(record["failure_time"])[scheme, case]
+    if "last_step" in record:
+        times = np.where(np.asarray(record["last_step"])[scheme, case] > 0, times, 0.0)
+    return tuple(float(t) for t in np.where(broken, times, np.nan))
 
 
 def _corner(experiment: Experiment, record: Record, scheme: int, case: int) -> Corner | None:

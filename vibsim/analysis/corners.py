@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from vibsim.expression import Name, Switch, names_in, to_formula
 from vibsim.models import Model
+from vibsim.models.events import Friction
 from vibsim.record import Record, Variable, attributes
 from vibsim.simulation import Members
 from vibsim.simulation.sides import TABLE, Sides, sides
@@ -68,6 +69,12 @@ class _Path:
 def switches_of(model: Model) -> tuple[Switch, ...]:
     """Return the switches of a model's force but for those of its table, which `has_corners` is about."""
     return tuple(row for row in sides(model, {}).switches if row.mode != TABLE)
+
+
+def _is_left_to_steps(model: Model, switch: Switch) -> bool:
+    """Tell whether steps go across a switch: not where friction turns, as that is an event (`Model.events`)."""
+    turns = isinstance(model.events, Friction) and switch.quantity == Name(model.velocity)
+    return switch.mode != TABLE and not turns
 
 
 def words_of(model: Model, index: int) -> str:
@@ -121,7 +128,7 @@ def _of_scheme(
     at = t[:, :-1] + part * np.diff(t)
     place = at / dt[:, None]
     inside = (np.diff(modes) != 0.0) & (np.abs(place - np.round(place)) > ON_A_POINT)
-    inside &= np.array([row.mode != TABLE for row in held.switches])[:, None, None]
+    inside &= np.array([_is_left_to_steps(held.model, row) for row in held.switches])[:, None, None]
     when = np.where(inside, at, np.inf)
     first = np.argmin(np.min(when, axis=0), axis=-1)
     own = np.arange(cases)

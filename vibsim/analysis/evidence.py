@@ -93,9 +93,17 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
         growth=part.growth,
         left_to_the_mesh=np.broadcast_to(part.left_to_the_mesh, shape),
         corner=part.corners.power,
+        steps=float(grid.steps[0]),
+        moved=_moved(q.values[-1]),
         span=np.broadcast_to(part.omega_dt[:, 0] * float(grid.steps[0]), shape),
         relative_floor=np.broadcast_to(part.relative_floor[..., 0], shape),
     )
+
+
+def _moved(finest: Floats) -> Floats:
+    """Return by how much a solution changes relative to its size, shape (scheme, case)."""
+    with np.errstate(all="ignore"):
+        return np.asarray((np.max(finest, axis=-1) - np.min(finest, axis=-1)) / largest(finest))
 
 
 def _size(finest: Floats) -> tuple[Floats, NDArray[np.bool_]]:

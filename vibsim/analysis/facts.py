@@ -5,6 +5,7 @@ Leading dimensions ``...`` are ladders (scheme, case); n is the number of levels
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,6 +63,10 @@ class Evidence:
     """Largest stable w dt, infinite where there is no limit, shape (...)."""
     span: Floats | None = None
     """w T, the length of the run in units of the inverse frequency, shape (...); None counts as long."""
+    steps: float = math.nan
+    """Number of steps at the coarsest level."""
+    moved: Floats | None = None
+    """By how much the solution changes over the run, relative to its size, shape (...)."""
     left_to_the_mesh: Floats | None = None
     """The one power of an error that has no expansion beyond it, since events or corners of the force are left to the
     mesh, shape (...); NaN where the error has an expansion."""
@@ -115,9 +120,14 @@ def truly_exact(e: Evidence) -> Flags:
     """Say where all differences are round-off although an ordinary error would have been seen."""
     # what a short run has accumulated is smaller by (w T)^2
     power = np.where(np.isinf(e.order), ORDINARY, e.order)
-    ordinary = np.minimum(e.omega_dt[..., 0], 1.0) ** power
+    p = e.omega_dt[..., 0]
+    oscillates = np.isfinite(p) & (p > 0.0)
+    ordinary = np.minimum(np.where(oscillates, p, 1.0 / e.steps), 1.0) ** power
     if e.span is not None:
-        ordinary = ordinary * np.minimum(e.span, 1.0) ** 2
+        ordinary = ordinary * np.where(oscillates, np.minimum(e.span, 1.0) ** 2, 1.0)
+    if e.moved is not None:
+        # without oscillations the run itself is the time in which something happens
+        ordinary = ordinary * np.where(oscillates, 1.0, np.minimum(e.moved, 1.0))
     tiny = np.all(e.difference <= TINY * e.size[..., None], axis=-1)
     return np.asarray(at_round_off(e) & tiny & (ordinary >= VISIBLE * BLAME * e.relative_floor))
 

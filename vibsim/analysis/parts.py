@@ -6,6 +6,7 @@ are read by the calling thread alone: the netCDF library knows one thread only.
 
 from __future__ import annotations
 
+import json
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -17,6 +18,7 @@ from vibsim import plan
 from vibsim.analysis.assemble import analyse_records
 from vibsim.analysis.parts_told import is_told
 from vibsim.analysis.reached import is_bound
+from vibsim.analysis.value_units import UNITS, units_in
 from vibsim.record import Record, Variable
 from vibsim.vocabulary import HIGHEST
 
@@ -93,14 +95,20 @@ _DECISIVE = ("status", "failure_time", "last_step", "omega_dt", HIGHEST, "measur
 
 
 def _is_kept(name: str) -> bool:
-    return name in _DECISIVE or name.startswith("check_") or is_bound(name) or is_told(name)
+    return (
+        name in _DECISIVE
+        or name.startswith(("check_", "corner_"))
+        or is_bound(name)
+        or is_told(name)
+    )
 
 
 def kept(parts: Iterable[Record], thin: list[Record]) -> Iterator[Record]:
     """Pass parts on, and keep of each in `thin` what `verdicts` and `summarise` need of it."""
     for part in parts:
         names = [n for n in part.variables if _is_kept(n)]
-        thin.append(Record(part.coords, {n: part.variables[n] for n in names}, part.attrs))
+        attrs = {**part.attrs, UNITS: json.dumps(units_in(part))}
+        thin.append(Record(part.coords, {n: part.variables[n] for n in names}, attrs))
         yield part
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING
 
 from vibsim.record import Record
@@ -10,6 +11,12 @@ from vibsim.spec.values import VALUES
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
     from vibsim.spec.checks import ValueCheck
+
+
+UNITS = "units_of_quantities"
+"""Attribute of a Record that holds verdicts and no quantities: their units by name, as JSON."""
+_ENDS = ("end", "difference_norm", "finest")
+"""What is stored of every quantity that a check may ask for, one of these at least."""
 
 
 def unit_of(experiment: Experiment, record: Record, check: ValueCheck) -> str:
@@ -36,10 +43,19 @@ def unit_of(experiment: Experiment, record: Record, check: ValueCheck) -> str:
     return ""
 
 
+def units_in(record: Record) -> dict[str, str]:
+    """Return the units of all quantities of a convergence Record, for one that keeps `UNITS` in place of them."""
+    found: dict[str, str] = {}
+    for end in _ENDS:
+        for name, variable in record.variables.items():
+            if name.endswith(f"_{end}"):
+                unit = str(variable.attrs.get("units", ""))
+                found.setdefault(name.removesuffix(f"_{end}"), "" if unit == "1" else unit)
+    return found
+
+
 def _of(record: Record, quantity: str | None) -> str:
     """Return the unit of a quantity."""
-    for end in ("end", "difference_norm", "finest"):
-        if f"{quantity}_{end}" in record:
-            found = str(record.variable(f"{quantity}_{end}").attrs.get("units", ""))
-            return "" if found == "1" else found
-    return ""
+    told = record.attrs.get(UNITS)
+    known = units_in(record) if told is None else json.loads(str(told))
+    return str(known.get(quantity or "", ""))

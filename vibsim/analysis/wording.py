@@ -21,6 +21,10 @@ class Corner:
     """The highest power of dt that it leaves regular."""
 
 
+ALIKE = 0.15
+"""Two levels fail at one time that fail within this part of it: the finer one sees it at most a step earlier."""
+
+
 @dataclass(frozen=True)
 class Story:
     """What a sentence on a convergence verdict needs to know about the member that decided it."""
@@ -69,6 +73,16 @@ class Story:
     """... and the same in compensated arithmetic."""
     cost: Callable[[Sequence[int]], str] = lambda levels: ""
     """What levels cost, in words."""
+    failures: tuple[float, ...] = ()
+    """When each level met a number that is not finite, in its first step at 0; NaN where it did not."""
+
+    @property
+    def singular(self) -> float:
+        """Time at which the two finest levels failed alike, so that finer ones will, too; NaN where they did not."""
+        if len(self.failures) < 2:
+            return math.nan
+        before, last = self.failures[-2:]
+        return last if abs(before - last) <= ALIKE * before else math.nan
 
 
 def number(value: float) -> str:
@@ -147,8 +161,7 @@ def tell(s: Story) -> str:
         case "unstable":
             return _unstable(s)
         case "non_finite":
-            where = f" at level {s.culprit}" if s.culprit >= 0 else ""
-            return f"The calculation of {s.quantity} met a number that is not finite{where}."
+            return f"The calculation of {s.quantity} met a number that is not finite{_place_of_failure(s)}."
         case "round_off":
             kept = f"; before it, {measured} is all that is left" if measured else ""
             return (
@@ -189,6 +202,19 @@ def tell(s: Story) -> str:
             return f"{s.quantity} does not exist here, so there is nothing to judge."
     so_far = f": the last estimate is {measured}" if measured else ""
     return f"The step is still too coarse to tell the order of {s.quantity}{so_far}.{s.parts}"
+
+
+def _place_of_failure(s: Story) -> str:
+    """Say where a calculation broke down, as far as it is known."""
+    if s.culprit < 0:
+        return ""
+    where = f" at level {s.culprit}"
+    if s.singular == 0.0:
+        return f"{where}, in its first step, and so does every finer level"
+    if not math.isnan(s.singular):
+        return f"{where}, and finer ones do not avoid it: level {s.levels[-1]} met one at t = {s.singular:.4g}"
+    at = s.failures[s.levels.index(s.culprit)] if s.culprit in s.levels and s.failures else math.nan
+    return where if math.isnan(at) else f"{where}, at t = {at:.4g}"
 
 
 def is_adaptive(s: Story) -> bool:

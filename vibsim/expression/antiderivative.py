@@ -72,6 +72,12 @@ def _asinh(x: Expression) -> Expression:
     return _product(x, Binary("-", _call("asinh", x), beyond))
 
 
+def _atan(x: Expression) -> Expression:
+    """Write ``x atan(x) - log(1 + x^2)/2``, whose second part is at most half of the first."""
+    logarithm = _call("log1p", Binary("**", x, TWO))
+    return Binary("-", _product(x, _call("atan", x)), _product(HALF, logarithm))
+
+
 def _atanh(x: Expression) -> Expression:
     """Write ``x atanh(x) + log(1 - x^2)/2``, whose logarithm has its digits near 0 in one form, near 1 in another."""
     is_small = Compare("<", _call("abs", x), HALF)
@@ -125,6 +131,7 @@ SMOOTH: Mapping[str, Callable[[Expression], Expression]] = {
     "cosh": lambda x: _call("sinh", x),
     "tanh": _log_cosh,
     "asinh": _asinh,
+    "atan": _atan,
     "atanh": _atanh,
     "cbrt": lambda x: _product(Number(0.75), x, _call("cbrt", x)),
     "erf": lambda x: Binary("-", _product(x, _call("erf", x)), _below_one(x)),

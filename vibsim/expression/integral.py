@@ -5,7 +5,8 @@ term by term; a term is a constant factor times a power of x, or a function of t
 What has a corner or jumps is integrated for ``a x + b`` too, though the difference ``F(a x + b) - F(b)`` may cost a
 small energy some digits; what holds on one side of a place alone is integrated up to that place or from there. Anything
 else is integrated by Gauss and Legendre's rule between 0 and x, written out as a formula: right to round-off for a
-function that is smooth there, even if it has a corner at 0.
+function that is smooth there, even if it has a corner at 0. Where a function has poles beside the real axis, as
+``x/sqrt(1 + x^2)`` at i, the rule is one over asinh(x): the way from 0 to 128 is then 5.5 long, and i still 1.6 away.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from functools import cache
 
 import numpy as np
 
+from vibsim.expression.algebra import put
 from vibsim.expression.antiderivative import BROKEN, SMOOTH, of_mod, ramp, ramp_integral
 from vibsim.expression.linear import factor_of, slope_of, start_of
 from vibsim.expression.parser import literal
@@ -34,6 +36,10 @@ from vibsim.expression.tree import (
 ZERO, ONE, TWO, HALF = Number(0.0), Number(1.0), Number(2.0), Number(0.5)
 POINTS = 24
 """Points of the rule: polynomials up to degree 47 are integrated exactly."""
+POLES = frozenset(
+    ("sqrt", "hypot", "log", "log1p", "log2", "log10", "atan", "asinh", "tanh", "tan", "atan2")
+)
+"""Functions that are singular beside the real axis."""
 MAX_CONDITIONS = 4
 """Most conditions inside one that decides of a part: each of them doubles the text of the integral."""
 
@@ -74,6 +80,10 @@ def _found(node: Expression, name: str) -> Expression | None:
                 return None
             raised = Binary("**", base, Number(power + 1.0))
             return Binary("/", raised, Number(power + 1.0))
+        case Binary("**", base, exponent) if name not in names_in(base):
+            # e**x
+            grown = Call("exp", (Binary("*", Call("log", (base,)), exponent),))
+            return _found(grown, name)
         case Call(function, (argument,)) if function in SMOOTH:
             factor = factor_of(argument, name)
             return None if factor is None else Binary("/", SMOOTH[function](argument), factor)
@@ -181,14 +191,48 @@ def _rule() -> tuple[tuple[float, float], ...]:
 
 
 def _by_quadrature(node: Expression, name: str) -> Expression:
-    def at(place: float) -> Expression:
-        here = Binary("*", Number(place), Name(name))
-        return rebuilt(node, lambda part: here if part == Name(name) else part)
+    """Write Gauss and Legendre's rule, over x itself or, where poles are near, over asinh(x)."""
+    if not _has_poles(node, name):
+        terms = [
+            _weighted(weight, put(node, name, Binary("*", Number(place), Name(name))))
+            for place, weight in _rule()
+        ]
+        return Binary("*", Name(name), _total(terms))
+    way = Call("asinh", (Name(name),))
+    terms = []
+    for place, weight in _rule():
+        y = Binary("*", Number(place), way)
+        force = put(node, name, Call("sinh", (y,)))
+        terms.append(_weighted(weight, Binary("*", force, Call("cosh", (y,)))))
+    return Binary("*", way, _total(terms))
 
-    terms = [Binary("*", Number(weight), at(place)) for place, weight in _rule()]
+
+def _has_poles(node: Expression, name: str) -> bool:
+    """Tell whether a formula may be singular beside the real axis, as 1/(1 + x^2) is at x = i."""
+
+    def may(part: Expression) -> bool:
+        match part:
+            case Binary("/", _, below):
+                return name in names_in(below)
+            case Binary("**", base, exponent):
+                power = literal(exponent)
+                is_entire = power is not None and power >= 0.0 and power.is_integer()
+                return name in names_in(base) and not is_entire
+            case Call(function, _):
+                return function in POLES and name in names_in(part)
+        return False
+
+    return any(may(part) for part in walk(node))
+
+
+def _weighted(weight: float, node: Expression) -> Expression:
+    return Binary("*", Number(weight), node)
+
+
+def _total(terms: list[Expression]) -> Expression:
+    """Write a sum in pairs, so that the tree stays flat."""
     while len(terms) > 1:
-        # in pairs, so that the tree stays flat
         ends = zip(terms[::2], terms[1::2], strict=False)
         odd = terms[len(terms) - len(terms) % 2 :]
-        terms = [Binary("+", left, right) for left, right in ends] + odd
-    return Binary("*", Name(name), terms[0])
+        terms = [*(Binary("+", left, right) for left, right in ends), *odd]
+    return terms[0]

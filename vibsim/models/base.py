@@ -89,6 +89,10 @@ class FormulaField:
     """The unit of b in each of them."""
     table: tuple[str, str] | None = None
     """Names that the place and the value have in a table, where one may stand instead; None where not."""
+    derivatives: int = 0
+    """How many times the equation differentiates it: it and all of its derivatives but the last must not jump."""
+    along: str = "t"
+    """What its own name is at a time: a formula in ``t`` and the parameters of the model."""
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ PARAMETERS = (
     Parameter("R", 0.0, "ohm", "resistance", minimum=0.0),
     Parameter("C", 1.0, "F", "capacitance", minimum=0.0, exclusive=True),
 )
-FORMULAS = (FormulaField("voltage", ("t",), "0", "voltage V(t) of the source [V]"),)
+FORMULAS = (FormulaField("voltage", ("t",), "0", "voltage V(t) of the source [V]", derivatives=1),)
 
 
 def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:

@@ -80,8 +80,9 @@ FORMULAS = (
         ("t",),
         "0",
         "exact solution x(t), from which forces then follow; the motion starts on it, without Theta and epsilon",
+        derivatives=2,
     ),
-    FormulaField("exact_y", ("t",), "0", "exact solution y(t) beside exact_x"),
+    FormulaField("exact_y", ("t",), "0", "exact solution y(t) beside exact_x", derivatives=2),
 )
 
 LENGTH = "sqrt(x**2 + (1.0 - y)**2)"

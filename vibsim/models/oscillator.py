@@ -59,7 +59,13 @@ FORMULAS = (
         UNITS,
     ),
     FormulaField("force", ("t",), "0", "driving force F(t) [N]"),
-    FormulaField("exact", ("t",), "", "exact solution u(t) [m], from which the force then follows"),
+    FormulaField(
+        "exact",
+        ("t",),
+        "",
+        "exact solution u(t) [m], from which the force then follows",
+        derivatives=2,
+    ),
     FormulaField(
         "potential",
         ("u",),

@@ -42,7 +42,15 @@ FORMULAS = (
     FormulaField(
         "spring", ("u",), "u", "force s(u) of the spring [N], positive where it pulls back"
     ),
-    FormulaField("road", ("x",), "0", "height h(x) of the road [m]", table=("x", "h")),
+    FormulaField(
+        "road",
+        ("x",),
+        "0",
+        "height h(x) of the road [m]",
+        table=("x", "h"),
+        derivatives=2,
+        along="speed*t",
+    ),
 )
 PLACE = Binary("*", Name("speed"), Name("t"))
 """Where the vehicle is."""

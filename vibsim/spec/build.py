@@ -15,7 +15,7 @@ from vibsim.errors import nearest
 from vibsim.models import MODELS, Model, quantities
 from vibsim.schemes import FIXED_STEP, SCHEMES
 from vibsim.schemes.base import EVENTS, VECTOR
-from vibsim.spec import limits, model_rules, sweep, table_rules
+from vibsim.spec import jump_rules, limits, model_rules, sweep, table_rules
 from vibsim.spec.check_places import Ladder, kinds_of
 from vibsim.spec.check_rules import finish_checks
 from vibsim.spec.checks import ConvergesCheck
@@ -66,6 +66,7 @@ def build(source: Source, place: Place, report: Report) -> Experiment:
     varied = _swept(part, source, model, schemes, report)
     if time is not None and varied.is_whole:
         _check_tables(read, time, varied, report)
+        _check_jumps(read, time, varied, report)
     numbers = Numbers(parameters, initial, time)
     if part.scaled:
         numbers = scaled(numbers, model, sorted(swept), report)
@@ -129,6 +130,16 @@ def _check_tables(
     runs = table_rules.Runs(read.model, read.parameters, time, varied.axes, 0)
     for name in read.tables:
         table_rules.check_length(runs, name, report)
+
+
+def _check_jumps(
+    read: model_rules.Read, time: TimeSpec, varied: sweep.Swept, report: Report
+) -> None:
+    """Check that what the equation differentiates has no jumps."""
+    if read.model is None or not read.parameters:
+        return
+    runs = table_rules.Runs(read.model, read.parameters, time, varied.axes, 0)
+    jump_rules.check_jumps(runs, read.formulas, report)
 
 
 def _sections(source: Source, report: Report) -> Any:

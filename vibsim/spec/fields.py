@@ -21,6 +21,7 @@ from pydantic import (
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from vibsim.expression import ExpressionError, constant
+from vibsim.spec.unit_text import split
 
 IDENTIFIER = r"^[a-z0-9_]+$"
 _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
@@ -29,6 +30,10 @@ MAX_FORMULAS = 1000
 """Values of one list that are not plain numbers."""
 MAX_ENTRIES = 1000
 """Schemes or checks of one experiment."""
+NO_UNIT = {
+    "rule": "must be a number without a unit: only model, initial, time and a sweep of these take units",
+    "hint": "write the number alone, in the unit of the table of models (of a scaled run: over its scale)",
+}
 FORMULA_NOTE = "a number, or a constant formula such as 2*pi/30"
 
 
@@ -79,6 +84,8 @@ def number(value: Any) -> float:
         try:
             return constant(value)
         except ExpressionError as error:
+            if split(value) is not None:
+                raise PydanticCustomError("unit", "{rule}", NO_UNIT) from None
             rule = f"must be {FORMULA_NOTE} ({error.rule})"
             raise PydanticCustomError(
                 "number", "{rule}", {"rule": rule, "hint": error.hint}

@@ -11,9 +11,12 @@ import numpy as np
 
 from vibsim.expression import (
     MAX_CHARACTERS,
+    ONE,
+    Binary,
     Expression,
     ExpressionError,
     evaluate,
+    is_zero,
     names_in,
     parse,
     values,
@@ -31,6 +34,8 @@ from vibsim.spec.source import Path_
 from vibsim.spec.table_file import ENDINGS
 from vibsim.spec.table_rules import table_of
 
+NONE = "none"
+"""Stands for a term that is left out, where others have words as well."""
 AMPLITUDES = (-6, 8)
 """Powers of 2, from and to, of the amplitudes at which a potential energy is compared with its spring."""
 PANELS, POINTS = 32, 16
@@ -95,6 +100,10 @@ def _read(section: Any, model: Model | None, folder: Path, report: Report) -> Re
             tables |= {row.name: table} if table is not None else {}
         elif isinstance(value, Section):
             texts |= _term(row, value, declared, parameters, report)
+        elif value is None and row.name in section.model_fields_set:
+            report.add(path, "must be a formula, or a number", "leave the key out", at_key=True)
+        elif value == NONE and row.terms and NONE not in declared:
+            continue
         elif value is not None and _is_sound(value, row, model, declared, path, report):
             texts[row.name] = value.strip()
     if "exact" in texts and section.force is not None:
@@ -202,10 +211,17 @@ def _is_sound(
         hint = f"for a table write {{{TABLE}: {text}}}" if is_file else error.hint
         report.add(path, rule, hint, text)
         return False
+    if row.terms and not is_zero(read_tree) and set(row.names).isdisjoint(names_in(read_tree)):
+        rule = f"does not depend on {row.names[0]}: it is a constant force, and no {row.name}"
+        report.add(path, rule, f"write ({text})*{row.names[0]}", text)
+        return False
     try:
         for part in walk(read_tree):
             if not names_in(part):
                 evaluate(part, {})
+            if isinstance(part, Binary) and part.operator == "/" and not names_in(part.right):
+                # u/0, which is no constant
+                evaluate(Binary("/", ONE, part.right), {})
     except ExpressionError as error:
         report.add(path, f"a constant in it {error.rule}", error.hint, text)
         return False

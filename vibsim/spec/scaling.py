@@ -78,6 +78,9 @@ def _refusal(model: Model) -> tuple[str, str]:
         return f"{rule}: it is dimensionless already", "leave it out"
     if model.scales is not None and model.scales.refusal:
         return f"{rule}: {model.scales.refusal}", "write k*u, say, with k under parameters"
+    if model.lookup is not None:
+        what = f"{rule} here: the numbers of its table have units, and stay what they are"
+        return what, "leave it out, or write the table's curve as a formula"
     if model.formulas:
         return f"{rule}: its spring is not linear", "write spring: k*u, with k under parameters"
     able = [row.kind for row in MODELS.values() if row.scales and row.scales.parameters]

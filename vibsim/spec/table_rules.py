@@ -112,16 +112,32 @@ class Runs:
 
     def members(self) -> Iterator[tuple[dict[str, Any], Floats]]:
         """Yield parts of the members that differ in what matters: their swept numbers, and their ends."""
-        axes = [axis for axis in self.axes if any(map(_matters, axis.keys))]
-        count = int(np.prod([axis.count for axis in axes], dtype=object))
+        count = self._count()
         for start in range(0, count, CHUNK):
-            stop = min(start + CHUNK, count)
-            found = {k: v for k, v in columns(axes, start, stop).items() if _matters(k)}
-            end = found.get("time.end", np.full(stop - start, self.time.end))
-            if self.time.periods is not None:
-                own = natural_end(self.model, self.time.periods, self._parameters(found))
-                end = np.broadcast_to(own, end.shape)
-            yield found, end
+            yield self._part(start, min(start + CHUNK, count))
+
+    def some(self, most: int) -> Iterator[tuple[dict[str, Any], float]]:
+        """Yield the parameters and the ends of at most so many of these members, evenly spread over them."""
+        count = self._count()
+        for i in sorted({k * (count - 1) // max(most - 1, 1) for k in range(most)}):
+            found, end = self._part(i, i + 1)
+            numbers = self._parameters(found)
+            yield {key: float(np.ravel(x)[0]) for key, x in numbers.items()}, float(end[0])
+
+    def _axes(self) -> list[Axis]:
+        return [axis for axis in self.axes if any(map(_matters, axis.keys))]
+
+    def _count(self) -> int:
+        return int(np.prod([axis.count for axis in self._axes()], dtype=object))
+
+    def _part(self, start: int, stop: int) -> tuple[dict[str, Any], Floats]:
+        """Return what differs in members start..stop-1, and their ends."""
+        found = {k: v for k, v in columns(self._axes(), start, stop).items() if _matters(k)}
+        end = found.get("time.end", np.full(stop - start, self.time.end))
+        if self.time.periods is not None:
+            own = natural_end(self.model, self.time.periods, self._parameters(found))
+            end = np.broadcast_to(own, end.shape)
+        return found, end
 
     def place(self, found: Mapping[str, Any], t: Floats) -> Floats:
         """Return the places at times t, of members with some numbers swept."""
