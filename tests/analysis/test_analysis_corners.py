@@ -105,8 +105,14 @@ def corner(model: dict[str, Any], **changes: Any) -> tuple[float, float, str]:
         ({"force": "mod(t, 1.7)/9"}, 1.7, 1.0, "t/1.7 passes a whole number"),
         ({"force": "1 if mod(t, 1.7) < 0.9 else 0"}, 0.9, 1.0, "a condition in the formula"),
         ({"spring": "u + max(u - 2, 0)"}, math.nan, math.nan, ""),
-        # a grid point of the coarsest level
-        ({"force": "heaviside(t - 5)"}, math.nan, math.nan, ""),
+        # grid points of the coarsest level: jumps alone matter there
+        ({"force": "heaviside(t - 5)"}, 5.0, 1.0, "t - 5 passes zero"),
+        ({"force": "1 if t < 5 else 0"}, 5.0, 1.0, "passes zero"),
+        ({"force": "heaviside(t)"}, 0.0, 1.0, "t passes zero"),
+        ({"force": "max(t - 5, 0)"}, math.nan, math.nan, ""),
+        ({"force": "max(t - 5, 0) + heaviside(t - 7.01)"}, 7.01, 1.0, "t - 7.01 passes zero"),
+        ({"force": "heaviside(t - 5) + heaviside(t - 4.01)"}, 4.01, 1.0, "t - 4.01 passes zero"),
+        ({"force": "heaviside(t - 5) + heaviside(t - 7.01)"}, 5.0, 1.0, "t - 5 passes zero"),
         # both sides are the same
         ({"spring": "u + max(u, 0) + min(u, 0)"}, math.nan, math.nan, ""),
     ],
@@ -147,3 +153,28 @@ def test_a_turn_with_friction_is_an_event_and_no_corner_within_a_step() -> None:
     driven = corner({"damping": {"coulomb": 0.1}, "force": "heaviside(t - 3.01)"})
     assert driven[0] == pytest.approx(3.01, abs=0.02)
     assert driven[2] == "t - 3.01 passes zero"
+
+
+@pytest.mark.parametrize("scheme", ["rk4", "central"])
+def test_a_jump_at_a_grid_point_is_named(scheme: str) -> None:
+    """A step that begins there and one that ends there take the same value, which is wrong for one of them."""
+    made = experiment(
+        [scheme],
+        model={"kind": "oscillator", "force": "1 if t < 1 else 0"},
+        time={"end": 2.0},
+        levels=[4, 5, 6, 7],
+    )
+    (verdict,) = judged(made)
+    assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "non_smooth")
+    assert "At t = 1, at a grid point, " in verdict.text
+
+
+def test_the_mean_of_both_sides_keeps_order_2_of_central() -> None:
+    made = experiment(
+        ["central"],
+        model={"kind": "oscillator", "force": "heaviside(t - 1)"},
+        time={"end": 2.0},
+        levels=[4, 5, 6, 7],
+    )
+    (verdict,) = judged(made)
+    assert (verdict.status, verdict.reason) == ("PASS", "asymptotic")

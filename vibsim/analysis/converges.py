@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vibsim import theory
 from vibsim.analysis.advice import advise
 from vibsim.analysis.causes import CAUSES
-from vibsim.analysis.corners import words_of
+from vibsim.analysis.corners import is_on_a_point, words_of
 from vibsim.analysis.costs import cost_in_words
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Orders, Outcome
 from vibsim.analysis.part import fastest
@@ -159,13 +159,16 @@ def _failures(record: Record, scheme: int, case: int) -> tuple[float, ...]:
 
 
 def _corner(experiment: Experiment, record: Record, scheme: int, case: int) -> Corner | None:
-    """Return the first corner of the force within a step, None where there is none."""
+    """Return the first corner of the force that steps feel, None where there is none."""
     if "corner_switch" not in record or record["corner_switch"][scheme, case] < 0:
         return None
+    time = np.asarray(record["corner_time"])[scheme, case]
+    dt = np.asarray(record["dt"])[0]
     return Corner(
         words_of(experiment.model.definition, int(record["corner_switch"][scheme, case])),
-        float(record["corner_time"][scheme, case]),
+        float(time),
         float(record["corner_power"][scheme, case]),
+        on_a_point=bool(is_on_a_point(time, dt[case] if dt.ndim else dt)),
     )
 
 

@@ -2,7 +2,9 @@
 
 A step across a jump of the k-th derivative of the force has an error of dt^(k+1) that depends on where in the step the
 jump lies: another place at each level. So no order above k + 1 is regular, wherever the motion meets such a place: 1
-for a jump of the force, 2 for ``abs(u)``, 3 for quadratic damping ``abs(v) v`` where the velocity vanishes. Switches
+for a jump of the force, 2 for ``abs(u)``, 3 for quadratic damping ``abs(v) v`` where the velocity vanishes. At a grid
+point only a jump of the force matters: of its two values a step that begins there and one that ends there take the
+same. Switches
 (`vibsim.expression.switches`) are followed along the samples of the finest level; k is read off the difference of the
 two formulas on either side.
 """
@@ -37,7 +39,7 @@ MOST_SMOOTH = 8
 
 @dataclass(frozen=True)
 class Corners:
-    """The first corner within a step of every scheme and member, shape (scheme, case)."""
+    """The first corner that steps feel of every scheme and member, shape (scheme, case)."""
 
     power: Floats
     """The highest power of dt that stays regular, k + 1; NaN where there is no corner."""
@@ -89,7 +91,7 @@ def words_of(model: Model, index: int) -> str:
 
 
 def corners_of(model: Model, finest: Record, group: Members, dt: Floats) -> Corners:
-    """Find the first corner that lies within a step.
+    """Find the first corner that lies within a step, or jump of the force in time that lies at a grid point.
 
     Parameters
     ----------
@@ -126,33 +128,82 @@ def _of_scheme(
     edge = np.where(held.whole[:, None, None], edge, 0.0)
     part = (edge - q[..., :-1]) / (q[..., 1:] - q[..., :-1])
     at = t[:, :-1] + part * np.diff(t)
-    place = at / dt[:, None]
-    inside = (np.diff(modes) != 0.0) & (np.abs(place - np.round(place)) > ON_A_POINT)
-    inside &= np.array([_is_left_to_steps(held.model, row) for row in held.switches])[:, None, None]
-    when = np.where(inside, at, np.inf)
-    first = np.argmin(np.min(when, axis=0), axis=-1)
-    own = np.arange(cases)
-    switch = np.argmin(when[:, own, first], axis=0)
-    exists = np.isfinite(when[switch, own, first])
-    around = np.stack([first, first + 1])
-    own_modes = np.stack([modes[:, own, i] for i in around])
-    # what else changes between these two samples is another corner
-    behind = own_modes[0].copy()
-    behind[switch, own] = own_modes[1][switch, own]
-    path = _Path(
-        Sides(held.model, held.formulas, held.switches, numbers),
-        np.stack([states[:, own, i] for i in around]),
-        np.stack([t[own, i] for i in around]),
-        np.stack([own_modes[0], behind]),
-    )
-    size = np.nanmax(np.abs(q), axis=-1)[switch, own]
-    power = np.where(exists, _power(path, switch, edge[switch, own, first], size), np.nan)
-    exists &= np.isfinite(power)
-    return (
-        power,
-        np.where(exists, when[switch, own, first], np.nan),
-        np.where(exists, switch - len(held.switches) + len(switches_of(held.model)), -1),
-    )
+    passed = np.diff(modes) != 0.0
+    passed &= np.array([_is_left_to_steps(held.model, row) for row in held.switches])[:, None, None]
+    is_within = ~is_on_a_point(at, dt[:, None])
+    of_time = np.array(_of_time(held))[:, None, None]
+    followed = _Followed(held, states, t, numbers, q, modes, edge)
+    within = followed.first(np.where(passed & is_within, at, np.inf))
+    on_point = followed.first(np.where(passed & of_time & ~is_within, at, np.inf))
+    is_first = (on_point[0] == 1.0) & ~(within[1] <= on_point[1])
+    power, time, switch = (np.where(is_first, *pair) for pair in zip(on_point, within, strict=True))
+    return power, time, np.asarray(switch, dtype=np.int64)
+
+
+def is_on_a_point(t: Floats, dt: Floats) -> NDArray[np.bool_]:
+    """Tell whether times are grid points of step dt."""
+    place = t / dt
+    return np.asarray(np.abs(place - np.round(place)) <= ON_A_POINT)
+
+
+def _of_time(held: Sides) -> list[bool]:
+    """Tell of every switch whether time alone moves it."""
+    state_names = {state.name for state in held.model.states}
+    moved = set(state_names)
+    found = []
+    for row in held.switches:
+        found.append(moved.isdisjoint(names_in(row.quantity)))
+        if not found[-1]:
+            moved.add(row.mode)
+    return found
+
+
+@dataclass(frozen=True)
+class _Followed:
+    """What all switches look at along the samples of every member."""
+
+    held: Sides
+    states: Floats
+    t: Floats
+    numbers: Mapping[str, Floats]
+    q: Floats
+    """Shape (switch, case, sample)."""
+    modes: Floats
+    edge: Floats
+    """The value that is passed between two samples, shape (switch, case, sample - 1)."""
+
+    def first(self, when: Floats) -> tuple[Floats, Floats, Ints]:
+        """Return power, time and switch of the first corner of every member, each of shape (case,).
+
+        Parameters
+        ----------
+        when
+            The times of those that count, infinite elsewhere, shape (switch, case, sample - 1).
+        """
+        held, own = self.held, np.arange(len(self.t))
+        first = np.argmin(np.min(when, axis=0), axis=-1)
+        switch = np.argmin(when[:, own, first], axis=0)
+        exists = np.isfinite(when[switch, own, first])
+        around = np.stack([first, first + 1])
+        own_modes = np.stack([self.modes[:, own, i] for i in around])
+        # what else changes between these two samples is another corner
+        behind = own_modes[0].copy()
+        behind[switch, own] = own_modes[1][switch, own]
+        path = _Path(
+            Sides(held.model, held.formulas, held.switches, self.numbers),
+            np.stack([self.states[:, own, i] for i in around]),
+            np.stack([self.t[own, i] for i in around]),
+            np.stack([own_modes[0], behind]),
+        )
+        size = np.nanmax(np.abs(self.q), axis=-1)[switch, own]
+        power = _power(path, switch, self.edge[switch, own, first], size)
+        power = np.where(exists, power, np.nan)
+        exists &= np.isfinite(power)
+        return (
+            power,
+            np.where(exists, when[switch, own, first], np.nan),
+            np.where(exists, switch - len(held.switches) + len(switches_of(held.model)), -1),
+        )
 
 
 def _modes(held: Sides, states: Floats, t: Floats) -> tuple[Floats, Floats]:

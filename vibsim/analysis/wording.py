@@ -12,13 +12,15 @@ from vibsim.schemes.base import is_on_the_mesh
 
 @dataclass(frozen=True)
 class Corner:
-    """The first corner of the force within a step."""
+    """The first corner of the force that steps feel."""
 
     words: str
     """What happens there."""
     time: float
     power: float
     """The highest power of dt that it leaves regular."""
+    on_a_point: bool = False
+    """Whether it is a jump at a grid point, not within a step."""
 
 
 ALIKE = 0.15
@@ -293,6 +295,12 @@ _WHY_HIGH = {
 def _cornered(s: Story, corner: Corner) -> str:
     measured = _measured(s)
     so_far = f"; the last estimate is {measured}" if measured else ""
+    if corner.on_a_point:
+        return (
+            f"At t = {corner.time:.4g}, at a grid point, {corner.words}, where the force jumps: the steps on both "
+            f"sides take the same one value there, which leaves an error of order 1, so that {s.quantity} does not "
+            f"show order {number(s.expected)}{so_far}."
+        )
     jump = {1.0: "the force jumps", 2.0: "the force has a corner"}
     what = jump.get(corner.power, "a derivative of the force jumps")
     return (
