@@ -71,12 +71,14 @@ def motion(t: Any, alpha: Any, beta: Any, u_0: Any, v_0: Any) -> tuple[Floats, F
     rest, linear = kind == REST, kind == LINEAR
     found[:, rest] = np.stack([u[rest], v[rest]])[:, :, None]
     if linear.any():
-        own = (x[linear, None] for x in (alpha, np.zeros_like(alpha), u, v))
-        found[:, linear] = damped_motion(t[linear], *own)
-    for code, move in ((CN, _cn), (DN, _dn), (SN, _sn)):
+        starts = (x[linear, None] for x in (alpha, np.zeros_like(alpha), u, v))
+        found[:, linear] = damped_motion(t[linear], *starts)
+    own = (size, rate, complement, u, v)
+    well = (*own, alpha + beta * u * u, beta)
+    for code, move, numbers in ((CN, _cn, own), (DN, _dn, well), (SN, _sn, own)):
         mask = kind == code
         if mask.any():
-            found[:, mask] = move(t[mask], *(x[mask] for x in (size, rate, complement, u, v)))
+            found[:, mask] = move(t[mask], *(x[mask] for x in numbers))
     return found[0].reshape(shape), found[1].reshape(shape)
 
 
@@ -101,16 +103,23 @@ def _cn(
 
 
 def _dn(
-    t: Floats, size: Floats, rate: Floats, complement: Floats, u: Floats, v: Floats
+    t: Floats,
+    size: Floats,
+    rate: Floats,
+    complement: Floats,
+    u: Floats,
+    v: Floats,
+    slope: Floats,
+    beta: Floats,
 ) -> tuple[Floats, Floats]:
     sn, cn, dn, m = _functions(t, rate, complement)
     side = np.copysign(size, u)[:, None]
     d = np.clip(u[:, None] / side, 0.0, 1.0)
-    # v = -A rate m s c and d^2 = 1 - m s^2: twice the amplitude of the well's small oscillation is m
-    product = -(v / rate)[:, None] / side
-    with np.errstate(all="ignore"):
-        s = np.sqrt(np.clip((1.0 - d) * (1.0 + d) / m, 0.0, 1.0))
-        c = np.where(s > 0.0, product / (m * np.where(s > 0.0, s, 1.0)), 1.0)
+    # slope = S cos(2 phi) and sqrt(2 beta) |v| = S sin(2 phi), where sn = sin(phi): from d = u/A neither sn near the
+    # outer turning point nor cn near the inner one would have a digit
+    phi = 0.5 * np.arctan2(np.sqrt(2.0 * beta) * np.abs(v), slope)
+    s = np.sin(phi)[:, None]
+    c = np.copysign(np.cos(phi), -v * side[:, 0])[:, None]
     below = 1.0 - m * (s * sn) ** 2
     delta = (d * dn - m * s * sn * c * cn) / below
     sine = (s * cn * dn + sn * c * d) / below
