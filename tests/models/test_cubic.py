@@ -37,6 +37,7 @@ def test_a_small_swing_at_the_bottom_of_a_well_is_harmonic():
         np.testing.assert_allclose(u, 1.0 + speed * np.sin(w * T) / w, rtol=0.0, atol=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("alpha", "beta", "u", "v", "accuracy"),
     [
