@@ -176,9 +176,7 @@ def test_a_body_that_sticks_and_goes_back_has_turned(
 
 @pytest.mark.parametrize("events", TREATMENTS)
 def test_a_body_that_sticks_and_goes_on_has_not_turned(events):
-    creeping = written(
-        {"damping": "b*sign(v)", "spring": "u", "force": "t/20 + cos(t/2)/2"}, ()
-    )
+    creeping = written({"damping": "b*sign(v)", "spring": "u", "force": "t/20 + cos(t/2)/2"}, ())
     run = runs_of.run(creeping, "rk4", {"b": 0.6}, (0.0, 0.0), 60.0, 2000, events=events)
     assert run.events.event_count == [8]
     assert np.isnan(run.gathered.first_peak[0]) or run.gathered.first_peak[0] == 0.0

@@ -64,4 +64,6 @@ def test_the_period_of_a_wide_swing_in_a_softening_well(gap):
     with mpmath.workdps(50):
         u = mpmath.mpf(1.0 - gap)
         expected = 4 * mpmath.ellipk(u**2 / (2 - u**2)) / mpmath.sqrt(1 - u**2 / 2)
-    assert float(period(1.0, -1.0, 1.0 - gap, 0.0)) == pytest.approx(float(expected), rel=1e-13 + 1e-16 / gap)
+    assert float(period(1.0, -1.0, 1.0 - gap, 0.0)) == pytest.approx(
+        float(expected), rel=1e-13 + 1e-16 / gap
+    )

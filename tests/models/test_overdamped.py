@@ -50,7 +50,10 @@ def test_a_forced_velocity_does_not_lose_digits_to_damping(half, rate):
         a, b = q - h, -q - h
         weights = [1 / ((x - y) * (x - z)) for x, y, z in ((s, a, b), (a, b, s), (b, s, a))]
         parts = [
-            [w * x * mpmath.exp(x * mpmath.mpf(time)) for w, x in zip(weights, (s, a, b))]
+            [
+                w * x * mpmath.exp(x * mpmath.mpf(time))
+                for w, x in zip(weights, (s, a, b), strict=True)
+            ]
             for time in t
         ]
         expected = np.array([float(mpmath.re(sum(row))) for row in parts])
