@@ -67,3 +67,8 @@ def test_the_period_of_a_wide_swing_in_a_softening_well(gap):
     assert float(period(1.0, -1.0, 1.0 - gap, 0.0)) == pytest.approx(
         float(expected), rel=1e-13 + 1e-16 / gap
     )
+
+
+def test_a_start_whose_energy_overflows_has_no_motion_and_no_warning():
+    for place in (1e100, -1e200):
+        assert np.isnan(motion(T, 1.0, 1.0, place, 0.0)).all()

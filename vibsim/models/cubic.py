@@ -75,11 +75,13 @@ def motion(t: Any, alpha: Any, beta: Any, u_0: Any, v_0: Any) -> tuple[Floats, F
         starts = (x[linear, None] for x in (alpha, np.zeros_like(alpha), u, v))
         found[:, linear] = damped_motion(t[linear], *starts)
     own = (size, rate, complement, u, v)
-    well = (*own, alpha + beta * u * u, beta)
-    for code, move, numbers in ((CN, _cn, own), (DN, _dn, well), (SN, _sn, own)):
-        mask = kind == code
-        if mask.any():
-            found[:, mask] = move(t[mask], *(x[mask] for x in numbers))
+    # of a start beyond 1e77 the energy overflows: NaN
+    with np.errstate(all="ignore"):
+        well = (*own, alpha + beta * u * u, beta)
+        for code, move, numbers in ((CN, _cn, own), (DN, _dn, well), (SN, _sn, own)):
+            mask = kind == code
+            if mask.any():
+                found[:, mask] = move(t[mask], *(x[mask] for x in numbers))
     return found[0].reshape(shape), found[1].reshape(shape)
 
 
