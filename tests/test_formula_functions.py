@@ -257,3 +257,14 @@ def test_a_constant_without_a_value_is_told(text: str) -> None:
     assert not math.isfinite(float(values(parse(text, ()), {})))
     with pytest.raises(Exception, match="no finite value"):
         evaluate(parse(text, ()), {}, text)
+
+
+@pytest.mark.parametrize("exponent", ["-(2 + 1)", "2*3", "-k", "5", "-7", "2**3", "k - 5"])
+def test_a_constant_power_has_the_bits_of_the_engine(exponent):
+    """Only a whole exponent that is written as a number is a multiplication."""
+    formula = parse(f"u**({exponent})", ("u", "k"))
+    text = "\n".join([*to_statements(formula, "found"), ""])
+    for u in (0.1, 1e-3, 1.7, 12.25, 3.0):
+        numbers = {"u": u, "k": 8.0, "power": ELEMENTARY["power"].full}
+        exec(text, numbers)
+        assert evaluate(formula, {"u": u, "k": 8.0}) == numbers["found"]

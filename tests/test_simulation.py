@@ -137,6 +137,21 @@ def test_a_member_that_overflows_is_reported_and_the_others_stand():
     assert data.omega_dt.values[1] == pytest.approx(12.5)
 
 
+def test_work_without_bound_is_reported_in_silence():
+    """The power of drag overflows while the state does not yet; a warning is an error here."""
+    unstable = experiment(
+        model={"kind": "oscillator", "damping": {"quadratic": 100.0}, "force": "cos(t)"},
+        initial={"u": 1.0, "v": 1.0},
+        time={"end": 20.0, "base_steps": 5},
+        levels=[2, 3],
+        schemes=["forward_euler"],
+        checks=[{"converges": "u", "order": "scheme"}],
+    )
+    data = simulate(unstable, 2)
+    assert data.status.values.tolist() == [[1]]
+    assert np.isfinite(data.energy_budget.values[0, 0, 0])
+
+
 def test_a_level_that_the_experiment_does_not_have_is_refused():
     with pytest.raises(ValueError, match=r"level 5 is none of \[6, 7, 8\]"):
         simulate(experiment(), 5)

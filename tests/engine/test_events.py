@@ -14,6 +14,7 @@ from vibsim.engine.kernel import source
 from vibsim.errors import SimulationError
 from vibsim.models import MODELS
 from vibsim.models.bouncing_ball import rest_time as lying_time
+from vibsim.models.oscillator import written
 from vibsim.models.sliding_box import rest_time as sticking_time
 from vibsim.schemes import FIXED_STEP
 
@@ -141,6 +142,46 @@ def test_peaks_at_events_are_those_of_the_motion(kind):
     assert run.gathered.period[0] == pytest.approx(2 * math.pi, rel=2e-3)
     assert run.gathered.last_peak[0] == pytest.approx(0.6, abs=2e-3)
     assert run.gathered.last_trough[0] == pytest.approx(-0.5, abs=2e-3)
+
+
+STICKING = written(
+    {"damping": "b*sign(v)", "spring": "k*u", "force": "cos(t/2) + a*cos(1.5*t + 1)"}, ("k", "a")
+)
+
+
+@pytest.mark.parametrize("kind", ["central", "rk4", "gauss4"])
+@pytest.mark.parametrize("events", TREATMENTS)
+@pytest.mark.parametrize(
+    ("a", "peaks", "last_peak", "last_trough"),
+    [
+        # turning points of 40-digit pieces: every one of them sticks, or every second one
+        (0.0, (2.03306898, 50.61213460), 1.25159476, -1.25159426),
+        (0.8, (1.09218406, 51.25630393), 1.59836487, -1.62596544),
+    ],
+)
+def test_a_body_that_sticks_and_goes_back_has_turned(
+    kind, events, a, peaks, last_peak, last_trough
+):
+    """Where it sticks and then goes on the way it came it has not."""
+    run = runs_of.run(
+        STICKING, kind, {"b": 0.6, "k": 1.0, "a": a}, (0.1, 0.0), 60.0, 4000, events=events
+    )
+    found = run.gathered
+    close = 2e-5 if events == "located" else 1e-2
+    assert found.period[0] == pytest.approx((peaks[1] - peaks[0]) / 4, rel=close)
+    assert found.period_count[0] == 4
+    assert found.last_peak[0] == pytest.approx(last_peak, rel=close)
+    assert found.last_trough[0] == pytest.approx(last_trough, rel=close)
+
+
+@pytest.mark.parametrize("events", TREATMENTS)
+def test_a_body_that_sticks_and_goes_on_has_not_turned(events):
+    creeping = written({"damping": "b*sign(v)", "spring": "u", "force": "t/20 + cos(t/2)/2"}, ())
+    run = runs_of.run(creeping, "rk4", {"b": 0.6}, (0.0, 0.0), 60.0, 2000, events=events)
+    assert run.events.event_count == [8]
+    assert np.isnan(run.gathered.first_peak[0]) or run.gathered.first_peak[0] == 0.0
+    assert np.isnan(run.gathered.last_trough[0])
+    assert run.gathered.period_count[0] == 0
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.3, 0.8, 0.95])

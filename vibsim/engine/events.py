@@ -39,7 +39,10 @@ EVENT_COUNT = N_STATS
 FIRST_EVENT = N_STATS + 1
 LAST_EVENT = N_STATS + 2
 REST_TIME = N_STATS + 3
-N_STATS_EVENTS = N_STATS + 4
+HALTED = N_STATS + 4
+"""The mode before the body came to rest, and the grid point behind: it may leave the other way, which is a turn."""
+HALTED_GRID = N_STATS + 5
+N_STATS_EVENTS = N_STATS + 6
 
 MOST_EVENTS = 256
 """Events of a step; a member with more comes to rest until the next grid point."""
@@ -137,6 +140,7 @@ def across(
             note_event(stats, counts, case, t, end, u, before, mode)
     if GATHER:
         stats[case, REST_TIME] = t
+        stats[case, HALTED] = math.nan
     return u, 0.0, with_mode(p, 0.0, end), MOST_EVENTS
 
 
@@ -206,7 +210,15 @@ def note_event(
     before: float,
     after: float,
 ) -> None:
-    """Write the event at time `t`, where the member came to rest there, and the peak or trough that it is."""
+    """Write the event at time `t`, where the member came to rest there, and the peak or trough that it is.
+
+    A member that rests and then leaves the way it came has turned where it came to rest.
+    """
+    since, point = t, grid
+    if before == 0.0:
+        since, point, before = stats[case, REST_TIME], stats[case, HALTED_GRID], stats[case, HALTED]
+    elif after == 0.0:
+        stats[case, HALTED], stats[case, HALTED_GRID] = before, grid
     if stats[case, EVENT_COUNT] == 0.0:
         stats[case, FIRST_EVENT] = t
     stats[case, LAST_EVENT] = t
@@ -214,4 +226,4 @@ def note_event(
     stats[case, REST_TIME] = t if after == 0.0 else math.nan
     kind = turning(before, after)
     if kind != 0.0:
-        note_turning(stats, counts, case, t, grid, u, kind)
+        note_turning(stats, counts, case, since, point, u, kind)

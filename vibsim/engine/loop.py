@@ -185,8 +185,8 @@ def run(
                 else:
                     slope = (following[0] - u_before) * (0.5 / h)
             if EVENTS:  # noqa: SIM102
-                # events have noted themselves whether they are peaks
-                if n == last_event:
+                # events have noted themselves whether they are peaks, also one at rest on the point before
+                if n == last_event or (n - 1 == last_event and slope_before == 0.0):
                     slope_before = math.nan
             if GATHER:
                 kinetic, potential = energies(q, w, t, p)

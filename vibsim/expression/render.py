@@ -13,7 +13,7 @@ from itertools import accumulate
 
 from vibsim.elementary import ELEMENTARY
 from vibsim.expression.faults import ExpressionError
-from vibsim.expression.parser import MAX_POWER, literal, parse
+from vibsim.expression.parser import literal, parse
 from vibsim.expression.tree import (
     FUNCTIONS,
     Binary,
@@ -86,7 +86,7 @@ def _value(node: Expression, values: Mapping[str, float]) -> float:
         case Negate(operand):
             return -_value(operand, values)
         case Binary("**", base, exponent):
-            return _power(_value(base, values), _value(exponent, values))
+            return _power(_value(base, values), _value(exponent, values), literal(exponent))
         case Binary(symbol, left, right) | Compare(symbol, left, right):
             return float(_OPERATORS[symbol](_value(left, values), _value(right, values)))
         case Call("where", (condition, yes, no)):
@@ -109,8 +109,9 @@ def _existing(value: float) -> float:
     return value
 
 
-def _power(base: float, exponent: float) -> float:
-    if not exponent.is_integer() or abs(exponent) > MAX_POWER:
+def _power(base: float, exponent: float, written: float | None) -> float:
+    """Return a power: by multiplication where a whole exponent is written as a number, as in the engine."""
+    if written is None or not exponent.is_integer():
         return _existing(ELEMENTARY["power"].full(base, exponent))
     if exponent == 0.0:
         return 1.0

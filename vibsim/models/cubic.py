@@ -33,10 +33,11 @@ def _orbit(alpha: Any, beta: Any, u: Any, v: Any) -> tuple[Floats, ...]:
     alpha, beta, u, v = (np.asarray(x, dtype=float) for x in np.broadcast_arrays(alpha, beta, u, v))
     with np.errstate(all="ignore"):
         energy = 0.5 * v * v + u * u * (0.5 * alpha + 0.25 * beta * u * u)
-        square = alpha * alpha + 4.0 * beta * energy
-        # (alpha + beta u^2)^2 + 2 beta v^2 is the same without cancellation where beta > 0
-        slope = alpha + beta * u * u
-        square = np.where(beta > 0.0, slope * slope + 2.0 * beta * v * v, square)
+        # S^2 = alpha^2 + 4 beta E is (alpha + beta u^2)^2 + 2 beta v^2, without cancellation as a sum or a product
+        slope, swing = alpha + beta * u * u, np.sqrt(2.0 * np.abs(beta)) * np.abs(v)
+        square = np.where(
+            beta > 0.0, slope * slope + swing * swing, (slope - swing) * (slope + swing)
+        )
         s = np.sqrt(np.maximum(square, 0.0))
         is_cn = (beta > 0.0) & ((energy > 0.0) | (alpha >= 0.0))
         is_dn = (beta > 0.0) & ~is_cn
@@ -71,12 +72,16 @@ def motion(t: Any, alpha: Any, beta: Any, u_0: Any, v_0: Any) -> tuple[Floats, F
     rest, linear = kind == REST, kind == LINEAR
     found[:, rest] = np.stack([u[rest], v[rest]])[:, :, None]
     if linear.any():
-        own = (x[linear, None] for x in (alpha, np.zeros_like(alpha), u, v))
-        found[:, linear] = damped_motion(t[linear], *own)
-    for code, move in ((CN, _cn), (DN, _dn), (SN, _sn)):
-        mask = kind == code
-        if mask.any():
-            found[:, mask] = move(t[mask], *(x[mask] for x in (size, rate, complement, u, v)))
+        starts = (x[linear, None] for x in (alpha, np.zeros_like(alpha), u, v))
+        found[:, linear] = damped_motion(t[linear], *starts)
+    own = (size, rate, complement, u, v)
+    # of a start beyond 1e77 the energy overflows: NaN
+    with np.errstate(all="ignore"):
+        well = (*own, alpha + beta * u * u, beta)
+        for code, move, numbers in ((CN, _cn, own), (DN, _dn, well), (SN, _sn, own)):
+            mask = kind == code
+            if mask.any():
+                found[:, mask] = move(t[mask], *(x[mask] for x in numbers))
     return found[0].reshape(shape), found[1].reshape(shape)
 
 
@@ -86,6 +91,12 @@ def _functions(t: Floats, rate: Floats, complement: Floats) -> tuple[Floats, ...
     return sn, cn, dn, (1.0 - complement)[:, None]
 
 
+def _below(complement: Floats, s: Floats, c: Floats, cn: Floats) -> Floats:
+    """Return the denominator ``1 - m s^2 sn^2`` of the theorems of addition, as a sum of what is not negative."""
+    beyond = complement[:, None]
+    return np.asarray(beyond + (1.0 - beyond) * (c * c + (s * cn) ** 2))
+
+
 def _cn(
     t: Floats, size: Floats, rate: Floats, complement: Floats, u: Floats, v: Floats
 ) -> tuple[Floats, Floats]:
@@ -93,7 +104,7 @@ def _cn(
     c = np.clip(u / size, -1.0, 1.0)[:, None]
     d = np.sqrt(complement[:, None] + m * c * c)
     s = -(v / (size * rate))[:, None] / d
-    below = 1.0 - m * (s * sn) ** 2
+    below = _below(complement, s, c, cn)
     cosine = (c * cn - s * sn * d * dn) / below
     sine = (s * cn * dn + sn * c * d) / below
     delta = (d * dn - m * s * sn * c * cn) / below
@@ -101,17 +112,27 @@ def _cn(
 
 
 def _dn(
-    t: Floats, size: Floats, rate: Floats, complement: Floats, u: Floats, v: Floats
+    t: Floats,
+    size: Floats,
+    rate: Floats,
+    complement: Floats,
+    u: Floats,
+    v: Floats,
+    slope: Floats,
+    beta: Floats,
 ) -> tuple[Floats, Floats]:
     sn, cn, dn, m = _functions(t, rate, complement)
     side = np.copysign(size, u)[:, None]
     d = np.clip(u[:, None] / side, 0.0, 1.0)
-    # v = -A rate m s c and d^2 = 1 - m s^2: twice the amplitude of the well's small oscillation is m
-    product = -(v / rate)[:, None] / side
-    with np.errstate(all="ignore"):
-        s = np.sqrt(np.clip((1.0 - d) * (1.0 + d) / m, 0.0, 1.0))
-        c = np.where(s > 0.0, product / (m * np.where(s > 0.0, s, 1.0)), 1.0)
-    below = 1.0 - m * (s * sn) ** 2
+    # slope = S cos(2 phi) and sqrt(2 beta) |v| = S sin(2 phi), where sn = sin(phi): from d = u/A neither sn near the
+    # outer turning point nor cn near the inner one would have a digit
+    swing = np.sqrt(2.0 * beta) * np.abs(v)
+    both = np.hypot(slope, swing)  # S
+    large = np.sqrt(0.5 + 0.5 * np.abs(slope) / both)
+    small = 0.5 * swing / (both * large)
+    s = np.where(slope > 0.0, small, large)[:, None]
+    c = np.copysign(np.where(slope > 0.0, large, small), -v * u)[:, None]
+    below = _below(complement, s, c, cn)
     delta = (d * dn - m * s * sn * c * cn) / below
     sine = (s * cn * dn + sn * c * d) / below
     cosine = (c * cn - s * sn * d * dn) / below
@@ -125,7 +146,7 @@ def _sn(
     s = np.clip(u / size, -1.0, 1.0)[:, None]
     d = np.sqrt(complement[:, None] + m * (1.0 - s) * (1.0 + s))
     c = (v / (size * rate))[:, None] / d
-    below = 1.0 - m * (s * sn) ** 2
+    below = _below(complement, s, c, cn)
     sine = (s * cn * dn + sn * c * d) / below
     cosine = (c * cn - s * sn * d * dn) / below
     delta = (d * dn - m * s * sn * c * cn) / below

@@ -148,8 +148,8 @@ def forced_motion(
         for c, s in terms:
             a, b, e = large * t, small * t, s * t
             u = u + np.real(c * t * t * divided_twice(a, b, e))
-            # u' - l1 u is the answer of the first-order equation that is left
-            v = v + np.real(c * t * (divided(b, e) + a * divided_twice(a, b, e)))
+            # u' - l u is the answer of the first-order equation that is left; the smaller root cancels less
+            v = v + np.real(c * t * (divided(a, e) + b * divided_twice(a, b, e)))
     return np.asarray(u), np.asarray(v)
 
 

@@ -22,7 +22,8 @@ def damped_motion(
 
     Source: vibration text (B), section 8 and exercise 11; with ``q = sqrt(|stiffness - half^2|)`` the solution is
     ``exp(-half t) (u_0 C + (v_0 + half u_0) S)``, with ``C = cos(q t)``, ``S = sin(q t)/q`` below critical damping,
-    1 and t at it, and the hyperbolic functions above, which are taken together with the exponential.
+    1 and t at it, and the hyperbolic functions above, which are taken together with the exponential. Its velocity is
+    ``exp(-half t) (v_0 (C - half S) - stiffness u_0 S)``.
     """
     with np.errstate(all="ignore"):
         square = stiffness - half * half
@@ -33,16 +34,22 @@ def damped_motion(
         small_rate = stiffness / large
         least, most = np.minimum(large, small_rate), np.maximum(large, small_rate)
         fast, slow = np.exp(-most * t), np.exp(-least * t)
-        even = np.where(square >= 0.0, decay * np.cos(q * t), 0.5 * (slow + fast))
         angle = q * t
         # sin(x)/x and its hyperbolic twin are 1 where the damping is critical
         small = np.abs(angle) < 1e-8
-        wave = np.where(small, decay * t, decay * np.sin(angle) / q)
-        rise = np.where(small, decay * t, -0.5 * slow * np.expm1(-2.0 * angle) / q)
+        even, wave = decay * np.cos(angle), np.where(small, decay * t, decay * np.sin(angle) / q)
+        loss = np.expm1(-2.0 * angle)
+        rise = np.where(small, decay * t, -0.5 * slow * loss / q)
+        # C + half S and C - half S: above critical damping one of them cancels as a sum
+        is_near, width = 2.0 * angle < 1.0, 2.0 * q
+        rest = np.where(is_near, slow * (1.0 - least * loss / width), most * slow - least * fast)
+        kick = np.where(is_near, slow * (1.0 + most * loss / width), most * fast - least * slow)
+        rest, kick = (np.where(is_near, part, part / width) for part in (rest, kick))
+        is_wave = (square >= 0.0) | small
         odd = np.where(square >= 0.0, wave, rise)
-    u = u_0 * even + (v_0 + half * u_0) * odd
-    v = v_0 * even - (half * v_0 + stiffness * u_0) * odd
-    return np.asarray(u), np.asarray(v)
+        rest = np.where(is_wave, even + half * odd, rest)
+        kick = np.where(is_wave, even - half * odd, kick)
+    return np.asarray(u_0 * rest + v_0 * odd), np.asarray(v_0 * kick - stiffness * u_0 * odd)
 
 
 def period(w: Any, u_0: Any, v_0: Any) -> Any:

@@ -132,8 +132,10 @@ def _series(samples: Samples, wanted: frozenset[str]) -> dict[str, Floats]:
         found[energy_d2t] = _energy_d2t(samples)
         found[deviation_d2t] = found[energy_d2t] - start
     if wanted & set(BUDGET):
-        dissipated, done = work(samples)
-        budget = (energy - start) + dissipated - done
+        # of a member that grows without bound, all of them do
+        with np.errstate(over="ignore", invalid="ignore"):
+            dissipated, done = work(samples)
+            budget = (energy - start) + dissipated - done
         found |= zip(BUDGET, (dissipated, done, budget), strict=True)
     outputs = [output for output in samples.model.outputs if output.name in wanted]
     if outputs:
