@@ -354,10 +354,20 @@ REFUSED = {
     "with f:\n    pass": "there is no such statement",
     "f[0, 0] = ends(x)": "it can end without a result",
     "f[0, 0] = 'word'": "this cannot be compiled",
+    "f[0, 0] = again(x)": "a function cannot call itself",
     "f[0, 0] = (lambda: x)()": "there is no function",
 }
 
-ENDS = "\n@compiled\ndef ends(a):\n    if a > 0.0:\n        return a\n"
+ENDS = """
+@compiled
+def ends(a):
+    if a > 0.0:
+        return a
+
+@called
+def again(a):
+    return again(a)
+"""
 
 
 @pytest.mark.parametrize("body", REFUSED)

@@ -41,9 +41,8 @@ class Inference:
         """Return what is known of a function for arguments of these kinds."""
         key = (name, arguments)
         if key not in results:
-            inference = cls(source, results, source.functions[name], arguments)
-            inference._settle()
-            results[key] = inference
+            results[key] = cls(source, results, source.functions[name], arguments)
+            results[key]._settle()
         return results[key]
 
     @cached_property
@@ -169,7 +168,8 @@ class Inference:
     def _call(self, node: ast.Call, func: ast.expr, arguments: tuple[Kind, ...]) -> Kind:
         if isinstance(func, ast.Name) and func.id in self.source.functions:
             result = Inference.of(self.source, self.results, func.id, arguments).result
-            assert result is not None
+            if result is None:
+                raise refusal(node, "a function cannot call itself")
             return result
         return operations.kind_of_call(node, ast.unparse(func), arguments)
 

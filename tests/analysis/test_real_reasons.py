@@ -1,0 +1,142 @@
+"""Real ladders, each with the one reason that is right for it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+
+from vibsim import Experiment, Verdict, analyse, simulate, verdicts
+
+PENDULUM: dict[str, Any] = {"model": {"kind": "pendulum"}, "initial": {"theta": 1.0}}
+SPRING: dict[str, Any] = {"model": {"kind": "oscillator"}, "initial": {"u": 1.0}}
+BOX: dict[str, Any] = {
+    "model": {"kind": "oscillator", "damping": {"coulomb": 0.06}},
+    "initial": {"u": 1.0, "v": 0.25},
+    "time": {"end": 16.0},
+}
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """An experiment with one check, and what its verdict has to be."""
+
+    content: dict[str, Any]
+    scheme: Any
+    levels: tuple[int, ...]
+    check: dict[str, Any]
+    verdict: tuple[str, str]
+    says: tuple[str, ...]
+    """Words that its sentence must have."""
+
+
+LADDERS = {
+    "three_term, before round-off": Ladder(
+        {**PENDULUM, "time": {"end": 20.0}, "samples": {"every": 64}},
+        {"kind": "central", "arithmetic": "three_term"},
+        (10, 11, 12, 13),
+        {"converges": "theta", "order": 2},
+        ("PASS", "asymptotic"),
+        ("order 2.00",),
+    ),
+    "three_term, from the window before round-off": Ladder(
+        {**PENDULUM, "time": {"end": 20.0}, "samples": {"every": 1024}},
+        {"kind": "central", "arithmetic": "three_term"},
+        tuple(range(10, 23)),
+        {"converges": "theta", "order": 2},
+        ("PASS", "asymptotic"),
+        ("order 2.00", "on levels 10 to 17"),
+    ),
+    "three_term, nothing but round-off": Ladder(
+        {**PENDULUM, "time": {"end": 20.0}, "samples": {"every": 4096}},
+        {"kind": "central", "arithmetic": "three_term"},
+        (18, 19, 20, 21, 22),
+        {"converges": "theta", "order": 2},
+        ("INCONCLUSIVE", "round_off"),
+        ("round-off",),
+    ),
+    "Euler-Cromer": Ladder(
+        {**PENDULUM, "time": {"end": 20.0}},
+        "euler_cromer",
+        (8, 9, 10, 11, 12),
+        {"converges": "theta", "order": 2},
+        ("FAIL", "order_low"),
+        ("order 1.0",),
+    ),
+    "first-order start": Ladder(
+        {**PENDULUM, "time": {"end": 20.0}},
+        {"kind": "central", "start": "first_order"},
+        (8, 9, 10, 11, 12),
+        {"converges": "theta", "order": 2},
+        ("FAIL", "order_low"),
+        ("first step", "start: first_order", "The phase is of first order"),
+    ),
+    "one-sided end": Ladder(
+        {**PENDULUM, "time": {"end": 20.0}},
+        {"kind": "central", "end_velocity": "backward"},
+        (8, 9, 10, 11, 12),
+        {"converges": "omega", "order": 2, "norm": "linf"},
+        ("FAIL", "order_low"),
+        ("last point", "end_velocity"),
+    ),
+    "unstable": Ladder(
+        {**SPRING, "time": {"end": 200.0}},
+        "central",
+        (3, 4, 5, 6),
+        {"converges": "u", "order": 2},
+        ("FAIL", "unstable"),
+        (
+            "w dt = 25 is beyond the limit 2",
+            "growth factor per period 5.03885 predicted, 5.03885 measured",
+        ),
+    ),
+    "friction on the mesh": Ladder(
+        BOX,
+        {"kind": "rk4", "events": "mesh"},
+        (6, 7, 8, 9, 10, 11),
+        {"converges": "u", "order": 4},
+        ("INCONCLUSIVE", "non_smooth"),
+        ("mesh",),
+    ),
+    "friction with located events": Ladder(
+        BOX,
+        "rk4",
+        (6, 7, 8, 9, 10, 11),
+        {"converges": "u", "order": 4},
+        ("PASS", "asymptotic"),
+        ("order 3.99", "on levels 6 to 11"),
+    ),
+    "Dt = pi/w": Ladder(
+        {**SPRING, "time": {"end": 16 * math.pi}, "samples": {"every": 16}},
+        "central",
+        (8, 9, 10, 11, 12),
+        {"converges": "u", "order": 2},
+        ("FAIL", "order_high"),
+        ("All common times are turning points of u", "This is no higher order"),
+    ),
+}
+
+
+def judged(ladder: Ladder) -> Verdict:
+    made = Experiment.from_dict(
+        {
+            "title": "t",
+            **ladder.content,
+            "levels": list(ladder.levels),
+            "schemes": [ladder.scheme],
+            "checks": [ladder.check],
+        }
+    )
+    (verdict,) = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
+    return verdict
+
+
+@pytest.mark.parametrize("name", LADDERS)
+def test_the_reason_is_the_right_one(name: str) -> None:
+    verdict = judged(LADDERS[name])
+    assert (verdict.status, verdict.reason) == LADDERS[name].verdict, verdict.text
+    for words in LADDERS[name].says:
+        assert words in verdict.text
+    assert bool(verdict.advice) == (verdict.status != "PASS")
