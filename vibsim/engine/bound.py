@@ -254,6 +254,16 @@ def settled(u: float, v: float, t: float, before: float, p: P) -> tuple[float, f
     _unbound()
 
 
+def spent(u: float, ahead: float) -> float:
+    """Return what a smooth piece between two positions costs, in units of `vibsim.models.events` (``cost``)."""
+    _unbound()
+
+
+def lost(before: float, after: float) -> float:
+    """Return what an event costs beside that, from the velocities before and behind it."""
+    _unbound()
+
+
 def turning(before: float, after: float) -> float:
     """Return 1 for an event between two modes that is a peak, -1 for a trough, 0 for neither."""
     _unbound()

@@ -24,8 +24,10 @@ from vibsim.engine.bound import (
     guard,
     guard_on_mesh,
     landed,
+    lost,
     mode_of,
     settled,
+    spent,
     start,
     start_of,
     step,
@@ -42,7 +44,9 @@ REST_TIME = N_STATS + 3
 HALTED = N_STATS + 4
 """The mode before the body came to rest, and the grid point behind: it may leave the other way, which is a turn."""
 HALTED_GRID = N_STATS + 5
-N_STATS_EVENTS = N_STATS + 6
+LOST = N_STATS + 6
+"""What sliding or impacts have cost so far (`spent`, `lost`)."""
+N_STATS_EVENTS = N_STATS + 7
 
 MOST_EVENTS = 256
 """Events of a step; a member with more comes to rest until the next grid point."""
@@ -58,6 +62,7 @@ def begun(stats: Any, case: int, u: float, v: float, p: P) -> P:
     mode = first_mode(u, v, 0.0, p)
     if GATHER:
         stats[case, EVENT_COUNT] = 0.0
+        stats[case, LOST] = 0.0
         if mode == 0.0:
             stats[case, REST_TIME] = 0.0
     return with_mode(p, mode, 0.0)
@@ -92,17 +97,22 @@ def passed(
         ahead = state[0]
         following, own = step(state, t - start_of(p), dt, p)
     count = 0
+    cost = spent(u, ahead)
     if LOCATED:
         if guard(ahead, own, t, p) < 0.0:
+            cost = 0.0
             ahead, own, p, count = across(stats, counts, case, variant, n, dt, u, v, p)
     else:
         if guard_on_mesh(ahead, own, t, p) < 0.0:
-            before = mode_of(p)
+            before, own_before = mode_of(p), own
             ahead, own, mode = settled(ahead, own, t, u, p)
             p = with_mode(p, mode, t)
             count = 1
+            cost += lost(own_before, own)
             if GATHER:
                 note_event(stats, counts, case, t, t, ahead, before, mode)
+    if GATHER:
+        stats[case, LOST] = stats[case, LOST] + cost
     if count > 0:
         p = with_mode(p, mode_of(p), t)
         following = anew(variant, ahead, own, dt, p)
@@ -123,10 +133,13 @@ def across(
 ) -> tuple[float, float, P, int]:
     """Return position, velocity and parameters at step `n` behind all events since step n - 1, and their number."""
     t, end = (n - 1) * dt, n * dt
+    cost = 0.0
     for count in range(MOST_EVENTS):
         left = end - t
         ahead, own = leap(variant, u, v, t, left, p)
         if not (left > 0.0 and guard(ahead, own, end, p) < 0.0):
+            if GATHER:
+                stats[case, LOST] = stats[case, LOST] + (cost + spent(u, ahead))
             return ahead, own, p, count
         tau = landing(variant, u, v, t, left, p)
         ahead, own = leap(variant, u, v, t, tau, p)
@@ -134,11 +147,14 @@ def across(
         t = t + tau if tau < left else end
         before = mode_of(p)
         ahead, own = landed(ahead, own)
+        cost += spent(u, ahead)
         u, v, mode = settled(ahead, own, t, math.inf, p)
+        cost += lost(own, v)
         p = with_mode(p, mode, t)
         if GATHER:
             note_event(stats, counts, case, t, end, u, before, mode)
     if GATHER:
+        stats[case, LOST] = stats[case, LOST] + (cost + lost(v, 0.0))
         stats[case, REST_TIME] = t
         stats[case, HALTED] = math.nan
     return u, 0.0, with_mode(p, 0.0, end), MOST_EVENTS

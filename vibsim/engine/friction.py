@@ -50,6 +50,16 @@ def settled(u: float, v: float, t: float, before: float, p: P) -> tuple[float, f
     return u, v, 1.0 if v > 0.0 else -1.0
 
 
+def spent(u: float, ahead: float) -> float:
+    """Return the path between two positions, without a turn."""
+    return abs(ahead - u)
+
+
+def lost(before: float, after: float) -> float:
+    """Return what an event costs beside the path: nothing."""
+    return 0.0
+
+
 def turning(before: float, after: float) -> float:
     """Return 1 for a peak between two modes, -1 for a trough, 0 for neither."""
     if before * after < 0.0:

@@ -65,23 +65,31 @@ VELOCITY_D2T_ROW = 3
 RUNNING_D2T_ROW = 4
 DISSIPATED_ROW = 5
 DRIVEN_ROW = 6
+LOST_ROW = 7
 
 
 def sample_rows(coordinates: int) -> dict[str, int]:
     """Return the numbers of these rows, by their names here, behind all positions and all velocities."""
     running = 2 * coordinates
-    names = ("RUNNING_D2T_ROW", "DISSIPATED_ROW", "DRIVEN_ROW")
+    names = ("RUNNING_D2T_ROW", "DISSIPATED_ROW", "DRIVEN_ROW", "LOST_ROW")
     behind = {name: running + 1 + coordinates + i for i, name in enumerate(names)}
     return {"RUNNING_ROW": running, "VELOCITY_D2T_ROW": running + 1, **behind}
 
 
-def n_sample_rows(coordinates: int, with_series: bool, own_velocity: bool, with_work: bool) -> int:
+def n_sample_rows(
+    coordinates: int,
+    *,
+    with_series: bool,
+    own_velocity: bool,
+    with_work: bool,
+    with_events: bool,
+) -> int:
     """Return how many rows samples have; one that a scheme has no use for stays NaN where others stand behind it."""
     rows = sample_rows(coordinates)
     if not with_series:
         return rows["RUNNING_ROW"]
     if with_work:
-        return rows["DRIVEN_ROW"] + 1
+        return rows["LOST_ROW" if with_events else "DRIVEN_ROW"] + 1
     return rows["RUNNING_D2T_ROW" if own_velocity else "RUNNING_ROW"] + 1
 
 

@@ -43,6 +43,16 @@ def settled(u: float, v: float, t: float, before: float, p: P) -> tuple[float, f
     return u, speed, 1.0
 
 
+def spent(u: float, ahead: float) -> float:
+    """Return what a flight costs: nothing."""
+    return 0.0
+
+
+def lost(before: float, after: float) -> float:
+    """Return half of what the square of the velocity has lost."""
+    return 0.5 * (before * before - after * after)
+
+
 def turning(before: float, after: float) -> float:
     """Return -1 where the body bounces, which is a trough, and 0 where it stays."""
     return -1.0 if after != 0.0 else 0.0

@@ -190,7 +190,16 @@ def _put_events(module: Module, model: Model, stepper: Stepper) -> None:
     module.put("with_mode", text)
     collect(module, stepper.step, "step", {})
     kind = friction if isinstance(model.events, Friction) else impact
-    for name in ("first_mode", "guard", "guard_on_mesh", "landed", "settled", "turning"):
+    for name in (
+        "first_mode",
+        "guard",
+        "guard_on_mesh",
+        "landed",
+        "settled",
+        "turning",
+        "spent",
+        "lost",
+    ):
         collect(module, getattr(kind, name), name, {})
 
 

@@ -34,13 +34,14 @@ from vibsim.engine.bound import (
     start,
     step,
 )
-from vibsim.engine.events import begun, passed
+from vibsim.engine.events import LOST, begun, passed
 from vibsim.engine.extrema import is_turned, note_turned
 from vibsim.engine.gather import (
     DISSIPATED_ROW,
     DRIVEN_ROW,
     LARGEST_DEVIATION,
     LAST_STEP,
+    LOST_ROW,
     OVERFLOW,
     RUNNING_D2T_ROW,
     RUNNING_ROW,
@@ -130,6 +131,8 @@ def run(
             dissipated, driven = powers(q, w, 0.0, p)
             samples[DISSIPATED_ROW, case, 0] = dissipated
             samples[DRIVEN_ROW, case, 0] = driven
+            if EVENTS:
+                samples[LOST_ROW, case, 0] = 0.0
         extrema = first_extrema(u, v)
         bottom = bottom_of(u, turn)
         if EVENTS:
@@ -230,6 +233,8 @@ def run(
                     if WORK:
                         samples[DISSIPATED_ROW, case, sample] = dissipated
                         samples[DRIVEN_ROW, case, sample] = driven
+                        if EVENTS:
+                            samples[LOST_ROW, case, sample] = stats[case, LOST]
                 sample += 1
                 due += every
         if GATHER:

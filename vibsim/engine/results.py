@@ -90,6 +90,8 @@ class Series:
     """Sum of the power that damping takes, over every point so far; None of a model without such forces."""
     driven: Floats | None
     """Sum of the power that driving forces put in."""
+    lost: Floats | None
+    """What sliding or impacts have cost so far, in units of ``cost`` (`vibsim.models.events`); None of other models."""
 
 
 @dataclass(frozen=True)
@@ -169,7 +171,7 @@ def events_of(stats: Floats) -> EventTimes:
     )
 
 
-def series_of(samples: Floats, coordinates: int, with_work: bool) -> Series:
+def series_of(samples: Floats, coordinates: int, with_work: bool, with_events: bool) -> Series:
     """Name the rows of samples behind the states: shape (row, case, n_samples)."""
     rows = gather.sample_rows(coordinates)
     nothing = np.broadcast_to(np.nan, samples.shape[1:])
@@ -185,6 +187,7 @@ def series_of(samples: Floats, coordinates: int, with_work: bool) -> Series:
         deviation_d2t_running=_storable(row(rows["RUNNING_D2T_ROW"])),
         dissipated=samples[rows["DISSIPATED_ROW"]] if with_work else None,
         driven=samples[rows["DRIVEN_ROW"]] if with_work else None,
+        lost=samples[rows["LOST_ROW"]] if with_work and with_events else None,
     )
 
 

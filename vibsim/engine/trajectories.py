@@ -90,11 +90,18 @@ def integrate(
     alone = stepper.implicit or model.events is not None or count > 1 or model.lookup is not None
     lane = lane or lane_for(members, steps, implicit=alone)
     run = kernel(model, stepper, lane, with_gathered, with_series, n_extrema > 0)
+    has_events, has_work = model.events is not None, has_budget(model)
     room = _Room.empty(
         model,
         members,
         steps // every + 1,
-        rows=gather.n_sample_rows(count, with_series, stepper.own_velocity, has_budget(model)),
+        rows=gather.n_sample_rows(
+            count,
+            with_series=with_series,
+            own_velocity=stepper.own_velocity,
+            with_work=has_work,
+            with_events=has_events,
+        ),
         with_gathered=with_gathered,
         n_extrema=n_extrema,
     )
@@ -111,12 +118,12 @@ def integrate(
         run(*numbers, first, stop, *settings, *room.arrays, _aligned(scratch))
 
     _share(task, range(0, members, TASK) if threads > 1 else range(1), threads)
-    has_events = model.events is not None
+    series = results.series_of(room.samples, count, has_work, has_events) if with_series else None
     return Trajectories(
         states=room.samples[: 2 * count],
         last_step=room.counts[:, gather.LAST_STEP],
         gathered=results.gathered_of(room.stats, room.counts, count) if with_gathered else None,
-        series=results.series_of(room.samples, count, has_budget(model)) if with_series else None,
+        series=series,
         extrema=results.extrema_of(room.kept, room.counts) if n_extrema else None,
         events=results.events_of(room.stats) if has_events and with_gathered else None,
     )

@@ -243,8 +243,12 @@ BUDGET = ("dissipated_energy", "work_done", "energy_budget")
 
 
 def has_budget(model: Model) -> bool:
-    """Tell whether damping or driving forces change the energy of a model."""
-    return model.dissipation is not None or model.driving is not None
+    """Tell whether damping, driving forces, friction or impacts change the energy of a model by known amounts."""
+    return (
+        model.dissipation is not None
+        or model.driving is not None
+        or (model.events is not None and model.events.cost is not None)
+    )
 
 
 def quantities(model: Model, own_velocity: bool = False) -> tuple[str, ...]:

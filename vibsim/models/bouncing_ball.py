@@ -136,5 +136,5 @@ BOUNCING_BALL = Model(
             ("eps_v", "eps_v*t_c/h_c"),
         ),
     ),
-    events=Impact(restitution="restitution", near="eps_h", slow="eps_v"),
+    events=Impact(restitution="restitution", near="eps_h", slow="eps_v", cost="1"),
 )

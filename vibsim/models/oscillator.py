@@ -203,7 +203,8 @@ def _written(
 def _friction(own: Written, forces: Forces) -> dict[str, Any]:
     """Return what is another with Coulomb friction.
 
-    Its power jumps at events, so that no sum over the points of the mesh gives its work.
+    The power of a force has a corner at every event, so that no sum over the points of the mesh gives its work: the
+    budget is that of free motions alone.
     """
     drive = forces.over_mass(minus(forces.force, forces.spring))
 
@@ -219,7 +220,11 @@ def _friction(own: Written, forces: Forces) -> dict[str, Any]:
         "dissipation": None,
         "driving": None,
         "exact": held if forces.is_linear and not forces.is_driven else None,
-        "events": Friction(drive=drive, limit=forces.over_mass(Name("b"))),
+        "events": Friction(
+            drive=drive,
+            limit=forces.over_mass(Name("b")),
+            cost=None if forces.is_driven else Name("b"),
+        ),
     }
 
 

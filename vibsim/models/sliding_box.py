@@ -97,5 +97,5 @@ SLIDING_BOX = Model(
             ("g", "1"),
         ),
     ),
-    events=Friction(drive=f"-{_PULL}", limit="mu*g"),
+    events=Friction(drive=f"-{_PULL}", limit="mu*g", cost="mu*m*g"),
 )

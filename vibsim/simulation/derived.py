@@ -38,6 +38,8 @@ class Samples:
     dissipated: Floats | None
     """Sum of the power of damping over every point so far, shape (case, t)."""
     driven: Floats | None
+    lost: Floats | None
+    """What sliding or impacts have cost so far (`vibsim.engine.results.Series`), shape (case, t)."""
     lane: str
 
     def energies(self, velocities: Floats) -> tuple[Floats, Floats]:
@@ -106,6 +108,7 @@ def _pieces(
                     velocities_d2t=series.velocities_d2t[s, part] if series else None,
                     dissipated=_part(series.dissipated, s, part) if series else None,
                     driven=_part(series.driven, s, part) if series else None,
+                    lost=_part(series.lost, s, part) if series else None,
                     lane=lane,
                 ),
             )
@@ -175,7 +178,11 @@ def work(samples: Samples) -> tuple[Floats, Floats]:
         assert total is not None
         ends = 0.5 * (power + power[:, :1])
         done.append(h * (total - ends) - h * h / 12.0 * (slope - slope[:, :1]))
-    return done[0], done[1]
+    taken, put = done
+    if samples.lost is not None and model.events is not None and model.events.cost is not None:
+        (cost,) = samples.values((model.events.cost,))
+        taken = taken + cost * samples.lost
+    return taken, put
 
 
 def rate(model: Model, formula: Expression) -> Expression:
