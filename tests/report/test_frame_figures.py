@@ -133,6 +133,23 @@ def test_no_word_leaves_a_figure(case):
             assert not drawn_outside(picture.figure), picture.name
 
 
+def test_few_common_times_are_not_told_to_be_round_off():
+    circuit = {"kind": "circuit", "L": 0.02, "R": 5.0, "C": 3e-5, "voltage": "12*cos(314.159*t)"}
+    exp = spring(
+        model=circuit,
+        initial={"di_dt": 600.0},
+        time={"end": 0.02},
+        levels=[3, 4, 5, 6],
+        schemes=["rk4"],
+        checks=[],
+    )
+    record = samples.record(exp)
+    assert np.isnan(np.asarray(record["i_ratio"])).all()
+    with style.applied():
+        figure = figures_time.overlay(record, "i", Member(0, 0, "rk4")).figure
+    assert "too few common times for ratios" in words_of(figure)
+
+
 def test_runs_that_broke_down_are_not_told_to_be_round_off(overflowing):
     _, record = overflowing
     assert (record["status"] != 0).any()

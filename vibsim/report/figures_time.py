@@ -215,12 +215,14 @@ def _draw_ratios(
             **look,
         )
     if not drawn:
-        note = (
-            "no ratio means anything: the runs grow without bound, or break down"
-            if set(lost) != {figures_frame.ROUND_OFF}
-            else "nothing to divide: every difference is within round-off, or zero"
+        ax.text(
+            0.5,
+            0.7,
+            _why_no_ratio(good, lost),
+            transform=ax.transAxes,
+            ha="center",
+            color=style.GREY,
         )
-        ax.text(0.5, 0.7, note, transform=ax.transAxes, ha="center", color=style.GREY)
     triples = [(levels[i], levels[i + 1], levels[i + 2]) for i in chosen]
     targets = sorted({float(target_ratio(order, triple)) for triple in triples})
     for k, target in enumerate(targets):
@@ -229,6 +231,15 @@ def _draw_ratios(
     ax.set_ylabel("ratio")
     ax.set_title("Ratio of successive differences", fontweight="normal", fontsize=9)
     style.beside(ax)
+
+
+def _why_no_ratio(good: list[bool], lost: list[str]) -> str:
+    """Say why no triple has a ratio at any time."""
+    if any(good):
+        return "too few common times for ratios: a difference changes its sign beside each of them"
+    if set(lost) != {figures_frame.ROUND_OFF}:
+        return "no ratio means anything: the runs grow without bound, or break down"
+    return "nothing to divide: every difference is within round-off, or zero"
 
 
 def _ratio_limits(drawn: list[Floats], targets: list[float]) -> tuple[float, float]:
