@@ -153,8 +153,18 @@ def test_another_damping_gives_no_number():
     assert "beta" not in numbers(oscillator(spring="k*u"), VALUES, INITIAL)
 
 
-def test_a_nonlinear_spring_has_no_scales():
-    model = oscillator(spring="k*sin(u)")
+@pytest.mark.parametrize(
+    "spring", ["k*sin(u)", "k*u + b*u**3", "k*u*(1 + b*u**2)", "k/b*tanh(b*u)"]
+)
+def test_a_nonlinear_spring_is_measured_by_its_stiffness_at_rest(spring):
+    found = sizes(oscillator(spring=spring), VALUES, INITIAL)
+    wanted = sizes(oscillator(spring="k*u"), VALUES, INITIAL)
+    assert found == pytest.approx(wanted, rel=1e-15)
+
+
+@pytest.mark.parametrize("spring", ["k*u**3", "k*abs(u)*u", "k*sqrt(u)"])
+def test_a_spring_without_stiffness_at_rest_has_no_scales(spring):
+    model = oscillator(spring=spring)
     assert scales(model, VALUES, INITIAL) == ()
     assert dimensionless(model, VALUES, INITIAL) == ()
     with pytest.raises(ValueError, match="no scaled equation"):

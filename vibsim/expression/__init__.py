@@ -14,6 +14,7 @@ from vibsim.expression.algebra import (
     over,
     plus,
     put,
+    tidied,
     times,
 )
 from vibsim.expression.arrays import values
@@ -82,6 +83,7 @@ __all__ = [
     "plus",
     "put",
     "rebuilt",
+    "tidied",
     "times",
     "to_formula",
     "to_python",

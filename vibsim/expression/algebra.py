@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from vibsim.expression.derivative import ONE, STEPS, ZERO
 from vibsim.expression.parser import literal
+from vibsim.expression.render import evaluate
 from vibsim.expression.tree import (
     Binary,
     Call,
@@ -26,6 +27,35 @@ EDGES = JUMPS | {"abs", "max", "min", "where"}
 def put(node: Expression, name: str, what: Expression) -> Expression:
     """Return a formula with another one in the place of a name."""
     return rebuilt(node, lambda part: what if part == Name(name) else part)
+
+
+def tidied(node: Expression) -> Expression:
+    """Return a formula without sums with 0, products with 0 and 1, and operations on numbers alone.
+
+    Raises
+    ------
+    ExpressionError
+        Where numbers alone have no value: 1/0.
+    """
+    return rebuilt(node, _tidied_top)
+
+
+def _tidied_top(node: Expression) -> Expression:
+    match node:
+        case Binary("+", left, right):
+            found = plus(left, right)
+        case Binary("-", left, right):
+            found = minus(left, right)
+        case Binary("*", left, right):
+            found = times(left, right)
+        case Binary("/", left, right):
+            found = over(left, right)
+        case _:
+            found = node
+    if names_in(found) or isinstance(found, Number):
+        return found
+    value = evaluate(found, {})
+    return Negate(Number(-value)) if value < 0.0 else Number(value)
 
 
 def is_zero(node: Expression) -> bool:

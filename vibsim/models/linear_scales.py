@@ -1,4 +1,4 @@
-"""Characteristic scales of ``m u'' + f(u') + k u = F(t)``: vibration text (B), section 10.2.
+"""Characteristic scales of ``m u'' + f(u') + s(u) = F(t)`` with ``k = s'(0)``: vibration text (B), section 10.2.
 
 ``t_c = sqrt(m/k)``; ``u_c = A/k`` under a force ``A sin(phi t)``, else the initial amplitude; ``E_c = k u_c^2``. With
 them ``u'' + 2 beta |u'| u' + u = sin(gamma t)``, equation (85): ``beta = b u_c/(2 m) = A b/(2 m k)`` and
@@ -19,6 +19,7 @@ from vibsim.expression import (
     Call,
     Compare,
     Expression,
+    ExpressionError,
     Name,
     Negate,
     Number,
@@ -27,6 +28,8 @@ from vibsim.expression import (
     literal,
     names_in,
     over,
+    put,
+    tidied,
     times,
 )
 from vibsim.models.base import Formula, Parameter
@@ -40,10 +43,10 @@ TWO = Number(2.0)
 
 
 def linear_scales(forces: Forces) -> Scales | None:
-    """Return the scales of an oscillator; None where its spring is not linear."""
-    if not forces.is_linear:
+    """Return the scales of an oscillator; None where its spring has no stiffness at rest."""
+    m, k = forces.mass, stiffness_at_rest(forces)
+    if k is None:
         return None
-    m, k = forces.mass, forces.stiffness
     driven = amplitude_and_frequency(forces.force)
     if driven is None:
         # without an initial position the amplitude is V t_c
@@ -59,7 +62,20 @@ def linear_scales(forces: Forces) -> Scales | None:
     if driven is not None:
         numbers.append(("gamma", times(driven[1], T_C)))
     energy = times(k, Binary("**", X_C, TWO))
-    return Scales(Call("sqrt", (over(m, k),)), size, energy, tuple(numbers))
+    return Scales(_time_scale(m, k), size, energy, tuple(numbers))
+
+
+def _time_scale(mass: Expression, stiffness: Expression) -> Expression:
+    return Call("sqrt", (over(mass, stiffness),))
+
+
+def stiffness_at_rest(forces: Forces) -> Expression | None:
+    """Return the slope of the spring at u = 0, in the parameters; None where it has none there, or is 0."""
+    try:
+        slope = tidied(put(forces.stiffness, forces.position, ZERO))
+    except ExpressionError:
+        return None
+    return None if is_zero(slope) else slope
 
 
 def with_scaled_run(
@@ -90,7 +106,7 @@ def with_scaled_run(
         )
         return replace(scales, refusal=rule)
     units = forces.mass, X_C, T_C
-    exactly = _exactly(forces) | dict(scales.parameters or ())
+    exactly = _exactly(forces, scales) | dict(scales.parameters or ())
     scaled = (
         (row.key, exactly.get(row.name) or over_scales(row.name, found[row.name], units))
         for row in parameters
@@ -98,12 +114,13 @@ def with_scaled_run(
     return replace(scales, parameters=tuple(scaled))
 
 
-def _exactly(forces: Forces) -> dict[str, Formula]:
+def _exactly(forces: Forces, scales: Scales) -> dict[str, Formula]:
     """Return what the scales make 1, or -1, and should not come out of a quotient with a rounding error."""
     found: dict[str, Formula] = dict.fromkeys(names_in(forces.mass), ONE)
-    if not forces.is_linear:
+    stiffness = stiffness_at_rest(forces)
+    if stiffness is None or scales.time != _time_scale(forces.mass, stiffness):
         return found
-    match forces.stiffness:
+    match stiffness:
         case Name(name) | Binary("/", Number(1.0), Name(name)):
             found[name] = ONE
     driven = amplitude_and_frequency(forces.force)

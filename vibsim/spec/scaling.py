@@ -82,6 +82,9 @@ def _refusal(model: Model) -> tuple[str, str]:
         what = f"{rule} here: the numbers of its table have units, and stay what they are"
         return what, "leave it out, or write the table's curve as a formula"
     if model.formulas:
-        return f"{rule}: its spring is not linear", "write spring: k*u, with k under parameters"
+        return (
+            f"{rule}: its spring has no stiffness at u = 0, by which time would be measured",
+            "leave it out",
+        )
     able = [row.kind for row in MODELS.values() if row.scales and row.scales.parameters]
     return rule, "choose from " + ", ".join(able)
