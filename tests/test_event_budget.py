@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vibsim import Experiment, InputError, simulate
+from vibsim import Experiment, simulate
 from vibsim.models import MODELS
 from vibsim.models.dry_friction import swings
 from vibsim.schemes import FIXED_STEP, SCHEMES
@@ -114,17 +114,41 @@ def test_both_compiled_and_plain_sum_the_same() -> None:
         np.testing.assert_array_equal(one, other)
 
 
-def test_a_driven_body_that_sticks_has_no_budget() -> None:
+@pytest.mark.parametrize("kind", ON_BOX)
+def test_the_budget_of_a_driven_body_that_sticks_now_and_then(kind: str) -> None:
+    content = {
+        "model": {
+            "kind": "oscillator",
+            "m": 1.3,
+            "spring": "2*u",
+            "damping": {"coulomb": 0.45},
+            "force": "0.9*cos(0.7*t) + 0.2",
+        },
+        "initial": {"u": 0.7},
+        "time": {"end": 18.0},
+        "schemes": [kind],
+    }
+    order = SCHEMES[kind].formal_order("energy_budget", BOX, SCHEMES[kind].defaults())
+    coarse, _, fine = largest(content, "energy_budget")
+    assert largest(content, "event_count")[0] >= 4
+    assert fine < 1e-12 or np.log2(coarse / fine) / 2.0 > order - 0.35
+
+
+def test_the_work_of_a_force_beside_friction_against_a_fine_sum() -> None:
     content = {
         "title": "t",
-        "model": {"kind": "oscillator", "damping": {"coulomb": 0.3}, "force": "cos(t/2)"},
-        "initial": {"u": 0.5},
-        "time": {"end": 9.0},
-        "levels": LEVELS,
+        "model": {"kind": "oscillator", "damping": {"coulomb": 0.3}, "force": "0.8*cos(t/2)"},
+        "initial": {"u": 0.5, "v": 0.3},
+        "time": {"end": 12.0},
+        "levels": [8, 16],
         "schemes": ["rk4"],
-        "checks": [{"converges": "energy_budget", "order": "scheme"}],
+        "samples": {"every": 1},
     }
-    with pytest.raises(InputError, match="energy_budget"):
-        Experiment.from_dict(content)
-    content["model"] = {"kind": "oscillator", "damping": {"coulomb": 0.3}}
-    Experiment.from_dict(content)
+    made = Experiment.from_dict(content)
+    coarse, fine = (simulate(made, level) for level in made.levels)
+    t = np.linspace(0.0, 12.0, 2**16 + 1)
+    full = simulate(Experiment.from_dict({**content, "levels": [16]}), 16)
+    power = 0.8 * np.cos(t / 2.0) * np.asarray(full["v"])[0, 0]
+    work = float(np.sum(power[1:] + power[:-1]) * 0.5 * (t[1] - t[0]))
+    for record, allowed in ((coarse, 1e-6), (fine, 1e-8)):
+        assert float(np.asarray(record["work_done"])[0, 0, -1]) == pytest.approx(work, abs=allowed)

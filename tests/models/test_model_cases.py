@@ -181,3 +181,11 @@ def test_every_scheme_converges_to_the_solution_of_the_equation(case, scheme):
             assert case.initial[index] == 0.0  # straight up and down
             continue
         assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.12)
+
+
+@pytest.mark.parametrize(
+    "model", [model for model in MODELS.values() if model.events], ids=lambda m: m.kind
+)
+def test_models_with_events_have_no_other_damping(model):
+    # what they lose is summed from event to event, and nothing beside it
+    assert model.dissipation is None

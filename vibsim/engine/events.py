@@ -17,6 +17,7 @@ from typing import Any
 from vibsim.engine.bound import (
     GATHER,
     LOCATED,
+    WORK,
     P,
     State,
     called,
@@ -26,6 +27,7 @@ from vibsim.engine.bound import (
     landed,
     lost,
     mode_of,
+    powers,
     settled,
     spent,
     start,
@@ -46,7 +48,9 @@ HALTED = N_STATS + 4
 HALTED_GRID = N_STATS + 5
 LOST = N_STATS + 6
 """What sliding or impacts have cost so far (`spent`, `lost`)."""
-N_STATS_EVENTS = N_STATS + 7
+DONE = N_STATS + 7
+"""Work of driving forces so far: their power has a corner at every event, so it is summed piece by piece."""
+N_STATS_EVENTS = N_STATS + 8
 
 MOST_EVENTS = 256
 """Events of a step; a member with more comes to rest until the next grid point."""
@@ -63,6 +67,7 @@ def begun(stats: Any, case: int, u: float, v: float, p: P) -> P:
     if GATHER:
         stats[case, EVENT_COUNT] = 0.0
         stats[case, LOST] = 0.0
+        stats[case, DONE] = 0.0
         if mode == 0.0:
             stats[case, REST_TIME] = 0.0
     return with_mode(p, mode, 0.0)
@@ -97,22 +102,22 @@ def passed(
         ahead = state[0]
         following, own = step(state, t - start_of(p), dt, p)
     count = 0
-    cost = spent(u, ahead)
     if LOCATED:
         if guard(ahead, own, t, p) < 0.0:
-            cost = 0.0
             ahead, own, p, count = across(stats, counts, case, variant, n, dt, u, v, p)
+        elif GATHER:
+            note_piece(stats, case, variant, u, v, ahead, own, t - dt, dt, p)
     else:
+        if GATHER:
+            note_piece(stats, case, variant, u, v, ahead, own, t - dt, dt, p)
         if guard_on_mesh(ahead, own, t, p) < 0.0:
             before, own_before = mode_of(p), own
             ahead, own, mode = settled(ahead, own, t, u, p)
             p = with_mode(p, mode, t)
             count = 1
-            cost += lost(own_before, own)
             if GATHER:
+                stats[case, LOST] = stats[case, LOST] + lost(own_before, own)
                 note_event(stats, counts, case, t, t, ahead, before, mode)
-    if GATHER:
-        stats[case, LOST] = stats[case, LOST] + cost
     if count > 0:
         p = with_mode(p, mode_of(p), t)
         following = anew(variant, ahead, own, dt, p)
@@ -133,31 +138,61 @@ def across(
 ) -> tuple[float, float, P, int]:
     """Return position, velocity and parameters at step `n` behind all events since step n - 1, and their number."""
     t, end = (n - 1) * dt, n * dt
-    cost = 0.0
     for count in range(MOST_EVENTS):
         left = end - t
         ahead, own = leap(variant, u, v, t, left, p)
         if not (left > 0.0 and guard(ahead, own, end, p) < 0.0):
             if GATHER:
-                stats[case, LOST] = stats[case, LOST] + (cost + spent(u, ahead))
+                note_piece(stats, case, variant, u, v, ahead, own, t, left, p)
             return ahead, own, p, count
         tau = landing(variant, u, v, t, left, p)
         ahead, own = leap(variant, u, v, t, tau, p)
+        ahead, own = landed(ahead, own)
+        if GATHER:
+            note_piece(stats, case, variant, u, v, ahead, own, t, tau, p)
         # the last event of a step may lie on its end
         t = t + tau if tau < left else end
         before = mode_of(p)
-        ahead, own = landed(ahead, own)
-        cost += spent(u, ahead)
         u, v, mode = settled(ahead, own, t, math.inf, p)
-        cost += lost(own, v)
         p = with_mode(p, mode, t)
         if GATHER:
+            stats[case, LOST] = stats[case, LOST] + lost(own, v)
             note_event(stats, counts, case, t, end, u, before, mode)
     if GATHER:
-        stats[case, LOST] = stats[case, LOST] + (cost + lost(v, 0.0))
+        stats[case, LOST] = stats[case, LOST] + lost(v, 0.0)
         stats[case, REST_TIME] = t
         stats[case, HALTED] = math.nan
     return u, 0.0, with_mode(p, 0.0, end), MOST_EVENTS
+
+
+@called
+def note_piece(
+    stats: Any,
+    case: int,
+    variant: int,
+    u: float,
+    v: float,
+    ahead: float,
+    own: float,
+    t: float,
+    dt: float,
+    p: P,
+) -> None:
+    """Add what a smooth piece costs, and the work of driving forces along it, by Simpson's rule.
+
+    Parameters
+    ----------
+    u, v
+        At its beginning, time `t`.
+    ahead, own
+        Position and velocity at its end.
+    """
+    stats[case, LOST] = stats[case, LOST] + spent(u, ahead)
+    if WORK:
+        middle, speed = leap(variant, u, v, t, 0.5 * dt, p)
+        inner = powers(middle, speed, t + 0.5 * dt, p)[1]
+        ends = powers(u, v, t, p)[1] + powers(ahead, own, t + dt, p)[1]
+        stats[case, DONE] = stats[case, DONE] + dt * (ends + 4.0 * inner) / 6.0
 
 
 @called

@@ -34,7 +34,7 @@ from vibsim.engine.bound import (
     start,
     step,
 )
-from vibsim.engine.events import LOST, begun, passed
+from vibsim.engine.events import DONE, LOST, begun, passed
 from vibsim.engine.extrema import is_turned, note_turned
 from vibsim.engine.gather import (
     DISSIPATED_ROW,
@@ -128,11 +128,13 @@ def run(
         if SERIES:
             samples[RUNNING_ROW, case, 0] = 0.0
         if WORK:
-            dissipated, driven = powers(q, w, 0.0, p)
+            if EVENTS:
+                dissipated = driven = 0.0
+                samples[LOST_ROW, case, 0] = 0.0
+            else:
+                dissipated, driven = powers(q, w, 0.0, p)
             samples[DISSIPATED_ROW, case, 0] = dissipated
             samples[DRIVEN_ROW, case, 0] = driven
-            if EVENTS:
-                samples[LOST_ROW, case, 0] = 0.0
         extrema = first_extrema(u, v)
         bottom = bottom_of(u, turn)
         if EVENTS:
@@ -202,9 +204,12 @@ def run(
                         stats, counts, case, t, h, turn, bottom, u_before, slope_before, u, slope
                     )
             if WORK:
-                taken, put = powers(q, w, t, p)
-                dissipated += taken
-                driven += put
+                if EVENTS:
+                    driven = stats[case, DONE]
+                else:
+                    taken, put = powers(q, w, t, p)
+                    dissipated += taken
+                    driven += put
             if D2T:
                 # that of the point before counts now that this one is sound, since it rests on it
                 largest_d2t = larger(pending, largest_d2t)

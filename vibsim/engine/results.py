@@ -89,7 +89,7 @@ class Series:
     dissipated: Floats | None
     """Sum of the power that damping takes, over every point so far; None of a model without such forces."""
     driven: Floats | None
-    """Sum of the power that driving forces put in."""
+    """Sum of the power that driving forces put in; of a model with events their work."""
     lost: Floats | None
     """What sliding or impacts have cost so far, in units of ``cost`` (`vibsim.models.events`); None of other models."""
 

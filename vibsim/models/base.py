@@ -244,11 +244,7 @@ BUDGET = ("dissipated_energy", "work_done", "energy_budget")
 
 def has_budget(model: Model) -> bool:
     """Tell whether damping, driving forces, friction or impacts change the energy of a model by known amounts."""
-    return (
-        model.dissipation is not None
-        or model.driving is not None
-        or (model.events is not None and model.events.cost is not None)
-    )
+    return model.dissipation is not None or model.driving is not None or model.events is not None
 
 
 def quantities(model: Model, own_velocity: bool = False) -> tuple[str, ...]:

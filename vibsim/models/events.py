@@ -32,8 +32,8 @@ class Friction:
     """By all forces but the friction."""
     limit: Formula
     """The largest that friction can hold, at least 0."""
-    cost: Formula | None
-    """Energy that goes per length of the path: a force. None where other forces act whose work is not known."""
+    cost: Formula
+    """Energy that goes per length of the path: a force."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Impact:
     """On the mesh: the height below which a body that falls is on the ground."""
     slow: Formula
     """The largest speed after an impact with which it stays there."""
-    cost: Formula | None
+    cost: Formula
     """Energy that goes per half square of the speed lost: a mass."""
 
 

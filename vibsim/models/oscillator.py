@@ -203,8 +203,7 @@ def _written(
 def _friction(own: Written, forces: Forces) -> dict[str, Any]:
     """Return what is another with Coulomb friction.
 
-    The power of a force has a corner at every event, so that no sum over the points of the mesh gives its work: the
-    budget is that of free motions alone.
+    What it takes is summed along the path (`vibsim.engine.events`), so that it has no power of damping.
     """
     drive = forces.over_mass(minus(forces.force, forces.spring))
 
@@ -218,12 +217,11 @@ def _friction(own: Written, forces: Forces) -> dict[str, Any]:
     return {
         "linear": False,
         "dissipation": None,
-        "driving": None,
         "exact": held if forces.is_linear and not forces.is_driven else None,
         "events": Friction(
             drive=drive,
             limit=forces.over_mass(Name("b")),
-            cost=None if forces.is_driven else Name("b"),
+            cost=Name("b"),
         ),
     }
 

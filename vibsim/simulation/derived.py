@@ -38,6 +38,7 @@ class Samples:
     dissipated: Floats | None
     """Sum of the power of damping over every point so far, shape (case, t)."""
     driven: Floats | None
+    """The same of the power of driving forces; their work so far where there are events."""
     lost: Floats | None
     """What sliding or impacts have cost so far (`vibsim.engine.results.Series`), shape (case, t)."""
     lane: str
@@ -162,9 +163,15 @@ def work(samples: Samples) -> tuple[Floats, Floats]:
     """Return the energy that damping took and the work of driving forces since the start.
 
     The integral of a power P is the trapezoidal sum over every step, ``dt (sum P - (P_0 + P_n)/2)``, corrected at both
-    ends by ``-dt^2/12 (P'_n - P'_0)``: the formula of Euler and Maclaurin, of fourth order where P is smooth.
+    ends by ``-dt^2/12 (P'_n - P'_0)``: the formula of Euler and Maclaurin, of fourth order where P is smooth. Where
+    there are events it is not, and the engine has summed both piece by piece (`vibsim.engine.events.note_piece`).
     """
     model = samples.model
+    if model.events is not None:
+        assert samples.lost is not None
+        assert samples.driven is not None
+        (cost,) = samples.values((model.events.cost,))
+        return cost * samples.lost, samples.driven
     powers = [
         Number(0.0) if formula is None else tree(model, formula)
         for formula in (model.dissipation, model.driving)
@@ -178,11 +185,7 @@ def work(samples: Samples) -> tuple[Floats, Floats]:
         assert total is not None
         ends = 0.5 * (power + power[:, :1])
         done.append(h * (total - ends) - h * h / 12.0 * (slope - slope[:, :1]))
-    taken, put = done
-    if samples.lost is not None and model.events is not None and model.events.cost is not None:
-        (cost,) = samples.values((model.events.cost,))
-        taken = taken + cost * samples.lost
-    return taken, put
+    return done[0], done[1]
 
 
 def rate(model: Model, formula: Expression) -> Expression:
