@@ -111,6 +111,10 @@ def test_samples_of_any_stride_are_those_of_every_step(kind, every, lane):
     whole, thinned = (run(model, kind, numbers, lane, every=n) for n in (1, every))
     for field in dataclasses.fields(whole.series):
         one, other = (getattr(runs.series, field.name) for runs in (whole, thinned))
+        if one is None:
+            # what events cost, which this model has not
+            assert other is None
+            continue
         sampled = np.ascontiguousarray(one[..., ::every])
         assert sampled.tobytes() == np.ascontiguousarray(other).tobytes(), field.name
     for field in dataclasses.fields(whole.extrema):
@@ -238,6 +242,7 @@ def test_of_a_member_that_fails_all_ends_with_its_last_sound_point(kind, every, 
         series = {
             f.name: getattr(runs.series, f.name)[case]
             for f in dataclasses.fields(runs.series)
+            if getattr(runs.series, f.name) is not None
             if getattr(runs.series, f.name) is not None
         }
         for values in series.values():
