@@ -7,7 +7,8 @@ is worked out from what it was made of, never from what the analysis finds:
 - the *order* is that of the largest term on the finest clean level, where every other one is below `DOMINANT` of it
   there; else there is none, and the two largest terms are kept;
 - the ladder is *decidable* where the last two ratios of clean levels are both within the tolerance of the order, or
-  where the rescaled differences of three clean levels coincide to `COINCIDES`, in numbers that are more than one.
+  where the rescaled differences of three clean levels coincide to `COINCIDES`. Differences of one shape, as those of a
+  single number are, coincide whatever they are made of, and are no evidence.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ CLEAN = 0.03
 DOMINANT = 0.1
 TOLERANCE = 0.1
 COINCIDES = 0.01
+ONE_SHAPE = 1e-9
 EPSILON = float(np.finfo(np.float64).eps)
 ROUNDING = EPSILON / 5
 """Noise that storing numbers of size 1 makes."""
@@ -180,9 +182,9 @@ def _is_decidable(clean: Floats, order: float) -> bool:
         local = np.log2(norm(d[:-1]) / norm(d[1:]))
     if len(local) > 1 and np.all(np.abs(local[-2:] - order) <= TOLERANCE):
         return True
-    several = np.count_nonzero(np.abs(d[-1]) > 1e-3 * np.max(np.abs(d[-1]))) > 2
+    shapes = d[-2] / norm(d[-2]), d[-1] / norm(d[-1])
     rest = norm(d[-2] - 2.0**order * d[-1]) / norm(d[-2])
-    return bool(several and rest <= COINCIDES)
+    return bool(rest <= COINCIDES and norm(shapes[0] - shapes[1]) > ONE_SHAPE)
 
 
 # the families

@@ -19,6 +19,7 @@ from vibsim.analysis.richardson import extrapolate
 from vibsim.analysis.verdict import Judgement
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 ROUND_OFF_SAFETY = 10.0
 """Factor on the predicted round-off in an error bound: the prediction is an order of magnitude."""
@@ -26,6 +27,10 @@ IRREGULAR = 2.0
 """Factor on an error bound behind events: where they lie in a step makes the second power another at each level."""
 FEW = 3
 """With so many levels the directions of the true errors are needed as evidence, too."""
+VANISHING = 1e-3
+"""A point at which a difference is a smaller part of its largest value does not count."""
+TWO = 2
+"""Series that differ at no more points have no shape."""
 NOTHING_LEFT = 16.0
 """Order with which a quantity that is promised to be exact is extrapolated: the finest level then stands as it is."""
 
@@ -103,6 +108,15 @@ class Comparison:
         """The largest bound over time, shape (scheme, case)."""
         # a bound never falls with time
         return self.extrapolation[1][..., -1]
+
+    @cached_property
+    def are_numbers(self) -> Flags:
+        """Whether the levels differ at no more than two points, shape (scheme, case)."""
+        if not self.differences:
+            return np.zeros(self.part.shape, dtype=bool)
+        size = np.abs(np.nan_to_num(self.differences[-1]))
+        counts = size > VANISHING * np.max(size, axis=-1, keepdims=True)
+        return np.asarray(np.sum(counts, axis=-1) <= TWO)
 
     def in_norm(self, kind: str) -> InNorm:
         """Measure the quantity in a norm."""

@@ -8,8 +8,9 @@ have nothing to do with each other, and it does not fall. Three floors are told 
   evidence enough;
 - *possible*: up to `LOUD` times eps N^2, more than double precision makes of N steps in any arithmetic. It is fitted:
   the scatter must rise faster than any lower power can make it (`STEEP`), up to the finest level;
-- *unexplained*: any size. The finest `PLATEAU` triples must show unrelated differences that do not fall. A single bad
-  level cannot look like that.
+- *unexplained*: any size. The finest `PLATEAU` triples must show unrelated differences that do not fall, or the scatter
+  must rise to unrelated differences more steeply than that of any lower power, twice in turn. A single bad level cannot
+  look like that. Single numbers have no shape: of these, the finest differences must stop falling.
 """
 
 from __future__ import annotations
@@ -40,6 +41,10 @@ PLATEAU = 3
 """So many triples, of five levels, show a floor that nothing explains."""
 VOUCHED = 2
 """So many triples before it must be those of an error."""
+HEARD = 0.05
+"""A floor that is a larger part of a difference spoils its order: by 0.07 and more."""
+HEARD_IN_ERROR = 0.3
+"""The same of an error: what is left of the bounds within which it must agree with the differences."""
 STAYS = 0.5
 """A floor does not fall below this part of itself."""
 SINGLE_NUMBER = 1e-9
@@ -69,6 +74,7 @@ def before_round_off(
     noise: Floats,
     possible: Floats,
     suspect: float,
+    numbers: Flags | None = None,
 ) -> Flags:
     """Say of every triple whether it stands before the first one that round-off spoils.
 
@@ -82,15 +88,21 @@ def before_round_off(
         Predicted and possible floor over the finer difference (`noise_share`), shape (..., m).
     suspect
         From this share of predicted noise on a triple is suspect.
+    numbers
+        Where the series are single numbers, shape (...).
     """
     incoherent = np.signbit(scatter) | (np.abs(scatter) > INCOHERENT) | np.isnan(scatter)
     spoiled = _breaks_the_trend(orders, scatter, incoherent)
     # what rises out of the floor again on a finer level was no floor
-    spoiled &= _from_here_on(noise) >= suspect
+    predicted = _from_here_on(noise) >= suspect
+    spoiled &= predicted
     onset = _onset(orders, scatter, incoherent)
     share = possible / np.fmax(np.fmin(np.abs(scatter), 1.0), SINGLE_NUMBER)
     spoiled |= onset & (_from_here_on(share) * LOUD >= 1.0)
-    spoiled[..., VOUCHED:] |= (onset & _plateau(incoherent, difference)[..., None])[..., VOUCHED:]
+    floor = _plateau(incoherent, difference) | _climbs(orders, scatter, incoherent)
+    spoiled[..., VOUCHED:] |= (onset & floor[..., None])[..., VOUCHED:]
+    if numbers is not None:
+        spoiled |= _below_a_flat_end(difference, orders) & numbers[..., None] & ~predicted
     return ~np.logical_or.accumulate(spoiled, axis=-1)
 
 
@@ -144,6 +156,43 @@ def _onset(orders: Floats, scatter: Floats, incoherent: Flags) -> Flags:
         noisy_next = to_the_end[..., i + 1] if i + 1 < count else np.zeros(rises.shape, dtype=bool)
         begins[..., i] |= rises & follows & (steep | noisy_next | begins[..., i])
     return begins
+
+
+def _climbs(orders: Floats, scatter: Floats, incoherent: Flags) -> Flags:
+    """Say of every ladder whether the scatter rises to unrelated differences, twice too steeply for a power.
+
+    A floor does that, which a single bad level does not: its scatter is large at once.
+    """
+    if orders.shape[-1] <= VOUCHED:
+        return np.zeros(orders.shape[:-1], dtype=bool)
+    size = np.abs(scatter)
+    with np.errstate(over="ignore", invalid="ignore"):
+        most = STEEP * np.exp2(np.clip(orders - 0.5, 0.5, 64.0))
+        steep = (size[..., 1:] > most[..., :-1] * size[..., :-1]) & (size[..., 1:] > AUDIBLE)
+    return np.asarray(incoherent[..., -1] & np.any(steep[..., 1:] & steep[..., :-1], axis=-1))
+
+
+def _below_a_flat_end(difference: Floats, orders: Floats) -> Flags:
+    """Say of every triple of single numbers whether it is spoiled by a floor that the finest differences show.
+
+    Numbers have no shape by which noise could be told. But differences that do not fall any more, over `PLATEAU` of
+    them at least, are a floor. The first of them tells its size; on coarser levels it is smaller like N^(1/2), as the
+    errors of single steps add up at least. What is not far above it is spoiled, or spoils the error
+    at the finer level, smaller by 2^p - 1.
+    """
+    pairs = difference.shape[-1]
+    index = np.arange(pairs)
+    noise = np.zeros(difference.shape)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        size = np.log2(difference)
+        for first in range(pairs - PLATEAU, VOUCHED - 1, -1):
+            flat = size[..., first] - size[..., -1] < FLAT_FIRST * (pairs - 1 - first)
+            grown = difference[..., first : first + 1] * np.exp2(0.5 * (index - first))
+            noise = np.where(flat[..., None], grown, noise)
+        heard = np.minimum(HEARD, HEARD_IN_ERROR / (np.exp2(np.clip(orders, 1.0, 16.0)) - 1))
+        spoiled = ~(noise[..., 1:] <= heard * difference[..., 1:])
+    vouched = np.sum(np.logical_and.accumulate(~spoiled, axis=-1), axis=-1) >= VOUCHED
+    return np.asarray(spoiled & vouched[..., None])
 
 
 def _plateau(incoherent: Flags, difference: Floats) -> Flags:

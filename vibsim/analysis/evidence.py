@@ -85,6 +85,7 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
         tolerance=tolerance,
         error=measured.error,
         error_scatter=measured.error_scatter,
+        numbers=q.are_numbers,
         size=in_norm(size),
         failed=part.failed,
         applicable=(exists | np.any(part.failed, axis=-1)) & ~part.adaptive[:, None],

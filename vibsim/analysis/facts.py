@@ -77,6 +77,8 @@ class Evidence:
     """Largest position over the largest exact position, shape (..., n); NaN where not known."""
     ceiling: Floats | None = None
     """The most that round-off can be in any arithmetic, at every level in the same norm, shape (..., n)."""
+    numbers: Flags | None = None
+    """Whether the series are single numbers: no more than two points count, shape (...)."""
     error_scatter: Floats | None = None
     """Signed scatter of the errors of successive levels, shape (..., n-1), of three levels; NaN where not known."""
 

@@ -45,8 +45,11 @@ SAFETY, SAFETY_ALONE = 2.0, 4.0
 """Factor on the change of an entry: where two ratios agree, and where there is one only."""
 LEAST_PART = 0.01
 """The least part of what was taken away that is left, where one change supports the extrapolation."""
-SPREAD, SPREAD_OF_TWO = 3.0, 4.0
-"""Factor on what the last three levels differ by, and two levels where there are no more."""
+SPREAD, SPREAD_OF_THREE, SPREAD_OF_TWO = 3.0, 3.5, 4.0
+"""Factor on what the last three levels differ by, three levels that are all there are, and two."""
+AGREES_OF_THREE, SAFETY_OF_THREE, LEAST_PART_OF_THREE = 0.05, 6.0, 0.03
+"""The same as `AGREES_ALONE`, `SAFETY_ALONE` and `LEAST_PART` of three levels: their only ratio may be an accident."""
+THREE = 3
 RAGGED, DECLINE = 5, 0.5
 """Of so many levels and more, changes may fall raggedly, where the last two are at most this part of those before."""
 ROUND_OFF_SAFETY = 10.0
@@ -143,7 +146,8 @@ def _bound_of_finest(values: Floats, floor: Floats) -> Floats:
     if n == 2:
         return np.asarray(SPREAD_OF_TWO * change[..., 0] + noise)
     recent = values[..., -3:]
-    bound = SPREAD * (np.max(recent, axis=-1) - np.min(recent, axis=-1)) + noise
+    spread = SPREAD_OF_THREE if n == THREE else SPREAD
+    bound = spread * (np.max(recent, axis=-1) - np.min(recent, axis=-1)) + noise
     falls = np.all(np.diff(change[..., -3:], axis=-1) < 0, axis=-1)
     rounding = np.max(change[..., -2:], axis=-1) <= BLAME * floor[..., -1]
     found = np.where(falls | rounding, bound, np.nan)
@@ -165,6 +169,10 @@ class _Tableau:
         self.levels, self.p, self.q = levels, p, q
         self.entries, self.noise = [values], [floor]
         self.changes = [_changes(values)]
+        few = len(levels) == THREE
+        self.agrees_alone = AGREES_OF_THREE if few else AGREES_ALONE
+        self.safety_alone = SAFETY_OF_THREE if few else SAFETY_ALONE
+        self.least_part = LEAST_PART_OF_THREE if few else LEAST_PART
         for j in range(1, min(len(levels) - 1, COLUMNS) + 1):
             self._extrapolate(j)
 
@@ -194,7 +202,7 @@ class _Tableau:
         if i < j + 2:
             return np.zeros(self.p.shape, dtype=bool)
         alone = i == j + 2
-        agrees = self._apart(j, i) <= (AGREES_ALONE if alone else AGREES)
+        agrees = self._apart(j, i) <= (self.agrees_alone if alone else AGREES)
         if not alone:
             agrees &= self._apart(j, i - 1) <= AGREED
         return np.asarray(agrees)
@@ -204,10 +212,10 @@ class _Tableau:
         change, alone = np.abs(self.changes[j][..., i]), i == j + 1
         if alone:
             taken = np.abs(self.entries[j][..., i] - self.entries[j - 1][..., i])
-            change = np.maximum(change, LEAST_PART * taken)
+            change = np.maximum(change, self.least_part * taken)
         else:
             change = np.maximum(change, np.abs(self.changes[j][..., i - 1]) / self.fall(j, i))
-        error = (SAFETY_ALONE if alone else SAFETY) * change
+        error = (self.safety_alone if alone else SAFETY) * change
         error = np.where(self._agrees(j, i), error / (self.fall(j, i) - 1.0), error)
         for finer in range(i + 1, len(self.levels)):
             contradiction = np.abs(self.entries[j][..., i] - self.entries[j][..., finer])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vibsim.analysis.cut import LOG2, QUIET
 from vibsim.analysis.facts import ORDINARY, Evidence, at_round_off, far_from_exact, truly_exact
-from vibsim.analysis.settling import GROWS, HIDDEN, OF_SCATTER, SINGLE_WIDTH, most_left
+from vibsim.analysis.settling import FADING, GROWS, HIDDEN, OF_SCATTER, SINGLE_WIDTH
 from vibsim.analysis.true_errors import (
     contradicts,
     errors_agree,
@@ -18,17 +18,14 @@ from vibsim.analysis.true_errors import (
     errors_stay,
     errors_vouch,
 )
-from vibsim.analysis.window import Trend
+from vibsim.analysis.two_ratios import COINCIDENT, SINGLE, little_left, two_ratios
+from vibsim.analysis.window import Trend, mismatches
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-COINCIDENT = 0.2
-"""Largest scatter (see `series.scatter`) of curves that count as proportional."""
 UNRELATED = 0.7
 """Series with so much scatter have nothing to do with each other, and a change from there says nothing."""
-SINGLE = 0.05
-"""The same where one triple is the only evidence."""
 STEADY = 1.0 / 3.0
 """Orders are steady that change by less than this part of the tolerance: three more changes do not leave it."""
 NARROW = 0.2
@@ -55,14 +52,16 @@ MOST_ABOVE = 2.0
 """A superconvergent quantity gains at most the next even power."""
 
 
-def rules(e: Evidence, t: Trend) -> list[tuple[Flags, str]]:
-    """Return the rules for ladders of three levels and more, first to last."""
+def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Flags]:
+    """Return the rules for ladders of three levels and more, first to last, and where a lower power may be hiding."""
     exactly, tol = np.isinf(e.order), e.tolerance
     # the rules of an order do not reach those ladders
     p = np.where(exactly, ORDINARY, e.order)
     nothing = t.count == 0
     exact = (exactly | nothing) & truly_exact(e)
     right = _right(e, t, p)
+    doubtful = ~right & two_ratios(e, t, p)
+    right |= doubtful
     excluded = (t.high < p - tol) | (t.low > p + tol)
     above = t.order > p
     wrong = excluded & (_pure(t) | _plausible(t, p, tol)) & ~_on_the_way(t, p, tol)
@@ -90,7 +89,7 @@ def rules(e: Evidence, t: Trend) -> list[tuple[Flags, str]]:
         (exact, "exact"),
         (exactly & ~at_round_off(e), "order_low"),
         (exactly | (nothing & (at_round_off(e) | ~rough)), "round_off"),
-        (t.alternating & ~rough & ~kinked, "oscillating"),
+        (t.alternating & ~rough & ~kinked & ~doubtful, "oscillating"),
         (missed & regular, "wrong_limit"),
         (right & ~too_small & regular, "asymptotic"),
         (wrong & ~above & regular & (~kinked | deeper), "order_low"),
@@ -98,7 +97,7 @@ def rules(e: Evidence, t: Trend) -> list[tuple[Flags, str]]:
         (wrong & above & ~rough, "order_high"),
         (rough, "non_smooth"),
         (t.cut, "round_off"),
-    ]
+    ], doubtful
 
 
 def _right(e: Evidence, t: Trend, p: Floats) -> Flags:
@@ -115,7 +114,9 @@ def _right(e: Evidence, t: Trend, p: Floats) -> Flags:
     together = np.abs(t.scatter) <= np.where(several, COINCIDENT, SINGLE)
     clear = _alone(e, t, p)
     right = near & together & clear & ~np.signbit(t.scatter)
-    return np.asarray(right & ~t.gap & ~t.drifting & ~t.turning & ~_leaving(t, p))
+    right &= ~t.gap & ~t.turning
+    right &= (~t.drifting & ~_leaving(t, p)) | t.irregular | little_left(t, p)
+    return np.asarray(right)
 
 
 def _kinked(e: Evidence, t: Trend, p: Floats) -> tuple[Flags, Flags]:
@@ -139,16 +140,17 @@ def _pure(t: Trend) -> Flags:
 
 def _alone(e: Evidence, t: Trend, p: Floats) -> Flags:
     """Say where h^p stands alone: what is left fades, or is less than a tenth of a lower power would make."""
-    mismatch = np.hypot(t.scatter, LOG2 * (t.local - p))
-    before = np.hypot(t.scatter_before, LOG2 * (t.local - t.change - p))
-    # what round-off may have made does not tell of a lower power that grows
-    clear = mismatch <= most_left(p, mismatch, before, t.several & (mismatch > t.noise))
+    mismatch, before = mismatches(t, p)
+    clear = little_left(t, p)
     clear |= t.several & ((t.fading & ~t.slow) | t.irregular)
     # as much as one triple alone may show, where it does not grow: the interval then reaches to a lower power
     steady = t.several & (np.abs(t.change) <= STEADY * e.tolerance)
     clear |= steady & (mismatch <= np.minimum(SINGLE, GROWS * before))
     # one order alone: two terms of one shape tell from a power by nothing but the number
     own = np.abs(t.local - p) <= np.maximum(SINGLE_WIDTH, OF_SCATTER * np.abs(t.scatter) / LOG2)
+    clear |= t.several & (mismatch <= SINGLE) & (mismatch <= FADING * before)
+    # one triple says too little for an order that few schemes have
+    own &= (p == np.round(p)) | (np.abs(t.local - p) <= SINGLE_WIDTH)
     clear = np.where(t.several, clear, own | errors_vouch(e, p))
     return np.asarray(clear & ~errors_leave(e, t, p))
 
@@ -188,8 +190,10 @@ def _plausible(t: Trend, p: Floats, tol: float) -> Flags:
         reach = np.where(several, np.maximum(t.width, least), np.maximum(wide, SINGLE_WIDTH))
         near = (np.abs(t.order - candidate) <= reach) & (np.abs(candidate - p) > tol)
         near &= (candidate >= LEAST_CANDIDATE) & (several | alone | (candidate <= p + MOST_ABOVE))
-        most = np.where(several, 2 * SINGLE, HIDDEN)
-        found |= near & ~passing & (whole | (np.abs(t.scatter) <= most))
+        pure = np.abs(t.order - candidate) <= SINGLE_WIDTH
+        found |= (
+            near & ~passing & (whole | np.where(several, np.abs(t.scatter) <= 2 * SINGLE, pure))
+        )
     return found
 
 

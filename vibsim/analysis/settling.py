@@ -60,8 +60,10 @@ HIDDEN = 0.015
 
 With more, a ladder of which no trend is known may be on the way to a lower order.
 """
-EMERGING = 0.08
-"""A lower power that is seen to grow may be so large a part of h^p at the finest level: a tenth, less a margin."""
+EMERGING = 0.1
+"""A lower power that is seen to grow may be so large a part of h^p at the finest level."""
+NEAREST = 0.1
+"""An order so near a multiple of 1/2 may be that one: expansions have no other, and the distance is an error seen."""
 FARTHEST = 3.0
 """A lower power is lower by no more."""
 PASSING = 0.05
@@ -106,6 +108,15 @@ def with_errors(width: Floats, local: Floats, of_errors: Floats, several: Flags)
     """Return half the width of the interval of a single order beside which the order of the errors is known."""
     apart = OF_ERRORS * np.abs(of_errors - local)
     return np.where(several | np.isnan(apart), width, np.maximum(width, apart))
+
+
+def with_nearest(order: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats]:
+    """Return an interval of an order that holds the order of an expansion next to it, too."""
+    nearest = np.round(2.0 * order) / 2
+    near = np.abs(order - nearest) <= NEAREST
+    return np.where(near, np.minimum(low, nearest), low), np.where(
+        near, np.maximum(high, nearest), high
+    )
 
 
 def left(

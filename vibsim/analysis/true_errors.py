@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from vibsim.analysis.cut import LOG2
 from vibsim.analysis.facts import Evidence, accuracy, error_orders, pick
 from vibsim.analysis.series import safe_ratio
-from vibsim.analysis.settling import GROWS, SETTLED
-from vibsim.analysis.window import Trend
+from vibsim.analysis.settling import EMERGING, FARTHEST, GROWS, SETTLED
+from vibsim.analysis.window import Trend, mismatches
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -41,7 +41,20 @@ def errors_leave(e: Evidence, t: Trend, p: Floats) -> Flags:
     found = error_orders(e)
     last, before = (np.abs(pick(found, t.last + 1 - back) - p) for back in (0, 1))
     known = pick(e.error, t.last + 2) > accuracy(e)
-    return np.asarray(known & (last > LEAVES) & (last > GROWS * before))
+    grows = last > GROWS * before
+    return np.asarray(known & (last > LEAVES) & grows & ~(t.several & _little(t, p, last, before)))
+
+
+def _little(t: Trend, p: Floats, last: Floats, before: Floats) -> Flags:
+    """Say where a lower power, which grows in the differences as well, is less than a tenth of h^p in the errors.
+
+    Errors ``h^p + x h^r`` have the order ``p - x (1 - 2^(r-p))/log 2``, which is further away from p by 2^(p-r) at each
+    level.
+    """
+    now, then = mismatches(t, p)
+    gap = np.clip(np.log2(np.maximum(safe_ratio(last, before), 1.0)), 0.5, FARTHEST)
+    share = LOG2 * last / (1.0 - np.exp2(-gap))
+    return np.asarray((now > GROWS * then) & (share <= EMERGING))
 
 
 def errors_vouch(e: Evidence, p: Floats) -> Flags:

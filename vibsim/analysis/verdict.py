@@ -36,6 +36,7 @@ from vibsim.analysis.facts import BLAME, Evidence, at_round_off, breakdown, erro
 from vibsim.analysis.rules import rules
 from vibsim.analysis.series import order_of_ratio, safe_ratio
 from vibsim.analysis.true_errors import errors_vouch
+from vibsim.analysis.two_ratios import below
 from vibsim.analysis.window import trend
 from vibsim.vocabulary import REASON_NAMES, REASONS, STATUSES
 
@@ -106,8 +107,11 @@ def judge(evidence: Evidence) -> Judgement:
         ceiling=e.ceiling,
         of_errors=of_errors,
         vouched=vouched,
+        numbers=e.numbers,
     )
-    cases += rules(e, found)
+    read, reaching = rules(e, found)
+    cases += read
+    found = replace(found, low=np.where(reaching, below(found), found.low))
     # the order of noise is none
     stated = sound & (found.count > 0) & ~(np.isinf(e.order) & at_round_off(e))
     order, low, high = (np.where(stated, x, np.nan) for x in (found.order, found.low, found.high))

@@ -31,11 +31,18 @@ from vibsim.analysis.settling import (
     most_left,
     settling,
     with_errors,
+    with_nearest,
 )
+from vibsim.analysis.uneven import accidents
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
+
+AGREE = 0.01
+"""Two triples agree that have no more left besides one power."""
+SUSPECT = 1.0 / 3.0
+"""From this part of what would be too much on, what grows is told as a lower power that may be hiding."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +94,9 @@ class Trend:
     several: Flags
     """Whether the order rests on several triples."""
     irregular: Flags
-    """Whether the last two changes of the order are small and of opposite signs: accidents of the levels."""
+    """Whether the last orders swing about their mean: accidents of the levels."""
+    earlier: Floats
+    """The change of the order before the last one; NaN where the order rests on two triples only."""
     slow: Flags
     """Whether what is left is not small, and fades no faster than h^(1/2)."""
 
@@ -102,6 +111,7 @@ def trend(
     ceiling: Floats | None = None,
     of_errors: Floats | None = None,
     vouched: Flags | None = None,
+    numbers: Flags | None = None,
 ) -> Trend:
     """Find the window of every ladder.
 
@@ -123,11 +133,13 @@ def trend(
         Order of the last two true errors of three levels, shape (...); NaN where not known.
     vouched
         Where the true errors leave no room for a lower power, shape (...).
+    numbers
+        Where the series are single numbers, which have no shape, shape (...); nowhere where None.
     """
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         noise = noise_share(difference, floor)
         possible = noise if ceiling is None else noise_share(difference, ceiling)
-        clean = before_round_off(orders, scatter, difference, noise, possible, 1.0 / blame)
+        clean = before_round_off(orders, scatter, difference, noise, possible, 1.0 / blame, numbers)
         count = np.sum(clean, axis=-1)
         last = np.maximum(count - 1, 0)
         local, spread, rest = (_at(x, last) for x in (orders, scatter, noise))
@@ -137,6 +149,7 @@ def trend(
         earlier = np.where(
             several & (count > 2), _at(orders, last - 1) - _at(orders, last - 2), np.nan
         )
+        earlier = np.where(_starts_before(before, change, earlier), np.nan, earlier)
         tail, width = settling(np.abs(spread), np.abs(before), change, earlier, several)
         width = np.maximum(width, np.minimum(rest, SHOWS * np.abs(spread)) / LOG2)
         # what is so far away is not known to be reached
@@ -161,6 +174,20 @@ def trend(
         falls = several & (change < 0) & ~np.signbit(spread) & ~turned
         reach = width if of_errors is None else with_errors(width, local, of_errors, several)
         unexplained = np.abs(spread) > 3 * rest
+        uneven = accidents(orders, scatter, last, several, tolerance)
+        order = np.where(uneven.found, uneven.mean, order)
+        width = np.where(uneven.found, uneven.width, width)
+        reach = np.where(uneven.found, uneven.width, reach)
+        open_ &= ~uneven.sure
+        falls &= ~uneven.found
+        suspect = SUSPECT * most_left(order, *beside, grown)
+        hiding |= ~fading & grown & (beside[0] > np.maximum(GROWS * beside[1], suspect))
+        hiding |= uneven.found & (beside[0] > SUSPECT * HIDDEN)
+        hiding &= ~uneven.sure
+        low = order - reach - np.where(open_ | hiding, NEXT, 0.0)
+        high = np.where(falls, np.maximum(order, local), order) + reach
+        high += np.where(open_ & ~falls, NEXT, 0.0)
+        low, high = with_nearest(order, low, high)
         return Trend(
             count=count,
             first=_first(orders, order, np.maximum(width, tolerance), last),
@@ -168,10 +195,8 @@ def trend(
             cut=count < orders.shape[-1],
             order=order,
             width=width,
-            low=order - reach - np.where(open_ | hiding, NEXT, 0.0),
-            high=np.where(falls, np.maximum(order, local), order)
-            + reach
-            + np.where(open_ & ~falls, NEXT, 0.0),
+            low=low,
+            high=high,
             open=open_,
             local=local,
             change=change,
@@ -181,19 +206,26 @@ def trend(
             & (np.abs(spread) > GROWS * np.abs(before))
             & (np.abs(spread) > QUIET)
             & unexplained,
-            alternating=_alternating(scatter, last, several, change, earlier, tolerance),
-            turning=turned | ((np.abs(change) > np.abs(earlier)) & (np.abs(change) > 5 * QUIET)),
+            alternating=_alternating(scatter, last, several, change, earlier, tolerance)
+            & ~uneven.found,
+            turning=(turned | ((np.abs(change) > np.abs(earlier)) & (np.abs(change) > 5 * QUIET)))
+            & ~uneven.found,
             gap=np.any(clean & np.isnan(orders), axis=-1),
             noisy=np.abs(change) <= np.minimum(LOUD * rest, SHOWS * np.abs(spread)) / LOG2,
             fading=fading,
             noise=rest,
             hiding=hiding,
             several=several,
-            irregular=(change * earlier < 0)
-            & (np.abs(earlier) <= tolerance)
-            & (np.abs(change) <= tolerance),
+            irregular=uneven.found,
+            earlier=earlier,
             slow=~(beside[0] <= np.maximum(QUICK * beside[1], SLOW)),
         )
+
+
+def mismatches(t: Trend, p: Floats) -> tuple[Floats, Floats]:
+    """Return how far the last triple, and the one before, are from proportional series of order p."""
+    now = np.hypot(t.scatter, LOG2 * (t.local - p))
+    return now, np.hypot(t.scatter_before, LOG2 * (t.local - t.change - p))
 
 
 def _starts_here(orders: Floats, scatter: Floats, last: Integers, rest: Floats) -> Flags:
@@ -205,6 +237,11 @@ def _starts_here(orders: Floats, scatter: Floats, last: Integers, rest: Floats) 
     size = np.abs(_at(scatter, last))
     jump = np.abs(_at(orders, last) - _at(orders, last - 1))
     return (jump > JUMP) & (size <= HIDDEN) & (size > np.maximum(READABLE, 3 * rest))
+
+
+def _starts_before(before: Floats, change: Floats, earlier: Floats) -> Flags:
+    """Say where the window begins with the last triple but one: the last two agree, and the one before is far away."""
+    return (np.abs(earlier) > JUMP) & (np.hypot(before, LOG2 * change) <= AGREE)
 
 
 def _alternating(

@@ -92,6 +92,8 @@ def number(value: float) -> str:
     return f"{value:.6g}"
 
 
+FAR_DOWN = 1.0
+"""An interval that reaches further below its order holds a lower power of the expansion as well."""
 NEAR_ONE, ROUND_OFF = 1e-2, 1e-13
 """A factor that is nearer to 1 is written as 1 and the rest; nearer still, the rest is rounding."""
 
@@ -145,7 +147,7 @@ def tell(s: Story) -> str:
         case "asymptotic":
             return (
                 f"{s.quantity} converges with {measured}, as promised ({promised}): the rescaled "
-                "differences coincide."
+                f"differences coincide.{_doubt(s)}"
             )
         case "exact":
             return (
@@ -204,6 +206,16 @@ def tell(s: Story) -> str:
             return f"{s.quantity} does not exist here, so there is nothing to judge."
     so_far = f": the last estimate is {measured}" if measured else ""
     return f"The step is still too coarse to tell the order of {s.quantity}{so_far}.{s.parts}"
+
+
+def _doubt(s: Story) -> str:
+    """Say of an order that passes why its interval reaches far down; empty where it does not."""
+    if not s.order - s.low > FAR_DOWN:
+        return ""
+    return (
+        " What is left besides that order may be a small part of a lower one, which these levels do not exclude: the "
+        "interval reaches down to it."
+    )
 
 
 def _place_of_failure(s: Story) -> str:
