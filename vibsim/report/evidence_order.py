@@ -52,8 +52,8 @@ def picture(
         return Picture(document([by_level], _label(quantity)), f"{member.title}: {told}")
     curves = _differences(record, quantity, member)
     left = (
-        f"Left: differences between levels of {member.title}, rescaled to coincide where the error has the promised "
-        "order; the finest pair is the thinnest line."
+        f"Left: differences between levels of {member.title}, rescaled to coincide where the error has the "
+        f"{words.due(quantity)} order; the finest pair is the thinnest line."
     )
     return Picture(document([curves, by_level], _label(quantity)), f"{left} Right: {told}")
 
