@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import samples
 
-from vibsim.report import evidence
+from vibsim.report import evidence, exhibit
 from vibsim.report.stamp import Panel, document
 
 ORDER = {"converges": "theta", "order": "scheme"}
@@ -77,11 +77,6 @@ def test_names_of_a_user_are_text():
     assert count(found.svg, "<b>") == 0
 
 
-def test_other_checks_have_none():
-    equal = {"equal": ["central", "exact"], "quantity": "theta", "atol": 1.0}
-    assert pictures({"stable": True}, equal, levels=[6, 7, 8]) == [None, None]
-
-
 def test_points_beyond_the_frame_are_triangles_on_its_edge():
     panel = Panel((0.0, 4.0), (1.0, 3.0))
     panel.points([1, 2, 3], np.array([2.0, 9.0, -9.0]), [True, True, False], "black")
@@ -101,4 +96,39 @@ def test_points_beyond_the_frame_are_triangles_on_its_edge():
     ],
 )
 def test_ticks_are_round(low, high, texts):
-    assert [text for _, text in evidence._ticks(low, high)] == texts
+    assert [text for _, text in exhibit.ticks(low, high)] == texts
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "texts"),
+    [
+        (-14.2, -11.0, ["10⁻¹⁵", "10⁻¹⁴", "10⁻¹³", "10⁻¹²", "10⁻¹¹"]),
+        (0.0, 1.0, ["1", "2", "5", "10", "20", "50"]),
+        (-20.0, 300.0, ["10⁰", "10¹⁰⁰", "10²⁰⁰", "10³⁰⁰"]),
+    ],
+)
+def test_ticks_of_a_logarithmic_scale_are_few(low, high, texts):
+    assert [text for _, text in exhibit.log_ticks(low, high)] == texts
+
+
+def test_a_short_logarithmic_scale_has_round_numbers():
+    found = exhibit.log_ticks(0.30, 0.36)
+    assert [text for _, text in found] == ["2", "2.1", "2.2"]
+    assert [value for value, _ in found] == pytest.approx(np.log10([2.0, 2.1, 2.2]))
+
+
+def test_growth_near_1_is_shown_less_1():
+    near, wide, huge = (exhibit.growth_scale(np.array([1.0, x])) for x in (1.0 + 1e-9, 1.5, 100.0))
+    assert near.title == "growth per period, less 1"
+    assert near.change(np.array([1.0 + 1e-9]))[0] == pytest.approx(1e-9, rel=1e-6)
+    assert wide.change(np.array([1.5]))[0] == 1.5
+    assert huge.change(np.array([100.0]))[0] == 2.0
+
+
+def test_an_error_in_a_norm_is_drawn_on_a_logarithmic_scale():
+    check = {"value": "error_linf", "quantity": "theta", "below": 1e-2}
+    (found,) = pictures(check, levels=[6, 7, 8, 9])
+    assert count(found.svg, "<circle") == 4
+    heights = [float(y) for y in re.findall(r'<circle cx="[\d.]+" cy="([\d.]+)"', found.svg)]
+    assert np.diff(heights) == pytest.approx(np.diff(heights)[0], rel=0.1)
+    assert "error linf of θ [rad]" in found.svg

@@ -8,6 +8,7 @@ it is `rules.BLAME` times the predicted floor, an order of magnitude.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,18 +30,22 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 
-def apart(
-    part: Part, compared: Mapping[str, Comparison], check: EqualCheck
-) -> tuple[int, Floats, Floats]:
-    """Return the scheme that a check compares, the largest distance over the stored times, and what it may be.
+@dataclass(frozen=True)
+class Apart:
+    """How far two solutions are from each other, in the unit of the quantity; NaN where one of them does not exist."""
 
-    Returns
-    -------
-    scheme
-        Its number.
-    distance, allowed
-        Shape (case,); NaN where one of the two does not exist.
-    """
+    scheme: int
+    """Number of the scheme that is compared."""
+    over_time: Floats
+    """At every stored time, shape (case, t); NaN where the quantity has no value, at the ends of ``[D_2t u]``."""
+    largest: Floats
+    """Shape (case,)."""
+    allowed: Floats
+    """What that may be, shape (case,)."""
+
+
+def apart(part: Part, compared: Mapping[str, Comparison], check: EqualCheck) -> Apart:
+    """Return how far the two solutions that a check compares are from each other."""
     names = [scheme.name for scheme in part.experiment.schemes]
     level = part.grid.levels[-1] if check.level is None else check.level
     first, name = names.index(check.first), check.quantity
@@ -58,10 +63,12 @@ def apart(
     else:
         other, more = discrete(part, level, name)[first], np.zeros_like(bound)
     inside = slice(1, -1) if name.endswith(CENTRED) else slice(None)
+    distance = np.full(part.shape[1:] + values.shape[-1:], np.nan)
     with np.errstate(invalid="ignore", over="ignore"):
-        distance = np.max(np.abs(values[first] - other)[..., inside], axis=-1)
-    allowed = np.full(distance.shape, check.atol) if check.atol is not None else bound + more
-    return first, distance, allowed
+        distance[:, inside] = np.abs(values[first] - other)[..., inside]
+    largest = np.max(distance[:, inside], axis=-1)
+    allowed = np.full(largest.shape, check.atol) if check.atol is not None else bound + more
+    return Apart(first, distance, largest, np.asarray(allowed))
 
 
 def rounding(part: Part, level: int, name: str, scheme: int, floor: Floats) -> Floats:

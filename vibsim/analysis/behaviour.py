@@ -1,31 +1,19 @@
 """The checks ``stable``, ``conserves`` and ``equal``: what they measured, compared with what they expect.
 
-What was measured stands in ``check_value``, ``check_low``, ``check_high`` and ``check_first`` of the convergence Record
-(`vibsim.analysis.measured`), with these meanings:
-
-- ``stable``: growth per period, measured and predicted; w dt; the level. The reason is ``match`` where it is stable,
-  ``unstable``, or ``mismatch`` where it grows otherwise than predicted;
-- ``conserves``: the largest error over the energy at the start; rate and k of the drift (`vibsim.analysis.drift`); its
-  kind, as a position in `vocabulary.DRIFTS`;
-- ``equal``: the largest distance, and what it may be; nothing; the level.
+What was measured stands in the convergence Record (`vibsim.analysis.behaviour_measured`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis.apart import apart
 from vibsim.analysis.behaviour_advice import BROKEN, on_distance, on_drift, on_stability
-from vibsim.analysis.compare import Comparison
-from vibsim.analysis.drifting import drift_at
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
-from vibsim.analysis.part import Part
 from vibsim.analysis.promise import columns_of, stability_limits
-from vibsim.analysis.stability import growth_at
 from vibsim.analysis.wording import growth_in_words, number, vanishing_in_words
 from vibsim.record import Record
 from vibsim.spec.about import schemes_of
@@ -37,51 +25,11 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int8]
-Row = Mapping[str, NDArray[Any] | int]
-"""Field of a check to its values, shape (scheme, case)."""
 
 MATCH, MISMATCH, UNSTABLE, NON_FINITE, PRE_ASYMPTOTIC, NOT_APPLICABLE = map(
     REASON_NAMES.index,
     ("match", "mismatch", "unstable", "non_finite", "pre_asymptotic", "not_applicable"),
 )
-
-
-def measure_stable(part: Part, check: StableCheck) -> Row:
-    """Return what a ``stable`` check measures."""
-    level = part.grid.levels[-1] if check.level is None else check.level
-    found = growth_at(part, level)
-    reason = np.where(found.unstable, UNSTABLE, MATCH)
-    return {
-        "value": found.measured,
-        "low": found.predicted,
-        "high": np.broadcast_to(part.omega_dt[:, part.grid.levels.index(level)], part.shape),
-        "first": level,
-        "culprit": level,
-        "reason": np.where(found.contradicted, MISMATCH, reason),
-        "status": np.where(found.unstable | found.contradicted, FAIL, PASS),
-    }
-
-
-def measure_conserves(part: Part, check: ConservesCheck) -> Row:
-    """Return what a ``conserves`` check measures."""
-    level = part.grid.levels[-1] if check.level is None else check.level
-    found = drift_at(part, level, check.about or "")
-    return {
-        "value": found.largest,
-        "low": found.rate,
-        "high": found.power,
-        "first": found.kind,
-        "culprit": level,
-    }
-
-
-def measure_equal(part: Part, compared: Mapping[str, Comparison], check: EqualCheck) -> Row:
-    """Return what an ``equal`` check measures; of other schemes NaN."""
-    level = part.grid.levels[-1] if check.level is None else check.level
-    scheme, distance, allowed = apart(part, compared, check)
-    value, low = (np.full(part.shape, np.nan) for _ in range(2))
-    value[scheme], low[scheme] = distance, allowed
-    return {"value": value, "low": low, "first": level, "culprit": level}
 
 
 def stable(experiment: Experiment, record: Record, check: StableCheck, index: int) -> Outcome:

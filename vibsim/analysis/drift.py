@@ -65,6 +65,10 @@ class Drift:
     """k; NaN where it cannot be told."""
     largest: Floats
     """M(T) over the energy at the start; NaN where that vanishes."""
+    means: Floats
+    """m3, m2 and m1 in the unit of the energy, shape (scheme, case, 3)."""
+    round_off: Floats
+    """M(T) up to which the drift is ``none``, in the unit of the energy."""
 
 
 def drift_of(
@@ -90,11 +94,13 @@ def drift_of(
     end = np.fmax.reduce(running[..., :-1], axis=-1)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         change = np.log(np.abs(ratio))
-        rise, k = _power(running)
+        means = _means(running)
+        rise, k = _rise(means)
         fall, k_log = _power(np.abs(change))
         last = change[..., -2]
         gone = (np.abs(ratio * energy[..., None])[..., -2] < SMALLEST) & (np.abs(energy) > SMALLEST)
     size = np.where(np.isfinite(end) & (end > 0), end, 1.0)
+    allowed = np.broadcast_to(BLAME * floor, end.shape)
     still = rise <= STILL * size
     creeps = (rise <= STILL_CREEPS * size) & (k <= CREEP)
     closer = ~(np.abs(k_log - 1.0) >= np.abs(k - 1.0))
@@ -103,7 +109,7 @@ def drift_of(
     unknown = ~np.isfinite(end) | np.isnan(running[..., -2])
     rules = [
         (unknown, UNCLEAR),
-        (end <= BLAME * floor, NONE),
+        (end <= allowed, NONE),
         (np.broadcast_to(short, end.shape), UNCLEAR),
         (exponential, EXPONENTIAL),
         (gone, UNCLEAR),
@@ -127,7 +133,12 @@ def drift_of(
     rate = np.select([kind == code for code in rates], list(rates.values()), np.nan)
     known = (kind != NONE) & ~unknown & ~short
     return Drift(
-        kind.astype(np.int8), rate, np.where(known, k, np.nan), safe_ratio(end, np.abs(energy))
+        kind.astype(np.int8),
+        rate,
+        np.where(known, k, np.nan),
+        safe_ratio(end, np.abs(energy)),
+        means,
+        allowed,
     )
 
 
@@ -147,10 +158,20 @@ def _decay(change: Floats, is_normal: NDArray[np.bool_]) -> tuple[float, float]:
 
 def _power(values: Floats) -> tuple[Floats, Floats]:
     """Return by how much the mean over the last window exceeds the one before, and k."""
+    return _rise(_means(values))
+
+
+def _means(values: Floats) -> Floats:
+    """Return m3, m2 and m1, along a new last dimension in place of the time."""
     n = values.shape[-1] - 1
     # each with its last point, but for the end of the run
     windows = [(n // 8, n // 4 + 1), (n // 4, n // 2 + 1), (n // 2, max(n, n // 2 + 1))]
-    third, second, first = (np.mean(values[..., a:b], axis=-1) for a, b in windows)
+    return np.stack([np.mean(values[..., a:b], axis=-1) for a, b in windows], axis=-1)
+
+
+def _rise(means: Floats) -> tuple[Floats, Floats]:
+    """Return m1 - m2, and k."""
+    third, second, first = (means[..., i] for i in range(3))
     rise = np.asarray(first - second)
     with np.errstate(divide="ignore", invalid="ignore"):
         return rise, np.log2(rise / (second - third))

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis import behaviour, best, values
+from vibsim.analysis import behaviour_measured, best, values
 from vibsim.analysis.causes import CAUSES, causes
 from vibsim.analysis.compare import Comparison
 from vibsim.analysis.evidence import judge_check, order_of
 from vibsim.analysis.foresight import UNKNOWN, finest_readable, more_levels
 from vibsim.analysis.part import Part
+from vibsim.analysis.shown import shown
 from vibsim.analysis.verdict import Judgement
 from vibsim.record import Variable, attributes
 from vibsim.vocabulary import REASON_NAMES, STATUSES
@@ -22,7 +23,6 @@ from vibsim.vocabulary import REASON_NAMES, STATUSES
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
     from vibsim.spec.checks import ConvergesCheck
-    from vibsim.spec.scheme_checks import ConservesCheck, EqualCheck, StableCheck
 
 Codes = NDArray[Any]
 
@@ -43,7 +43,7 @@ FIELDS: Mapping[str, tuple[str, type[np.generic], float, str]] = {
 }
 """Variable ``check_<name>``: the field of a judgement, its type, its value for a number, and its meaning.
 
-Checks of stability, energy and equality have other numbers there: `vibsim.analysis.behaviour`.
+Checks of stability, energy and equality have other numbers there: `vibsim.analysis.behaviour_measured`.
 """
 
 
@@ -64,7 +64,7 @@ _WORDS = {"status": STATUSES, "reason": REASON_NAMES, "cause": CAUSES}
 
 
 def measured(part: Part, compared: Mapping[str, Comparison]) -> dict[str, Variable]:
-    """Return what every check measured, shape (check, scheme, case)."""
+    """Return what every check measured, shape (check, scheme, case), and what its picture needs beside that."""
     checks = part.experiment.checks
     table: dict[str, NDArray[Any]] = {
         name: np.full((len(checks), *part.shape), empty, dtype=kind)
@@ -75,6 +75,7 @@ def measured(part: Part, compared: Mapping[str, Comparison]) -> dict[str, Variab
         for name in FORESEEN
     }
     words = {name: row[3] for name, row in FIELDS.items()} | dict(FORESEEN)
+    rows: list[tuple[str, behaviour_measured.Row]] = []
     for i, check in enumerate(checks):
         inner = check.measured
         if inner.kind == "converges":
@@ -88,15 +89,18 @@ def measured(part: Part, compared: Mapping[str, Comparison]) -> dict[str, Variab
             place = values.Place(part, compared, inner.quantity or "", at.level, at.t, at.step)
             table["value"][i], table["high"][i] = best.value(inner.value, place)
         else:
-            for name, found in _behaviour(part, compared, inner).items():
-                table[name][i] = found
+            row = behaviour_measured.measure(part, compared, inner)
+            rows.append((inner.kind, row))
+            for name in FIELDS.keys() & row.keys():
+                table[name][i] = row[name]
     dims = ("check", "scheme", "case")
     if not checks:
         return {}
-    return {
+    found = {
         f"check_{name}": Variable(dims, array, attributes(words[name], "1") | _flags_of(name))
         for name, array in table.items()
     }
+    return found | shown(part, rows)
 
 
 def _foreseen(
@@ -111,18 +115,6 @@ def _foreseen(
         "compensated": finest_readable(q, judged, norm, order, "compensated"),
         "cause": causes(q, compared, judged, norm, order, check.tolerance),
     }
-
-
-def _behaviour(
-    part: Part,
-    compared: Mapping[str, Comparison],
-    check: StableCheck | ConservesCheck | EqualCheck,
-) -> behaviour.Row:
-    if check.kind == "stable":
-        return behaviour.measure_stable(part, check)
-    if check.kind == "conserves":
-        return behaviour.measure_conserves(part, check)
-    return behaviour.measure_equal(part, compared, check)
 
 
 def _flags_of(name: str) -> dict[str, Any]:

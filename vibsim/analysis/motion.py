@@ -48,7 +48,13 @@ def motion(part: Part, compared: Mapping[str, Comparison]) -> Table:
     words = "evaluations of the acceleration; of an implicit scheme those of one iteration per step"
     counts = _by_level(part, lambda level: oscillation.force_evaluations(part, level))
     total = Variable(OF_LEVEL, counts, attributes(words, "1"))
-    return table | {"stability_limit": limit, "force_evaluations_total": total}
+    words = "largest position over the largest exact one, or over that of the coarsest level"
+    size = Variable(OF_LEVEL, part.growth, attributes(words, "1"))
+    return table | {
+        "stability_limit": limit,
+        "size_over_exact": size,
+        "force_evaluations_total": total,
+    }
 
 
 def _by_level(part: Part, of: Callable[[int], Floats]) -> Floats:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from vibsim.models.error_parts import is_error_part
 from vibsim.schemes import Options
 from vibsim.schemes.base import is_on_the_mesh
 
@@ -137,6 +138,11 @@ def _measured(s: Story) -> str:
     return f"order {s.order:.3f}{between} on levels {s.first} to {s.last}"
 
 
+def _due(quantity: str) -> str:
+    """Say whose the order of a quantity is: of a part of an error no scheme promises one, a check expects it."""
+    return "expected" if is_error_part(quantity) else "promised"
+
+
 def tell(s: Story) -> str:
     """Say what was measured of a convergence, in one sentence."""
     measured, promised = _measured(s), f"order {number(s.expected)}"
@@ -146,7 +152,7 @@ def tell(s: Story) -> str:
     match s.reason:
         case "asymptotic":
             return (
-                f"{s.quantity} converges with {measured}, as promised ({promised}): the rescaled "
+                f"{s.quantity} converges with {measured}, as {_due(s.quantity)} ({promised}): the rescaled "
                 f"differences coincide.{_doubt(s)}"
             )
         case "exact":

@@ -16,7 +16,7 @@ def heading(check: Check | Measurement) -> str:
     """Return the assertion of a check in one line."""
     if check.kind == "claim":
         return f"Claim: {check.claim}"
-    return _measured(check)
+    return words.sentence(_measured(check))
 
 
 def of_tolerance(bound: str) -> str:

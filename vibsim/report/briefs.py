@@ -37,11 +37,18 @@ def row(asserted: Check, check: Mapping[str, Any]) -> dict[str, str]:
             "measured": _measured(asserted.that, check),
         }
     return {
-        "subject": assertions.subject(asserted),
+        "subject": words.sentence(assertions.subject(asserted)),
         "origin": "",
-        "asked": "as its scheme promises" if expected == "PASS" else expected,
+        "asked": _order(asserted) if expected == "PASS" else expected,
         "measured": _measured(asserted, check),
     }
+
+
+def _order(check: Measurement) -> str:
+    """Return the order that a check asks for."""
+    if check.kind != "converges" or check.order == "scheme":
+        return "as its scheme promises"
+    return f"order {check.order:g} ± {check.tolerance:g}"
 
 
 def _asked(that: Measurement) -> str:

@@ -13,6 +13,7 @@ from vibsim.record import Record
 from vibsim.report import words
 from vibsim.report.contents import without
 from vibsim.report.data import Member, at, exact_periods, exact_series, flags, swept, unit, whole
+from vibsim.report.style import power
 from vibsim.report.tables import Cell, Column, Table, Written
 
 LEAN = ("period", "amplitude")
@@ -27,7 +28,7 @@ CLASSES = {
 }
 """How the levels follow each other, in words."""
 MOST_DIGITS = 16
-"""Decimals of a double of size 1."""
+"""Significant digits of a double."""
 PER_NUMBER = ("finest level", "GCI", "GCI relative", "order", "levels", "convergence")
 """Columns that are kept with series only."""
 
@@ -122,18 +123,19 @@ def _error(size: float) -> Written | None:
     """Write the size of an error with two digits; nothing where there is none."""
     if not math.isfinite(size):
         return None
-    return Written(size, words.readable(f"{size:.1e}") if size else "0")
+    mantissa, exponent = f"{size:.1e}".split("e")
+    return Written(size, f"{mantissa}·{power(int(exponent))}" if size else "0")
 
 
 def _rounded(value: float, error: float) -> Written:
     """Write a number with one digit beyond the first that its error touches."""
     if not (math.isfinite(error) and error > 0.0):
         return Written(value, f"{value:.12g}".replace("-", "−"))
-    decimals = min(max(1 - math.floor(math.log10(error)), 0), MOST_DIGITS)
     size = math.floor(math.log10(abs(value))) if value else 0
+    decimals = max(min(1 - math.floor(math.log10(error)), MOST_DIGITS - 1 - size), 0)
     if abs(value) >= 1e-3 or value == 0.0:
         return Written(value, f"{value:.{decimals}f}".replace("-", "−"))
-    digits = min(max(decimals + size, 0), MOST_DIGITS)
+    digits = max(decimals + size, 0)
     return Written(value, words.readable(f"{value:.{digits}e}").replace("-", "−"))
 
 

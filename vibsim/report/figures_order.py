@@ -49,7 +49,7 @@ def against_step(experiment: Experiment, record: Record, quantity: str, case: in
     panel = max(2.2, 0.17 * len(schemes)) if many else 2.2
     orders = dict.fromkeys(order for order, _ in promises(experiment, record, quantity))
     told = [*schemes, "level difference", "true error", "predicted round-off"]
-    told += [f"slope {order:g} (promised)" for order in orders]
+    told += [f"slope {order:g} ({words.due(quantity)})" for order in orders]
     columns = figures_frame.columns(told, FONT, 0.9 * style.WIDTH)
     rows = math.ceil(len(told) / columns)
     height = panel + 0.95 + 0.2 * rows
@@ -78,13 +78,15 @@ def against_step(experiment: Experiment, record: Record, quantity: str, case: in
     return Picture(
         name=f"order_{quantity}_{case}",
         title=f"How fast does the error shrink? {letter}{suffix}",
-        caption=_caption(kinds, is_settled, many),
+        caption=_caption(kinds, is_settled, many, words.due(quantity)),
         alt=f"Norm of the level differences of {words.name(quantity)} against the step, and local order against level",
         figure=figure,
     )
 
 
-def _caption(kinds: frozenset[str], is_settled: bool | None, many: bool = False) -> str:
+def _caption(
+    kinds: frozenset[str], is_settled: bool | None, many: bool = False, due: str = "promised"
+) -> str:
     """Explain what is drawn, and nothing else (see `_draw_norms`, `_draw_orders`)."""
     if not kinds:
         return "Nothing is drawn: there is no error to measure here."
@@ -92,13 +94,13 @@ def _caption(kinds: frozenset[str], is_settled: bool | None, many: bool = False)
     true = "size of the true error (hollow)" if "true" in kinds else ""
     parts = [
         f"Left: {' and '.join(filter(None, [shown, true]))} against dt.",
-        "Parallel to a dashed line means that promised order." if "slope" in kinds else "",
+        f"Parallel to a dashed line means that {due} order." if "slope" in kinds else "",
         "Points on the dotted line are round-off." if "floor" in kinds else "",
     ]
     if is_settled is not None and many:
         parts.append(
             "Right: the stated order of every scheme with its interval; where none is stated, hollow, the order of the "
-            "finest three levels; the vertical stroke is the promised one."
+            f"finest three levels; the vertical stroke is the {due} one."
         )
     elif is_settled is not None:
         parts.append(
@@ -155,7 +157,14 @@ def _draw_norms(
         return frozenset()
     orders = dict.fromkeys(order for order, _ in promises(experiment, record, quantity))
     slopes = [
-        _reference(ax, dt, seen, order, SLOPES[k % len(SLOPES)] if len(orders) > 1 else "")
+        _reference(
+            ax,
+            dt,
+            seen,
+            order,
+            f"slope {order:g} ({words.due(quantity)})",
+            SLOPES[k % len(SLOPES)] if len(orders) > 1 else "",
+        )
         for k, order in enumerate(orders)
     ]
     near = _step_limits(ax, dt, seen, floors)
@@ -194,7 +203,9 @@ def _highest(values: Floats) -> float:
     return min(float(values.max()), WILD * float(np.quantile(values, 0.75)), style.LARGEST)
 
 
-def _reference(ax: Axes, dt: Floats, seen: list[Floats], order: float, dashes: Any) -> bool:
+def _reference(
+    ax: Axes, dt: Floats, seen: list[Floats], order: float, label: str, dashes: Any
+) -> bool:
     """Draw the promised slope a little above the largest value at the coarsest step, and say whether there is room.
 
     Of several each has dashes of its own, and its number at its end.
@@ -209,7 +220,7 @@ def _reference(ax: Axes, dt: Floats, seen: list[Floats], order: float, dashes: A
             reach,
             start * (reach / dt[0]) ** order,
             **SLOPE | ({"linestyle": dashes} if dashes else {}),
-            label=f"slope {order:g} (promised)",
+            label=label,
         )
     if is_drawn and dashes:
         end = float(reach[-1]), float(start * (reach[-1] / dt[0]) ** order)

@@ -69,8 +69,9 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
     axes[-1].set_xlabel(style.label("t", time_unit(record)))
     first = whole(record, "pair")[0]
     low = words.lowered(first)
+    law = f"dt{words.raised(order)}" if order != 1.0 else "dt"
     shrinks = (
-        f"{_multiplied(order, whole(record, 'level'))}; if the error shrinks as dt{words.raised(order)}, the curves "
+        f"{_multiplied(order, whole(record, 'level'))}; if the error shrinks as {law}, the curves "
         "fall on one another."
     )
     parts = [
@@ -226,7 +227,7 @@ def _draw_ratios(
     triples = [(levels[i], levels[i + 1], levels[i + 2]) for i in chosen]
     targets = sorted({float(target_ratio(order, triple)) for triple in triples})
     for k, target in enumerate(targets):
-        ax.axhline(target, zorder=1, label="" if k else "promised", **TARGET)
+        ax.axhline(target, zorder=1, label="" if k else words.due(quantity), **TARGET)
     ax.set_ylim(*_ratio_limits(drawn, targets))
     ax.set_ylabel("ratio")
     ax.set_title("Ratio of successive differences", fontweight="normal", fontsize=9)

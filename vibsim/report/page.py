@@ -213,9 +213,21 @@ LONG_HEADING = 90
 
 def _heading(caption: str) -> str:
     """Return what stands above a table that is folded away."""
-    if len(caption) <= LONG_HEADING:
-        return caption
-    return re.split(r"[:;(]", caption, maxsplit=1)[0].strip()
+    for end in ("$", r"; |\. ", r": | \("):
+        found = re.split(end, caption, maxsplit=1)[0]
+        if len(found) <= LONG_HEADING:
+            return found
+    return caption
+
+
+def _folded(tables: Sequence[Table]) -> list[tuple[str, list[Table]]]:
+    """Return tables with their headings, which differ: of two that would be the same each says more."""
+    short = [_heading(table.caption) for table in tables]
+    whole = [re.split(r"[,;]|\. ", table.caption, maxsplit=1)[0] for table in tables]
+    headings = [
+        more if short.count(text) > 1 else text for text, more in zip(short, whole, strict=True)
+    ]
+    return [(text, [table]) for text, table in zip(headings, tables, strict=True)]
 
 
 def _tables(
@@ -245,9 +257,7 @@ def _tables(
     # the first table is what the page is about; a long one after it would push the figures away
     long = [table for table in listed[1:] if len(table.rows) > LONG]
     listed = [table for table in listed if table not in long]
-    folded = [
-        (_heading(table.caption), [table]) for table in [*long, *order[kept:]] if table is not None
-    ]
+    folded = _folded([table for table in [*long, *order[kept:]] if table is not None])
     other = [contents.orders(record, quantity, shown, norm) for quantity in found for norm in norms]
     if other:
         folded.append(("Norms and orders in the other norms", other))

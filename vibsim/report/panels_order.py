@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.record import Record
-from vibsim.report import style
+from vibsim.report import style, words
 from vibsim.report.data import Floats, Member, at, formal_order, whole
 
 if TYPE_CHECKING:
@@ -82,12 +82,12 @@ def draw_orders(
         if not np.isfinite(order).any():
             continue
         look = colours.index(i) if i in colours else i
-        words = "levels " + ", ".join(map(str, levels[i : i + 3]))
-        _draw_one(ax, t, (order, low, high), sure, look, words)
+        text = "levels " + ", ".join(map(str, levels[i : i + 3]))
+        _draw_one(ax, t, (order, low, high), sure, look, text)
         drawn += [order[sure] if sure.any() else order, order[-1:]]
     if math.isfinite(promised):
         line: dict[str, Any] = {"linestyle": (0, (4, 3)), "linewidth": 1.0, "zorder": 1}
-        ax.axhline(promised, color="black", label="promised", **line)
+        ax.axhline(promised, color="black", label=words.due(quantity), **line)
     ax.set_ylim(*_limits(drawn, promised))
     ax.set_ylabel("order")
     ax.set_title("Order over time, in windows of half a period", fontweight="normal", fontsize=9)
@@ -100,7 +100,7 @@ def _draw_one(
     of: tuple[Floats, Floats, Floats],
     sure: NDArray[np.bool_],
     look: int,
-    words: str,
+    text: str,
 ) -> None:
     """Draw one order with its interval, and its last point apart; where it is uncertain, as grey dots."""
     order, low, high = of
@@ -111,7 +111,7 @@ def _draw_one(
     inner = np.where(sure, order, np.nan)[:-1]
     band: dict[str, Any] = {"color": colour, "alpha": BAND, "linewidth": 0}
     ax.fill_between(t[:-1], low[:-1], high[:-1], where=sure[:-1].tolist(), **band)
-    ax.plot(*style.thin(t[:-1], inner), color=colour, linestyle=dashes, linewidth=1.3, label=words)
+    ax.plot(*style.thin(t[:-1], inner), color=colour, linestyle=dashes, linewidth=1.3, label=text)
     ax.plot(t[-1:], order[-1:], clip_on=False, zorder=5, **_POINT, markeredgecolor=colour)
     unsure = np.isfinite(order) & ~sure
     if unsure.any():

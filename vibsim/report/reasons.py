@@ -18,8 +18,8 @@ class Reason:
 
 REASONS = {
     "asymptotic": Reason(
-        "The error shrinks from level to level as the scheme promises: the rescaled differences fall on top of each "
-        "other, and more closely so on finer levels.",
+        "The error shrinks from level to level with the order that is asked for: the rescaled differences fall on top "
+        "of each other, and more closely so on finer levels.",
         "Three levels at least, curves that coincide, ratios that settle, and differences well above round-off: all "
         "four are met on the levels named.",
     ),

@@ -76,13 +76,17 @@ class Panel:
                 f'<path d="M{a:.1f} {self.up(y):.1f}H{b:.1f}" stroke="{colour}"{dash} fill="none"/>'
             )
 
-    def curve(self, x: Floats, y: Floats, colour: str, width: float = 1.4) -> None:
+    def curve(
+        self, x: Floats, y: Floats, colour: str, width: float = 1.4, dashed: bool = False
+    ) -> None:
         """Draw a line through the finite points."""
         pairs = zip(x, y, strict=True)
         found = [f"{self.across(a):.1f},{self.up(b):.1f}" for a, b in pairs if math.isfinite(b)]
-        self.parts.append(
-            f'<polyline points="{" ".join(found)}" fill="none" stroke="{colour}" stroke-width="{width:g}"/>'
-        )
+        dash = ' stroke-dasharray="4 3"' if dashed else ""
+        if found:
+            self.parts.append(
+                f'<polyline points="{" ".join(found)}" fill="none" stroke="{colour}" stroke-width="{width:g}"{dash}/>'
+            )
 
     def points(self, x: Sequence[float], y: Floats, filled: Sequence[bool], colour: str) -> None:
         """Draw dots, hollow ones that do not count; those beyond the frame become triangles on its edge."""
@@ -101,11 +105,18 @@ class Panel:
                 )
 
     def word(
-        self, x: float, y: float, text: str, anchor: str = "middle", colour: str = SOFT
+        self,
+        x: float,
+        y: float,
+        text: str,
+        anchor: str = "middle",
+        colour: str = SOFT,
+        halo: bool = False,
     ) -> None:
-        """Write a text at a place in the picture [pixel]."""
+        """Write a text at a place in the picture [pixel], with a white border where lines may cross it."""
+        border = ' stroke="white" stroke-width="3" paint-order="stroke"' if halo else ""
         self.parts.append(
-            f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{colour}">{escape(text)}</text>'
+            f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{colour}"{border}>{escape(text)}</text>'
         )
 
     def frame(
@@ -123,7 +134,8 @@ class Panel:
         )
         self.word(left, TOP - 6, title, "start", INK)
         for value, text in x_ticks:
-            self.word(self.across(value), base + 13, text)
+            if self.x[0] <= value <= self.x[1]:
+                self.word(self.across(value), base + 13, text)
         self.word((left + right) / 2, base + 26, x_name)
         for value, text in y_ticks:
             if self.inside(value):

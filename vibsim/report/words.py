@@ -102,12 +102,26 @@ def told(check: Mapping[str, Any], field: str = "text") -> str:
         letter = title(quantity)
         parts[::2] = [re.sub(rf"\b{re.escape(quantity)}\b", letter, p) for p in parts[::2]]
     parts[::2] = map(readable, parts[::2])
-    return claim + mark + "`".join(parts)
+    return claim + mark + sentence("`".join(parts))
 
 
 _POWER = re.compile(r"(?<![\w.])(-?)(\d+(?:\.\d+)?)e([-+]?\d+)(?!\w)")
 _LONG = re.compile(r"(?<![\w.])\d+\.(?:0\b|\d{9,})(?![\w.]*\w)")
 _NAMED = re.compile(r"(?<!scheme )\b[a-z0-9]+(?:_[a-z0-9]+)+(?=(?: of | is | at ))")
+
+
+def sentence(text: str) -> str:
+    """Begin sentences that begin with the name of a value, or of a part of an error, with a capital letter."""
+    from vibsim.spec.values import VALUES
+
+    names = {spoken(value).split()[0] for value in VALUES} | {"phase"}
+    first = "|".join(sorted(name for name in names if name.isalpha()))
+    return re.sub(rf"(^|[.] )({first})(?= )", lambda m: m[1] + m[2].capitalize(), text)
+
+
+def due(quantity: str) -> str:
+    """Say whose the order of a quantity is: promised by a scheme, or of a part of an error expected by a check."""
+    return "expected" if is_error_part(quantity) else "promised"
 
 
 def readable(text: str) -> str:

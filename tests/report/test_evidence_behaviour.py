@@ -1,0 +1,306 @@
+"""The pictures of stability, energy and equality: every kind has one, with its marks where the numbers are."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import samples
+
+from vibsim.report import evidence
+from vibsim.report.exhibit import short
+from vibsim.report.stamp import LEFT, TOP
+from vibsim.report.style import LOWER
+from vibsim.simulation import simulate_record
+from vibsim.spec.checks import MEASURED
+
+WIDTH, HEIGHT = 320.0, 96.0
+SPRING = {
+    "model": {"kind": "spring", "w": "2*pi"},
+    "initial": {"u": 1.0},
+    "time": {"end": 10.0, "base_steps": 100},
+    "levels": [0, 1, 2, 3],
+    "samples": "all",
+}
+KINDS = {
+    "converges": {"converges": "u"},
+    "value": {"value": "error_linf", "quantity": "u", "below": 1.0},
+    "stable": {"stable": True},
+    "conserves": {"conserves": "energy", "drift": "linear"},
+    "equal": {"equal": ["rk4", "discrete"], "quantity": "u"},
+}
+BEHAVIOUR = ("stable", "conserves", "equal")
+
+
+def run(*checks, **changes):
+    """Return the experiment, its record, and the picture of every check."""
+    content = SPRING | {"schemes": ["rk4"], "checks": list(checks)} | changes
+    experiment = samples.experiment(**content)
+    record = samples.record(experiment)
+    told = samples.summary(experiment, record)["checks"]
+    pairs = zip(experiment.checks, told, strict=True)
+    found = [evidence.picture(experiment, record, asserted, check) for asserted, check in pairs]
+    for picture in found:
+        if picture is not None and picture.svg:
+            ElementTree.fromstring(picture.svg)
+            assert "nan" not in picture.svg
+    return experiment, record, found
+
+
+def bars(svg):
+    """Return the ends and heights of the wide bars [pixel]."""
+    pattern = r'points="([\d.]+),([\d.]+) ([\d.]+),\2" fill="none" stroke="#D55E00"'
+    return [tuple(map(float, row)) for row in re.findall(pattern, svg)]
+
+
+def dots(svg, fill="#0072B2"):
+    """Return the places of dots [pixel]."""
+    pattern = rf'<circle cx="([\d.]+)" cy="([\d.]+)" r="3.4" fill="{fill}"'
+    return [tuple(map(float, row)) for row in re.findall(pattern, svg)]
+
+
+def exponent_at(svg, height):
+    """Return the power of ten at a height, by the ticks of a logarithmic scale."""
+    found = re.findall(r'y="([\d.]+)" text-anchor="end"[^>]*>10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)<', svg)
+    rows = [(float(y) - 4.0, int(text.translate(LOWER))) for y, text in found]
+    slope, start = np.polyfit(*zip(*rows, strict=True), 1)
+    return slope * height + start
+
+
+def test_the_kinds_are_all_there():
+    assert set(KINDS) == set(MEASURED)
+
+
+@pytest.mark.parametrize("kind", MEASURED)
+@pytest.mark.parametrize("is_claim", [False, True])
+def test_every_kind_of_check_has_a_picture(kind, is_claim):
+    check = {"claim": "it is so", "that": KINDS[kind]} if is_claim else KINDS[kind]
+    _, _, (found,) = run(check)
+    assert found.svg
+    assert "rk4" in found.caption
+
+
+@pytest.mark.parametrize("kind", BEHAVIOUR)
+def test_the_member_that_decides_is_drawn(kind):
+    _, _, (found,) = run(KINDS[kind], sweep={"initial.u": [0.5, 1.0, 2.0]})
+    assert found.svg
+    assert "initial.u = " in found.caption
+
+
+def test_the_means_of_a_linear_drift_climb_by_two():
+    check = {"conserves": "energy", "drift": "linear", "level": 1}
+    experiment, _, (found,) = run(check)
+    marks = bars(found.svg)
+    ends = [
+        (LEFT + WIDTH * a, LEFT + WIDTH * b)
+        for a, b in ((1 / 8, 1 / 4), (1 / 4, 1 / 2), (1 / 2, 1))
+    ]
+    assert np.array([(a, b) for a, _, b in marks]) == pytest.approx(np.array(ends))
+    third, second, first = (y for _, y, _ in marks)
+    assert (first - second) / (second - third) == pytest.approx(2.0, rel=0.05)
+    # told by the largest error of the level itself
+    level = simulate_record(experiment, 1)
+    largest = level["energy_deviation_running_max"][0, 0] / level["energy_initial"][0, 0]
+    n = largest.size - 1
+    assert f"m₁ = {short(np.mean(largest[n // 2 : n]))}." in found.caption
+    assert "a drift like t has 2" in found.caption
+    assert "in proportion to t through" in found.caption
+
+
+def test_a_quadratic_drift_climbs_by_four():
+    limit = {"end": "300/pi", "base_dt": "1/pi"}
+    _, _, (found,) = run(
+        {"conserves": "energy", "drift": "quadratic"},
+        schemes=["central"],
+        initial={"u": 1.0, "v": 1.0},
+        time=limit,
+        levels=[0],
+    )
+    third, second, first = (y for _, y, _ in bars(found.svg))
+    assert (first - second) / (second - third) == pytest.approx(4.0, rel=0.1)
+    assert "a drift like t² has 4" in found.caption
+
+
+def test_a_drift_that_is_round_off_lies_below_its_border():
+    _, record, (found,) = run({"conserves": "energy", "drift": "none"}, schemes=["crank_nicolson"])
+    (border,) = map(float, re.findall(r'd="M[\d.]+ ([\d.]+)H[\d.]+"[^>]*dasharray', found.svg))
+    allowed = record["check_round_off"][0, 0, 0] / record["energy_initial"][0, 0]
+    assert exponent_at(found.svg, border) == pytest.approx(np.log10(allowed), abs=0.05)
+    (curve,) = re.findall(r'points="([^"]+)" fill="none" stroke="#0072B2"', found.svg)
+    assert min(float(pair.split(",")[1]) for pair in curve.split()) > border
+    assert bars(found.svg) == []
+    assert "within the round-off of this run" in found.caption
+
+
+def test_a_bounded_error_stays_at_the_dashed_line():
+    _, _, (found,) = run(
+        {"conserves": "energy", "drift": "bounded"}, schemes=["central"], levels=[1, 2]
+    )
+    heights = [y for _, y, _ in bars(found.svg)]
+    assert max(heights) - min(heights) < 1.0
+    assert "no growth" in found.caption
+
+
+def test_an_exponential_drift_is_a_line_on_a_logarithmic_scale():
+    _, _, (found,) = run(
+        {"conserves": "energy", "drift": "bounded"}, schemes=["forward_euler"], levels=[0, 1]
+    )
+    assert "by the factor" in found.caption
+    assert re.search(r">10[⁰¹²³⁴⁵⁶⁷⁸⁹]+<", found.svg)
+
+
+def test_a_run_too_short_for_a_drift_says_so():
+    _, _, (found,) = run(
+        {"conserves": "energy", "drift": "linear"}, time={"end": 2.0, "base_steps": 20}
+    )
+    assert "too short a run" in found.caption
+
+
+def test_the_difference_is_marked_where_it_is_largest():
+    check = {"equal": ["rk4", "exact"], "quantity": "u", "level": 1, "atol": 1e-8}
+    experiment, record, (found,) = run(check)
+    level = simulate_record(experiment, 1)
+    distance = np.abs(level["u"][0, 0] - level["u_exact"][0])
+    assert np.nanmax(record["check_distance"]) == distance.max() == record["check_value"][0, 0, 0]
+    ((x, y),) = dots(found.svg)
+    place = LEFT + WIDTH * np.argmax(distance) / (distance.size - 1)
+    assert x == pytest.approx(place, abs=WIDTH / 240 / 2)
+    assert exponent_at(found.svg, y) == pytest.approx(np.log10(distance.max()), abs=0.05)
+    (border,) = map(float, re.findall(r'd="M[\d.]+ ([\d.]+)H[\d.]+"[^>]*dasharray', found.svg))
+    assert exponent_at(found.svg, border) == pytest.approx(-8.0, abs=0.05)
+    assert "times the 1·10⁻⁸ that is allowed" in found.caption
+
+
+def test_a_long_run_keeps_its_largest_difference():
+    check = {"equal": ["rk4", "exact"], "quantity": "u", "level": 3, "atol": 1.0}
+    _, record, (found,) = run(check)
+    assert record["check_distance"].shape == (1, 1, 241)
+    assert np.nanmax(record["check_distance"]) == record["check_value"][0, 0, 0]
+    assert len(dots(found.svg)) == 1
+
+
+def test_two_that_are_the_same_have_words_and_no_picture():
+    check = {"equal": ["central", "verlet"], "quantity": "u", "atol": 0.0}
+    two = ["central", {"kind": "central", "label": "verlet"}]
+    _, _, (found,) = run(check, schemes=two)
+    assert found.svg == ""
+    assert "the same bit by bit" in found.caption
+
+
+def test_w_dt_is_marked_beside_the_limit():
+    time = {"end": 10.0, "base_steps": 25}
+    checks = [{"stable": False, "level": 0}, {"stable": True}]
+    _, _, (unstable, stable) = run(*checks, schemes=["central"], time=time)
+    for found, beyond, judged in ((unstable, True, 0), (stable, False, 3)):
+        steps, size, growth = dots(found.svg)
+        limit, border, _ = (
+            float(y) for y in re.findall(r'd="M[\d.]+ ([\d.]+)H[\d.]+"[^>]*dasharray', found.svg)
+        )
+        assert (steps[1] < limit) == beyond
+        assert (size[1] < border) == beyond
+        assert steps[0] == pytest.approx(LEFT + 150.0 * (judged + 0.5) / 4, abs=0.1)
+        assert len(dots(found.svg, "white")) == 9
+        # measured and predicted are one
+        assert bars(found.svg)[judged][1] == pytest.approx(growth[1], abs=0.2)
+    assert "is beyond the limit 2;" in unstable.caption
+    assert "is below the limit 2;" in stable.caption
+
+
+def test_growth_that_refinement_removes_is_told():
+    _, _, (found,) = run({"stable": True, "level": 0}, schemes=["forward_euler"], levels=[0, 1, 2])
+    assert "grows at every step" in found.caption
+    assert "falls to less than half from level 0 to 1" in found.caption
+    # without a limit there are two panels
+    assert found.svg.count("<g ") == 2
+
+
+def test_at_the_limit_the_size_decides():
+    _, _, (found,) = run(
+        {"stable": False},
+        schemes=["central"],
+        initial={"u": 1.0, "v": 1.0},
+        time={"end": "300/pi", "base_dt": "1/pi"},
+        levels=[0],
+    )
+    assert "at the limit 2" in found.caption
+    assert "it has blown up" in found.caption
+
+
+def test_a_prediction_for_a_nonlinear_model_is_that_of_small_oscillations():
+    pendulum = {"model": {"kind": "pendulum"}, "initial": {"theta": 1.0}, "time": {"end": 40.0}}
+    _, _, (found,) = run({"stable": True}, schemes=["central"], levels=[6, 7], **pendulum)
+    assert "predicted for small oscillations" in found.caption
+    assert len(bars(found.svg)) == 1
+
+
+def test_a_run_that_breaks_down_is_drawn_up_to_there():
+    checks = [
+        {"conserves": "energy", "drift": "bounded"},
+        {"equal": ["central", "exact"], "quantity": "u", "atol": 1.0},
+        {"stable": False},
+    ]
+    time = {"end": 400.0, "base_steps": 400}
+    _, _, found = run(*checks, schemes=["central"], time=time, levels=[0])
+    energy, equal, stable = found
+    assert "it ends where the run breaks down" in energy.caption
+    assert "then the run breaks down" in equal.caption
+    assert "beyond the limit" in stable.caption
+
+
+def test_what_is_not_stored_has_a_reason_for_no_picture():
+    experiment, record, _ = run(KINDS["conserves"])
+    told = samples.summary(experiment, record)["checks"]
+    kept = {name: v for name, v in record.variables.items() if not name.endswith("running_max")}
+    poor = replace(record, variables=kept)
+    found = evidence.picture(experiment, poor, experiment.checks[0], told[0])
+    assert found.svg == ""
+    assert "is not stored" in found.caption
+
+
+@pytest.fixture
+def lean(monkeypatch):
+    """Let every experiment be so large that no series are kept."""
+    monkeypatch.setattr("vibsim.spec.sampling.LEAN", 0)
+
+
+@pytest.mark.parametrize("kind", BEHAVIOUR)
+@pytest.mark.parametrize("count", [5, 100])
+def test_without_series_the_members_are_drawn(lean, kind, count):
+    sweep = {"initial.u": {"linspace": [0.5, 2.0, count]}}
+    _, record, (found,) = run(KINDS[kind], sweep=sweep, samples="auto")
+    assert record.attrs["storage"] == "lean"
+    assert {"check_means", "check_distance", "size_over_exact"}.isdisjoint(record.variables)
+    assert len(dots(found.svg)) == 1
+    assert len(dots(found.svg, "white")) == (count if count == 5 else 0)
+    assert f"all {count} members, of which no series are kept" in found.caption
+
+
+def test_members_on_a_grid_are_numbered(lean):
+    sweep = {"initial.u": [0.5, 1.0], "model.w": [1.0, 2.0]}
+    _, _, (found,) = run({"stable": True}, sweep=sweep, samples="auto")
+    assert "number of the member" in found.svg
+
+
+def test_members_that_are_spread_over_decades_have_a_logarithmic_axis(lean):
+    sweep = {"initial.u": {"logspace": [1e-3, 1e3, 7]}}
+    _, _, (found,) = run(KINDS["equal"], sweep=sweep, samples="auto")
+    white = [x for x, _ in dots(found.svg, "white")]
+    assert np.diff(white) == pytest.approx(np.diff(white)[0], abs=0.15)
+
+
+@pytest.mark.parametrize("kind", BEHAVIOUR)
+def test_a_single_run_without_series_says_why_there_is_no_picture(lean, kind):
+    _, _, (found,) = run(KINDS[kind], samples="auto")
+    assert found.svg == ""
+    assert "keeps no series over time" in found.caption
+
+
+def test_the_frame_holds_every_mark():
+    for kind in BEHAVIOUR:
+        _, _, (found,) = run(KINDS[kind])
+        for x, y in dots(found.svg):
+            assert LEFT <= x <= LEFT + WIDTH
+            assert TOP <= y <= TOP + HEIGHT
