@@ -65,7 +65,7 @@ def numbers(q: Comparison) -> Table:
         add("richardson_error_max", ("scheme", "case"), q.largest_bound, words, q.units)
     add("floor", of_level, q.floor, "predicted round-off", q.units)
     words = "order that the scheme promises, infinite for what is exact"
-    if options_swept(part.experiment):
+    if options_swept(part.experiment) or q.order.shape[1] > 1:
         add("formal_order", ("scheme", "case"), np.broadcast_to(q.order, part.shape), words, "1")
     else:
         add("formal_order", ("scheme",), q.order[:, 0], words, "1")
