@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,8 @@ import numpy as np
 import pytest
 from spring_runs import Run, judged
 
+from vibsim.analysis.parts import analyse_parts, joined
+from vibsim.record import Record, Variable
 from vibsim.schemes import FIXED_STEP
 from vibsim.simulation import simulate_record
 from vibsim.spec import Experiment
@@ -123,6 +126,35 @@ def test_members_have_promises_of_their_own() -> None:
     np.testing.assert_array_equal(promised(run, PARTS[0]), [[1, 2, 1, 2]])
     np.testing.assert_array_equal(promised(run, PARTS[1]), [[2, np.inf, 1, 2]])
     assert {row.status for verdict in run.verdicts for row in verdict.results} == {"PASS"}
+
+
+def test_options_alone_may_be_swept() -> None:
+    sweep = {"schemes.ec.start": ["first_order", "centred"]}
+    run = ladder({"kind": "spring"}, ["rk4", FEW[3]], sweep=sweep, levels=[4, 5])
+    np.testing.assert_array_equal(promised(run, PARTS[0]), [[4, 4], [1, 2]])
+
+
+def test_a_sweep_analysed_in_parts_has_the_promises_of_the_whole() -> None:
+    sweep = {"initial.v": [0.0, 1.0, 2.0]}
+    run = ladder({"kind": "spring"}, FEW[3:4], sweep=sweep)
+    readers = {level: partial(some, record) for level, record in run.levels.items()}
+    whole = joined(list(analyse_parts(run.experiment, readers, size=2)))
+    for part in PARTS:
+        name = f"{part}_formal_order"
+        np.testing.assert_array_equal(whole[name], run.record[name])
+
+
+def some(record: Record, start: int, stop: int) -> Record:
+    """Return a range of the members of a level."""
+
+    def cut(variable: Variable) -> Variable:
+        if "case" not in variable.dims:
+            return variable
+        index = (slice(None),) * variable.dims.index("case") + (slice(start, stop),)
+        return Variable(variable.dims, variable.values[index], variable.attrs)
+
+    tables = ({n: cut(v) for n, v in t.items()} for t in (record.coords, record.variables))
+    return Record(*tables, record.attrs)
 
 
 def test_a_member_that_does_not_oscillate_is_not_judged() -> None:

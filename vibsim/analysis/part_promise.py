@@ -28,6 +28,11 @@ def is_promised(experiment: Experiment, quantity: str) -> bool:
     return is_error_part(quantity) and not why_not_free(experiment.model.definition)
 
 
+def is_promised_to_members(experiment: Experiment, quantity: str) -> bool:
+    """Tell whether every member has a promise of its own."""
+    return experiment.sweep is not None and is_promised(experiment, quantity)
+
+
 def part_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floats:
     """Return the order of a part for which `is_promised` holds, shape (scheme, 1 or case).
 
@@ -38,20 +43,19 @@ def part_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floa
     for s, scheme in enumerate(experiment.schemes):
         if SCHEMES[scheme.kind].adaptive:
             continue
-        groups = plan.option_groups(experiment, s, columns)
-        for options, cases in groups:
-            where = cases if len(groups) > 1 else np.arange(found.shape[1])
-            both = _of_scheme(experiment, scheme.kind, options, motion, where)
-            found[s, where] = both[0 if quantity.endswith(PHASE) else 1]
+        for options, cases in plan.option_groups(experiment, s, columns):
+            both = _of_scheme(experiment, scheme.kind, options, motion, cases)
+            found[s, cases] = both[0 if quantity.endswith(PHASE) else 1]
     return found
 
 
 def _motion(experiment: Experiment, columns: Columns) -> FreeOscillation:
     """Return the numbers of the members that swept values belong to; of the one member without any."""
+    size = len(next(iter(columns.values()))) if columns else 1
 
     def filled(section: str, values: dict[str, float]) -> dict[str, Floats]:
         return {
-            name: np.asarray(columns.get(f"{section}.{name}", value), dtype=float)
+            name: np.broadcast_to(np.asarray(columns.get(f"{section}.{name}", value), float), size)
             for name, value in values.items()
         }
 
