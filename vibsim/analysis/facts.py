@@ -135,8 +135,9 @@ def truly_exact(e: Evidence) -> Flags:
     blur = np.zeros((*e.order.shape, len(e.levels))) if e.blur is None else e.blur
     of_pairs = MEASURED * (blur[..., :-1] + blur[..., 1:])
     tiny = np.all(e.difference <= TINY * e.size[..., None] + of_pairs, axis=-1)
-    seen = BLAME * e.relative_floor + safe_ratio(blur[..., 0], e.size)
-    return np.asarray(at_round_off(e) & tiny & (ordinary >= VISIBLE * seen))
+    seen = ordinary >= VISIBLE * BLAME * e.relative_floor
+    seen &= ordinary * e.size >= VISIBLE * blur[..., 0]
+    return np.asarray(at_round_off(e) & tiny & seen)
 
 
 def accuracy(e: Evidence) -> Floats:
