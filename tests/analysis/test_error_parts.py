@@ -274,11 +274,32 @@ def faults(**more: Any) -> str:
     return str(caught.value)
 
 
-def test_no_scheme_promises_an_order_of_a_part() -> None:
-    for order in ({}, {"order": "scheme"}):
-        text = faults(checks=[{"converges": "u_phase_error", **order}])
-        assert "no scheme promises an order of u_phase_error" in text
-        assert "give `order:` as a number" in text
+@pytest.mark.parametrize(
+    ("model", "initial", "reason"),
+    [
+        ({"kind": "pendulum"}, {"theta": 1.0}, "pendulum is nonlinear"),
+        (
+            {"kind": "oscillator", "force": "cos(t)"},
+            {"u": 1.0},
+            "oscillator has a force that depends on time",
+        ),
+        (
+            {"kind": "oscillator", "damping": {"quadratic": 0.1}},
+            {"u": 1.0},
+            "oscillator has a damping that is not linear",
+        ),
+        ({"kind": "elastic_pendulum", "beta": 0.9}, {}, "elastic_pendulum has several coordinates"),
+    ],
+)
+def test_where_theory_knows_no_order_of_a_part_it_must_be_given(
+    model: dict[str, Any], initial: dict[str, float], reason: str
+) -> None:
+    part = {"pendulum": "theta", "elastic_pendulum": "x"}.get(model["kind"], "u") + "_phase_error"
+    for order, key in (({}, "converges"), ({"order": "scheme"}, "order")):
+        text = faults(model=model, initial=initial, checks=[{"converges": part, **order}])
+        assert f"checks[0].{key}" in text
+        assert f"theory knows the order of {part} on linear models" in text
+        assert f"{reason}: give `order:` as a number" in text
 
 
 def test_parts_of_another_name_and_of_motions_with_events() -> None:

@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.analysis.facts import BLAME, MEASURED
 from vibsim.analysis.part import Part
+from vibsim.analysis.part_promise import is_promised
 from vibsim.analysis.promise import formal_orders
 from vibsim.analysis.shift import shift, strides
 from vibsim.analysis.swing import swing
@@ -22,6 +24,7 @@ from vibsim.analysis.template import template
 from vibsim.expression import values
 from vibsim.models import tree
 from vibsim.models.error_parts import AMPLITUDE, PHASE, has_error_parts, is_error_part, whole_of
+from vibsim.spec.series import asked
 
 if TYPE_CHECKING:
     from vibsim.analysis.compare import Comparison
@@ -44,14 +47,14 @@ def wanted(part: Part, names: tuple[str, ...]) -> tuple[str, ...]:
 
     They are made of the states, and let a verdict on the position say which of the two is wrong.
     """
-    asked = [name for name in names if is_error_part(name)]
+    named = [name for name in names if is_error_part(name)]
     schemes, cases = part.shape
     size = schemes * cases * len(part.grid.t) * len(part.grid.levels)
     small = not part.lean and len(part.grid.levels) > 2 and size <= ALWAYS
     small &= {*part.model.positions, *part.model.velocities} <= {*names}
     more = part.model.positions if small and has_error_parts(part.model) else ()
     return tuple(
-        dict.fromkeys([*asked, *(name + end for name in more for end in (PHASE, AMPLITUDE))])
+        dict.fromkeys([*named, *(name + end for name in more for end in (PHASE, AMPLITUDE))])
     )
 
 
@@ -72,6 +75,7 @@ def parts_of_errors(
     parts: dict[str, Comparison] = {}
     for position in dict.fromkeys(map(whole_of, names)):
         told, floors, known = _told(part, found, position)
+        between = _blur(part, told)
         for k, end in enumerate((PHASE, AMPLITUDE)):
             name = position + end
             if name not in names:
@@ -85,18 +89,22 @@ def parts_of_errors(
                 values=[row[k] for row in told],
                 exact=_nothing(known, told[0][k].shape) if known.any() else None,
                 order=_order(part, name),
-                floor=part.floor_of(name, scale * part.magnified),
+                floor=part.floor_of(name, scale * part.magnified) + MEASURED / BLAME * between[k],
                 scale=scale,
+                blur=between[k],
             )
     return parts
 
 
 def _order(part: Part, name: str) -> Floats:
-    """Return the order by which a part is rescaled: that of the first check which expects one, else the position's.
+    """Return the order by which a part is rescaled: the promised one where some check asks for the part.
 
-    A claim that is known to be false, and a check that is to fail, expect none.
+    Where theory promises none it is that of the first check which expects one, else the position's. A claim that is
+    known to be false, and a check that is to fail, expect none.
     """
-    order = formal_orders(part.experiment, name, part.columns).copy()
+    if is_promised(part.experiment, name) and name in asked(part.experiment):
+        return formal_orders(part.experiment, name, part.columns)
+    order = formal_orders(part.experiment, whole_of(name), part.columns).copy()
     for check in reversed(part.experiment.checks):
         inner = check.measured
         if inner.kind != "converges" or inner.converges != name or inner.order == "scheme":
@@ -138,6 +146,22 @@ def _told(
     rest, fastest = (_least(x, stride).reshape(part.shape) for x in (u, v))
     scale = found[position].scale
     return told, (scale / fastest, scale / rest), known
+
+
+def _blur(part: Part, told: list[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
+    """Return what phase and amplitude are off by between samples of the true motion, shape (scheme, case, level).
+
+    The quintic between two samples is off by ``(s (h - s))^3/720`` times the sixth derivative, s behind the one of them
+    (`vibsim.analysis.template`). That is known, and no order of magnitude as round-off is.
+    """
+    w = (2.0 * np.pi / np.broadcast_to(swing(part), part.shape))[..., None]
+    h = np.broadcast_to(part.grid.spacing, part.shape)[..., None]
+    off = []
+    for time, _ in told:
+        behind = np.mod(np.where(np.isfinite(time), time, 0.0), h)
+        off.append(np.max((w * behind) * (w * (h - behind)), axis=-1))
+    amplitude = np.stack(off, axis=-1) ** 3 / 720.0
+    return amplitude / w, amplitude
 
 
 def _is_known(q: Comparison, shape: tuple[int, ...]) -> Flags:

@@ -69,6 +69,8 @@ class Comparison:
     """Predicted round-off at one point, shape (scheme, case, level)."""
     scale: Floats
     """Size that round-off is relative to, shape (scheme, case)."""
+    blur: Floats | None = None
+    """What the measurement of the quantity is off by, rounding apart, shape (scheme, case, level); None for nothing."""
     judged: dict[tuple[str, str, float], Judgement] = field(default_factory=dict, repr=False)
     """Judgements made so far, by norm, order and tolerance."""
     _norms: dict[str, InNorm] = field(default_factory=dict, repr=False)

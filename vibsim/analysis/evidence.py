@@ -73,14 +73,18 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
     def in_norm(noise: Floats) -> Floats:
         return norm_of_floor(noise, norm, points, grid.spacing)
 
+    def by_level(noise: Floats) -> Floats:
+        return np.moveaxis(in_norm(np.moveaxis(noise, -1, 0)), 0, -1)
+
     steps = np.array(grid.steps, dtype=np.float64)
     worst = SPACING_AT_ONE * steps**2 * (q.scale * part.magnified)[..., None]
     return Evidence(
         levels=grid.levels,
         difference=measured.difference,
         scatter=measured.scatter,
-        floor=np.moveaxis(in_norm(np.moveaxis(q.floor, -1, 0)), 0, -1),
-        ceiling=np.moveaxis(in_norm(np.moveaxis(np.maximum(worst, q.floor), -1, 0)), 0, -1),
+        floor=by_level(q.floor),
+        ceiling=by_level(np.maximum(worst, q.floor)),
+        blur=None if q.blur is None else by_level(q.blur),
         order=np.broadcast_to(order, shape),
         tolerance=tolerance,
         error=measured.error,
@@ -88,7 +92,10 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
         numbers=q.are_numbers,
         size=in_norm(size),
         failed=part.failed,
-        applicable=(exists | np.any(part.failed, axis=-1)) & ~part.adaptive[:, None],
+        # where nothing oscillates, no order is promised of a part of an error
+        applicable=(exists | np.any(part.failed, axis=-1))
+        & ~part.adaptive[:, None]
+        & ~np.isnan(order),
         omega_dt=np.broadcast_to(part.fastest, (*shape, len(grid.levels))),
         stability_limit=np.broadcast_to(part.stability_limit, shape),
         growth=part.growth,

@@ -23,6 +23,8 @@ TINY = 1e-10
 """Differences of a scheme that is exact are no larger part of the solution."""
 VISIBLE = 1e4
 """An ordinary error, (w dt)^p at the coarsest level, this many times above the blamed floor would have been seen."""
+MEASURED = 2.0
+"""A difference may be laid to the measurement of a quantity up to so many times what that is known to be off by."""
 BLOWN_UP = 10.0
 """A solution so many times larger than the exact one has grown."""
 EXACT_ACCURACY = 1e-12
@@ -81,6 +83,8 @@ class Evidence:
     """Whether the series are single numbers: no more than two points count, shape (...)."""
     error_scatter: Floats | None = None
     """Signed scatter of the errors of successive levels, shape (..., n-1), of three levels; NaN where not known."""
+    blur: Floats | None = None
+    """How well the quantity itself is measured at every level, rounding apart, in the same norm, shape (..., n)."""
 
 
 def breakdown(e: Evidence, shape: tuple[int, ...]) -> tuple[Flags, Flags, Flags]:
@@ -130,8 +134,12 @@ def truly_exact(e: Evidence) -> Flags:
     if e.moved is not None:
         # without oscillations the run itself is the time in which something happens
         ordinary = ordinary * np.where(oscillates, 1.0, np.minimum(e.moved, 1.0))
-    tiny = np.all(e.difference <= TINY * e.size[..., None], axis=-1)
-    return np.asarray(at_round_off(e) & tiny & (ordinary >= VISIBLE * BLAME * e.relative_floor))
+    blur = np.zeros((*e.order.shape, len(e.levels))) if e.blur is None else e.blur
+    of_pairs = MEASURED * (blur[..., :-1] + blur[..., 1:])
+    tiny = np.all(e.difference <= TINY * e.size[..., None] + of_pairs, axis=-1)
+    seen = ordinary >= VISIBLE * BLAME * e.relative_floor
+    seen &= ordinary * e.size >= VISIBLE * blur[..., 0]
+    return np.asarray(at_round_off(e) & tiny & seen)
 
 
 def accuracy(e: Evidence) -> Floats:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vibsim import plan
 from vibsim.analysis.floor import relative_floor
+from vibsim.analysis.part_promise import is_promised, part_orders
 from vibsim.models import Model
 from vibsim.models.error_parts import whole_of
 from vibsim.record import Record
@@ -51,9 +52,12 @@ def options_of(experiment: Experiment, columns: Columns, scheme: int, case: int)
 def formal_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floats:
     """Return the order that every scheme promises for a quantity, shape (scheme, case).
 
-    It is infinite for what is exact, and NaN for a scheme that chooses its own steps; of a part of an error it is that
-    of the position. Where no option is swept there is one case for all, here and below.
+    It is infinite for what is exact, and NaN for a scheme that chooses its own steps. Of a part of an error it is what
+    theory says of it, and that of the position where it says nothing. Where no option is swept there is one case for
+    all, here and below, but of parts, which depend on every number of a member.
     """
+    if is_promised(experiment, quantity):
+        return part_orders(experiment, quantity, columns)
     model, of = experiment.model.definition, whole_of(quantity)
     return _each(experiment, columns, lambda s, o: float(s.formal_order(of, model, o)))
 

@@ -92,7 +92,7 @@ def _converges(check: ConvergesCheck, path: Path_, ladder: Ladder, report: Repor
     known_schemes(check.schemes, path, ladder, report)
     if is_error_part(check.converges):
         known_part(check.converges, (*path, "converges"), ladder, report)
-        promised_part(check, path, report)
+        promised_part(check, path, ladder, report)
     elif known_quantity(check.converges, (*path, "converges"), ladder, report):
         named = ((name, (*path, "schemes", i)) for i, name in enumerate(check.schemes or ()))
         has_quantity(check.converges, named, ladder, report)
