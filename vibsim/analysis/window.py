@@ -19,11 +19,9 @@ from vibsim.analysis.cut import LOG2, LOUD, QUIET, SHOWS, before_round_off, nois
 from vibsim.analysis.settling import (
     GROWS,
     HIDDEN,
-    JUMP,
     NEXT,
     PASSING,
     QUICK,
-    READABLE,
     SETTLED,
     SLOW,
     fades,
@@ -33,14 +31,13 @@ from vibsim.analysis.settling import (
     with_errors,
     with_nearest,
 )
-from vibsim.analysis.uneven import accidents
+from vibsim.analysis.tail import Tail, at, last_triples
+from vibsim.analysis.uneven import Uneven, accidents
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 
-AGREE = 0.01
-"""Two triples agree that have no more left besides one power."""
 SUSPECT = 1.0 / 3.0
 """From this part of what would be too much on, what grows is told as a lower power that may be hiding."""
 
@@ -140,86 +137,111 @@ def trend(
         noise = noise_share(difference, floor)
         possible = noise if ceiling is None else noise_share(difference, ceiling)
         clean = before_round_off(orders, scatter, difference, noise, possible, 1.0 / blame, numbers)
-        count = np.sum(clean, axis=-1)
-        last = np.maximum(count - 1, 0)
-        local, spread, rest = (_at(x, last) for x in (orders, scatter, noise))
-        several = (count > 1) & ~_starts_here(orders, scatter, last, rest)
-        before = np.where(several, _at(scatter, last - 1), 0.0)
-        change = np.where(several, local - _at(orders, last - 1), 0.0)
-        earlier = np.where(
-            several & (count > 2), _at(orders, last - 1) - _at(orders, last - 2), np.nan
-        )
-        earlier = np.where(_starts_before(before, change, earlier), np.nan, earlier)
-        tail, width = settling(np.abs(spread), np.abs(before), change, earlier, several)
-        width = np.maximum(width, np.minimum(rest, SHOWS * np.abs(spread)) / LOG2)
-        # what is so far away is not known to be reached
-        width = np.where(np.abs(tail) > tolerance, np.maximum(width, np.abs(tail)), width)
-        tail = np.where(np.abs(tail) > tolerance, 0.0, tail)
-        order = local + tail
-        beside = left(spread, before, change, earlier, tail)
-        fading = several & fades(beside, spread, before, tail, change * earlier > 0, tolerance)
-        # what round-off may have made does not tell of a lower power that grows
-        grown = several & (beside[0] > rest)
-        hiding = ~fading & (beside[0] > most_left(order, *beside, grown))
-        if vouched is not None:
-            hiding &= several | ~vouched
-        turned = several & np.signbit(before)
-        open_ = (
-            turned
-            | (beside[0] > SETTLED)
-            | np.signbit(spread)
-            | (~fading & (np.abs(change) > PASSING))
-        )
-        # where orders fall, a higher one is behind
-        falls = several & (change < 0) & ~np.signbit(spread) & ~turned
-        reach = width if of_errors is None else with_errors(width, local, of_errors, several)
-        unexplained = np.abs(spread) > 3 * rest
-        uneven = accidents(orders, scatter, last, several, tolerance)
-        order = np.where(uneven.found, uneven.mean, order)
-        width = np.where(uneven.found, uneven.width, width)
-        reach = np.where(uneven.found, uneven.width, reach)
-        open_ &= ~uneven.sure
-        falls &= ~uneven.found
-        suspect = SUSPECT * most_left(order, *beside, grown)
-        hiding |= ~fading & grown & (beside[0] > np.maximum(GROWS * beside[1], suspect))
-        hiding |= uneven.found & (beside[0] > SUSPECT * HIDDEN)
-        hiding &= ~uneven.sure
-        low = order - reach - np.where(open_ | hiding, NEXT, 0.0)
-        high = np.where(falls, np.maximum(order, local), order) + reach
-        high += np.where(open_ & ~falls, NEXT, 0.0)
-        low, high = with_nearest(order, low, high)
+        tail = last_triples(orders, scatter, clean, noise)
+        to_come, width = _settled(tail, tolerance)
+        beside = left(tail.spread, tail.before, tail.change, tail.earlier, to_come)
+        onward = tail.change * tail.earlier > 0
+        fading = tail.several & fades(beside, tail.spread, tail.before, to_come, onward, tolerance)
+        uneven = accidents(orders, scatter, tail.last, tail.several, tolerance)
+        limit = tail.local + to_come
+        order = np.where(uneven.found, uneven.mean, limit)
+        hiding = _hides(tail, limit, order, beside, fading, vouched, uneven)
+        open_ = _opens(tail, beside, fading) & ~uneven.sure
+        reach = width
+        if of_errors is not None:
+            reach = with_errors(width, tail.local, of_errors, tail.several)
+        reach, width = (np.where(uneven.found, uneven.width, x) for x in (reach, width))
+        low, high = _interval(tail, order, reach, open_, hiding, ~uneven.found)
+        size, change = np.abs(tail.spread), np.abs(tail.change)
         return Trend(
-            count=count,
-            first=_first(orders, order, np.maximum(width, tolerance), last),
-            last=last,
-            cut=count < orders.shape[-1],
+            count=tail.count,
+            first=_first(orders, order, np.maximum(width, tolerance), tail.last),
+            last=tail.last,
+            cut=tail.count < orders.shape[-1],
             order=order,
             width=width,
             low=low,
             high=high,
             open=open_,
-            local=local,
-            change=change,
-            scatter=spread,
-            scatter_before=np.abs(before),
-            drifting=several
-            & (np.abs(spread) > GROWS * np.abs(before))
-            & (np.abs(spread) > QUIET)
-            & unexplained,
-            alternating=_alternating(scatter, last, several, change, earlier, tolerance)
-            & ~uneven.found,
-            turning=(turned | ((np.abs(change) > np.abs(earlier)) & (np.abs(change) > 5 * QUIET)))
-            & ~uneven.found,
+            local=tail.local,
+            change=tail.change,
+            earlier=tail.earlier,
+            scatter=tail.spread,
+            scatter_before=np.abs(tail.before),
+            drifting=tail.several
+            & (size > GROWS * np.abs(tail.before))
+            & (size > np.maximum(QUIET, 3 * tail.noise)),
+            alternating=_alternating(scatter, tail, tolerance) & ~uneven.found,
+            turning=(_turned(tail) | _speeds_up(tail)) & ~uneven.found,
             gap=np.any(clean & np.isnan(orders), axis=-1),
-            noisy=np.abs(change) <= np.minimum(LOUD * rest, SHOWS * np.abs(spread)) / LOG2,
+            noisy=change <= np.minimum(LOUD * tail.noise, SHOWS * size) / LOG2,
             fading=fading,
-            noise=rest,
+            noise=tail.noise,
             hiding=hiding,
-            several=several,
+            several=tail.several,
             irregular=uneven.found,
-            earlier=earlier,
             slow=~(beside[0] <= np.maximum(QUICK * beside[1], SLOW)),
         )
+
+
+def _settled(tail: Tail, tolerance: float) -> tuple[Floats, Floats]:
+    """Return what the last order still lacks of its limit, and half the width of the interval of that limit."""
+    size = np.abs(tail.spread)
+    to_come, width = settling(size, np.abs(tail.before), tail.change, tail.earlier, tail.several)
+    width = np.maximum(width, np.minimum(tail.noise, SHOWS * size) / LOG2)
+    # what is so far away is not known to be reached
+    far = np.abs(to_come) > tolerance
+    return np.where(far, 0.0, to_come), np.where(far, np.maximum(width, np.abs(to_come)), width)
+
+
+def _turned(tail: Tail) -> Flags:
+    """Say where the differences have turned round at the triple before the last one."""
+    return tail.several & np.signbit(tail.before)
+
+
+def _speeds_up(tail: Tail) -> Flags:
+    """Say where the changes of the order grow."""
+    change = np.abs(tail.change)
+    return (change > np.abs(tail.earlier)) & (change > 5 * QUIET)
+
+
+def _opens(tail: Tail, beside: tuple[Floats, Floats], fading: Flags) -> Flags:
+    """Say where the orders have not settled."""
+    moves = ~fading & (np.abs(tail.change) > PASSING)
+    return _turned(tail) | (beside[0] > SETTLED) | np.signbit(tail.spread) | moves
+
+
+def _hides(
+    tail: Tail,
+    limit: Floats,
+    order: Floats,
+    beside: tuple[Floats, Floats],
+    fading: Flags,
+    vouched: Flags | None,
+    uneven: Uneven,
+) -> Flags:
+    """Say where a lower power may be hiding in what is left besides the first one."""
+    # what round-off may have made does not tell of a lower power that grows
+    grown = tail.several & (beside[0] > tail.noise)
+    hiding = ~fading & (beside[0] > most_left(limit, *beside, grown))
+    if vouched is not None:
+        hiding &= tail.several | ~vouched
+    suspect = SUSPECT * most_left(order, *beside, grown)
+    hiding |= ~fading & grown & (beside[0] > np.maximum(GROWS * beside[1], suspect))
+    hiding |= uneven.found & (beside[0] > SUSPECT * HIDDEN)
+    return np.asarray(hiding & ~uneven.sure)
+
+
+def _interval(
+    tail: Tail, order: Floats, reach: Floats, open_: Flags, hiding: Flags, trend: Flags
+) -> tuple[Floats, Floats]:
+    """Return the ends of the interval of the order; `trend`: whether the last change is more than an accident."""
+    # where orders fall, a higher one is behind
+    falls = trend & tail.several & (tail.change < 0) & ~np.signbit(tail.spread) & ~_turned(tail)
+    low = order - reach - np.where(open_ | hiding, NEXT, 0.0)
+    high = np.where(falls, np.maximum(order, tail.local), order) + reach
+    high += np.where(open_ & ~falls, NEXT, 0.0)
+    return with_nearest(order, low, high)
 
 
 def mismatches(t: Trend, p: Floats) -> tuple[Floats, Floats]:
@@ -228,37 +250,14 @@ def mismatches(t: Trend, p: Floats) -> tuple[Floats, Floats]:
     return now, np.hypot(t.scatter_before, LOG2 * (t.local - t.change - p))
 
 
-def _starts_here(orders: Floats, scatter: Floats, last: Integers, rest: Floats) -> Flags:
-    """Say where the window begins with the last triple: it is proportional, and the one before has another order.
-
-    A power that fades would have left more in the scatter than there is. The coarser levels are of another range:
-    they have blown up, or their errors are as large as the solution.
-    """
-    size = np.abs(_at(scatter, last))
-    jump = np.abs(_at(orders, last) - _at(orders, last - 1))
-    return (jump > JUMP) & (size <= HIDDEN) & (size > np.maximum(READABLE, 3 * rest))
-
-
-def _starts_before(before: Floats, change: Floats, earlier: Floats) -> Flags:
-    """Say where the window begins with the last triple but one: the last two agree, and the one before is far away."""
-    return (np.abs(earlier) > JUMP) & (np.hypot(before, LOG2 * change) <= AGREE)
-
-
-def _alternating(
-    scatter: Floats,
-    last: Integers,
-    several: Flags,
-    change: Floats,
-    earlier: Floats,
-    tolerance: float,
-) -> Flags:
+def _alternating(scatter: Floats, tail: Tail, tolerance: float) -> Flags:
     """Say where differences alternate in sign, or orders swing without settling."""
-    now = _at(scatter, last)
-    opposite = np.signbit(now)
-    signs = opposite & np.where(several, np.signbit(_at(scatter, last - 1)), now > -0.5)
-    swings = change * earlier < 0
-    wide = (np.abs(change) > tolerance) & (np.abs(change) > 0.5 * np.abs(earlier))
-    return signs | (swings & wide)
+    now = tail.spread
+    before = at(scatter, tail.last - 1)
+    signs = np.signbit(now) & np.where(tail.several, np.signbit(before), now > -0.5)
+    swings = tail.change * tail.earlier < 0
+    size = np.abs(tail.change)
+    return signs | (swings & (size > np.maximum(tolerance, 0.5 * np.abs(tail.earlier))))
 
 
 def _first(orders: Floats, order: Floats, reach: Floats, last: Integers) -> Integers:
@@ -267,8 +266,3 @@ def _first(orders: Floats, order: Floats, reach: Floats, last: Integers) -> Inte
     away = ~(np.abs(orders - order[..., None]) <= reach[..., None])
     away &= index < np.maximum(last - 1, 0)[..., None]
     return np.asarray(np.max(np.where(away, index + 1, 0), axis=-1))
-
-
-def _at(values: Floats, index: Integers) -> Floats:
-    """Return one entry of the last axis for each ladder; the first one for a negative index."""
-    return np.take_along_axis(values, np.maximum(index, 0)[..., None], axis=-1)[..., 0]
