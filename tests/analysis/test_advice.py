@@ -30,7 +30,7 @@ KINDS: dict[str, dict[str, Any]] = {
     "value": {"value": "period", "equals": 1.0},
     "best": {"value": "period", "equals": 1.0, "at": {"level": "best"}},
     "stable": {"stable": True},
-    "conserves": {"conserves": "energy"},
+    "conserves": {"conserves": "energy", "drift": "bounded"},
     "equal": {"equal": ["central", "exact"], "quantity": "theta"},
 }
 MAKES = {
