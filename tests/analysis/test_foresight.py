@@ -118,6 +118,34 @@ def test_an_order_that_theory_has_too_is_told_from_an_accident() -> None:
     assert "`order: scheme`" in found.advice or "`order: 4`" in found.advice
 
 
+def test_a_velocity_of_higher_order_than_its_position_is_no_matter_of_theory() -> None:
+    """From rest, the velocity of Euler-Cromer is of second order; its position, and the phase, of first."""
+    checks = [{"converges": "v"}, {"converges": "u"}]
+    time = {"end": 1.9, "base_steps": 32}
+    run = spring(["euler_cromer_u_first"], *checks, levels=range(6), time=time)
+    velocity, position = run.verdicts
+    assert (velocity.reason, position.status) == ("order_high", "PASS")
+    assert cause(run.record) == "one_quantity"
+    assert "vanishes in v" in velocity.text
+    assert "The phase of u is of first order" in velocity.text
+
+
+def test_what_is_not_known_of_every_state_is_not_told_of_it() -> None:
+    """The velocity of Euler-Cromer shows order 2 at levels where the position shows none yet."""
+    model = {"kind": "oscillator", "spring": "k*tanh(u)", "parameters": {"k": 3.11}}
+    (found,), record = judged(
+        {"converges": "v"},
+        model=model,
+        initial={"u": 0.781},
+        time={"end": 40.0, "base_steps": 3},
+        schemes=["euler_cromer_u_first"],
+        levels=[7, 8, 9],
+    )
+    assert found.reason == "order_high"
+    assert cause(record) == "none"
+    assert "every state" not in found.text
+
+
 def test_a_scheme_that_promises_less_is_named() -> None:
     model = {"kind": "oscillator", "damping": {"linear": 0.3}, "spring": "u"}
     (found,), _ = judged(

@@ -287,7 +287,7 @@ _WHY_HIGH = {
     ),
     "theory": " The theory of scheme {1} has that order on this linear model, too.",
     "one_norm": " In another norm than {2} the order is the expected one: errors cancel in this one.",
-    "one_quantity": " Another state has the expected order: the leading error vanishes in {0} alone.",
+    "one_quantity": " Another state has the expected order: the leading error vanishes in {0}, not in every state.",
     "everything": " It is so in every state and every norm.",
 }
 
