@@ -52,6 +52,34 @@ def test_the_predicted_number_of_levels_suffices(theta: float) -> None:
     pytest.fail("no ladder was too coarse")
 
 
+def test_levels_are_predicted_towards_the_order_that_the_scheme_has() -> None:
+    """An order of 3 is asked of a scheme of order 2, which shows 2.00: one level more decides, and not those to 3."""
+    check = {"converges": "theta", "order": 3}
+    scheme = {"kind": "euler_cromer", "start": "centred"}
+    run = {"initial": {"theta": 0.8}, "time": {"end": 5.0}, "schemes": [scheme]}
+    (found,), record = judged(check, **run, levels=[6, 7, 8])
+    assert found.reason == "pre_asymptotic"
+    assert int(record["check_more"][0, 0, 0]) == 1
+    (then,), _ = judged(check, **run, levels=[6, 7, 8, 9])
+    assert then.reason == "order_low"
+
+
+def test_levels_that_have_nothing_to_do_with_the_solution_predict_nothing() -> None:
+    """Adams-Bashforth with long steps grows beyond all bounds: the differences fall like dt^36."""
+    model = {"kind": "spring", "w": 4.398}
+    (found,), record = judged(
+        {"converges": "u"},
+        model=model,
+        initial={"u": 0.928, "v": -1.09},
+        time={"end": 24.39},
+        schemes=["ab2"],
+        levels=[6, 7, 8],
+    )
+    assert found.reason == "pre_asymptotic"
+    assert int(record["check_more"][0, 0, 0]) == -1
+    assert "cannot be told yet" in found.advice
+
+
 def test_of_a_verdict_that_is_settled_nothing_is_predicted() -> None:
     (found,), record = judged(levels=[6, 7, 8, 9])
     assert found.status == "PASS"

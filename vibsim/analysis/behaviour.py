@@ -98,7 +98,9 @@ def stable(experiment: Experiment, record: Record, check: StableCheck, index: in
         name = experiment.schemes[scheme].name
         unstable = reason[scheme, case] != MATCH
         word = "unstable" if unstable else "stable"
-        told = f"Scheme {name} is {word} at level {level}, w dt = {p[scheme, case]:.4g}"
+        told = f"Scheme {name} is {word} at level {level}"
+        if np.isfinite(p[scheme, case]):
+            told += f", w dt = {p[scheme, case]:.4g}"
         factors = float(expected[scheme, case]), float(measured[scheme, case])
         told += growth_in_words(*factors)
         if not unstable and never[scheme, case]:

@@ -23,6 +23,8 @@ class Corner:
     """Whether it is a jump at a grid point, not within a step."""
 
 
+HIGHEST = 12.0
+"""An estimate above is the order of no scheme."""
 ALIKE = 0.15
 """Two levels fail at one time that fail within this part of it: the finer one sees it at most a step earlier."""
 
@@ -202,8 +204,24 @@ def tell(s: Story) -> str:
             )
         case "not_applicable":
             return f"{s.quantity} does not exist here, so there is nothing to judge."
+    return f"{_too_coarse(s, measured)}{s.parts}"
+
+
+def _too_coarse(s: Story, measured: str) -> str:
+    """Say that levels show no order yet; where it is none that an expansion has, what they show instead."""
+    if s.order <= 0.0:
+        return (
+            f"The differences of {s.quantity} grow from level to level ({measured}): the step is still too coarse to "
+            f"tell an order, or level {s.last} is not of one kind with those before it."
+        )
+    if s.order > HIGHEST:
+        return (
+            f"The step is still too coarse to tell the order of {s.quantity}: its differences fall faster on levels "
+            f"{s.first} to {s.last} than those of any power of dt, as where the coarser ones have nothing to do with "
+            "the solution."
+        )
     so_far = f": the last estimate is {measured}" if measured else ""
-    return f"The step is still too coarse to tell the order of {s.quantity}{so_far}.{s.parts}"
+    return f"The step is still too coarse to tell the order of {s.quantity}{so_far}."
 
 
 def _place_of_failure(s: Story) -> str:
