@@ -82,6 +82,7 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
         floor=np.moveaxis(in_norm(np.moveaxis(q.floor, -1, 0)), 0, -1),
         ceiling=np.moveaxis(in_norm(np.moveaxis(np.maximum(worst, q.floor), -1, 0)), 0, -1),
         order=np.broadcast_to(order, shape),
+        promised=np.broadcast_to(q.order, shape),
         tolerance=tolerance,
         error=measured.error,
         error_scatter=measured.error_scatter,
