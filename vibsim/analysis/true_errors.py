@@ -34,14 +34,18 @@ LEAST_ORDER = 0.25
 def errors_leave(e: Evidence, t: Trend, p: Floats) -> Flags:
     """Say where the true errors move away from h^p over the last levels of the window.
 
-    They show a lower power before the differences do, which are steeper.
+    They show a lower power before the differences do, which are steeper. Errors that stay, larger than the differences
+    allow, show none: the limit is another one.
     """
-    if e.error is None or len(e.levels) < 4:
+    if e.error is None:
         return np.zeros(p.shape, dtype=bool)
     found = error_orders(e)
     last, before = (np.abs(pick(found, t.last + 1 - back) - p) for back in (0, 1))
     known = pick(e.error, t.last + 2) > accuracy(e)
-    return np.asarray(known & (last > LEAVES) & (last > GROWS * before))
+    stays = contradicts(e, t)[0]
+    if len(e.levels) > 3:
+        stays = stays & errors_stay(e, t)
+    return np.asarray(known & (last > LEAVES) & (last > GROWS * before) & ~stays)
 
 
 def errors_vouch(e: Evidence, p: Floats) -> Flags:

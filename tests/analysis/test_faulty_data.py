@@ -1,0 +1,49 @@
+"""Data of programs that are wrong, judged by the experiment that they should have been made by."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from vibsim import Experiment, Verdict, analyse, simulate, verdicts
+
+
+def spring(w: float, levels: tuple[int, ...]) -> dict[str, Any]:
+    return {
+        "title": "test",
+        "model": {"kind": "spring", "w": w},
+        "initial": {"u": 1.0},
+        "time": {"end": 10.0},
+        "levels": list(levels),
+        "schemes": ["central"],
+        "samples": "all",
+        "checks": [{"converges": "u", "order": 2}],
+    }
+
+
+def judged(meant: dict[str, Any], made: dict[str, Any]) -> Verdict:
+    """Judge by one experiment the states that another one computes."""
+    right, wrong = Experiment.from_dict(meant), Experiment.from_dict(made)
+    levels = []
+    for level in right.levels:
+        data, faulty = simulate(right, level).copy(deep=True), simulate(wrong, level)
+        for name in ("u", "v"):
+            data[name] = (data[name].dims, faulty[name].values, data[name].attrs)
+        levels.append(data)
+    (found,) = verdicts(right, analyse(right, levels))
+    return found
+
+
+@pytest.mark.parametrize("levels", [(6, 7, 8), (6, 7, 8, 9), (6, 7, 8, 9, 10, 11)])
+@pytest.mark.parametrize("w", [1.701, 1.71, 1.8])
+def test_a_wrong_frequency_is_a_wrong_limit(w: float, levels: tuple[int, ...]) -> None:
+    """The error that stays is 0.01 and more; at the finest level that of the scheme is 5e-5 to 3e-3."""
+    found = judged(spring(1.7, levels), spring(w, levels))
+    assert found.reason == "wrong_limit"
+
+
+def test_an_error_that_stays_is_seen_in_three_levels() -> None:
+    """What stays is a third of the error at the finest level: a tenth would spoil an order."""
+    found = judged(spring(1.7, (6, 7, 8)), spring(1.7001, (6, 7, 8)))
+    assert found.status == "INCONCLUSIVE"
