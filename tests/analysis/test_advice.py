@@ -227,6 +227,8 @@ def test_what_is_no_order_is_not_told_as_one() -> None:
     growing = tell(story(reason="pre_asymptotic", order=-4.4, low=math.nan, high=math.nan))
     assert "grow from level to level" in growing
     assert "level 7 is not of one kind" in growing
+    noise = tell(story(reason="round_off", order=-1.7, low=math.nan, high=math.nan))
+    assert "order" not in noise
     blown_up = tell(story(reason="pre_asymptotic", order=36.2, low=math.nan, high=math.nan))
     assert "36" not in blown_up
     assert "faster on levels 4 to 7" in blown_up

@@ -80,6 +80,26 @@ def test_levels_that_have_nothing_to_do_with_the_solution_predict_nothing() -> N
     assert "cannot be told yet" in found.advice
 
 
+def test_noise_that_grows_predicts_by_the_order_of_the_scheme() -> None:
+    """Gauss' method is exact on the solution 2 + t, near which rounding grows: an order of -1.7 reaches no level 40."""
+    model = {
+        "kind": "oscillator",
+        "spring": "sin(u)",
+        "damping": {"linear": 0.2},
+        "exact": "2+t",
+    }
+    (found,), record = judged(
+        {"converges": "u"},
+        model=model,
+        initial={},
+        time={"end": 40.0, "base_steps": 7},
+        schemes=["gauss4"],
+        levels=[9, 10, 11, 12],
+    )
+    assert found.reason == "round_off"
+    assert int(record["check_readable"][0, 0, 0]) < 15
+
+
 def test_of_a_verdict_that_is_settled_nothing_is_predicted() -> None:
     (found,), record = judged(levels=[6, 7, 8, 9])
     assert found.status == "PASS"

@@ -21,7 +21,7 @@ from vibsim.analysis.compare import Comparison
 from vibsim.analysis.evidence import evidence
 from vibsim.analysis.limits import LOUD, ORDINARY
 from vibsim.analysis.promise import even_powers, relative_floors
-from vibsim.analysis.rules import MOST_ABOVE
+from vibsim.analysis.rules import LEAST_CANDIDATE, MOST_ABOVE
 from vibsim.analysis.verdict import Judgement
 from vibsim.vocabulary import REASON_NAMES
 
@@ -105,7 +105,9 @@ def finest_readable(
     shape = judged.reason.shape
     found = np.full(shape, UNKNOWN, dtype=np.int8)
     lost = judged.reason == REASON_NAMES.index("round_off")
-    p = np.where(np.isfinite(judged.order), judged.order, np.broadcast_to(order, shape))
+    with np.errstate(invalid="ignore"):
+        shown = judged.order >= LEAST_CANDIDATE
+    p = np.where(shown, judged.order, np.broadcast_to(order, shape))
     lost &= np.isfinite(p)
     if not np.any(lost):
         return found

@@ -167,7 +167,7 @@ def tell(s: Story) -> str:
         case "non_finite":
             return f"The calculation of {s.quantity} met a number that is not finite{_place_of_failure(s)}."
         case "round_off":
-            kept = f"; before it, {measured} is all that is left" if measured else ""
+            kept = f"; before it, {measured} is all that is left" if s.order > 0.0 else ""
             return (
                 f"The differences of {s.quantity} have reached the floor of round-off, where they say "
                 f"nothing about the scheme{kept}."
