@@ -94,6 +94,8 @@ def stable(experiment: Experiment, record: Record, check: StableCheck, index: in
     limits = record["stability_limit"] if "stability_limit" in record else np.zeros(reason.shape)
     never = np.broadcast_to(np.asarray(limits) == 0.0, reason.shape)
 
+    model = experiment.model.definition
+
     def tell(scheme: int, case: int) -> str:
         name = experiment.schemes[scheme].name
         unstable = reason[scheme, case] != MATCH
@@ -102,7 +104,7 @@ def stable(experiment: Experiment, record: Record, check: StableCheck, index: in
         if np.isfinite(p[scheme, case]):
             told += f", w dt = {p[scheme, case]:.4g}"
         factors = float(expected[scheme, case]), float(measured[scheme, case])
-        told += growth_in_words(*factors)
+        told += growth_in_words(*factors, is_simple=model.conservative)
         if not unstable and never[scheme, case]:
             told += vanishing_in_words(*factors)
         if record["status"][scheme, case, _place(record, level)]:

@@ -118,11 +118,15 @@ def vanishing_in_words(predicted: float, measured: float) -> str:
     return f"; it grows {much} per period, which vanishes with dt"
 
 
-def growth_in_words(predicted: float, measured: float) -> str:
-    """Say what growth theory predicts and what was measured; empty where neither is known."""
+def growth_in_words(predicted: float, measured: float, is_simple: bool = True) -> str:
+    """Say what growth theory predicts and what was measured; empty where neither is known.
+
+    The theory is of free linear oscillations without damping: of another model (not `is_simple`) that is said.
+    """
+    theory = "predicted" if is_simple else "predicted of free oscillations without damping"
     told = [
         f"{factor_in_words(value)} {word}"
-        for value, word in ((predicted, "predicted"), (measured, "measured"))
+        for value, word in ((predicted, theory), (measured, "measured"))
         if not math.isnan(value)
     ]
     return f": growth factor per period {', '.join(told)}" if told else ""
