@@ -69,3 +69,21 @@ def test_an_event_on_the_mesh_is_no_wrong_limit() -> None:
     assert judged(right, right).reason == "non_smooth"
     wrong = judged(ball(1.713, (4, 5, 6, 7, 8)), ball(1.9, (4, 5, 6, 7, 8)))
     assert wrong.status != "PASS"
+
+
+def test_what_no_level_can_tell_is_said() -> None:
+    """Nothing is known of friction with a spring of its own: 1 % more of it is another motion, and looks as good."""
+    data = {
+        "title": "test",
+        "model": {"kind": "sliding_box", "alpha": 0.5, "mu": 0.1},
+        "initial": {"u": 2.0},
+        "time": {"end": 10.0},
+        "levels": [7, 8, 9, 10],
+        "schemes": ["rk2"],
+        "samples": "all",
+        "checks": [{"converges": "u"}],
+    }
+    found = judged(data, {**data, "model": {"kind": "sliding_box", "alpha": 0.5, "mu": 0.101}})
+    assert found.status == "PASS"
+    assert "a wrong limit would not be noticed" in found.text
+    assert "noticed" not in judged(spring(1.7, (6, 7, 8, 9)), spring(1.7, (6, 7, 8, 9))).text

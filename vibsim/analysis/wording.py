@@ -77,6 +77,8 @@ class Story:
     """... and the same in compensated arithmetic."""
     cost: Callable[[Sequence[int]], str] = lambda levels: ""
     """What levels cost, in words."""
+    has_exact: bool = True
+    """Whether an exact solution or a reference is known, which alone shows a wrong limit."""
     failures: tuple[float, ...] = ()
     """When each level met a number that is not finite, in its first step at 0; NaN where it did not."""
 
@@ -151,12 +153,12 @@ def tell(s: Story) -> str:
         case "asymptotic":
             return (
                 f"{s.quantity} converges with {measured}, as promised ({promised}): the rescaled "
-                "differences coincide."
+                f"differences coincide.{_unseen(s)}"
             )
         case "exact":
             return (
                 f"{s.quantity} is exact: the levels differ by round-off only, so there is no order "
-                "to measure."
+                f"to measure.{_unseen(s)}"
             )
         case "order_low" | "order_high":
             word = "slower" if s.reason == "order_low" else "faster"
@@ -209,6 +211,15 @@ def tell(s: Story) -> str:
         case "not_applicable":
             return f"{s.quantity} does not exist here, so there is nothing to judge."
     return f"{_too_coarse(s, measured)}{s.parts}"
+
+
+def _unseen(s: Story) -> str:
+    """Say what levels that approach each other do not tell."""
+    if s.has_exact:
+        return ""
+    return (
+        " No exact solution is known to compare with, so that a wrong limit would not be noticed."
+    )
 
 
 def _too_coarse(s: Story, measured: str) -> str:
