@@ -18,7 +18,7 @@ from vibsim import Experiment, analyse, simulate
 from vibsim.analysis import analyse_records, verdicts
 from vibsim.analysis.advice import advise
 from vibsim.analysis.causes import CAUSES
-from vibsim.analysis.wording import Story, tell
+from vibsim.analysis.wording import Corner, Story, tell
 from vibsim.record import Record, Variable
 from vibsim.spec.checks import MEASURED
 from vibsim.vocabulary import DRIFTS, REASON_NAMES, REASONS, STATUSES
@@ -30,7 +30,7 @@ KINDS: dict[str, dict[str, Any]] = {
     "value": {"value": "period", "equals": 1.0},
     "best": {"value": "period", "equals": 1.0, "at": {"level": "best"}},
     "stable": {"stable": True},
-    "conserves": {"conserves": "energy"},
+    "conserves": {"conserves": "energy", "drift": "bounded"},
     "equal": {"equal": ["central", "exact"], "quantity": "theta"},
 }
 MAKES = {
@@ -205,6 +205,33 @@ def test_what_is_predicted_is_told_with_its_cost() -> None:
     assert "such as 3 to 6" in advise(noise)
     assert "central" in advise(story(promised=1.0, kind="central_backward_damping"))
     assert "backward" in tell(story(promised=1.0, kind="central_backward_damping"))
+
+
+def test_levels_finer_than_those_of_the_ladder_are_not_called_coarser() -> None:
+    """Noise above what rounding can make: by the prediction an order could be read beyond the finest level."""
+    text = advise(story(reason="round_off", order=math.nan, last=-1, readable=9))
+    assert "such as" not in text
+    assert "below 7" in text
+    assert_specific(text)
+
+
+def test_a_scheme_of_an_order_is_not_asked_for_where_it_is_one() -> None:
+    corner = Corner("the force changes", 0.5, 1.0)
+    high = advise(story(reason="non_smooth", corner=corner))
+    assert "or take a scheme (`schemes:`) of order 1." in high
+    low = advise(story(reason="non_smooth", corner=corner, promised=1.0, expected=1.0))
+    assert low == "End the time interval (`time: end`) before t = 0.5, where order 1 can be seen."
+
+
+def test_what_is_no_order_is_not_told_as_one() -> None:
+    growing = tell(story(reason="pre_asymptotic", order=-4.4, low=math.nan, high=math.nan))
+    assert "grow from level to level" in growing
+    assert "level 7 is not of one kind" in growing
+    noise = tell(story(reason="round_off", order=-1.7, low=math.nan, high=math.nan))
+    assert "order" not in noise
+    blown_up = tell(story(reason="pre_asymptotic", order=36.2, low=math.nan, high=math.nan))
+    assert "36" not in blown_up
+    assert "faster on levels 4 to 7" in blown_up
 
 
 def test_no_kind_of_check_is_left_out() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -85,6 +86,23 @@ def test_advice_on_stability_points_the_right_way() -> None:
     assert "coarser" in stable.advice
     assert "finer" not in stable.advice
     assert "finer" in unstable.advice
+
+
+def test_a_tolerance_that_is_advised_suffices() -> None:
+    check = {"equal": ["central", "exact"], "quantity": "u"}
+    for u in (1.0, 1.3, 1.7, 2.1, 2.3):
+        verdict = spring(["central"], check, initial={"u": u}).verdicts[0]
+        advised = float(re.findall(r"`atol:` above ([0-9.e+-]+)", verdict.advice)[0])
+        loose = {**check, "atol": advised}
+        assert spring(["central"], loose, initial={"u": u}).verdicts[0].status == "PASS"
+        assert advised < 1.15 * float(verdict.results[0].value or 0.0)
+
+
+def test_growth_that_theory_predicts_without_damping_is_said_to_be_so() -> None:
+    model = {"kind": "oscillator", "damping": {"linear": 0.2}, "spring": "40*u"}
+    told = spring(["rk4"], {"stable": True}, model=model).verdicts[0].text
+    assert "predicted of free oscillations without damping, 0.9" in told
+    assert "without damping" not in spring(["rk4"], {"stable": True}).verdicts[0].text
 
 
 def test_the_result_nearest_to_what_is_allowed_decides() -> None:

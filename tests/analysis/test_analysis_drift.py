@@ -146,6 +146,28 @@ def test_what_cannot_be_named_is_unclear() -> None:
     assert kind_of(broken)[0] == "unclear"
 
 
+def test_an_overflow_of_one_member_is_no_warning() -> None:
+    running = np.stack([1e-3 * S, np.where(S > 0.5, np.inf, 1e-3 * S)])[None]
+    ones = np.ones((1, 2))
+    found = drift_of(running, 1.0 + running, ones, 1e-15 * ones, np.array([PERIODS, PERIODS]))
+    assert [DRIFTS[int(code)] for code in found.kind[0]] == ["linear", "unclear"]
+
+
+def test_an_error_above_round_off_is_not_none_however_short_the_run() -> None:
+    checks = [{"conserves": "energy", "drift": drift} for drift in ("none", "bounded")]
+    none, bounded = spring(["central"], *checks, time={"end": 1.0, "base_steps": 40}).verdicts
+    assert (none.status, none.reason) == ("FAIL", "mismatch")
+    assert "more than round-off" in none.text
+    assert (bounded.status, bounded.reason) == ("INCONCLUSIVE", "pre_asymptotic")
+
+
+def test_an_energy_that_is_conserved_better_than_asked_for_needs_no_better_scheme() -> None:
+    check = {"conserves": "energy", "drift": "linear"}
+    (verdict,) = spring(["crank_nicolson"], check).verdicts
+    assert verdict.status == "FAIL"
+    assert verdict.advice.startswith("Set `drift: none`, which was measured")
+
+
 KINDS = {
     "central": "bounded",
     "rk4": "linear",

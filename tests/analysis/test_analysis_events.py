@@ -112,3 +112,20 @@ def test_the_treatment_of_events_can_be_swept_on_a_scheme_without_other_words() 
     assert record["schemes_rk4_events"].values.tolist() == ["located"] * 2 + ["mesh"] * 2
     (verdict,) = verdicts(made, record)
     assert verdict.status == "PASS"
+
+
+def test_a_motion_without_a_frequency_is_told_without_one() -> None:
+    experiment = Experiment.from_dict(
+        {
+            "title": "test",
+            "model": {"kind": "bouncing_ball"},
+            "initial": {"h": 1.0},
+            "time": {"end": 4.0},
+            "levels": [6],
+            "schemes": ["rk4"],
+            "checks": [{"stable": True}],
+        }
+    )
+    (verdict,) = verdicts(experiment, analyse(experiment, [simulate(experiment, 6)]))
+    assert verdict.status == "PASS"
+    assert "nan" not in verdict.text

@@ -52,6 +52,54 @@ def test_the_predicted_number_of_levels_suffices(theta: float) -> None:
     pytest.fail("no ladder was too coarse")
 
 
+def test_levels_are_predicted_towards_the_order_that_the_scheme_has() -> None:
+    """An order of 3 is asked of a scheme of order 2, which shows 2.00: one level more decides, and not those to 3."""
+    check = {"converges": "theta", "order": 3}
+    scheme = {"kind": "euler_cromer", "start": "centred"}
+    run = {"initial": {"theta": 0.8}, "time": {"end": 5.0}, "schemes": [scheme]}
+    (found,), record = judged(check, **run, levels=[6, 7, 8])
+    assert found.reason == "pre_asymptotic"
+    assert int(record["check_more"][0, 0, 0]) == 1
+    (then,), _ = judged(check, **run, levels=[6, 7, 8, 9])
+    assert then.reason == "order_low"
+
+
+def test_levels_that_have_nothing_to_do_with_the_solution_predict_nothing() -> None:
+    """Adams-Bashforth with long steps grows beyond all bounds: the differences fall like dt^36."""
+    model = {"kind": "spring", "w": 4.398}
+    (found,), record = judged(
+        {"converges": "u"},
+        model=model,
+        initial={"u": 0.928, "v": -1.09},
+        time={"end": 24.39},
+        schemes=["ab2"],
+        levels=[6, 7, 8],
+    )
+    assert found.reason == "pre_asymptotic"
+    assert int(record["check_more"][0, 0, 0]) == -1
+    assert "cannot be told yet" in found.advice
+
+
+def test_noise_that_grows_predicts_by_the_order_of_the_scheme() -> None:
+    """Gauss' method is exact on the solution 2 + t, near which rounding grows: an order of -1.7 reaches no level 40."""
+    model = {
+        "kind": "oscillator",
+        "spring": "sin(u)",
+        "damping": {"linear": 0.2},
+        "exact": "2+t",
+    }
+    (found,), record = judged(
+        {"converges": "u"},
+        model=model,
+        initial={},
+        time={"end": 40.0, "base_steps": 7},
+        schemes=["gauss4"],
+        levels=[9, 10, 11, 12],
+    )
+    assert found.reason == "round_off"
+    assert int(record["check_readable"][0, 0, 0]) < 15
+
+
 def test_of_a_verdict_that_is_settled_nothing_is_predicted() -> None:
     (found,), record = judged(levels=[6, 7, 8, 9])
     assert found.status == "PASS"
@@ -116,6 +164,34 @@ def test_an_order_that_theory_has_too_is_told_from_an_accident() -> None:
     assert found.reason == "order_high"
     assert cause(run.record) == "theory"
     assert "`order: scheme`" in found.advice or "`order: 4`" in found.advice
+
+
+def test_a_velocity_of_higher_order_than_its_position_is_no_matter_of_theory() -> None:
+    """From rest, the velocity of Euler-Cromer is of second order; its position, and the phase, of first."""
+    checks = [{"converges": "v"}, {"converges": "u"}]
+    time = {"end": 1.9, "base_steps": 32}
+    run = spring(["euler_cromer_u_first"], *checks, levels=range(6), time=time)
+    velocity, position = run.verdicts
+    assert (velocity.reason, position.status) == ("order_high", "PASS")
+    assert cause(run.record) == "one_quantity"
+    assert "vanishes in v" in velocity.text
+    assert "The phase of u is of first order" in velocity.text
+
+
+def test_what_is_not_known_of_every_state_is_not_told_of_it() -> None:
+    """The velocity of Euler-Cromer shows order 2 at levels where the position shows none yet."""
+    model = {"kind": "oscillator", "spring": "k*tanh(u)", "parameters": {"k": 3.11}}
+    (found,), record = judged(
+        {"converges": "v"},
+        model=model,
+        initial={"u": 0.781},
+        time={"end": 40.0, "base_steps": 3},
+        schemes=["euler_cromer_u_first"],
+        levels=[7, 8, 9],
+    )
+    assert found.reason == "order_high"
+    assert cause(record) == "none"
+    assert "every state" not in found.text
 
 
 def test_a_scheme_that_promises_less_is_named() -> None:

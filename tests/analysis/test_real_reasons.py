@@ -108,6 +108,14 @@ LADDERS = {
         ("PASS", "asymptotic"),
         ("order 3.99", "on levels 6 to 11"),
     ),
+    "a lower order asked for than the scheme has, in round-off": Ladder(
+        {**SPRING, "time": {"end": 10.0, "base_steps": 7}},
+        "pefrl",
+        (9, 10, 11, 12),
+        {"converges": "u", "order": 2},
+        ("INCONCLUSIVE", "round_off"),
+        ("floor of round-off",),
+    ),
     "Dt = pi/w": Ladder(
         {**SPRING, "time": {"end": 16 * math.pi}, "samples": {"every": 16}},
         "central",

@@ -37,7 +37,7 @@ def advise(s: Story) -> str:
         case "non_smooth" if s.corner:
             return (
                 f"End the time interval (`time: end`) before t = {s.corner.time:.4g}, where order {number(s.expected)} "
-                f"can be seen, or take a scheme (`schemes:`) of order {_below(s.corner)}."
+                f"can be seen{_or_lower(s, s.corner)}."
             )
         case "order_low":
             return _on_low_order(s)
@@ -83,8 +83,13 @@ def advise(s: Story) -> str:
     return _on_coarse_levels(s)
 
 
-def _below(corner: Corner) -> str:
-    return f"{number(corner.power - 1.0)} at most" if corner.power > 1.0 else "1"
+def _or_lower(s: Story, corner: Corner) -> str:
+    """Ask for a scheme of an order that the corner leaves regular; for none where the scheme is one."""
+    most = max(corner.power - 1.0, 1.0)
+    if s.promised <= most:
+        return ""
+    at_most = " at most" if corner.power > 1.0 else ""
+    return f", or take a scheme (`schemes:`) of order {number(most)}{at_most}"
 
 
 def _on_low_order(s: Story) -> str:
@@ -143,6 +148,12 @@ def _readable(s: Story) -> str:
     if s.readable < 2:
         last = s.levels[0] if s.last < 0 else s.last
         return f"Use coarser `levels:`, below {max(last, 1)}, or a longer `time: end`"
+    if s.readable >= s.levels[-1]:
+        last = s.levels[-1] if s.last < 0 else s.last
+        return (
+            f"Use coarser `levels:`, below {max(last, 1)}, and look for what is rougher than rounding in `model:` and "
+            f"`schemes:`: that alone would leave an order up to level {s.readable}"
+        )
     first = max(s.readable - 3, 0)
     return f"Use coarser `levels:`, such as {first} to {s.readable}: finer ones are round-off"
 

@@ -42,13 +42,17 @@ def stable(experiment: Experiment, record: Record, check: StableCheck, index: in
     limits = record["stability_limit"] if "stability_limit" in record else np.zeros(reason.shape)
     never = np.broadcast_to(np.asarray(limits) == 0.0, reason.shape)
 
+    model = experiment.model.definition
+
     def tell(scheme: int, case: int) -> str:
         name = experiment.schemes[scheme].name
         unstable = reason[scheme, case] != MATCH
         word = "unstable" if unstable else "stable"
-        told = f"Scheme {name} is {word} at level {level}, w dt = {p[scheme, case]:.4g}"
+        told = f"Scheme {name} is {word} at level {level}"
+        if np.isfinite(p[scheme, case]):
+            told += f", w dt = {p[scheme, case]:.4g}"
         factors = float(expected[scheme, case]), float(measured[scheme, case])
-        told += growth_in_words(*factors)
+        told += growth_in_words(*factors, is_simple=model.conservative)
         if not unstable and never[scheme, case]:
             told += vanishing_in_words(*factors)
         if record["status"][scheme, case, _place(record, level)]:
@@ -95,10 +99,12 @@ def conserves(experiment: Experiment, record: Record, check: ConservesCheck, ind
     if check.drift == "bounded":
         # what is conserved is bounded too
         wanted.add(DRIFTS.index("none"))
+    unclear = kind == DRIFTS.index("unclear")
     masks = [
         (broken, NON_FINITE),
-        (np.isnan(largest) & (kind == DRIFTS.index("unclear")), NOT_APPLICABLE),
-        (kind == DRIFTS.index("unclear"), PRE_ASYMPTOTIC),
+        (np.isnan(largest) & unclear, NOT_APPLICABLE),
+        # an error above round-off is not none, however short the run
+        (unclear & (check.drift != "none"), PRE_ASYMPTOTIC),
         (np.isin(kind, list(wanted)), MATCH),
     ]
     reason = np.select([mask for mask, _ in masks], [code for _, code in masks], MISMATCH)
@@ -123,7 +129,9 @@ def conserves(experiment: Experiment, record: Record, check: ConservesCheck, ind
 
     def advise(scheme: int, case: int) -> str:
         found = DRIFTS[int(kind[scheme, case])]
-        return on_drift(REASON_NAMES[int(reason[scheme, case])], found, check.conserves)
+        return on_drift(
+            REASON_NAMES[int(reason[scheme, case])], found, check.conserves, check.drift
+        )
 
     return _valued(experiment, record, check, reason, largest, check.drift, tell, largest, advise)
 
@@ -134,7 +142,7 @@ _DRIFT_WORDS = {
     "linear": "grows in proportion to the time",
     "quadratic": "grows in proportion to the square of the time",
     "exponential": "grows exponentially with time",
-    "unclear": "grows in a way that this run is too short to name",
+    "unclear": "is more than round-off, and grows in a way that this run does not show",
 }
 _RATES = {
     "linear": "by {:.4g} of the energy per period",

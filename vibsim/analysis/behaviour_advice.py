@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from decimal import Decimal
 from typing import TYPE_CHECKING, get_args
 
 from vibsim.analysis.wording import number
@@ -38,12 +39,20 @@ def on_stability(reason: str, level: int, p: float, limit: float) -> str:
     return f"Take finer `levels:`, from {first} on (w dt within the limit {number(limit)}), or correct `stable:`."
 
 
-def on_drift(reason: str, drift: str, quantity: str) -> str:
-    """Say what to change where the energy does not drift as a check expects."""
+def on_drift(reason: str, drift: str, quantity: str, expected: str) -> str:
+    """Say what to change where the energy does not drift as a check expects.
+
+    Parameters
+    ----------
+    drift, expected
+        The kind of drift that was measured, and the one that the check asks for.
+    """
     if reason == "not_applicable":
         return f"Name `schemes:` that have {quantity}, or ask for `conserves: energy`."
     if reason == "pre_asymptotic":
         return "Lengthen the run (`time: end`), or store more of it (`samples: all`): it is too short to show a drift."
+    if drift in KNOWN_DRIFTS and KNOWN_DRIFTS.index(drift) < KNOWN_DRIFTS.index(expected):
+        return f"Set `drift: {drift}`, which was measured: the energy is conserved better than the check asks for."
     other = (
         f"set `drift: {drift}`, which was measured"
         if drift in KNOWN_DRIFTS
@@ -58,10 +67,19 @@ def on_drift(reason: str, drift: str, quantity: str) -> str:
 def on_distance(reason: str, check: EqualCheck, distance: float) -> str:
     """Say what to change where two solutions are not as near to each other as a check expects."""
     if reason == "not_applicable" and math.isfinite(distance):
-        return f"Give `atol:`, above {distance:.2g} if so much is right."
+        return f"Give `atol:`, above {_above(distance)} if so much is right."
     if reason == "not_applicable":
         return "Name in `equal:` a scheme or a solution that exists here, or another `quantity:`."
-    loose = f"give `atol:` above {distance:.2g} if so much is right"
+    loose = f"give `atol:` above {_above(distance)} if so much is right"
     if check.second in SOLUTIONS:
         return f"Correct what `equal:` names, take a finer `level:`, or {loose}."
     return f"Correct what `equal:` names or the options of one of the `schemes:`, or {loose}."
+
+
+def _above(distance: float) -> str:
+    """Write a number with two digits that is no smaller than a distance: one that is asked for must suffice."""
+    if not 0.0 < distance < math.inf:
+        return f"{distance:.2g}"
+    near = Decimal(f"{distance:.1e}")
+    unit = Decimal(1).scaleb(near.adjusted() - 1)
+    return f"{float(near if near >= Decimal(distance) else near + unit):.2g}"

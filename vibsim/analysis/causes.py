@@ -62,26 +62,36 @@ def causes(
     found = np.full(shape, NONE, dtype=np.int8)
     low, high = (judged.reason == REASON_NAMES.index(word) for word in ("order_low", "order_high"))
     wanted = np.broadcast_to(order, shape)
+    if not np.any(low | high):
+        return found
+    beside = _other_states(q, others, norm, tolerance, wanted)
+    positions = {name: others[name] for name in q.part.model.positions if name in others}
+    of_positions = q, positions, norm, tolerance, wanted
     if np.any(low):
-        beside = _other_states(q, others, norm, tolerance, wanted)
         inside = _near(judgement(q, "linf_interior"), wanted, tolerance)
+        same = _alike(q, others, judged, norm, tolerance)
         kinds = [(inside & (norm != "linf_interior"), LAST_POINT), (beside, ONE_QUANTITY)]
-        found = np.where(low, _first(kinds, shape), found)
+        found = np.where(low, _first([*kinds, (same, EVERYTHING)], shape), found)
     if np.any(high):
         kinds = [
             (_at_rest(q, others), SPECIAL_TIMES),
-            (_in_theory(q, judged), THEORY),
+            # frequency and growth are those of the position: one of the expected order says that they are not the cause
+            (_in_theory(q, judged) & ~_other_states(*of_positions), THEORY),
             (_other_norms(q, norm, wanted, tolerance), ONE_NORM),
-            (_other_states(q, others, norm, tolerance, wanted), ONE_QUANTITY),
+            (beside, ONE_QUANTITY),
+            (
+                _alike(q, others, judged, norm, tolerance) & _same_norms(q, judged, tolerance),
+                EVERYTHING,
+            ),
         ]
         found = np.where(high, _first(kinds, shape), found)
     return found.astype(np.int8)
 
 
 def _first(kinds: list[tuple[Flags, int]], shape: tuple[int, ...]) -> Codes:
-    """Return the first cause that applies, `EVERYTHING` where none does."""
+    """Return the first cause that applies, `NONE` where none is seen."""
     masks = [np.broadcast_to(mask, shape) for mask, _ in kinds]
-    return np.asarray(np.select(masks, [code for _, code in kinds], EVERYTHING), dtype=np.int8)
+    return np.asarray(np.select(masks, [code for _, code in kinds], NONE), dtype=np.int8)
 
 
 def _near(judged: Judgement, order: Floats, tolerance: float) -> Flags:
@@ -107,6 +117,25 @@ def _other_norms(q: Comparison, norm: str, order: Floats, tolerance: float) -> F
     for other in NORMS:
         if other != norm:
             found |= _near(judgement(q, other), order, tolerance)
+    return found
+
+
+def _alike(
+    q: Comparison, others: Mapping[str, Comparison], judged: Judgement, norm: str, tolerance: float
+) -> Flags:
+    """Say where every state has the order of the quantity: one of which nothing is known need not."""
+    found = np.ones(q.part.shape, dtype=bool)
+    for state in q.part.model.states:
+        if state.name != q.name and state.name in others:
+            found &= _near(judgement(others[state.name], norm), judged.order, tolerance)
+    return found
+
+
+def _same_norms(q: Comparison, judged: Judgement, tolerance: float) -> Flags:
+    """Say where the quantity has the same order in every norm."""
+    found = np.ones(q.part.shape, dtype=bool)
+    for other in NORMS:
+        found &= _near(judgement(q, other), judged.order, tolerance)
     return found
 
 

@@ -143,8 +143,16 @@ def _story(
         kind=spec.kind,
         promised=_promised(experiment, check.converges, columns, scheme, case),
         cost=partial(cost_in_words, experiment),
+        has_exact=_has_exact(record, check.converges, scheme, case),
         failures=_failures(record, scheme, case),
     )
+
+
+def _has_exact(record: Record, quantity: str, scheme: int, case: int) -> bool:
+    """Tell whether a true error of a quantity is known at some level."""
+    name = f"{quantity}_error_norm"
+    # parts of an error are measured against the motion itself
+    return name not in record or bool(np.any(np.isfinite(record[name][scheme, case])))
 
 
 def _failures(record: Record, scheme: int, case: int) -> tuple[float, ...]:

@@ -120,7 +120,7 @@ def drift_of(
     kind = np.select([mask for mask, _ in rules], [code for _, code in rules], UNCLEAR)
     relative = safe_ratio(rise, np.abs(energy))
     time = np.linspace(0.0, 1.0, samples + 1)
-    first, second = (_power(time**j)[0] * periods**j + 0.0 * end for j in (1, 2))
+    first, second = (np.broadcast_to(_power(time**j)[0] * periods**j, end.shape) for j in (1, 2))
     per_period, per_square = safe_ratio(relative, first), safe_ratio(relative, second)
     of_log = safe_ratio(np.sign(last) * fall, first)
     for at in zip(*np.nonzero((kind == UNCLEAR) & gone & ~unknown & ~short), strict=True):

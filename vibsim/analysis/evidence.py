@@ -86,6 +86,7 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
         ceiling=by_level(np.maximum(worst, q.floor)),
         blur=None if q.blur is None else by_level(q.blur),
         order=np.broadcast_to(order, shape),
+        promised=np.broadcast_to(q.order, shape),
         tolerance=tolerance,
         error=measured.error,
         error_scatter=measured.error_scatter,

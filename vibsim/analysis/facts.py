@@ -81,6 +81,9 @@ class Evidence:
     """The most that round-off can be in any arithmetic, at every level in the same norm, shape (..., n)."""
     numbers: Flags | None = None
     """Whether the series are single numbers: no more than two points count, shape (...)."""
+    promised: Floats | None = None
+    """The order that the scheme promises, infinite or NaN where it promises none, shape (...); None for the expected
+    one."""
     error_scatter: Floats | None = None
     """Signed scatter of the errors of successive levels, shape (..., n-1), of three levels; NaN where not known."""
     blur: Floats | None = None
@@ -126,6 +129,9 @@ def truly_exact(e: Evidence) -> Flags:
     """Say where all differences are round-off although an ordinary error would have been seen."""
     # what a short run has accumulated is smaller by (w T)^2
     power = np.where(np.isinf(e.order), ORDINARY, e.order)
+    if e.promised is not None:
+        # what a scheme of higher order leaves is smaller than an error of the order that is asked for
+        power = np.where(np.isinf(e.promised), power, np.fmax(power, e.promised))
     p = e.omega_dt[..., 0]
     oscillates = np.isfinite(p) & (p > 0.0)
     ordinary = np.minimum(np.where(oscillates, p, 1.0 / e.steps), 1.0) ** power

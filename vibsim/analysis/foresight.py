@@ -1,8 +1,9 @@
 r"""What would settle a verdict that is open: how many finer levels, or which levels and which arithmetic.
 
-**Too coarse.** With ``d_k = a h^p + b h^q`` the local orders approach p like ``p_k - p = C r^k``, ``r = 2^-(q-p)`` per
-level. So the last order and the factor r, as it was seen or as the powers of the scheme give it, say at which level the
-order is within the tolerance; one more confirms it.
+**Too coarse.** With ``d_k = a h^p + b h^q`` the local orders approach the order p of the scheme, or the expected one
+where they are nearer to that, like ``p_k - p = C r^k``, ``r = 2^-(q-p)`` per level. So the last order and the factor r,
+as it was seen or as the powers of the scheme give it, say at which level the order is within the tolerance; one more
+confirms it. An order far above p is that of levels which have nothing to do with the solution, and tells nothing.
 
 **Round-off.** Differences fall like h^p from the finest clean one on, the predicted round-off of an arithmetic grows
 with the number of steps. An order can be read from three levels as long as the finer of their two differences is `LOUD`
@@ -20,6 +21,7 @@ from vibsim.analysis.compare import Comparison
 from vibsim.analysis.evidence import evidence
 from vibsim.analysis.limits import LOUD, ORDINARY
 from vibsim.analysis.promise import even_powers, relative_floors
+from vibsim.analysis.rules import LEAST_CANDIDATE, MOST_ABOVE
 from vibsim.analysis.verdict import Judgement
 from vibsim.vocabulary import REASON_NAMES
 
@@ -59,16 +61,26 @@ def more_levels(q: Comparison, judged: Judgement, order: Floats, tolerance: floa
     early = judged.reason == REASON_NAMES.index("pre_asymptotic")
     if not np.any(early) or not orders.shape[-1]:
         return needed
-    away = np.abs(orders - np.broadcast_to(order, shape)[..., None])
+    aim = _aim(q, orders[..., -1], np.broadcast_to(order, shape))
+    away = np.abs(orders - aim[..., None])
     with np.errstate(all="ignore"):
         promised = np.where(even_powers(q.part.experiment, q.name, q.part.columns), 0.25, 0.5)
         seen = away[..., -1] / away[..., -2] if orders.shape[-1] > 1 else promised
         # what was seen once may be an accident; no power falls faster than the next one
         factor = np.maximum(seen, promised)
         steps = np.ceil(np.log(tolerance / away[..., -1]) / np.log(factor)) + 1
-    known = early & np.isfinite(steps) & (factor <= SLOWEST) & (steps <= MOST)
+        # an error that falls faster than the powers do is none of them
+        known = early & np.isfinite(steps) & (orders[..., -1] <= aim + MOST_ABOVE)
+    known &= (factor <= SLOWEST) & (steps <= MOST)
     needed[known] = np.maximum(steps[known], 1).astype(np.int8)
     return needed
+
+
+def _aim(q: Comparison, last: Floats, order: Floats) -> Floats:
+    """Return the order that the levels approach: the one that the scheme has, where they are nearer to that one."""
+    has = np.broadcast_to(q.order, last.shape)
+    with np.errstate(invalid="ignore"):
+        return np.where(np.abs(last - has) < np.abs(last - order), has, order)
 
 
 def finest_readable(
@@ -93,7 +105,9 @@ def finest_readable(
     shape = judged.reason.shape
     found = np.full(shape, UNKNOWN, dtype=np.int8)
     lost = judged.reason == REASON_NAMES.index("round_off")
-    p = np.where(np.isfinite(judged.order), judged.order, np.broadcast_to(order, shape))
+    with np.errstate(invalid="ignore"):
+        shown = judged.order >= LEAST_CANDIDATE
+    p = np.where(shown, judged.order, np.broadcast_to(order, shape))
     lost &= np.isfinite(p)
     if not np.any(lost):
         return found

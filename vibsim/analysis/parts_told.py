@@ -63,10 +63,10 @@ def parts_in_words(model: Model, record: Record, quantity: str, scheme: int, cas
         float(record[f"{position}{end}_order"][scheme, case, norm]) for end in (PHASE, AMPLITUDE)
     )
     share = float(record[f"{position}{PHASE}_at_start"][scheme, case])
-    return sentence(phase, amplitude, share)
+    return sentence(phase, amplitude, share, "" if quantity == position else f" of {position}")
 
 
-def sentence(phase: float, amplitude: float, share: float) -> str:
+def sentence(phase: float, amplitude: float, share: float, whose: str = "") -> str:
     """Tell two orders apart, and where the lower one comes from.
 
     Parameters
@@ -75,12 +75,14 @@ def sentence(phase: float, amplitude: float, share: float) -> str:
         Orders; NaN where none is stated.
     share
         Part of the phase error that is there from the start.
+    whose
+        Of which position they are, in words; empty where the verdict is on that position.
     """
     if not math.isfinite(phase + amplitude) or abs(phase - amplitude) < APART:
         return ""
     if not (_is_near(phase) and _is_near(amplitude)):
         return ""
-    both = f" The phase is of {_order(phase)}, the amplitude of {_order(amplitude)}"
+    both = f" The phase{whose} is of {_order(phase)}, the amplitude of {_order(amplitude)}"
     if amplitude < phase:
         return f"{both}: it is the amplitude that is wrong."
     if share >= THERE:

@@ -27,6 +27,8 @@ VOUCHED = 0.04
 """Mismatch of errors that leaves no room for a tenth of a lower power, which makes 0.05."""
 VOUCHED_FADING = 0.6
 """What the errors show besides h^p falls at least to this part of itself per level when it is a higher power."""
+STAYED = 0.5
+"""An error that depends on where events lie stays where the finest level has more than this part of the coarsest."""
 LEAST_ORDER = 0.25
 """No stated order is taken for less when errors are predicted: half the least that an expansion has, 1/2."""
 
@@ -34,15 +36,20 @@ LEAST_ORDER = 0.25
 def errors_leave(e: Evidence, t: Trend, p: Floats) -> Flags:
     """Say where the true errors move away from h^p over the last levels of the window.
 
-    They show a lower power before the differences do, which are steeper.
+    They show a lower power before the differences do, which are steeper. Errors that stay, larger than the differences
+    allow, show none: the limit is another one.
     """
-    if e.error is None or len(e.levels) < 4:
+    if e.error is None:
         return np.zeros(p.shape, dtype=bool)
     found = error_orders(e)
     last, before = (np.abs(pick(found, t.last + 1 - back) - p) for back in (0, 1))
     known = pick(e.error, t.last + 2) > accuracy(e)
+    stays = contradicts(e, t)[0]
+    if len(e.levels) > 3:
+        stays = stays & errors_stay(e, t)
     grows = last > GROWS * before
-    return np.asarray(known & (last > LEAVES) & grows & ~(t.several & _little(t, p, last, before)))
+    little = t.several & _little(t, p, last, before)
+    return np.asarray(known & (last > LEAVES) & grows & ~little & ~stays)
 
 
 def _little(t: Trend, p: Floats, last: Floats, before: Floats) -> Flags:
@@ -76,7 +83,9 @@ def errors_vouch(e: Evidence, p: Floats) -> Flags:
 def contradicts(e: Evidence, t: Trend) -> tuple[Flags, Flags]:
     """Say where the error at the last level of the window is larger, or smaller, than its difference allows.
 
-    Larger: the limit is another one. Smaller: the differences are not those of the power that they look like.
+    Larger: the limit is another one. Smaller: the differences are not those of the power that they look like. So are,
+    whatever their error, those of two levels whose errors depend on where events or corners lie between grid points,
+    unless it stays over four levels and more.
     """
     if e.error is None:
         return np.zeros(e.order.shape, dtype=bool), np.zeros(e.order.shape, dtype=bool)
@@ -91,7 +100,24 @@ def contradicts(e: Evidence, t: Trend) -> tuple[Flags, Flags]:
         )
     )
     too_large = np.nan_to_num(error, nan=0.0) > EXCESS * most + accuracy(e)
-    return too_large, np.asarray(error < least / EXCESS - accuracy(e))
+    too_small = error < least / EXCESS - accuracy(e)
+    accident = too_large & _irregular(e) & ~_stays_throughout(e)
+    return too_large & ~accident, np.asarray(too_small | accident)
+
+
+def _irregular(e: Evidence) -> Flags:
+    """Say where errors are the accident of where events or corners lie between grid points."""
+    if e.left_to_the_mesh is None:
+        return np.zeros(e.order.shape, dtype=bool)
+    return ~np.isnan(e.left_to_the_mesh)
+
+
+def _stays_throughout(e: Evidence) -> Flags:
+    """Say where the errors of four levels and more have not even halved: those of order 1 are eight times smaller."""
+    if e.error is None or len(e.levels) < 4:
+        return np.zeros(e.order.shape, dtype=bool)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(e.error[..., -1] > STAYED * e.error[..., 0])
 
 
 def errors_stay(e: Evidence, t: Trend) -> Flags:

@@ -24,6 +24,8 @@ class Corner:
     """Whether it is a jump at a grid point, not within a step."""
 
 
+HIGHEST = 12.0
+"""An estimate above is the order of no scheme."""
 ALIKE = 0.15
 """Two levels fail at one time that fail within this part of it: the finer one sees it at most a step earlier."""
 
@@ -76,6 +78,8 @@ class Story:
     """... and the same in compensated arithmetic."""
     cost: Callable[[Sequence[int]], str] = lambda levels: ""
     """What levels cost, in words."""
+    has_exact: bool = True
+    """Whether an exact solution or a reference is known, which alone shows a wrong limit."""
     failures: tuple[float, ...] = ()
     """When each level met a number that is not finite, in its first step at 0; NaN where it did not."""
 
@@ -119,11 +123,15 @@ def vanishing_in_words(predicted: float, measured: float) -> str:
     return f"; it grows {much} per period, which vanishes with dt"
 
 
-def growth_in_words(predicted: float, measured: float) -> str:
-    """Say what growth theory predicts and what was measured; empty where neither is known."""
+def growth_in_words(predicted: float, measured: float, is_simple: bool = True) -> str:
+    """Say what growth theory predicts and what was measured; empty where neither is known.
+
+    The theory is of free linear oscillations without damping: of another model (not `is_simple`) that is said.
+    """
+    theory = "predicted" if is_simple else "predicted of free oscillations without damping"
     told = [
         f"{factor_in_words(value)} {word}"
-        for value, word in ((predicted, "predicted"), (measured, "measured"))
+        for value, word in ((predicted, theory), (measured, "measured"))
         if not math.isnan(value)
     ]
     return f": growth factor per period {', '.join(told)}" if told else ""
@@ -153,12 +161,12 @@ def tell(s: Story) -> str:
         case "asymptotic":
             return (
                 f"{s.quantity} converges with {measured}, as {_due(s.quantity)} ({promised}): the rescaled "
-                f"differences coincide.{_doubt(s)}"
+                f"differences coincide.{_doubt(s)}{_unseen(s)}"
             )
         case "exact":
             return (
                 f"{s.quantity} is exact: the levels differ by round-off only, so there is no order "
-                "to measure."
+                f"to measure.{_unseen(s)}"
             )
         case "order_low" | "order_high":
             word = "slower" if s.reason == "order_low" else "faster"
@@ -173,7 +181,7 @@ def tell(s: Story) -> str:
         case "non_finite":
             return f"The calculation of {s.quantity} met a number that is not finite{_place_of_failure(s)}."
         case "round_off":
-            kept = f"; before it, {measured} is all that is left" if measured else ""
+            kept = f"; before it, {measured} is all that is left" if s.order > 0.0 else ""
             return (
                 f"The differences of {s.quantity} have reached the floor of round-off, where they say "
                 f"nothing about the scheme{kept}."
@@ -210,8 +218,33 @@ def tell(s: Story) -> str:
             )
         case "not_applicable":
             return f"{s.quantity} does not exist here, so there is nothing to judge."
+    return f"{_too_coarse(s, measured)}{s.parts}"
+
+
+def _unseen(s: Story) -> str:
+    """Say what levels that approach each other do not tell."""
+    if s.has_exact:
+        return ""
+    return (
+        " No exact solution is known to compare with, so that a wrong limit would not be noticed."
+    )
+
+
+def _too_coarse(s: Story, measured: str) -> str:
+    """Say that levels show no order yet; where it is none that an expansion has, what they show instead."""
+    if s.order <= 0.0:
+        return (
+            f"The differences of {s.quantity} grow from level to level ({measured}): the step is still too coarse to "
+            f"tell an order, or level {s.last} is not of one kind with those before it."
+        )
+    if s.order > HIGHEST:
+        return (
+            f"The step is still too coarse to tell the order of {s.quantity}: its differences fall faster on levels "
+            f"{s.first} to {s.last} than those of any power of dt, as where the coarser ones have nothing to do with "
+            "the solution."
+        )
     so_far = f": the last estimate is {measured}" if measured else ""
-    return f"The step is still too coarse to tell the order of {s.quantity}{so_far}.{s.parts}"
+    return f"The step is still too coarse to tell the order of {s.quantity}{so_far}."
 
 
 def _doubt(s: Story) -> str:
@@ -305,7 +338,7 @@ _WHY_HIGH = {
     ),
     "theory": " The theory of scheme {1} has that order on this linear model, too.",
     "one_norm": " In another norm than {2} the order is the expected one: errors cancel in this one.",
-    "one_quantity": " Another state has the expected order: the leading error vanishes in {0} alone.",
+    "one_quantity": " Another state has the expected order: the leading error vanishes in {0}, not in every state.",
     "everything": " It is so in every state and every norm.",
 }
 
