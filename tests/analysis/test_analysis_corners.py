@@ -178,3 +178,36 @@ def test_the_mean_of_both_sides_keeps_order_2_of_central() -> None:
     )
     (verdict,) = judged(made)
     assert (verdict.status, verdict.reason) == ("PASS", "asymptotic")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        {
+            "model": {"kind": "oscillator", "spring": "k*u+abs(u)*u", "parameters": {"k": 0.962}},
+            "initial": {"u": 0.846},
+            "time": {"end": 15.65},
+            "levels": [9, 10, 11],
+            "schemes": ["gauss4"],
+        },
+        {
+            "model": {
+                "kind": "oscillator",
+                "force": "max(t-a,0)",
+                "spring": "k*u",
+                "parameters": {"k": 1.932, "a": 3.632},
+            },
+            "initial": {"u": -0.988},
+            "time": {"end": 10, "base_steps": 5},
+            "levels": [9, 10, 11, 12],
+            "schemes": ["pefrl"],
+        },
+    ],
+)
+def test_differences_that_a_corner_makes_unlike_each_other_are_no_round_off(
+    content: dict[str, Any],
+) -> None:
+    checks = [{"converges": "u"}]
+    (found,) = judged(Experiment.from_dict({"title": "t", **content, "checks": checks}))
+    assert (found.status, found.reason) == ("INCONCLUSIVE", "non_smooth")
+    assert "At t = " in found.text

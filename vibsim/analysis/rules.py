@@ -84,11 +84,14 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Flags]:
     # any other power is the accident of where events or corners lie between grid points
     regular = ~rough | ((np.abs(t.order - left) <= tol) & ~t.alternating)
     kinked, deeper = _kinked(e, t, p)
+    # where no triple is left although the differences are above round-off, the corner has made them unlike each other
+    unlike = np.zeros(p.shape, dtype=bool) if e.corner is None else nothing & (p >= e.corner)
+    kinked |= unlike
     return [
         (exact & far_from_exact(e), "wrong_limit"),
         (exact, "exact"),
         (exactly & ~at_round_off(e), "order_low"),
-        (exactly | (nothing & (at_round_off(e) | ~rough)), "round_off"),
+        (exactly | (nothing & (at_round_off(e) | ~(rough | unlike))), "round_off"),
         (t.alternating & ~rough & ~kinked & ~doubtful, "oscillating"),
         (missed & regular, "wrong_limit"),
         (right & ~too_small & regular, "asymptotic"),
