@@ -87,12 +87,15 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Flags]:
     # where no triple is left although the differences are above round-off, the corner has made them unlike each other
     unlike = np.zeros(p.shape, dtype=bool) if e.corner is None else nothing & (p >= e.corner)
     kinked |= unlike
+    swings = t.alternating & ~rough & ~kinked & ~doubtful
     return [
         (exact & far_from_exact(e), "wrong_limit"),
         (exact, "exact"),
         (exactly & ~at_round_off(e), "order_low"),
         (exactly | (nothing & (at_round_off(e) | ~(rough | unlike))), "round_off"),
-        (t.alternating & ~rough & ~kinked & ~doubtful, "oscillating"),
+        # orders that swing into a floor do so by noise
+        (swings & t.cut, "round_off"),
+        (swings, "oscillating"),
         (missed & regular, "wrong_limit"),
         (right & ~too_small & regular, "asymptotic"),
         (wrong & ~above & regular & (~kinked | deeper), "order_low"),
