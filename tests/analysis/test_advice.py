@@ -18,7 +18,8 @@ from vibsim import Experiment, analyse, simulate
 from vibsim.analysis import analyse_records, verdicts
 from vibsim.analysis.advice import advise
 from vibsim.analysis.causes import CAUSES
-from vibsim.analysis.wording import Corner, Story, tell
+from vibsim.analysis.sentences import tell
+from vibsim.analysis.story import Corner, Story
 from vibsim.record import Record, Variable
 from vibsim.spec.checks import MEASURED
 from vibsim.vocabulary import DRIFTS, REASON_NAMES, REASONS, STATUSES

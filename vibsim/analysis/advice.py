@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from vibsim.analysis.wording import (
+from vibsim.analysis.numbers_in_words import number
+from vibsim.analysis.story import (
     Corner,
     Story,
     ends_low,
     first_stable,
     is_adaptive,
-    number,
     promises_less,
     promises_more,
     starts_low,

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis.behaviour_advice import BROKEN, on_distance, on_drift, on_stability
+from vibsim.analysis.numbers_in_words import growth_in_words, number, vanishing_in_words
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
 from vibsim.analysis.promise import columns_of, stability_limits
-from vibsim.analysis.wording import growth_in_words, number, vanishing_in_words
 from vibsim.record import Record
 from vibsim.spec.about import schemes_of
 from vibsim.vocabulary import DRIFTS, REASON_NAMES

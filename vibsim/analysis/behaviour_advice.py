@@ -6,7 +6,7 @@ import math
 from decimal import Decimal
 from typing import TYPE_CHECKING, get_args
 
-from vibsim.analysis.wording import number
+from vibsim.analysis.numbers_in_words import number
 from vibsim.spec.scheme_checks import SOLUTIONS, Drift
 
 if TYPE_CHECKING:

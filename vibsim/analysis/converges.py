@@ -26,7 +26,8 @@ from vibsim.analysis.promise import (
     options_of,
     stability_limits,
 )
-from vibsim.analysis.wording import Corner, Story, tell
+from vibsim.analysis.sentences import tell
+from vibsim.analysis.story import Corner, Story
 from vibsim.record import Record
 from vibsim.schemes import SCHEMES, Options, Scheme
 from vibsim.spec.about import schemes_of

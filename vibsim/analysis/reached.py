@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vibsim.analysis.extrapolation import extrapolated
+from vibsim.analysis.numbers_in_words import number
 from vibsim.analysis.outcome import FAIL, PASS, Outcome
 from vibsim.analysis.part import Part
-from vibsim.analysis.wording import number
 from vibsim.errors import VibsimError
 from vibsim.record import Record, Variable, attributes
 from vibsim.vocabulary import REASON_NAMES

@@ -6,6 +6,7 @@ import json
 from typing import TYPE_CHECKING
 
 from vibsim.record import Record
+from vibsim.simulation.scaled import has_time_unit
 from vibsim.spec.values import VALUES
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ def unit_of(experiment: Experiment, record: Record, check: ValueCheck) -> str:
     record
         Convergence Record: a scaled run, and a model without units, have none.
     """
-    time = "" if {"scale_t", "time_units"} & record.attrs.keys() else "s"
+    time = "s" if has_time_unit(record) else ""
     match VALUES[check.value].measure:
         case "quantity":
             return _of(record, check.quantity)

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from vibsim.analysis.best import has_limit
 from vibsim.analysis.costs import cost_in_words
+from vibsim.analysis.numbers_in_words import number
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
 from vibsim.analysis.value_units import unit_of
-from vibsim.analysis.wording import number
 from vibsim.record import Record
 from vibsim.spec.about import schemes_of
 from vibsim.spec.values import VALUES

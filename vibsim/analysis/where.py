@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.analysis.numbers_in_words import number
 from vibsim.analysis.outcome import PASS, Outcome
 from vibsim.analysis.promise import columns_of
-from vibsim.analysis.wording import number
 from vibsim.record import Record
 from vibsim.vocabulary import STATUSES
 

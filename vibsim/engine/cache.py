@@ -7,14 +7,12 @@ same time wait for the first one to compile it.
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import os
-import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
+from vibsim import sealed
 from vibsim.engine.entry import bind
 from vibsim.errors import SimulationError
 
@@ -54,12 +52,13 @@ def load(text: str, kinds: str) -> Kernel:
         home = folder()
         home.mkdir(parents=True, exist_ok=True)
         path = home / f"{name}.o"
-        with _lock(path.with_suffix(".lock")):
-            code = _whole(path)
+        with path.with_suffix(".lock").open("w") as lock, sealed.held(lock):
+            # damaged code would give wrong numbers
+            code = sealed.read(path)
             if code is None:
-                _write(path.with_suffix(".py"), text.encode())
+                sealed.put(path.with_suffix(".py"), text.encode())
                 code = _compile(text, kinds)
-                _write(path, code + hashlib.sha256(code).digest())
+                sealed.write(path, code)
             return bind(link(code, ENTRY), kinds)
     except OSError as error:
         raise SimulationError(
@@ -68,32 +67,8 @@ def load(text: str, kinds: str) -> Kernel:
         ) from error
 
 
-def _whole(path: Path) -> bytes | None:
-    """Return the code in a file, None where it is not as it was written: damaged code would give wrong numbers."""
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
-        return None
-    code, seal = content[:-32], content[-32:]
-    return code if code and hashlib.sha256(code).digest() == seal else None
-
-
-def _write(path: Path, content: bytes) -> None:
-    with tempfile.NamedTemporaryFile("wb", dir=path.parent, suffix=".tmp", delete=False) as file:
-        file.write(content)
-    Path(file.name).replace(path)
-
-
 def _compile(text: str, kinds: str) -> bytes:
     # what finds its kernel needs no compiler
     from vibsim.native.machine import machine_code
 
     return machine_code(text, ENTRY, kinds)
-
-
-@contextmanager
-def _lock(path: Path) -> Iterator[None]:
-    """Hold the lock file `path`; it goes with the process, so that a killed job leaves nothing locked."""
-    with path.open("w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield

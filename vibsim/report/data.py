@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from vibsim.analysis.floor import norm_of_floor
 from vibsim.record import Record
 from vibsim.report.style import RAISE
+from vibsim.simulation.scaled import has_time_unit
 from vibsim.vocabulary import TYPICAL_NORM
 
 Floats = NDArray[np.float64]
@@ -99,8 +100,7 @@ def unit(record: Record, name: str) -> str:
 
 def time_unit(record: Record, name: str = "t") -> str:
     """Return the unit of times, also where `t` is a fraction of the end; empty where times have none."""
-    without = {"scale_t", "time_units"} & record.attrs.keys()
-    return "" if without else unit(record, name) or "s"
+    return (unit(record, name) or "s") if has_time_unit(record) else ""
 
 
 def pretty_unit(text: str) -> str:

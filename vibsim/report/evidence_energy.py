@@ -7,30 +7,26 @@ drift ``a + b t^k`` has ``(m1 - m2)/(m2 - m3) = 2^k``.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vibsim.analysis.drift import LEAST_PERIODS, LEAST_SAMPLES, STILL
-from vibsim.analysis.shown import number_of
 from vibsim.record import Record
 from vibsim.report import style
-from vibsim.report.data import Floats, Member, at, pick, time_unit, times, unit, whole
+from vibsim.report.data import Floats, Member, at, time_unit, unit
+from vibsim.report.energy_error import NAMES, POWERS, EnergyError, energy_error
+from vibsim.report.energy_told import dashed, told
 from vibsim.report.exhibit import (
     COLOUR,
     SECOND,
     Picture,
-    brief,
     log_ticks,
     logarithms,
     measured,
     over_time,
-    short,
     ticks,
 )
 from vibsim.report.stamp import BAND, INK, Panel, document
-from vibsim.vocabulary import DRIFTS
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
@@ -38,63 +34,9 @@ if TYPE_CHECKING:
 
 WINDOWS = ((0.125, 0.25), (0.25, 0.5), (0.5, 1.0))
 """In parts of the end, those of m3, m2 and m1."""
-NAMES = ("m₃", "m₂", "m₁")
-POWERS = {"linear": 1, "quadratic": 2}
-TOO_SHORT = f"That is too short a run to name a drift: {LEAST_PERIODS:g} periods and {LEAST_SAMPLES} times are needed."
 LEAST = 1e-4
 """Part of the time before which a logarithmic scale need not show the error."""
 WIDTH = 320.0
-
-
-@dataclass(frozen=True)
-class _Found:
-    """What was found of the energy error of one run, over the energy at the start where that is not 0."""
-
-    kind: str
-    """Of `vocabulary.DRIFTS`."""
-    asked: str
-    """Kind of drift that the check asks for."""
-    t: Floats
-    running: Floats
-    """The largest error so far, shape (t,)."""
-    means: Floats
-    """m3, m2, m1."""
-    round_off: float
-    """Largest error that is taken for round-off."""
-    power: float
-    """k, NaN where it cannot be told."""
-    rate: float
-    """Of the kind of drift, see `vibsim.analysis.drift.Drift`."""
-
-    @property
-    def is_round_off(self) -> bool:
-        """Whether the error is so small that nothing but the border tells anything."""
-        return self.kind == "none"
-
-    @property
-    def has_border(self) -> bool:
-        """Whether the error has to be compared with round-off."""
-        return self.is_round_off or self.asked == "none"
-
-    @property
-    def is_log(self) -> bool:
-        """Whether the scale has to be logarithmic."""
-        return self.has_border or self.kind == "exponential" or self.is_broken
-
-    @property
-    def is_broken(self) -> bool:
-        """Whether the run broke down, so that it has no means."""
-        return not np.isfinite(self.means).all()
-
-    @property
-    def has_bars(self) -> bool:
-        """Whether the means are shown."""
-        return not (self.is_round_off or self.is_broken)
-
-    @property
-    def most(self) -> float:
-        """The largest error."""
-        return float(np.nanmax(self.running))
 
 
 def picture(
@@ -106,7 +48,7 @@ def picture(
         return Picture("", f"{member.title}: the largest energy error so far is not stored.")
     level = int(measured(record, name, "culprit", member.scheme, member.case))
     first = abs(float(at(record, "energy_initial", member)))
-    found = _found(experiment, record, check, name, member, first or 1.0, level)
+    found = energy_error(experiment, record, check, name, member, first or 1.0, level)
     if not (np.isfinite(found.running) & (found.running > 0.0)).any():
         return _nothing(found, member)
     label = "largest energy error so far" + (" / E(0)" if first else "")
@@ -116,11 +58,11 @@ def picture(
     scale = log_ticks(*panel.y) if found.is_log else ticks(*panel.y)
     seconds = style.label("t", time_unit(record))
     panel.frame(title, seconds, ticks(*panel.x, 5), scale)
-    caption = f"{member.title}, level {level}: {_told(found)} {_dashed(found)}".strip()
+    caption = f"{member.title}, level {level}: {told(found)} {dashed(found)}".strip()
     return Picture(document([panel], title), caption)
 
 
-def _nothing(found: _Found, member: Member) -> Picture | None:
+def _nothing(found: EnergyError, member: Member) -> Picture | None:
     """Say that there is no error to draw, where that was found."""
     if not np.any(found.running == 0.0):
         return None
@@ -129,37 +71,7 @@ def _nothing(found: _Found, member: Member) -> Picture | None:
     )
 
 
-def _found(
-    experiment: Experiment,
-    record: Record,
-    check: ConservesCheck,
-    name: str,
-    member: Member,
-    first: float,
-    level: int,
-) -> _Found:
-    number = number_of(experiment, name)
-    index = whole(record, "level").index(level)
-    running = at(record, f"{check.about}_running_max", member, level=index)
-    kind, rate, power = (
-        measured(record, name, field, member.scheme, member.case)
-        for field in ("first", "low", "high")
-    )
-    own = {"conserves_check": number, "scheme": member.scheme, "case": member.case}
-    return _Found(
-        kind=DRIFTS[int(kind)],
-        asked=check.drift,
-        t=times(record, member.case),
-        # the last velocity may be a one-sided one, which the verdict does not look at
-        running=np.append(running[:-1], np.nan) / first,
-        means=np.asarray(pick(record, "check_means", **own), dtype=np.float64) / first,
-        round_off=float(pick(record, "check_round_off", **own)) / first,
-        rate=rate,
-        power=power,
-    )
-
-
-def _panel(found: _Found) -> Panel:
+def _panel(found: EnergyError) -> Panel:
     """Return the panel with windows, error, means and the drift asked for."""
     t, end = found.t, float(found.t[-1])
     curve, means = _scaled(found, found.running), _scaled(found, found.means)
@@ -180,7 +92,7 @@ def _panel(found: _Found) -> Panel:
     return panel
 
 
-def _border(panel: Panel, found: _Found) -> None:
+def _border(panel: Panel, found: EnergyError) -> None:
     """Draw the most that is taken for round-off, and fill what is below if that is where the error is."""
     if found.round_off > 0.0:
         border = math.log10(found.round_off)
@@ -199,12 +111,12 @@ def _bars(panel: Panel, means: Floats, end: float) -> None:
             )
 
 
-def _scaled(found: _Found, values: Floats) -> Floats:
+def _scaled(found: EnergyError, values: Floats) -> Floats:
     """Return values as the vertical scale has them: their powers of ten where it is logarithmic."""
     return logarithms(values) if found.is_log else values
 
 
-def _limits(found: _Found, curve: Floats, means: Floats) -> tuple[float, float]:
+def _limits(found: EnergyError, curve: Floats, means: Floats) -> tuple[float, float]:
     if not found.is_log:
         high = style.limits(curve, means, np.zeros(1), margin=0.22)[1]
         return 0.0, high
@@ -214,7 +126,7 @@ def _limits(found: _Found, curve: Floats, means: Floats) -> tuple[float, float]:
     return low, max(high, low + 1.0)
 
 
-def _expected(found: _Found, t: Floats) -> Floats:
+def _expected(found: EnergyError, t: Floats) -> Floats:
     """Return the drift that is asked for, through m2, and m1 where it grows; NaN where it is no line."""
     _, second, first = found.means
     if found.has_border:
@@ -231,43 +143,3 @@ def _mean_power(window: tuple[float, float], power: int) -> float:
     """Return the mean of t^power over a window."""
     a, b = window
     return (b ** (power + 1) - a ** (power + 1)) / ((power + 1) * (b - a))
-
-
-def _told(found: _Found) -> str:
-    """Say by which number the drift was named."""
-    third, second, first = found.means
-    numbers = [f"{n} = {short(float(m))}" for n, m in zip(NAMES, found.means, strict=True)]
-    bars = f"the largest energy error so far has the means (bars) {', '.join(numbers)}."
-    if found.is_round_off:
-        return (
-            f"the largest energy error, {brief(found.most)}, is within the round-off of this run, "
-            f"{brief(found.round_off)}."
-        )
-    if found.is_broken:
-        return "the largest energy error so far; it ends where the run breaks down."
-    rise, before = first - second, second - third
-    if found.kind == "bounded":
-        part = 100.0 * float(rise) / found.most
-        how = "no growth" if part <= 100.0 * STILL else "it creeps ever more slowly"
-        return f"{bars} m₁ is above m₂ by {brief(part)} % of the largest error: {how}."
-    if found.kind == "exponential":
-        factor = short(float(np.exp(found.rate)))
-        return f"{bars} The energy itself changes by the factor {factor} per period: exponential."
-    if math.isnan(found.power):
-        return f"{bars} {TOO_SHORT}"
-    law = f"(m₁ − m₂)/(m₂ − m₃) = {short(float(rise / before)) if before else '∞'}"
-    if found.kind in POWERS:
-        power = POWERS[found.kind]
-        return f"{bars} {law}; a drift like {'t²' if power == 2 else 't'} has {2**power}."
-    return f"{bars} {law}, which is that of no drift that has a name."
-
-
-def _dashed(found: _Found) -> str:
-    """Say what the dashed line is."""
-    if found.is_broken:
-        return ""
-    if found.has_border:
-        return "Dashed: the most that is taken for round-off."
-    if found.asked == "bounded":
-        return "Dashed: m₂, above which a bounded error does not rise."
-    return f"Dashed: a drift in proportion to {'t²' if found.asked == 'quadratic' else 't'} through m₂ and m₁."

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vibsim.analysis.facts import BLOWN_UP
+from vibsim.analysis.numbers_in_words import factor_in_words
 from vibsim.analysis.stability import LIMIT_ROUNDING
-from vibsim.analysis.wording import factor_in_words
 from vibsim.record import Record
 from vibsim.report import style, words
 from vibsim.report.choice import position

@@ -9,14 +9,12 @@ longest.
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import io
 import os
 import platform
-import tempfile
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -25,6 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim import sealed
 from vibsim.engine.cache import folder
 from vibsim.expression import Expression
 from vibsim.models import Model, tree
@@ -39,8 +38,6 @@ MOST_OF_ENTRY = 2**26
 """A larger entry is not kept."""
 LOCKS = 2
 """Digits of a digest that name a lock: 256 files, whatever the number of references."""
-SEAL = 32
-"""Bytes of the SHA-256 behind an entry."""
 
 
 def home() -> Path:
@@ -58,7 +55,7 @@ def kept(digest: str, compute: Callable[[], Arrays]) -> Arrays:
         lock = (home() / f"lock_{digest[:LOCKS]}").open("w")
     except OSError:
         return compute()
-    with lock, _held(lock.fileno()):
+    with lock, sealed.held(lock):
         path = home() / f"reference_{digest}"
         found = _read(path)
         if found is None:
@@ -67,35 +64,24 @@ def kept(digest: str, compute: Callable[[], Arrays]) -> Arrays:
     return found
 
 
-@contextmanager
-def _held(file: int) -> Iterator[None]:
-    """Hold a lock; it goes with the process, so that a killed job leaves nothing locked."""
-    fcntl.flock(file, fcntl.LOCK_EX)
-    try:
-        yield
-    finally:
-        fcntl.flock(file, fcntl.LOCK_UN)
-
-
 def _read(path: Path) -> Arrays | None:
     """Return the arrays of an entry; None where there is none, or it is not as it was written."""
     try:
-        content = path.read_bytes()
+        content = sealed.read(path, _label(path))
     except OSError:
         return None
-    body, seal = content[:-SEAL], content[-SEAL:]
-    if hashlib.sha256(_named(path, body)).digest() != seal:
+    if content is None:
         return None
     with suppress(OSError):
         # the one used last is the newest
         os.utime(path)
-    with np.load(io.BytesIO(body), allow_pickle=False) as arrays:
+    with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
         return dict(arrays)
 
 
-def _named(path: Path, body: bytes) -> bytes:
-    """Return what is sealed: the name as well, so that another's entry is none."""
-    return path.name.encode() + b"\0" + body
+def _label(path: Path) -> bytes:
+    """Return what is sealed with an entry: its name, so that another's entry is none."""
+    return path.name.encode() + b"\0"
 
 
 def _write(path: Path, arrays: Arrays) -> None:
@@ -104,11 +90,8 @@ def _write(path: Path, arrays: Arrays) -> None:
         return
     buffer = io.BytesIO()
     np.savez(buffer, allow_pickle=False, **arrays)
-    body = buffer.getvalue()
     with suppress(OSError):
-        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as file:
-            file.write(body + hashlib.sha256(_named(path, body)).digest())
-        Path(file.name).replace(path)
+        sealed.write(path, buffer.getvalue(), _label(path))
         _bound(path.parent)
 
 

@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from vibsim.spec import Experiment
 
 
+TIMELESS = "time_units"
+"""Attribute of a Record whose times have no unit although it is no scaled one."""
+
+
 def in_scales(record: Record, experiment: Experiment) -> Record:
     """Return `record` with unit 1 and ``scale_<name>`` for every scale, where the run is a scaled one.
 
@@ -29,9 +33,14 @@ def in_scales(record: Record, experiment: Experiment) -> Record:
     return Record(_plain(record.coords), _plain(record.variables), attrs)
 
 
+def has_time_unit(record: Record) -> bool:
+    """Tell whether times have a unit: not those of a scaled run, nor of a model that is dimensionless by itself."""
+    return not {"scale_t", TIMELESS} & record.attrs.keys()
+
+
 def _timeless(record: Record) -> Record:
     timed = ("s", "rad s-1")
-    attrs = {**record.attrs, "time_units": "1"}
+    attrs = {**record.attrs, TIMELESS: "1"}
     return Record(_plain(record.coords, timed), _plain(record.variables, timed), attrs)
 
 

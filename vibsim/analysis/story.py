@@ -1,0 +1,122 @@
+"""What is known of the member that decided a convergence verdict, for the sentence and the advice on it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from vibsim.schemes import Options
+
+ALIKE = 0.15
+"""Two levels fail at one time that fail within this part of it: the finer one sees it at most a step earlier."""
+
+
+@dataclass(frozen=True)
+class Corner:
+    """The first corner of the force that steps feel."""
+
+    words: str
+    """What happens there."""
+    time: float
+    power: float
+    """The highest power of dt that it leaves regular."""
+    on_a_point: bool = False
+    """Whether it is a jump at a grid point, not within a step."""
+
+
+@dataclass(frozen=True)
+class Story:
+    """What a sentence on a convergence verdict needs to know about the member that decided it."""
+
+    quantity: str
+    reason: str
+    order: float
+    low: float
+    high: float
+    first: int
+    last: int
+    expected: float
+    """The order that was expected; infinite where the quantity was to be exact."""
+    tolerance: float
+    norm: str
+    levels: tuple[int, ...]
+    culprit: int
+    """Level that failed or is beyond the stability limit; -1 for none."""
+    omega_dt: float
+    """w dt at the culprit; NaN for none."""
+    growth: tuple[float, float]
+    """Growth factor per period at the culprit, predicted and measured; NaN where it is not known."""
+    limit: float
+    """Stability limit of the scheme; infinite for none."""
+    options: Options
+    """Options of the scheme."""
+    is_position: bool
+    scheme: str
+    has_corners: bool = False
+    """Whether steps have corners of a force from a table inside."""
+    corner: Corner | None = None
+    """The first other corner of the force within a step."""
+    parts: str = ""
+    """What phase and amplitude of the error say of it (`vibsim.analysis.parts_told`)."""
+    kind: str = ""
+    """Kind of the scheme."""
+    promised: float = math.nan
+    """The order that the scheme promises."""
+    cause: str = "none"
+    """Why the order is another one, one of `vibsim.analysis.causes.CAUSES`."""
+    more: int = -1
+    """Finer levels that are probably needed; -1 where that is not known, here and below."""
+    readable: int = -1
+    """Finest level at which an order can be read, ..."""
+    compensated: int = -1
+    """... and the same in compensated arithmetic."""
+    cost: Callable[[Sequence[int]], str] = lambda levels: ""
+    """What levels cost, in words."""
+    has_exact: bool = True
+    """Whether an exact solution or a reference is known, which alone shows a wrong limit."""
+    failures: tuple[float, ...] = ()
+    """When each level met a number that is not finite, in its first step at 0; NaN where it did not."""
+
+    @property
+    def singular(self) -> float:
+        """Time at which the two finest levels failed alike, so that finer ones will, too; NaN where they did not."""
+        if len(self.failures) < 2:
+            return math.nan
+        before, last = self.failures[-2:]
+        return last if abs(before - last) <= ALIKE * before else math.nan
+
+
+def is_adaptive(s: Story) -> bool:
+    """Tell whether the scheme chooses its own steps."""
+    return "tolerance" in s.options
+
+
+def starts_low(s: Story) -> bool:
+    """Tell whether the first step explains the order."""
+    return s.options.get("start") == "first_order" and 0.5 < s.order < 1.5
+
+
+def ends_low(s: Story) -> bool:
+    """Tell whether the formula for the last velocity explains the order, or may."""
+    one_sided = s.options.get("end_velocity") in {"backward", "extrapolate"}
+    sees_end = s.norm != "linf_interior" and not s.is_position
+    backward = s.options.get("end_velocity") == "backward"
+    return one_sided and sees_end and (backward or s.reason == "pre_asymptotic")
+
+
+def promises_less(s: Story) -> bool:
+    """Tell whether the scheme itself promises a lower order than the check expects."""
+    return math.isfinite(s.promised) and s.promised < s.expected - s.tolerance
+
+
+def promises_more(s: Story) -> bool:
+    """Tell whether the scheme itself promises a higher order than the check expects."""
+    return s.promised > s.expected + s.tolerance
+
+
+def first_stable(s: Story) -> int:
+    """Return the coarsest level whose w dt is within the limit."""
+    if not (math.isfinite(s.omega_dt) and s.omega_dt > s.limit):
+        return s.levels[-1] + 1
+    return s.culprit + math.ceil(math.log2(s.omega_dt / s.limit) - 1e-9)
