@@ -312,3 +312,14 @@ def test_parts_of_another_name_and_of_motions_with_events() -> None:
     assert "bouncing_ball has events" in text
     text = faults(checks=[{"value": "end", "quantity": "u_phase_error", "equals": 0.0}])
     assert "unknown quantity" in text
+
+
+@pytest.mark.parametrize("asked", ["u_phase_error", "u_amplitude_error"])
+def test_a_large_run_that_is_asked_for_one_part_alone_is_judged(asked: str) -> None:
+    """Beyond 2^14 samples a part that no check asks for is not there; what the parts say is then left out."""
+    checks = [{"converges": "u", "order": 2}, {"converges": asked, "order": 2}]
+    found = spring(["euler_cromer"], *checks, time={"end": 4.0}, levels=[12, 13, 14, 15])
+    assert f"{asked}_order" in found.record
+    assert len({"u_phase_error_order", "u_amplitude_error_order"} & set(found.record.variables)) == 1
+    assert found.verdicts[0].reason == "order_low"
+    assert "The phase is of" not in found.verdicts[0].text
