@@ -320,6 +320,23 @@ def test_a_large_run_that_is_asked_for_one_part_alone_is_judged(asked: str) -> N
     checks = [{"converges": "u", "order": 2}, {"converges": asked, "order": 2}]
     found = spring(["euler_cromer"], *checks, time={"end": 4.0}, levels=[12, 13, 14, 15])
     assert f"{asked}_order" in found.record
-    assert len({"u_phase_error_order", "u_amplitude_error_order"} & set(found.record.variables)) == 1
+    assert (
+        len({"u_phase_error_order", "u_amplitude_error_order"} & set(found.record.variables)) == 1
+    )
     assert found.verdicts[0].reason == "order_low"
     assert "The phase is of" not in found.verdicts[0].text
+
+
+def test_the_order_of_a_part_is_promised_where_theory_has_it_and_expected_elsewhere() -> None:
+    parts = [
+        {"converges": "u_phase_error", "order": "scheme"},
+        {"converges": "u_amplitude_error", "order": 2},
+    ]
+    short = {"time": {"end": 2.0, "base_steps": 640}, "levels": [0, 1, 2, 3]}
+    for found in spring(["euler_cromer"], *parts, **short).verdicts:
+        assert found.status == "PASS"
+        assert "as promised (order " in found.text
+    swing = {"model": {"kind": "pendulum"}, "initial": {"theta": 1.0}}
+    check = {"converges": "theta_phase_error", "order": 2}
+    (found,) = spring(["central"], check, levels=[0, 1, 2, 3], **swing).verdicts
+    assert "as expected (order 2)" in found.text

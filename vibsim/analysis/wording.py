@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from vibsim.models.error_parts import is_error_part
 from vibsim.schemes import Options
 from vibsim.schemes.base import is_on_the_mesh
 
@@ -67,7 +66,11 @@ class Story:
     kind: str = ""
     """Kind of the scheme."""
     promised: float = math.nan
-    """The order that the scheme promises."""
+    """The order that the scheme promises, ..."""
+    centred: float = math.nan
+    """... and would promise with `start: centred`; NaN where it has that start, or no such option."""
+    has_promise: bool = True
+    """Whether that is a promise for the quantity; of a part of an error it may be the one for its position."""
     cause: str = "none"
     """Why the order is another one, one of `vibsim.analysis.causes.CAUSES`."""
     more: int = -1
@@ -123,12 +126,16 @@ def vanishing_in_words(predicted: float, measured: float) -> str:
     return f"; it grows {much} per period, which vanishes with dt"
 
 
-def growth_in_words(predicted: float, measured: float, is_simple: bool = True) -> str:
+def growth_in_words(
+    predicted: float, measured: float, is_simple: bool = True, is_linear: bool = True
+) -> str:
     """Say what growth theory predicts and what was measured; empty where neither is known.
 
-    The theory is of free linear oscillations without damping: of another model (not `is_simple`) that is said.
+    The theory is of free linear oscillations without damping: of a model with damping or a force in time (not
+    `is_simple`), and of a nonlinear one, that is said.
     """
-    theory = "predicted" if is_simple else "predicted of free oscillations without damping"
+    small = "predicted" if is_linear else "predicted of small oscillations"
+    theory = small if is_simple else "predicted of free oscillations without damping"
     told = [
         f"{factor_in_words(value)} {word}"
         for value, word in ((predicted, theory), (measured, "measured"))
@@ -146,9 +153,11 @@ def _measured(s: Story) -> str:
     return f"order {s.order:.3f}{between} on levels {s.first} to {s.last}"
 
 
-def _due(quantity: str) -> str:
-    """Say whose the order of a quantity is: of a part of an error no scheme promises one, a check expects it."""
-    return "expected" if is_error_part(quantity) else "promised"
+def _due(s: Story) -> str:
+    """Say whose the order is: the scheme's, or that of the check alone, where theory has none or another one."""
+    if not s.has_promise or promises_less(s) or promises_more(s):
+        return "expected"
+    return "promised"
 
 
 def tell(s: Story) -> str:
@@ -160,7 +169,7 @@ def tell(s: Story) -> str:
     match s.reason:
         case "asymptotic":
             return (
-                f"{s.quantity} converges with {measured}, as {_due(s.quantity)} ({promised}): the rescaled "
+                f"{s.quantity} converges with {measured}, as {_due(s)} ({promised}): the rescaled "
                 f"differences coincide.{_doubt(s)}{_unseen(s)}"
             )
         case "exact":
