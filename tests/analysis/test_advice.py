@@ -21,6 +21,7 @@ from vibsim.analysis.causes import CAUSES
 from vibsim.analysis.sentences import tell
 from vibsim.analysis.story import Corner, Story
 from vibsim.record import Record, Variable
+from vibsim.simulation import simulate_record
 from vibsim.spec.checks import MEASURED
 from vibsim.vocabulary import DRIFTS, REASON_NAMES, REASONS, STATUSES
 
@@ -274,3 +275,30 @@ def test_a_failure_of_coarse_levels_alone_is_placed_and_mended_by_finer_ones() -
     assert "Start `levels:` at 5 or finer" in advise(coarse)
     moving = story(reason="non_finite", culprit=4, failures=(1.25, 2.5, 4.0, 9.0))
     assert "or finer" in advise(moving)
+
+
+def test_a_number_that_needs_more_levels_than_there_are_says_so() -> None:
+    exp = experiment(levels=[4, 5], checks=[{"value": "ratio", "quantity": "theta", "equals": 4.0}])
+    (found,) = verdicts(exp, analyse_records(exp, level_records(exp)))
+    assert (found.status, found.reason) == ("INCONCLUSIVE", "too_few_levels")
+    assert (
+        found.text == "ratio of theta does not exist here: it rests on more levels than there are."
+    )
+    assert found.advice == "Add finer `levels:`, so that there are 3 of them."
+
+
+def test_a_motion_that_escapes_is_not_told_to_take_finer_levels_alone() -> None:
+    """u'' = -u + u^3 from 1.5 at rest runs away in finite time, whatever the step; see `check: converges` beside it."""
+    exp = experiment(
+        model={"kind": "duffing", "beta": -1.0},
+        initial={"u": 1.5},
+        schemes=["rk4"],
+        levels=[5, 6, 7],
+        time={"end": 20.0},
+        checks=[{"stable": True}],
+    )
+    levels = {level: simulate_record(exp, level) for level in exp.levels}
+    (found,) = verdicts(exp, analyse_records(exp, levels))
+    assert found.reason == "unstable"
+    assert "`time: end`) before t = 1." in found.advice
+    assert "if the motion itself escapes" in found.advice

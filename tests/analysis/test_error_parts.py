@@ -312,3 +312,31 @@ def test_parts_of_another_name_and_of_motions_with_events() -> None:
     assert "bouncing_ball has events" in text
     text = faults(checks=[{"value": "end", "quantity": "u_phase_error", "equals": 0.0}])
     assert "unknown quantity" in text
+
+
+@pytest.mark.parametrize("asked", ["u_phase_error", "u_amplitude_error"])
+def test_a_large_run_that_is_asked_for_one_part_alone_is_judged(asked: str) -> None:
+    """Beyond 2^14 samples a part that no check asks for is not there; what the parts say is then left out."""
+    checks = [{"converges": "u", "order": 2}, {"converges": asked, "order": 2}]
+    found = spring(["euler_cromer"], *checks, time={"end": 4.0}, levels=[12, 13, 14, 15])
+    assert f"{asked}_order" in found.record
+    assert (
+        len({"u_phase_error_order", "u_amplitude_error_order"} & set(found.record.variables)) == 1
+    )
+    assert found.verdicts[0].reason == "order_low"
+    assert "The phase is of" not in found.verdicts[0].text
+
+
+def test_the_order_of_a_part_is_promised_where_theory_has_it_and_expected_elsewhere() -> None:
+    parts = [
+        {"converges": "u_phase_error", "order": "scheme"},
+        {"converges": "u_amplitude_error", "order": 2},
+    ]
+    short = {"time": {"end": 2.0, "base_steps": 640}, "levels": [0, 1, 2, 3]}
+    for found in spring(["euler_cromer"], *parts, **short).verdicts:
+        assert found.status == "PASS"
+        assert "as promised (order " in found.text
+    swing = {"model": {"kind": "pendulum"}, "initial": {"theta": 1.0}}
+    check = {"converges": "theta_phase_error", "order": 2}
+    (found,) = spring(["central"], check, levels=[0, 1, 2, 3], **swing).verdicts
+    assert "as expected (order 2)" in found.text

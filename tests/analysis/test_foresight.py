@@ -210,6 +210,14 @@ def test_a_scheme_that_promises_less_is_named() -> None:
         {"converges": "theta", "order": 2}, schemes=["euler_cromer"], levels=[9, 10, 11, 12]
     )
     assert "promises no more than order 1" in found.text
+    assert found.advice == "Set `start: centred` for scheme euler_cromer, or `order: scheme`."
+    (found,), _ = judged(
+        {"converges": "energy_deviation", "order": 2},
+        schemes=["euler_cromer"],
+        levels=[9, 10, 11, 12],
+    )
+    assert "`kind:`" in found.advice
+    assert "start:" not in found.advice
 
 
 def test_a_last_point_of_lower_order_is_seen_in_the_data() -> None:

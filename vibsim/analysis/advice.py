@@ -110,6 +110,8 @@ def _on_low_order(s: Story) -> str:
 def _on_promise(s: Story) -> str:
     if s.kind == BACKWARD_DAMPING:
         return f"Set `kind: central` for scheme {s.scheme}, which centres the damping, or `order: scheme`."
+    if s.centred >= s.expected - s.tolerance:
+        return f"Set `start: centred` for scheme {s.scheme}, or `order: scheme`."
     return f"Set `order: scheme`, or another `kind:` than that of scheme {s.scheme}."
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis.behaviour_advice import BROKEN, on_distance, on_drift, on_stability
-from vibsim.analysis.numbers_in_words import growth_in_words, number, vanishing_in_words
+from vibsim.analysis.numbers_in_words import growth_in_words, vanishing_in_words
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
 from vibsim.analysis.promise import columns_of, stability_limits
 from vibsim.record import Record
@@ -44,6 +44,10 @@ def stable(experiment: Experiment, record: Record, check: StableCheck, index: in
 
     model = experiment.model.definition
 
+    def failed_at(scheme: int, case: int) -> float:
+        place = (scheme, case, _place(record, level))
+        return float(record["failure_time"][place]) if record["status"][place] else np.nan
+
     def tell(scheme: int, case: int) -> str:
         name = experiment.schemes[scheme].name
         unstable = reason[scheme, case] != MATCH
@@ -52,12 +56,11 @@ def stable(experiment: Experiment, record: Record, check: StableCheck, index: in
         if np.isfinite(p[scheme, case]):
             told += f", w dt = {p[scheme, case]:.4g}"
         factors = float(expected[scheme, case]), float(measured[scheme, case])
-        told += growth_in_words(*factors, is_simple=model.conservative)
+        told += growth_in_words(*factors, model.conservative, model.linear)
         if not unstable and never[scheme, case]:
             told += vanishing_in_words(*factors)
-        if record["status"][scheme, case, _place(record, level)]:
-            t = float(record["failure_time"][scheme, case, _place(record, level)])
-            told += f"; it met a number that is not finite or too large at t = {number(t)}"
+        if not np.isnan(t := failed_at(scheme, case)):
+            told += f"; it met a number that is not finite or too large at t = {t:.4g}"
         if reason[scheme, case] == MISMATCH:
             told += "; the two do not agree, so the scheme is not what the theory is of"
         return told + "."
@@ -84,7 +87,11 @@ def stable(experiment: Experiment, record: Record, check: StableCheck, index: in
         quantity=None,
         tell=tell,
         advise=lambda scheme, case: on_stability(
-            word_of(scheme, case), level, float(p[scheme, case]), limit_of(scheme, case)
+            word_of(scheme, case),
+            level,
+            float(p[scheme, case]),
+            limit_of(scheme, case),
+            failed_at(scheme, case),
         ),
         value=measured,
     )
@@ -183,7 +190,7 @@ def equal(experiment: Experiment, record: Record, check: EqualCheck, index: int)
         verb = "equals" if reason[scheme, case] == MATCH else "differs from"
         return (
             f"{check.quantity} of scheme {check.first} {verb} {second}: they are at most "
-            f"{distance[scheme, case]:.4g} apart, and may be {allowed[scheme, case]:.4g}."
+            f"{distance[scheme, case]:.4g} apart; {allowed[scheme, case]:.4g} is allowed."
         )
 
     def advise(scheme: int, case: int) -> str:

@@ -18,13 +18,15 @@ KNOWN_DRIFTS = get_args(Drift)
 """What `drift:` may be."""
 
 
-def on_stability(reason: str, level: int, p: float, limit: float) -> str:
+def on_stability(reason: str, level: int, p: float, limit: float, failed: float = math.nan) -> str:
     """Say what to change where a scheme is not as stable as a check expects.
 
     Parameters
     ----------
     p, limit
         w dt at `level`, and the largest stable one.
+    failed
+        Time at which `level` met a number that is not finite; NaN where it did not.
     """
     if reason == "match":
         return "Set `stable: true`, or take coarser `levels:` where the scheme has a limit (w dt beyond it)."
@@ -33,7 +35,13 @@ def on_stability(reason: str, level: int, p: float, limit: float) -> str:
             "Take another `kind:` in `schemes:`, or look for an error in this one: it does not grow as its own theory "
             "says."
         )
-    if not (math.isfinite(limit) and p > limit > 0.0):
+    is_beyond = math.isfinite(limit) and p > limit > 0.0
+    if not is_beyond and not math.isnan(failed):
+        return (
+            f"End the time interval (`time: end`) before t = {failed:.4g} if the motion itself escapes there, take "
+            "finer `levels:` if it does not, or correct `stable:`."
+        )
+    if not is_beyond:
         return "Take finer `levels:`, shorten `time: end`, or correct `stable:`."
     first = level + math.ceil(math.log2(p / limit) - 1e-9)
     return f"Take finer `levels:`, from {first} on (w dt within the limit {number(limit)}), or correct `stable:`."
@@ -60,7 +68,7 @@ def on_drift(reason: str, drift: str, quantity: str, expected: str) -> str:
     )
     return (
         f"Take a scheme that conserves the energy better (`schemes:`), or {other}: finer `levels:` make the error "
-        "smaller, and of no other kind."
+        "smaller, but do not change how it grows."
     )
 
 

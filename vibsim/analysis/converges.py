@@ -17,6 +17,7 @@ from vibsim.analysis.corners import is_on_a_point, words_of
 from vibsim.analysis.costs import cost_in_words
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Orders, Outcome
 from vibsim.analysis.part import fastest
+from vibsim.analysis.part_promise import is_promised
 from vibsim.analysis.parts_told import parts_in_words
 from vibsim.analysis.promise import (
     Columns,
@@ -28,6 +29,7 @@ from vibsim.analysis.promise import (
 )
 from vibsim.analysis.sentences import tell
 from vibsim.analysis.story import Corner, Story
+from vibsim.models.error_parts import is_error_part, whole_of
 from vibsim.record import Record
 from vibsim.schemes import SCHEMES, Options, Scheme
 from vibsim.spec.about import schemes_of
@@ -143,6 +145,8 @@ def _story(
         parts=parts_in_words(experiment.model.definition, record, check.converges, scheme, case),
         kind=spec.kind,
         promised=_promised(experiment, check.converges, columns, scheme, case),
+        centred=_centred(experiment, check.converges, SCHEMES[spec.kind], options),
+        has_promise=not is_error_part(check.converges) or is_promised(experiment, check.converges),
         cost=partial(cost_in_words, experiment),
         has_exact=_has_exact(record, check.converges, scheme, case),
         failures=_failures(record, scheme, case),
@@ -187,6 +191,14 @@ def _promised(
     """Return the order that the scheme of a member promises."""
     orders = formal_orders(experiment, quantity, columns)[scheme]
     return float(orders[case if len(orders) > 1 else 0])
+
+
+def _centred(experiment: Experiment, quantity: str, scheme: Scheme, options: Options) -> float:
+    """Return the order that a scheme would promise with a centred start; NaN where its start is not of first order."""
+    if options.get("start") != "first_order":
+        return math.nan
+    model = experiment.model.definition
+    return float(scheme.formal_order(whole_of(quantity), model, {**options, "start": "centred"}))
 
 
 def _foreseen(record: Record, index: int, scheme: int, case: int) -> dict[str, Any]:

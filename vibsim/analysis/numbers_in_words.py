@@ -33,12 +33,16 @@ def vanishing_in_words(predicted: float, measured: float) -> str:
     return f"; it grows {much} per period, which vanishes with dt"
 
 
-def growth_in_words(predicted: float, measured: float, is_simple: bool = True) -> str:
+def growth_in_words(
+    predicted: float, measured: float, is_simple: bool = True, is_linear: bool = True
+) -> str:
     """Say what growth theory predicts and what was measured; empty where neither is known.
 
-    The theory is of free linear oscillations without damping: of another model (not `is_simple`) that is said.
+    The theory is of free linear oscillations without damping: of a model with damping or a force in time (not
+    `is_simple`), and of a nonlinear one, that is said.
     """
-    theory = "predicted" if is_simple else "predicted of free oscillations without damping"
+    small = "predicted" if is_linear else "predicted of small oscillations"
+    theory = small if is_simple else "predicted of free oscillations without damping"
     told = [
         f"{factor_in_words(value)} {word}"
         for value, word in ((predicted, theory), (measured, "measured"))

@@ -56,7 +56,8 @@ def parts_in_words(model: Model, record: Record, quantity: str, scheme: int, cas
     """
     known = dict(zip((*model.positions, *model.velocities), model.positions * 2, strict=True))
     position = known.get(quantity, "")
-    if f"{position}{PHASE}_order" not in record:
+    # a large run keeps only the part that a check asks for
+    if any(f"{position}{end}_order" not in record for end in (PHASE, AMPLITUDE)):
         return ""
     norm = record.words("norm").index(TYPICAL_NORM)
     phase, amplitude = (

@@ -9,8 +9,14 @@ import math
 
 from vibsim.analysis.causes_told import cause_in_words
 from vibsim.analysis.numbers_in_words import growth_in_words, number
-from vibsim.analysis.story import Corner, Story, first_stable, is_adaptive
-from vibsim.models.error_parts import is_error_part
+from vibsim.analysis.story import (
+    Corner,
+    Story,
+    first_stable,
+    is_adaptive,
+    promises_less,
+    promises_more,
+)
 from vibsim.schemes.base import is_on_the_mesh
 
 HIGHEST = 12.0
@@ -28,9 +34,11 @@ def _measured(s: Story) -> str:
     return f"order {s.order:.3f}{between} on levels {s.first} to {s.last}"
 
 
-def _due(quantity: str) -> str:
-    """Say whose the order of a quantity is: of a part of an error no scheme promises one, a check expects it."""
-    return "expected" if is_error_part(quantity) else "promised"
+def _due(s: Story) -> str:
+    """Say whose the order is: the scheme's, or that of the check alone, where theory has none or another one."""
+    if not s.has_promise or promises_less(s) or promises_more(s):
+        return "expected"
+    return "promised"
 
 
 def tell(s: Story) -> str:
@@ -42,7 +50,7 @@ def tell(s: Story) -> str:
     match s.reason:
         case "asymptotic":
             return (
-                f"{s.quantity} converges with {measured}, as {_due(s.quantity)} ({promised}): the rescaled "
+                f"{s.quantity} converges with {measured}, as {_due(s)} ({promised}): the rescaled "
                 f"differences coincide.{_doubt(s)}{_unseen(s)}"
             )
         case "exact":

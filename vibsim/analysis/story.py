@@ -62,7 +62,11 @@ class Story:
     kind: str = ""
     """Kind of the scheme."""
     promised: float = math.nan
-    """The order that the scheme promises."""
+    """The order that the scheme promises, ..."""
+    centred: float = math.nan
+    """... and would promise with `start: centred`; NaN where it has that start, or no such option."""
+    has_promise: bool = True
+    """Whether that is a promise for the quantity; of a part of an error it may be the one for its position."""
     cause: str = "none"
     """Why the order is another one, one of `vibsim.analysis.causes.CAUSES`."""
     more: int = -1

@@ -75,7 +75,8 @@ def valued(experiment: Experiment, record: Record, check: ValueCheck, index: int
     masks = [lost | infinite, np.isnan(measured), holds, open_]
     status = np.select(masks, [FAIL, INCONCLUSIVE, PASS, INCONCLUSIVE], FAIL).astype(np.int8)
     few = "too_few_levels" if len(record["level"]) < FEW else "pre_asymptotic"
-    codes = [REASON_NAMES.index(name) for name in ("non_finite", "not_applicable", "match", few)]
+    missing = "too_few_levels" if _lacks_levels(experiment, check) else "not_applicable"
+    codes = [REASON_NAMES.index(name) for name in ("non_finite", missing, "match", few)]
     reason = np.select(masks, codes, REASON_NAMES.index("mismatch"))
     what = f"{check.value} of {check.quantity}" if check.quantity else check.value
     unit = f" {measure}" if (measure := unit_of(experiment, record, check)) else ""
@@ -125,6 +126,8 @@ def _advise(experiment: Experiment, check: ValueCheck, reason: str) -> str:
     """Say what to change in the YAML; finer levels only where they change the number."""
     if reason in _ADVICE:
         return _ADVICE[reason]
+    if reason == "too_few_levels" and _lacks_levels(experiment, check):
+        return f"Add finer `levels:`, so that there are {VALUES[check.value].finer_levels + 1} of them."
     finest = experiment.levels[-1]
     finer = [finest + 1 + i for i in range(FINER)]
     cost = cost_in_words(experiment, finer)
@@ -172,12 +175,19 @@ def _tell(what: str, reason: str, found: float, rule: str, error: str) -> str:
             return f"{what} means nothing here: the calculation met a number that is not finite."
         case "not_applicable":
             return f"{what} does not exist here, or was not stored."
+        case "too_few_levels" if np.isnan(found):
+            return f"{what} does not exist here: it rests on more levels than there are."
         case "pre_asymptotic" | "too_few_levels":
             return f"{what} is {found:.10g}{error}: it may be {rule}, or not."
     verb = "is" if reason == "match" else "is not"
     # of round-off two digits say all
     digits = 2 if reason == "match" and abs(found) <= ROUND_OFF else 10
     return f"{what} is {found:.{digits}g}{error}; it {verb} {rule}."
+
+
+def _lacks_levels(experiment: Experiment, check: ValueCheck) -> bool:
+    """Say whether a number rests on more levels than the experiment has."""
+    return VALUES[check.value].finer_levels >= len(experiment.levels)
 
 
 def sees_several_levels(name: str) -> bool:

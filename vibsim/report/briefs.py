@@ -66,5 +66,5 @@ def _measured(that: Measurement, check: Mapping[str, Any]) -> str:
         text = text.partition("; it is")[0]
         text = text if text.startswith("it grows") else text.rpartition(" is ")[2]
     elif that.kind == "equal":
-        text = text.rpartition("they are ")[2].replace(", and may be ", "; allowed is ")
+        text = text.rpartition("they are ")[2]
     return several + text.rstrip(".")

@@ -15,6 +15,7 @@ from vibsim.report.data import (
     at,
     formal_order,
     is_lean,
+    power,
     sound_triples,
     stated_order,
     time_unit,
@@ -51,9 +52,11 @@ def picture(
     if is_lean(record):
         return Picture(document([by_level], _label(quantity)), f"{member.title}: {told}")
     curves = _differences(record, quantity, member)
+    order = power(record, member, quantity)
+    how = f"rescaled to coincide where the error has order {order:g}" if order else "as they are"
     left = (
-        f"Left: differences between levels of {member.title}, rescaled to coincide where the error has the "
-        f"{words.due(quantity)} order; the finest pair is the thinnest line."
+        f"Left: differences between levels of {member.title}, {how}; the finest pair is the "
+        "thinnest line."
     )
     return Picture(document([curves, by_level], _label(quantity)), f"{left} Right: {told}")
 

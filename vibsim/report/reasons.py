@@ -51,7 +51,8 @@ REASONS = {
         "The differences alone cannot show this; the exact solution does. Check the equation that is being solved.",
     ),
     "unstable": Reason(
-        "The numerical solution grows where the exact one does not, and the finer of these levels do not cure it.",
+        "The numerical solution grows where the exact one does not: w dt is beyond the limit of the scheme, or the "
+        "next finer level grows no less.",
         "A smaller step (w dt below the stability limit), or a scheme without such a limit.",
     ),
     "non_finite": Reason(
