@@ -247,3 +247,25 @@ def test_without_an_exact_solution_only_errors_are_unknown(
     assert np.all(found["theta_floor"] <= known["theta_floor"])
     assert_same_bytes(analysed(experiment, records, 1), found)
     assert [v.status for v in verdicts(experiment, found)]
+
+
+def test_what_no_level_can_tell_is_said_of_what_is_kept_of_parts() -> None:
+    """Of friction with a spring of its own nothing is known; of the undamped one the exact solution is."""
+    for alpha, is_said in ((0.5, True), (0.0, False)):
+        data = {
+            "title": "test",
+            "model": {"kind": "sliding_box", "alpha": alpha, "mu": 0.1},
+            "initial": {"u": 2.0},
+            "time": {"end": 10.0},
+            "levels": [7, 8, 9, 10],
+            "schemes": ["rk2"],
+            "checks": [{"converges": "u"}],
+        }
+        experiment = Experiment.from_dict(data)
+        whole = analyse_records(experiment, simulated(experiment))
+        thin: list[Record] = []
+        list(kept([whole], thin))
+        (found,) = verdicts(experiment, thin[0])
+        assert found.status == "PASS"
+        assert ("a wrong limit would not be noticed" in found.text) == is_said
+        assert found.text == verdicts(experiment, whole)[0].text

@@ -27,6 +27,7 @@ from vibsim.analysis.promise import (
     options_of,
     stability_limits,
 )
+from vibsim.analysis.seen import has_exact
 from vibsim.analysis.sentences import tell
 from vibsim.analysis.story import Corner, Story
 from vibsim.models.error_parts import is_error_part, whole_of
@@ -148,16 +149,9 @@ def _story(
         centred=_centred(experiment, check.converges, SCHEMES[spec.kind], options),
         has_promise=not is_error_part(check.converges) or is_promised(experiment, check.converges),
         cost=partial(cost_in_words, experiment),
-        has_exact=_has_exact(record, check.converges, scheme, case),
+        has_exact=has_exact(record, check.converges, scheme, case),
         failures=_failures(record, scheme, case),
     )
-
-
-def _has_exact(record: Record, quantity: str, scheme: int, case: int) -> bool:
-    """Tell whether a true error of a quantity is known at some level."""
-    name = f"{quantity}_error_norm"
-    # parts of an error are measured against the motion itself
-    return name not in record or bool(np.any(np.isfinite(record[name][scheme, case])))
 
 
 def _failures(record: Record, scheme: int, case: int) -> tuple[float, ...]:

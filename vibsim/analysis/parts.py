@@ -18,6 +18,7 @@ from vibsim import plan
 from vibsim.analysis.assemble import analyse_records
 from vibsim.analysis.parts_told import is_told
 from vibsim.analysis.reached import is_bound
+from vibsim.analysis.seen import known_errors
 from vibsim.analysis.value_units import UNITS, units_in
 from vibsim.record import Record, Variable
 from vibsim.vocabulary import HIGHEST
@@ -108,7 +109,8 @@ def kept(parts: Iterable[Record], thin: list[Record]) -> Iterator[Record]:
     for part in parts:
         names = [n for n in part.variables if _is_kept(n)]
         attrs = {**part.attrs, UNITS: json.dumps(units_in(part))}
-        thin.append(Record(part.coords, {n: part.variables[n] for n in names}, attrs))
+        thinned = {n: part.variables[n] for n in names} | known_errors(part)
+        thin.append(Record(part.coords, thinned, attrs))
         yield part
 
 
