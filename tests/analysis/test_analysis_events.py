@@ -47,6 +47,7 @@ def reasons() -> dict[tuple[str, Any], Counter[str]]:
     }
 
 
+@pytest.mark.slow
 def test_located_events_pass_with_the_order_of_the_scheme() -> None:
     found = reasons()["rk4", "scheme"]
     assert found == reasons()["rk4", 4]

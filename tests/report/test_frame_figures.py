@@ -120,6 +120,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_no_word_leaves_a_figure(case):
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -94,7 +94,7 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Flags]:
         (exactly & ~at_round_off(e), "order_low"),
         (exactly | (nothing & (at_round_off(e) | ~(rough | unlike))), "round_off"),
         # orders that swing into a floor do so by noise
-        (swings & t.cut, "round_off"),
+        (swings & t.cut & ~np.signbit(t.scatter), "round_off"),
         (swings, "oscillating"),
         (missed & regular, "wrong_limit"),
         (right & ~too_small & regular, "asymptotic"),
