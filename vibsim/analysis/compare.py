@@ -116,9 +116,9 @@ class Comparison:
         """Whether the levels differ at no more than two points, shape (scheme, case)."""
         if not self.differences:
             return np.zeros(self.part.shape, dtype=bool)
-        size = np.abs(np.nan_to_num(self.differences[-1]))
-        counts = size > VANISHING * np.max(size, axis=-1, keepdims=True)
-        return np.asarray(np.sum(counts, axis=-1) <= TWO)
+        d = self.differences[-1]
+        least = VANISHING * series.largest(d)[..., None]
+        return np.asarray(np.count_nonzero((d > least) | (d < -least), axis=-1) <= TWO)
 
     def in_norm(self, kind: str) -> InNorm:
         """Measure the quantity in a norm."""

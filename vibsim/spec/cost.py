@@ -66,7 +66,7 @@ LARGEST_SHARD = 2**20
 
 ANALYSIS_MEMORY = 85 * 10**6
 """Bytes of an analysis without its arrays."""
-ANALYSED = 3.2
+ANALYSED = 3.4
 """Bytes that an analysis holds at its peak for each byte that it reads of the members at hand."""
 PART_SAMPLES = 2**17
 """Samples of one variable that an analysis takes at a time (`vibsim.analysis`)."""
