@@ -147,8 +147,7 @@ def _onset(orders: Floats, scatter: Floats, incoherent: Flags) -> Flags:
     begins = incoherent.copy()
     to_the_end = np.logical_and.accumulate(incoherent[..., ::-1], axis=-1)[..., ::-1]
     begins &= to_the_end
-    with np.errstate(over="ignore", invalid="ignore"):
-        most = STEEP * np.exp2(np.clip(orders - 0.5, 0.5, 64.0))
+    most = _steepest(orders)
     for i in range(count - 1, 0, -1):
         rises = (size[..., i] > AUDIBLE) & (size[..., i] > size[..., i - 1])
         steep = size[..., i] > most[..., i - 1] * size[..., i - 1]
@@ -156,6 +155,12 @@ def _onset(orders: Floats, scatter: Floats, incoherent: Flags) -> Flags:
         noisy_next = to_the_end[..., i + 1] if i + 1 < count else np.zeros(rises.shape, dtype=bool)
         begins[..., i] |= rises & follows & (steep | noisy_next | begins[..., i])
     return begins
+
+
+def _steepest(orders: Floats) -> Floats:
+    """Return the factor by which no lower power makes the scatter rise from one triple to the next."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.asarray(STEEP * np.exp2(np.clip(orders - 0.5, 0.5, 64.0)))
 
 
 def _climbs(orders: Floats, scatter: Floats, incoherent: Flags) -> Flags:
@@ -166,8 +171,8 @@ def _climbs(orders: Floats, scatter: Floats, incoherent: Flags) -> Flags:
     if orders.shape[-1] <= VOUCHED:
         return np.zeros(orders.shape[:-1], dtype=bool)
     size = np.abs(scatter)
+    most = _steepest(orders)
     with np.errstate(over="ignore", invalid="ignore"):
-        most = STEEP * np.exp2(np.clip(orders - 0.5, 0.5, 64.0))
         steep = (size[..., 1:] > most[..., :-1] * size[..., :-1]) & (size[..., 1:] > AUDIBLE)
     return np.asarray(incoherent[..., -1] & np.any(steep[..., 1:] & steep[..., :-1], axis=-1))
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vibsim.analysis.cut import LOG2, QUIET
 from vibsim.analysis.facts import ORDINARY, Evidence, at_round_off, far_from_exact, truly_exact
-from vibsim.analysis.settling import FADING, GROWS, HIDDEN, OF_SCATTER, SINGLE_WIDTH
+from vibsim.analysis.settling import COINCIDENT, FADING, GROWS, HIDDEN, OF_SCATTER, SINGLE_WIDTH
 from vibsim.analysis.true_errors import (
     contradicts,
     errors_agree,
@@ -18,7 +18,7 @@ from vibsim.analysis.true_errors import (
     errors_stay,
     errors_vouch,
 )
-from vibsim.analysis.two_ratios import COINCIDENT, SINGLE, little_left, two_ratios
+from vibsim.analysis.two_ratios import SINGLE, little_left, two_ratios
 from vibsim.analysis.window import Trend, mismatches
 
 Floats = NDArray[np.float64]

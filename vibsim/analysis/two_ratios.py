@@ -12,15 +12,22 @@ from numpy.typing import NDArray
 
 from vibsim.analysis.cut import QUIET
 from vibsim.analysis.facts import Evidence
-from vibsim.analysis.settling import FADING, FARTHEST, GROWS, HIDDEN, JUMP, READABLE, most_left
+from vibsim.analysis.settling import (
+    COINCIDENT,
+    FADING,
+    FARTHEST,
+    GROWS,
+    HIDDEN,
+    JUMP,
+    READABLE,
+    most_left,
+)
 from vibsim.analysis.true_errors import errors_leave
 from vibsim.analysis.window import Trend, mismatches
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-COINCIDENT = 0.2
-"""Largest scatter (see `series.scatter`) of curves that count as proportional."""
 SINGLE = 0.05
 """The same where one triple is the only evidence."""
 

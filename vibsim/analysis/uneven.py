@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis.cut import QUIET
-from vibsim.analysis.settling import GROWS
+from vibsim.analysis.settling import COINCIDENT, GROWS
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -24,8 +24,6 @@ FEWEST, MOST = 3, 6
 """So many orders, the last ones, are looked at."""
 SURE = 2
 """So many changes of direction are no power that takes over from another one, which makes one of them."""
-COHERENT = 0.2
-"""Largest scatter of curves that count as proportional."""
 OF_SWINGS = 2.0
 """Half the width of the interval of the mean over the largest distance from it."""
 
@@ -71,7 +69,7 @@ def accidents(
         away = np.max(np.abs(values - middle[..., None]), axis=-1)
         swings = several & (last + 1 >= count) & (away <= tolerance)
         swings &= turns >= (1 if count == FEWEST else SURE)
-        swings &= np.all((left >= 0) & (left <= COHERENT), axis=-1) & ~_turns_away(left)
+        swings &= np.all((left >= 0) & (left <= COINCIDENT), axis=-1) & ~_turns_away(left)
         found |= swings
         sure = np.where(swings, turns >= SURE, sure)
         mean = np.where(swings, middle, mean)

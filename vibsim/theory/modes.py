@@ -22,6 +22,7 @@ from typing import Any
 
 from vibsim.schemes.base import Stepper, handed
 from vibsim.theory import series
+from vibsim.theory.division import by_quadratic
 from vibsim.theory.exact import coefficients
 from vibsim.theory.laurent import Field, Laurent
 from vibsim.theory.polynomial import SUBSTITUTES
@@ -153,11 +154,11 @@ def _first_two(
     """
     field = matrix[0][0].field
     t, d = (Laurent(field, 0, row) for row in (trace, determinant))
-    rest = _divided(polynomial, t, d)[:-2]
+    rest = by_quadratic(polynomial, t, d)[:-2]
     state = [x * rest[0] for x in start]
     for coefficient in rest[1:]:
         state = [_dot(row, state) + coefficient * x for row, x in zip(matrix, start, strict=True)]
-    *_, by_x, left = _divided([field.constant(0.0), *rest], t, d)
+    *_, by_x, left = by_quadratic([field.constant(0.0), *rest], t, d)
     beside = left - t * by_x
     turned = by_x * t + beside
     bottom = beside * turned + by_x * by_x * d
@@ -168,19 +169,6 @@ def _first_two(
     nought = (t * one - two) / d
     length = min(len(trace), one.end, nought.end)
     return _listed(nought, length), _listed(one, length)
-
-
-def _divided(polynomial: Sequence[Laurent], trace: Laurent, determinant: Laurent) -> list[Laurent]:
-    """Divide a polynomial by ``x^2 - T x + D``: the quotient, then two numbers left (`series.divided`)."""
-    found: list[Laurent] = []
-    for k, coefficient in enumerate(polynomial):
-        value = coefficient
-        if k > 0:
-            value = value + trace * found[-1]
-        if k > 1:
-            value = value - determinant * found[-2]
-        found.append(value)
-    return found
 
 
 def _mode(

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vibsim.schemes.base import Stepper
 from vibsim.theory.amplification import step_matrix
+from vibsim.theory.division import by_quadratic
 from vibsim.theory.doubled import Doubled, doubled, matmul, root
 
 Floats = NDArray[np.float64]
@@ -179,8 +180,8 @@ def _refined(
 ) -> tuple[Doubled, Doubled]:
     """Return T and D with ``x^2 - T x + D`` dividing a polynomial, by Bairstow's method."""
     for _ in range(_REFINEMENTS):
-        b = _divided(polynomial, trace, determinant)
-        slopes = _divided(b[:-1], trace, determinant)
+        b = by_quadratic(polynomial, trace, determinant)
+        slopes = by_quadratic(b[:-1], trace, determinant)
         one, zero = b[-2], b[-1]
         c_1, c_2, c_3 = slopes[-1], slopes[-2], slopes[-3] if len(slopes) > 2 else doubled(0.0)
         bottom = c_2 * c_2 - c_1 * c_3
@@ -190,19 +191,6 @@ def _refined(
         trace = trace + _where(good, d_trace)
         determinant = determinant - _where(good, d_minus)
     return trace, determinant
-
-
-def _divided(polynomial: list[Doubled], trace: Doubled, determinant: Doubled) -> list[Doubled]:
-    """Return ``b_k = a_k + T b_(k-1) - D b_(k-2)``: the quotient, then what is left of the division."""
-    quotient: list[Doubled] = []
-    for k, coefficient in enumerate(polynomial):
-        value = coefficient
-        if k > 0:
-            value = value + trace * quotient[-1]
-        if k > 1:
-            value = value - determinant * quotient[-2]
-        quotient.append(value)
-    return quotient
 
 
 def _where(good: NDArray[np.bool_], value: Doubled) -> Doubled:
