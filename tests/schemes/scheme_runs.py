@@ -8,7 +8,7 @@ import numpy as np
 from vibsim.engine import integrate
 from vibsim.models import MODELS
 from vibsim.schemes import FIXED_STEP, Flag
-from vibsim.schemes.base import depends_on_velocity
+from vibsim.schemes.orders import depends_on_velocity
 
 DRIVEN = dataclasses.replace(
     MODELS["pendulum"],

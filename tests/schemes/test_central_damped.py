@@ -8,7 +8,7 @@ import pytest
 from vibsim.engine import LANES, integrate
 from vibsim.models.oscillator import written
 from vibsim.schemes import SCHEMES
-from vibsim.schemes.base import depends_on_velocity
+from vibsim.schemes.orders import depends_on_velocity
 
 KINDS = ("central", "central_quadratic_root", "central_backward_damping")
 ARITHMETICS = ("compensated", "increment", "three_term")

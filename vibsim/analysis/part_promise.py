@@ -15,6 +15,7 @@ from vibsim import plan, theory
 from vibsim.models.error_parts import PHASE, is_error_part
 from vibsim.models.free import FreeOscillation, free_oscillation, why_not_free
 from vibsim.schemes import SCHEMES, Options
+from vibsim.simulation.members import numbers_of
 
 if TYPE_CHECKING:
     from vibsim.analysis.promise import Columns
@@ -52,17 +53,7 @@ def part_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floa
 def _motion(experiment: Experiment, columns: Columns) -> FreeOscillation:
     """Return the numbers of the members that swept values belong to; of the one member without any."""
     size = len(next(iter(columns.values()))) if columns else 1
-
-    def filled(section: str, values: dict[str, float]) -> dict[str, Floats]:
-        return {
-            name: np.broadcast_to(np.asarray(columns.get(f"{section}.{name}", value), float), size)
-            for name, value in values.items()
-        }
-
-    initial, parameters = (
-        filled("initial", experiment.initial),
-        filled("model", experiment.model.parameters),
-    )
+    parameters, initial = numbers_of(experiment, columns, size)
     return free_oscillation(experiment.model.definition, initial, parameters)
 
 

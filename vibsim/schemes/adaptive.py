@@ -13,7 +13,8 @@ from __future__ import annotations
 import math
 
 from vibsim.errors import SimulationError
-from vibsim.schemes.base import NumberOption, Options, Orders, Scheme, Stepper
+from vibsim.schemes.base import NumberOption, Options, Scheme, Stepper
+from vibsim.schemes.orders import Orders
 
 LEAST_RELATIVE = 100 * 2.0**-52
 """Relative tolerance that SciPy does not go below, 2.2e-14; a smaller one acts on the absolute tolerance alone."""

@@ -37,10 +37,8 @@ from vibsim.schemes.base import (
     Function,
     Option,
     Options,
-    Orders,
     Scheme,
     Stepper,
-    depends_on_velocity,
 )
 from vibsim.schemes.central_steps import (
     BACKWARD,
@@ -51,6 +49,7 @@ from vibsim.schemes.central_steps import (
     Treatment,
     step,
 )
+from vibsim.schemes.orders import Orders, depends_on_velocity
 
 
 def start_three_term(

@@ -31,13 +31,12 @@ from vibsim.schemes.base import (
     Function,
     Option,
     Options,
-    Orders,
     Scheme,
     Stepper,
     always,
-    depends_on_velocity,
 )
 from vibsim.schemes.one_step import self_starting
+from vibsim.schemes.orders import Orders, depends_on_velocity
 from vibsim.schemes.written import written
 
 KICK, DRIFT = "kick", "drift"

@@ -21,7 +21,6 @@ from vibsim.schemes.base import (
     Acceleration,
     Function,
     Options,
-    Orders,
     Scheme,
     Slopes,
     Stepper,
@@ -29,6 +28,7 @@ from vibsim.schemes.base import (
 )
 from vibsim.schemes.newton import solved
 from vibsim.schemes.one_step import self_starting
+from vibsim.schemes.orders import Orders
 
 Two = tuple[float, float]
 Four = tuple[float, float, float, float]

@@ -21,7 +21,8 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from vibsim.schemes.base import Acceleration, Function, Options, Orders, Scheme, Stepper
+from vibsim.schemes.base import Acceleration, Function, Options, Scheme, Stepper
+from vibsim.schemes.orders import Orders
 from vibsim.schemes.runge_kutta import HEUN, RK3
 from vibsim.schemes.written import weighted, written
 

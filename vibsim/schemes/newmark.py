@@ -30,9 +30,10 @@ import math
 from functools import cache
 
 from vibsim.models.base import Model
-from vibsim.schemes.base import NumberOption, Options, Orders, Scheme, Stepper
+from vibsim.schemes.base import NumberOption, Options, Scheme, Stepper
 from vibsim.schemes.newton import solved
 from vibsim.schemes.one_step import with_acceleration
+from vibsim.schemes.orders import Orders
 from vibsim.schemes.written import written
 
 _STEP = """\

@@ -14,8 +14,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
-from vibsim.schemes.base import Options, Orders, Scheme, Stepper
+from vibsim.schemes.base import Options, Scheme, Stepper
 from vibsim.schemes.one_step import self_starting
+from vibsim.schemes.orders import Orders
 from vibsim.schemes.written import weighted, written
 
 

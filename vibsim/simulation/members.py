@@ -32,23 +32,11 @@ class Members:
 def members(experiment: Experiment, start: int, stop: int) -> Members:
     """Work out the numbers of members start..stop-1."""
     columns = plan.columns(experiment, start, stop)
-
-    def fill(section: str, values: Mapping[str, float]) -> dict[str, Floats]:
-        return {
-            name: columns.get(f"{section}.{name}", np.full(stop - start, value, dtype=float))
-            for name, value in values.items()
-        }
-
-    parameters = fill("model", experiment.model.parameters)
-    end = fill("time", {"end": experiment.time.end})["end"]
+    parameters, initial = numbers_of(experiment, columns, stop - start)
+    end = _filled("time", {"end": experiment.time.end}, columns, stop - start)["end"]
     if experiment.end_varies and "time.end" not in columns:
         # the end is a number of natural periods, and each member has its own
         end = np.asarray(experiment.natural_end(parameters), dtype=float)
-    initial = fill("initial", experiment.initial)
-    known = experiment.model.definition.start
-    if known is not None:
-        shape = (stop - start,)
-        initial |= {name: np.full(shape, value) for name, value in known(parameters).items()}
     return Members(
         index=np.arange(start, stop, dtype=np.int64),
         columns=columns,
@@ -56,3 +44,25 @@ def members(experiment: Experiment, start: int, stop: int) -> Members:
         initial=initial,
         end=end,
     )
+
+
+def numbers_of(
+    experiment: Experiment, columns: Mapping[str, NDArray[Any]], size: int
+) -> tuple[dict[str, Floats], dict[str, Floats]]:
+    """Return parameters and initial values of the members that swept values belong to, arrays of shape (size,)."""
+    parameters = _filled("model", experiment.model.parameters, columns, size)
+    initial = _filled("initial", experiment.initial, columns, size)
+    known = experiment.model.definition.start
+    if known is not None:
+        initial |= {name: np.full(size, value) for name, value in known(parameters).items()}
+    return parameters, initial
+
+
+def _filled(
+    section: str, values: Mapping[str, float], columns: Mapping[str, NDArray[Any]], size: int
+) -> dict[str, Floats]:
+    """Return the values of a section, swept or the same for every member."""
+    return {
+        name: columns.get(f"{section}.{name}", np.full(size, value, dtype=float))
+        for name, value in values.items()
+    }

@@ -1,0 +1,88 @@
+"""The orders that a scheme promises: powers of dt with which the errors of quantities vanish."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+from vibsim.expression import names_in
+from vibsim.models.base import BUDGET, Model, tree
+from vibsim.models.events import Friction
+
+ORDER_OF_WORK = 4.0
+"""Order of the sum by which the work of forces is found (`vibsim.simulation.budget`)."""
+
+
+@cache
+def depends_on_velocity(model: Model) -> bool:
+    """Tell whether the acceleration of a model depends on the velocity; between events, where there are some."""
+    events = model.events
+    smooth = (events.drive,) if isinstance(events, Friction) else model.accelerations
+    named = {name for formula in smooth for name in names_in(tree(model, formula))}
+    return not named.isdisjoint(model.velocities)
+
+
+@dataclass(frozen=True)
+class Orders:
+    """Powers of dt with which the errors of a scheme vanish, infinite where a quantity is exact.
+
+    Those of the energy differ between a linear, conservative model and any other one.
+    """
+
+    position: float
+    velocity: float
+    energy: float
+    energy_linear: float
+    velocity_d2t: float | None = None
+    """Of the centred difference ``[D_2t u]``; None: that of the position, 2 at most."""
+    energy_d2t: float | None = None
+    """Of the energy with that velocity; None: that of the energy, 2 at most."""
+    energy_d2t_linear: float | None = None
+    position_linear: float | None = None
+    """Of the position of a linear, conservative model; None: that of any other one."""
+    velocity_dependent: Orders | None = None
+    """What is promised instead where the acceleration depends on the velocity; None: the same."""
+
+    def between_events(self, model: Model) -> float:
+        """Return the order of every quantity where events are located: the lower one of position and velocity.
+
+        Of these two the scheme starts anew.
+        """
+        if self.velocity_dependent is not None and depends_on_velocity(model):
+            return self.velocity_dependent.between_events(model)
+        return min(self.position, self.velocity)
+
+    def of(self, quantity: str, model: Model) -> float:
+        """Return the order of a quantity of a model.
+
+        Parameters
+        ----------
+        quantity
+            A state, an energy (`vibsim.models.ENERGIES`), or either with ``_d2t`` behind it.
+        """
+        if self.velocity_dependent is not None and depends_on_velocity(model):
+            return self.velocity_dependent.of(quantity, model)
+        is_simple = model.linear and model.conservative
+        linear = self.position if self.position_linear is None else self.position_linear
+        position = linear if is_simple else self.position
+        energy = self.energy_linear if is_simple else self.energy
+        given = self.energy_d2t_linear if is_simple else self.energy_d2t
+        energy_d2t = min(energy, 2.0) if given is None else given
+        velocity_d2t = min(position, 2.0) if self.velocity_d2t is None else self.velocity_d2t
+        of_both = min(position, self.velocity)
+        moving = set(model.velocities)
+        outputs = {
+            row.name: position if moving.isdisjoint(names_in(tree(model, row.formula))) else of_both
+            for row in model.outputs
+        }
+        return {
+            **outputs,
+            **dict.fromkeys(BUDGET, min(of_both, ORDER_OF_WORK)),
+            **dict.fromkeys(model.positions, position),
+            **dict.fromkeys(model.velocities, self.velocity),
+            "kinetic_energy": self.velocity,
+            "potential_energy": position,
+            **dict.fromkeys((f"{name}_d2t" for name in model.velocities), velocity_d2t),
+            "energy_d2t": energy_d2t,
+            "energy_deviation_d2t": energy_d2t,
+        }.get(quantity, energy)
