@@ -29,11 +29,6 @@ def is_promised(experiment: Experiment, quantity: str) -> bool:
     return is_error_part(quantity) and not why_not_free(experiment.model.definition)
 
 
-def is_promised_to_members(experiment: Experiment, quantity: str) -> bool:
-    """Tell whether every member has a promise of its own."""
-    return experiment.sweep is not None and is_promised(experiment, quantity)
-
-
 def part_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floats:
     """Return the order of a part for which `is_promised` holds, shape (scheme, 1 or case).
 

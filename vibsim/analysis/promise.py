@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vibsim import plan
+from vibsim.analysis.beginning import BEGINNINGS, beginning_varies, beginnings
 from vibsim.analysis.floor import relative_floor
 from vibsim.analysis.part_promise import is_promised, part_orders
 from vibsim.models import Model
@@ -18,6 +19,7 @@ from vibsim.models.error_parts import whole_of
 from vibsim.record import Record
 from vibsim.schemes import SCHEMES, Options, Scheme
 from vibsim.schemes.base import ORDER_AT_CORNERS, OptionValue, is_on_the_mesh
+from vibsim.schemes.orders import Beginning
 from vibsim.theory import stability_limit
 
 if TYPE_CHECKING:
@@ -54,12 +56,26 @@ def formal_orders(experiment: Experiment, quantity: str, columns: Columns) -> Fl
 
     It is infinite for what is exact, and NaN for a scheme that chooses its own steps. Of a part of an error it is what
     theory says of it, and that of the position where it says nothing. Where no option is swept there is one case for
-    all, here and below, but of parts, which depend on every number of a member.
+    all, here and below, but of parts, which depend on every number of a member, and of schemes whose orders depend on
+    how a motion begins.
     """
     if is_promised(experiment, quantity):
         return part_orders(experiment, quantity, columns)
     model, of = experiment.model.definition, whole_of(quantity)
-    return _each(experiment, columns, lambda s, o: float(s.formal_order(of, model, o)))
+
+    def promised(beginning: Beginning) -> Floats:
+        return _each(
+            experiment, columns, lambda s, o: float(s.formal_order(of, model, o, beginning))
+        )
+
+    return np.choose(beginnings(experiment, columns), [promised(b) for b in BEGINNINGS])
+
+
+def orders_vary(experiment: Experiment, quantity: str) -> bool:
+    """Tell whether members have orders of their own."""
+    if is_promised(experiment, quantity):
+        return experiment.sweep is not None
+    return options_swept(experiment) or beginning_varies(experiment)
 
 
 def even_powers(experiment: Experiment, quantity: str, columns: Columns) -> NDArray[np.bool_]:

@@ -14,8 +14,7 @@ from vibsim.analysis.gci import of_order
 from vibsim.analysis.limits import ORDINARY
 from vibsim.analysis.local_order import local_order, window_points
 from vibsim.analysis.part import CENTRED, by_level, plain_name
-from vibsim.analysis.part_promise import is_promised_to_members
-from vibsim.analysis.promise import options_swept
+from vibsim.analysis.promise import orders_vary
 from vibsim.analysis.swing import swing
 from vibsim.models import ENERGIES
 from vibsim.record import Variable, attributes
@@ -66,7 +65,7 @@ def numbers(q: Comparison) -> Table:
         add("richardson_error_max", ("scheme", "case"), q.largest_bound, words, q.units)
     add("floor", of_level, q.floor, "predicted round-off", q.units)
     words = "order that the scheme promises, infinite for what is exact"
-    if options_swept(part.experiment) or is_promised_to_members(part.experiment, q.name):
+    if orders_vary(part.experiment, q.name):
         add("formal_order", ("scheme", "case"), np.broadcast_to(q.order, part.shape), words, "1")
     else:
         add("formal_order", ("scheme",), q.order[:, 0], words, "1")

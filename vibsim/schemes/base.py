@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from vibsim.models.base import BUDGET, Model
 from vibsim.models.events import TREATMENTS
-from vibsim.schemes.orders import Orders, depends_on_velocity
+from vibsim.schemes.orders import Beginning, Orders, depends_on_velocity
 
 OptionValue = str | float | bool
 Options = Mapping[str, OptionValue]
@@ -224,6 +224,11 @@ class Scheme:
         """Return every option with its default."""
         return {option.name: option.default for option in self.options}
 
+    def depends_on_beginning(self, options: Options) -> bool:
+        """Tell whether its orders depend on how a motion begins."""
+        orders = self.orders(options)
+        return orders.from_rest is not None or orders.from_balance is not None
+
     @property
     def words(self) -> tuple[Option, ...]:
         """The options that are a choice of words."""
@@ -255,7 +260,9 @@ class Scheme:
         treatment = str(options.get(EVENTS.name, EVENTS.default))
         return replace(stepper, events=treatment, own_velocity=False, staggered=False)
 
-    def formal_order(self, quantity: str, model: Model, options: Options) -> float:
+    def formal_order(
+        self, quantity: str, model: Model, options: Options, beginning: Beginning = "any"
+    ) -> float:
         """Return the order that is promised for a quantity of a model; infinite for what is exact.
 
         An event that is left to the mesh is noticed up to a step late: no order above 1 is left. A corner of the force
@@ -263,7 +270,7 @@ class Scheme:
         """
         orders = self.orders(options)
         if model.events is None:
-            order = orders.of(quantity, model)
+            order = orders.of(quantity, model, beginning)
             # the power of the force has its corners, whatever the steps do; that of damping has none
             is_kept = self._sees_corners(model) and quantity not in BUDGET[1:]
             return order if model.lookup is None or is_kept else min(order, ORDER_AT_CORNERS)

@@ -8,7 +8,10 @@ Where the first and the last substep are kicks, the last acceleration of a step 
 state carries it, and it is worked out once. Euler-Cromer is the composition of one kick and one drift, in either order:
 the recurrence of the centred scheme, with a velocity that lives half a step away from the position. With plain initial
 values its solution is of first order (`errata`, vibration text 7.1), with the centred start of second order; its own
-velocity and energy are of first order with both.
+velocity and energy are of first order with both. Of a motion ``u'' = a(u, t)`` plain initial values leave the errors
+``dt/2 y`` and ``dt/2 (y' - a)`` with ``y'' = (da/du) y``, ``y(0) = 0``, ``y'(0) = a(0)`` (less them, position first).
+With no acceleration at the start y is 0, and the position of second order. From rest y is v where time does not enter,
+and the velocity is of second order.
 
 A kick needs the force at a known velocity. Only Euler-Cromer with the velocity first has one, the old velocity (B,
 section 7.1); the others would be implicit or lose their order on a force that depends on the velocity.
@@ -210,7 +213,25 @@ def with_slope_ahead(u: Function, v: Function, a: Function, t: Any, dt: Any) -> 
 _STARTS = ("first_order", "centred")
 
 _DRAGGED = Orders(position=1, velocity=1, energy=1, energy_linear=1)
-_PLAIN = Orders(position=1, velocity=1, energy=1, energy_linear=1)
+_PLAIN = Orders(
+    position=1,
+    velocity=1,
+    energy=1,
+    energy_linear=1,
+    # the errors stand at the head of this module
+    from_rest=Orders(
+        position=1,
+        velocity=2,
+        energy=1,
+        energy_linear=1,
+        velocity_d2t=1,
+        energy_d2t=2,
+        energy_d2t_linear=2,
+    ),
+    from_balance=Orders(
+        position=2, velocity=1, energy=1, energy_linear=1, energy_d2t=2, energy_d2t_linear=2
+    ),
+)
 _CENTRED = Orders(
     position=2,
     velocity=1,

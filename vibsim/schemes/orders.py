@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import Literal
 
 from vibsim.expression import names_in
 from vibsim.models.base import BUDGET, Model, tree
@@ -13,13 +14,28 @@ ORDER_OF_WORK = 4.0
 """Order of the sum by which the work of forces is found (`vibsim.simulation.budget`)."""
 
 
+Beginning = Literal["any", "rest", "balance"]
+"""How a smooth motion begins whose forces do not depend on the velocity: at rest, where they do not depend on time
+either; with no acceleration; or in any other way."""
+
+
 @cache
 def depends_on_velocity(model: Model) -> bool:
     """Tell whether the acceleration of a model depends on the velocity; between events, where there are some."""
+    return not _named(model).isdisjoint(model.velocities)
+
+
+@cache
+def is_autonomous(model: Model) -> bool:
+    """Tell whether the acceleration of a model does not depend on time."""
+    return "t" not in _named(model)
+
+
+def _named(model: Model) -> frozenset[str]:
+    """Return what the acceleration names; between events, where there are some."""
     events = model.events
     smooth = (events.drive,) if isinstance(events, Friction) else model.accelerations
-    named = {name for formula in smooth for name in names_in(tree(model, formula))}
-    return not named.isdisjoint(model.velocities)
+    return frozenset(name for formula in smooth for name in names_in(tree(model, formula)))
 
 
 @dataclass(frozen=True)
@@ -42,6 +58,10 @@ class Orders:
     """Of the position of a linear, conservative model; None: that of any other one."""
     velocity_dependent: Orders | None = None
     """What is promised instead where the acceleration depends on the velocity; None: the same."""
+    from_rest: Orders | None = None
+    """What is promised instead of a motion that begins at rest (`Beginning`); None: the same."""
+    from_balance: Orders | None = None
+    """What is promised instead of a motion that begins with no acceleration (`Beginning`); None: the same."""
 
     def between_events(self, model: Model) -> float:
         """Return the order of every quantity where events are located: the lower one of position and velocity.
@@ -52,14 +72,19 @@ class Orders:
             return self.velocity_dependent.between_events(model)
         return min(self.position, self.velocity)
 
-    def of(self, quantity: str, model: Model) -> float:
+    def of(self, quantity: str, model: Model, beginning: Beginning = "any") -> float:
         """Return the order of a quantity of a model.
 
         Parameters
         ----------
         quantity
             A state, an energy (`vibsim.models.ENERGIES`), or either with ``_d2t`` behind it.
+        beginning
+            How the motion begins.
         """
+        special = {"rest": self.from_rest, "balance": self.from_balance}.get(beginning)
+        if special is not None:
+            return special.of(quantity, model)
         if self.velocity_dependent is not None and depends_on_velocity(model):
             return self.velocity_dependent.of(quantity, model)
         is_simple = model.linear and model.conservative

@@ -1,0 +1,129 @@
+"""Orders that depend on how a motion begins: promised where theory knows of them, and seen."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vibsim import Experiment, analyse, simulate, verdicts
+from vibsim.analysis import Verdict
+from vibsim.analysis.beginning import BEGINNINGS, beginnings
+from vibsim.models import MODELS
+from vibsim.schemes import SCHEMES
+
+LEVELS = [6, 7, 8, 9]
+STARTS = {"any": (0.8, 0.5), "rest": (0.8, 0.0), "balance": (0.0, 0.7)}
+FREE: dict[str, tuple[dict[str, Any], str, str]] = {
+    "pendulum": ({"kind": "pendulum", "g": 1.0, "L": 1.0}, "theta", "omega"),
+    "spring": ({"kind": "spring", "w": 1.3}, "u", "v"),
+    "uneven": ({"kind": "oscillator", "spring": "u + 0.2*u**2"}, "u", "v"),
+}
+OTHERS: dict[str, tuple[dict[str, Any], str, str]] = {
+    "damped": ({"kind": "oscillator", "spring": "u", "damping": {"linear": 0.2}}, "u", "v"),
+    "driven": ({"kind": "oscillator", "spring": "u", "force": "sin(2*t)"}, "u", "v"),
+}
+FIRST_ORDER = [
+    kind
+    for kind, scheme in SCHEMES.items()
+    if not scheme.adaptive and scheme.formal_order("u", MODELS["spring"], scheme.defaults()) == 1.0
+]
+"""Schemes whose first power may vanish by the start."""
+
+
+def experiment(
+    model: tuple[dict[str, Any], str, str], kind: str, start: tuple[float, float], **more: Any
+) -> Experiment:
+    declared, position, velocity = model
+    names = (position, velocity)
+    return Experiment.from_dict(
+        {
+            "title": "beginnings",
+            "model": declared,
+            "initial": dict(zip(names, start, strict=True)),
+            "time": {"end": 6.3, "base_steps": 3},
+            "levels": LEVELS,
+            "schemes": [kind],
+            "checks": [{"converges": name} for name in (*names, *more.pop("quantities", ()))],
+            **more,
+        }
+    )
+
+
+def judged(e: Experiment) -> list[Verdict]:
+    return list(verdicts(e, analyse(e, [simulate(e, level) for level in e.levels])))
+
+
+TREATED = [
+    (kind, name)
+    for kind in FIRST_ORDER
+    for name, model in {**FREE, **OTHERS}.items()
+    if name != "damped" or SCHEMES[kind].velocity_forces
+]
+
+
+@pytest.mark.parametrize("start", STARTS)
+@pytest.mark.parametrize(("kind", "model"), TREATED)
+def test_schemes_of_first_order_keep_their_promise_however_a_motion_begins(
+    kind: str, model: str, start: str
+) -> None:
+    energies = ("kinetic_energy", "potential_energy", "energy") if model in FREE else ()
+    e = experiment({**FREE, **OTHERS}[model], kind, STARTS[start], quantities=energies)
+    assert [v.status for v in judged(e)] == ["PASS"] * len(e.checks)
+
+
+@pytest.mark.parametrize("kind", ["euler_cromer", "euler_cromer_u_first"])
+@pytest.mark.parametrize("model", FREE)
+def test_euler_cromer_gains_an_order_from_rest_and_where_no_force_acts(
+    model: str, kind: str
+) -> None:
+    found = {}
+    for name, start in STARTS.items():
+        record = analyse(e := experiment(FREE[model], kind, start), _runs(e))
+        found[name] = [float(record[f"{q}_formal_order"][0]) for q in FREE[model][1:]]
+    assert found == {"any": [1.0, 1.0], "rest": [1.0, 2.0], "balance": [2.0, 1.0]}
+
+
+@pytest.mark.parametrize(("model", "balanced"), [("damped", 1.0), ("driven", 2.0)])
+def test_forces_of_velocity_or_time_take_gains_away(model: str, balanced: float) -> None:
+    gains = {"any": (1.0, 1.0), "rest": (1.0, 1.0), "balance": (balanced, 1.0)}
+    for name, start in STARTS.items():
+        e = experiment(OTHERS[model], "euler_cromer", start)
+        record = analyse(e, _runs(e))
+        assert tuple(float(record[f"{q}_formal_order"][0]) for q in "uv") == gains[name]
+
+
+def test_a_driven_motion_may_begin_at_rest_and_in_balance() -> None:
+    e = experiment(OTHERS["driven"], "euler_cromer", (0.0, 0.0))
+    assert BEGINNINGS[int(beginnings(e, {})[0])] == "balance"
+    assert [v.status for v in judged(e)] == ["PASS", "PASS"]
+
+
+def test_members_begin_in_ways_of_their_own() -> None:
+    sweep = {"initial.omega": [0.0, 0.3, 0.0], "initial.theta": [0.8, 0.0, np.pi]}
+    e = experiment(
+        FREE["pendulum"],
+        "euler_cromer",
+        (1.0, 1.0),
+        sweep={"zip": sweep},
+    )
+    columns = {key: np.array(column) for key, column in sweep.items()}
+    assert [BEGINNINGS[i] for i in beginnings(e, columns)] == ["rest", "balance", "rest"]
+    # any shard of the members is told the same
+    for case in range(3):
+        own = {key: column[case : case + 1] for key, column in columns.items()}
+        assert beginnings(e, own) == beginnings(e, columns)[case]
+    record = analyse(e, _runs(e))
+    assert record["omega_formal_order"].dims == ("scheme", "case")
+    assert record["omega_formal_order"].values.tolist() == [[2.0, 1.0, 2.0]]
+    assert record["theta_formal_order"].values.tolist() == [[1.0, 2.0, 1.0]]
+
+
+def test_a_pull_that_is_rounding_is_none() -> None:
+    e = experiment(FREE["pendulum"], "euler_cromer", (float(np.pi), 0.5))
+    assert BEGINNINGS[int(beginnings(e, {})[0])] == "balance"
+
+
+def _runs(e: Experiment) -> list[Any]:
+    return [simulate(e, level) for level in e.levels]
