@@ -257,7 +257,7 @@ def scatters(differences: Sequence[Floats], kind: str, end_included: bool = True
     Returns
     -------
     list
-        Arrays of shape (...); negative where s is negative; NaN where a difference vanishes.
+        Arrays of shape (...); with the sign bit of s, also where they are 0; NaN where a difference vanishes.
     """
     one = np.ones(1)
     if kind == "linf_interior" and end_included:
@@ -266,7 +266,9 @@ def scatters(differences: Sequence[Floats], kind: str, end_included: bool = True
     found = []
     for first, second in pairwise(units):
         sign = np.where(total(first * second) < 0, -1.0, 1.0)
-        found.append(sign * norm(first - sign[..., None] * second, kind, one, False))
+        left = norm(first - sign[..., None] * second, kind, one, False)
+        # a norm of 0 may carry either sign
+        found.append(np.copysign(left, sign))
     return found
 
 
