@@ -114,6 +114,22 @@ def test_the_held_out_half_is_judged_rightly(held_out: list[Finding]) -> None:
     check(held_out)
 
 
+def test_an_order_that_passes_fails_wherever_its_interval_excludes_what_is_asked_for(
+    held_out: list[Finding],
+) -> None:
+    """What is enough to believe an order is enough to say that it is no other one."""
+    ladders: dict[int, list[Finding]] = {}
+    for one in held_out:
+        ladders.setdefault(id(one.ladder), []).append(one)
+    told: Counter[str] = Counter()
+    for group in ladders.values():
+        for passed in (one for one in group if one.status == "PASS" and one.reason != "exact"):
+            low, high = passed.low - TOLERANCE, passed.high + TOLERANCE
+            told.update(one.status for one in group if not low <= one.formal <= high)
+    assert told["PASS"] == 0
+    assert told["INCONCLUSIVE"] <= 0.005 * told["FAIL"]
+
+
 @pytest.mark.parametrize("family", FAMILIES)
 def test_intervals_are_calibrated_family_by_family(held_out: list[Finding], family: str) -> None:
     intervals = [one for one in stated(held_out) if one.ladder.family == family]

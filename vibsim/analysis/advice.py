@@ -14,6 +14,7 @@ from vibsim.analysis.story import (
     is_adaptive,
     promises_less,
     promises_more,
+    shows_promise,
     starts_low,
 )
 from vibsim.schemes.base import is_on_the_mesh
@@ -93,7 +94,7 @@ def _or_lower(s: Story, corner: Corner) -> str:
 
 
 def _on_low_order(s: Story) -> str:
-    if promises_less(s):
+    if promises_less(s) and shows_promise(s):
         return _on_promise(s)
     if starts_low(s):
         return f"Set `start: centred` for scheme {s.scheme}."
@@ -116,7 +117,7 @@ def _on_promise(s: Story) -> str:
 
 
 def _on_high_order(s: Story) -> str:
-    if promises_more(s):
+    if promises_more(s) and shows_promise(s):
         return "Set `order: scheme`."
     match s.cause:
         case "special_times":

@@ -5,13 +5,20 @@ from __future__ import annotations
 import math
 
 from vibsim.analysis.numbers_in_words import number
-from vibsim.analysis.story import Story, ends_low, promises_less, promises_more, starts_low
+from vibsim.analysis.story import (
+    Story,
+    ends_low,
+    promises_less,
+    promises_more,
+    shows_promise,
+    starts_low,
+)
 from vibsim.schemes.base import is_on_the_mesh
 
 
 def cause_in_words(s: Story) -> str:
     """Say why an order is lower or higher than expected; empty where nothing tells."""
-    if s.reason == "order_high" and promises_more(s):
+    if s.reason == "order_high" and promises_more(s) and shows_promise(s):
         promised = f"order {number(s.promised)}" if math.isfinite(s.promised) else "to be exact"
         return f" Scheme {s.scheme} promises {promised} here."
     if s.reason == "order_high":
@@ -20,7 +27,7 @@ def cause_in_words(s: Story) -> str:
         return " The likely cause is `events: mesh`: an event is noticed up to a step late."
     if s.has_corners:
         return " The likely cause is the table: the force has corners at its points, which lie within steps."
-    if promises_less(s):
+    if promises_less(s) and shows_promise(s):
         damping = ": it takes the damping backward" if "backward_damping" in s.kind else ""
         return f" Scheme {s.scheme} promises no more than order {number(s.promised)} here{damping}."
     if starts_low(s):

@@ -147,7 +147,7 @@ def _onset(orders: Floats, scatter: Floats, incoherent: Flags) -> Flags:
     begins = incoherent.copy()
     to_the_end = np.logical_and.accumulate(incoherent[..., ::-1], axis=-1)[..., ::-1]
     begins &= to_the_end
-    most = _steepest(orders)
+    most = steepest(orders)
     for i in range(count - 1, 0, -1):
         rises = (size[..., i] > AUDIBLE) & (size[..., i] > size[..., i - 1])
         steep = size[..., i] > most[..., i - 1] * size[..., i - 1]
@@ -157,7 +157,7 @@ def _onset(orders: Floats, scatter: Floats, incoherent: Flags) -> Flags:
     return begins
 
 
-def _steepest(orders: Floats) -> Floats:
+def steepest(orders: Floats) -> Floats:
     """Return the factor by which no lower power makes the scatter rise from one triple to the next."""
     with np.errstate(over="ignore", invalid="ignore"):
         return np.asarray(STEEP * np.exp2(np.clip(orders - 0.5, 0.5, 64.0)))
@@ -171,7 +171,7 @@ def _climbs(orders: Floats, scatter: Floats, incoherent: Flags) -> Flags:
     if orders.shape[-1] <= VOUCHED:
         return np.zeros(orders.shape[:-1], dtype=bool)
     size = np.abs(scatter)
-    most = _steepest(orders)
+    most = steepest(orders)
     with np.errstate(over="ignore", invalid="ignore"):
         steep = (size[..., 1:] > most[..., :-1] * size[..., :-1]) & (size[..., 1:] > AUDIBLE)
     return np.asarray(incoherent[..., -1] & np.any(steep[..., 1:] & steep[..., :-1], axis=-1))

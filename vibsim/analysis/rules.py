@@ -5,12 +5,21 @@ The order in which the rules apply, and why, stands at the head of `vibsim.analy
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis.cut import LOG2, QUIET
 from vibsim.analysis.facts import ORDINARY, Evidence, at_round_off, far_from_exact, truly_exact
-from vibsim.analysis.settling import COINCIDENT, FADING, GROWS, HIDDEN, OF_SCATTER, SINGLE_WIDTH
+from vibsim.analysis.settling import (
+    COINCIDENT,
+    FADING,
+    GROWS,
+    HIDDEN,
+    OF_SCATTER,
+    SINGLE_WIDTH,
+)
 from vibsim.analysis.true_errors import (
     contradicts,
     errors_agree,
@@ -18,8 +27,9 @@ from vibsim.analysis.true_errors import (
     errors_stay,
     errors_vouch,
 )
-from vibsim.analysis.two_ratios import SINGLE, little_left, two_ratios
+from vibsim.analysis.two_ratios import SINGLE, below, little_left, two_ratios
 from vibsim.analysis.window import Trend, mismatches
+from vibsim.vocabulary import TOLERANCE
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -75,6 +85,7 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Flags]:
         together & (t.width <= NARROW) & ~t.drifting & ~t.hiding & _alone(e, t, likely),
         several | (np.abs(t.scatter) <= COINCIDENT),
     )
+    wrong |= _settled_elsewhere(e, t, p)
     too_large, too_small = contradicts(e, t)
     sure = several | (np.abs(t.scatter) <= HIDDEN)
     missed = too_large & (right | (wrong & sure & errors_stay(e, t)))
@@ -123,6 +134,20 @@ def _right(e: Evidence, t: Trend, p: Floats) -> Flags:
     right &= ~t.gap & ~t.turning
     right &= (~t.drifting & ~_leaving(t, p)) | t.irregular | little_left(t, p)
     return np.asarray(right)
+
+
+def _settled_elsewhere(e: Evidence, t: Trend, p: Floats) -> Flags:
+    """Say where the ladder would pass as one of another order, whose interval excludes p.
+
+    What is enough to believe an order is enough to say that it is not p.
+    """
+    likely = np.maximum(np.round(2.0 * t.order) / 2, LEAST_CANDIDATE)
+    usual = replace(e, tolerance=min(e.tolerance, TOLERANCE))
+    settled = _right(usual, t, likely)
+    doubtful = ~settled & two_ratios(usual, t, likely)
+    low = np.where(doubtful, below(t), t.low)
+    excluded = (t.high < p - e.tolerance) | (low > p + e.tolerance)
+    return np.asarray((settled | doubtful) & excluded & (np.abs(likely - p) > e.tolerance))
 
 
 def _kinked(e: Evidence, t: Trend, p: Floats) -> tuple[Flags, Flags]:

@@ -112,6 +112,11 @@ def with_errors(width: Floats, local: Floats, of_errors: Floats, several: Flags)
     return np.where(several | np.isnan(apart), width, np.maximum(width, apart))
 
 
+def lowest(low: Floats, further: float | Floats) -> Floats:
+    """Return the lower end of an interval that reaches further down, to the order 0 of a limit that is missed."""
+    return np.maximum(low - further, np.minimum(low, 0.0))
+
+
 def with_nearest(order: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats]:
     """Return an interval of an order that holds the order of an expansion next to it, too."""
     nearest = np.round(2.0 * order) / 2

@@ -119,6 +119,14 @@ def promises_more(s: Story) -> bool:
     return s.promised > s.expected + s.tolerance
 
 
+def shows_promise(s: Story) -> bool:
+    """Tell whether the order that was found may be the one that the scheme promises, and not what was expected."""
+    if not (promises_less(s) or promises_more(s)):
+        return False
+    # what has no interval may be any order
+    return not (s.promised < s.low - s.tolerance or s.promised > s.high + s.tolerance)
+
+
 def first_stable(s: Story) -> int:
     """Return the coarsest level whose w dt is within the limit."""
     if not (math.isfinite(s.omega_dt) and s.omega_dt > s.limit):

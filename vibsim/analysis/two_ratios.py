@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis.cut import QUIET
+from vibsim.analysis.cut import QUIET, steepest
 from vibsim.analysis.facts import Evidence
 from vibsim.analysis.settling import (
     COINCIDENT,
@@ -20,6 +20,7 @@ from vibsim.analysis.settling import (
     HIDDEN,
     JUMP,
     READABLE,
+    lowest,
     most_left,
 )
 from vibsim.analysis.true_errors import errors_leave
@@ -39,12 +40,14 @@ def two_ratios(e: Evidence, t: Trend, p: Floats) -> Flags:
     both = t.several & near & (now <= SINGLE) & (before <= COINCIDENT)
     # behind a jump two orders may be neighbours by accident
     both &= ~np.signbit(t.scatter) & ~t.gap & ~t.alternating & ~(np.abs(t.earlier) > JUMP)
+    # nor are they the orders of one power where the differences have turned round between them
+    both &= ~t.turning
     return np.asarray(both & ~_emerges(t, p) & (t.irregular | ~errors_leave(e, t, p)))
 
 
 def below(t: Trend) -> Floats:
     """Return the lower end of an interval that reaches to the lowest power that may be hiding, shape (...)."""
-    return np.minimum(t.low, t.order - t.width - FARTHEST)
+    return np.minimum(t.low, lowest(t.order - t.width, FARTHEST))
 
 
 def little_left(t: Trend, p: Floats) -> Flags:
@@ -63,6 +66,8 @@ def _emerges(t: Trend, p: Floats) -> Flags:
     now, _ = mismatches(t, p)
     spread, before = np.abs(t.scatter), t.scatter_before
     by_shape = (spread > QUIET) & (spread > GROWS * before)
+    # what rises more steeply than any lower power is a floor that begins
+    by_shape &= ~(spread > steepest(t.local - t.change) * before)
     last = t.local - p
     away, then, earlier = np.abs(last), np.abs(last - t.change), np.abs(last - t.change - t.earlier)
     calm = (before > READABLE) & (spread <= FADING * before)

@@ -26,6 +26,7 @@ from vibsim.analysis.settling import (
     SLOW,
     fades,
     left,
+    lowest,
     most_left,
     settling,
     with_errors,
@@ -238,7 +239,7 @@ def _interval(
     """Return the ends of the interval of the order; `trend`: whether the last change is more than an accident."""
     # where orders fall, a higher one is behind
     falls = trend & tail.several & (tail.change < 0) & ~np.signbit(tail.spread) & ~_turned(tail)
-    low = order - reach - np.where(open_ | hiding, NEXT, 0.0)
+    low = lowest(order - reach, np.where(open_ | hiding, NEXT, 0.0))
     high = np.where(falls, np.maximum(order, tail.local), order) + reach
     high += np.where(open_ & ~falls, NEXT, 0.0)
     return with_nearest(order, low, high)

@@ -1,0 +1,93 @@
+"""Ladders made by hand, through the public way in: what two ratios, a floor that begins and a sign may be taken for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from judged import Finding, findings
+from numpy.typing import NDArray
+from synthetic import POINTS, Group, Ladder
+
+from vibsim.analysis.series import scatters
+from vibsim.vocabulary import NORMS
+
+Floats = NDArray[np.float64]
+T = np.linspace(0.0, 1.0, POINTS + 1)
+WAVE, OTHER = T * np.sin(7.0 * T), T * np.cos(11.0 * T)
+
+
+def judged(
+    error: Callable[[float, int], Floats], levels: tuple[int, ...], folder: Path, known: bool
+) -> dict[float, Finding]:
+    """Judge one ladder of errors ``error(h, index)``, h = 1 at the coarsest level, by every expectation."""
+    rows = np.stack([error(2.0 ** (levels[0] - level), i) for i, level in enumerate(levels)])
+    ladder = Ladder("by hand", rows, np.nan, (np.nan, np.nan), (0, len(levels)), True)
+    group = Group(levels, POINTS, known, "compensated", (ladder, ladder))
+    return {found.formal: found for found in findings(group, folder)}
+
+
+@pytest.mark.parametrize("norm", NORMS)
+def test_proportional_series_have_the_sign_of_their_inner_product(norm: str) -> None:
+    """Exactly: of a norm of 0 the sign bit decides, which some ways to take a largest value do not keep."""
+    first, second = np.sin(T)[None], 0.25 * np.sin(T)[None]
+    alike, opposite = scatters([first, second, -second], norm)
+    assert (alike[0], np.signbit(alike[0])) == (0.0, False)
+    assert np.signbit(opposite[0])
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_a_change_of_sign_is_no_half_order(known: bool, tmp_path: Path) -> None:
+    """At the finest level of h - 0.83 h^3 there is h; the last two ratios are those of h^(1/2) by accident."""
+    found = judged(lambda h, i: 6e-3 * (h - 0.8345 * h**3) * WAVE, (6, 7, 8, 9), tmp_path, known)
+    assert found[0.5].status != "PASS"
+    found = judged(lambda h, i: 2e-2 * (h**2 - 1.154 * h**4) * WAVE, (6, 7, 8, 9), tmp_path, known)
+    assert found[1.5].status != "PASS"
+
+
+@pytest.mark.parametrize(("power", "size"), [(4, 1e-5), (2, 1e-4), (2, 2e-4)])
+def test_a_floor_that_begins_is_no_lower_power(power: int, size: float, tmp_path: Path) -> None:
+    """Its part rises from level to level by 2^p and more, that of a lower power by less."""
+    noise = np.random.default_rng(power).normal(size=(4, len(T))) * (T > 0)
+
+    def error(h: float, i: int) -> Floats:
+        return np.asarray(1e-3 * (h**power * WAVE + size * noise[i]))
+
+    found = judged(error, (6, 7, 8, 9), tmp_path, False)
+    assert found[float(power)].status == "PASS"
+
+
+@pytest.mark.parametrize(
+    ("power", "more", "further", "count", "known"),
+    [
+        (2, 0.015, 3, 3, True),
+        (2, -0.0104, 4, 4, True),
+        (2, -0.0104, 4, 4, False),
+        (4, 0.083, 5, 4, True),
+        (4, 0.083, 5, 4, False),
+    ],
+)
+def test_an_order_that_passes_fails_where_another_one_is_asked_for(
+    power: int, more: float, further: int, count: int, known: bool, tmp_path: Path
+) -> None:
+    """What is enough to believe an order is enough to say that it is no other one."""
+    found = judged(
+        lambda h, i: 1e-3 * (h**power + more * h**further) * WAVE,
+        tuple(range(6, 6 + count)),
+        tmp_path,
+        known,
+    )
+    one = found[float(power)]
+    assert one.status == "PASS"
+    told = {p: f.reason for p, f in found.items() if p < one.low - 0.1 or p > one.high + 0.1}
+    assert told == {p: "order_high" if p < power else "order_low" for p in told}
+    assert {p for p in found if p > power} <= set(told)
+
+
+def test_no_interval_reaches_below_the_order_of_a_limit_that_is_missed(tmp_path: Path) -> None:
+    """Of two right ratios a lower power may hide in what is left, but none that is negative."""
+    found = judged(lambda h, i: 1e-3 * (h**2 - 0.0104 * h**4) * WAVE, (6, 7, 8, 9), tmp_path, False)
+    assert found[2.0].status == "PASS"
+    assert found[2.0].low == 0.0
