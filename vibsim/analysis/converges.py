@@ -116,7 +116,7 @@ def _story(
 ) -> Story:
     levels = tuple(int(level) for level in record["level"])
     culprit = int(found.culprit[scheme, case])
-    spec = experiment.schemes[scheme]
+    spec, model = experiment.schemes[scheme], experiment.model.definition
     columns = columns_of(record)
     limits = stability_limits(experiment, columns)[scheme]
     at = levels.index(culprit) if culprit >= 0 else None
@@ -137,13 +137,14 @@ def _story(
         culprit=culprit,
         omega_dt=p,
         growth=_growth(record, SCHEMES[spec.kind], options, p, (scheme, case, at)),
+        growth_of=(model.conservative, model.linear, len(model.positions)),
         limit=float(limits[case if len(limits) > 1 else 0]),
         options=options,
-        is_position=check.converges in experiment.model.definition.positions,
+        is_position=check.converges in model.positions,
         scheme=spec.name,
-        has_corners=has_corners(experiment.model.definition),
+        has_corners=has_corners(model),
         corner=_corner(experiment, record, scheme, case),
-        parts=parts_in_words(experiment.model.definition, record, check.converges, scheme, case),
+        parts=parts_in_words(model, record, check.converges, scheme, case),
         kind=spec.kind,
         promised=_promised(experiment, check.converges, columns, scheme, case),
         centred=_centred(experiment, check.converges, SCHEMES[spec.kind], options),

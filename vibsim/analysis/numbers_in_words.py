@@ -34,14 +34,20 @@ def vanishing_in_words(predicted: float, measured: float) -> str:
 
 
 def growth_in_words(
-    predicted: float, measured: float, is_simple: bool = True, is_linear: bool = True
+    predicted: float,
+    measured: float,
+    is_simple: bool = True,
+    is_linear: bool = True,
+    coordinates: int = 1,
 ) -> str:
     """Say what growth theory predicts and what was measured; empty where neither is known.
 
     The theory is of free linear oscillations without damping: of a model with damping or a force in time (not
-    `is_simple`), and of a nonlinear one, that is said.
+    `is_simple`), and of a nonlinear one, that is said. Of several coordinates it is that of their fastest oscillation.
     """
     small = "predicted" if is_linear else "predicted of small oscillations"
+    if coordinates > 1:
+        small = "predicted of the fastest small oscillations"
     theory = small if is_simple else "predicted of free oscillations without damping"
     told = [
         f"{factor_in_words(value)} {word}"

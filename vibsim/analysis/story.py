@@ -53,6 +53,8 @@ class Story:
     """Options of the scheme."""
     is_position: bool
     scheme: str
+    growth_of: tuple[bool, bool, int] = (True, True, 1)
+    """What a growth is told of: whether the model is conservative, whether it is linear, its number of coordinates."""
     has_corners: bool = False
     """Whether steps have corners of a force from a table inside."""
     corner: Corner | None = None
