@@ -302,3 +302,42 @@ def test_a_motion_that_escapes_is_not_told_to_take_finer_levels_alone() -> None:
     assert found.reason == "unstable"
     assert "`time: end`) before t = 1." in found.advice
     assert "if the motion itself escapes" in found.advice
+
+
+PENDULUM = {"title": "t", "model": {"kind": "pendulum"}, "initial": {"theta": 1.0}}
+RUN = {**PENDULUM, "time": {"end": 10.0}, "schemes": ["central"]}
+
+
+@pytest.mark.parametrize("value", ["end", "period"])
+@pytest.mark.parametrize("away", [1e-5, 1e-3, 1e-1])
+def test_advice_on_a_number_is_right_when_it_is_followed(value: str, away: float) -> None:
+    """Finer levels bring a number that is off by their error, and none that is off by more."""
+    of = {"quantity": "theta"} if value == "end" else {}
+    truth = _number({**of, "value": value, "at": {"level": 14}, "equals": 9.0}, [13, 14])
+    check = {**of, "value": value, "equals": truth + away, "atol": away / 20}
+    advice = judged({**RUN, "levels": [5, 6, 7], "checks": [check]}).advice
+    assert advice.startswith("Correct `equals:`") == (away == 1e-1), advice
+    # and one that finer levels bring
+    check = {**of, "value": value, "equals": truth, "atol": 1e-6}
+    assert judged({**RUN, "levels": [5, 6, 7], "checks": [check]}).advice.startswith("Add finer")
+    assert judged({**RUN, "levels": [5, 6, 13, 14], "checks": [check]}).status == "PASS"
+
+
+def test_a_finer_level_is_asked_for_where_it_has_the_number() -> None:
+    check = {"value": "at", "quantity": "theta", "atol": 1e-3, "at": {"level": 5, "step": 16}}
+    truth = _number({**check, "at": {"t": 5.0}, "equals": 9.0}, [13, 14])
+    verdict = judged({**RUN, "levels": [5, 6, 9], "checks": [{**check, "equals": truth}]})
+    assert "`at: {level: 9, step: 256}`" in verdict.advice
+    followed = {**check, "equals": truth, "at": {"level": 9, "step": 256}}
+    assert judged({**RUN, "levels": [5, 6, 9], "checks": [followed]}).status == "PASS"
+
+
+def judged(content: dict[str, Any]) -> Any:
+    made = Experiment.from_dict(content)
+    (found,) = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
+    return found
+
+
+def _number(check: dict[str, Any], levels: list[int]) -> float:
+    """Return the number that a check measures."""
+    return float(judged({**RUN, "levels": levels, "checks": [check]}).results[0].value)

@@ -3,8 +3,8 @@
 It stands in ``check_value``, ``check_low``, ``check_high`` and ``check_first`` of the convergence Record
 (`vibsim.analysis.measured`), with these meanings:
 
-- ``stable``: growth per period, measured and predicted; w dt, the highest; the level. The reason is ``match`` where it is stable,
-  ``unstable``, or ``mismatch`` where it grows otherwise than predicted;
+- ``stable``: growth per period, measured and predicted; w dt, the highest; the level. The reason is ``match`` where it
+  is stable, ``unstable``, or ``mismatch`` where it grows otherwise than predicted;
 - ``conserves``: the largest error over the energy at the start; rate and k of the drift (`vibsim.analysis.drift`); its
   kind, as a position in `vocabulary.DRIFTS`;
 - ``equal``: the largest distance, and what it may be; nothing; the level.

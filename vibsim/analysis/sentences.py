@@ -148,8 +148,8 @@ def _unstable(s: Story) -> str:
     if math.isfinite(s.omega_dt) and s.omega_dt > s.limit:
         return (
             f"The run is unstable: at level {s.culprit}, w dt = {s.omega_dt:.4g} is beyond the limit "
-            f"{number(s.limit)} of scheme {s.scheme}{growth_in_words(*s.growth, *s.growth_of)}; level {first_stable(s)} is the first "
-            "within it."
+            f"{number(s.limit)} of scheme {s.scheme}{growth_in_words(*s.growth, s.growth_of)}; level "
+            f"{first_stable(s)} is the first within it."
         )
     return (
         f"{s.quantity} is unstable: the solution grows where the exact one does not, and finer levels "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vibsim.analysis.valued import COUNTED, depends_on_level
+from vibsim.analysis.value_advice import COUNTED, depends_on_level
 from vibsim.vocabulary import BY_TOLERANCE
 
 
