@@ -309,15 +309,13 @@ RUN = {**PENDULUM, "time": {"end": 10.0}, "schemes": ["central"]}
 
 
 @pytest.mark.parametrize("value", ["end", "period"])
-@pytest.mark.parametrize("away", [1e-5, 1e-3, 1e-1])
-def test_advice_on_a_number_is_right_when_it_is_followed(value: str, away: float) -> None:
+def test_advice_on_a_number_is_right_when_it_is_followed(value: str) -> None:
     """Finer levels bring a number that is off by their error, and none that is off by more."""
     of = {"quantity": "theta"} if value == "end" else {}
     truth = _number({**of, "value": value, "at": {"level": 14}, "equals": 9.0}, [13, 14])
-    check = {**of, "value": value, "equals": truth + away, "atol": away / 20}
+    check = {**of, "value": value, "equals": truth + 0.1, "atol": 1e-3}
     advice = judged({**RUN, "levels": [5, 6, 7], "checks": [check]}).advice
-    assert advice.startswith("Correct `equals:`") == (away == 1e-1), advice
-    # and one that finer levels bring
+    assert advice.startswith("Correct `equals:`")
     check = {**of, "value": value, "equals": truth, "atol": 1e-6}
     assert judged({**RUN, "levels": [5, 6, 7], "checks": [check]}).advice.startswith("Add finer")
     assert judged({**RUN, "levels": [5, 6, 13, 14], "checks": [check]}).status == "PASS"
