@@ -14,10 +14,11 @@ from vibsim.analysis.gci import of_order
 from vibsim.analysis.limits import ORDINARY
 from vibsim.analysis.local_order import local_order, window_points
 from vibsim.analysis.part import CENTRED, by_level, plain_name
-from vibsim.analysis.part_promise import is_promised_to_members
+from vibsim.analysis.part_promise import is_promised, is_promised_to_members
 from vibsim.analysis.promise import options_swept
 from vibsim.analysis.swing import swing
 from vibsim.models import ENERGIES
+from vibsim.models.error_parts import is_error_part
 from vibsim.record import Variable, attributes
 from vibsim.vocabulary import TYPICAL_NORM
 
@@ -25,6 +26,10 @@ Floats = NDArray[np.float64]
 Table = dict[str, Variable]
 Add = Callable[..., None]
 
+LEAST_ORDER = (
+    "order that the scheme promises for the position, at least that of a part of its error"
+)
+"""What is said of the order of a part of an error of which theory says nothing."""
 SERIES = ("scheme", "case", "t")
 _IN_NORM = "{} in a norm over time (times s for l1, times the square root of s for l2)"
 
@@ -66,6 +71,8 @@ def numbers(q: Comparison) -> Table:
         add("richardson_error_max", ("scheme", "case"), q.largest_bound, words, q.units)
     add("floor", of_level, q.floor, "predicted round-off", q.units)
     words = "order that the scheme promises, infinite for what is exact"
+    if is_error_part(q.name) and not is_promised(part.experiment, q.name):
+        words = LEAST_ORDER
     if options_swept(part.experiment) or is_promised_to_members(part.experiment, q.name):
         add("formal_order", ("scheme", "case"), np.broadcast_to(q.order, part.shape), words, "1")
     else:
