@@ -339,3 +339,33 @@ def judged(content: dict[str, Any]) -> Any:
 def _number(check: dict[str, Any], levels: list[int]) -> float:
     """Return the number that a check measures."""
     return float(judged({**RUN, "levels": levels, "checks": [check]}).results[0].value)
+
+
+@pytest.mark.parametrize(
+    ("orders", "due", "says"),
+    [
+        ((3.1, 2.8, 2.4), 1.0, "fall towards order 1 (3.10, 2.80, 2.40): a higher power"),
+        ((math.nan, 0.9, 1.6), 2.0, "rise towards order 2 (0.90, 1.60)"),
+        ((1.6, 1.1), 2.0, "move away from order 2 (1.60, 1.10)"),
+        ((1.1, 2.9, 1.4), 2.0, "1.10, 2.90, 1.40, which do not settle"),
+        ((2.4,), 1.0, "which is above order 1: a higher power"),
+        ((1.1,), 2.0, ""),
+        ((1.5, 1.8), 2.0, ""),
+        ((), 2.0, ""),
+    ],
+)
+def test_where_orders_go_is_told(orders: tuple[float, ...], due: float, says: str) -> None:
+    order = next((x for x in reversed(orders)), 2.0)
+    of = {"expected": due, "promised": due, "orders": orders}
+    told = tell(story(reason="pre_asymptotic", order=order, **of))
+    assert says in told
+    assert ("from level to level" in told) == (len(says) > 0 and len(orders) > 1)
+
+
+def test_an_order_above_the_promised_one_is_said_to_fall_towards_it() -> None:
+    """The error of Forward Euler on a pendulum is that of its growth, which a coarse step does not show."""
+    check = {"converges": "theta", "order": "scheme"}
+    run = {**RUN, "time": {"end": 20.0}, "schemes": ["forward_euler"], "levels": [6, 7, 8]}
+    verdict = judged({**run, "checks": [check]})
+    assert verdict.reason == "pre_asymptotic"
+    assert "which is above order 1: a higher power of dt still outweighs that one" in verdict.text

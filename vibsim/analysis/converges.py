@@ -151,8 +151,18 @@ def _story(
         has_promise=not is_error_part(check.converges) or is_promised(experiment, check.converges),
         cost=partial(cost_in_words, experiment),
         has_exact=has_exact(record, check.converges, scheme, case),
+        orders=_orders(record, check, scheme, case),
         failures=_failures(record, scheme, case),
     )
+
+
+def _orders(record: Record, check: ConvergesCheck, scheme: int, case: int) -> tuple[float, ...]:
+    """Return the orders of successive levels; none where the record does not have them, or the norm."""
+    name, norms = f"{check.converges}_observed_order", record.words("norm")
+    if name not in record or check.norm not in norms:
+        return ()
+    found = np.asarray(record[name])[scheme, case, :, norms.index(check.norm)]
+    return tuple(float(order) for order in found)
 
 
 def _failures(record: Record, scheme: int, case: int) -> tuple[float, ...]:

@@ -12,11 +12,13 @@ from vibsim.analysis.numbers_in_words import growth_in_words, number
 from vibsim.analysis.story import (
     Corner,
     Story,
+    due,
     first_stable,
     is_adaptive,
     promises_less,
     promises_more,
 )
+from vibsim.analysis.trend import trend_in_words
 from vibsim.schemes.base import is_on_the_mesh
 
 HIGHEST = 12.0
@@ -116,7 +118,9 @@ def _too_coarse(s: Story, measured: str) -> str:
             f"{s.first} to {s.last} than those of any power of dt, as where the coarser ones have nothing to do with "
             "the solution."
         )
-    so_far = f": the last estimate is {measured}" if measured else ""
+    so_far = (
+        f": the last estimate is {measured}{trend_in_words(s.orders, due(s))}" if measured else ""
+    )
     return f"The step is still too coarse to tell the order of {s.quantity}{so_far}."
 
 

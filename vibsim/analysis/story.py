@@ -81,6 +81,8 @@ class Story:
     """What levels cost, in words."""
     has_exact: bool = True
     """Whether an exact solution or a reference is known, which alone shows a wrong limit."""
+    orders: tuple[float, ...] = ()
+    """The orders of successive levels in the norm of the check, the coarsest first; NaN where there is none."""
     failures: tuple[float, ...] = ()
     """When each level met a number that is not finite, in its first step at 0; NaN where it did not."""
 
@@ -119,6 +121,14 @@ def promises_less(s: Story) -> bool:
 def promises_more(s: Story) -> bool:
     """Tell whether the scheme itself promises a higher order than the check expects."""
     return s.promised > s.expected + s.tolerance
+
+
+def due(s: Story) -> float:
+    """Return the order that levels approach: the one that the scheme has, where the last order is nearer to that."""
+    known = [order for order in s.orders if math.isfinite(order)]
+    if not known or not math.isfinite(s.promised):
+        return s.expected
+    return min(s.expected, s.promised, key=lambda order: abs(known[-1] - order))
 
 
 def first_stable(s: Story) -> int:
