@@ -115,17 +115,22 @@ def _index(q: Comparison, norm: str, change: Floats) -> Floats:
 
 def _triples(q: Comparison, add: Add) -> None:
     """Add the numbers of triples of levels; where storage is bounded, all but the order in single precision."""
-    precision = precision_of(q)
     dims = ("scheme", "case", "triple", "norm")
 
     def stacked(of: Callable[[str], Floats]) -> Floats:
         return np.stack([of(norm) for norm in q.part.norms], axis=-1)
 
     words = "ratio of successive differences in a norm over time"
-    add("ratio_norm", dims, stacked(q.ratios).astype(precision), words, "1")
+    add("ratio_norm", dims, in_precision(q, stacked(q.ratios)), words, "1")
     add("observed_order", dims, stacked(q.observed_orders), "observed order", "1")
     words = "relative distance of the rescaled differences"
-    add("coincidence", dims[:-1], q.coincidence.astype(precision), words, "1")
+    add("coincidence", dims[:-1], in_precision(q, q.coincidence), words, "1")
+
+
+def in_precision(q: Comparison, values: Floats) -> NDArray[np.floating]:
+    """Return values in the type in which they are kept: infinite where they are beyond its range."""
+    with np.errstate(over="ignore"):
+        return values.astype(precision_of(q))
 
 
 def precision_of(q: Comparison) -> type[np.floating]:
