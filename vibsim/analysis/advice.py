@@ -138,6 +138,11 @@ def _on_high_order(s: Story) -> str:
 
 def _on_round_off(s: Story) -> str:
     """Name the arithmetic and the levels with which an order can be read, as far as they are predicted."""
+    if s.cause == "stored":
+        coarser = _readable(s)
+        return (
+            f"Store the states in double precision (float64), or {coarser[0].lower()}{coarser[1:]}."
+        )
     arithmetic = s.options.get("arithmetic", "compensated")
     coarser = _readable(s)
     if arithmetic == "compensated":

@@ -142,6 +142,9 @@ def _noise(q: Comparison, norm: str, arithmetic: str | None) -> Callable[[int], 
     """Return what gives the predicted round-off of a level in a norm, shape (scheme, case)."""
     part = q.part
     e = evidence(q, norm, q.order, ORDINARY)
+    if part.stored_floor[-1] > 0.0:
+        # what storing leaves is the same at every level, in any arithmetic
+        return lambda level: e.floor[..., -1]
     base = e.floor[..., -1] / part.relative_floor[..., -1]
 
     def at(level: int) -> Floats:

@@ -74,8 +74,9 @@ def tell(s: Story) -> str:
             return f"The calculation of {s.quantity} met a number that is not finite{_place_of_failure(s)}."
         case "round_off":
             kept = f"; before it, {measured} is all that is left" if s.order > 0.0 else ""
+            stored = " of the single precision that it is stored in" if s.cause == "stored" else ""
             return (
-                f"The differences of {s.quantity} have reached the floor of round-off, where they say "
+                f"The differences of {s.quantity} have reached the floor of round-off{stored}, where they say "
                 f"nothing about the scheme{kept}."
             )
         case "oscillating":
