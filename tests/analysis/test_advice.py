@@ -369,3 +369,27 @@ def test_an_order_above_the_promised_one_is_said_to_fall_towards_it() -> None:
     verdict = judged({**run, "checks": [check]})
     assert verdict.reason == "pre_asymptotic"
     assert "which is above order 1: a higher power of dt still outweighs that one" in verdict.text
+
+
+def test_a_corner_is_not_blamed_for_an_order_that_the_scheme_does_not_have() -> None:
+    """Quadratic damping leaves order 3 where v vanishes, but `central` has no more than 2 before that."""
+    corner = Corner("the velocity v passes zero", 0.1451, 3.0)
+    told = story(reason="non_smooth", order=1.892, expected=3.0, promised=2.0, corner=corner)
+    assert "Scheme mine promises no more than order 2 without it" in tell(told)
+    assert advise(told).startswith("Set `order: scheme`, and end the time interval")
+    assert "where order 2 can be seen" in advise(told)
+    kept = story(reason="non_smooth", order=-2.0, expected=4.0, promised=4.0, corner=corner)
+    assert "promises no more" not in tell(kept)
+    assert "last estimate" not in tell(kept)
+    assert "where order 4 can be seen" in advise(kept)
+
+
+def test_a_scheme_that_is_exact_is_not_sent_to_coarser_levels_alone() -> None:
+    """A ball in free flight is a parabola, which this scheme has to round-off on every level."""
+    ball = {"title": "t", "model": {"kind": "bouncing_ball"}, "initial": {"h": 1.0}}
+    check = {"converges": "h", "order": 4}
+    schemes = [{"kind": "newmark", "gamma": 0.7, "beta": 0.4}]
+    run = {**ball, "time": {"end": 1.0, "base_steps": 3}, "schemes": schemes, "checks": [check]}
+    verdict = judged({**run, "levels": [6, 7, 8, 9, 10]})
+    assert verdict.reason == "round_off"
+    assert "where those are round-off, too, the scheme is exact here" in verdict.advice

@@ -35,9 +35,11 @@ def advise(s: Story) -> str:
                 "spacing over the speed, or a whole part of that."
             )
         case "non_smooth" if s.corner:
+            lower = promises_less(s)
+            order = s.promised if lower else s.expected
             return (
-                f"End the time interval (`time: end`) before t = {s.corner.time:.4g}, where order {number(s.expected)} "
-                f"can be seen{_or_lower(s, s.corner)}."
+                f"{'Set `order: scheme`, and end' if lower else 'End'} the time interval (`time: end`) before t = "
+                f"{s.corner.time:.4g}, where order {number(order)} can be seen{_or_lower(s, s.corner)}."
             )
         case "order_low":
             return _on_low_order(s)
@@ -145,6 +147,8 @@ def _on_round_off(s: Story) -> str:
         )
     arithmetic = s.options.get("arithmetic", "compensated")
     coarser = _readable(s)
+    if not s.order > 0.0:
+        coarser += "; where those are round-off, too, the scheme is exact here, and another `model:` shows its order"
     if arithmetic == "compensated":
         return f"{coarser}."
     reach = f" (it can be read up to level {s.compensated})" if s.compensated > s.readable else ""

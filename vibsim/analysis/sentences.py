@@ -181,8 +181,10 @@ def _not_smooth(s: Story) -> str:
 
 def _cornered(s: Story, corner: Corner) -> str:
     """Say where the first corner of the force lies, and the order that it leaves."""
-    measured = _measured(s)
+    measured = _measured(s) if s.order > 0.0 else ""
     so_far = f"; the last estimate is {measured}" if measured else ""
+    if promises_less(s):
+        so_far += f". Scheme {s.scheme} promises no more than order {number(s.promised)} without it"
     if corner.on_a_point:
         return (
             f"At t = {corner.time:.4g}, at a grid point, {corner.words}, where the force jumps: the steps on both "
