@@ -321,6 +321,14 @@ def test_advice_on_a_number_is_right_when_it_is_followed(value: str) -> None:
     assert judged({**RUN, "levels": [5, 6, 13, 14], "checks": [check]}).status == "PASS"
 
 
+def test_advice_on_a_number_of_several_levels_looks_at_those_that_have_one() -> None:
+    check = {"value": "observed_order", "quantity": "theta"}
+    far = judged({**RUN, "levels": [6, 7, 8, 9, 10], "checks": [{**check, "above": 3.9}]})
+    assert far.advice.startswith("Correct `above:`")
+    near = judged({**RUN, "levels": [4, 5, 6, 7, 8], "checks": [{**check, "below": 2.001}]})
+    assert near.advice.startswith("Add finer `levels:`")
+
+
 def test_a_finer_level_is_asked_for_where_it_has_the_number() -> None:
     check = {"value": "at", "quantity": "theta", "atol": 1e-3, "at": {"level": 5, "step": 16}}
     truth = _number({**check, "at": {"t": 5.0}, "equals": 9.0}, [13, 14])

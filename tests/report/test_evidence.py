@@ -102,6 +102,13 @@ def test_a_number_that_no_run_enters_has_no_picture():
     assert found is None
 
 
+def test_a_number_of_two_levels_stands_at_the_coarser_one():
+    check = {"value": "max_abs_ratio", "quantity": "energy_deviation", "above": 3.5}
+    (found,) = pictures(check, levels=[6, 7, 8])
+    assert re.findall('<circle[^>]*fill="([^"]*)"', found.svg) == ["white", "#0072B2"]
+    assert pictures(check, levels=[6]) == [None]
+
+
 def test_a_number_that_is_hit_exactly_is_drawn():
     check = {"value": "accepted_steps", "equals": 256.0, "rtol": 0.1}
     (found,) = pictures(check, levels=[6, 7, 8])

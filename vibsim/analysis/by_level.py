@@ -51,6 +51,11 @@ def has_levels(name: str) -> bool:
     return "level" in VALUES[name].at
 
 
+def own_levels(name: str, levels: Sequence[int]) -> tuple[int, ...]:
+    """Return the levels that have such a number: one that is made of several has the coarsest of them as its own."""
+    return tuple(levels)[: len(levels) - VALUES[name].finer_levels]
+
+
 def prospects(
     check: ValueCheck, numbers: Floats, levels: Sequence[int], level: int
 ) -> tuple[Codes, Codes]:

@@ -124,8 +124,11 @@ def _along_levels(
         numbers = by_level.by_level(check.value, place)
     else:
         numbers = np.full((*found.shape, len(levels)), np.nan)
-    level = levels[-1] if place.at_level is None else place.at_level
-    return *by_level.prospects(check, numbers, levels, level), {"numbers": numbers}
+    own = by_level.own_levels(check.value, levels)
+    level = place.level if place.level in own else (own or levels)[-1]
+    found_at = numbers[..., : len(own)] if own else numbers
+    more, first = by_level.prospects(check, found_at, own or levels, int(level))
+    return more, first, {"numbers": numbers}
 
 
 def _foreseen(

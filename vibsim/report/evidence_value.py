@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vibsim.analysis.by_level import own_levels
 from vibsim.analysis.shown import number_of
 from vibsim.analysis.value_units import unit_of
 from vibsim.record import Record
@@ -54,7 +55,7 @@ def picture(
     if check.equals is None:
         return _beside_border(row, check)
     # what a coarser level has to give is no limit that the others approach
-    is_limit = row.counts[-1]
+    is_limit = row.counts[-1] or check.at.level is None
     drawn = _distance(row, check.equals, check.allowed) if is_limit else None
     return drawn or _within(row, check.equals, check.allowed)
 
@@ -141,7 +142,8 @@ def _row(
     """Return the numbers of the levels, and behind them the extrapolated one where that is asked for."""
     levels = whole(record, "level")
     if check.at.level != "best":
-        level = levels[-1] if check.at.level is None else check.at.level
+        own = own_levels(check.value, levels) or levels
+        level = own[-1] if check.at.level is None else check.at.level
         return ByLevel(title, levels, values, [one == level for one in levels], member.title)
     place = member.scheme, member.case
     best, bound = (measured(record, name, field, *place) for field in ("value", "high"))
