@@ -401,3 +401,14 @@ def test_a_scheme_that_is_exact_is_not_sent_to_coarser_levels_alone() -> None:
     verdict = judged({**run, "levels": [6, 7, 8, 9, 10]})
     assert verdict.reason == "round_off"
     assert "where those are round-off, too, the scheme is exact here" in verdict.advice
+
+
+def test_levels_are_started_behind_the_last_one_that_fails() -> None:
+    """Heun's method on a hardening spring overflows on levels 4 and 5, at times that differ."""
+    model = {"kind": "duffing", "gamma": 0.3, "omega": 1.2, "delta": 0.1}
+    run = {"title": "t", "model": model, "initial": {"u": 0.1}, "time": {"end": 25.0}}
+    run = {**run, "schemes": ["heun"], "checks": [{"converges": "u"}]}
+    verdict = judged({**run, "levels": [4, 5, 6]})
+    assert verdict.reason == "non_finite"
+    assert "Start `levels:` at 6 or finer" in verdict.advice
+    assert judged({**run, "levels": [6, 7, 8, 9]}).reason != "non_finite"

@@ -10,6 +10,7 @@ from vibsim.analysis.story import (
     Corner,
     Story,
     ends_low,
+    first_sound,
     first_stable,
     is_adaptive,
     promises_less,
@@ -66,7 +67,7 @@ def advise(s: Story) -> str:
                 "finer levels will not help where the motion escapes, or a formula has no finite value."
             )
         case "non_finite":
-            level = max(s.culprit, s.levels[0]) + 1
+            level = first_sound(s)
             return (
                 f"Start `levels:` at {level} or finer{_priced(s, [level])}, or shorten `time: end`."
             )

@@ -131,6 +131,12 @@ def due(s: Story) -> float:
     return min(s.expected, s.promised, key=lambda order: abs(known[-1] - order))
 
 
+def first_sound(s: Story) -> int:
+    """Return the coarsest level from which on none met a number that is not finite, as far as they tell."""
+    failed = [level for level, t in zip(s.levels, s.failures, strict=False) if not math.isnan(t)]
+    return max([s.culprit, s.levels[0], *failed]) + 1
+
+
 def first_stable(s: Story) -> int:
     """Return the coarsest level whose w dt is within the limit."""
     if not (math.isfinite(s.omega_dt) and s.omega_dt > s.limit):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from vibsim.analysis import asked
-from vibsim.analysis.best import has_limit
 from vibsim.analysis.by_level import SETTLED
 from vibsim.analysis.costs import cost_in_words
 from vibsim.spec.values import VALUES
@@ -65,7 +64,7 @@ def advise(
         )
     if first > 0:
         return f"Ask for a finer level (`at: {_at(check, first)}`), where the number is as asked, or c{correct}."
-    if more == SETTLED or has_limit(check.value, check.at.level):
+    if more == SETTLED:
         return f"C{correct}, or what is computed (`model:`, `initial:`): finer levels change the number too little."
     ask = (
         ""
