@@ -412,3 +412,10 @@ def test_levels_are_started_behind_the_last_one_that_fails() -> None:
     assert verdict.reason == "non_finite"
     assert "Start `levels:` at 6 or finer" in verdict.advice
     assert judged({**run, "levels": [6, 7, 8, 9]}).reason != "non_finite"
+
+
+def test_nothing_is_readable_of_a_motion_that_does_not_move() -> None:
+    ball = {"title": "t", "model": {"kind": "bouncing_ball"}, "initial": {"h": 0.0}}
+    run = {**ball, "time": {"end": 5.0}, "schemes": ["rk4"], "levels": [5, 6, 7, 8]}
+    verdict = judged({**run, "checks": [{"converges": "h"}]})
+    assert "level 40" not in verdict.advice

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int16]
+Flags = NDArray[np.bool_]
 
 UNKNOWN, SETTLED, MOVING = -1, 0, 1
 """What finer levels do to a number that misses what is asked: not known, too little, perhaps enough."""
@@ -57,7 +58,7 @@ def own_levels(name: str, levels: Sequence[int]) -> tuple[int, ...]:
 
 
 def prospects(
-    check: ValueCheck, numbers: Floats, levels: Sequence[int], level: int
+    check: ValueCheck, numbers: Floats, levels: Sequence[int], level: int, fulfilled: Flags
 ) -> tuple[Codes, Codes]:
     """Return what finer levels do to a number that misses what is asked, each of shape (scheme, case).
 
@@ -67,6 +68,8 @@ def prospects(
         Of every level, shape (scheme, case, level).
     level
         The level that is asked for.
+    fulfilled
+        Where the number that is asked for is as it should be, shape (scheme, case): nothing is said of it.
 
     Returns
     -------
@@ -86,6 +89,5 @@ def prospects(
             last = np.max(change, axis=-1)
             code[away[..., -1] <= REACH * last] = MOVING
             code[away[..., -1] > REACH * last] = SETTLED
-    fulfilled = holds[..., list(levels).index(level)]
     code[fulfilled], first[fulfilled] = UNKNOWN, -1
     return code, first.astype(np.int16)

@@ -116,7 +116,7 @@ def finest_readable(
     with np.errstate(all="ignore"):
         for level in range(FINEST - 1):
             fall = np.exp2(p * (at - level - 1))
-            clean = size * fall >= LOUD * (noise(level + 1) + noise(level + 2))
+            clean = (size > 0.0) & (size * fall >= LOUD * (noise(level + 1) + noise(level + 2)))
             found = np.where(lost & clean, level + 2, found).astype(np.int8)
     return found
 

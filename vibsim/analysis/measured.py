@@ -119,7 +119,8 @@ def _along_levels(
 ) -> tuple[Codes, Codes, behaviour_measured.Row]:
     """Return what finer levels do to a number, which of them has it as asked, and the number at every level."""
     levels = place.levels
-    is_needed = not (place.part.lean and np.all(compare(check, found)[0]))
+    fulfilled = compare(check, found)[0]
+    is_needed = not (place.part.lean and np.all(fulfilled))
     if is_needed and by_level.has_levels(check.value):
         numbers = by_level.by_level(check.value, place)
     else:
@@ -127,8 +128,9 @@ def _along_levels(
     own = by_level.own_levels(check.value, levels)
     level = place.level if place.level in own else (own or levels)[-1]
     found_at = numbers[..., : len(own)] if own else numbers
-    more, first = by_level.prospects(check, found_at, own or levels, int(level))
-    return more, first, {"numbers": numbers}
+    more, first = by_level.prospects(check, found_at, own or levels, int(level), fulfilled)
+    # a large sweep has no pictures of single members
+    return more, first, {"numbers": np.full(1, np.nan) if place.part.lean else numbers}
 
 
 def _foreseen(

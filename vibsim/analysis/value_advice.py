@@ -59,9 +59,7 @@ def advise(
     if check.value in COUNTED or not depends_on_level(check.value):
         return f"C{correct}."
     if VALUES[check.value].needs_events and on_the_mesh:
-        return (
-            f"Set `events: located` for the scheme, which times events to round-off, or c{correct}."
-        )
+        return f"Set `events: located` for scheme {on_the_mesh}, or c{correct}."
     if first > 0:
         return f"Ask for a finer level (`at: {_at(check, first)}`), where the number is as asked, or c{correct}."
     if more == SETTLED:
