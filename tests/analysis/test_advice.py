@@ -414,6 +414,17 @@ def test_levels_are_started_behind_the_last_one_that_fails() -> None:
     assert judged({**run, "levels": [6, 7, 8, 9]}).reason != "non_finite"
 
 
+def test_finer_levels_of_an_extrapolated_number_are_not_asked_for_one_by_one() -> None:
+    """Three coarse levels may have too small a bound: more of them mend that, and `best` stays what is asked for."""
+    check = {"value": "frequency", "at": {"level": "best"}, "equals": 1.3, "atol": 1e-13}
+    model = {"kind": "spring", "w": 1.3}
+    run = {**RUN, "model": model, "initial": {"u": 1.0}, "time": {"end": 20.0}, "samples": "all"}
+    verdict = judged({**run, "schemes": ["rk4"], "levels": [4, 5, 6], "checks": [check]})
+    assert verdict.reason == "mismatch"
+    assert verdict.advice.startswith("Add finer `levels:`")
+    assert "ask for one" not in verdict.advice
+
+
 def test_nothing_is_readable_of_a_motion_that_does_not_move() -> None:
     ball = {"title": "t", "model": {"kind": "bouncing_ball"}, "initial": {"h": 0.0}}
     run = {**ball, "time": {"end": 5.0}, "schemes": ["rk4"], "levels": [5, 6, 7, 8]}

@@ -66,7 +66,7 @@ def advise(
         return f"C{correct}, or what is computed (`model:`, `initial:`): finer levels change the number too little."
     ask = (
         ""
-        if check.at.level in (None, finest)
+        if check.at.level in (None, finest, "best")
         else f" and ask for one (`at: {_at(check, finer[-1])}`)"
     )
     return f"Add finer `levels:` ({finer[0]} and {finer[1]} cost {cost}){ask}, or c{correct}."
