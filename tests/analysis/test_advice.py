@@ -302,3 +302,131 @@ def test_a_motion_that_escapes_is_not_told_to_take_finer_levels_alone() -> None:
     assert found.reason == "unstable"
     assert "`time: end`) before t = 1." in found.advice
     assert "if the motion itself escapes" in found.advice
+
+
+PENDULUM = {"title": "t", "model": {"kind": "pendulum"}, "initial": {"theta": 1.0}}
+RUN = {**PENDULUM, "time": {"end": 10.0}, "schemes": ["central"]}
+
+
+@pytest.mark.parametrize("value", ["end", "period"])
+def test_advice_on_a_number_is_right_when_it_is_followed(value: str) -> None:
+    """Finer levels bring a number that is off by their error, and none that is off by more."""
+    of = {"quantity": "theta"} if value == "end" else {}
+    truth = _number({**of, "value": value, "at": {"level": 14}, "equals": 9.0}, [13, 14])
+    check = {**of, "value": value, "equals": truth + 0.1, "atol": 1e-3}
+    advice = judged({**RUN, "levels": [5, 6, 7], "checks": [check]}).advice
+    assert advice.startswith("Correct `equals:`")
+    check = {**of, "value": value, "equals": truth, "atol": 1e-6}
+    assert judged({**RUN, "levels": [5, 6, 7], "checks": [check]}).advice.startswith("Add finer")
+    assert judged({**RUN, "levels": [5, 6, 13, 14], "checks": [check]}).status == "PASS"
+
+
+def test_advice_on_a_number_of_several_levels_looks_at_those_that_have_one() -> None:
+    check = {"value": "observed_order", "quantity": "theta"}
+    far = judged({**RUN, "levels": [6, 7, 8, 9, 10], "checks": [{**check, "above": 3.9}]})
+    assert far.advice.startswith("Correct `above:`")
+    near = judged({**RUN, "levels": [4, 5, 6, 7, 8], "checks": [{**check, "below": 2.001}]})
+    assert near.advice.startswith("Add finer `levels:`")
+
+
+def test_a_finer_level_is_asked_for_where_it_has_the_number() -> None:
+    check = {"value": "at", "quantity": "theta", "atol": 1e-3, "at": {"level": 5, "step": 16}}
+    truth = _number({**check, "at": {"t": 5.0}, "equals": 9.0}, [13, 14])
+    verdict = judged({**RUN, "levels": [5, 6, 9], "checks": [{**check, "equals": truth}]})
+    assert "`at: {level: 9, step: 256}`" in verdict.advice
+    followed = {**check, "equals": truth, "at": {"level": 9, "step": 256}}
+    assert judged({**RUN, "levels": [5, 6, 9], "checks": [followed]}).status == "PASS"
+
+
+def judged(content: dict[str, Any]) -> Any:
+    made = Experiment.from_dict(content)
+    (found,) = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
+    return found
+
+
+def _number(check: dict[str, Any], levels: list[int]) -> float:
+    """Return the number that a check measures."""
+    return float(judged({**RUN, "levels": levels, "checks": [check]}).results[0].value)
+
+
+@pytest.mark.parametrize(
+    ("orders", "due", "says"),
+    [
+        ((3.1, 2.8, 2.4), 1.0, "fall towards order 1 (3.10, 2.80, 2.40): a higher power"),
+        ((math.nan, 0.9, 1.6), 2.0, "rise towards order 2 (0.90, 1.60)"),
+        ((1.6, 1.1), 2.0, "move away from order 2 (1.60, 1.10)"),
+        ((1.1, 2.9, 1.4), 2.0, "1.10, 2.90, 1.40, which do not settle"),
+        ((2.4,), 1.0, "which is above order 1: a higher power"),
+        ((1.1,), 2.0, ""),
+        ((1.5, 1.8), 2.0, ""),
+        ((), 2.0, ""),
+    ],
+)
+def test_where_orders_go_is_told(orders: tuple[float, ...], due: float, says: str) -> None:
+    order = next((x for x in reversed(orders)), 2.0)
+    of = {"expected": due, "promised": due, "orders": orders}
+    told = tell(story(reason="pre_asymptotic", order=order, **of))
+    assert says in told
+    assert ("from level to level" in told) == (len(says) > 0 and len(orders) > 1)
+
+
+def test_an_order_above_the_promised_one_is_said_to_fall_towards_it() -> None:
+    """The error of Forward Euler on a pendulum is that of its growth, which a coarse step does not show."""
+    check = {"converges": "theta", "order": "scheme"}
+    run = {**RUN, "time": {"end": 20.0}, "schemes": ["forward_euler"], "levels": [6, 7, 8]}
+    verdict = judged({**run, "checks": [check]})
+    assert verdict.reason == "pre_asymptotic"
+    assert "which is above order 1: a higher power of dt still outweighs that one" in verdict.text
+
+
+def test_a_corner_is_not_blamed_for_an_order_that_the_scheme_does_not_have() -> None:
+    """Quadratic damping leaves order 3 where v vanishes, but `central` has no more than 2 before that."""
+    corner = Corner("the velocity v passes zero", 0.1451, 3.0)
+    told = story(reason="non_smooth", order=1.892, expected=3.0, promised=2.0, corner=corner)
+    assert "Scheme mine promises no more than order 2 without it" in tell(told)
+    assert advise(told).startswith("Set `order: scheme`, and end the time interval")
+    assert "where order 2 can be seen" in advise(told)
+    kept = story(reason="non_smooth", order=-2.0, expected=4.0, promised=4.0, corner=corner)
+    assert "promises no more" not in tell(kept)
+    assert "last estimate" not in tell(kept)
+    assert "where order 4 can be seen" in advise(kept)
+
+
+def test_a_scheme_that_is_exact_is_not_sent_to_coarser_levels_alone() -> None:
+    """A ball in free flight is a parabola, which this scheme has to round-off on every level."""
+    ball = {"title": "t", "model": {"kind": "bouncing_ball"}, "initial": {"h": 1.0}}
+    check = {"converges": "h", "order": 4}
+    schemes = [{"kind": "newmark", "gamma": 0.7, "beta": 0.4}]
+    run = {**ball, "time": {"end": 1.0, "base_steps": 3}, "schemes": schemes, "checks": [check]}
+    verdict = judged({**run, "levels": [6, 7, 8, 9, 10]})
+    assert verdict.reason == "round_off"
+    assert "where those are round-off, too, the scheme is exact here" in verdict.advice
+
+
+def test_levels_are_started_behind_the_last_one_that_fails() -> None:
+    """Heun's method on a hardening spring overflows on levels 4 and 5, at times that differ."""
+    model = {"kind": "duffing", "gamma": 0.3, "omega": 1.2, "delta": 0.1}
+    run = {"title": "t", "model": model, "initial": {"u": 0.1}, "time": {"end": 25.0}}
+    run = {**run, "schemes": ["heun"], "checks": [{"converges": "u"}]}
+    verdict = judged({**run, "levels": [4, 5, 6]})
+    assert verdict.reason == "non_finite"
+    assert "Start `levels:` at 6 or finer" in verdict.advice
+    assert judged({**run, "levels": [6, 7, 8, 9]}).reason != "non_finite"
+
+
+def test_finer_levels_of_an_extrapolated_number_are_not_asked_for_one_by_one() -> None:
+    """Three coarse levels may have too small a bound: more of them mend that, and `best` stays what is asked for."""
+    check = {"value": "frequency", "at": {"level": "best"}, "equals": 1.3, "atol": 1e-13}
+    model = {"kind": "spring", "w": 1.3}
+    run = {**RUN, "model": model, "initial": {"u": 1.0}, "time": {"end": 20.0}, "samples": "all"}
+    verdict = judged({**run, "schemes": ["rk4"], "levels": [4, 5, 6], "checks": [check]})
+    assert verdict.reason == "mismatch"
+    assert verdict.advice.startswith("Add finer `levels:`")
+    assert "ask for one" not in verdict.advice
+
+
+def test_nothing_is_readable_of_a_motion_that_does_not_move() -> None:
+    ball = {"title": "t", "model": {"kind": "bouncing_ball"}, "initial": {"h": 0.0}}
+    run = {**ball, "time": {"end": 5.0}, "schemes": ["rk4"], "levels": [5, 6, 7, 8]}
+    verdict = judged({**run, "checks": [{"converges": "h"}]})
+    assert "level 40" not in verdict.advice

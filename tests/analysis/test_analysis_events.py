@@ -66,6 +66,27 @@ def test_events_on_the_mesh_do_not_pass_by_chance(order: Any) -> None:
     assert set(found) <= {"non_smooth", "asymptotic" if order == "scheme" else "order_low"}
 
 
+BALL: dict[str, Any] = {"model": {"kind": "bouncing_ball"}, "initial": {"h": 1.0}}
+WRONG = {"value": "event_count", "equals": 7}
+
+
+@pytest.mark.parametrize(
+    ("scheme", "check", "advice"),
+    [
+        ("rk4", WRONG, "Correct `equals:`"),
+        ("rk4", {**WRONG, "at": {"level": 6}}, "Correct `equals:`"),
+        ({"kind": "rk4", "events": "mesh"}, WRONG, "Set `events: located` for scheme rk4, or"),
+    ],
+)
+def test_finer_levels_are_not_advised_where_they_count_the_same_bounces(
+    scheme: Any, check: dict[str, Any], advice: str
+) -> None:
+    made = experiment(**BALL, time={"end": 5.0}, levels=[6, 7, 8], schemes=[scheme], checks=[check])
+    (verdict,) = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
+    assert (verdict.status, verdict.reason) == ("FAIL", "mismatch")
+    assert verdict.advice.startswith(advice)
+
+
 def test_the_verdict_says_what_to_change() -> None:
     made = experiment(initial={"u": 1.0, "v": 0.3})
     record = analyse(made, [simulate(made, level) for level in made.levels])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -243,3 +244,22 @@ def test_real_simulations_give_the_numbers_of_the_issue() -> None:
     assert np.all(np.abs(error) <= bound)
     assert found["theta_ratio_norm"].values[0, 0, :, 1] == pytest.approx(4.0, abs=0.05)
     assert found["energy_deviation_ratio_norm"].values[0, 0, :, 1] == pytest.approx(4.0, abs=0.05)
+
+
+def test_a_ratio_beyond_single_precision_is_kept_as_infinite() -> None:
+    """A large sweep keeps ratios with seven digits; a level that has all but blown up makes some of 1e40."""
+
+    def blown_up(t: Any, h: float, scheme: int, case: int) -> tuple[Any, Any]:
+        size = 1e30 if h == 2.0**-4 else h**4 * 1e-8
+        return size * np.sin(t), size * np.cos(t)
+
+    exp = experiment()
+    rows = level_records(exp, blown_up)
+    lean = {
+        level: Record(row.coords, row.variables, {**row.attrs, "storage": "lean"})
+        for level, row in rows.items()
+    }
+    ratio = np.asarray(analyse_records(exp, lean)["theta_ratio_norm"])
+    assert ratio.dtype == np.float32
+    assert np.isinf(ratio[0, 0, 0, 0])
+    assert np.isfinite(ratio[0, 0, 1, 0])

@@ -87,3 +87,24 @@ def test_what_no_level_can_tell_is_said() -> None:
     assert found.status == "PASS"
     assert "a wrong limit would not be noticed" in found.text
     assert "noticed" not in judged(spring(1.7, (6, 7, 8, 9)), spring(1.7, (6, 7, 8, 9))).text
+
+
+def test_noise_of_storing_in_single_precision_is_round_off() -> None:
+    """And not a step that is too coarse, which finer levels would mend."""
+    content = {
+        "title": "t",
+        "model": {"kind": "pendulum"},
+        "initial": {"theta": 1.0},
+        "time": {"end": 5.0},
+        "levels": [5, 6, 7, 8],
+        "schemes": ["rk4"],
+        "checks": [{"converges": "theta"}],
+    }
+    made = Experiment.from_dict(content)
+    levels = [simulate(made, level) for level in made.levels]
+    assert verdicts(made, analyse(made, levels))[0].status == "PASS"
+    single = [data.assign(theta=data.theta.astype("float32")) for data in levels]
+    (verdict,) = verdicts(made, analyse(made, single))
+    assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "round_off")
+    assert "single precision" in verdict.text
+    assert verdict.advice.startswith("Store the states in double precision")

@@ -58,10 +58,63 @@ def test_a_number_with_a_border_is_drawn_by_level():
 def test_a_number_that_must_equal_another_is_drawn_by_its_distance():
     finest = {"value": "period", "equals": 6.7, "rtol": 0.1}
     coarse = {"value": "period", "at": {"level": 6}, "equals": 6.7, "rtol": 0.1}
-    drawn, none = pictures(finest, coarse, levels=[6, 7, 8])
+    drawn, beside = pictures(finest, coarse, levels=[6, 7, 8])
     assert "distance of period [s] from 6.7" in drawn.svg
     assert "what the tolerance allows" in drawn.caption
-    assert none is None
+    # what a coarse level has to give is no limit: the numbers themselves, and the one that it should equal
+    assert "what the tolerance allows around 6.7" in beside.caption
+    assert "distance" not in beside.svg
+    assert re.findall('<circle[^>]*fill="([^"]*)"', beside.svg)[0] == "#0072B2"
+
+
+PLACES = [
+    {"value": "at", "quantity": "theta", "at": {"t": 5.0}, "equals": 0.1, "atol": 0.1},
+    {"value": "end", "quantity": "theta", "at": {"step": 64, "level": 6}, "below": 2.0},
+    {"value": "running_max", "quantity": "energy_deviation", "at": {"t": 5.0}, "below": 1.0},
+    {"value": "error_linf", "quantity": "theta", "at": {"level": 6}, "below": 1.0},
+    {"value": "growth_per_period", "equals": 1.0, "atol": 1e-3},
+]
+
+
+@pytest.mark.parametrize("check", PLACES)
+@pytest.mark.parametrize("levels", [[6], [6, 7, 8]])
+def test_a_number_at_a_time_or_of_one_level_is_drawn(check, levels):
+    (found,) = pictures(check, levels=levels)
+    shown = count(found.svg, "<circle") + count(found.svg, "h8l-4")
+    assert shown == len(levels)
+    assert count(found.svg, '<(circle|path)[^>]*fill="#0072B2"') == 1
+    assert "level 6:" in found.caption or len(levels) > 1
+
+
+@pytest.mark.parametrize("border", [{"equals": 6.7, "atol": 1e-3}, {"below": 6.8}, {"above": 6.0}])
+def test_an_extrapolated_number_stands_behind_the_levels_with_its_error_bar(border):
+    check = {"value": "period", "at": {"level": "best"}, **border}
+    (found,) = pictures(check, levels=[6, 7, 8])
+    assert count(found.svg, "<circle") == 4
+    assert re.findall('<circle[^>]*fill="([^"]*)"', found.svg)[-1] == "#0072B2"
+    assert count(found.svg, '<polyline[^>]*stroke="#0072B2"') == 1
+    assert ">best<" in found.svg
+    assert "the bar is the bound of its error" in found.caption
+
+
+def test_a_number_that_no_run_enters_has_no_picture():
+    (found,) = pictures({"value": "stability_limit", "equals": 2.0}, levels=[6, 7, 8])
+    assert found is None
+
+
+def test_a_number_of_two_levels_stands_at_the_coarser_one():
+    check = {"value": "max_abs_ratio", "quantity": "energy_deviation", "above": 3.5}
+    (found,) = pictures(check, levels=[6, 7, 8])
+    assert re.findall('<circle[^>]*fill="([^"]*)"', found.svg) == ["white", "#0072B2"]
+    assert pictures(check, levels=[6]) == [None]
+
+
+def test_a_number_that_is_hit_exactly_is_drawn():
+    check = {"value": "accepted_steps", "equals": 256.0, "rtol": 0.1}
+    (found,) = pictures(check, levels=[6, 7, 8])
+    assert count(found.svg, "<circle") == 2
+    assert count(found.svg, '<path[^>]*fill="#0072B2"') == 1
+    assert "a triangle at the lower edge has no distance at all" in found.caption
 
 
 def test_a_large_sweep_without_series_has_the_order_alone():

@@ -406,6 +406,22 @@ def test_a_quantity_has_one_name_on_the_page(tmp_path):
     assert "Measured: the statement is false. dE converges" in text
 
 
+@pytest.mark.parametrize(
+    ("scheme", "order", "meaning"),
+    [
+        ("euler_cromer", 2, "with the order that the scheme promises here"),
+        ({"kind": "central", "start": "first_order"}, 2, "more slowly than the scheme promises"),
+        ("central", 1, "faster than asked for, as the scheme promises here"),
+    ],
+)
+def test_an_order_that_a_scheme_keeps_is_not_said_to_miss_its_promise(scheme, order, meaning):
+    exp = samples.experiment(schemes=[scheme], checks=[{"converges": "theta", "order": order}])
+    rec = samples.record(exp)
+    (check,) = samples.summary(exp, rec)["checks"]
+    assert check["status"] == "FAIL"
+    assert meaning in cards.card(exp, rec, check)["meaning"]
+
+
 def test_every_reason_has_words():
     assert set(reasons.REASONS) == set(REASONS)
     assert all(r.meaning and r.needs for r in reasons.REASONS.values())

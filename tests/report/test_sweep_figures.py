@@ -18,6 +18,7 @@ from vibsim.report import (
     drawing,
     figures_cloud,
     figures_map,
+    figures_order,
     figures_spread,
     figures_sweep,
     finest,
@@ -361,3 +362,27 @@ def test_numbers_of_checks_have_maps_unless_they_are_shown_already():
     shown = panel.collections[0].get_array().ravel()
     np.testing.assert_array_equal(np.sort(shown), np.sort(record["check_value"][0, 0]))
     assert "map_checks_0" in [p.name for p in pictures]
+
+
+@pytest.mark.parametrize(
+    ("model", "order", "word"),
+    [
+        ("linear_pendulum", "scheme", "promised"),
+        ("linear_pendulum", 2, "promised"),
+        ("pendulum", 3, "expected"),
+    ],
+)
+def test_an_order_of_a_part_is_promised_where_theory_has_one(model, order, word):
+    """And where it has none, the line stands at the order that the check expects."""
+    part = "theta_phase_error"
+    checks = [{"converges": part, "order": order}]
+    exp = samples.swept(4, model={"kind": model}, checks=checks, levels=[8, 9, 10])
+    record = samples.record(exp)
+    along = layout.along_of(layout.keys(record))
+    swept = figures_sweep.orders(exp, record, along, part)
+    entries = swept.figure.axes[0].get_legend_handles_labels()[1]
+    assert f"{word}, {3 if order == 3 else 2} ± 0.1" in entries
+    other = {"promised": "expected", "expected": "promised"}[word]
+    for picture in (swept, figures_order.against_step(exp, record, part, 0)):
+        assert word in picture.caption
+        assert other not in picture.caption

@@ -10,6 +10,7 @@ from vibsim.analysis.story import (
     Corner,
     Story,
     ends_low,
+    first_sound,
     first_stable,
     is_adaptive,
     promises_less,
@@ -36,9 +37,11 @@ def advise(s: Story) -> str:
                 "spacing over the speed, or a whole part of that."
             )
         case "non_smooth" if s.corner:
+            lower = promises_less(s)
+            order = s.promised if lower else s.expected
             return (
-                f"End the time interval (`time: end`) before t = {s.corner.time:.4g}, where order {number(s.expected)} "
-                f"can be seen{_or_lower(s, s.corner)}."
+                f"{'Set `order: scheme`, and end' if lower else 'End'} the time interval (`time: end`) before t = "
+                f"{s.corner.time:.4g}, where order {number(order)} can be seen{_or_lower(s, s.corner)}."
             )
         case "order_low":
             return _on_low_order(s)
@@ -65,7 +68,7 @@ def advise(s: Story) -> str:
                 "finer levels will not help where the motion escapes, or a formula has no finite value."
             )
         case "non_finite":
-            level = max(s.culprit, s.levels[0]) + 1
+            level = first_sound(s)
             return (
                 f"Start `levels:` at {level} or finer{_priced(s, [level])}, or shorten `time: end`."
             )
@@ -139,8 +142,15 @@ def _on_high_order(s: Story) -> str:
 
 def _on_round_off(s: Story) -> str:
     """Name the arithmetic and the levels with which an order can be read, as far as they are predicted."""
+    if s.cause == "stored":
+        coarser = _readable(s)
+        return (
+            f"Store the states in double precision (float64), or {coarser[0].lower()}{coarser[1:]}."
+        )
     arithmetic = s.options.get("arithmetic", "compensated")
     coarser = _readable(s)
+    if not s.order > 0.0:
+        coarser += "; where those are round-off, too, the scheme is exact here, and another `model:` shows its order"
     if arithmetic == "compensated":
         return f"{coarser}."
     reach = f" (it can be read up to level {s.compensated})" if s.compensated > s.readable else ""

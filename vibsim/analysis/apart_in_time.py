@@ -89,7 +89,7 @@ def parts_of_errors(
                 values=[row[k] for row in told],
                 exact=_nothing(known, told[0][k].shape) if known.any() else None,
                 order=_order(part, name),
-                floor=part.floor_of(name, scale * part.magnified) + MEASURED / BLAME * between[k],
+                floor=part.floor_of(name, scale) + MEASURED / BLAME * between[k],
                 scale=scale,
                 blur=between[k],
             )

@@ -18,7 +18,7 @@ from vibsim.analysis.motion import motion
 from vibsim.analysis.part import CENTRED, Part, part_of
 from vibsim.analysis.parts_told import at_start
 from vibsim.analysis.reached import bounds
-from vibsim.analysis.tables import SERIES, Table, numbers, over_time, precision_of
+from vibsim.analysis.tables import SERIES, Table, in_precision, numbers, over_time
 from vibsim.analysis.work import work_precision
 from vibsim.errors import VibsimError
 from vibsim.models import centred
@@ -220,7 +220,7 @@ def _verdict(q: Comparison) -> Table:
     for key, field in (("order", "order"), ("order_low", "low"), ("order_high", "high")):
         values = np.stack([getattr(judgement(q, kind), field) for kind in norms], axis=-1)
         attrs = attributes(f"{name}: {words[key]}", "1")
-        table[f"{name}_{key}"] = Variable((*member, "norm"), values.astype(precision_of(q)), attrs)
+        table[f"{name}_{key}"] = Variable((*member, "norm"), in_precision(q, values), attrs)
     for key, levels in (("first", typical.first), ("last", typical.last)):
         words_ = f"{name}: {key} level that the order rests on, -1 for none"
         kept = levels.astype(np.int16)

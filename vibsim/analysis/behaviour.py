@@ -56,7 +56,7 @@ def stable(experiment: Experiment, record: Record, check: StableCheck, index: in
         if np.isfinite(p[scheme, case]):
             told += f", w dt = {p[scheme, case]:.4g}"
         factors = float(expected[scheme, case]), float(measured[scheme, case])
-        told += growth_in_words(*factors, model.conservative, model.linear)
+        told += growth_in_words(*factors, (model.conservative, model.linear, len(model.positions)))
         if not unstable and never[scheme, case]:
             told += vanishing_in_words(*factors)
         if not np.isnan(t := failed_at(scheme, case)):

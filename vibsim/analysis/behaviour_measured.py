@@ -3,8 +3,8 @@
 It stands in ``check_value``, ``check_low``, ``check_high`` and ``check_first`` of the convergence Record
 (`vibsim.analysis.measured`), with these meanings:
 
-- ``stable``: growth per period, measured and predicted; w dt; the level. The reason is ``match`` where it is stable,
-  ``unstable``, or ``mismatch`` where it grows otherwise than predicted;
+- ``stable``: growth per period, measured and predicted; w dt, the highest; the level. The reason is ``match`` where it
+  is stable, ``unstable``, or ``mismatch`` where it grows otherwise than predicted;
 - ``conserves``: the largest error over the energy at the start; rate and k of the drift (`vibsim.analysis.drift`); its
   kind, as a position in `vocabulary.DRIFTS`;
 - ``equal``: the largest distance, and what it may be; nothing; the level.
@@ -59,7 +59,7 @@ def _stable(part: Part, check: StableCheck) -> Row:
     return {
         "value": found.measured,
         "low": found.predicted,
-        "high": np.broadcast_to(part.omega_dt[:, part.grid.levels.index(level)], part.shape),
+        "high": np.broadcast_to(part.fastest[:, part.grid.levels.index(level)], part.shape),
         "first": level,
         "culprit": level,
         "reason": np.where(found.contradicted, MISMATCH, reason),

@@ -27,9 +27,20 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Codes = NDArray[np.int8]
 
-CAUSES = ("none", "last_point", "one_quantity", "everything", "special_times", "one_norm", "theory")
+CAUSES = (
+    "none",
+    "last_point",
+    "one_quantity",
+    "everything",
+    "special_times",
+    "one_norm",
+    "theory",
+    "stored",
+)
 """What was found; files hold a position here."""
-NONE, LAST_POINT, ONE_QUANTITY, EVERYTHING, SPECIAL_TIMES, ONE_NORM, THEORY = range(len(CAUSES))
+NONE, LAST_POINT, ONE_QUANTITY, EVERYTHING, SPECIAL_TIMES, ONE_NORM, THEORY, STORED = range(
+    len(CAUSES)
+)
 
 STILL = 1e-3
 """A rate of change that is no larger a part of its largest value, at every common time, vanishes there."""
@@ -45,7 +56,7 @@ def causes(
     order: Floats,
     tolerance: float,
 ) -> Codes:
-    """Return why orders are too low or too high, as positions in `CAUSES`, shape (scheme, case).
+    """Return why orders are too low or too high, or lost in round-off, as positions in `CAUSES`, shape (scheme, case).
 
     Parameters
     ----------
@@ -62,6 +73,8 @@ def causes(
     found = np.full(shape, NONE, dtype=np.int8)
     low, high = (judged.reason == REASON_NAMES.index(word) for word in ("order_low", "order_high"))
     wanted = np.broadcast_to(order, shape)
+    if q.part.stored_floor[-1] > 0.0:
+        found[judged.reason == REASON_NAMES.index("round_off")] = STORED
     if not np.any(low | high):
         return found
     beside = _other_states(q, others, norm, tolerance, wanted)

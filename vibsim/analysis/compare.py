@@ -201,7 +201,7 @@ def comparisons(part: Part, names: tuple[str, ...]) -> Mapping[str, Comparison]:
             values=values[name],
             exact=part.exact_of(name),
             order=formal_orders(part.experiment, name, part.columns),
-            floor=part.floor_of(name, scale * part.magnified),
+            floor=part.floor_of(name, scale),
             scale=scale,
         )
     return found | parts_of_errors(part, found, apart, Comparison)

@@ -116,7 +116,7 @@ def _story(
 ) -> Story:
     levels = tuple(int(level) for level in record["level"])
     culprit = int(found.culprit[scheme, case])
-    spec = experiment.schemes[scheme]
+    spec, model = experiment.schemes[scheme], experiment.model.definition
     columns = columns_of(record)
     limits = stability_limits(experiment, columns)[scheme]
     at = levels.index(culprit) if culprit >= 0 else None
@@ -137,21 +137,32 @@ def _story(
         culprit=culprit,
         omega_dt=p,
         growth=_growth(record, SCHEMES[spec.kind], options, p, (scheme, case, at)),
+        growth_of=(model.conservative, model.linear, len(model.positions)),
         limit=float(limits[case if len(limits) > 1 else 0]),
         options=options,
-        is_position=check.converges in experiment.model.definition.positions,
+        is_position=check.converges in model.positions,
         scheme=spec.name,
-        has_corners=has_corners(experiment.model.definition),
+        has_corners=has_corners(model),
         corner=_corner(experiment, record, scheme, case),
-        parts=parts_in_words(experiment.model.definition, record, check.converges, scheme, case),
+        parts=parts_in_words(model, record, check.converges, scheme, case),
         kind=spec.kind,
         promised=_promised(experiment, check.converges, columns, scheme, case),
         centred=_centred(experiment, check.converges, SCHEMES[spec.kind], options),
         has_promise=not is_error_part(check.converges) or is_promised(experiment, check.converges),
         cost=partial(cost_in_words, experiment),
         has_exact=has_exact(record, check.converges, scheme, case),
+        orders=_orders(record, check, scheme, case),
         failures=_failures(record, scheme, case),
     )
+
+
+def _orders(record: Record, check: ConvergesCheck, scheme: int, case: int) -> tuple[float, ...]:
+    """Return the orders of successive levels; none where the record does not have them, or the norm."""
+    name, norms = f"{check.converges}_observed_order", record.words("norm")
+    if name not in record or check.norm not in norms:
+        return ()
+    found = np.asarray(record[name])[scheme, case, :, norms.index(check.norm)]
+    return tuple(float(order) for order in found)
 
 
 def _failures(record: Record, scheme: int, case: int) -> tuple[float, ...]:

@@ -34,7 +34,7 @@ def drift_at(part: Part, level: int, name: str = "energy_deviation") -> Drift:
     missing = np.full((*part.shape, len(record["t"])), np.nan)
     deviation = np.asarray(record[name], dtype=float) if name in record else missing
     size = np.abs(initial) + solution_size([np.nan_to_num(deviation)])
-    floor = part.floor_of(name, size * part.magnified)[..., index]
+    floor = part.floor_of(name, size)[..., index]
     floor = np.maximum(floor, _of_steps(part, level) * size * part.magnified)
     # the tolerance of an adaptive scheme is an error that it makes, and no round-off
     floor[part.adaptive] = SPACING_AT_ONE * size[part.adaptive]

@@ -6,10 +6,13 @@ steps. It is an order of magnitude; the verdict blames it only where the data sh
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis.series import largest
+from vibsim.record import Record
 from vibsim.schemes import Options, Scheme
 
 Floats = NDArray[np.float64]
@@ -21,9 +24,39 @@ No stored number is known better than this, relative to its size.
 """
 
 
+STORED = 1.0 / 7.0
+"""Root mean square of the error that storing leaves of numbers from 1/2 to 1: half a spacing over root 12."""
+
+
 def relative_floor(scheme: Scheme, options: Options, steps: tuple[int, ...]) -> Floats:
     """Return the predicted round-off at every level relative to the solution's size, shape (level,)."""
     return np.array([max(scheme.round_off(options, n), SPACING_AT_ONE) for n in steps])
+
+
+def stored_floor(
+    records: Mapping[int, Record], levels: Sequence[int], names: Sequence[str]
+) -> Floats:
+    """Return the round-off of storing at every level, relative to the solution's size, shape (level,); 0 for doubles.
+
+    Data of other programs may be kept in single precision: no difference of two such levels is known to more than its
+    seven digits.
+
+    Parameters
+    ----------
+    records
+        Level Records by level.
+    names
+        The states.
+    """
+    kinds = [
+        {np.asarray(records[level][name]).dtype for name in names if name in records[level]}
+        for level in levels
+    ]
+    known = [
+        max((float(np.finfo(kind).eps) for kind in found if kind.kind == "f"), default=0.0)
+        for found in kinds
+    ]
+    return np.array([STORED * eps if eps > SPACING_AT_ONE else 0.0 for eps in known])
 
 
 def solution_size(series: list[Floats]) -> Floats:

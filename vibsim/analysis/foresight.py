@@ -116,7 +116,7 @@ def finest_readable(
     with np.errstate(all="ignore"):
         for level in range(FINEST - 1):
             fall = np.exp2(p * (at - level - 1))
-            clean = size * fall >= LOUD * (noise(level + 1) + noise(level + 2))
+            clean = (size > 0.0) & (size * fall >= LOUD * (noise(level + 1) + noise(level + 2)))
             found = np.where(lost & clean, level + 2, found).astype(np.int8)
     return found
 
@@ -142,6 +142,9 @@ def _noise(q: Comparison, norm: str, arithmetic: str | None) -> Callable[[int], 
     """Return what gives the predicted round-off of a level in a norm, shape (scheme, case)."""
     part = q.part
     e = evidence(q, norm, q.order, ORDINARY)
+    if part.stored_floor[-1] > 0.0:
+        # what storing leaves is the same at every level, in any arithmetic
+        return lambda level: e.floor[..., -1]
     base = e.floor[..., -1] / part.relative_floor[..., -1]
 
     def at(level: int) -> Floats:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis import behaviour_measured, best, values
+from vibsim.analysis import behaviour_measured, best, by_level, values
+from vibsim.analysis.asked import compare
 from vibsim.analysis.causes import CAUSES, causes
 from vibsim.analysis.compare import Comparison
 from vibsim.analysis.evidence import judge_check, order_of
@@ -22,9 +23,10 @@ from vibsim.vocabulary import REASON_NAMES, STATUSES
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
-    from vibsim.spec.checks import ConvergesCheck
+    from vibsim.spec.checks import ConvergesCheck, ValueCheck
 
 Codes = NDArray[Any]
+Floats = NDArray[np.float64]
 
 FIELDS: Mapping[str, tuple[str, type[np.generic], float, str]] = {
     "value": ("order", np.float64, np.nan, "number that each check measured"),
@@ -35,7 +37,12 @@ FIELDS: Mapping[str, tuple[str, type[np.generic], float, str]] = {
         np.nan,
         "upper end of the order of each check, or the bound of the error of an extrapolated number",
     ),
-    "first": ("first", np.int16, -1, "first level that the order rests on, -1 for none"),
+    "first": (
+        "first",
+        np.int16,
+        -1,
+        "first level that the order rests on, or finer one with the number that is asked for, -1 for none",
+    ),
     "last": ("last", np.int16, -1, "last level that the order rests on, -1 for none"),
     "culprit": ("culprit", np.int16, -1, "coarsest level that broke down, -1 for none"),
     "status": ("status", np.int8, 0, "status of each check on an order"),
@@ -53,7 +60,7 @@ def flags(names: tuple[str, ...]) -> dict[str, Any]:
 
 
 FORESEEN: Mapping[str, str] = {
-    "more": "finer levels that each check on an order probably needs, -1 unknown",
+    "more": "finer levels that each check on an order probably needs, 0 where no finer one mends a number, -1 unknown",
     "readable": "finest level at which each check can read an order, -1 unknown",
     "compensated": "the same in compensated arithmetic",
     "cause": "why the order of each check is another one, as far as it is known",
@@ -88,6 +95,10 @@ def measured(part: Part, compared: Mapping[str, Comparison]) -> dict[str, Variab
             at = inner.at
             place = values.Place(part, compared, inner.quantity or "", at.level, at.t, at.step)
             table["value"][i], table["high"][i] = best.value(inner.value, place)
+            table["more"][i], table["first"][i], row = _along_levels(
+                inner, place, table["value"][i]
+            )
+            rows.append((inner.kind, row))
         else:
             row = behaviour_measured.measure(part, compared, inner)
             rows.append((inner.kind, row))
@@ -101,6 +112,25 @@ def measured(part: Part, compared: Mapping[str, Comparison]) -> dict[str, Variab
         for name, array in table.items()
     }
     return found | shown(part, rows)
+
+
+def _along_levels(
+    check: ValueCheck, place: values.Place, found: Floats
+) -> tuple[Codes, Codes, behaviour_measured.Row]:
+    """Return what finer levels do to a number, which of them has it as asked, and the number at every level."""
+    levels = place.levels
+    fulfilled = compare(check, found)[0]
+    is_needed = not (place.part.lean and np.all(fulfilled))
+    if is_needed and by_level.has_levels(check.value):
+        numbers = by_level.by_level(check.value, place)
+    else:
+        numbers = np.full((*found.shape, len(levels)), np.nan)
+    own = by_level.own_levels(check.value, levels)
+    level = place.level if place.level in own else (own or levels)[-1]
+    found_at = numbers[..., : len(own)] if own else numbers
+    more, first = by_level.prospects(check, found_at, own or levels, int(level), fulfilled)
+    # a large sweep has no pictures of single members
+    return more, first, {"numbers": np.full(1, np.nan) if place.part.lean else numbers}
 
 
 def _foreseen(

@@ -64,7 +64,7 @@ def _by_level(part: Part, of: Callable[[int], Floats]) -> Floats:
 def _theory(part: Part) -> Table:
     """Return growth, frequency and phase error, predicted and measured."""
     measured: dict[str, Callable[[int], Floats]] = {
-        "growth": lambda level: oscillation.growth_per_period(part, level),
+        "growth": lambda level: oscillation.growth_of_motion(part, level),
         "frequency": lambda level: oscillation.frequency(part, level),
         "phase_error": lambda level: oscillation.phase_error(part, level),
     }

@@ -34,15 +34,23 @@ def vanishing_in_words(predicted: float, measured: float) -> str:
 
 
 def growth_in_words(
-    predicted: float, measured: float, is_simple: bool = True, is_linear: bool = True
+    predicted: float, measured: float, of: tuple[bool, bool, int] = (True, True, 1)
 ) -> str:
     """Say what growth theory predicts and what was measured; empty where neither is known.
 
-    The theory is of free linear oscillations without damping: of a model with damping or a force in time (not
-    `is_simple`), and of a nonlinear one, that is said.
+    The theory is of free linear oscillations without damping: of a model with damping or a force in time, and of a
+    nonlinear one, that is said. Of several coordinates it is that of their fastest oscillation.
+
+    Parameters
+    ----------
+    of
+        Whether the model is conservative, whether it is linear, and its number of coordinates.
     """
+    is_conservative, is_linear, coordinates = of
     small = "predicted" if is_linear else "predicted of small oscillations"
-    theory = small if is_simple else "predicted of free oscillations without damping"
+    if coordinates > 1:
+        small = "predicted of the fastest small oscillations"
+    theory = small if is_conservative else "predicted of free oscillations without damping"
     told = [
         f"{factor_in_words(value)} {word}"
         for value, word in ((predicted, theory), (measured, "measured"))

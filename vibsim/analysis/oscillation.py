@@ -51,6 +51,16 @@ def growth_per_period(part: Part, level: int) -> Floats:
     return np.where(np.isfinite(own), own, found)
 
 
+def growth_of_motion(part: Part, level: int) -> Floats:
+    """Return the same where it is the growth of the whole motion; NaN of several coordinates.
+
+    Two coordinates pass their energy to and fro: the peaks of the first one rise and fall without any growth.
+    """
+    if len(part.model.positions) > 1:
+        return np.full(part.shape, np.nan)
+    return growth_per_period(part, level)
+
+
 def has_recurrence(part: Part, level: int) -> bool:
     """Tell whether the steps of a level satisfy a recurrence that can be seen: a linear model, and no step left out."""
     return is_simple(part) and int(np.asarray(part.records[level].attrs["every"])) == 1

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vibsim.analysis.belonging import check_belonging
 from vibsim.analysis.corners import Corners, corners_of
-from vibsim.analysis.floor import SPACING_AT_ONE, solution_size
+from vibsim.analysis.floor import SPACING_AT_ONE, solution_size, stored_floor
 from vibsim.analysis.grid import Grid, common_grid, take
 from vibsim.analysis.known import known_values
 from vibsim.analysis.promise import (
@@ -63,6 +63,8 @@ class Part:
     """Factor by which disturbances grow, shape (c,)."""
     relative_floor: Floats
     """Predicted round-off relative to the solution, shape (s, 1 or c, l)."""
+    stored_floor: Floats
+    """Round-off of storing relative to the solution, shape (l,): 0 for double precision, which the above knows."""
     omega_dt: Floats
     """w dt, shape (c, l)."""
     fastest: Floats
@@ -173,15 +175,17 @@ class Part:
         return np.asarray(np.maximum(own, sizes[position] * rate))
 
     def floor_of(self, name: str, size: Floats) -> Floats:
-        """Return the predicted round-off of a quantity of a size, shape (s, c, l).
+        """Return the predicted round-off of a quantity of a size, shape (s, c, l), or what its storing leaves of it.
 
+        A motion magnifies the former alone.
         ``[D_2t u]`` divides the last digit of the position by dt: eps/(w dt) of the velocity's size.
         """
         relative = self.relative_floor
         if name.endswith(CENTRED):
             with np.errstate(divide="ignore"):
                 relative = relative + SPACING_AT_ONE / self.omega_dt
-        return np.asarray(relative * size[..., None])
+        computed = relative * (size * self.magnified)[..., None]
+        return np.asarray(np.maximum(computed, self.stored_floor * size[..., None]))
 
 
 def part_of(experiment: Experiment, records: Mapping[int, Record]) -> Part:
@@ -196,7 +200,7 @@ def part_of(experiment: Experiment, records: Mapping[int, Record]) -> Part:
     check_belonging(experiment, records)
     finest = records[grid.levels[-1]]
     lean = any(record.attrs.get("storage") == "lean" for record in records.values())
-    columns = columns_of(finest)
+    columns, states = columns_of(finest), experiment.model.definition.states
     case = np.asarray(finest["case"], dtype=np.int64)
     group = members(experiment, int(case[0]), int(case[-1]) + 1)
     t = grid.times(group.end)
@@ -211,6 +215,7 @@ def part_of(experiment: Experiment, records: Mapping[int, Record]) -> Part:
         exact=exact,
         magnified=sensitivity(experiment, t, group, exact if lean else None),
         relative_floor=relative_floors(experiment, grid.steps, columns),
+        stored_floor=stored_floor(records, grid.levels, [state.name for state in states]),
         omega_dt=by_level([records[level]["omega_dt"] for level in grid.levels]),
         fastest=by_level([fastest(records[level]) for level in grid.levels]),
         group=group,

@@ -87,8 +87,8 @@ def _angle(part: Part, level: int) -> Floats:
 
 
 def _step(part: Part, level: int) -> Floats:
-    """Return w dt, shape (case,)."""
-    return part.omega_dt[:, part.grid.levels.index(level)]
+    """Return w dt, of several coordinates that of their fastest oscillation, shape (case,)."""
+    return part.fastest[:, part.grid.levels.index(level)]
 
 
 def natural_frequency(part: Part) -> Floats:

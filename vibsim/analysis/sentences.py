@@ -12,11 +12,13 @@ from vibsim.analysis.numbers_in_words import growth_in_words, number
 from vibsim.analysis.story import (
     Corner,
     Story,
+    due,
     first_stable,
     is_adaptive,
     promises_less,
     promises_more,
 )
+from vibsim.analysis.trend import trend_in_words
 from vibsim.schemes.base import is_on_the_mesh
 
 HIGHEST = 12.0
@@ -72,8 +74,9 @@ def tell(s: Story) -> str:
             return f"The calculation of {s.quantity} met a number that is not finite{_place_of_failure(s)}."
         case "round_off":
             kept = f"; before it, {measured} is all that is left" if s.order > 0.0 else ""
+            stored = " of the single precision that it is stored in" if s.cause == "stored" else ""
             return (
-                f"The differences of {s.quantity} have reached the floor of round-off, where they say "
+                f"The differences of {s.quantity} have reached the floor of round-off{stored}, where they say "
                 f"nothing about the scheme{kept}."
             )
         case "oscillating":
@@ -116,7 +119,9 @@ def _too_coarse(s: Story, measured: str) -> str:
             f"{s.first} to {s.last} than those of any power of dt, as where the coarser ones have nothing to do with "
             "the solution."
         )
-    so_far = f": the last estimate is {measured}" if measured else ""
+    so_far = (
+        f": the last estimate is {measured}{trend_in_words(s.orders, due(s))}" if measured else ""
+    )
     return f"The step is still too coarse to tell the order of {s.quantity}{so_far}."
 
 
@@ -148,8 +153,8 @@ def _unstable(s: Story) -> str:
     if math.isfinite(s.omega_dt) and s.omega_dt > s.limit:
         return (
             f"The run is unstable: at level {s.culprit}, w dt = {s.omega_dt:.4g} is beyond the limit "
-            f"{number(s.limit)} of scheme {s.scheme}{growth_in_words(*s.growth)}; level {first_stable(s)} is the first "
-            "within it."
+            f"{number(s.limit)} of scheme {s.scheme}{growth_in_words(*s.growth, s.growth_of)}; level "
+            f"{first_stable(s)} is the first within it."
         )
     return (
         f"{s.quantity} is unstable: the solution grows where the exact one does not, and finer levels "
@@ -176,8 +181,10 @@ def _not_smooth(s: Story) -> str:
 
 def _cornered(s: Story, corner: Corner) -> str:
     """Say where the first corner of the force lies, and the order that it leaves."""
-    measured = _measured(s)
+    measured = _measured(s) if s.order > 0.0 else ""
     so_far = f"; the last estimate is {measured}" if measured else ""
+    if promises_less(s):
+        so_far += f". Scheme {s.scheme} promises no more than order {number(s.promised)} without it"
     if corner.on_a_point:
         return (
             f"At t = {corner.time:.4g}, at a grid point, {corner.words}, where the force jumps: the steps on both "

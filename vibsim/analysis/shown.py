@@ -1,10 +1,12 @@
-"""What pictures of checks on energy and equality need beside the number that decides, kept where series are.
+"""What pictures of checks need beside the number that decides, kept where series are.
 
+- ``value``: the number at every level;
 - ``conserves``: the means of the largest energy error so far over [T/8, T/4], [T/4, T/2] and [T/2, T], by which its
   drift is named (`vibsim.analysis.drift`), and the error up to which it is round-off;
 - ``equal``: how far the two solutions are from each other over time.
 
-Both are those of the level that a check names, at all of its stored times, which `convergence.nc` does not have.
+The latter two are those of the level that a check names, at all of its stored times, which `convergence.nc` does not
+have.
 """
 
 from __future__ import annotations
@@ -38,6 +40,11 @@ FIELDS: Mapping[str, tuple[str, tuple[str, ...], str]] = {
         "conserves",
         ("scheme", "case"),
         "largest energy error that is taken for round-off, in the unit of the energy",
+    ),
+    "numbers": (
+        "value",
+        ("scheme", "case", "level"),
+        "the number at every level, in its own unit; that of a step at the same time of every level",
     ),
     "distance": (
         "equal",

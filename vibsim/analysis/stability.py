@@ -38,15 +38,15 @@ class Growth:
     contradicted: Flags
     """Whether a linear model beyond the limit grows otherwise than predicted."""
     measured: Floats
-    """Growth factor of the amplitude per period; NaN below two peaks."""
+    """Growth factor of the amplitude per period; NaN below two peaks, and of several coordinates."""
     predicted: Floats
-    """The same by theory, of small oscillations; NaN for adaptive schemes."""
+    """The same by theory, of the fastest small oscillations; NaN for adaptive schemes."""
 
 
 def growth_at(part: Part, level: int) -> Growth:
     """Find whether schemes and members are stable at a level."""
     index = part.grid.levels.index(level)
-    p = np.broadcast_to(part.omega_dt[:, index], part.shape)
+    p = np.broadcast_to(part.fastest[:, index], part.shape)
     beyond = p > part.stability_limit * (1.0 + LIMIT_ROUNDING)
     at_limit = ~beyond & (p >= part.stability_limit * (1.0 - LIMIT_ROUNDING))
     broken = part.failed[..., index]
@@ -65,9 +65,12 @@ def growth_at(part: Part, level: int) -> Growth:
 
 def _measured(part: Part, level: int) -> Floats:
     """Return the growth as `convergence.nc` has it, and where a run is too short for that the one over all of it."""
-    whole = oscillation.growth_over_run(part, part.records[level])
-    found = oscillation.growth_per_period(part, level)
-    return np.where(np.isfinite(found), found, whole)
+    found = oscillation.growth_of_motion(part, level)
+    if len(part.model.positions) > 1:
+        return found
+    return np.where(
+        np.isfinite(found), found, oscillation.growth_over_run(part, part.records[level])
+    )
 
 
 def _removed(part: Part, index: int) -> Flags:

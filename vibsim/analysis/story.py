@@ -53,6 +53,8 @@ class Story:
     """Options of the scheme."""
     is_position: bool
     scheme: str
+    growth_of: tuple[bool, bool, int] = (True, True, 1)
+    """What a growth is told of: whether the model is conservative, whether it is linear, its number of coordinates."""
     has_corners: bool = False
     """Whether steps have corners of a force from a table inside."""
     corner: Corner | None = None
@@ -79,6 +81,8 @@ class Story:
     """What levels cost, in words."""
     has_exact: bool = True
     """Whether an exact solution or a reference is known, which alone shows a wrong limit."""
+    orders: tuple[float, ...] = ()
+    """The orders of successive levels in the norm of the check, the coarsest first; NaN where there is none."""
     failures: tuple[float, ...] = ()
     """When each level met a number that is not finite, in its first step at 0; NaN where it did not."""
 
@@ -125,6 +129,20 @@ def shows_promise(s: Story) -> bool:
         return False
     # what has no interval may be any order
     return not (s.promised < s.low - s.tolerance or s.promised > s.high + s.tolerance)
+
+
+def due(s: Story) -> float:
+    """Return the order that levels approach: the one that the scheme has, where the last order is nearer to that."""
+    known = [order for order in s.orders if math.isfinite(order)]
+    if not known or not math.isfinite(s.promised):
+        return s.expected
+    return min(s.expected, s.promised, key=lambda order: abs(known[-1] - order))
+
+
+def first_sound(s: Story) -> int:
+    """Return the coarsest level from which on none met a number that is not finite, as far as they tell."""
+    failed = [level for level, t in zip(s.levels, s.failures, strict=False) if not math.isnan(t)]
+    return max([s.culprit, s.levels[0], *failed]) + 1
 
 
 def first_stable(s: Story) -> int:

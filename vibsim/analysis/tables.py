@@ -14,9 +14,11 @@ from vibsim.analysis.gci import of_order
 from vibsim.analysis.limits import ORDINARY
 from vibsim.analysis.local_order import local_order, window_points
 from vibsim.analysis.part import CENTRED, by_level, plain_name
+from vibsim.analysis.part_promise import is_promised
 from vibsim.analysis.promise import orders_vary
 from vibsim.analysis.swing import swing
 from vibsim.models import ENERGIES
+from vibsim.models.error_parts import is_error_part
 from vibsim.record import Variable, attributes
 from vibsim.vocabulary import TYPICAL_NORM
 
@@ -24,6 +26,10 @@ Floats = NDArray[np.float64]
 Table = dict[str, Variable]
 Add = Callable[..., None]
 
+LEAST_ORDER = (
+    "order that the scheme promises for the position, at least that of a part of its error"
+)
+"""What is said of the order of a part of an error of which theory says nothing."""
 SERIES = ("scheme", "case", "t")
 _IN_NORM = "{} in a norm over time (times s for l1, times the square root of s for l2)"
 
@@ -65,6 +71,8 @@ def numbers(q: Comparison) -> Table:
         add("richardson_error_max", ("scheme", "case"), q.largest_bound, words, q.units)
     add("floor", of_level, q.floor, "predicted round-off", q.units)
     words = "order that the scheme promises, infinite for what is exact"
+    if is_error_part(q.name) and not is_promised(part.experiment, q.name):
+        words = LEAST_ORDER
     if orders_vary(part.experiment, q.name):
         add("formal_order", ("scheme", "case"), np.broadcast_to(q.order, part.shape), words, "1")
     else:
@@ -107,17 +115,22 @@ def _index(q: Comparison, norm: str, change: Floats) -> Floats:
 
 def _triples(q: Comparison, add: Add) -> None:
     """Add the numbers of triples of levels; where storage is bounded, all but the order in single precision."""
-    precision = precision_of(q)
     dims = ("scheme", "case", "triple", "norm")
 
     def stacked(of: Callable[[str], Floats]) -> Floats:
         return np.stack([of(norm) for norm in q.part.norms], axis=-1)
 
     words = "ratio of successive differences in a norm over time"
-    add("ratio_norm", dims, stacked(q.ratios).astype(precision), words, "1")
+    add("ratio_norm", dims, in_precision(q, stacked(q.ratios)), words, "1")
     add("observed_order", dims, stacked(q.observed_orders), "observed order", "1")
     words = "relative distance of the rescaled differences"
-    add("coincidence", dims[:-1], q.coincidence.astype(precision), words, "1")
+    add("coincidence", dims[:-1], in_precision(q, q.coincidence), words, "1")
+
+
+def in_precision(q: Comparison, values: Floats) -> NDArray[np.floating]:
+    """Return values in the type in which they are kept: infinite where they are beyond its range."""
+    with np.errstate(over="ignore"):
+        return values.astype(precision_of(q))
 
 
 def precision_of(q: Comparison) -> type[np.floating]:

@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.analysis import asked
+from vibsim.analysis.asked import compare
 from vibsim.analysis.best import has_limit
-from vibsim.analysis.costs import cost_in_words
-from vibsim.analysis.numbers_in_words import number
 from vibsim.analysis.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
+from vibsim.analysis.promise import columns_of, options_of
+from vibsim.analysis.value_advice import advise, lacks_levels, sees_several_levels
 from vibsim.analysis.value_units import unit_of
 from vibsim.record import Record
+from vibsim.schemes.base import is_on_the_mesh
 from vibsim.spec.about import schemes_of
-from vibsim.spec.values import VALUES
 from vibsim.vocabulary import REASON_NAMES
 
 if TYPE_CHECKING:
@@ -64,7 +66,7 @@ def valued(experiment: Experiment, record: Record, check: ValueCheck, index: int
     schemes = list(schemes_of(experiment, check))
     every = np.asarray(record["case"])
     cases = np.flatnonzero(every == at.case) if at.case is not None else np.arange(len(every))
-    holds, away, rule = _compare(check, measured)
+    (holds, away), rule = compare(check, measured), asked.rule(check)
     lost = _failed(record, check) & ~(
         np.isfinite(measured) if check.value in SURVIVES_FAILURE else np.zeros_like(holds)
     )
@@ -75,9 +77,10 @@ def valued(experiment: Experiment, record: Record, check: ValueCheck, index: int
     masks = [lost | infinite, np.isnan(measured), holds, open_]
     status = np.select(masks, [FAIL, INCONCLUSIVE, PASS, INCONCLUSIVE], FAIL).astype(np.int8)
     few = "too_few_levels" if len(record["level"]) < FEW else "pre_asymptotic"
-    missing = "too_few_levels" if _lacks_levels(experiment, check) else "not_applicable"
+    missing = "too_few_levels" if lacks_levels(experiment, check) else "not_applicable"
     codes = [REASON_NAMES.index(name) for name in ("non_finite", missing, "match", few)]
     reason = np.select(masks, codes, REASON_NAMES.index("mismatch"))
+    columns = columns_of(record)
     what = f"{check.value} of {check.quantity}" if check.quantity else check.value
     unit = f" {measure}" if (measure := unit_of(experiment, record, check)) else ""
 
@@ -100,58 +103,16 @@ def valued(experiment: Experiment, record: Record, check: ValueCheck, index: int
         expects_pass=True,
         quantity=check.quantity,
         tell=tell,
-        advise=lambda scheme, case: _advise(
-            experiment, check, REASON_NAMES[int(reason[scheme, case])]
+        advise=lambda scheme, case: advise(
+            experiment,
+            check,
+            REASON_NAMES[int(reason[scheme, case])],
+            names[scheme] if is_on_the_mesh(options_of(experiment, columns, scheme, case)) else "",
+            int(record["check_more"][index, scheme, case]),
+            int(record["check_first"][index, scheme, case]),
         ),
         value=measured,
     )
-
-
-_ADVICE = {
-    "non_finite": "Start `levels:` at a finer level, or shorten `time: end`.",
-    "not_applicable": (
-        "Ask for a level, a step and a time that are stored (`at:`, `samples: all`), and choose `time: end` so that "
-        "the number exists."
-    ),
-}
-FINER = 2
-"""So many finer levels are advised."""
-HALF = 0.5
-"""Counted numbers are equal, or apart by more."""
-COUNTED = frozenset({"accepted_steps", "force_evaluations"})
-"""Numbers that finer levels make larger, and no more accurate."""
-
-
-def _advise(experiment: Experiment, check: ValueCheck, reason: str) -> str:
-    """Say what to change in the YAML; finer levels only where they change the number."""
-    if reason in _ADVICE:
-        return _ADVICE[reason]
-    if reason == "too_few_levels" and _lacks_levels(experiment, check):
-        return f"Add finer `levels:`, so that there are {VALUES[check.value].finer_levels + 1} of them."
-    finest = experiment.levels[-1]
-    finer = [finest + 1 + i for i in range(FINER)]
-    cost = cost_in_words(experiment, finer)
-    if reason != "mismatch":
-        return (
-            f"Add levels {finer[0]} and {finer[1]} to `levels:` ({cost}), so that the bound of the error shrinks, or "
-            "ask for the number of one level (`at: {level: ...}`)."
-        )
-    correct = f"orrect `{_border(check)}:`, the number that the check asks for."
-    if check.value in COUNTED or not depends_on_level(check.value):
-        return f"C{correct}"
-    if isinstance(check.at.level, int) and check.at.level < finest:
-        return f"Ask for a finer level (`at: {{level: {finest}}}`), or c{correct}"
-    return f"Add finer `levels:` ({finer[0]} and {finer[1]} cost {cost}), or c{correct}"
-
-
-def _border(check: ValueCheck) -> str:
-    """Return the key that holds the number that the check asks for."""
-    return next(key for key in ("equals", "below", "above") if getattr(check, key) is not None)
-
-
-def depends_on_level(name: str) -> bool:
-    """Say whether a number is another at another level, or rests on the whole ladder."""
-    return "level" in VALUES[name].at or sees_several_levels(name)
 
 
 def _is_open(check: ValueCheck, away: Floats, bound: Floats) -> Flags:
@@ -185,17 +146,6 @@ def _tell(what: str, reason: str, found: float, rule: str, error: str) -> str:
     return f"{what} is {found:.{digits}g}{error}; it {verb} {rule}."
 
 
-def _lacks_levels(experiment: Experiment, check: ValueCheck) -> bool:
-    """Say whether a number rests on more levels than the experiment has."""
-    return VALUES[check.value].finer_levels >= len(experiment.levels)
-
-
-def sees_several_levels(name: str) -> bool:
-    """Say whether a number rests on more than one level: on finer ones, or on the whole ladder."""
-    row = VALUES[name]
-    return row.finer_levels > 0 or (row.of == "convergent" and "level" not in row.at)
-
-
 def _failed(record: Record, check: ValueCheck) -> Flags:
     """Say which members broke down at a level that the value depends on, shape (scheme, case)."""
     broken = record["status"] != 0
@@ -205,16 +155,3 @@ def _failed(record: Record, check: ValueCheck) -> Flags:
     levels = [int(known) for known in record["level"]]
     index = levels.index(level) if isinstance(level, int) and level in levels else -1
     return np.asarray(broken[..., index])
-
-
-def _compare(check: ValueCheck, measured: Floats) -> tuple[Flags, Floats, str]:
-    """Return where the number is as it should be, how far beyond the border it is, and the rule in words."""
-    if check.below is not None:
-        return measured < check.below, measured - check.below, f"below {number(check.below)}"
-    if check.above is not None:
-        return measured > check.above, check.above - measured, f"above {number(check.above)}"
-    wanted = float("nan") if check.equals is None else check.equals
-    away, allowed = np.asarray(np.abs(measured - wanted)), check.allowed
-    is_counted = VALUES[check.value].measure == "count" and allowed < HALF
-    rule = f"{wanted:.15g}" if is_counted else f"{wanted!r} within {number(allowed)}"
-    return away <= allowed, away - allowed, f"equal to {rule}"

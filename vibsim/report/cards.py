@@ -28,6 +28,7 @@ from vibsim.vocabulary import BY_TOLERANCE
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
+    from vibsim.spec.checks import Measurement
 
 
 def context(
@@ -110,6 +111,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         measured.kind if measured else check["kind"],
         value=measured.value if measured and measured.kind == "value" else "",
         levels=len(data.whole(record, "level")),
+        is_promised=_keeps_promise(record, measured, check),
     )
     unit = (
         data.pretty_unit(unit_of(experiment, record, measured)).replace("sqrt(s)", "√s")
@@ -142,6 +144,20 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         "alone": _alone(check),
         "picture": evidence.picture(experiment, record, asserted, check),
     }
+
+
+def _keeps_promise(record: Record, measured: Measurement | None, check: Mapping[str, Any]) -> bool:
+    """Say whether the result that decides has the order of its scheme, and the check asks for another one."""
+    decisive: Mapping[str, Any] = next(iter(check.get("results") or []), {})
+    order, place = decisive.get("order"), data.place_of(record, decisive.get("case", -1))
+    if measured is None or measured.kind != "converges" or measured.order == "scheme":
+        return False
+    if order is None or place is None:
+        return False
+    promised = data.formal_orders(record, measured.converges)
+    own = promised[record.words("scheme").index(decisive["scheme"]), place]
+    is_due = data.due(record, measured.converges) == "promised"
+    return bool(is_due and abs(own - order) <= measured.tolerance)
 
 
 def _meaning(asserted: object, check: Mapping[str, Any], explained: reasons.Reason) -> str:

@@ -8,21 +8,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.record import Record
-from vibsim.report.data import Member, case_name, flags, formal_orders, pick, swept
+from vibsim.report.data import Member, case_name, due, flags, formal_orders, pick, swept
 from vibsim.schemes import SCHEMES
 from vibsim.spec.series import asked
 from vibsim.vocabulary import SEVERITY, TOLERANCE, TYPICAL_NORM
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
+    from vibsim.spec.checks import ConvergesCheck
 
 
 def promises(experiment: Experiment, record: Record, quantity: str) -> list[tuple[float, float]]:
-    """Return every finite order that a scheme promises for a quantity, with its tolerance, in ascending order.
+    """Return every finite order that is due to a quantity, with its tolerance, in ascending order.
+
+    It is what a scheme promises; of a part of an error of which theory says nothing, what its checks expect.
 
     What is exact has no order to compare with, nor has a scheme that chooses its own steps.
     The tolerance is the smallest that a check has which is about the quantity and the scheme.
     """
+    asked_for = {
+        (float(check.order), check.tolerance)
+        for check in _on_order(experiment, quantity)
+        if isinstance(check.order, float)
+    }
+    if due(record, quantity) == "expected" and asked_for:
+        return sorted(asked_for)
     promised = formal_orders(record, quantity)
     found = {
         (float(order), tolerance(experiment, quantity, scheme))
@@ -34,15 +44,18 @@ def promises(experiment: Experiment, record: Record, quantity: str) -> list[tupl
 
 def tolerance(experiment: Experiment, quantity: str, scheme: str) -> float:
     """Return the smallest tolerance of a check that is about the order of a quantity by a scheme."""
-    inner = [check.measured for check in experiment.checks]
     found = [
         check.tolerance
-        for check in inner
-        if check.kind == "converges"
-        and check.converges == quantity
-        and (check.schemes is None or scheme in check.schemes)
+        for check in _on_order(experiment, quantity)
+        if check.schemes is None or scheme in check.schemes
     ]
     return min(found, default=TOLERANCE)
+
+
+def _on_order(experiment: Experiment, quantity: str) -> list[ConvergesCheck]:
+    """Return the checks that are about the order of a quantity."""
+    inner = [check.measured for check in experiment.checks]
+    return [row for row in inner if row.kind == "converges" and row.converges == quantity]
 
 
 def position(experiment: Experiment) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis.floor import norm_of_floor
+from vibsim.analysis.tables import LEAST_ORDER
 from vibsim.record import Record
 from vibsim.report.style import RAISE
 from vibsim.simulation.scaled import has_time_unit
@@ -180,10 +181,16 @@ def formal_orders(record: Record, quantity: str) -> Floats:
     return np.broadcast_to(by_case, (len(record["scheme"]), len(record["case"])))
 
 
+def due(record: Record, quantity: str) -> str:
+    """Say whose an order is: promised by theory, or expected by a check of a part of an error that has no promise."""
+    words = str(record.variable(f"{quantity}_formal_order").attrs.get("long_name", ""))
+    return "expected" if words.endswith(LEAST_ORDER) else "promised"
+
+
 def promised_text(record: Record, quantity: str, scheme: int) -> str:
-    """Write the order that a scheme promises: a number, or that it depends on the member."""
+    """Write the order that is due to a quantity: a number, or whose it is where it depends on the member."""
     found = np.unique(formal_orders(record, quantity)[scheme])
-    return f"{found[0]:g}".replace("inf", "∞") if found.size == 1 else "promised"
+    return f"{found[0]:g}".replace("inf", "∞") if found.size == 1 else due(record, quantity)
 
 
 def is_lean(record: Record) -> bool:

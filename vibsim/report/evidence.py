@@ -37,7 +37,7 @@ def picture(
     if measured.kind == "converges":
         return evidence_order.picture(experiment, record, measured, member)
     if measured.kind == "value":
-        return evidence_value.picture(record, measured, member)
+        return evidence_value.picture(experiment, record, measured, asserted.id, member)
     if is_lean(record):
         return evidence_members.picture(record, measured, asserted.id, member)
     if measured.kind == "conserves":

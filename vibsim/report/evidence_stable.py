@@ -34,6 +34,7 @@ from vibsim.report.exhibit import (
     short,
 )
 from vibsim.report.stamp import BAND, Panel, document
+from vibsim.vocabulary import HIGHEST
 
 if TYPE_CHECKING:
     from vibsim.spec import Experiment
@@ -98,7 +99,7 @@ def picture(experiment: Experiment, record: Record, name: str, member: Member) -
 
 def _steps(record: Record, levels: _Levels, member: Member) -> tuple[Panel, str] | None:
     """Draw w dt beside the limit; None for a scheme without one, or one that grows at every step."""
-    p = at(record, "omega_dt", member)
+    p = at(record, _step_name(record), member)
     limit = float(at(record, "stability_limit", member))
     if not 0.0 < limit < math.inf or not np.isfinite(logarithms(p)).any():
         return None
@@ -141,8 +142,13 @@ def _sizes(
 
 def _step_and_limit(record: Record, levels: _Levels, member: Member) -> tuple[float, float]:
     """Return w dt of the judged level, and the limit of the scheme."""
-    p = at(record, "omega_dt", member, level=levels.index)
+    p = at(record, _step_name(record), member, level=levels.index)
     return float(p), float(at(record, "stability_limit", member))
+
+
+def _step_name(record: Record) -> str:
+    """Name the variable of w dt that limits a scheme: of several coordinates that of their fastest oscillation."""
+    return HIGHEST if HIGHEST in record else "omega_dt"
 
 
 def _size_told(levels: _Levels, size: Floats, at_limit: bool) -> str:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from vibsim.record import Record
 from vibsim.report import finest, style, words
 from vibsim.report.choice import tolerance
-from vibsim.report.data import Floats, flags, norm_unit, promised_text, whole
+from vibsim.report.data import Floats, due, flags, norm_unit, promised_text, whole
 from vibsim.report.layout import Key, bins, place_in
 from vibsim.report.style import Picture
 from vibsim.vocabulary import SEVERITY, TYPICAL_NORM
@@ -81,16 +81,18 @@ def projections(
     return Picture(
         name=f"projections_{quantity}_{scheme}",
         title=f"Where do members fail? {letter}{several}",
-        caption=_caption(away, len(keys) - len(shown), whole(record, "level")[-1]),
+        caption=_caption(
+            away, len(keys) - len(shown), whole(record, "level")[-1], due(record, quantity)
+        ),
         alt=f"Order and error of {words.name(quantity)} and the shares of verdicts against every swept key{several}",
         figure=figure,
     )
 
 
-def _caption(away: Floats, left_out: int, level: int) -> str:
+def _caption(away: Floats, left_out: int, level: int, due: str) -> str:
     parts = [
         "Each row shows all members against one swept key, whatever the others are: left the stated order less the "
-        f"promised one, with its tolerance in grey; then the error on level {level}; right what share of the members "
+        f"{due} one, with its tolerance in grey; then the error on level {level}; right what share of the members "
         "near a value comes to which verdict. A key whose shares do not vary does not matter.",
         "Darker cells hold more members; FAIL lies over INCONCLUSIVE over PASS."
         if away.size > POINTS

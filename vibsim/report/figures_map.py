@@ -9,7 +9,7 @@ import numpy as np
 from vibsim.record import Record
 from vibsim.report import finest, panels_map, ridge, style, words
 from vibsim.report.choice import position, tolerance
-from vibsim.report.data import Floats, exact_periods, norm_unit, pick, promised_text, whole
+from vibsim.report.data import Floats, due, exact_periods, norm_unit, pick, promised_text, whole
 from vibsim.report.layout import Grid
 from vibsim.report.panels_map import Panel
 from vibsim.report.style import Picture
@@ -32,7 +32,11 @@ def verdicts(
         _, low, high = (part[scheme] for part in finest.orders(record, quantity))
         text = f"order of {letter} − {promised}"
         order = grid.worst(away, np.abs(away))
-        panels.append(Panel("Order against the promised one", order, text, "distance", allowed))
+        panels.append(
+            Panel(
+                f"Order against the {due(record, quantity)} one", order, text, "distance", allowed
+            )
+        )
         panels.append(
             Panel("Error bar of the order", grid.worst(high - low), "width of the interval")
         )
@@ -43,7 +47,7 @@ def verdicts(
     return Picture(
         name=f"map_{quantity}_{scheme}",
         title=f"Where does it converge, how fast, how well? {letter}{several}",
-        caption=_caption(panels, grid, marked, allowed),
+        caption=_caption(panels, grid, marked, allowed, due(record, quantity)),
         alt=f"Maps over two swept parameters: verdict on {words.name(quantity)}, its order and its error{several}",
         figure=panels_map.draw(grid, panels, marked),
     )
@@ -217,10 +221,16 @@ def _positive(values: Floats) -> Floats:
     return np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
 
 
-def _caption(panels: list[Panel], grid: Grid, marked: tuple[Floats, Floats], allowed: float) -> str:
+def _caption(
+    panels: list[Panel],
+    grid: Grid,
+    marked: tuple[Floats, Floats],
+    allowed: float,
+    due: str = "promised",
+) -> str:
     kinds = {panel.kind for panel in panels}
     parts = [
-        f"Pale colours are orders within ± {allowed:g} of the promised one, where the scale jumps."
+        f"Pale colours are orders within ± {allowed:g} of the {due} one, where the scale jumps."
         if "distance" in kinds
         else "",
         "Where estimated over true error is pale, two levels alone tell the error."

@@ -18,6 +18,7 @@ from vibsim.report.data import (
     Member,
     at,
     case_name,
+    due,
     floor_norm,
     formal_orders,
     norm_unit,
@@ -49,7 +50,7 @@ def against_step(experiment: Experiment, record: Record, quantity: str, case: in
     panel = max(2.2, 0.17 * len(schemes)) if many else 2.2
     orders = dict.fromkeys(order for order, _ in promises(experiment, record, quantity))
     told = [*schemes, "level difference", "true error", "predicted round-off"]
-    told += [f"slope {order:g} ({words.due(quantity)})" for order in orders]
+    told += [f"slope {order:g} ({due(record, quantity)})" for order in orders]
     columns = figures_frame.columns(told, FONT, 0.9 * style.WIDTH)
     rows = math.ceil(len(told) / columns)
     height = panel + 0.95 + 0.2 * rows
@@ -78,7 +79,7 @@ def against_step(experiment: Experiment, record: Record, quantity: str, case: in
     return Picture(
         name=f"order_{quantity}_{case}",
         title=f"How fast does the error shrink? {letter}{suffix}",
-        caption=_caption(kinds, is_settled, many, words.due(quantity)),
+        caption=_caption(kinds, is_settled, many, due(record, quantity)),
         alt=f"Norm of the level differences of {words.name(quantity)} against the step, and local order against level",
         figure=figure,
     )
@@ -162,7 +163,7 @@ def _draw_norms(
             dt,
             seen,
             order,
-            f"slope {order:g} ({words.due(quantity)})",
+            f"slope {order:g} ({due(record, quantity)})",
             SLOPES[k % len(SLOPES)] if len(orders) > 1 else "",
         )
         for k, order in enumerate(orders)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vibsim.record import Record
 from vibsim.report import figures_frame, finest, ridge, style, words
 from vibsim.report.choice import promises
-from vibsim.report.data import Floats, flags, norm_unit, whole
+from vibsim.report.data import Floats, due, flags, norm_unit, whole
 from vibsim.report.layout import Along
 from vibsim.report.panels import figure_of, panels
 from vibsim.report.style import Picture
@@ -43,9 +43,10 @@ def orders(experiment: Experiment, record: Record, along: Along, quantity: str) 
     return Picture(
         name=f"sweep_order_{quantity}",
         title=f"Order and error of every member: {letter}",
-        caption="Top: the order that each member's levels state; a grey band is a promised order with the tolerance of "
-        f"its check. {error} Bottom: what can be said of it. Members that fail or stay open are worth a look one by "
-        f"one.{marked}{f' {figures_frame.LEAVING}' if leaves else ''}",
+        caption="Top: the order that each member's levels state; a grey band is an order that is "
+        f"{due(record, quantity)}, with the tolerance of its check. {error} Bottom: what can be said of it. Members "
+        "that fail or stay open are worth a look one by one."
+        f"{marked}{f' {figures_frame.LEAVING}' if leaves else ''}",
         alt=f"Stated order of {words.name(quantity)}, its error and its verdict against the swept parameter",
         figure=figure_of(axes[0]),
     )
@@ -81,7 +82,7 @@ def _draw_orders(
             linestyle=(0, (4, 3)),
             linewidth=1.0,
             zorder=1,
-            label=f"promised, {order:g} ± {tolerance:g}",
+            label=f"{due(record, quantity)}, {order:g} ± {tolerance:g}",
         )
     value, low, high = finest.orders(record, quantity)
     for s, scheme in enumerate(record.words("scheme")):

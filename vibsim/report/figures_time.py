@@ -17,6 +17,7 @@ from vibsim.report.data import (
     Floats,
     Member,
     at,
+    due,
     formal_order,
     power,
     sound_levels,
@@ -227,7 +228,7 @@ def _draw_ratios(
     triples = [(levels[i], levels[i + 1], levels[i + 2]) for i in chosen]
     targets = sorted({float(target_ratio(order, triple)) for triple in triples})
     for k, target in enumerate(targets):
-        ax.axhline(target, zorder=1, label="" if k else words.due(quantity), **TARGET)
+        ax.axhline(target, zorder=1, label="" if k else due(record, quantity), **TARGET)
     ax.set_ylim(*_ratio_limits(drawn, targets))
     ax.set_ylabel("ratio")
     ax.set_title("Ratio of successive differences", fontweight="normal", fontsize=9)

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.record import Record
-from vibsim.report import style, words
-from vibsim.report.data import Floats, Member, at, formal_order, whole
+from vibsim.report import style
+from vibsim.report.data import Floats, Member, at, due, formal_order, whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -87,7 +87,7 @@ def draw_orders(
         drawn += [order[sure] if sure.any() else order, order[-1:]]
     if math.isfinite(promised):
         line: dict[str, Any] = {"linestyle": (0, (4, 3)), "linewidth": 1.0, "zorder": 1}
-        ax.axhline(promised, color="black", label=words.due(quantity), **line)
+        ax.axhline(promised, color="black", label=due(record, quantity), **line)
     ax.set_ylim(*_limits(drawn, promised))
     ax.set_ylabel("order")
     ax.set_title("Order over time, in windows of half a period", fontweight="normal", fontsize=9)

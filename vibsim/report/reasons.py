@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vibsim.analysis.valued import COUNTED, depends_on_level
+from vibsim.analysis.value_advice import COUNTED, depends_on_level
 from vibsim.vocabulary import BY_TOLERANCE
 
 
@@ -124,6 +124,19 @@ _BY_KIND = {
 }
 
 
+_OF_PROMISE = {
+    "order_low": Reason(
+        "The error does shrink, with the order that the scheme promises here, which is lower than the one asked for.",
+        "Nothing more: the ratios have settled where they should. Ask for the order of the scheme, or take a scheme of "
+        "a higher one.",
+    ),
+    "order_high": Reason(
+        "The error shrinks faster than asked for, as the scheme promises here.",
+        "Nothing more: the ratios have settled where they should. Ask for the order of the scheme.",
+    ),
+}
+"""What an order means that is not the one of the check, but the one of the scheme."""
+
 REFUTED = "The measurement contradicts the statement, as was expected of it."
 """What it means that a claim matches which is expected to be false."""
 
@@ -140,7 +153,9 @@ _OF_TOLERANCE = {
 }
 
 
-def reason(word: str | None, kind: str, value: str = "", levels: int = 2) -> Reason:
+def reason(
+    word: str | None, kind: str, value: str = "", levels: int = 2, is_promised: bool = False
+) -> Reason:
     """Return the explanation of a reason for a kind of measurement; empty words for one that has none.
 
     Parameters
@@ -149,7 +164,11 @@ def reason(word: str | None, kind: str, value: str = "", levels: int = 2) -> Rea
         What a ``value`` check measures.
     levels
         How many levels the page has.
+    is_promised
+        Whether an order that is not the one of the check is the one that the scheme promises.
     """
+    if is_promised and word in _OF_PROMISE:
+        return _OF_PROMISE[word]
     if kind == BY_TOLERANCE and word in _OF_TOLERANCE:
         return _OF_TOLERANCE[word]
     if word == "match" and kind in _BY_KIND:

@@ -119,11 +119,6 @@ def sentence(text: str) -> str:
     return re.sub(rf"(^|[.] )({first})(?= )", lambda m: m[1] + m[2].capitalize(), text)
 
 
-def due(quantity: str) -> str:
-    """Say whose the order of a quantity is: promised by a scheme, or of a part of an error expected by a check."""
-    return "expected" if is_error_part(quantity) else "promised"
-
-
 def readable(text: str) -> str:
     """Return a machine's sentence with no more digits than say something, powers of ten and names in words."""
     text = re.sub(
