@@ -91,3 +91,49 @@ def test_no_interval_reaches_below_the_order_of_a_limit_that_is_missed(tmp_path:
     found = judged(lambda h, i: 1e-3 * (h**2 - 0.0104 * h**4) * WAVE, (6, 7, 8, 9), tmp_path, False)
     assert found[2.0].status == "PASS"
     assert found[2.0].low == 0.0
+
+
+def test_differences_that_change_their_sign_oscillate(tmp_path: Path) -> None:
+    """Errors of one shape that alternate from level to level are no round-off, for which they fall too well."""
+    found = judged(lambda h, i: (-1) ** i * 1e-3 * h**2 * WAVE, (6, 7, 8, 9), tmp_path, True)
+    assert {one.reason for one in found.values()} == {"oscillating"}
+
+
+@pytest.mark.parametrize(
+    ("part", "reason"),
+    [(0.01, "asymptotic"), (0.03, "asymptotic"), (0.5, "wrong_limit"), (3.0, "wrong_limit")],
+)
+def test_one_power_to_another_limit_is_seen_in_the_errors(
+    part: float, reason: str, tmp_path: Path
+) -> None:
+    """The limit is off by a part of the finest error, which no power makes where the differences are h^2 alone."""
+
+    def error(h: float, i: int) -> Floats:
+        return np.asarray(1e-2 * (h**2 * WAVE + part / 64 * OTHER))
+
+    found = judged(error, (6, 7, 8, 9), tmp_path, True)
+    assert found[2.0].reason == reason
+    assert found[4.0].status == "FAIL"
+
+
+@pytest.mark.parametrize("part", [3.0, 10.0])
+def test_a_wrong_order_to_a_wrong_limit_fails(part: float, tmp_path: Path) -> None:
+    def error(h: float, i: int) -> Floats:
+        return np.asarray(1e-3 * (h * WAVE + part / 8 * OTHER))
+
+    found = judged(error, (6, 7, 8, 9), tmp_path, True)
+    assert found[2.0].status == "FAIL"
+    assert found[1.0].reason == "wrong_limit"
+
+
+@pytest.mark.parametrize("more", [-0.12, -0.08, 0.08, 0.12])
+def test_a_level_more_takes_no_verdict_away(more: float, tmp_path: Path) -> None:
+    """The finest three levels pass with their errors; so do they with coarser ones before them."""
+    for count in (3, 4, 5, 6):
+        coarsest = 2.0 ** (count - 4)
+
+        def error(h: float, i: int, coarsest: float = coarsest) -> Floats:
+            return np.asarray(1e-3 * ((coarsest * h) ** 2 + more * (coarsest * h) ** 4) * WAVE)
+
+        found = judged(error, tuple(range(12 - count, 12)), tmp_path, True)
+        assert found[2.0].status == "PASS", count

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis.cut import LOG2, QUIET
+from vibsim.analysis.cut import FLAT_FIRST, INCOHERENT, LOG2, QUIET
 from vibsim.analysis.facts import ORDINARY, Evidence, at_round_off, far_from_exact, truly_exact
 from vibsim.analysis.settling import (
     COINCIDENT,
@@ -23,9 +23,11 @@ from vibsim.analysis.settling import (
 from vibsim.analysis.true_errors import (
     contradicts,
     errors_agree,
+    errors_confirm,
     errors_leave,
     errors_stay,
     errors_vouch,
+    limit_is_missed,
 )
 from vibsim.analysis.two_ratios import SINGLE, below, little_left, two_ratios
 from vibsim.analysis.window import Trend, mismatches
@@ -88,7 +90,9 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Flags]:
     wrong |= _settled_elsewhere(e, t, p)
     too_large, too_small = contradicts(e, t)
     sure = several | (np.abs(t.scatter) <= HIDDEN)
-    missed = too_large & (right | (wrong & sure & errors_stay(e, t)))
+    # one pure power to another limit is at fault whatever its errors look like
+    missed = too_large & (right | (wrong & sure & (errors_stay(e, t) | _pure(t))))
+    missed |= right & limit_is_missed(e, t, p)
     wrong &= errors_agree(e, t)
     left = np.full(p.shape, np.nan) if e.left_to_the_mesh is None else e.left_to_the_mesh
     rough = ~np.isnan(left)
@@ -103,6 +107,7 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Flags]:
         (exact & far_from_exact(e), "wrong_limit"),
         (exact, "exact"),
         (exactly & ~at_round_off(e), "order_low"),
+        (nothing & ~exactly & ~rough & _opposite(e), "oscillating"),
         (exactly | (nothing & (at_round_off(e) | ~(rough | unlike))), "round_off"),
         # orders that swing into a floor do so by noise
         (swings & t.cut & ~np.signbit(t.scatter), "round_off"),
@@ -127,6 +132,7 @@ def _right(e: Evidence, t: Trend, p: Floats) -> Flags:
     both = several & (np.abs(t.local - p) <= tol) & (np.abs(t.local - t.change - p) <= tol)
     both &= t.width <= NARROW
     both |= several & t.fading & (np.abs(t.local - p) <= tol) & (np.abs(t.change) <= tol)
+    both |= errors_confirm(e, t, p) & (np.abs(t.local - p) <= tol)
     near = (np.abs(t.order - p) <= tol) & ((t.width <= tol) | both | ~several)
     together = np.abs(t.scatter) <= np.where(several, COINCIDENT, SINGLE)
     clear = _alone(e, t, p)
@@ -164,6 +170,13 @@ def _kinked(e: Evidence, t: Trend, p: Floats) -> tuple[Flags, Flags]:
     return kinked, np.asarray(t.order < e.corner - np.maximum(e.tolerance, BELOW_CORNER))
 
 
+def _opposite(e: Evidence) -> Flags:
+    """Say where differences change their sign from level to level and fall: those of an error do, of noise do not."""
+    opposite = np.signbit(e.scatter) & (np.abs(e.scatter) <= INCOHERENT)
+    falls = e.difference[..., 1:] <= e.difference[..., :-1] * 2.0**-FLAT_FIRST
+    return np.asarray(np.all(opposite & falls, axis=-1) & ~at_round_off(e))
+
+
 def _pure(t: Trend) -> Flags:
     """Say where a ladder is one pure power, whatever the power."""
     return np.asarray(t.several & (np.abs(t.scatter) <= PURE) & (np.abs(t.change) <= PURE))
@@ -182,7 +195,7 @@ def _alone(e: Evidence, t: Trend, p: Floats) -> Flags:
     clear |= t.several & (mismatch <= SINGLE) & (mismatch <= FADING * before)
     # one triple says too little for an order that few schemes have
     own &= (p == np.round(p)) | (np.abs(t.local - p) <= SINGLE_WIDTH)
-    clear = np.where(t.several, clear, own | errors_vouch(e, p))
+    clear = np.where(t.several, clear | errors_confirm(e, t, p), own | errors_vouch(e, p))
     return np.asarray(clear & ~errors_leave(e, t, p))
 
 

@@ -27,6 +27,8 @@ VOUCHED = 0.04
 """Mismatch of errors that leaves no room for a tenth of a lower power, which makes 0.05."""
 VOUCHED_FADING = 0.6
 """What the errors show besides h^p falls at least to this part of itself per level when it is a higher power."""
+SEEN = 0.3
+"""Of what a lower power in the errors must leave in the differences, this part would be seen."""
 STAYED = 0.5
 """An error that depends on where events lie stays where the finest level has more than this part of the coarsest."""
 LEAST_ORDER = 0.25
@@ -39,17 +41,37 @@ def errors_leave(e: Evidence, t: Trend, p: Floats) -> Flags:
     They show a lower power before the differences do, which are steeper. Errors that stay, larger than the differences
     allow, show none: the limit is another one.
     """
-    if e.error is None:
-        return np.zeros(p.shape, dtype=bool)
-    found = error_orders(e)
-    last, before = (np.abs(pick(found, t.last + 1 - back) - p) for back in (0, 1))
-    known = pick(e.error, t.last + 2) > accuracy(e)
+    leave, last, before = _away(e, t, p)
     stays = contradicts(e, t)[0]
     if len(e.levels) > 3:
         stays = stays & errors_stay(e, t)
-    grows = last > GROWS * before
     little = t.several & _little(t, p, last, before)
-    return np.asarray(known & (last > LEAVES) & grows & ~little & ~stays)
+    return np.asarray(leave & ~little & ~stays & ~_unseen(t, p, last))
+
+
+def limit_is_missed(e: Evidence, t: Trend, p: Floats) -> Flags:
+    """Say where the true errors move away from h^p although the differences show h^p alone: to another limit."""
+    leave, last, _ = _away(e, t, p)
+    return leave & _unseen(t, p, last)
+
+
+def _away(e: Evidence, t: Trend, p: Floats) -> tuple[Flags, Floats, Floats]:
+    """Say where the orders of the true errors move away from p, and return how far the last two are from it."""
+    found = error_orders(e)
+    last, before = (np.abs(pick(found, t.last + 1 - back) - p) for back in (0, 1))
+    if e.error is None:
+        return np.zeros(p.shape, dtype=bool), last, before
+    known = pick(e.error, t.last + 2) > accuracy(e)
+    return np.asarray(known & (last > LEAVES) & (last > GROWS * before)), last, before
+
+
+def _unseen(t: Trend, p: Floats, last: Floats) -> Flags:
+    """Say where the differences show too little for any power that would make the errors leave h^p so far.
+
+    Of h^(1/2), the part x of the errors is ``x (2^(1/2) - 1)/(2^p - 1)`` of the differences.
+    """
+    least = LOG2 * last * (np.sqrt(2.0) - 1.0) / np.expm1(np.maximum(p, LEAST_ORDER) * LOG2)
+    return np.asarray(t.several & (np.maximum(*mismatches(t, p)) < SEEN * least))
 
 
 def _little(t: Trend, p: Floats, last: Floats, before: Floats) -> Flags:
@@ -74,10 +96,32 @@ def errors_vouch(e: Evidence, p: Floats) -> Flags:
         return np.zeros(p.shape, dtype=bool)
     found = error_orders(e)
     mismatch = np.hypot(e.error_scatter, LOG2 * (found - p[..., None]))
-    finer, coarser = mismatch[..., 1], mismatch[..., 0]
+    return _no_room(e, e.error[..., -1], mismatch[..., 1], mismatch[..., 0])
+
+
+def errors_confirm(e: Evidence, t: Trend, p: Floats) -> Flags:
+    """Say of several triples where the last three true errors of the window leave no room for another power.
+
+    The scatter of the errors is at most that of the differences times what these see less of h^(p-1), or of the least
+    power below p.
+    """
+    if e.error is None:
+        return np.zeros(p.shape, dtype=bool)
+    found = error_orders(e)
+    below = np.maximum(np.where(p > 1.0, p - 1.0, p - 0.5), 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        less = np.expm1(p * LOG2) / np.expm1(below * LOG2)
+        finer, coarser = (
+            np.hypot(less * scatter, LOG2 * (pick(found, t.last + 1 - back) - p))
+            for back, scatter in enumerate((t.scatter, t.scatter_before))
+        )
+    return t.several & _no_room(e, pick(e.error, t.last + 2), finer, coarser)
+
+
+def _no_room(e: Evidence, error: Floats, finer: Floats, coarser: Floats) -> Flags:
+    """Say where mismatches of two pairs of errors are small, or fade, and the last error is no round-off."""
     fades = (finer <= VOUCHED_FADING * coarser) & (finer <= SETTLED)
-    known = e.error[..., -1] > EXCESS * accuracy(e)
-    return np.asarray(known & ((finer <= VOUCHED) | fades))
+    return np.asarray((error > EXCESS * accuracy(e)) & ((finer <= VOUCHED) | fades))
 
 
 def contradicts(e: Evidence, t: Trend) -> tuple[Flags, Flags]:
