@@ -71,6 +71,22 @@ def test_an_event_on_the_mesh_is_no_wrong_limit() -> None:
     assert wrong.status != "PASS"
 
 
+def test_a_ball_at_rest_at_every_common_time_is_no_wrong_limit() -> None:
+    """Long implicit steps damp the ball until it lies: finer ones, on which it bounces, are what is missing."""
+    data = {
+        "title": "test",
+        "model": {"kind": "bouncing_ball", "g": 1.439, "restitution": 0.69, "eps_v": 0.05},
+        "initial": {"h": 0.812},
+        "time": {"end": 40.0, "base_steps": 2},
+        "levels": [3, 4, 5, 6],
+        "schemes": ["backward_euler"],
+        "checks": [{"converges": "h"}],
+    }
+    found = judged(data, data)
+    assert (found.status, found.reason) == ("INCONCLUSIVE", "pre_asymptotic")
+    assert "level" in found.advice
+
+
 def test_what_no_level_can_tell_is_said() -> None:
     """Nothing is known of friction with a spring of its own: 1 % more of it is another motion, and looks as good."""
     data = {

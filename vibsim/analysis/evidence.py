@@ -110,9 +110,13 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
 
 
 def _moved(finest: Floats) -> Floats:
-    """Return by how much a solution changes relative to its size, shape (scheme, case)."""
+    """Return by how much a solution changes behind the start relative to its size, shape (scheme, case).
+
+    The start is the same on every level: what lies still at all other common times shows nothing of a scheme.
+    """
+    later = finest[..., 1:]
     with np.errstate(all="ignore"):
-        return np.asarray((np.max(finest, axis=-1) - np.min(finest, axis=-1)) / largest(finest))
+        return np.asarray((np.max(later, axis=-1) - np.min(later, axis=-1)) / largest(finest))
 
 
 def _size(finest: Floats) -> tuple[Floats, NDArray[np.bool_]]:

@@ -107,6 +107,8 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Flags]:
         (exact & far_from_exact(e), "wrong_limit"),
         (exact, "exact"),
         (exactly & ~at_round_off(e), "order_low"),
+        # at rest on every level, and away from a motion: steps as long as that see nothing of it
+        (nothing & ~exactly & _lies_still(e) & far_from_exact(e), "pre_asymptotic"),
         (nothing & ~exactly & ~rough & _opposite(e), "oscillating"),
         (exactly | (nothing & (at_round_off(e) | ~(rough | unlike))), "round_off"),
         # orders that swing into a floor do so by noise
@@ -168,6 +170,11 @@ def _kinked(e: Evidence, t: Trend, p: Floats) -> tuple[Flags, Flags]:
     low |= t.several & (t.local - t.change < p - e.tolerance)
     kinked = ~np.isnan(e.corner) & (p >= e.corner) & (low | t.alternating)
     return kinked, np.asarray(t.order < e.corner - np.maximum(e.tolerance, BELOW_CORNER))
+
+
+def _lies_still(e: Evidence) -> Flags:
+    """Say where nothing moves at the common times behind the start."""
+    return np.zeros(e.order.shape, dtype=bool) if e.moved is None else np.asarray(e.moved == 0.0)
 
 
 def _opposite(e: Evidence) -> Flags:
