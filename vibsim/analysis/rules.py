@@ -109,7 +109,7 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Flags]:
         (exactly & ~at_round_off(e), "order_low"),
         # at rest on every level, and away from a motion: steps as long as that see nothing of it
         (nothing & ~exactly & _lies_still(e) & far_from_exact(e), "pre_asymptotic"),
-        (nothing & ~exactly & ~rough & _opposite(e), "oscillating"),
+        (nothing & ~exactly & ~(rough | unlike) & _opposite(e), "oscillating"),
         (exactly | (nothing & (at_round_off(e) | ~(rough | unlike))), "round_off"),
         # orders that swing into a floor do so by noise
         (swings & t.cut & ~np.signbit(t.scatter), "round_off"),
