@@ -146,6 +146,8 @@ def test_points_beyond_the_frame_are_triangles_on_its_edge():
         (0.0, 20.0, ["0", "5", "10", "15", "20"]),
         (-0.052, 0.055, ["−0.05", "0", "0.05"]),
         (0.9991, 1.0003, ["0.9995", "1"]),
+        # the round step would leave 0 alone
+        (-0.047, 0.049, ["−0.04", "−0.02", "0", "0.02", "0.04"]),
     ],
 )
 def test_ticks_are_round(low, high, texts):

@@ -31,6 +31,27 @@ def compare(check: ValueCheck, measured: Floats) -> tuple[Flags, Floats]:
     return away <= allowed, away - allowed
 
 
+SAMPLED = ("at", "end")
+"""Numbers that are a sample of a series, and are told by its name."""
+
+
+def what(check: ValueCheck, quantity: str | None = None, value: str = "") -> str:
+    """Say which number is meant.
+
+    Parameters
+    ----------
+    quantity, value
+        How the page writes the quantity and the name of the number; as the check does where not given.
+    """
+    quantity, value = quantity or check.quantity, value or check.value
+    when = "at the end"
+    if check.at.t is not None or check.at.step is not None:
+        when = f"at t = {check.at.t:g}" if check.at.t is not None else f"at step {check.at.step}"
+    if check.value in SAMPLED:
+        return f"{quantity} {when}"
+    return f"{value} of {quantity}" if quantity else value
+
+
 def rule(check: ValueCheck) -> str:
     """Say what a number should be."""
     if check.below is not None:

@@ -81,7 +81,7 @@ def valued(experiment: Experiment, record: Record, check: ValueCheck, index: int
     codes = [REASON_NAMES.index(name) for name in ("non_finite", missing, "match", few)]
     reason = np.select(masks, codes, REASON_NAMES.index("mismatch"))
     columns = columns_of(record)
-    what = f"{check.value} of {check.quantity}" if check.quantity else check.value
+    what = asked.what(check)
     unit = f" {measure}" if (measure := unit_of(experiment, record, check)) else ""
 
     def tell(scheme: int, case: int) -> str:

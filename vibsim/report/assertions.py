@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from vibsim.analysis.asked import SAMPLED, what
 from vibsim.report import words
 
 if TYPE_CHECKING:
     from vibsim.spec import Check, ConvergesCheck, ValueCheck
     from vibsim.spec.checks import Measurement
     from vibsim.spec.scheme_checks import ConservesCheck, EqualCheck, StableCheck
+
+
+PLACES = ("t", "step", "level", "scheme", "case")
+"""Where a number may be taken."""
 
 
 def heading(check: Check | Measurement) -> str:
@@ -63,10 +68,14 @@ def subject(check: Measurement) -> str:
         return f"{words.title(check.quantity)} by {check.first}{_where(check)}"
     if check.kind != "value":
         return _measured(check)
-    of = f" of {words.title(check.quantity)}" if check.quantity else ""
-    places = ((key, getattr(check.at, key)) for key in ("t", "step", "level", "scheme", "case"))
+    quantity = words.title(check.quantity) if check.quantity else None
+    told = what(check, quantity, words.spoken(check.value))
+    keys = ("level", "scheme", "case") if check.value in SAMPLED else PLACES
+    places = ((key, getattr(check.at, key)) for key in keys)
     where = ", ".join(f"{key} {value}" for key, value in places if value is not None)
-    return f"{words.spoken(check.value)}{of}{f' at {where}' if where else ''}"
+    if check.value in SAMPLED:
+        return f"{told}{f' ({where})' if where else ''}"
+    return f"{told}{f' at {where}' if where else ''}"
 
 
 def _value(check: ValueCheck) -> str:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vibsim.analysis import asked
 from vibsim.analysis.by_level import own_levels
 from vibsim.analysis.shown import number_of
 from vibsim.analysis.value_units import unit_of
@@ -62,14 +63,11 @@ def picture(
 
 def _spoken(check: ValueCheck) -> str:
     """Return the name of a number as a title has it."""
-    letter = words.symbol(check.quantity) if check.quantity else ""
-    when = ""
-    if check.at.t is not None or check.at.step is not None:
-        when = f"t = {check.at.t:g}" if check.at.t is not None else f"step {check.at.step}"
-    if check.value in ("at", "end") and when:
-        return f"{letter} at {when}"
-    of = f" of {letter}" if letter else ""
-    return f"{words.spoken(check.value)}{of}{f' up to {when}' if when else ''}"
+    letter = words.symbol(check.quantity) if check.quantity else None
+    told = asked.what(check, letter, words.spoken(check.value))
+    if check.value in asked.SAMPLED or (check.at.t is None and check.at.step is None):
+        return told
+    return f"{told} up to {f't = {check.at.t:g}' if check.at.t is not None else f'step {check.at.step}'}"
 
 
 def _values(

@@ -67,12 +67,20 @@ def brief(value: float) -> str:
     return words.number(value, "brief")
 
 
+FEWEST = 2
+"""Round numbers on a scale: one alone does not tell how large a curve is."""
+
+
 def ticks(low: float, high: float, most: int = 4) -> Ticks:
-    """Return about `most` round numbers in a range, as a scale has them."""
+    """Return about `most` round numbers in a range, as a scale has them; `FEWEST` at least."""
     raw = (high - low) / most
     ten = 10.0 ** math.floor(math.log10(raw))
-    step = next(m * ten for m in (1.0, 2.0, 5.0, 10.0) if m * ten >= raw)
-    first, last = math.ceil(low / step), math.floor(high / step)
+    steps = [m * ten for m in (10.0, 5.0, 2.0, 1.0, 0.5)]
+    wide = min(step for step in steps if step >= raw)
+    for step in steps[steps.index(wide) :]:
+        first, last = math.ceil(low / step), math.floor(high / step)
+        if last - first + 1 >= FEWEST:
+            break
     return [(k * step, words.number(k * step, "step")) for k in range(first, last + 1)]
 
 

@@ -44,7 +44,7 @@ REASONS = {
     ),
     "mismatch": Reason(
         "The measured outcome is not the expected one.",
-        "Compare the expected with the measured value below: one of the two is wrong.",
+        "Compare the expected value with the measured one: one of the two is wrong.",
     ),
     "wrong_limit": Reason(
         "The levels approach each other, but not the exact solution: the scheme converges to something else.",
