@@ -34,7 +34,10 @@ FIRST_ORDER = [
 
 
 def experiment(
-    model: tuple[dict[str, Any], str, str], kind: str, start: tuple[float, float], **more: Any
+    model: tuple[dict[str, Any], str, str],
+    kind: str | dict[str, Any],
+    start: tuple[float, float],
+    **more: Any,
 ) -> Experiment:
     declared, position, velocity = model
     names = (position, velocity)
@@ -102,6 +105,17 @@ def test_euler_cromer_gains_an_order_from_rest_and_where_no_force_acts(
     columns = plan.columns(e, 0, len(STARTS))
     found = [formal_orders(e, name, columns)[0] for name in declared[1:]]
     assert [np.broadcast_to(row, len(STARTS)).tolist() for row in found] == orders
+
+
+@pytest.mark.parametrize("start", ["first_order", "centred"])
+def test_a_swept_start_has_the_orders_of_every_choice(start: str) -> None:
+    """Whatever is written where the sweep puts its own."""
+    declared = {"kind": "euler_cromer", "start": start}
+    sweep = {"schemes.euler_cromer.start": ["first_order", "centred"]}
+    e = experiment(FREE["pendulum"], declared, STARTS["rest"], sweep=sweep)
+    columns = plan.columns(e, 0, 2)
+    assert formal_orders(e, "omega", columns).tolist() == [[2.0, 1.0]]
+    assert formal_orders(e, "theta", columns).tolist() == [[1.0, 2.0]]
 
 
 def test_a_driven_motion_may_begin_at_rest_and_in_balance() -> None:

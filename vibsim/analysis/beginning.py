@@ -28,18 +28,23 @@ BALANCED = 1e-12
 def beginning_matters(experiment: Experiment) -> bool:
     """Tell whether some scheme promises other orders to motions that begin in a special way."""
     model = experiment.model.definition
-    is_smooth = model.events is None and model.lookup is None
-    return (is_smooth and not depends_on_velocity(model)) and any(
+    if model.events is not None or model.lookup is not None or depends_on_velocity(model):
+        return False
+    # a swept option is another one in every member
+    return _sweeps(experiment, "schemes.") or any(
         SCHEMES[scheme.kind].depends_on_beginning(scheme.options) for scheme in experiment.schemes
     )
 
 
 def beginning_varies(experiment: Experiment) -> bool:
     """Tell whether members may begin in different ways, so that each has orders of its own."""
+    return beginning_matters(experiment) and _sweeps(experiment, "initial.", "model.")
+
+
+def _sweeps(experiment: Experiment, *sections: str) -> bool:
+    """Tell whether something in one of these sections is swept."""
     keys = experiment.sweep.keys if experiment.sweep else ()
-    return beginning_matters(experiment) and any(
-        key.startswith(("initial.", "model.")) for key in keys
-    )
+    return any(key.startswith(sections) for key in keys)
 
 
 def beginnings(experiment: Experiment, columns: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:

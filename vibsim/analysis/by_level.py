@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.analysis import values
-from vibsim.analysis.asked import compare
+from vibsim.analysis.asked import SAMPLED, compare
 from vibsim.spec.values import VALUES
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def by_level(name: str, place: values.Place) -> Floats:
     A step of a level is the same time on every other one; of the extrapolated solution it is that of a common time.
     NaN where a level has no such number.
     """
-    if place.level == "best" and name in ("end", "at"):
+    if place.level == "best" and name in SAMPLED:
         return np.stack(values.samples(place), axis=-1)
     time, data = place.t, place.data()
     if place.step is not None and data is not None:

@@ -68,7 +68,10 @@ def formal_orders(experiment: Experiment, quantity: str, columns: Columns) -> Fl
             experiment, columns, lambda s, o: float(s.formal_order(of, model, o, beginning))
         )
 
-    return np.choose(beginnings(experiment, columns), [promised(b) for b in BEGINNINGS])
+    begins = beginnings(experiment, columns)
+    if not begins.any():
+        return promised(BEGINNINGS[0])
+    return np.choose(begins, [promised(b) for b in BEGINNINGS])
 
 
 def orders_vary(experiment: Experiment, quantity: str) -> bool:
