@@ -20,7 +20,8 @@ lint: set-up-dev  ## check style, types, layers, workflow and generated files
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m vibsim.spec.schema --check
+	$(BIN)/python -m vibsim.experiment.schema.json_schema --check
+	$(BIN)/python -m vibsim.analysis.summary_schema --check
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/python workflow/lint.py
 

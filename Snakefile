@@ -3,20 +3,26 @@ import sys
 from pathlib import Path
 from shlex import quote
 
-from vibsim.cli.lock import hold
-from vibsim.cli.plans import resolve
+from vibsim.cli.run.lock import hold
+from vibsim.cli.results_folder import check
+from vibsim.cli.chosen_plans import resolve
+from vibsim.cli.run.supervise import children_end_with_this
 from vibsim.plan import Names
 
 root = Path(workflow.basedir)
 results = config.get("results", root / "results")
 names = Names.of(config.get("experiments", []), results, root, resolve)
+check(names.results, names.plans)
 
 
 # Jobs run the vibsim that stands beside this Python, whatever else is installed.
+# They take the place of their shell (`exec`), which makes them children of Snakemake, and end with it.
+children_end_with_this()
 shell.prefix(f"export PATH={quote(str(Path(sys.executable).parent))}:$PATH; ")
 
 
-# Every path below is relative to the results folder, and so are Snakemake's own records.
+# Every path below is relative to the results folder, and so are Snakemake's own records. Jobs work elsewhere: what
+# libraries read from the folder that they are in must not come with results.
 workdir: str(names.results)
 
 
@@ -28,6 +34,7 @@ wildcard_constraints:
 rule all:
     input:
         "index.html",
+        "summary.csv",
         names.files,
         # Of what a job writes, Snakemake misses only what is asked for.
         expand("{name}/{part}", name=list(names.plans), part=["figures", "tables"]),

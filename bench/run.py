@@ -88,9 +88,9 @@ def page(known: dict[str, Any]) -> str:
     lines = [
         "# Benchmarks",
         "",
-        "Written by `make bench`. Times are medians of interleaved runs (A B C A B C ...); a ratio is of two medians "
-        "unless it says otherwise. Nothing else ran on the machine unless a part says so. "
-        "What could not be measured says why.",
+        "`make bench` writes this page. Times are medians of interleaved runs (A B C A B C ...). A ratio is of two "
+        "medians unless the text says otherwise. Nothing else ran on the machine unless a part says so. "
+        "Each part that could not be measured says why.",
         "",
         *(f"{text}\n" for text in machines[:1]),
     ]

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from vibsim import ladder
+from vibsim.experiment import Experiment
 from vibsim.models import MODELS
-from vibsim.spec import Experiment
 
 PAGE = Path(__file__).parents[1] / "docs" / "ladder.md"
 HEAD = "| theta_0 | arithmetic | tolerance | levels | steps | largest bound | largest error |"

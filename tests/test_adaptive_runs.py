@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vibsim.core.errors import SimulationError
+from vibsim.core.record import Record
 from vibsim.engine import integrate
-from vibsim.errors import SimulationError
+from vibsim.experiment import Experiment
+from vibsim.experiment.level_counts import load_of
 from vibsim.models import MODELS
-from vibsim.plan.shards import load_of
-from vibsim.record import Record
 from vibsim.schemes import SCHEMES
 from vibsim.schemes.adaptive import LEAST_RELATIVE, TOLERANCE, seconds
 from vibsim.simulation import adaptive, simulate_record
-from vibsim.spec import from_dict
 
 ADAPTIVE = [kind for kind, scheme in SCHEMES.items() if scheme.adaptive]
 SPRING = MODELS["spring"]
@@ -42,7 +42,7 @@ def experiment(*schemes: Any, **sections: Any) -> Any:
         "levels": [4, 5, 7],
         "schemes": list(schemes),
     }
-    return from_dict({**content, **sections})
+    return Experiment.from_dict({**content, **sections})
 
 
 def problem(kind: str, tolerance: float = 1e-6, end: float = 20.0, **more: Any) -> adaptive.Problem:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from vibsim.spec import load
+from vibsim.experiment import Experiment
 
 FOLDER = Path(__file__).parents[1] / "configs" / "vibration_text"
 ROAD = FOLDER / "bumpy_road.csv"
@@ -41,5 +41,9 @@ def test_the_claimed_end_is_that_of_another_solver() -> None:
 
         span = (i / 80, (i + 1) / 80)
         y = solve_ivp(right, span, y, method="DOP853", rtol=3e-14, atol=1e-16).y[:, -1]
-    (claim,) = (c for c in load(FOLDER / "bumpy_road.yaml").checks if c.id == "by_another_solver")
+    (claim,) = (
+        c
+        for c in Experiment.from_yaml(FOLDER / "bumpy_road.yaml").checks
+        if c.id == "by_another_solver"
+    )
     assert abs(claim.measured.equals - y[0]) < 1e-9 * abs(y[0])

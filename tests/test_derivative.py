@@ -9,7 +9,7 @@ import pytest
 
 from vibsim.elementary import ELEMENTARY
 from vibsim.engine.text import divided, with_quotients
-from vibsim.expression import (
+from vibsim.formula import (
     ExpressionError,
     Number,
     derivative,

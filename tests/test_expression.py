@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vibsim.elementary import ELEMENTARY
-from vibsim.expression import (
+from vibsim.formula import (
     MAX_DEPTH,
     Binary,
     ExpressionError,

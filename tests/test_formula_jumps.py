@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from vibsim.expression import parse
-from vibsim.expression.jumps import first_jump
+from vibsim.formula import parse
+from vibsim.formula.jumps import first_jump
 
 END = 4.0
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from vibsim import ladder
-from vibsim.analysis.extrapolation import best_record
-from vibsim.errors import InputError, VibsimError
+from vibsim.comparison.best_solution import best_record
+from vibsim.core.errors import InputError, VibsimError
+from vibsim.experiment import Experiment
 from vibsim.ladder import Extrapolated, Method, Start, choosing, climb, product, solve
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import simulate_record
-from vibsim.spec import Experiment
 
 
 def experiment(

@@ -6,7 +6,7 @@ import pytest
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.models import MODELS, has_solution
 from vibsim.simulation.members import Members
-from vibsim.simulation.reference import reference
+from vibsim.simulation.reference.solve import reference
 
 FRACTION = np.arange(101) / 100
 

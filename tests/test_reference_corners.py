@@ -14,7 +14,7 @@ from vibsim import Experiment, analyse, simulate
 from vibsim.models import MODELS, Model
 from vibsim.models.table import Table
 from vibsim.simulation.members import Members
-from vibsim.simulation.reference import method, reference
+from vibsim.simulation.reference.solve import method, reference
 
 FRACTION = np.arange(101) / 100
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -10,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vibsim.core import private_cache
 from vibsim.models import MODELS, Model
-from vibsim.simulation import kept, reference
+from vibsim.simulation.reference import reference_cache, solve
 
 FRACTION = np.arange(33) / 32
 
@@ -19,7 +19,7 @@ FRACTION = np.arange(33) / 32
 @pytest.fixture
 def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("VIBSIM_CACHE_DIR", str(tmp_path))
-    reference.choose.cache_clear()
+    solve.choose.cache_clear()
     return tmp_path / "references"
 
 
@@ -39,30 +39,30 @@ MODELS_ = {
 OWN = numbers([1.0, 0.2, 2.0], [0.0, 1.0, -1.0], [6.0, 3.0, 9.0], [1.0, 1.0, 2.0])
 
 
-def bits(chosen: reference.Chosen) -> list[bytes]:
+def bits(chosen: solve.Chosen) -> list[bytes]:
     found = [chosen.bounds.tobytes()]
     for members, solved in chosen.parts:
         found += [members.tobytes(), solved.at(FRACTION).tobytes()]
     return found
 
 
-def again(which: Model) -> reference.Chosen:
-    reference.choose.cache_clear()
-    return reference.choose(which, OWN)
+def again(which: Model) -> solve.Chosen:
+    solve.choose.cache_clear()
+    return solve.choose(which, OWN)
 
 
 def entries(home: Path) -> list[Path]:
-    return sorted(home.glob("reference_*"))
+    return sorted(path for path in home.iterdir() if not path.name.startswith("lock_"))
 
 
 @pytest.mark.parametrize("name", MODELS_)
 def test_the_bits_are_those_that_were_computed(
     home: Path, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    alone = bits(reference.computed(MODELS_[name], OWN))
+    alone = bits(solve.computed(MODELS_[name], OWN))
     assert bits(again(MODELS_[name])) == alone
     assert len(entries(home)) == 1
-    monkeypatch.setattr(reference, "computed", None)
+    monkeypatch.setattr(solve, "computed", None)
     assert bits(again(MODELS_[name])) == alone
 
 
@@ -85,15 +85,17 @@ def test_an_entry_that_is_not_as_it_was_written_is_computed_again(home: Path, da
 
 
 def test_the_digest_knows_all_that_the_numbers_depend_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    first = kept.digest_of(MODELS_["corners"], OWN)
-    assert first == kept.digest_of(model(damping="0.3*abs(v)*v", spring="sinh(u)"), OWN)
+    first = reference_cache.digest_of(MODELS_["corners"], OWN)
+    assert first == reference_cache.digest_of(model(damping="0.3*abs(v)*v", spring="sinh(u)"), OWN)
     others = [
-        kept.digest_of(MODELS_["smooth"], OWN),
-        kept.digest_of(MODELS_["corners"], (*OWN[:2], numbers([6.0, 3.0, 9.1])[0], OWN[3])),
-        kept.digest_of(MODELS_["corners"], OWN[:3]),
+        reference_cache.digest_of(MODELS_["smooth"], OWN),
+        reference_cache.digest_of(
+            MODELS_["corners"], (*OWN[:2], numbers([6.0, 3.0, 9.1])[0], OWN[3])
+        ),
+        reference_cache.digest_of(MODELS_["corners"], OWN[:3]),
     ]
-    monkeypatch.setattr(kept, "_surroundings", lambda: (b"other code",))
-    others.append(kept.digest_of(MODELS_["corners"], OWN))
+    monkeypatch.setattr(reference_cache, "_surroundings", lambda: (b"other code",))
+    others.append(reference_cache.digest_of(MODELS_["corners"], OWN))
     assert len({first, *others}) == 5
 
 
@@ -103,24 +105,17 @@ def test_the_digest_knows_the_table() -> None:
     road = MODELS["vehicle"].written({"spring": "u"}, ())
     heights = np.array([0.0, 0.1, 0.0, 0.2])
     tables = [Table(0.0, 1.0, heights), Table(0.0, 1.0, heights * 2), Table(0.5, 1.0, heights)]
-    assert len({kept.digest_of(road.with_table(table, False), OWN) for table in tables}) == 3
+    assert (
+        len({reference_cache.digest_of(road.with_table(table, False), OWN) for table in tables})
+        == 3
+    )
 
 
-def test_the_folder_is_bounded_and_what_was_used_last_stays(
-    home: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    arrays = {"x": np.zeros(1000)}
-    monkeypatch.setattr(kept, "MOST_BYTES", 3 * 8400)
-    for k, digest in enumerate("abcd"):
-        kept.kept(digest * 8, lambda: arrays)
-        os.utime(home / f"reference_{digest * 8}", (k, k)) if k < 3 else None
-        if k == 2:
-            # the first one is used again
-            kept.kept("a" * 8, lambda: pytest.fail("it is there"))
-    assert [path.name[-1] for path in entries(home)] == ["a", "c", "d"]
-    monkeypatch.setattr(kept, "MOST_OF_ENTRY", 7999)
-    kept.kept("e" * 8, lambda: arrays)
-    assert len(entries(home)) == 3
+def test_a_large_entry_is_not_kept(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    reference_cache.kept("a" * 64, lambda: {"x": np.zeros(1000)})
+    monkeypatch.setattr(private_cache, "MOST_OF_ENTRY", 7999)
+    reference_cache.kept("e" * 64, lambda: {"x": np.zeros(1000)})
+    assert [path.name[0] for path in entries(home)] == ["a"]
 
 
 def test_a_folder_that_cannot_be_written_changes_nothing(
@@ -129,13 +124,13 @@ def test_a_folder_that_cannot_be_written_changes_nothing(
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("VIBSIM_CACHE_DIR", str(tmp_path / "file"))
     which = MODELS_["corners"]
-    assert bits(again(which)) == bits(reference.computed(which, OWN))
+    assert bits(again(which)) == bits(solve.computed(which, OWN))
 
 
 JOB = """
 import sys, numpy as np
 from pathlib import Path
-from vibsim.simulation import kept
+from vibsim.simulation.reference import reference_cache as kept
 def compute():
     with Path(sys.argv[1]).open("a") as file:
         file.write("x")

@@ -12,9 +12,9 @@ import pytest
 import yaml
 
 from vibsim.cli.arguments import parser
+from vibsim.experiment import Experiment
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES, Option
-from vibsim.spec import Experiment
 
 ROOT = Path(__file__).resolve().parents[1]
 EDITOR_LINE = "# yaml-language-server: $schema=../../workflow/schemas/experiment.schema.json"
@@ -38,8 +38,8 @@ def is_ours(path: Path) -> bool:
 
 
 def tracked() -> list[Path]:
-    """Return the files that are, or would be, under version control."""
-    command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    """Return the files under version control: what else lies there, such as a log of `make`, is the user's."""
+    command = ["git", "ls-files", "-z"]
     if (ROOT / ".git").exists():
         done = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
         files = [ROOT / name for name in done.stdout.split("\0") if name]
@@ -58,6 +58,12 @@ def texts() -> Iterator[tuple[Path, str]]:
 
 def pages() -> list[Path]:
     return [path for path in tracked() if path.suffix == ".md"]
+
+
+def test_no_text_cites_a_document_that_is_not_here() -> None:
+    cites = re.compile(r"design(\.md)?, section|[Tt]he design['.,]|errata\.md")
+    found = [f"{path.name}: {cites.search(text)}" for path, text in texts() if cites.search(text)]
+    assert found == []
 
 
 def blocks(path: Path, language: str) -> list[str]:
@@ -208,7 +214,7 @@ def test_documented_experiments_are_accepted(page: str, tmp_path: Path) -> None:
 
 
 def test_every_value_name_is_documented() -> None:
-    from vibsim.spec.values import VALUES
+    from vibsim.experiment.value_names import VALUES
 
     text = (ROOT / "docs/experiment-file.md").read_text()
     assert [name for name in VALUES if f"`{name}`" not in text] == []
@@ -226,7 +232,7 @@ def table_rows(text: str) -> dict[str, str]:
 
 
 def test_every_function_is_documented() -> None:
-    from vibsim.expression import FUNCTIONS
+    from vibsim.formula import FUNCTIONS
 
     text = (
         (ROOT / "docs/experiment-file.md")
@@ -270,7 +276,7 @@ def test_every_scheme_is_documented_with_its_options() -> None:
 
 
 def test_every_reason_is_documented_with_its_status() -> None:
-    from vibsim.vocabulary import REASONS
+    from vibsim.core.vocabulary import REASONS
 
     text = (ROOT / "docs/verdicts.md").read_text()
     rows = dict(re.findall(r"^\| `([a-z_]+)` \| ([A-Z]+) \|", text, re.MULTILINE))
@@ -294,6 +300,20 @@ def test_no_file_holds_the_place_of_this_checkout() -> None:
     places = {str(ROOT), str(Path.home())} - {"/"}
     found = [path for path, text in texts() if any(place + os.sep in text for place in places)]
     assert found == []
+
+
+def test_a_log_in_the_checkout_is_not_looked_at(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As ``make > make.log`` leaves one."""
+    (tmp_path / "ours.md").write_text("ours\n")
+    (tmp_path / "make.log").write_text(f"cd {tmp_path}/somewhere\n")
+    for words in (["init", "-q"], ["add", "ours.md"]):
+        subprocess.run(["git", *words], cwd=tmp_path, check=True)
+    monkeypatch.setattr(f"{__name__}.ROOT", tmp_path)
+    assert tracked() == [tmp_path / "ours.md"]
+    test_no_file_holds_the_place_of_this_checkout()
+    test_no_file_names_a_folder_of_one_machine()
 
 
 def test_scripts_can_be_executed() -> None:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from vibsim import Experiment, simulate
+from vibsim.experiment.stored_series import FEWEST_EXTREMA, MOST_EXTREMA, extrema_kept
 from vibsim.simulation import simulate_record
-from vibsim.spec.series import FEWEST_EXTREMA, MOST_EXTREMA, extrema_kept
 
 BASE = {
     "title": "t",
@@ -23,7 +23,7 @@ def experiment(**changes):
     return Experiment.from_dict({**BASE, **changes})
 
 
-def test_a_level_has_the_names_and_shapes_of_the_design():
+def test_a_level_has_its_public_names_and_shapes():
     data = simulate(experiment(sweep={"initial.theta": [0.5, 1.0, 3.0]}), 7)
     assert data.sizes["scheme"] == 2
     assert data.sizes["case"] == 3
@@ -142,7 +142,7 @@ def test_work_without_bound_is_reported_in_silence():
     unstable = experiment(
         model={"kind": "oscillator", "damping": {"quadratic": 100.0}, "force": "cos(t)"},
         initial={"u": 1.0, "v": 1.0},
-        time={"end": 20.0, "base_steps": 5},
+        time={"end": 10.0, "base_steps": 3},
         levels=[2, 3],
         schemes=["forward_euler"],
         checks=[{"converges": "u", "order": "scheme"}],

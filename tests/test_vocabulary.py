@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from vibsim.vocabulary import NORMS, REASONS, STATUSES, TOLERANCE, TYPICAL_NORM, worst
+from vibsim.core.vocabulary import NORMS, REASONS, STATUSES, TOLERANCE, TYPICAL_NORM, worst
 
 PAGE = Path(__file__).parents[1] / "docs" / "verdicts.md"
 
@@ -38,7 +38,7 @@ def test_a_word_that_is_no_status_does_not_pass() -> None:
 
 
 def test_a_check_that_names_neither_norm_nor_tolerance_has_the_common_ones() -> None:
-    from vibsim.spec.checks import ConvergesCheck
+    from vibsim.experiment.schema.checks import ConvergesCheck
 
     check = ConvergesCheck(converges="theta")
     assert (check.norm, check.tolerance) == (TYPICAL_NORM, TOLERANCE)

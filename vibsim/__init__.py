@@ -7,22 +7,22 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vibsim.lazy import loader
+from vibsim.core.lazy import loader
 
 if TYPE_CHECKING:
     from vibsim.analysis import Verdict, analyse, verdicts
-    from vibsim.errors import InputError, VibsimError
+    from vibsim.core.errors import InputError, VibsimError
+    from vibsim.experiment import Experiment
     from vibsim.ladder import best
     from vibsim.simulation import simulate
-    from vibsim.spec import Experiment
 
 __version__ = "0.1.0"
 
 _HOME = {
-    "Experiment": "vibsim.spec",
-    "InputError": "vibsim.errors",
+    "Experiment": "vibsim.experiment",
+    "InputError": "vibsim.core.errors",
     "Verdict": "vibsim.analysis",
-    "VibsimError": "vibsim.errors",
+    "VibsimError": "vibsim.core.errors",
     "analyse": "vibsim.analysis",
     "best": "vibsim.ladder",
     "simulate": "vibsim.simulation",

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis import series
-from vibsim.analysis.facts import Evidence
-from vibsim.analysis.floor import norm_of_floor
+from vibsim.apriori.roundoff_floor import norm_of_floor
+from vibsim.convergence import differences
+from vibsim.convergence.ladder_statistics import Evidence
 
 Floats = NDArray[np.float64]
 
@@ -53,11 +53,11 @@ def evidence_of(
     floors = np.broadcast_to(np.asarray(floor, dtype=float), (1, len(levels)))
 
     def measure(values: list[Floats]) -> Floats:
-        return np.stack([series.norm(v.reshape(1, -1), norm, SPACING) for v in values], -1)
+        return np.stack([differences.norm(v.reshape(1, -1), norm, SPACING) for v in values], -1)
 
     errors = [] if exact is None else [(exact - u)[None] for u in fields]
-    of_errors = [series.scatter(x, y, norm) for x, y in itertools.pairwise(errors)]
-    scatter = [series.scatter(x, y, norm) for x, y in itertools.pairwise(d)]
+    of_errors = [differences.scatter(x, y, norm) for x, y in itertools.pairwise(errors)]
+    scatter = [differences.scatter(x, y, norm) for x, y in itertools.pairwise(d)]
     return Evidence(
         levels=levels,
         difference=measure(d) if d else np.empty((1, 0)),
@@ -80,7 +80,7 @@ def shape_in_time(rng: np.random.Generator) -> Floats:
         rng.normal() * np.sin(rng.uniform(0.3, 3.0) * T + rng.uniform(0, 6.3)) for _ in range(3)
     )
     field = np.asarray(waves) * (T / T[-1]) ** rng.choice([0.0, 1.0, 2.0])
-    return field / series.norm(field[None], "l2", SPACING)[0]
+    return field / differences.norm(field[None], "l2", SPACING)[0]
 
 
 def random_truth(rng: np.random.Generator) -> Truth:

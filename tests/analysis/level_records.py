@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from vibsim import plan
-from vibsim.record import Record, Variable
-from vibsim.spec import Experiment
+from vibsim.core.record import Record, Variable
+from vibsim.experiment import Experiment
 
 Floats = np.ndarray
 

@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 
 from vibsim.analysis import Verdict, analyse_records, summarise, verdicts
-from vibsim.record import Record
+from vibsim.core.record import Record
+from vibsim.experiment import Experiment
 from vibsim.schemes import SCHEMES, Scheme
 from vibsim.simulation import simulate_record
-from vibsim.spec import Experiment
 
 PERIODS = 10
 STEPS = 400

@@ -10,7 +10,7 @@ import numpy as np
 
 from vibsim import Experiment
 from vibsim.analysis import analyse_parts, joined
-from vibsim.record import Record, Variable
+from vibsim.core.record import Record, Variable
 from vibsim.simulation import simulate_record
 
 CHECKS: list[dict[str, Any]] = [

@@ -10,13 +10,13 @@ import pytest
 from ladders import T, evidence_of
 from spring_runs import PERIODS, STEPS, judged, registered, spring
 
-from vibsim.analysis.verdict import judge
-from vibsim.record import Variable
+from vibsim.convergence.verdict import judge
+from vibsim.core.record import Variable
+from vibsim.core.vocabulary import REASON_NAMES
 from vibsim.schemes import SCHEMES
 from vibsim.schemes.base import Orders
 from vibsim.schemes.runge_kutta import Tableau, from_tableau
 from vibsim.theory import rounding_bound
-from vibsim.vocabulary import REASON_NAMES
 
 LIMIT = 2.0
 
@@ -128,7 +128,7 @@ def test_the_result_nearest_to_what_is_allowed_decides() -> None:
     sweep = {"initial.u": [1e-3, 1.0, 0.5, 0.7, 30.0]}
     run = spring(["rk4"], {"equal": ["rk4", "discrete"], "quantity": "u"}, sweep=sweep)
     (verdict,) = run.verdicts
-    distance, allowed = (run.record[f"check_{n}"][0, 0] for n in ("value", "low"))
+    distance, allowed = (run.record[f"check_check_1_{n}"][0] for n in ("distance", "allowed"))
     assert verdict.status == "PASS"
     assert verdict.results[0].case == int(np.argmax(distance / allowed))
     # which is no longer the one that is allowed the least
@@ -199,7 +199,7 @@ def test_a_run_that_overflows_is_compared_without_a_warning() -> None:
     """Its rounding has no finite bound; pytest makes an error of every warning."""
     check = {"equal": ["central", "discrete"], "quantity": "u"}
     run = spring(["central"], check, time={"end": 2000.0, "base_steps": 4000})
-    assert run.record["check_low"].item() == np.inf
+    assert run.record["check_check_1_allowed"].item() == np.inf
     assert run.verdicts[0].status == "FAIL"
 
 
@@ -223,7 +223,9 @@ def test_a_disturbance_of_ten_times_the_bound_is_seen() -> None:
     run = spring(["rk4"], {"equal": ["rk4", "discrete"], "quantity": "u"})
     level = run.levels[0]
     u = level.variable("u")
-    moved = u.values + 10 * float(run.record["check_low"][0, 0, 0]) * (np.arange(STEPS + 1) == 7)
+    moved = u.values + 10 * float(run.record["check_check_1_allowed"][0, 0]) * (
+        np.arange(STEPS + 1) == 7
+    )
     variables = {**level.variables, "u": Variable(u.dims, moved, u.attrs)}
     found = judged(run.experiment, {0: replace(level, variables=variables)})
     assert (found.verdicts[0].status, found.verdicts[0].reason) == ("FAIL", "mismatch")
@@ -236,7 +238,7 @@ def test_what_is_allowed_are_the_rounding_errors_of_both_sides() -> None:
     steppers = [SCHEMES[name].stepper(SCHEMES[name].defaults()) for name in pair]
     numbers = 2 * np.pi, PERIODS / STEPS, 1.0, 0.0, STEPS
     bounds = np.array([rounding_bound(stepper, *numbers) for stepper in steppers])
-    allowed = run.record["check_low"][:, 0, 0]
+    allowed = [run.record[f"check_check_{i}_allowed"][0, 0] for i in (1, 2, 3)]
     assert allowed == pytest.approx([*np.sum(bounds, axis=0), bounds[0, 0]], rel=1e-9)
 
 

@@ -1,7 +1,7 @@
 """Verdicts on thousands of ladders with known truth, of which no number was used to set the rules.
 
 The rules and the factors of the intervals were set on other seeds (`TUNED`). The table that these tests print with
-``-s`` stands in ``docs/verdicts.md``.
+``-s`` stands in ``docs/method.md``.
 """
 
 from __future__ import annotations

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from level_records import experiment, level_records, standard_error
 
-from vibsim.analysis import Verdict, analyse_records, summarise, values, verdicts
-from vibsim.analysis.compare import comparisons
-from vibsim.analysis.evidence import evidence
-from vibsim.analysis.part import part_of
-from vibsim.analysis.value_advice import sees_several_levels
-from vibsim.spec import VALUES
+from vibsim.analysis import Verdict, analyse_records, summarise, verdicts
+from vibsim.checks.value.advice import sees_several_levels
+from vibsim.comparison import value_numbers as values
+from vibsim.comparison.order_evidence import evidence
+from vibsim.comparison.quantity_comparison import comparisons
+from vibsim.experiment import VALUES
+from vibsim.observe.member_block import part_of
 
 T = np.linspace(0.0, 8.0, 17)
 
@@ -299,17 +300,17 @@ def test_the_summary_has_the_keys_of_the_design() -> None:
     summary = summarise(exp, verdicts(exp, record), record)
     keys = {"vibsim_format", "collection", "experiment", "title", "status", "checks", "failures"}
     assert keys <= set(summary)
-    assert summary["vibsim_format"] == 1
+    assert summary["vibsim_format"] == 2
     check = summary["checks"][0]
     assert {"id", "kind", "text", "quantity", "expected", "status", "reason", "advice"} <= set(
         check
     )
     result = check["results"][0]
-    keys = {"scheme", "case", "status", "reason", "order", "interval", "levels"}
-    assert keys <= set(result)
-    assert result["levels"] == [4, 7]
-    assert len(result["interval"]) == 2
-    assert result["value"] is None
+    assert set(result) == {"scheme", "case", "status", "reason", "facts", "sentence"}
+    facts = result["facts"]
+    assert facts["levels"] == [4, 7]
+    assert facts["order_low"] <= facts["order"] <= facts["order_high"]
+    assert check["text"].endswith(result["sentence"])
 
 
 def test_known_causes_are_named() -> None:

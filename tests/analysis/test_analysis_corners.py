@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vibsim import Experiment, Verdict, analyse, simulate, verdicts
-from vibsim.analysis.corners import switches_of, words_of
+from vibsim.apriori.force_discontinuities import switches_of, words_of
 from vibsim.schemes import FIXED_STEP, SCHEMES
 
 QUADRATIC = {"kind": "oscillator", "damping": {"quadratic": 0.5}}
@@ -211,3 +211,30 @@ def test_differences_that_a_corner_makes_unlike_each_other_are_no_round_off(
     (found,) = judged(Experiment.from_dict({"title": "t", **content, "checks": checks}))
     assert (found.status, found.reason) == ("INCONCLUSIVE", "non_smooth")
     assert "At t = " in found.text
+
+
+JUMPS = {
+    "title": "t",
+    "model": {"kind": "oscillator", "spring": "u", "force": "heaviside(t - 3.3)"},
+    "initial": {"u": 1.0},
+    "time": {"end": 10.0},
+    "schemes": ["rk4", "central"],
+    "checks": [{"converges": "u", "order": 1}, {"converges": "v", "order": 1}],
+}
+
+
+@pytest.mark.parametrize("levels", [[4, 8], [4, 12], [6, 11]])
+def test_a_jump_within_a_step_makes_no_wrong_limit(levels: list[int]) -> None:
+    """Differences may show order 1 by accident, with errors that belong to another place of the jump in its step."""
+    made = Experiment.from_dict(JUMPS | {"levels": {"from": levels[0], "to": levels[1]}})
+    reasons = {result.reason for verdict in judged(made) for result in verdict.results}
+    assert reasons <= {"asymptotic", "non_smooth", "pre_asymptotic"}
+
+
+def test_a_wrong_limit_is_seen_beside_a_jump() -> None:
+    made = Experiment.from_dict(JUMPS | {"levels": [4, 5, 6, 7, 8], "schemes": ["rk4"]})
+    data = [simulate(made, level) for level in made.levels]
+    for level in data:
+        level["u"] = level["u"] + 0.1 * level["t"]
+    (found, _) = verdicts(made, analyse(made, data))
+    assert (found.status, found.reason) == ("FAIL", "wrong_limit")

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from spring_runs import registered, spring
 
-from vibsim.analysis.drift import STILL, drift_of
+from vibsim.core.vocabulary import DRIFTS
+from vibsim.observe.energy_drift import STILL, drift_of
 from vibsim.schemes import SCHEMES
 from vibsim.schemes.implicit import step_crank_nicolson
 from vibsim.schemes.one_step import self_starting
-from vibsim.vocabulary import DRIFTS
 
 PERIODS = 20.0
 SAMPLES = 512

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vibsim.analysis.grid import common_grid, take
-from vibsim.errors import VibsimError
-from vibsim.record import Record, Variable
+from vibsim.core.errors import VibsimError
+from vibsim.core.record import Record, Variable
+from vibsim.observe.common_grid import common_grid, take
 
 
 def level_record(level: int, steps: int, every: int, end: np.ndarray | None = None) -> Record:

@@ -8,9 +8,9 @@ from level_records import experiment, level_records
 from spring_runs import PERIODS, STEPS, judged, spring
 
 from vibsim.analysis import analyse_records
-from vibsim.record import Record, Variable
+from vibsim.core.record import Record, Variable
+from vibsim.experiment.stored_series import FEWEST_EXTREMA
 from vibsim.schemes import FIXED_STEP
-from vibsim.spec.series import FEWEST_EXTREMA
 
 SCHEMES = ["central", "rk2", "rk4", "crank_nicolson", "euler_cromer", "backward_euler"]
 
@@ -47,7 +47,9 @@ def test_values_are_those_of_the_record() -> None:
     }
     run = spring(SCHEMES, *[{"value": name, "above": -1e300} for name in names], levels=(0, 1))
     for i, name in enumerate(names.values()):
-        assert np.array_equal(run.record["check_value"][i], run.record[name][..., -1]), name
+        assert np.array_equal(
+            run.record[f"check_check_{i + 1}_value"], run.record[name][..., -1]
+        ), name
     w = 2 * np.pi
     error = spring(["central"], {"value": "error_of_frequency", "above": 0.0}).verdicts[0]
     frequency = float(spring(["central"]).record["measured_frequency"][0, 0, 0])
@@ -76,7 +78,7 @@ def test_running_maxima_at_a_time_and_at_the_end() -> None:
     ]
     run = spring(["rk4", "central"], *checks)
     level = run.levels[0]
-    found = run.record["check_value"][:, :, 0]
+    found = np.array([run.record[f"check_check_{i}_value"][:, 0] for i in range(1, 6)])
     deviation = np.abs(level["energy_deviation"][0, 0])
     assert found[0, 0] == np.max(deviation[: STEPS // 2 + 1])
     assert found[1, 0] == np.max(deviation)

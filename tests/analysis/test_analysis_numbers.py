@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vibsim.analysis import sensitivity as responses
-from vibsim.analysis import series
+from vibsim.convergence import differences
 from vibsim.models import MODELS
+from vibsim.observe import sensitivity as responses
 
 Floats = np.ndarray
 
@@ -21,10 +21,10 @@ Floats = np.ndarray
 def test_a_total_depends_on_neither_company_nor_layout(points: int, cases: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     values = rng.normal(size=(2, cases, points)) * 10.0 ** rng.integers(-8, 8, (2, cases, points))
-    together = series.total(series.laid_out(values))
-    assert together.tobytes() == series.total(values).tobytes()
+    together = differences.total(differences.laid_out(values))
+    assert together.tobytes() == differences.total(values).tobytes()
     for case in range(cases):
-        alone = series.total(values[:1, case : case + 1])
+        alone = differences.total(values[:1, case : case + 1])
         assert alone.tobytes() == together[:1, case : case + 1].tobytes()
     # pairwise: the error grows with the logarithm of the number of points
     bound = np.finfo(float).eps * (np.log2(points) + 2) * np.abs(values).sum(axis=-1)
@@ -36,9 +36,9 @@ def test_a_neighbour_out_of_range_changes_no_bit_of_a_norm(other: float) -> None
     rng = np.random.default_rng(1)
     values = rng.normal(size=(50, 33)) * 10.0 ** rng.uniform(-100, 100, (50, 1))
     spacing = np.full(50, 0.3)
-    alone = series.norm(values, "l2", spacing)
+    alone = differences.norm(values, "l2", spacing)
     values = np.concatenate([values, np.full((1, 33), other)])
-    together = series.norm(values, "l2", np.full(51, 0.3))
+    together = differences.norm(values, "l2", np.full(51, 0.3))
     assert together[:50].tobytes() == alone.tobytes()
 
 

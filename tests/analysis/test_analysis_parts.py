@@ -7,23 +7,24 @@ import sys
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from sweeps import CHECKS, SWEEPS, analysed, assert_same_bytes, cut, of, simulated
 
 from vibsim import Experiment, analyse
 from vibsim.analysis import analyse_records, kept, summarise, verdicts
-from vibsim.analysis.values import KNOWN
-from vibsim.errors import VibsimError
+from vibsim.comparison.value_numbers import KNOWN
+from vibsim.core.errors import VibsimError
+from vibsim.core.record import Record, Variable
+from vibsim.experiment import VALUES
+from vibsim.experiment.stored_series import stored_series
+from vibsim.experiment.value_names import Value
 from vibsim.models import MODELS
-from vibsim.record import Record, Variable
-from vibsim.spec import VALUES
-from vibsim.spec.series import stored_series
-from vibsim.spec.values import Value
 
 
 @pytest.fixture(params=["series", "lean"])
 def storage(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     if request.param == "lean":
-        monkeypatch.setattr("vibsim.spec.sampling.LEAN", 0)
+        monkeypatch.setattr("vibsim.experiment.stored_samples.LEAN", 0)
     return str(request.param)
 
 
@@ -62,7 +63,7 @@ def test_a_member_alone_has_the_numbers_and_verdicts_that_it_has_in_the_sweep(
 def test_bounded_storage_changes_no_number(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     experiment = SWEEPS[name]
     full = analyse_records(experiment, simulated(experiment))
-    monkeypatch.setattr("vibsim.spec.sampling.LEAN", 0)
+    monkeypatch.setattr("vibsim.experiment.stored_samples.LEAN", 0)
     lean = analyse_records(experiment, simulated(experiment))
     assert not any("t" in variable.dims for variable in lean.variables.values())
     assert lean.words("norm") == ["l1", "l2", "linf"]
@@ -104,18 +105,25 @@ def every_value() -> Experiment:
     return of({"initial.theta": [0.5, 1.0, 2.0], "time.end": [10.0, 20.0]}, checks=checks)
 
 
+def values_of(experiment: Experiment, record: Record) -> NDArray[np.float64]:
+    """Return the number that each check on a value or an order measured, shape (check, scheme, case)."""
+    field = {"value": "value", "converges": "order"}
+    names = [f"check_{check.id}_{field[check.kind]}" for check in experiment.checks]
+    return np.array([record[name] for name in names])
+
+
 def test_every_value_can_be_asked_for_where_storage_is_bounded(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     experiment = every_value()
-    full = analyse_records(experiment, simulated(experiment))["check_value"]
-    monkeypatch.setattr("vibsim.spec.sampling.LEAN", 0)
+    full = values_of(experiment, analyse_records(experiment, simulated(experiment)))
+    monkeypatch.setattr("vibsim.experiment.stored_samples.LEAN", 0)
     records = simulated(experiment)
     names = {n for n, v in records[7].variables.items() if "t" in v.dims}
     running = "energy_deviation_running_max"
     assert names == {"theta", "omega", "energy_deviation", "potential_energy", running}
     assert names == set(stored_series(experiment))
-    lean = analyse_records(experiment, records)["check_value"]
+    lean = values_of(experiment, analyse_records(experiment, records))
     asked = {check.value for check in experiment.checks if check.kind == "value"}
     rows = {name: VALUES[name] for name in KNOWN}
     assert asked == {n for n, row in rows.items() if not needs_another_model(row)}
@@ -124,12 +132,12 @@ def test_every_value_can_be_asked_for_where_storage_is_bounded(
 
 
 def test_what_bounded_storage_keeps_of_a_member(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vibsim.spec.sampling.LEAN", 0)
+    monkeypatch.setattr("vibsim.experiment.stored_samples.LEAN", 0)
     experiment = of({"initial.theta": [0.5, 1.0]}, checks=CHECKS[:1], schemes=["central"])
     record = analyse_records(experiment, simulated(experiment))
     everything = (*record.coords.values(), *record.variables.values())
     size = sum(v.values.nbytes for v in everything if "case" in v.dims) / experiment.members
-    assert size < 900
+    assert size < 940
 
 
 def test_verdicts_need_only_what_is_kept_of_parts() -> None:
@@ -148,7 +156,7 @@ def test_verdicts_need_only_what_is_kept_of_parts() -> None:
 def test_a_failure_has_its_step_where_storage_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     experiment = SWEEPS["ends"]
     full = analyse_records(experiment, simulated(experiment))
-    monkeypatch.setattr("vibsim.spec.sampling.LEAN", 0)
+    monkeypatch.setattr("vibsim.experiment.stored_samples.LEAN", 0)
     lean = analyse_records(experiment, simulated(experiment))
     assert "last_step" in full
     assert "last_step" not in lean

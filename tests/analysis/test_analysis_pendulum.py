@@ -9,8 +9,8 @@ import pytest
 from ladders import evidence_of
 from reference_pendulum import pendulum
 
-from vibsim.analysis.verdict import judge
-from vibsim.vocabulary import REASON_NAMES, STATUSES
+from vibsim.convergence.verdict import judge
+from vibsim.core.vocabulary import REASON_NAMES, STATUSES
 
 THETA_AT_20 = {6: 0.9996677748139638, 7: 0.9971663759228251, 8: 0.9961666300804089}
 

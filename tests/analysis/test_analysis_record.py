@@ -11,8 +11,8 @@ import pytest
 from level_records import experiment, level_records, standard_error
 
 from vibsim.analysis import analyse, analyse_records, summarise, verdicts
-from vibsim.errors import VibsimError
-from vibsim.record import Record, Variable
+from vibsim.core.errors import VibsimError
+from vibsim.core.record import Record, Variable
 from vibsim.simulation import simulate
 
 T = np.linspace(0.0, 8.0, 17)
@@ -107,7 +107,7 @@ def test_dimensions_and_sizes_agree() -> None:
         "period": ("scheme", "case", "level"),
         "exact_period": ("case",),
         "omega_dt": ("case", "level"),
-        "check_value": ("check", "scheme", "case"),
+        "check_check_1_order": ("scheme", "case"),
     }
     for name, dims in shapes.items():
         assert record.variables[name].dims == dims, name

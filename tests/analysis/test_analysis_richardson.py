@@ -7,7 +7,7 @@ import pytest
 from ladders import random_truth, shape_in_time
 from reference_pendulum import pendulum
 
-from vibsim.analysis.richardson import extrapolate
+from vibsim.convergence.richardson import extrapolate
 
 T = np.linspace(0.0, 20.0, 65)
 LADDERS = [(3, 4, 5), (3, 5, 6), (2, 5, 6), (3, 4, 5, 6), (3, 5, 6, 9), (2, 4, 5, 6, 8)]

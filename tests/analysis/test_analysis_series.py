@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vibsim.analysis import series
-from vibsim.vocabulary import NORMS
+from vibsim.convergence import differences
+from vibsim.core.vocabulary import NORMS
 
 T = np.linspace(0.0, 3.0, 31)
 E2, E4 = np.sin(2 * T) + 0.3, np.cos(T) * T
@@ -24,7 +24,7 @@ def computed(level: int, p: float = 2.0) -> np.ndarray:
 def test_estimate_is_the_error_up_to_the_next_power(p: float, gap: int) -> None:
     level = 6
     error = 0.7 - computed(level, p)
-    estimate = series.error_factor(p, gap) * (computed(level, p) - computed(level + gap, p))
+    estimate = differences.error_factor(p, gap) * (computed(level, p) - computed(level + gap, p))
     leading = 2.0 ** (-level * p) * np.max(np.abs(E2))
     defect = np.max(np.abs(estimate - error))
     # with h^2 e4 beside e2: |defect| = h^(p+2) |e4| (1 - 2^-(2 gap)) 2^(-p gap) / (1 - 2^(-p gap))
@@ -35,8 +35,8 @@ def test_estimate_is_the_error_up_to_the_next_power(p: float, gap: int) -> None:
 
 
 def test_error_factor_is_minus_four_thirds_for_order_two() -> None:
-    assert series.error_factor(2.0, 1) == pytest.approx(-4 / 3, rel=1e-15)
-    assert series.error_factor(np.array([1.0, 4.0]), 1) == pytest.approx([-2.0, -16 / 15])
+    assert differences.error_factor(2.0, 1) == pytest.approx(-4 / 3, rel=1e-15)
+    assert differences.error_factor(np.array([1.0, 4.0]), 1) == pytest.approx([-2.0, -16 / 15])
 
 
 def test_difference_has_the_sign_of_the_lecture() -> None:
@@ -49,17 +49,17 @@ def test_difference_has_the_sign_of_the_lecture() -> None:
 @pytest.mark.parametrize("p", [-1.5, 0.0, 0.5, 1.0, 2.0, 4.0])
 def test_order_inverts_target_ratio(levels: tuple[int, int, int], p: float) -> None:
     h = [2.0 ** (-p * level) for level in levels]
-    ratio = series.target_ratio(p, levels)
+    ratio = differences.target_ratio(p, levels)
     if p:
         assert ratio == pytest.approx((h[0] - h[1]) / (h[1] - h[2]), rel=1e-10)
-    found = series.order_of_ratio(np.array([ratio, 0.0, -1.0, np.nan, np.inf]), levels)
+    found = differences.order_of_ratio(np.array([ratio, 0.0, -1.0, np.nan, np.inf]), levels)
     assert found[0] == pytest.approx(p, abs=1e-12)
     assert np.all(np.isnan(found[1:]))
 
 
 def test_order_of_an_impossible_ratio_is_nan() -> None:
     # gaps 3 and 1: no order gives a ratio of 2^-300, nor of 2^300
-    assert np.all(np.isnan(series.order_of_ratio(np.array([2.0**-300, 2.0**300]), (3, 6, 7))))
+    assert np.all(np.isnan(differences.order_of_ratio(np.array([2.0**-300, 2.0**300]), (3, 6, 7))))
 
 
 def test_norms_by_hand() -> None:
@@ -68,33 +68,33 @@ def test_norms_by_hand() -> None:
     by_hand = {"l1": 6.5, "l2": np.sqrt(0.5 * 63), "linf": 7.0, "linf_interior": 3.0}
     assert set(by_hand) == set(NORMS)
     for kind, value in by_hand.items():
-        assert series.norm(e, kind, dt) == pytest.approx([value])
-    assert series.norm(e, "linf_interior", dt, end_included=False) == pytest.approx([7.0])
+        assert differences.norm(e, kind, dt) == pytest.approx([value])
+    assert differences.norm(e, "linf_interior", dt, end_included=False) == pytest.approx([7.0])
 
 
 def test_norms_take_the_step_of_each_member() -> None:
     e = np.ones((2, 3, 4))
     dt = np.array([0.1, 0.2, 0.4])
-    assert series.norm(e, "l1", dt) == pytest.approx(np.broadcast_to(4 * dt, (2, 3)))
-    assert series.norm(e, "l2", dt) == pytest.approx(np.broadcast_to(2 * np.sqrt(dt), (2, 3)))
+    assert differences.norm(e, "l1", dt) == pytest.approx(np.broadcast_to(4 * dt, (2, 3)))
+    assert differences.norm(e, "l2", dt) == pytest.approx(np.broadcast_to(2 * np.sqrt(dt), (2, 3)))
 
 
 @pytest.mark.parametrize("size", [1e200, 1e-200])
 def test_norms_neither_overflow_nor_vanish(size: float) -> None:
-    assert series.norm(np.full((1, 4), size), "l2", np.ones(1)) == pytest.approx([2 * size])
+    assert differences.norm(np.full((1, 4), size), "l2", np.ones(1)) == pytest.approx([2 * size])
 
 
 @pytest.mark.parametrize("kind", NORMS)
 def test_norm_of_nan_is_nan_and_of_zero_is_zero(kind: str) -> None:
     e = np.array([[0.0, np.nan, 1.0], [0.0, 0.0, 0.0]])
-    found = series.norm(e, kind, np.ones(1))
+    found = differences.norm(e, kind, np.ones(1))
     assert np.isnan(found[0])
     assert found[1] == 0.0
 
 
 def test_ratio_is_masked_at_zero_crossings_and_right_elsewhere() -> None:
     d = [computed(level) - computed(level + 1) for level in (9, 10)]
-    ratio = series.masked_ratio(*d)[0]
+    ratio = differences.masked_ratio(*d)[0]
     assert np.nanmax(np.abs(ratio - 4.0)) < 0.01
     crossing = (np.abs(E2) < 0.05 * np.max(np.abs(E2))) & (T < 2.5)
     assert np.any(crossing)
@@ -104,46 +104,46 @@ def test_ratio_is_masked_at_zero_crossings_and_right_elsewhere() -> None:
 
 def test_ratio_follows_a_growing_error_from_its_start() -> None:
     growing = (np.exp(4 * T) * np.sin(9 * T))[None]
-    ratio = series.masked_ratio(4 * growing, growing)
+    ratio = differences.masked_ratio(4 * growing, growing)
     assert np.mean(np.isfinite(ratio[0, 1:10])) > 0.5
     assert np.nanmax(np.abs(ratio - 4)) < 1e-12
 
 
 def test_ratio_of_nothing_is_nan_without_a_warning() -> None:
     zero = np.zeros((2, 5))
-    assert np.all(np.isnan(series.masked_ratio(zero, zero)))
+    assert np.all(np.isnan(differences.masked_ratio(zero, zero)))
     nan = np.full((2, 5), np.nan)
-    assert np.all(np.isnan(series.masked_ratio(nan, np.ones((2, 5)))))
-    assert np.all(np.isnan(series.masked_ratio(np.full((1, 3), np.inf), np.ones((1, 3)))))
+    assert np.all(np.isnan(differences.masked_ratio(nan, np.ones((2, 5)))))
+    assert np.all(np.isnan(differences.masked_ratio(np.full((1, 3), np.inf), np.ones((1, 3)))))
 
 
 def test_ratio_is_masked_under_the_floor() -> None:
     d = np.full((1, 4), 5e-13)
-    assert np.all(np.isnan(series.masked_ratio(4 * d, d, floor=1e-13)))
-    assert np.all(series.masked_ratio(4 * d, d, floor=1e-14) == 4.0)
+    assert np.all(np.isnan(differences.masked_ratio(4 * d, d, floor=1e-13)))
+    assert np.all(differences.masked_ratio(4 * d, d, floor=1e-14) == 4.0)
 
 
 def test_coincidence_and_proportionality() -> None:
     d = E2[None]
-    assert series.coincidence(4 * d, d, np.array([4.0])) == pytest.approx([0.0], abs=1e-15)
-    assert series.coincidence(2 * d, d, np.array([4.0])) == pytest.approx([1.0])
-    assert series.proportionality(-3 * d, d) == pytest.approx([-3.0])
+    assert differences.coincidence(4 * d, d, np.array([4.0])) == pytest.approx([0.0], abs=1e-15)
+    assert differences.coincidence(2 * d, d, np.array([4.0])) == pytest.approx([1.0])
+    assert differences.proportionality(-3 * d, d) == pytest.approx([-3.0])
     mixed = 2 * E2 + 0.1 * E4
     expected = np.sum(mixed * E2) / np.sum(E2 * E2)
-    assert series.proportionality(mixed[None], d) == pytest.approx([expected])
-    assert series.coincidence(0 * d, 0 * d, np.array([4.0])) == [0.0]
-    assert np.isnan(series.coincidence(0 * d, d, np.array([4.0])))[0]
-    assert np.isnan(series.proportionality(d, 0 * d))[0]
+    assert differences.proportionality(mixed[None], d) == pytest.approx([expected])
+    assert differences.coincidence(0 * d, 0 * d, np.array([4.0])) == [0.0]
+    assert np.isnan(differences.coincidence(0 * d, d, np.array([4.0])))[0]
+    assert np.isnan(differences.proportionality(d, 0 * d))[0]
 
 
 def test_scatter_measures_the_angle_in_its_own_norm() -> None:
     a, b = np.array([[1.0, 0.0, 0.0]]), np.array([[1.0, 0.1, 0.0]])
     angle = np.arctan(0.1)
-    assert series.scatter(a, b, "l2") == pytest.approx([2 * np.sin(angle / 2)])
-    assert series.scatter(a, 5 * a, "l2") == pytest.approx([0.0])
-    assert series.scatter(a, -b, "l2") == pytest.approx([-2 * np.sin(angle / 2)])
+    assert differences.scatter(a, b, "l2") == pytest.approx([2 * np.sin(angle / 2)])
+    assert differences.scatter(a, 5 * a, "l2") == pytest.approx([0.0])
+    assert differences.scatter(a, -b, "l2") == pytest.approx([-2 * np.sin(angle / 2)])
     # only the end differs: linf_interior does not see it
     c = np.array([[1.0, 0.0, 0.5]])
-    assert series.scatter(a, c, "linf_interior") == pytest.approx([0.0])
-    assert series.scatter(a, c, "linf") == pytest.approx([0.5])
-    assert np.isnan(series.scatter(a, 0 * a, "l2"))[0]
+    assert differences.scatter(a, c, "linf_interior") == pytest.approx([0.0])
+    assert differences.scatter(a, c, "linf") == pytest.approx([0.5])
+    assert np.isnan(differences.scatter(a, 0 * a, "l2"))[0]

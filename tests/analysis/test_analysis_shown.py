@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from spring_runs import spring
 
-from vibsim.analysis.shown import PLACES, by_place, number_of
-from vibsim.vocabulary import DRIFTS
+from vibsim.checks.equal import PLACES, by_place
+from vibsim.core.vocabulary import DRIFTS
 
 RNG = np.random.default_rng(7)
 
@@ -45,23 +45,12 @@ def test_what_is_kept_is_what_the_verdict_was_made_of() -> None:
         levels=(0, 1, 2),
     )
     record = run.record
-    assert record["check_distance"].shape == (2, 1, PLACES)
-    for name, place, scheme in (("first", 1, 0), ("second", 3, 1)):
-        number = number_of(run.experiment, name)
-        largest = np.nanmax(record["check_distance"][number, 0])
-        assert largest == record["check_value"][place, scheme, 0]
-    third, second, first = record["check_means"][0, 0, 0]
+    for name, scheme in (("first", 0), ("second", 1)):
+        distance = record[f"check_{name}_distance_over_time"]
+        assert distance.shape == (1, PLACES)
+        assert np.nanmax(distance) == record[f"check_{name}_distance"][scheme, 0]
+    third, second, first = record["check_check_3_window_means"][0, 0]
     k = np.log2((first - second) / (second - third))
-    assert k == record["check_high"][2, 0, 0]
-    assert DRIFTS[int(record["check_first"][2, 0, 0])] == "linear"
-    assert record["check_round_off"][0, 0, 0] < first
-
-
-def test_checks_are_counted_within_their_kind() -> None:
-    run = spring(
-        ["rk4"],
-        {"conserves": "energy", "id": "a"},
-        {"equal": ["rk4", "exact"], "quantity": "u", "id": "b"},
-        {"id": "c", "claim": "so", "that": {"equal": ["rk4", "exact"], "quantity": "v"}},
-    )
-    assert [number_of(run.experiment, name) for name in "abc"] == [0, 0, 1]
+    assert k == record["check_check_3_drift_power"][0, 0]
+    assert DRIFTS[int(record["check_check_3_drift"][0, 0])] == "linear"
+    assert record["check_check_3_round_off"][0, 0] < first

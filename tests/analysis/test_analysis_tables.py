@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vibsim import Experiment, Verdict, analyse, simulate, verdicts
-from vibsim.analysis.promise import left_to_the_mesh
+from vibsim.apriori.formal_orders import left_to_the_mesh
 
 MODEL = {"kind": "vehicle", "m": 60, "b": 80, "speed": 5, "spring": "600*u"}
 LEVELS = [0, 1, 2, 3, 4]

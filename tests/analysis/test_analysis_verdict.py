@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
 import pytest
-from ladders import T, evidence_of, random_truth, shape_in_time
+from ladders import T, Truth, evidence_of, random_truth, shape_in_time
 
-from vibsim.analysis import facts
-from vibsim.analysis.verdict import judge
-from vibsim.vocabulary import NORMS, REASON_NAMES, STATUSES
+from vibsim.convergence import ladder_statistics
+from vibsim.convergence.verdict import judge
+from vibsim.core.vocabulary import NORMS, REASON_NAMES, STATUSES
 
 EXACT = np.cos(T)
 RNG = np.random.default_rng(5)
@@ -224,7 +225,19 @@ def test_no_nan_among_the_evidence_passes(place: str) -> None:
     values = np.array(getattr(evidence, place), dtype=float)
     values[..., -1] = np.nan
     fields = {**vars(evidence), place: values}
-    assert STATUSES[int(judge(facts.Evidence(**fields)).status[0])] != "PASS"
+    assert STATUSES[int(judge(ladder_statistics.Evidence(**fields)).status[0])] != "PASS"
+
+
+def stacked(
+    rows: list[ladder_statistics.Evidence], shape: tuple[int, ...]
+) -> ladder_statistics.Evidence:
+    """Return the evidence of many ladders of the same levels."""
+    arrays = {
+        name: np.concatenate([getattr(row, name) for row in rows]).reshape(*shape, *one.shape[1:])
+        for name, one in vars(rows[0]).items()
+        if isinstance(one, np.ndarray)
+    }
+    return dataclasses.replace(rows[0], **arrays)
 
 
 def test_many_ladders_at_once_are_judged_as_one_by_one() -> None:
@@ -234,14 +247,7 @@ def test_many_ladders_at_once_are_judged_as_one_by_one() -> None:
         truth = random_truth(rng)
         if len(truth.levels) == 5:
             rows.append(evidence_of(truth.fields, FIVE, floor=truth.floor, exact=truth.exact))
-    names = ("difference", "scatter", "floor", "order", "error", "size", "omega_dt")
-    stacked = {
-        name: np.stack([getattr(row, name)[0] for row in rows]).reshape(
-            (4, 5, *rows[0].__dict__[name].shape[1:])
-        )
-        for name in (*names, "relative_floor")
-    }
-    together = judge(facts.Evidence(levels=FIVE, **stacked))
+    together = judge(stacked(rows, (4, 5)))
     alone = [judge(row) for row in rows]
     assert together.reason.shape == (4, 5)
     assert together.reason.ravel().tolist() == [int(one.reason[0]) for one in alone]
@@ -252,7 +258,8 @@ def test_many_ladders_at_once_are_judged_as_one_by_one() -> None:
 def test_random_ladders_have_no_false_pass(norm: str) -> None:
     rng = np.random.default_rng(2026)
     false_pass, false_fail, right, passed, widths = [], [], 0, 0, []
-    for i in range(700):
+    of_levels: dict[tuple[int, ...], list[tuple[Truth, float, ladder_statistics.Evidence]]] = {}
+    for _ in range(700):
         truth = random_truth(rng)
         p, q = truth.orders
         formal = float(rng.choice([p, p, p, q, p + 1, max(p - 1, 0.5)]))
@@ -264,20 +271,24 @@ def test_random_ladders_have_no_false_pass(norm: str) -> None:
             exact=truth.exact,
             norm=norm,
         )
-        found = judge(evidence)
-        status, reason = STATUSES[int(found.status[0])], REASON_NAMES[int(found.reason[0])]
-        mixed = np.isnan(truth.order)
-        # with three clean levels, a mixture of two powers may look like the second one alone
-        visible = min(truth.clean, len(truth.levels)) > 3
-        in_it = found.low[0] <= min(p, q) and max(p, q) <= found.high[0]
-        if status == "PASS" and (truth.order != formal if not mixed else visible and not in_it):
-            false_pass.append((i, formal, truth.orders, reason))
-        if truth.order == formal and truth.clean > 2:
-            right += 1
-            passed += status == "PASS"
-            widths.append(float(found.high[0] - found.low[0]) if status == "PASS" else np.nan)
-            if status == "FAIL":
-                false_fail.append((i, formal, reason, found.orders))
+        of_levels.setdefault(truth.levels, []).append((truth, formal, evidence))
+    for group in of_levels.values():
+        found = judge(stacked([evidence for *_, evidence in group], (len(group),)))
+        for i, (truth, formal, _) in enumerate(group):
+            p, q = truth.orders
+            status, reason = STATUSES[int(found.status[i])], REASON_NAMES[int(found.reason[i])]
+            mixed = np.isnan(truth.order)
+            # with three clean levels, a mixture of two powers may look like the second one alone
+            visible = min(truth.clean, len(truth.levels)) > 3
+            in_it = found.low[i] <= min(p, q) and max(p, q) <= found.high[i]
+            if status == "PASS" and (truth.order != formal if not mixed else visible and not in_it):
+                false_pass.append((truth.levels, formal, truth.orders, reason))
+            if truth.order == formal and truth.clean > 2:
+                right += 1
+                passed += status == "PASS"
+                widths.append(float(found.high[i] - found.low[i]) if status == "PASS" else np.nan)
+                if status == "FAIL":
+                    false_fail.append((truth.levels, formal, reason, found.orders[i]))
     assert false_pass == []
     assert len(false_fail) < 0.02 * right, false_fail
     assert passed > 0.6 * right
@@ -310,7 +321,7 @@ def from_orders(
     """Decide on a ladder of neighbouring levels from its local orders and its scatter alone."""
     difference = SMALL / np.cumprod([1.0, *(2.0**p for p in orders)])
     levels = tuple(range(6, 8 + len(orders)))
-    evidence = facts.Evidence(
+    evidence = ladder_statistics.Evidence(
         levels=levels,
         difference=difference[None],
         scatter=np.array([scatter]),

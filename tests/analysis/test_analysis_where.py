@@ -10,10 +10,10 @@ import pytest
 from sweeps import SWEEPS, of, simulated
 
 from vibsim.analysis import analyse_records, summarise, verdicts
-from vibsim.analysis.outcome import Outcome
-from vibsim.analysis.results import Results
-from vibsim.analysis.where import where
-from vibsim.record import Record, Variable
+from vibsim.checks.outcome import Outcome
+from vibsim.checks.results import Results
+from vibsim.checks.sweep_regions import where
+from vibsim.core.record import Record, Variable
 
 
 def outcome(compared: np.ndarray, away: np.ndarray | None = None) -> Outcome:
@@ -32,6 +32,7 @@ def outcome(compared: np.ndarray, away: np.ndarray | None = None) -> Outcome:
         quantity=None,
         tell=lambda scheme, case: "",
         advise=lambda scheme, case: "",
+        facts={},
     )
 
 
@@ -167,7 +168,7 @@ def test_the_worst_are_the_beginning_of_the_ranking(seed: int) -> None:
     found = outcome(rng.integers(0, 3, shape).astype(np.int8), away)
     for most in (1, 3, 10, 200):
         assert found.worst(most).tolist() == found.ranking[:most].tolist()
-        assert Results(found).worst(most) == Results(found)[:most]
+        assert tuple(result for result, _ in Results(found).told(most)) == Results(found)[:most]
     assert len(Results(found)) == len(list(Results(found))) == found.total
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from vibsim import Experiment
-from vibsim.analysis.asked import what
+from vibsim.checks.value.criteria import what
 
 
 @pytest.mark.parametrize(

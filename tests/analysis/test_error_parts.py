@@ -10,11 +10,11 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from spring_runs import Run, judged, spring
 
-from vibsim.analysis.parts_told import sentence
-from vibsim.errors import InputError
-from vibsim.record import Record, Variable
+from vibsim.checks.order.phase_amplitude_text import sentence
+from vibsim.core.errors import InputError
+from vibsim.core.record import Record, Variable
+from vibsim.experiment import Experiment
 from vibsim.simulation import simulate_record
-from vibsim.spec import Experiment
 
 W = 2 * np.pi
 PARTS = [

@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vibsim.analysis.climb import Extrapolated, extrapolate_members
-from vibsim.analysis.extrapolation import best_record
-from vibsim.analysis.method import Method, Start
-from vibsim.analysis.tableau import FLOATS, Circumstances, best_entry
-from vibsim.analysis.weights import tableau
+from vibsim.comparison.best_solution import best_record
+from vibsim.comparison.extrapolate_members import Extrapolated, extrapolate_members
+from vibsim.comparison.member_method import Method, Start
+from vibsim.convergence.romberg import FLOATS, Circumstances, best_entry
+from vibsim.convergence.romberg_weights import tableau
+from vibsim.core.record import Record, Variable
 from vibsim.engine import integrate
+from vibsim.experiment import Experiment
 from vibsim.ladder import climb
 from vibsim.models import MODELS
-from vibsim.record import Record, Variable
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import simulate_record
-from vibsim.spec import Experiment
 
 Floats = NDArray[np.float64]
 ARITHMETICS = ("compensated", "increment", "three_term")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from vibsim.analysis import analyse_records
-from vibsim.analysis.gci import CLASSES, classify, index, of_order, relative
+from vibsim.convergence.gci import CLASSES, classify, index, of_order, relative
+from vibsim.experiment import Experiment
 from vibsim.simulation import simulate_record
-from vibsim.spec import Experiment
 
 LEVELS = (4, 5, 6)
 

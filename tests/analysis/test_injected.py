@@ -11,8 +11,8 @@ from judged import Finding, findings
 from numpy.typing import NDArray
 from synthetic import POINTS, Group, Ladder
 
-from vibsim.analysis.series import scatters
-from vibsim.vocabulary import NORMS
+from vibsim.convergence.differences import scatters
+from vibsim.core.vocabulary import NORMS
 
 Floats = NDArray[np.float64]
 T = np.linspace(0.0, 1.0, POINTS + 1)

@@ -1,6 +1,6 @@
 """Limits of single numbers: exact where the expansion ends, with a bound that holds where it does not.
 
-The table that the calibration prints with ``-s`` stands in ``docs/verdicts.md``.
+The table that the calibration prints with ``-s`` stands in ``docs/method.md``.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from synthetic import FAMILIES, groups
 
-from vibsim.analysis.limits import limit, observed_order
+from vibsim.convergence.scalar_extrapolation import limit, observed_order
 
 HELD_OUT = 2
 TUNED = (1, 3)

@@ -10,9 +10,9 @@ import pytest
 from spring_runs import spring
 
 from vibsim.analysis import analyse_records
-from vibsim.analysis.local_order import box_sum, local_order, window_points
+from vibsim.convergence.local_order import box_sum, local_order, window_points
+from vibsim.experiment import Experiment
 from vibsim.simulation import simulate_record
-from vibsim.spec import Experiment
 
 END, POINTS = 40.0, 801
 T = np.linspace(0.0, END, POINTS)

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from spring_runs import Run, judged
 
-from vibsim.analysis.parts import analyse_parts, joined
-from vibsim.record import Record, Variable
+from vibsim.analysis.blockwise import analyse_parts, joined
+from vibsim.core.record import Record, Variable
+from vibsim.experiment import Experiment
 from vibsim.schemes import FIXED_STEP
 from vibsim.simulation import simulate_record
-from vibsim.spec import Experiment
 
 sys.path.append(str(Path(__file__).parents[1] / "theory"))
 from scheme_variants import VARIANTS

@@ -11,8 +11,8 @@ from sweeps import simulated
 
 from vibsim import Experiment, InputError, VibsimError, best, ladder, verdicts
 from vibsim.analysis import analyse_records, kept, summarise
-from vibsim.analysis.extrapolation import best_record
-from vibsim.record import Record
+from vibsim.comparison.best_solution import best_record
+from vibsim.core.record import Record
 
 STATES = ("theta", "omega")
 HARD = 22

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vibsim.analysis.shift import FEWEST, shift, strides
-from vibsim.analysis.template import template
 from vibsim.models import MODELS
+from vibsim.observe.quintic_interpolant import template
+from vibsim.observe.waveform_fit import FEWEST, shift, strides
 
 W = 2 * np.pi
 T = np.linspace(0.0, 10.0, 321)

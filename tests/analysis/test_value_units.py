@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from vibsim import spec
+from vibsim import experiment as spec
 from vibsim.analysis import analyse_records, verdicts
-from vibsim.analysis.parts import joined, kept
-from vibsim.analysis.value_units import unit_of
+from vibsim.analysis.blockwise import joined, kept
+from vibsim.checks.value.units import unit_of
+from vibsim.experiment.value_names import VALUES
 from vibsim.simulation import simulate_record
-from vibsim.spec.values import VALUES
 
 QUANTITIES = {"value": "end", "quantity": "omega", "above": -9.0}
 
@@ -25,7 +25,7 @@ def run(*checks, **changes):
         "schemes": ["central"],
         "checks": list(checks),
     }
-    experiment = spec.from_dict(content | changes, name="swing", collection="adhoc")
+    experiment = spec.Experiment.from_dict(content | changes, name="swing", collection="adhoc")
     levels = {level: simulate_record(experiment, level) for level in experiment.levels}
     return experiment, analyse_records(experiment, levels)
 

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vibsim.analysis.assemble import analyse_records
-from vibsim.analysis.compare import Comparison, comparisons
-from vibsim.analysis.part import part_of
-from vibsim.analysis.work import reference_of, work_precision
+from vibsim.analysis.compare_levels import analyse_records
+from vibsim.comparison.quantity_comparison import Comparison, comparisons
+from vibsim.comparison.work_precision import reference_of, work_precision
+from vibsim.experiment import Experiment
+from vibsim.observe.member_block import part_of
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import simulate_record
-from vibsim.spec import from_dict
 
-EXPERIMENT = from_dict(
+EXPERIMENT = Experiment.from_dict(
     {
         "title": "work",
         "model": {"kind": "pendulum"},

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from vibsim.cli import deleted, jobs, main, room, workflow
-from vibsim.errors import FileError, VibsimError
+from vibsim.cli import main, resources
+from vibsim.cli.jobs import deleted, extrapolate
+from vibsim.cli.run import snakemake
+from vibsim.core.errors import FileError, VibsimError
 from vibsim.models import MODELS
 
 TEXT = """\
@@ -87,7 +89,7 @@ def test_what_does_not_fit_is_refused_with_both_numbers(
     function: str,
     told: str,
 ) -> None:
-    monkeypatch.setattr(room, function, lambda _: 1500)
+    monkeypatch.setattr(resources, function, lambda _: 1500)
     results = tmp_path / "results"
     assert main([command, str(file), "--results", str(results)]) == 2
     assert told in capsys.readouterr().err
@@ -141,13 +143,16 @@ def test_a_failing_shard_names_its_members_and_the_other_levels_are_made(
     common = [str(file), "--results", str(tmp_path)]
     assert main(["simulate", *common, "--level", "5", "6", "7"]) == 1
     told = capsys.readouterr().err
-    assert "adhoc/tiny, level 5, members 0 to 299: MemoryError" in told
-    assert "adhoc/tiny, level 6, members 0 to 299: ZeroDivisionError: a fault in the code" in told
-    assert "Traceback" in told, "a fault in the code is shown with its place"
+    assert "adhoc/tiny, level 5, members 0 to 299: not enough memory (MemoryError)" in told
+    assert (
+        "adhoc/tiny, level 6, members 0 to 299: internal error, test_cli_commands.py, line" in told
+    )
+    assert "ZeroDivisionError: a fault in the code" in told
+    assert "Traceback" not in told, "the full text is in a file of its own"
     assert (tmp_path / "adhoc/tiny/level_07/shard_0000.nc").is_file()
     out = ["--out", str(tmp_path / "x.nc")]
     assert main(["simulate", *common, "--level", "5", *out]) == 1
-    assert "level 5, members 0 to 299: MemoryError" in capsys.readouterr().err
+    assert "level 5, members 0 to 299: not enough memory" in capsys.readouterr().err
 
 
 def test_an_extrapolation_is_made_only_where_it_is_asked_for(
@@ -165,7 +170,7 @@ def test_an_extrapolation_is_made_only_where_it_is_asked_for(
     record = store.read(tmp_path / "adhoc/tiny/best.nc")
     assert record["theta"].shape[:2] == (1, 300)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(jobs, "PART_BYTES", 100_000)
+        patch.setattr(extrapolate, "PART_BYTES", 100_000)
         assert main(["extrapolate", *common]) == 0
     assert (tmp_path / "adhoc/tiny/best.nc").read_bytes() == whole
 
@@ -266,7 +271,7 @@ def test_a_closed_pipe_is_no_fault() -> None:
 
 def test_the_command_starts_without_what_it_does_not_need() -> None:
     program = (
-        "import sys; import vibsim.cli.run\n"
+        "import sys; import vibsim.cli.run.command\n"
         "heavy = {'numpy', 'pydantic', 'yaml', 'netCDF4', 'xarray', 'llvmlite', 'snakemake'}\n"
         "assert not heavy & set(sys.modules), heavy & set(sys.modules)"
     )
@@ -280,8 +285,8 @@ def test_unknown_formats_are_refused_first(file: Path, tmp_path: Path, capsys: C
 
 
 def test_the_formats_are_those_of_the_report() -> None:
-    from vibsim.cli.jobs import FORMATS
-    from vibsim.report import drawing
+    from vibsim.cli.jobs.report import FORMATS
+    from vibsim.report.figures import drawing
 
     assert FORMATS == drawing.FORMATS
 
@@ -312,13 +317,61 @@ def test_a_folder_in_the_place_of_a_file_is_deleted_only_when_empty(tmp_path: Pa
     assert deleted.take(tmp_path) == [f"{folder}: bad"]
 
 
-def test_caches_move_to_the_results_where_home_cannot_be_written(
+def test_search_paths_do_not_mean_the_results_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Snakemake and its jobs work there, and an empty place in a search path means the folder that one is in."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("VIBSIM_CACHE_DIR", str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", ":here:/there")
+    monkeypatch.setenv("LD_LIBRARY_PATH", "/there:")
+    found = snakemake._environment()
+    assert found["PYTHONPATH"] == f"{tmp_path}:{tmp_path}/here:/there"
+    assert found["LD_LIBRARY_PATH"] == f"/there:{tmp_path}"
+
+
+def test_snakemake_keeps_its_rules_where_nobody_else_can_write(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own, home = tmp_path / "own", tmp_path / "home"
+    monkeypatch.setenv("VIBSIM_CACHE_DIR", str(own))
+    monkeypatch.setenv("HOME", str(home))
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
-    monkeypatch.setenv("HOME", str(tmp_path))
-    assert workflow._caches(tmp_path) == {}
+    assert snakemake._environment()["XDG_CACHE_HOME"] == str(home / ".cache")
+    (home / ".cache").chmod(0o777)
+    assert snakemake._environment()["XDG_CACHE_HOME"] == str(own)
     monkeypatch.setenv("HOME", "/proc/none")
-    found = workflow._caches(tmp_path)
-    assert Path(found["XDG_CACHE_HOME"]).is_dir()
-    assert Path(found["XDG_CACHE_HOME"]).is_relative_to(tmp_path / ".vibsim")
+    assert snakemake._environment()["XDG_CACHE_HOME"] == str(own)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["run", "--results", ""],
+        ["run", ""],
+        ["run", "--results="],
+        ["run", "pendulum_lab", "  "],
+        ["check", ""],
+        ["plan", "pendulum_lab", "--results", ""],
+        ["simulate", "", "--level", "6"],
+        ["simulate", "theta_convergence", "--level", "6", "--out", ""],
+        ["simulate", "theta_convergence", "--level", "6", "--results", ""],
+        ["analyse", "theta_convergence", "--out", ""],
+        ["extrapolate", "theta_convergence", "--out", ""],
+        ["report", "theta_convergence", "--out", ""],
+        ["report", "--results", ""],
+        ["report", "theta_convergence", "--formats", ""],
+    ],
+)
+def test_an_empty_name_is_refused(
+    arguments: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert caught.value.code == 2
+    assert "must not be empty" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

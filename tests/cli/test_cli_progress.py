@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import pytest
 
-from vibsim.cli.progress import Progress, describe
-from vibsim.cli.units import amount, duration, size
-from vibsim.cli.workflow import Job, _Reader
+from vibsim.cli.run.progress import Progress, describe
+from vibsim.cli.run.snakemake import Job, _Reader
+from vibsim.cli.sizes import amount, duration, size
 
 TEXT = """\
 Building DAG of jobs...

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from elementary_arguments import EXACT, arguments, error, exact
 
-from vibsim import expression
+from vibsim import formula
 from vibsim.elementary import ELEMENTARY
 
 INF, NAN, PI, TINY = math.inf, math.nan, math.pi, math.ulp(0.0)
@@ -133,8 +133,8 @@ def bits(value):
 
 
 def test_every_function_of_a_formula_is_there():
-    assert set(ELEMENTARY) == {*expression.FUNCTIONS, "power"}
-    for name, (count, _) in expression.FUNCTIONS.items():
+    assert set(ELEMENTARY) == {*formula.FUNCTIONS, "power"}
+    for name, (count, _) in formula.FUNCTIONS.items():
         assert len(inspect.signature(ELEMENTARY[name].full).parameters) == count
 
 

@@ -62,9 +62,10 @@ def same(a, b):
     return (a.view(np.int64) == b.view(np.int64)) | (np.isnan(a) & np.isnan(b))
 
 
+@pytest.mark.parametrize("count", [4_000, pytest.param(20_000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", ELEMENTARY)
-def test_fast_and_full_plain_and_compiled(name):
-    columns = arguments(name, 20_000)
+def test_fast_and_full_plain_and_compiled(name, count):
+    columns = arguments(name, count)
     function = ELEMENTARY[name]
     full = plain(function.full, columns)
     fast = plain(function.fast, columns) if function.fast is not function.full else full

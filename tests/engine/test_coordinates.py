@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from vibsim.core.errors import SimulationError
 from vibsim.engine import integrate
 from vibsim.engine.coordinates import NUMBER, VECTOR, collect_system
 from vibsim.engine.text import Module
-from vibsim.errors import SimulationError
 from vibsim.models import MODELS
 from vibsim.models.base import Damping, Parameter, State
 from vibsim.schemes import FIXED_STEP, SCHEMES
@@ -178,7 +178,7 @@ def test_a_stiff_wire_keeps_its_digits():
     """The force from 40 digits, at a place where L - 1 is as small as 1 - beta."""
     from mpmath import mp, mpf, sqrt
 
-    from vibsim.expression import evaluate
+    from vibsim.formula import evaluate
     from vibsim.models import tree
 
     mp.dps = 40

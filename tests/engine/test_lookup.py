@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from vibsim.core.errors import SimulationError
 from vibsim.engine import integrate
-from vibsim.errors import SimulationError
 from vibsim.models import MODELS, Model
 from vibsim.models.table import Table
 from vibsim.schemes import FIXED_STEP, SCHEMES

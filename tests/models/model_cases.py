@@ -3,16 +3,17 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
-from scipy.integrate import solve_ivp
+from scipy.integrate import OdeSolution, solve_ivp
 
 from vibsim.engine import integrate
 from vibsim.models import MODELS
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Case:
     """A model with numbers, and its acceleration as a function of (u, v, t) that shares nothing with it.
 
@@ -61,16 +62,7 @@ class Case:
 
     def reference(self, t):
         """The states at times t, by SciPy at its smallest tolerance."""
-        found = solve_ivp(
-            lambda t, y: (*y[self.coordinates :], *self.accelerations(y, t)),
-            (0.0, max(self.end, t[-1])),
-            self.initial,
-            method="DOP853",
-            t_eval=t,
-            rtol=3e-14,
-            atol=1e-15,
-        )
-        return found.y
+        return solution(self, max(self.end, t[-1]))(t)
 
     def run(self, scheme, steps, *, lane="plain", **more):
         numbers = np.array([list(self.parameters.values())])
@@ -79,6 +71,21 @@ class Case:
         if any(option.name == "end_velocity" for option in scheme.options):
             options = {**options, "end_velocity": "kick"}
         return integrate(self.model, scheme, options, *arrays, steps, 1, lane=lane, **more)
+
+
+@cache
+def solution(case: Case, end: float) -> OdeSolution:
+    """Solve the equation of a case once, for every scheme that is compared with it."""
+    found = solve_ivp(
+        lambda t, y: (*y[case.coordinates :], *case.accelerations(y, t)),
+        (0.0, end),
+        case.initial,
+        method="DOP853",
+        dense_output=True,
+        rtol=3e-14,
+        atol=1e-15,
+    )
+    return found.sol
 
 
 def elastic(u, v, t, beta, gamma=0.0, push=lambda t: (0.0, 0.0)):

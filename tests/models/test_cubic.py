@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from vibsim.models.cubic import motion, period
+from vibsim.models.shared.cubic import motion, period
 
 T = np.linspace(0.0, 4.0, 9)
 

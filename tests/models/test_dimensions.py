@@ -6,9 +6,9 @@ from fractions import Fraction
 
 import pytest
 
-from vibsim.expression import names_in, parse, to_formula
-from vibsim.expression.tree import Name
-from vibsim.models.dimensions import DimensionError, over_scales, powers
+from vibsim.formula import names_in, parse, to_formula
+from vibsim.formula.tree import Name
+from vibsim.models.shared.dimensions import DimensionError, over_scales, powers
 
 KNOWN = {"u": (0, 1, 0), "v": (0, 1, -1), "t": (0, 0, 1)}
 NAMES = ("k", "b", "A", "B", "w", "n", "t0", "a")

@@ -4,8 +4,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from vibsim.models import elliptic
-from vibsim.models.elliptic import agm_quarter_period, carlson_rf, jacobi, pendulum_motion
+from vibsim.models.shared import elliptic
+from vibsim.models.shared.elliptic import agm_quarter_period, carlson_rf, jacobi, pendulum_motion
 
 BOUNDS = [bound for bound, _ in elliptic._MEANS if bound]
 EDGES = [

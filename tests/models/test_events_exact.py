@@ -6,7 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from vibsim.expression import values
+from vibsim.formula import values
 from vibsim.models import MODELS, tree
 from vibsim.models import bouncing_ball as ball
 from vibsim.models import sliding_box as box

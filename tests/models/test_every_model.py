@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibsim.expression import evaluate
+from vibsim.formula import evaluate
 from vibsim.models import MODELS, quantities, tree
 
 RNG = np.random.default_rng(11)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vibsim.models import MODELS, Model
-from vibsim.models.free import free_oscillation, why_not_free
+from vibsim.models.shared.free import free_oscillation, why_not_free
 
 OSCILLATOR = MODELS["oscillator"]
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from vibsim.engine import LANES, integrate
-from vibsim.expression import names_in
+from vibsim.experiment import Experiment
+from vibsim.formula import names_in
 from vibsim.models import tree
 from vibsim.models.oscillator import written
 from vibsim.schemes import FIXED_STEP
-from vibsim.spec import Experiment
 
 FORMULAS = [
     {"spring": "k*u + u**3", "force": "k*cos(2*t)"},

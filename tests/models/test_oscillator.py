@@ -7,10 +7,10 @@ import mpmath
 import numpy as np
 import pytest
 
-from vibsim.expression import ExpressionError, derivative, names_in, parse, values
+from vibsim.formula import ExpressionError, derivative, names_in, parse, values
 from vibsim.models import MODELS, tree
-from vibsim.models.mechanical import damping_of
 from vibsim.models.oscillator import Written, written
+from vibsim.models.shared.mechanical import damping_of
 
 EPS = np.finfo(float).eps
 DAMPINGS = ("0", "c*v", "c*abs(v)*v", "c*v + v**3", "c*tanh(v)", "b*v", "b*abs(v)*v")

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vibsim.models import MODELS
-from vibsim.models.elliptic import agm_quarter_period, carlson_rf, jacobi
+from vibsim.models.shared.elliptic import agm_quarter_period, carlson_rf, jacobi
 
 UNIT = {"g": 1.0, "L": 1.0, "m": 1.0}
 

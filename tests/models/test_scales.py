@@ -9,7 +9,7 @@ import pytest
 
 from vibsim.models import MODELS
 from vibsim.models.oscillator import written
-from vibsim.models.scales import dimensionless, scaled_parameters, scales
+from vibsim.models.shared.scales import dimensionless, scaled_parameters, scales
 
 FORMULAS = {
     "oscillator": {"spring": "k*u"},

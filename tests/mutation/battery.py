@@ -222,9 +222,10 @@ EXPERIMENTS = {
 
 def run(name: str) -> dict[str, Any]:
     """Return what the verdicts of an experiment say, by check and scheme, and what a plain ratio says."""
-    from vibsim import analyse, simulate, spec, verdicts
+    from vibsim import analyse, simulate, verdicts
+    from vibsim import experiment as spec
 
-    experiment = spec.from_dict(EXPERIMENTS[name], name=name, collection="battery")
+    experiment = spec.Experiment.from_dict(EXPERIMENTS[name], name=name, collection="battery")
     found = analyse(experiment, [simulate(experiment, level) for level in experiment.levels])
     told = {}
     for check, verdict in zip(experiment.checks, verdicts(experiment, found), strict=True):

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from vibsim.errors import InputError, VibsimError
-from vibsim.plan import Choice, code, load, load_all
-from vibsim.spec import Experiment
+from vibsim.core.errors import InputError, VibsimError
+from vibsim.experiment import Experiment
+from vibsim.plan import Choice, code_digest, load, load_all
 
 from .conftest import TEXT
 
@@ -20,9 +20,14 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def entry(results: Path) -> Path:
-    (found,) = (results / ".vibsim/plans").iterdir()
-    return found
+@pytest.fixture(autouse=True)
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("VIBSIM_CACHE_DIR", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def entries(home: Path) -> list[Path]:
+    return [path for path in (home / "plans").iterdir() if not path.name.startswith("lock_")]
 
 
 def refuse_to_build(*_: object, **__: object) -> None:
@@ -32,17 +37,17 @@ def refuse_to_build(*_: object, **__: object) -> None:
 def test_a_cached_plan_is_the_plan(
     tmp_path: Path, file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    built = load(Choice("adhoc", file), tmp_path)
+    built = load(Choice("adhoc", file), cached=True)
     monkeypatch.setattr("vibsim.plan.build.build", refuse_to_build)
-    assert load(Choice("adhoc", file), tmp_path) == built
+    assert load(Choice("adhoc", file), cached=True) == built
     with pytest.raises(AssertionError, match="built again"):
-        load(Choice("other", file), tmp_path)
+        load(Choice("other", file), cached=True)
 
 
 @pytest.mark.parametrize("fault", ["flip", "cut", "empty", "foreign"])
-def test_a_damaged_entry_is_built_again(tmp_path: Path, file: Path, fault: str) -> None:
-    built = load(Choice("adhoc", file), tmp_path)
-    path = entry(tmp_path)
+def test_a_damaged_entry_is_built_again(home: Path, file: Path, fault: str) -> None:
+    built = load(Choice("adhoc", file), cached=True)
+    (path,) = entries(home)
     content = path.read_bytes()
     places = range(0, len(content), 37) if fault == "flip" else [0]
     for place in places:
@@ -50,32 +55,32 @@ def test_a_damaged_entry_is_built_again(tmp_path: Path, file: Path, fault: str) 
         damaged[place] ^= 1
         kinds = {"flip": damaged, "cut": content[:-9], "empty": b"", "foreign": b"{}"}
         path.write_bytes(kinds[fault])
-        assert load(Choice("adhoc", file), tmp_path) == built
+        assert load(Choice("adhoc", file), cached=True) == built
         assert path.read_bytes() == content
 
 
 def test_a_changed_file_and_changed_code_are_planned_again(
     tmp_path: Path, file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    load(Choice("adhoc", file), tmp_path)
+    load(Choice("adhoc", file), cached=True)
     file.write_text(TEXT.replace("A tiny", "Another"))
-    assert load(Choice("adhoc", file), tmp_path).title == "Another pendulum"
-    monkeypatch.setattr(code, "everything", lambda: "other code")
+    assert load(Choice("adhoc", file), cached=True).title == "Another pendulum"
+    monkeypatch.setattr(code_digest, "everything", lambda: "other code")
     monkeypatch.setattr("vibsim.plan.build.build", refuse_to_build)
     with pytest.raises(AssertionError, match="built again"):
-        load(Choice("adhoc", file), tmp_path)
+        load(Choice("adhoc", file), cached=True)
 
 
-def test_faults_of_all_files_are_told_at_once(tmp_path: Path, file: Path) -> None:
+def test_faults_of_all_files_are_told_at_once(tmp_path: Path, home: Path, file: Path) -> None:
     bad = [tmp_path / "a.yaml", tmp_path / "b.yaml"]
     for path in bad:
         path.write_text(TEXT.replace("end: 20.0", "end: -1"))
     missing = tmp_path / "none.yaml"
     with pytest.raises(InputError) as caught:
-        load_all([Choice("adhoc", p) for p in (*bad, missing, file)], tmp_path)
+        load_all([Choice("adhoc", p) for p in (*bad, missing, file)], cached=True)
     told = str(caught.value)
     assert all(str(path) in told for path in (*bad, missing))
-    assert not [p for p in (tmp_path / ".vibsim/plans").iterdir() if p.name != "adhoc.tiny.json"]
+    assert len(entries(home)) == 1
 
 
 def test_a_member_alone_has_the_ladder_of_the_whole_sweep(tmp_path: Path, file: Path) -> None:
@@ -88,21 +93,24 @@ def test_a_member_alone_has_the_ladder_of_the_whole_sweep(tmp_path: Path, file: 
         seen.append(experiment.members)
         return experiment.with_levels((6, 7, 8))
 
-    plan = load(Choice("adhoc", file, 1), tmp_path, resolve)
+    plan = load(Choice("adhoc", file, 1), resolve, cached=True)
     assert plan.experiment.levels == (6, 7, 8)
     assert plan.experiment.initial["theta"] == 1.0
     assert seen == [3]
     with pytest.raises(InputError, match="from 0 to 2"):
-        load(Choice("adhoc", file, 3), tmp_path, resolve)
+        load(Choice("adhoc", file, 3), resolve, cached=True)
     assert seen == [3], "no pilot for a member that does not exist"
     with pytest.raises(VibsimError, match="nothing is there to choose levels"):
-        load(Choice("adhoc", file, 2), tmp_path)
+        load(Choice("adhoc", file, 2), cached=True)
 
 
-def test_results_that_cannot_be_written_do_without_a_cache(tmp_path: Path, file: Path) -> None:
+def test_plans_are_made_without_a_cache(
+    tmp_path: Path, file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     blocked = tmp_path / "blocked"
     blocked.write_text("a file where the folder should be")
-    assert load(Choice("adhoc", file), blocked).name == "tiny"
+    monkeypatch.setenv("VIBSIM_CACHE_DIR", str(blocked))
+    assert load(Choice("adhoc", file), cached=True).name == "tiny"
 
 
 MANY = """
@@ -111,7 +119,7 @@ from pathlib import Path
 from vibsim.plan import Choice, load_all
 folder = Path(sys.argv[1])
 choices = [Choice("adhoc", p) for p in sorted(folder.glob("*.yaml"))]
-print(len(load_all(choices, folder)))
+print(len(load_all(choices, cached=True)))
 heavy = {"numpy", "pydantic", "yaml", "netCDF4", "xarray", "llvmlite"} & set(sys.modules)
 assert len(sys.argv) < 3 or not heavy, heavy
 """

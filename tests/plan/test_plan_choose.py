@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from vibsim.errors import InputError
+from vibsim.core.errors import InputError
 from vibsim.plan import choose
 
 

@@ -1,111 +1,286 @@
 from __future__ import annotations
 
+import json
 import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 import vibsim
-from vibsim.plan import build, code, shards
+from vibsim.models import MODELS
+from vibsim.plan import build, code_digest, shards
+from vibsim.schemes import SCHEMES
+
+PACKAGE = Path(vibsim.__file__).parent
+ROOT = PACKAGE.parent
 
 
-@pytest.fixture
-def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+@pytest.fixture(scope="module")
+def package(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """Return a copy of the package whose sources may be changed, read but never executed."""
-    copy = tmp_path / "vibsim"
-    ignored = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(Path(vibsim.__file__).parent, copy, ignore=ignored)
-    monkeypatch.setattr(code, "PACKAGE", copy)
-    forget()
-    yield copy
+    copy = tmp_path_factory.mktemp("copy") / "vibsim"
+    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(code_digest, "PACKAGE", copy)
+        forget()
+        yield copy
     forget()
 
 
 def forget() -> None:
     for cached in (
-        code.everything,
-        code._imports,
+        code_digest.everything,
+        code_digest._imports,
+        code_digest._handed_on,
         shards.code_of,
-        build._analysis_code,
-        build.report_code,
+        build._code,
     ):
         cached.cache_clear()
 
 
 def digests() -> dict[str, str]:
-    forget()
+    """Return the digests of the code; imports are not read anew, which a constant at the end does not change."""
+    for cached in (code_digest.everything, shards.code_of, build._code):
+        cached.cache_clear()
     return {
         "pendulum": shards.code_of("pendulum", ("central",)),
         "linear": shards.code_of("linear_pendulum", ("central",)),
-        "analysis": build._analysis_code(),
-        "report": build.report_code(),
-        "everything": code.everything(),
+        "analyse": build._code("analyse"),
+        "extrapolate": build._code("extrapolate"),
+        "report": build._code("report"),
+        "everything": code_digest.everything(),
     }
 
 
-def python_files(package: Path, part: str) -> list[Path]:
-    path = package / part
-    return sorted(path.rglob("*.py")) if path.is_dir() else [path]
+@pytest.fixture(scope="module")
+def before(package: Path) -> dict[str, str]:
+    return digests()
 
 
-SPEC = Path(vibsim.__file__).parent / "spec"
-SPEC_ALONE = sorted(path.stem for path in SPEC.glob("*.py"))
-"""What makes an experiment, its members and its samples: the numbers that come out are themselves part of a digest."""
+SIMULATIONS = {"pendulum", "linear"}
+ALL = {*SIMULATIONS, "analyse", "extrapolate", "report"}
+AFTER = ALL - SIMULATIONS
 
 
 @pytest.mark.parametrize(
     ("part", "touched"),
     [
-        ("engine", {"pendulum", "linear"}),
-        ("elementary", {"pendulum", "linear"}),
-        ("simulation", {"pendulum", "linear"}),
-        ("schemes/base.py", {"pendulum", "linear"}),
-        ("models/base.py", {"pendulum", "linear"}),
-        ("schemes/central.py", {"pendulum", "linear"}),
+        ("core/errors.py", ALL),
+        ("core/vocabulary.py", ALL),
+        ("core/lazy.py", ALL),
+        ("core/record.py", ALL),
+        ("core/netcdf.py", ALL),
+        ("__init__.py", ALL),
+        ("core/private_cache.py", {*SIMULATIONS, "analyse", "extrapolate"}),
+        ("experiment/level_counts.py", {"analyse", "report"}),
+        ("native/lowering.py", {*SIMULATIONS, "analyse", "extrapolate"}),
+        ("elementary/exponential.py", ALL),
+        ("formula/parser.py", ALL),
+        ("models/base.py", ALL),
         # The linear pendulum takes its parameters from the other one.
-        ("models/pendulum.py", {"pendulum", "linear"}),
+        ("models/pendulum.py", SIMULATIONS),
         ("models/linear_pendulum.py", {"linear"}),
-        ("record.py", {"pendulum", "linear", "analysis"}),
-        ("store/writing.py", {"pendulum", "linear", "analysis"}),
-        ("store/reading.py", {"analysis"}),
-        ("store/seal.py", {"pendulum", "linear", "analysis"}),
-        ("plan", set()),
-        ("analysis", {"analysis"}),
-        ("report", {"report"}),
-        ("cli", set()),
-        *((f"spec/{name}.py", set()) for name in SPEC_ALONE),
-        ("errors.py", set()),
+        ("models/spring.py", set()),
+        ("schemes/base.py", ALL),
+        ("schemes/central.py", SIMULATIONS),
+        ("schemes/nystrom.py", set()),
+        ("theory/amplification.py", {"analyse", "report"}),
+        ("experiment/experiment.py", ALL),
+        ("experiment/data.py", ALL),
+        ("experiment/stored_series.py", ALL - {"extrapolate"}),
+        ("experiment/stored_samples.py", ALL),
+        ("experiment/sweep/columns.py", ALL),
+        ("experiment/schema/axes.py", ALL),
+        ("experiment/schema/checks.py", ALL),
+        ("experiment/check_scheme_selection.py", {"analyse"}),
+        ("experiment/tables/file.py", ALL),
+        # An experiment file is read before a job has its plan, and what comes out is in the digest.
+        *(
+            (f"experiment/{name}.py", set())
+            for name in ("reading", "build", "schema/document", "faults", "units/convert")
+        ),
+        ("plan/cases.py", ALL),
+        ("plan/jobs.py", ALL),
+        ("plan/digested_part.py", ALL - {"report"}),
+        *(
+            (f"plan/{name}.py", set())
+            for name in ("build", "cache", "choose", "workflow_names", "shards")
+        ),
+        ("engine/member_loop.py", {*SIMULATIONS, "analyse", "extrapolate"}),
+        ("simulation/level.py", SIMULATIONS),
+        ("simulation/derived.py", SIMULATIONS),
+        ("checks/order/judge.py", {"analyse"}),
+        ("comparison/best_solution.py", {"analyse", "extrapolate"}),
+        ("ladder/choosing.py", set()),
+        ("store/writing.py", {*SIMULATIONS, "analyse", "extrapolate"}),
+        ("store/reading.py", ALL),
+        ("store/seal.py", ALL),
+        ("store/summary.py", {"analyse", "report"}),
+        ("report/page/page.py", {"report"}),
+        ("report/page/index.py", {"report"}),
+        ("report/templates/report.html", {"report"}),
+        ("cli/jobs/simulate.py", SIMULATIONS),
+        ("cli/jobs/analyse.py", {"analyse"}),
+        ("cli/jobs/extrapolate.py", {"extrapolate"}),
+        ("cli/jobs/report.py", {"report"}),
+        ("cli/jobs/common.py", ALL),
+        ("cli/run/command.py", set()),
+        ("cli/arguments.py", set()),
     ],
 )
-def test_a_changed_module_changes_what_uses_it(package: Path, part: str, touched: set[str]) -> None:
-    before = digests()
-    for file in python_files(package, part):
-        content = file.read_bytes()
-        file.write_bytes(content + b"\n# changed\n")
-        after = digests()
-        file.write_bytes(content)
-        changed = {name for name in before if before[name] != after[name]} - {"everything"}
-        # The analysis may use more of the core than it must: it is quick, and right to run again.
-        assert changed - {"analysis"} == touched - {"analysis"}, file
-        assert changed >= touched, file
-        assert before["everything"] != after["everything"]
-    assert digests() == before
-
-
-def test_templates_belong_to_the_report(package: Path) -> None:
-    before = digests()
-    template = next((package / "report/templates").rglob("*.html"))
-    template.write_text(template.read_text() + "<!-- changed -->")
+def test_a_changed_module_changes_what_can_run_it(
+    package: Path, before: dict[str, str], part: str, touched: set[str]
+) -> None:
+    file = package / part
+    content = file.read_bytes()
+    file.write_bytes(content + b"\n# changed\n")
     after = digests()
-    assert {n for n in before if before[n] != after[n]} == {"report", "everything"}
+    file.write_bytes(content)
+    assert {name for name in before if before[name] != after[name]} == {*touched, "everything"}
 
 
-def test_imports_for_types_alone_are_not_followed(package: Path) -> None:
-    (package / "record.py").write_text(
+def test_another_entry_under_the_same_name_changes_the_simulation(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The lists of all schemes and models count by the entries that they give."""
+    before = shards.code_of("pendulum", ("rk4",))
+    swapped = {**SCHEMES, "rk4": SCHEMES["rk2"]}
+    monkeypatch.setattr("vibsim.schemes.SCHEMES", swapped)
+    shards.code_of.cache_clear()
+    assert shards.code_of("pendulum", ("rk4",)) != before
+    shards.code_of.cache_clear()
+
+
+def test_imports_are_followed_wherever_they_stand(package: Path) -> None:
+    (package / "new.py").write_text(
         "from typing import TYPE_CHECKING\n"
+        "from vibsim import store\n"
+        "from vibsim.experiment import schemes_of\n"
         "if TYPE_CHECKING:\n    from vibsim.report import write\n"
-        "def f():\n    import vibsim.variables\n    from vibsim.models import base\n"
+        "def f():\n    import vibsim.variables\n    from vibsim.models import has_solution\n"
+        "    store.write_text()\n"
     )
     (package / "variables.py").write_text("")
-    forget()
-    assert code._imports("vibsim.record") == {"vibsim.variables", "vibsim.models.base"}
+    assert code_digest._imports("vibsim.new") == {
+        "vibsim",
+        "vibsim.models",
+        "vibsim.models.base",
+        "vibsim.experiment",
+        "vibsim.experiment.check_scheme_selection",
+        "vibsim.store",
+        "vibsim.store.atomic",
+        "vibsim.variables",
+    }
+
+
+def test_every_lazy_name_is_found_without_running_anything() -> None:
+    """A lazy name stands twice: for Python, and for the types; the digests go by the types."""
+    for package in ("vibsim", "vibsim.experiment", "vibsim.store"):
+        loaded = __import__(package, fromlist=["*"])
+        for name in set(loaded.__all__) - {"__version__"}:
+            found = getattr(getattr(loaded, name), "__module__", None)
+            if found and found.startswith("vibsim."):
+                assert found in code_digest._homes(package, name), name
+
+
+TRACE = """
+import json, sys, threading
+from pathlib import Path
+ran, state, begun = set(), threading.local(), []
+def trace(frame, event, argument):
+    name = frame.f_code.co_name
+    if event == "call" and name == "<module>":
+        state.depth = getattr(state, "depth", 0) + 1
+    elif event == "return" and name == "<module>":
+        state.depth = max(0, getattr(state, "depth", 0) - 1)
+    elif event == "call" and begun and not getattr(state, "depth", 0):
+        ran.add(frame.f_code.co_filename)
+    # A job has its plan when this has compared it.
+    if (event, name) in {("return", "check_digest"), ("call", "write_index")}:
+        begun.append(name)
+threading.setprofile(trace)
+sys.setprofile(trace)
+from vibsim.cli import main
+status = main(sys.argv[1:])
+sys.setprofile(None)
+from vibsim.plan.code_digest import PACKAGE
+files = [Path(file) for file in ran if file.startswith(f"{PACKAGE}/") and file.endswith(".py")]
+names = [".".join(("vibsim", *f.relative_to(PACKAGE).with_suffix("").parts)) for f in files]
+print(json.dumps([status, bool(begun), [name.removesuffix(".__init__") for name in names]]))
+"""
+
+
+def ran_by(*arguments: object) -> set[str]:
+    """Name the modules in which a job really runs a function, once it has its plan."""
+    command = [sys.executable, "-c", TRACE, *map(str, arguments)]
+    ended = subprocess.run(command, capture_output=True, text=True, check=True)
+    status, begun, names = json.loads(ended.stdout.splitlines()[-1])
+    assert (status, begun) == (0, True), ended.stderr
+    return set(names)
+
+
+def covered(command: str, model: str = "", schemes: tuple[str, ...] = ()) -> set[str]:
+    homes = [code_digest.home(MODELS[model], "vibsim.models")[0]] if model else []
+    homes += [code_digest.home(SCHEMES[kind], "vibsim.schemes")[0] for kind in schemes]
+    return code_digest.reached(f"vibsim.cli.jobs.{command}", *homes)
+
+
+EXPERIMENTS = {
+    "plain": ("pendulum", ("central",), "initial: {theta: 1.0}"),
+    "sweep": (
+        "pendulum",
+        ("rk4", "dop853"),
+        "initial: {theta: 1.0}\nsweep: {initial.theta: [0.5, 1.0]}\nsamples: common",
+    ),
+    "events": ("bouncing_ball", ("central", "velocity_verlet"), "initial: {h: 1.0}"),
+    "damped": (
+        "oscillator",
+        ("gauss4", "generalized_alpha"),
+        "initial: {u: 1.0}\nsweep: {schemes.generalized_alpha.rho_inf: [0.5, 0.8]}",
+    ),
+    "table": ("vehicle", ("crank_nicolson", "ab3"), "initial: {u: 0.0}\noutput: best"),
+}
+MODEL = {
+    "oscillator": ", damping: {linear: 0.1}, force: sin(t), spring: u",
+    "vehicle": ", m: 1.0, b: 0.1, spring: u, speed: 2.0, road: {table: road.csv}",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_every_job_runs_only_what_its_digest_covers(tmp_path: Path, name: str) -> None:
+    model, schemes, rest = EXPERIMENTS[name]
+    state = {"pendulum": "theta", "bouncing_ball": "h"}.get(model, "u")
+    file = tmp_path / f"{name}.yaml"
+    (tmp_path / "road.csv").write_text("x,h\n" + "".join(f"{x},{x % 3}\n" for x in range(50)))
+    file.write_text(
+        f"title: {name}\nmodel: {{kind: {model}{MODEL.get(model, '')}}}\n{rest}\ntime: {{end: 4.0}}\n"
+        f"levels: [5, 6, 7]\nschemes: [{', '.join(schemes)}]\nchecks:\n"
+        f"  - {{converges: {state}, order: 1, tolerance: 3}}\n"
+    )
+    common = ("--results", tmp_path / "results")
+    found = ran_by("simulate", file, "--level", 5, 6, 7, *common)
+    assert found <= covered("simulate", model, schemes)
+    found = ran_by("analyse", file, *common)
+    assert found <= covered("analyse") | covered("simulate", model, schemes)
+    assert found & covered("analyse")
+    if "output" in rest:
+        found = ran_by("extrapolate", file, *common)
+        assert found <= covered("extrapolate") | covered("simulate", model, schemes)
+    before = covered("analyse") | covered("simulate", model, schemes)
+    assert ran_by("report", file, *common) <= covered("report") | before
+    assert ran_by("report", *common) <= covered("report")
+
+
+def test_a_simulation_runs_only_what_its_digest_covers(tmp_path: Path) -> None:
+    file = tmp_path / "plain.yaml"
+    file.write_text(
+        "title: plain\nmodel: {kind: pendulum}\ninitial: {theta: 1.0}\ntime: {end: 4.0}\n"
+        "levels: [5, 6, 7]\nschemes: [central]\n"
+    )
+    found = ran_by("simulate", file, "--level", 5, "--results", tmp_path / "results")
+    assert {"vibsim.experiment.stored_series", "vibsim.plan.cases", "vibsim.store.writing"} <= found
+    assert found <= covered("simulate", "pendulum", ("central",))

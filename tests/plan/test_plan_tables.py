@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from vibsim.errors import InputError
+from vibsim.core.errors import InputError
 from vibsim.plan import Choice, Plan, load
 
 TEXT = """\
@@ -33,8 +33,8 @@ def put(file: Path, rows: list[str], name: str = "road.csv", head: str = "x,h") 
     (file.parent / name).write_text("\n".join([head, *rows]) + "\n")
 
 
-def plan(file: Path, results: Path | None = None) -> Plan:
-    return load(Choice("adhoc", file), results)
+def plan(file: Path, cached: bool = False) -> Plan:
+    return load(Choice("adhoc", file), cached=cached)
 
 
 def digests(made: Plan) -> tuple[object, ...]:
@@ -67,15 +67,16 @@ def test_the_same_numbers_run_nothing_again(file: Path) -> None:
 def test_a_kept_plan_knows_its_table(
     file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    kept = plan(file, tmp_path / "results")
+    monkeypatch.setenv("VIBSIM_CACHE_DIR", str(tmp_path / "cache"))
+    kept = plan(file, cached=True)
     with monkeypatch.context() as patch:
         patch.setattr("vibsim.plan.build.build", None)
-        assert plan(file, tmp_path / "results") == kept
+        assert plan(file, cached=True) == kept
     put(file, [*ROWS[:50], "5,0.123", *ROWS[51:]])
-    assert digests(plan(file, tmp_path / "results")) != digests(kept)
+    assert digests(plan(file, cached=True)) != digests(kept)
     (file.parent / "road.csv").unlink()
     with pytest.raises(InputError, match="there is no such file"):
-        plan(file, tmp_path / "results")
+        plan(file, cached=True)
 
 
 def test_a_table_that_changes_during_a_run_is_refused(file: Path) -> None:

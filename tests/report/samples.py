@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
-from vibsim import spec
+from vibsim import experiment as spec
 from vibsim.analysis import analyse_records, summarise, verdicts
 from vibsim.simulation import simulate_record
 
@@ -23,7 +23,7 @@ def experiment(*, name: str = "theta", collection: str = "pendulum_lab", **chang
         "levels": [6, 7, 8, 9],
         "schemes": CENTRAL,
     }
-    return spec.from_dict(content | changes, name=name, collection=collection)
+    return spec.Experiment.from_dict(content | changes, name=name, collection=collection)
 
 
 def record(exp: Any) -> Any:

@@ -11,20 +11,21 @@ import pytest
 import samples
 
 from vibsim.analysis import analyse_records
-from vibsim.record import Record
-from vibsim.report import choice, contents_best
-from vibsim.report.tables import to_csv, to_latex
+from vibsim.core.record import Record
+from vibsim.report import choice
+from vibsim.report.tables import best
+from vibsim.report.tables.table import to_csv, to_latex
 from vibsim.simulation import simulate_record
 
 
-def table(exp: object) -> tuple[Record, contents_best.Table]:
+def table(exp: object) -> tuple[Record, best.Table]:
     record = samples.record(exp)
-    found = contents_best.table(record, choice.members(record, "theta"))
+    found = best.table(record, choice.members(record, "theta"))
     assert found is not None
     return record, found
 
 
-def rows(found: contents_best.Table) -> dict[str, dict[str, str]]:
+def rows(found: best.Table) -> dict[str, dict[str, str]]:
     return {row["number"]: row for row in csv.DictReader(io.StringIO(to_csv(found)))}
 
 
@@ -56,7 +57,7 @@ def test_what_is_unknown_is_said() -> None:
     record, _ = table(samples.plain())
     bound = record.variables["period_richardson_error"]
     bound.values[...] = np.nan
-    found = contents_best.table(record, choice.members(record, "theta"))
+    found = best.table(record, choice.members(record, "theta"))
     assert found is not None
     assert any("unknown" in row for row in found.text_rows())
     assert rows(found)["period [s]"]["bound"] == ""
@@ -65,7 +66,7 @@ def test_what_is_unknown_is_said() -> None:
 def test_one_level_has_no_table_and_a_sweep_names_its_members() -> None:
     exp = samples.plain(levels=[9])
     record = samples.record(exp)
-    assert contents_best.table(record, choice.members(record, "theta")) is None
+    assert best.table(record, choice.members(record, "theta")) is None
     _, found = table(samples.swept(4))
     assert "member" in [column.header for column in found.columns]
 
@@ -78,7 +79,7 @@ def test_a_lean_record_has_period_and_amplitude() -> None:
         for level, row in levels.items()
     }
     record = analyse_records(exp, lean)
-    found = contents_best.table(record, choice.members(record, "theta"))
+    found = best.table(record, choice.members(record, "theta"))
     assert found is not None
     assert {row[0] for row in found.rows} == {"period [s]", "amplitude [rad]"}
     assert not {"GCI", "order"} & {column.header for column in found.columns}
@@ -103,4 +104,4 @@ def test_latex_has_every_row() -> None:
     ],
 )
 def test_rounding(value: float, error: float, text: str) -> None:
-    assert contents_best._rounded(value, error).text == text
+    assert best._rounded(value, error).text == text

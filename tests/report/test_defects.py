@@ -9,20 +9,11 @@ import pytest
 import samples
 
 from vibsim import report
-from vibsim.report import (
-    cards,
-    choice,
-    contents,
-    data,
-    drawing,
-    figures_map,
-    figures_order,
-    figures_solution,
-    figures_time,
-    layout,
-    style,
-)
+from vibsim.report import choice, data, style, sweep_layout
 from vibsim.report.data import Member
+from vibsim.report.figures import drawing, maps, order, solution, time
+from vibsim.report.page import cards
+from vibsim.report.tables import orders as contents
 
 STIFF = {
     "model": {"kind": "linear_pendulum"},
@@ -94,7 +85,7 @@ def test_svg_is_written_whatever_else_is_asked_for(tmp_path):
 def test_an_empty_panel_says_why_and_a_caption_names_only_what_is_drawn(changes, notes, absent):
     exp = samples.experiment(**changes)
     with style.applied():
-        picture = figures_order.against_step(exp, samples.record(exp), "theta", 0)
+        picture = order.against_step(exp, samples.record(exp), "theta", 0)
         text = drawing.svg(picture)
     assert all(note in text for note in notes)
     assert not [word for word in absent if word in picture.caption]
@@ -104,7 +95,7 @@ def test_a_caption_names_the_dotted_line_where_it_is_drawn():
     scheme = {"kind": "central", "arithmetic": "three_term"}
     exp = samples.experiment(schemes=[scheme], levels=[10, 12, 14, 16], samples="common")
     with style.applied():
-        picture = figures_order.against_step(exp, samples.record(exp), "theta", 0)
+        picture = order.against_step(exp, samples.record(exp), "theta", 0)
         text = drawing.svg(picture)
     assert ("dotted" in picture.caption) == ("predicted round-off" in text)
     assert "dotted" in picture.caption
@@ -115,8 +106,8 @@ def test_missing_cells_of_a_map_are_hatched_and_cells_have_borders():
         exp = samples.experiment(levels=[6, 7, 8, 9], sweep=sweep)
         record = samples.record(exp)
         with style.applied():
-            return figures_map.verdicts(
-                exp, record, layout.grid_of(layout.keys(record)), "theta", 0
+            return maps.verdicts(
+                exp, record, sweep_layout.grid_of(sweep_layout.keys(record)), "theta", 0
             )
 
     picture, full = draw(GRID), draw({**GRID, "model.g": [1.0, 4.0]})
@@ -167,8 +158,8 @@ def test_a_run_that_grows_is_cut_off_or_drawn_by_its_size():
     for rec, case in [(record, 0), (grown, 2), (grown, 8)]:
         member = Member(0, case, "central", role="worst")
         with style.applied():
-            top = figures_solution.solution(rec, "theta", member).figure.axes[0]
-            curves = figures_time.overlay(rec, "theta", member).figure.axes[0]
+            top = solution.solution(rec, "theta", member).figure.axes[0]
+            curves = time.overlay(rec, "theta", member).figure.axes[0]
         size = np.abs(rec["theta_exact"][case]).max()
         assert max(np.abs(top.get_ylim())) <= 3.0 * size * (1 + 1e-12)
         assert curves.get_yscale() == "log" or max(np.abs(curves.get_ylim())) < 1e6
@@ -182,7 +173,7 @@ def test_time_ends_with_the_breakdown_and_the_panel_says_so():
     t, member = data.times(record, 2), Member(0, 2, "central", role="worst")
     with style.applied():
         pages = [draw(record, "theta", member) for draw in
-                 (figures_solution.solution, figures_time.overlay)]  # fmt: skip
+                 (solution.solution, time.overlay)]  # fmt: skip
     for page in pages:
         top = page.figure.axes[0]
         assert t[0] < top.get_xlim()[1] < t[-1] / 2

@@ -3,10 +3,10 @@
 import pytest
 import sympy
 
-from vibsim.expression import parse
-from vibsim.report import contents_degrees
-from vibsim.report.contents_degrees import is_polynomial, table, told
-from vibsim.spec import Experiment
+from vibsim.experiment import Experiment
+from vibsim.formula import parse
+from vibsim.report.tables import degrees
+from vibsim.report.tables.degrees import is_polynomial, table, told
 from vibsim.theory import Residual
 
 TEXT = """
@@ -26,7 +26,7 @@ def experiment(tmp_path, exact="3*t**2 + t", scheme="rk4", more=""):
 
 def test_a_row_says_what_is_missed_and_why(tmp_path):
     found = table(experiment(tmp_path))
-    damping, force = (contents_degrees.CAUSES[name] for name in ("damping", "force"))
+    damping, force = (degrees.CAUSES[name] for name in ("damping", "force"))
     by_rk4 = ("-b c_1 c_2 k/24 dt^5", "-b c_2 k (c_1 + 2 c_2 t)/24 dt^5")
     assert found.rows == (
         ("central", 1, 2, "exact", "b c_2^2 dt^4", damping),
@@ -36,7 +36,7 @@ def test_a_row_says_what_is_missed_and_why(tmp_path):
 
 def test_a_start_that_is_wrong_beside_the_steps_is_named(tmp_path):
     root = table(experiment(tmp_path, scheme="central_quadratic_root")).rows[1]
-    assert root[-1] == f"the first step, and {contents_degrees.CAUSES['damping']}"
+    assert root[-1] == f"the first step, and {degrees.CAUSES['damping']}"
 
 
 def test_only_experiments_about_polynomials_have_it(tmp_path):

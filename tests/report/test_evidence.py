@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import samples
 
-from vibsim.report import evidence, exhibit
-from vibsim.report.stamp import Panel, document
+from vibsim.report.evidence import figure, frame
+from vibsim.report.evidence.svg_plot import Panel, document
 
 ORDER = {"converges": "theta", "order": "scheme"}
 
@@ -21,7 +21,7 @@ def pictures(*checks, **changes):
     record = samples.record(experiment)
     told = samples.summary(experiment, record)["checks"]
     pairs = zip(experiment.checks, told, strict=True)
-    return [evidence.picture(experiment, record, asserted, check) for asserted, check in pairs]
+    return [figure.picture(experiment, record, asserted, check) for asserted, check in pairs]
 
 
 def count(svg, what):
@@ -151,7 +151,7 @@ def test_points_beyond_the_frame_are_triangles_on_its_edge():
     ],
 )
 def test_ticks_are_round(low, high, texts):
-    assert [text for _, text in exhibit.ticks(low, high)] == texts
+    assert [text for _, text in frame.ticks(low, high)] == texts
 
 
 @pytest.mark.parametrize(
@@ -163,17 +163,17 @@ def test_ticks_are_round(low, high, texts):
     ],
 )
 def test_ticks_of_a_logarithmic_scale_are_few(low, high, texts):
-    assert [text for _, text in exhibit.log_ticks(low, high)] == texts
+    assert [text for _, text in frame.log_ticks(low, high)] == texts
 
 
 def test_a_short_logarithmic_scale_has_round_numbers():
-    found = exhibit.log_ticks(0.30, 0.36)
+    found = frame.log_ticks(0.30, 0.36)
     assert [text for _, text in found] == ["2", "2.1", "2.2"]
     assert [value for value, _ in found] == pytest.approx(np.log10([2.0, 2.1, 2.2]))
 
 
 def test_growth_near_1_is_shown_less_1():
-    near, wide, huge = (exhibit.growth_scale(np.array([1.0, x])) for x in (1.0 + 1e-9, 1.5, 100.0))
+    near, wide, huge = (frame.growth_scale(np.array([1.0, x])) for x in (1.0 + 1e-9, 1.5, 100.0))
     assert near.title == "growth per period, less 1"
     assert near.change(np.array([1.0 + 1e-9]))[0] == pytest.approx(1e-9, rel=1e-6)
     assert wide.change(np.array([1.5]))[0] == 1.5

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import samples
 
-from vibsim.report import evidence
-from vibsim.report.exhibit import short
-from vibsim.report.stamp import LEFT, TOP
+from vibsim.experiment.schema.checks import MEASURED
+from vibsim.report.evidence import figure
+from vibsim.report.evidence.frame import short
+from vibsim.report.evidence.svg_plot import LEFT, TOP
 from vibsim.report.style import LOWER
 from vibsim.simulation import simulate_record
-from vibsim.spec.checks import MEASURED
 
 WIDTH, HEIGHT = 320.0, 96.0
 SPRING = {
@@ -42,7 +42,7 @@ def run(*checks, **changes):
     record = samples.record(experiment)
     told = samples.summary(experiment, record)["checks"]
     pairs = zip(experiment.checks, told, strict=True)
-    found = [evidence.picture(experiment, record, asserted, check) for asserted, check in pairs]
+    found = [figure.picture(experiment, record, asserted, check) for asserted, check in pairs]
     for picture in found:
         if picture is not None and picture.svg:
             ElementTree.fromstring(picture.svg)
@@ -127,7 +127,7 @@ def test_a_quadratic_drift_climbs_by_four():
 def test_a_drift_that_is_round_off_lies_below_its_border():
     _, record, (found,) = run({"conserves": "energy", "drift": "none"}, schemes=["crank_nicolson"])
     (border,) = map(float, re.findall(r'd="M[\d.]+ ([\d.]+)H[\d.]+"[^>]*dasharray', found.svg))
-    allowed = record["check_round_off"][0, 0, 0] / record["energy_initial"][0, 0]
+    allowed = record["check_check_1_round_off"][0, 0] / record["energy_initial"][0, 0]
     assert exponent_at(found.svg, border) == pytest.approx(np.log10(allowed), abs=0.05)
     (curve,) = re.findall(r'points="([^"]+)" fill="none" stroke="#0072B2"', found.svg)
     assert min(float(pair.split(",")[1]) for pair in curve.split()) > border
@@ -164,7 +164,8 @@ def test_the_difference_is_marked_where_it_is_largest():
     experiment, record, (found,) = run(check)
     level = simulate_record(experiment, 1)
     distance = np.abs(level["u"][0, 0] - level["u_exact"][0])
-    assert np.nanmax(record["check_distance"]) == distance.max() == record["check_value"][0, 0, 0]
+    assert np.nanmax(record["check_check_1_distance_over_time"]) == distance.max()
+    assert distance.max() == record["check_check_1_distance"][0, 0]
     ((x, y),) = dots(found.svg)
     place = LEFT + WIDTH * np.argmax(distance) / (distance.size - 1)
     assert x == pytest.approx(place, abs=WIDTH / 240 / 2)
@@ -177,8 +178,11 @@ def test_the_difference_is_marked_where_it_is_largest():
 def test_a_long_run_keeps_its_largest_difference():
     check = {"equal": ["rk4", "exact"], "quantity": "u", "level": 3, "atol": 1.0}
     _, record, (found,) = run(check)
-    assert record["check_distance"].shape == (1, 1, 241)
-    assert np.nanmax(record["check_distance"]) == record["check_value"][0, 0, 0]
+    assert record["check_check_1_distance_over_time"].shape == (1, 241)
+    assert (
+        np.nanmax(record["check_check_1_distance_over_time"])
+        == record["check_check_1_distance"][0, 0]
+    )
     assert len(dots(found.svg)) == 1
 
 
@@ -255,7 +259,7 @@ def test_what_is_not_stored_has_a_reason_for_no_picture():
     told = samples.summary(experiment, record)["checks"]
     kept = {name: v for name, v in record.variables.items() if not name.endswith("running_max")}
     poor = replace(record, variables=kept)
-    found = evidence.picture(experiment, poor, experiment.checks[0], told[0])
+    found = figure.picture(experiment, poor, experiment.checks[0], told[0])
     assert found.svg == ""
     assert "is not stored" in found.caption
 
@@ -263,7 +267,7 @@ def test_what_is_not_stored_has_a_reason_for_no_picture():
 @pytest.fixture
 def lean(monkeypatch):
     """Let every experiment be so large that no series are kept."""
-    monkeypatch.setattr("vibsim.spec.sampling.LEAN", 0)
+    monkeypatch.setattr("vibsim.experiment.stored_samples.LEAN", 0)
 
 
 @pytest.mark.parametrize("kind", BEHAVIOUR)
@@ -272,7 +276,9 @@ def test_without_series_the_members_are_drawn(lean, kind, count):
     sweep = {"initial.u": {"linspace": [0.5, 2.0, count]}}
     _, record, (found,) = run(KINDS[kind], sweep=sweep, samples="auto")
     assert record.attrs["storage"] == "lean"
-    assert {"check_means", "check_distance", "size_over_exact"}.isdisjoint(record.variables)
+    fields = ("window_means", "distance_over_time", "value_by_level")
+    assert not any(name.endswith(fields) for name in record.variables)
+    assert "size_over_exact" not in record
     assert len(dots(found.svg)) == 1
     assert len(dots(found.svg, "white")) == (count if count == 5 else 0)
     assert f"all {count} members, of which no series are kept" in found.caption

@@ -10,22 +10,10 @@ import pytest
 import samples
 from matplotlib.text import Text
 
-from vibsim.report import (
-    figures_energy,
-    figures_extrema,
-    figures_frame,
-    figures_order,
-    figures_period,
-    figures_sweep,
-    figures_theory,
-    figures_time,
-    figures_work,
-    gallery,
-    layout,
-    style,
-)
+from vibsim.report import frame, style, sweep_layout
 from vibsim.report.data import Member
-from vibsim.report.panels import Curve
+from vibsim.report.figures import energy, extrema, gallery, order, period, sweep, theory, time, work
+from vibsim.report.figures.panels import Curve
 
 TEXT = ["forward_euler", "backward_euler", "crank_nicolson", "euler_cromer", "central"]
 MANY = [
@@ -147,7 +135,7 @@ def test_few_common_times_are_not_told_to_be_round_off():
     record = samples.record(exp)
     assert np.isnan(np.asarray(record["i_ratio"])).all()
     with style.applied():
-        figure = figures_time.overlay(record, "i", Member(0, 0, "rk4")).figure
+        figure = time.overlay(record, "i", Member(0, 0, "rk4")).figure
     assert "too few common times for ratios" in words_of(figure)
 
 
@@ -156,13 +144,13 @@ def test_runs_that_broke_down_are_not_told_to_be_round_off(overflowing):
     assert (record["status"] != 0).any()
     for s, name in enumerate(record.words("scheme")):
         with style.applied():
-            figure = figures_time.overlay(record, "u", Member(s, 0, name)).figure
+            figure = time.overlay(record, "u", Member(s, 0, name)).figure
         assert "round-off" not in words_of(figure)
         if (record["status"][s, 0] != 0).all():
             assert "(broke down)" in words_of(figure)
             assert "no ratio means anything" in words_of(figure)
     with style.applied():
-        running = figures_energy.running(record, 0)
+        running = energy.running(record, 0)
     assert "forward_euler: broke down" in words_of(running.figure)
     assert "unclear" not in words_of(running.figure)
 
@@ -177,18 +165,18 @@ def test_a_centred_formula_that_has_no_value_at_the_ends_did_not_break_down():
 
 def test_frames_are_those_of_the_members_that_stay(diverging):
     exp, record = diverging
-    along = layout.along_of(layout.keys(record))
+    along = sweep_layout.along_of(sweep_layout.keys(record))
     with style.applied():
-        error = figures_sweep.orders(exp, record, along, "u")
-        amplitude = figures_period.amplitude(exp, record, along)
-        running = figures_energy.running(record, 8)
+        error = sweep.orders(exp, record, along, "u")
+        amplitude = period.amplitude(exp, record, along)
+        running = energy.running(record, 8)
     assert np.nanmax(record["u_max"]) > 1e40
     for picture, axes in ((error, [1]), (amplitude, [0, 1]), (running, [0])):
         for i in axes:
             low, high = picture.figure.axes[i].get_ylim()
             assert high < 1e8
             assert low > (1e-20 if picture.figure.axes[i].get_yscale() == "log" else -1e8)
-        assert figures_frame.LEAVING in picture.caption
+        assert frame.LEAVING in picture.caption
 
 
 def test_the_local_amplitude_is_shown_or_said_to_be_cut():
@@ -197,10 +185,10 @@ def test_the_local_amplitude_is_shown_or_said_to_be_cut():
         record = samples.record(exp)
         shown, _ = gallery.choose(exp, record)
         with style.applied():
-            picture = figures_extrema.local(exp, record, shown)
+            picture = extrema.local(exp, record, shown)
         peaks = record["peak"][np.isfinite(record["peak"])]
         top = picture.figure.axes[1].get_ylim()[1]
-        assert bool(peaks.max() > figures_extrema.WILD) == cut
+        assert bool(peaks.max() > extrema.WILD) == cut
         assert cut or peaks.max() < top
         said = words_of(picture.figure)
         assert ("cut off" in said or "logarithmic" in said) is cut
@@ -211,16 +199,16 @@ def test_a_mark_stands_where_a_curve_leaves():
     ax = figure.add_axes((0.1, 0.1, 0.8, 0.8))
     ax.set(xlim=(0.0, 4.0), ylim=(0.0, 1.0))
     x = np.arange(5.0)
-    assert figures_frame.mark_leaving(ax, x, np.array([0.5, 0.5, 1.5, 3.0, np.nan]), "black")
+    assert frame.mark_leaving(ax, x, np.array([0.5, 0.5, 1.5, 3.0, np.nan]), "black")
     assert [line.get_xdata().tolist() for line in ax.lines] == [[1.5]]
-    assert not figures_frame.mark_leaving(ax, x, np.full(5, 0.5), "black")
+    assert not frame.mark_leaving(ax, x, np.full(5, 0.5), "black")
 
 
 def test_the_legend_of_work_and_precision_has_a_name_for_every_symbol():
     exp = spring(schemes=MANY, levels=[0, 1])
     record = samples.record(exp)
     with style.applied():
-        figure = figures_work.precision(exp, record, 0).figure
+        figure = work.precision(exp, record, 0).figure
         figure.draw_without_rendering()
     for text in figure.legends[0].get_texts():
         box = text.get_window_extent()
@@ -230,19 +218,19 @@ def test_the_legend_of_work_and_precision_has_a_name_for_every_symbol():
 def test_coinciding_curves_are_told(few):
     exp, record = few
     with style.applied():
-        picture = figures_theory.order_and_stability(exp, record)
+        picture = theory.order_and_stability(exp, record)
     assert "backward_euler:\n  same as forward_euler" in words_of(picture.figure)
     assert "central:\n  same as euler_cromer" in words_of(picture.figure)
     assert "phase error of backward_euler as of forward_euler" in picture.caption
     x = np.linspace(0.0, 1.0, 9)
-    assert figures_frame.same_as([x, x + 1e-5, x + 0.1, x], 1.0) == [None, 0, None, 0]
+    assert frame.same_as([x, x + 1e-5, x + 0.1, x], 1.0) == [None, 0, None, 0]
 
 
 def test_a_colour_of_the_local_periods_is_a_scheme(few):
     exp, record = few
     shown = [Member(s, 0, name) for s, name in enumerate(TEXT[:3])]
     with style.applied():
-        axes = figures_extrema.local(exp, record, shown).figure.axes[2]
+        axes = extrema.local(exp, record, shown).figure.axes[2]
     colours = [line.get_color() for line in axes.lines if line.get_marker() not in {"", "None"}]
     assert len(colours) == 6
     assert set(colours) == {style.look(s)["color"] for s in range(3)}
@@ -251,7 +239,7 @@ def test_a_colour_of_the_local_periods_is_a_scheme(few):
 def test_several_promised_slopes_are_told_apart(few):
     exp, record = few
     with style.applied():
-        figure = figures_order.against_step(exp, record, "u", 0).figure
+        figure = order.against_step(exp, record, "u", 0).figure
     lines = [line for line in figure.axes[0].lines if str(line.get_label()).startswith("slope")]
     assert len(lines) > 1
     assert len({str(line._unscaled_dash_pattern) for line in lines}) == len(lines)

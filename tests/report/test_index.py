@@ -60,14 +60,14 @@ def test_one_row_per_check_in_the_csv(tmp_path):
         {**summary["checks"][0], "id": "second", "status": "INCONCLUSIVE", "reason": "round_off"}
     )
     summary["status"] = "INCONCLUSIVE"
-    store.write_json(tmp_path / "a/b/summary.json", summary, digest="d")
+    store.write_json(tmp_path / "pendulum_lab/theta/summary.json", summary, digest="d")
     report.write_index(tmp_path)
     rows = lines(tmp_path)
     assert [(r["check"], r["status"], r["reason"]) for r in rows] == [
         ("check_1", "PASS", "asymptotic"),
         ("second", "INCONCLUSIVE", "round_off"),
     ]
-    assert float(rows[0]["order"]) == summary["checks"][0]["results"][0]["order"]
+    assert float(rows[0]["order"]) == summary["checks"][0]["results"][0]["facts"]["order"]
     assert rows[0]["levels"] == "6 to 9"
 
 

@@ -9,7 +9,7 @@ import pytest
 import samples
 
 from vibsim import report
-from vibsim.record import Record, Variable
+from vibsim.core.record import Record, Variable
 
 ACROSS = {
     "initial.theta": {"linspace": [-2.9, 2.9, 10]},

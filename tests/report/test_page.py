@@ -12,22 +12,17 @@ import samples
 
 from vibsim import report
 from vibsim.analysis import verdicts
-from vibsim.errors import VibsimError
-from vibsim.record import Record, Variable
-from vibsim.report import (
-    cards,
-    choice,
-    drawing,
-    figures_map,
-    figures_order,
-    figures_sweep,
-    figures_time,
-    layout,
-    reasons,
-    style,
-)
+from vibsim.core.errors import VibsimError
+from vibsim.core.record import Record, Variable
+from vibsim.core.vocabulary import REASONS
+from vibsim.report import choice, style, sweep_layout
 from vibsim.report.data import Member
-from vibsim.vocabulary import REASONS
+from vibsim.report.figures import drawing, time
+from vibsim.report.figures import maps as figures_map
+from vibsim.report.figures import order as figures_order
+from vibsim.report.figures import sweep as figures_sweep
+from vibsim.report.page import cards
+from vibsim.report.text import reasons
 
 PROVENANCE = {"versions": {"vibsim": "1.2", "python": "3.99", "numpy": "9.9"}, "digest": "d1"}
 VOID = {"meta", "br", "img", "link", "hr", "input", "col"}
@@ -275,7 +270,7 @@ def test_a_ladder_lost_in_round_off_shows_what_is_there(tmp_path):
 
 def test_uneven_levels_are_rescaled_so_that_they_coincide():
     exp = samples.experiment(levels=[8, 9, 11, 12])
-    curves = figures_time.differences(samples.record(exp), "theta", Member(0, 0, "central"))
+    curves = time.differences(samples.record(exp), "theta", Member(0, 0, "central"))
     largest = [np.abs(curve.values).max() for curve in curves]
     np.testing.assert_allclose(largest, largest[-1], rtol=0.01)
     assert [curve.label for curve in curves] == ["θ₈ − θ₉", "3.2 (θ₉ − θ₁₁)", "64 (θ₁₁ − θ₁₂)"]
@@ -346,8 +341,8 @@ def test_a_sweep_shows_every_promise_and_the_map_is_relative_to_it():
     exp = samples.several(checks=TOLERANT, sweep=sweep)
     record = promising(samples.record(exp), 2, 1)
     with style.applied():
-        keys = layout.keys(record)
-        along, grid = layout.along_of(keys), layout.grid_of(keys)
+        keys = sweep_layout.keys(record)
+        along, grid = sweep_layout.along_of(keys), sweep_layout.grid_of(keys)
         text = drawing.svg(figures_sweep.orders(exp, record, along, "theta"))
         maps = [figures_map.verdicts(exp, record, grid, "theta", s) for s in (0, 1)]
     assert "promised, 1 ± 0.1" in text
@@ -361,7 +356,7 @@ def test_a_sweep_shows_every_promise_and_the_map_is_relative_to_it():
 def test_the_rescaled_curves_are_those_that_are_stored():
     exp = samples.experiment(levels=[8, 9, 11, 12])
     record = samples.record(exp)
-    curves = figures_time.differences(record, "theta", Member(0, 0, "central"))
+    curves = time.differences(record, "theta", Member(0, 0, "central"))
     np.testing.assert_array_equal([c.values for c in curves], record["theta_rescaled"][0, 0])
 
 

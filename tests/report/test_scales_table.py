@@ -8,7 +8,7 @@ import pytest
 import samples
 
 from vibsim import report
-from vibsim.report import contents_scales
+from vibsim.report.tables import scales as contents_scales
 
 MODEL = {"kind": "pendulum", "g": "9.8 m/s^2", "L": "4.9 m"}
 

@@ -11,8 +11,9 @@ import samples
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vibsim.report import drawing, figures_time, style
+from vibsim.report import style
 from vibsim.report.data import Member
+from vibsim.report.figures import drawing, time
 
 VALUES = st.lists(
     st.floats(allow_infinity=False, width=32) | st.just(float("nan")), min_size=1, max_size=400
@@ -84,8 +85,7 @@ def documents():
     record = samples.record(exp)
     with style.applied():
         return [
-            drawing.svg(figures_time.overlay(record, "theta", Member(0, 0, "central")))
-            for _ in range(2)
+            drawing.svg(time.overlay(record, "theta", Member(0, 0, "central"))) for _ in range(2)
         ]
 
 
@@ -121,8 +121,8 @@ def test_a_name_with_markup_stays_text_in_a_figure():
     exp = samples.experiment(schemes=[{"kind": "central", "label": "<script>x</script>"}])
     record = samples.record(exp)
     with style.applied():
-        from vibsim.report import figures_order
+        from vibsim.report.figures import order
 
-        text = drawing.svg(figures_order.against_step(exp, record, "theta", 0))
+        text = drawing.svg(order.against_step(exp, record, "theta", 0))
     assert "<script" not in text
     ElementTree.fromstring(text)

@@ -13,23 +13,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vibsim import report
+from vibsim.core.vocabulary import REASONS
 from vibsim.models import MODELS
-from vibsim.report import (
-    drawing,
-    figures_cloud,
-    figures_map,
-    figures_order,
-    figures_spread,
-    figures_sweep,
-    finest,
-    gallery,
-    layout,
-    panels_map,
-    ridge,
-    style,
-)
-from vibsim.report.layout import Key
-from vibsim.vocabulary import REASONS
+from vibsim.report import finest_level, style, sweep_layout
+from vibsim.report.figures import cloud as figures_cloud
+from vibsim.report.figures import drawing, gallery, map_panels, maps, separatrix, spread
+from vibsim.report.figures import order as figures_order
+from vibsim.report.figures import sweep as figures_sweep
+from vibsim.report.sweep_layout import Key
 
 ACROSS = {
     "initial.theta": {"linspace": [-2.9, 2.9, 12]},
@@ -52,9 +43,9 @@ def key(values, name="model.g"):
 
 @given(st.floats(0.001, 100), st.floats(40, 1e8), st.integers(3, 60))
 def test_geometric_values_are_told_from_even_ones(low, span, count):
-    assert layout.is_geometric(np.geomspace(low, low * span, count))
-    assert not layout.is_geometric(np.linspace(low, low * span, count))
-    assert not layout.is_geometric(np.linspace(-low, low * span, count))
+    assert sweep_layout.is_geometric(np.geomspace(low, low * span, count))
+    assert not sweep_layout.is_geometric(np.linspace(low, low * span, count))
+    assert not sweep_layout.is_geometric(np.linspace(-low, low * span, count))
 
 
 @given(st.lists(st.floats(0.01, 1e6), min_size=2, max_size=50, unique=True), st.booleans())
@@ -62,7 +53,7 @@ def test_every_value_lies_in_its_own_cell(values, logarithmic):
     distinct = np.unique(values)
     if np.min(np.diff(distinct) / distinct[1:]) < 1e-9:
         return  # cells that are thinner than a rounding error
-    borders = layout.edges(distinct, logarithmic)
+    borders = sweep_layout.edges(distinct, logarithmic)
     assert np.all(np.diff(borders) > 0)
     np.testing.assert_array_equal(np.searchsorted(borders, distinct), np.arange(1, borders.size))
     mean = (
@@ -81,19 +72,19 @@ def across():
 
 def test_a_grid_has_every_member_in_its_cell(across):
     _, record = across
-    grid = layout.grid_of(layout.keys(record))
+    grid = sweep_layout.grid_of(sweep_layout.keys(record))
     assert (grid.x.key, grid.y.key) == ("initial.theta", "initial.omega")
     for name, rows in (("initial_theta", grid.x.distinct), ("initial_omega", grid.y.distinct)):
         table = grid.worst(record[name])
         expected = np.broadcast_to(rows if name == "initial_theta" else rows[:, None], (9, 12))
         np.testing.assert_array_equal(table, expected)
-    assert layout.along_of(layout.keys(record)) is None
+    assert sweep_layout.along_of(sweep_layout.keys(record)) is None
 
 
 def test_a_large_grid_shows_the_worst_member_of_every_block(monkeypatch, across):
-    monkeypatch.setattr(layout, "CELLS", 4)
+    monkeypatch.setattr(sweep_layout, "CELLS", 4)
     _, record = across
-    grid = layout.grid_of(layout.keys(record))
+    grid = sweep_layout.grid_of(sweep_layout.keys(record))
     values = np.zeros(108)
     values[[5, 40]] = [7.0, -3.0]
     values[77] = np.nan
@@ -109,11 +100,11 @@ def test_members_anywhere_in_a_plane_are_gathered_in_cells():
     over = {"initial.theta": [0.2, 2.9], "model.g": [0.5, 60.0]}
     exp = samples.experiment(sweep={"sample": {**SAMPLE["sample"], "over": over}})
     record = samples.record(exp)
-    grid = layout.grid_of(layout.keys(record))
+    grid = sweep_layout.grid_of(sweep_layout.keys(record))
     values = record["model_g"]
     table = grid.worst(values)
     assert np.nanmax(table) == values.max()
-    column = layout.place_in(grid.x, grid.borders[0])
+    column = sweep_layout.place_in(grid.x, grid.borders[0])
     for i in range(table.shape[1]):
         assert np.isnan(table[:, i]).all() or np.nanmax(table[:, i]) == values[column == i].max()
     assert "within it" in grid.note
@@ -121,7 +112,7 @@ def test_members_anywhere_in_a_plane_are_gathered_in_cells():
 
 def test_the_separatrix_is_found_where_the_energy_says(across):
     exp, record = across
-    x, y = ridge.separatrix(exp, layout.grid_of(layout.keys(record)))
+    x, y = separatrix.separatrix(exp, sweep_layout.grid_of(sweep_layout.keys(record)))
     assert x.size >= 12
     # from w = 1: omega = 2 cos(theta/2); golden sections end within rounding errors of a bracket
     np.testing.assert_allclose(y, 2.0 * np.cos(x / 2.0), atol=1e-9)
@@ -131,37 +122,37 @@ def test_no_separatrix_is_drawn_where_there_is_none():
     sweep = {"initial.theta": {"linspace": [0.1, 2.0, 9]}, "model.g": {"linspace": [1.0, 3.0, 8]}}
     for model in ("pendulum", "linear_pendulum"):
         exp = samples.experiment(sweep=sweep, model={"kind": model})
-        grid = layout.grid_of(layout.keys(samples.record(exp)))
-        assert not ridge.separatrix(exp, grid)[0].size
-        assert not ridge.on_line(exp, grid.x).size
+        grid = sweep_layout.grid_of(sweep_layout.keys(samples.record(exp)))
+        assert not separatrix.separatrix(exp, grid)[0].size
+        assert not separatrix.on_line(exp, grid.x).size
 
 
 def test_the_separatrix_crosses_a_line_once():
     exp = samples.experiment(
         initial={"theta": 0.5}, sweep={"initial.omega": {"linspace": [0.1, 3.0, 20]}}
     )
-    (found,) = ridge.on_line(exp, layout.keys(samples.record(exp))[0])
+    (found,) = separatrix.on_line(exp, sweep_layout.keys(samples.record(exp))[0])
     assert abs(found - 2.0 * np.cos(0.25)) < 1e-9
 
 
 def test_the_estimated_error_of_the_finest_level_is_the_true_one(across):
     _, record = across
-    error = finest.error(record, "theta")
+    error = finest_level.error(record, "theta")
     passed = record["theta_status"] == 0
     ratio = (error.estimate / error.true)[passed]
     # the next term of the expansion is smaller by the distance of the order from 2, at most 0.1, times log 2 * 4/3
     assert np.all(np.abs(ratio - 1.0) < 0.1)
-    period = finest.period(record, "theta")
+    period = finest_level.period(record, "theta")
     true = np.abs(period.value - record["exact_period"])[passed]
     assert np.median(np.abs(period.error[passed] / true - 1.0)) < 0.1
 
 
 def test_maps_show_verdict_order_error_and_the_separatrix(across):
     exp, record = across
-    grid = layout.grid_of(layout.keys(record))
+    grid = sweep_layout.grid_of(sweep_layout.keys(record))
     with style.applied():
-        picture = figures_map.verdicts(exp, record, grid, "theta", 0)
-        motion = figures_map.motion(exp, record, grid, 0)
+        picture = maps.verdicts(exp, record, grid, "theta", 0)
+        motion = maps.motion(exp, record, grid, 0)
         text = drawing.svg(picture) + drawing.svg(motion)
     titles = [ax.get_title(loc="left") for ax in (*picture.figure.axes, *motion.figure.axes)]
     for title in (
@@ -178,7 +169,7 @@ def test_maps_show_verdict_order_error_and_the_separatrix(across):
 
 
 def test_the_scale_jumps_where_the_tolerance_ends():
-    colours = panels_map._pale_within(0.1)
+    colours = map_panels._pale_within(0.1)
     shade = {x: np.sum(np.abs(np.subtract(colours(x + 0.5), colours(0.5)))) for x in
              (-0.11, -0.09, 0.09, 0.11)}  # fmt: skip
     assert shade[0.09] < 0.4 < 0.6 < shade[0.11]
@@ -186,10 +177,10 @@ def test_the_scale_jumps_where_the_tolerance_ends():
 
 
 def test_a_scale_is_logarithmic_only_over_decades():
-    assert panels_map.limits(np.geomspace(1e-9, 1.0, 50))[2]
-    assert not panels_map.limits(np.linspace(1.0, 10.0, 50))[2]
-    assert not panels_map.limits(np.linspace(-1.0, 1e5, 50))[2]
-    low, high, _ = panels_map.limits(np.zeros(3))
+    assert map_panels.limits(np.geomspace(1e-9, 1.0, 50))[2]
+    assert not map_panels.limits(np.linspace(1.0, 10.0, 50))[2]
+    assert not map_panels.limits(np.linspace(-1.0, 1e5, 50))[2]
+    low, high, _ = map_panels.limits(np.zeros(3))
     assert low < 0.0 < high
 
 
@@ -203,7 +194,9 @@ def test_a_sweep_over_decades_has_a_logarithmic_axis(values, scale):
     exp = samples.experiment(sweep={"model.g": {"logspace": [*values, 7]}})
     record = samples.record(exp)
     with style.applied():
-        picture = figures_sweep.orders(exp, record, layout.along_of(layout.keys(record)), "theta")
+        picture = figures_sweep.orders(
+            exp, record, sweep_layout.along_of(sweep_layout.keys(record)), "theta"
+        )
     assert picture.figure.axes[0].get_xscale() == scale
     assert picture.figure.axes[-1].get_xlabel() == "model.g [m s⁻²]"
 
@@ -211,10 +204,10 @@ def test_a_sweep_over_decades_has_a_logarithmic_axis(values, scale):
 def test_keys_that_move_together_are_one_line():
     rows = {"initial.theta": [0.5, 1.0, 1.5, 2.0], "model.g": [8.0, 4.0, 2.0, 1.0]}
     record = samples.record(samples.experiment(sweep={"zip": rows}))
-    along = layout.along_of(layout.keys(record))
+    along = sweep_layout.along_of(sweep_layout.keys(record))
     assert along.key.key == "initial.theta"
     assert [members.tolist() for _, members in along.lines] == [[0, 1, 2, 3]]
-    assert layout.grid_of(layout.keys(record)) is None
+    assert sweep_layout.grid_of(sweep_layout.keys(record)) is None
 
 
 @pytest.fixture(scope="module")
@@ -225,8 +218,8 @@ def cloud():
 
 def test_a_sample_of_three_keys_is_shown_against_each(cloud):
     exp, record = cloud
-    assert layout.along_of(layout.keys(record)) is None
-    assert layout.grid_of(layout.keys(record)) is None
+    assert sweep_layout.along_of(sweep_layout.keys(record)) is None
+    assert sweep_layout.grid_of(sweep_layout.keys(record)) is None
     with style.applied():
         drawn = gallery.over_members(exp, record, ["theta"])
     assert [picture.name for picture in drawn] == ["projections_theta_0", "spread_theta"]
@@ -238,7 +231,7 @@ def test_shares_add_up_to_one_and_count_every_member(cloud, monkeypatch):
     exp, record = cloud
     monkeypatch.setattr(figures_cloud, "SHARES", 4)
     with style.applied():
-        picture = figures_cloud.projections(exp, record, layout.keys(record), "theta", 0)
+        picture = figures_cloud.projections(exp, record, sweep_layout.keys(record), "theta", 0)
     for ax in picture.figure.axes[2::3]:
         ends = {}
         for bar in ax.patches:
@@ -253,11 +246,11 @@ def test_many_members_are_counted_in_cells(cloud, monkeypatch):
     exp, record = cloud
     monkeypatch.setattr(figures_cloud, "POINTS", 10)
     with style.applied():
-        picture = figures_cloud.projections(exp, record, layout.keys(record), "theta", 0)
+        picture = figures_cloud.projections(exp, record, sweep_layout.keys(record), "theta", 0)
     for ax in picture.figure.axes[:2]:
         counts = [np.ma.filled(image.get_array(), 0.0).sum() for image in ax.collections]
         assert sum(counts) == 80
-    away = np.nan_to_num(finest.deviation(record, "theta")[0], nan=-figures_cloud.BEYOND)
+    away = np.nan_to_num(finest_level.deviation(record, "theta")[0], nan=-figures_cloud.BEYOND)
     inside = np.clip(away, -figures_cloud.BEYOND, figures_cloud.BEYOND)
     images = picture.figure.axes[0].collections
     found = sum(np.ma.filled(image.get_array(), 0.0).sum(axis=1) for image in images)
@@ -269,26 +262,26 @@ def test_many_members_are_counted_in_cells(cloud, monkeypatch):
 def test_a_histogram_counts_every_member_that_has_the_number(cloud):
     exp, record = cloud
     with style.applied():
-        picture = figures_spread.histograms(exp, record, "theta")
-    error = finest.error(record, "theta").best[0]
+        picture = spread.histograms(exp, record, "theta")
+    error = finest_level.error(record, "theta").best[0]
     ax = picture.figure.axes[1]
     drawn = sum(float(np.sum(p.get_data().values - p.get_data().baseline)) for p in ax.patches)
     assert drawn == np.isfinite(error).sum()
-    assert figures_spread.histograms(exp, samples.record(samples.plain()), "theta") is None
+    assert spread.histograms(exp, samples.record(samples.plain()), "theta") is None
 
 
 def test_words_that_are_swept_are_written_on_their_axis():
     sweep = {"schemes.central.start": ["centred", "first_order"], "initial.theta": [0.5, 1.0, 2.0]}
     exp = samples.experiment(sweep=sweep)
     record = samples.record(exp)
-    along = layout.along_of(layout.keys(record))
+    along = sweep_layout.along_of(sweep_layout.keys(record))
     assert [name for name, _ in along.lines] == [
         "schemes.central.start = centred",
         "schemes.central.start = first_order",
     ]
-    grid = layout.grid_of(layout.keys(record))
+    grid = sweep_layout.grid_of(sweep_layout.keys(record))
     with style.applied():
-        text = drawing.svg(figures_map.verdicts(exp, record, grid, "theta", 0))
+        text = drawing.svg(maps.verdicts(exp, record, grid, "theta", 0))
         figures_sweep.orders(exp, record, along, "theta")
     assert "first_order" in text
     assert "order of θ − 2" in text
@@ -317,10 +310,10 @@ def test_without_an_exact_solution_maps_show_the_estimate_and_its_error_bar(monk
     monkeypatch.setattr("vibsim.simulation.level.MOST_REFERENCES", 0)
     exp = samples.experiment(sweep=ACROSS, levels=[8, 9, 10, 11], time={"end": 30.0})
     record = samples.record(exp)
-    grid = layout.grid_of(layout.keys(record))
+    grid = sweep_layout.grid_of(sweep_layout.keys(record))
     with style.applied():
-        picture = figures_map.verdicts(exp, record, grid, "theta", 0)
-        motion = figures_map.motion(exp, record, grid, 0)
+        picture = maps.verdicts(exp, record, grid, "theta", 0)
+        motion = maps.motion(exp, record, grid, 0)
     axes = picture.figure.axes
     titles = {ax.get_title(loc="left"): ax for ax in axes}
     assert "Error bar of the error" in titles
@@ -328,7 +321,7 @@ def test_without_an_exact_solution_maps_show_the_estimate_and_its_error_bar(monk
     assert "estimated error of θ (l2) [rad √s]" in [ax.get_xlabel() for ax in axes]
     assert "separatrix" not in picture.caption + motion.caption
     assert "Exact period" not in [ax.get_title(loc="left") for ax in motion.figure.axes]
-    error = finest.error(record, "theta")
+    error = finest_level.error(record, "theta")
     # an interval is stated where something is decided
     stated = np.isfinite(record["theta_order_low"][..., 1])
     assert stated.any()
@@ -353,14 +346,14 @@ def test_numbers_of_checks_have_maps_unless_they_are_shown_already():
     ]
     exp = samples.experiment(sweep=ACROSS, checks=checks)
     record = samples.record(exp)
-    grid = layout.grid_of(layout.keys(record))
+    grid = sweep_layout.grid_of(sweep_layout.keys(record))
     with style.applied():
-        picture = figures_map.numbers(exp, record, grid, 0)
+        picture = maps.numbers(exp, record, grid, 0)
         pictures = gallery.over_members(exp, record, ["theta"])
     panel, bar = picture.figure.axes
     assert (panel.get_title(loc="left"), bar.get_xlabel()) == ("kept", "relative energy error")
     shown = panel.collections[0].get_array().ravel()
-    np.testing.assert_array_equal(np.sort(shown), np.sort(record["check_value"][0, 0]))
+    np.testing.assert_array_equal(np.sort(shown), np.sort(record["check_kept_value"][0]))
     assert "map_checks_0" in [p.name for p in pictures]
 
 
@@ -378,7 +371,7 @@ def test_an_order_of_a_part_is_promised_where_theory_has_one(model, order, word)
     checks = [{"converges": part, "order": order}]
     exp = samples.swept(4, model={"kind": model}, checks=checks, levels=[8, 9, 10])
     record = samples.record(exp)
-    along = layout.along_of(layout.keys(record))
+    along = sweep_layout.along_of(sweep_layout.keys(record))
     swept = figures_sweep.orders(exp, record, along, part)
     entries = swept.figure.axes[0].get_legend_handles_labels()[1]
     assert f"{word}, {3 if order == 3 else 2} ± 0.1" in entries

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vibsim.report import tables, words
-from vibsim.report.tables import Column, Table
+from vibsim.report.tables import table
+from vibsim.report.tables.table import Column, Table
+from vibsim.report.text import words
 
 
 def _table(*rows):
@@ -21,13 +22,13 @@ def _table(*rows):
 
 @given(st.floats(allow_nan=False, allow_infinity=False))
 def test_csv_keeps_every_digit(value):
-    rows = list(csv.reader(io.StringIO(tables.to_csv(_table(("a", value, 2.0))))))
+    rows = list(csv.reader(io.StringIO(table.to_csv(_table(("a", value, 2.0))))))
     assert rows[0] == ["scheme", "difference [rad]", "order"]
     assert float(rows[1][1]) == value
 
 
 def test_csv_leaves_what_does_not_apply_empty():
-    text = tables.to_csv(_table(('a, "b"', math.nan, None)))
+    text = table.to_csv(_table(('a, "b"', math.nan, None)))
     assert list(csv.reader(io.StringIO(text)))[1] == ['a, "b"', "", ""]
 
 
@@ -44,7 +45,7 @@ def test_a_row_of_the_wrong_length_is_refused():
 
 
 def test_latex_is_booktabs_and_escaped():
-    text = tables.to_latex(_table((r"a_b & \input{x} 50% #1 $x^2~", 1.5e-12, 2.0)))
+    text = table.to_latex(_table((r"a_b & \input{x} 50% #1 $x^2~", 1.5e-12, 2.0)))
     assert r"\toprule" in text
     assert r"\caption{Orders of 100 \% \& more}" in text
     assert (
@@ -57,8 +58,8 @@ def test_latex_is_booktabs_and_escaped():
 
 @given(st.text())
 def test_latex_escapes_every_special_character(text):
-    bare = tables.escape(text)
-    for token in tables._SPECIAL.values():
+    bare = table.escape(text)
+    for token in table._SPECIAL.values():
         bare = bare.replace(token, "")
     assert not set("&%#_~^\\") & set(_without_powers(bare))
 

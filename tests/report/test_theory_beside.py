@@ -12,23 +12,19 @@ import samples
 
 from vibsim import report
 from vibsim.models import MODELS
-from vibsim.report import (
-    choice,
-    contents_energy,
-    contents_published,
-    contents_theory,
-    contents_work,
-    figures_energy,
-    figures_extrema,
-    figures_growth,
-    figures_phase,
-    figures_theory,
-    figures_work,
-    gallery,
-    style,
-    words,
-)
-from vibsim.report.tables import Column, Table, Written, to_csv
+from vibsim.report import choice, style
+from vibsim.report.figures import energy as figures_energy
+from vibsim.report.figures import extrema, gallery
+from vibsim.report.figures import growth as figures_growth
+from vibsim.report.figures import phase as figures_phase
+from vibsim.report.figures import theory as figures_theory
+from vibsim.report.figures import work as figures_work
+from vibsim.report.tables import energy as contents_energy
+from vibsim.report.tables import published
+from vibsim.report.tables import theory as contents_theory
+from vibsim.report.tables import work as contents_work
+from vibsim.report.tables.table import Column, Table, Written, to_csv
+from vibsim.report.text import words
 from vibsim.schemes import FIXED_STEP
 
 W = 2.0 * math.pi
@@ -89,7 +85,7 @@ def write(directory, exp, rec, summary):
 
 def test_printed_digits_stand_beside_ours(text, tmp_path):
     exp, rec, summary = text
-    (table,) = contents_published.tables(exp, rec, summary)
+    (table,) = published.tables(exp, rec, summary)
     assert column(table, "printed") == [row["printed"] for row in PRINTED["rows"]]
     agrees = [abs(ours - row.number) <= row.half_unit for ours, row in
               zip(column(table, "ours"), exp.published[0].rows, strict=True)]  # fmt: skip
@@ -204,7 +200,7 @@ def test_a_further_number_by_the_own_velocity_says_so(tmp_path):
     }
     exp = spring(published=[table])
     rec = samples.record(exp)
-    (found,) = contents_published.tables(exp, rec, samples.summary(exp, rec))
+    (found,) = published.tables(exp, rec, samples.summary(exp, rec))
     assert [c.header for c in found.columns][-2:] == ["by own velocity", "beside: period"]
 
 
@@ -266,13 +262,13 @@ def test_runs_beyond_the_limit_show_predicted_and_measured_growth():
 def test_the_first_peak_is_that_of_the_exact_solution(u, v):
     exp = spring(initial={"u": u, "v": v}, schemes=["gauss4"], levels=[2, 3])
     rec = samples.record(exp)
-    expected = figures_extrema.first_peak(exp, rec, 0, 1.0)
+    expected = extrema.first_peak(exp, rec, 0, 1.0)
     assert float(rec["peak_time"][0, 0, -1, 0]) == pytest.approx(expected, abs=1e-4)
 
 
 def test_local_amplitudes_are_half_the_height_to_the_next_trough():
     time, trough = np.array([0.0, 1.0, 2.0]), np.array([0.5, 1.5])
-    found = figures_extrema.heights(time, np.array([1.0, 2.0, 3.0]), trough, np.array([-1.0, -4.0]))
+    found = extrema.heights(time, np.array([1.0, 2.0, 3.0]), trough, np.array([-1.0, -4.0]))
     np.testing.assert_array_equal(found, [1.0, 3.0, 3.5])
 
 

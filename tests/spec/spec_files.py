@@ -1,14 +1,17 @@
-"""Experiment files for the tests of `vibsim.spec`."""
+"""Experiment files for the tests of `vibsim.experiment`."""
 
 from __future__ import annotations
 
+import cProfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from vibsim.errors import Fault, InputError
-from vibsim.spec import Experiment
+from vibsim.core.errors import Fault, InputError
+from vibsim.experiment import Experiment
 
 GOOD = """\
 title: A pendulum
@@ -18,6 +21,14 @@ time: {end: 20.0}
 levels: {from: 6, to: 9}
 schemes: [central]
 """
+
+
+@contextmanager
+def calls_at_most(most: int) -> Iterator[None]:
+    """Check how many functions are called: that is work, which does not depend on what else the machine does."""
+    with cProfile.Profile() as profile:
+        yield
+    assert sum(entry.callcount for entry in profile.getstats()) <= most
 
 
 def content(**changes: Any) -> dict[str, Any]:

@@ -10,8 +10,8 @@ import pytest
 from spec_files import GOOD, build, write
 
 from vibsim import plan
-from vibsim.errors import InputError
-from vibsim.spec import Experiment, canonical, restore
+from vibsim.core.errors import InputError
+from vibsim.experiment import Experiment, canonical, restore
 
 SWEEP: dict[str, Any] = {
     "schemes.trap.start": ["centred", "first_order"],

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from vibsim import spec
-from vibsim.errors import InputError
+from vibsim import experiment as spec
+from vibsim.core.errors import InputError
 
 BASE = {
     "title": "t",
@@ -19,7 +19,7 @@ BASE = {
 
 def read(**changes):
     whole = {key: value for key, value in (BASE | changes).items() if value is not None}
-    return spec.from_dict(whole, name="elastic", collection="adhoc")
+    return spec.Experiment.from_dict(whole, name="elastic", collection="adhoc")
 
 
 def refused(**changes):

@@ -3,8 +3,8 @@
 import pytest
 
 from vibsim import analyse, simulate, verdicts
-from vibsim.errors import VibsimError
-from vibsim.spec import Experiment
+from vibsim.core.errors import VibsimError
+from vibsim.experiment import Experiment
 
 TEXT = """
 title: polynomials

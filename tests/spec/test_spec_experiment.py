@@ -15,17 +15,18 @@ import pytest
 from pydantic import ValidationError
 from spec_files import GOOD, build, content, only_fault, write
 
-from vibsim.errors import InputError
+from vibsim.core.errors import InputError
+from vibsim.experiment import Experiment, canonical, collection_of, restore
+from vibsim.experiment import collection as collections
+from vibsim.experiment.stored_samples import stride
 from vibsim.models import MODELS
 from vibsim.plan import choose, sampling
 from vibsim.plan import load as load_plan
 from vibsim.schemes import SCHEMES
-from vibsim.spec import Experiment, canonical, collection_of, load, restore, stride
-from vibsim.spec import collection as collections
 
 ROOT = Path(__file__).resolve().parents[2]
 
-DESIGN = """\
+EXAMPLE = """\
 # yaml-language-server: $schema=../../workflow/schemas/experiment.schema.json
 title: Nonlinear pendulum on four levels
 source: pendulum lecture, section 2.5   # what this experiment comes from (free text)
@@ -44,8 +45,8 @@ checks:
 """
 
 
-def test_the_designs_example(tmp_path: Path) -> None:
-    experiment = Experiment.from_yaml(write(tmp_path, DESIGN, "four_levels.yaml"))
+def test_the_first_example(tmp_path: Path) -> None:
+    experiment = Experiment.from_yaml(write(tmp_path, EXAMPLE, "four_levels.yaml"))
     assert (experiment.collection, experiment.name) == ("adhoc", "four_levels")
     assert experiment.model.parameters == {"g": 1.0, "L": 1.0, "m": 1.0, "drag": 0.0}
     assert experiment.levels == (6, 7, 8, 9)
@@ -327,12 +328,14 @@ def test_collection(
     file = tmp_path / path
     file.parent.mkdir(parents=True)
     file.write_text(GOOD)
-    assert load(file).collection == "adhoc"
-    assert load(file, configs=tmp_path / "configs").collection == collection
-    assert load(file, configs=tmp_path / "others").collection == "adhoc"
-    assert load(file, collection="mine").collection == "mine"
+    assert Experiment.from_yaml(file).collection == "adhoc"
+    assert Experiment.from_yaml(file, configs=tmp_path / "configs").collection == collection
+    assert Experiment.from_yaml(file, configs=tmp_path / "others").collection == "adhoc"
+    assert Experiment.from_yaml(file, collection="mine").collection == "mine"
     monkeypatch.setattr(collections, "find_checkout", lambda: tmp_path)
-    assert load(file).collection == Experiment.from_yaml(file).collection == collection
+    assert (
+        Experiment.from_yaml(file).collection == Experiment.from_yaml(file).collection == collection
+    )
     assert [choice.collection for choice in choose([str(file)], tmp_path)] == [collection]
 
 
@@ -345,7 +348,7 @@ def test_without_a_checkout_every_file_is_ad_hoc(monkeypatch: pytest.MonkeyPatch
 
 def test_a_plan_that_is_kept_needs_no_validation() -> None:
     program = (
-        "import sys; import vibsim.plan, vibsim.spec.collection\n"
+        "import sys; import vibsim.plan, vibsim.experiment.collection\n"
         "heavy = {'numpy', 'pydantic', 'yaml'} & set(sys.modules)\n"
         "assert not heavy, heavy"
     )
@@ -364,7 +367,7 @@ def test_collection_must_be_plain(tmp_path: Path) -> None:
     folder = tmp_path / "configs" / "My Lab"
     folder.mkdir(parents=True)
     with pytest.raises(InputError, match="name of the collection, 'My Lab'"):
-        load(write(folder, GOOD), configs=tmp_path / "configs")
+        Experiment.from_yaml(write(folder, GOOD), configs=tmp_path / "configs")
     with pytest.raises(InputError, match="name of the collection, 'My Lab'"):
         load_plan(*choose([str(folder / "case.yaml")], tmp_path))
 

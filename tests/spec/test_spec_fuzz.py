@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from spec_files import content
 
 from vibsim import plan
-from vibsim.errors import InputError
-from vibsim.spec import Experiment, canonical, restore
-from vibsim.spec.build import Place, build
-from vibsim.spec.faults import Report
-from vibsim.spec.source import parse
+from vibsim.core.errors import InputError
+from vibsim.experiment import Experiment, canonical, restore
+from vibsim.experiment.build import Place, build
+from vibsim.experiment.faults import Report
+from vibsim.experiment.yaml.parse import parse
 
 QUIET = settings(
     max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
@@ -55,7 +55,7 @@ def members(experiment: Experiment) -> None:
 def read(data: bytes) -> None:
     def make() -> Experiment:
         source = parse(data, "fuzz.yaml")
-        return build(source, Place("adhoc", "fuzz"), Report(source))
+        return build(Experiment, source, Place("adhoc", "fuzz"), Report(source))
 
     attempt(make)
 

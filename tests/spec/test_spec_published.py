@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 from spec_files import GOOD, build, content, faults_of, file_faults, only_fault, write
 
+from vibsim.experiment import Experiment, canonical, restore
+from vibsim.experiment.schema.json_schema import schema
+from vibsim.experiment.schema.printed_numbers import read_printed
+from vibsim.experiment.schema.published import row_id
 from vibsim.plan.build import build as build_plan
-from vibsim.spec import Experiment, canonical, restore
-from vibsim.spec.printed import read_printed
-from vibsim.spec.published import row_id
-from vibsim.spec.schema import schema
 
 TABLE: dict[str, Any] = {
     "title": "Relative error of the energy",

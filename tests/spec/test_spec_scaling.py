@@ -9,8 +9,8 @@ import pytest
 from spec_files import build, faults_of, only_fault
 
 from vibsim.analysis import analyse_records
+from vibsim.experiment import canonical, restore
 from vibsim.simulation import simulate_record
-from vibsim.spec import canonical, restore
 
 PENDULUM = {"kind": "pendulum", "g": "9.8 m/s^2", "L": "4.9 m", "m": "2 kg"}
 BODY = {"kind": "physical_pendulum", "inertia": 3, "m": 2, "g": 9.8, "L": 0.7}

@@ -8,13 +8,13 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 from spec_files import build, content, faults_of
-from test_spec_experiment import DESIGN
+from test_spec_experiment import EXAMPLE
 from test_spec_faults import CASES
 
+from vibsim.experiment.schema.json_schema import FILE, main, schema, text
+from vibsim.experiment.yaml.parse import parse
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
-from vibsim.spec.schema import FILE, main, schema, text
-from vibsim.spec.source import parse
 
 ROOT = Path(__file__).resolve().parents[2]
 VALIDATOR = Draft202012Validator(schema())
@@ -79,8 +79,8 @@ def test_refuses_what_the_loader_refuses(changes: dict[str, Any]) -> None:
     faults_of(**changes)
 
 
-def test_accepts_the_designs_example() -> None:
-    VALIDATOR.validate(parse(DESIGN.encode(), "design").data)
+def test_accepts_the_first_example() -> None:
+    VALIDATOR.validate(parse(EXAMPLE.encode(), "example").data)
 
 
 BY_SHAPE = ("unknown key", "required key", "unknown choice", "must be a mapping", "must be a list")

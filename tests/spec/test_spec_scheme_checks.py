@@ -9,10 +9,11 @@ import pytest
 from spec_files import build, faults_of, only_fault
 from test_spec_faults import change_model
 
+from vibsim.experiment import VALUES, Experiment, canonical, restore
+from vibsim.experiment.check_scheme_selection import schemes_of
+from vibsim.experiment.rules import quantities as quantity_rules
 from vibsim.models import MODELS, centred, quantities
 from vibsim.schemes import FIXED_STEP, SCHEMES
-from vibsim.spec import VALUES, Experiment, canonical, quantity_rules, restore
-from vibsim.spec.about import schemes_of
 
 REFERENCE = next(kind for kind in SCHEMES if kind not in FIXED_STEP)
 SPRING: dict[str, Any] = {

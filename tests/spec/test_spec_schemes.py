@@ -13,11 +13,12 @@ import pytest
 from spec_files import GOOD, build, faults_of, file_faults, only_fault
 
 from vibsim import plan
+from vibsim.experiment import Experiment, canonical, restore
+from vibsim.experiment import build as building
+from vibsim.experiment.rules import schemes as scheme_rules
+from vibsim.experiment.schema.options import tolerance_name
 from vibsim.models import MODELS
 from vibsim.schemes import FIXED_STEP, SCHEMES, AnyOption, Flag, NumberOption, Option
-from vibsim.spec import Experiment, canonical, restore
-from vibsim.spec import build as building
-from vibsim.spec.options import tolerance_name
 
 EVERY = [(kind, option) for kind, scheme in SCHEMES.items() for option in scheme.options]
 NAMES = [f"{kind}-{option.name}" for kind, option in EVERY]
@@ -196,7 +197,7 @@ def test_a_scheme_for_forces_without_velocity_names_those_that_can(
 ) -> None:
     schemes = dict(SCHEMES) | {"central": SCHEMES["central"]}
     model = replace(MODELS["pendulum"], variant=None, acceleration="-(g/L)*sin(theta) - 0.1*omega")
-    monkeypatch.setattr(building, "SCHEMES", schemes)
+    monkeypatch.setattr(scheme_rules, "SCHEMES", schemes)
     build()
     monkeypatch.setattr(building, "MODELS", {"pendulum": model})
     (fault,) = file_faults(tmp_path, GOOD)

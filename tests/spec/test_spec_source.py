@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from spec_files import GOOD, file_faults, write
 
-from vibsim.errors import InputError
-from vibsim.spec import Experiment
-from vibsim.spec.content import MAX_BYTES
-from vibsim.spec.scalars import resolve
-from vibsim.spec.source import dotted, parse
+from vibsim.core.errors import InputError
+from vibsim.experiment import Experiment
+from vibsim.experiment.yaml.file_content import MAX_BYTES
+from vibsim.experiment.yaml.parse import dotted, parse
+from vibsim.experiment.yaml.scalars import resolve
 
 
 @pytest.mark.parametrize(
@@ -94,17 +94,17 @@ LAUGHS = "a: &a [1,1,1,1,1,1,1,1,1]\n" + "".join(
         ("a: 1\nb: [1, 2\n", 3, "not valid YAML"),
         ("a: 1\n\tb: 2\n", 2, "not valid YAML"),
         ("a: 'x\n", 2, "not valid YAML"),
-        ("a: 1\nb: 2\na: 3\n", 3, "duplicate key, first on line 1"),
-        ("a:\n  x: 1\n  'x': 2\n", 3, "duplicate key, first on line 2"),
-        ("a: 1\nb: !!float 2\n", 2, "tags are not allowed"),
-        ("a: 1\nb: !!python/object/apply:os.getcwd []\n", 2, "tags are not allowed"),
-        ("a: ! b\n", 1, "tags are not allowed"),
+        ("title: 1\nb: 2\ntitle: 3\n", 3, "duplicate key, first on line 1"),
+        ("time:\n  x: 1\n  'x': 2\n", 3, "duplicate key, first on line 2"),
+        ("title: 1\nb: !!float 2\n", 2, "tags are not allowed"),
+        ("title: 1\nb: !!python/object/apply:os.getcwd []\n", 2, "tags are not allowed"),
+        ("title: ! b\n", 1, "tags are not allowed"),
         ("a: 1\n---\nb: 2\n", 2, "one YAML document"),
         ("a: 1\nb: *x\n", 2, "alias"),
         ("a: &x [*x]\n", 1, "alias"),
         ("a: &x 1\nb: [" + "*x, " * 51 + "]\n", 2, "more than 50 aliases"),
         (LAUGHS, 7, "more than 200000 values"),
-        ("<<: &x {a: 1}\nb: {<<: *x}\n", 1, "unknown key"),
+        ("<<: &x {a: 1}\ntime: {<<: *x}\n", 1, "unknown key"),
         ("? [1, 2]\n: 3\n", 1, "key must be plain text"),
         ("? {a: 1}\n: 3\n", 1, "key must be plain text"),
         ("- 1\n- 2\n", 1, "must be a mapping"),
@@ -182,3 +182,58 @@ def test_a_tab_is_named(tmp_path: Path) -> None:
     (fault,) = file_faults(tmp_path, "a:\n\tb: 1\n")
     assert (fault.line, fault.hint) == (2, "use spaces")
     assert "tabs are not allowed for indentation" in fault.rule
+
+
+@pytest.mark.parametrize("number", ["010", "00", "-07", "+012", "01.5", "00e1", "0777", "09"])
+@pytest.mark.parametrize(
+    "text", ["levels: [6, N]", "levels: {from: 6, to: N}", "initial: {theta: N}"]
+)
+def test_a_number_with_a_needless_0_is_refused(tmp_path: Path, text: str, number: str) -> None:
+    section = text.partition(":")[0]
+    kept = [line for line in GOOD.splitlines() if not line.startswith(section)]
+    kept.append(text.replace("N", number))
+    (fault,) = file_faults(tmp_path, "\n".join(kept) + "\n")
+    assert (fault.line, fault.value) == (6, number)
+    assert fault.key.startswith(section)
+    assert fault.rule == "a number must not begin with 0, which some read as octal"
+
+
+def test_numbers_are_read_as_yaml_has_them(tmp_path: Path) -> None:
+    levels = Experiment.from_yaml(
+        write(tmp_path, GOOD.replace("{from: 6, to: 9}", "[0o1, 0o7, 0x8, 9.0, 0.1e2]"))
+    ).levels
+    assert levels == (1, 7, 8, 9, 10)
+
+
+@pytest.mark.parametrize(
+    "number", ["1_0", "1:30", "yes", "true", "~", "0b11", "1e1_0", "1,5", "'7'"]
+)
+def test_what_is_no_number_of_yaml_is_no_level(tmp_path: Path, number: str) -> None:
+    text = GOOD.replace("{from: 6, to: 9}", f"{{from: 2, to: {number}}}")
+    faults = file_faults(tmp_path, text)
+    assert {(fault.line, fault.key) for fault in faults} <= {(5, "levels.to"), (5, "levels.5")}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "root:x:0:0:Secret:/root\nbin:x:1:1:Secret:/bin\n",
+        "password: Secret\nuser: Secret\n",
+        "password: 007\npassword: Secret\nusers:\n  - Secret: [1\n",
+        "a: &Secret 1\nb: *Secret2\n",
+        "a: !Secret 1\n: :\n",
+        "Secret: {a: 1, a: 2}\nx: 'y\n",
+        "- Secret\n- Secret\n",
+        "Secret\n",
+        "-----BEGIN KEY-----\nSecret\n-----END KEY-----\n",
+        "[Secret]\nkey = Secret\n",
+    ],
+)
+def test_no_message_shows_a_file_that_is_no_experiment(tmp_path: Path, text: str) -> None:
+    (tmp_path / "case.yaml").symlink_to(write(tmp_path, text, "foreign"))
+    with pytest.raises(InputError) as caught:
+        Experiment.from_yaml(tmp_path / "case.yaml")
+    told = str(caught.value)
+    assert "case.yaml" in told
+    for word in ("Secret", "password", "root", "users", "BEGIN"):
+        assert word not in told.replace(str(tmp_path), "")

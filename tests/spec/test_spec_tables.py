@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from spec_files import write
 
-from vibsim.errors import Fault, InputError
+from vibsim.core.errors import Fault, InputError
+from vibsim.experiment import Experiment, canonical, restore
+from vibsim.experiment.tables import file as table_file
+from vibsim.experiment.tables.file import EVEN, TableError, read
 from vibsim.models.table import Table
-from vibsim.spec import Experiment, canonical, load, restore, table_file
-from vibsim.spec.table_file import EVEN, TableError, read
 
 HEIGHTS = [0.02 * (i % 7) ** 2 for i in range(101)]
 ROWS = [f"{i / 10:g},{h:g}" for i, h in enumerate(HEIGHTS)]
@@ -37,7 +38,7 @@ def table(folder: Path, rows: list[str], head: str = "x,h") -> Path:
 
 
 def road(folder: Path, text: str = "{table: road.csv}", more: str = "") -> Experiment:
-    return load(write(folder, TEXT.replace("ROAD", text) + more))
+    return Experiment.from_yaml(write(folder, TEXT.replace("ROAD", text) + more))
 
 
 def only_fault(folder: Path, text: str = "{table: road.csv}", more: str = "") -> Fault:
@@ -89,9 +90,13 @@ def test_places_may_be_rounded_but_not_moved(tmp_path: Path) -> None:
         (ROWS[:40] + ROWS[41:], "line 42: 'x' must be equally spaced, but is 0.2", "0.1 apart"),
         ([*ROWS[:5], "0.5,nan", *ROWS[6:]], "line 7: 'h' is nan, and must be finite", ""),
         ([*ROWS[:5], "inf,1", *ROWS[6:]], "line 7: 'x' is inf, and must be finite", ""),
-        ([*ROWS[:5], "0.5,high", *ROWS[6:]], "line 7: 'high' is no number, in column 'h'", ""),
-        ([*ROWS[:5], "0.5", *ROWS[6:]], "line 7 has no value of 'h'", ""),
-        ([*ROWS[:5], "0.5,", *ROWS[6:]], "line 7: '' is no number, in column 'h'", ""),
+        ([*ROWS[:5], "0.5,high", *ROWS[6:]], "line 7: the cell is no number, in column 'h'", ""),
+        (
+            [*ROWS[:5], "0.5", *ROWS[6:]],
+            "line 7: has 1 cell between commas, and the table has 2 columns",
+            "",
+        ),
+        ([*ROWS[:5], "0.5,", *ROWS[6:]], "line 7: the cell is empty, in column 'h'", ""),
         (ROWS[:2], "must have at least 3 points, has 2", ""),
         ([], "must have at least 3 points, has 0", ""),
         (ROWS[:9] + ROWS[3:4] + ROWS[9:], "line 11: 'x' must increase, but is 0.8 and then", ""),
@@ -157,7 +162,7 @@ def test_a_path_as_a_formula_is_told_apart(tmp_path: Path) -> None:
 def test_too_many_points_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(table_file, "MOST_POINTS", 100)
     table(tmp_path, ROWS)
-    assert "must not have more than 100 points, has 101" in only_fault(tmp_path).rule
+    assert "must not have more than 100 points" in only_fault(tmp_path).rule
 
 
 @pytest.mark.parametrize(
@@ -214,7 +219,7 @@ def test_steps_that_meet_the_points(
     table(tmp_path, [f"{place:.10g},{place % 0.7:g}" for place in x])
     text = TEXT.replace("ROAD", "{table: road.csv}").replace("speed: 5", f"speed: {speed}")
     text = text.replace("base_steps: 100", f"base_steps: {steps}") + sweep
-    found = load(write(tmp_path, text))
+    found = Experiment.from_yaml(write(tmp_path, text))
     assert found.model.tables["road"].is_met is is_met
     lookup = found.model.definition.lookup
     assert lookup is not None
@@ -228,7 +233,9 @@ def test_levels_and_members_alone_are_asked_again(tmp_path: Path) -> None:
     assert found.alone(0).model.tables["road"].is_met
     assert not found.alone(1).model.tables["road"].is_met
     text = TEXT.replace("ROAD", "{table: road.csv}").replace("levels: [0, 1, 2]", "tolerance: 1e-6")
-    chosen = load(write(tmp_path, text.replace("base_steps: 100", "base_steps: 50")))
+    chosen = Experiment.from_yaml(
+        write(tmp_path, text.replace("base_steps: 100", "base_steps: 50"))
+    )
     assert not chosen.model.tables["road"].is_met
     assert chosen.with_levels([1, 2, 3]).model.tables["road"].is_met
 

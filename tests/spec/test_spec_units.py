@@ -17,11 +17,11 @@ from spec_files import build, content, faults_of, file_faults, only_fault, write
 from test_spec_fuzz import QUIET, attempt
 
 from vibsim import plan
+from vibsim.experiment import Experiment
+from vibsim.experiment.schema.unit_text import MAX_EXPONENT, MAX_UNIT, UnitError, factors, split
+from vibsim.experiment.units.convert import MAX_OWN
+from vibsim.experiment.units.names import DEFINITIONS, finite, known, meaning, registry
 from vibsim.models import MODELS
-from vibsim.spec import Experiment
-from vibsim.spec.unit_names import DEFINITIONS, finite, known, meaning, registry
-from vibsim.spec.unit_text import MAX_EXPONENT, MAX_UNIT, UnitError, factors, split
-from vibsim.spec.units import MAX_OWN
 
 OSCILLATOR = {"kind": "oscillator", "spring": "k*u", "damping": {"linear": 0.1}}
 
@@ -378,7 +378,10 @@ def test_prefixes_and_names() -> None:
 
 
 def test_pint_is_imported_for_units_alone(tmp_path: Path) -> None:
-    probe = "import sys, vibsim.spec; vibsim.spec.load(sys.argv[1]); print('pint' in sys.modules)"
+    probe = (
+        "import sys; from vibsim.experiment import Experiment\n"
+        "Experiment.from_yaml(sys.argv[1]); print('pint' in sys.modules)"
+    )
     for changes, wanted in (({}, "False"), (pendulum(L="4.9 m"), "True")):
         path = write(tmp_path, json.dumps(content(**changes)))
         command = [sys.executable, "-c", probe, str(path)]

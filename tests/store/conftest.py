@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vibsim import store
-from vibsim.record import Record, Variable
+from vibsim.core.record import Record, Variable
 
 DIGEST = "d" * 64
 

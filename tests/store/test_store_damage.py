@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from vibsim import store
-from vibsim.errors import DamagedFileError, FileError, StaleFileError
-from vibsim.record import Record
+from vibsim.core.errors import DamagedFileError, FileError, StaleFileError
+from vibsim.core.record import Record
 
 from .conftest import DIGEST, build
 

@@ -12,8 +12,8 @@ import pytest
 import xarray
 
 from vibsim import store
-from vibsim.errors import StaleFileError
-from vibsim.record import Record, Variable
+from vibsim.core.errors import StaleFileError
+from vibsim.core.record import Record, Variable
 
 from .conftest import DIGEST, build
 
@@ -52,7 +52,7 @@ def test_the_comparison_of_records_sees_one_bit(record: Record) -> None:
 
 def test_identity_and_provenance_stand_in_the_file(file: Path) -> None:
     found = store.read(file)
-    assert found.attrs["vibsim_format"] == 1
+    assert found.attrs["vibsim_format"] == 2
     assert found.attrs["digest"] == DIGEST
     assert json.loads(str(found.attrs["provenance"])) == {"experiment": {"model": "pendulum"}}
 
@@ -90,7 +90,7 @@ def test_another_process_writes_the_same_bytes(tmp_path: Path, file: Path) -> No
     assert other.read_bytes() == file.read_bytes()
 
 
-def test_data_are_contiguous_and_uncompressed(file: Path) -> None:
+def test_small_data_are_contiguous_and_uncompressed(file: Path) -> None:
     import netCDF4
 
     with netCDF4.Dataset(file) as dataset:

@@ -10,12 +10,14 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
+import netCDF4
 import numpy as np
 import pytest
 
 from vibsim import store
-from vibsim.errors import DamagedFileError, StaleFileError
-from vibsim.record import Record, Variable
+from vibsim.core.errors import DamagedFileError, StaleFileError
+from vibsim.core.record import Record, Variable
+from vibsim.store import writing
 
 from .conftest import DIGEST, build
 from .test_store_netcdf import same
@@ -146,7 +148,7 @@ import re, sys
 from pathlib import Path
 import numpy as np
 from vibsim import store
-from vibsim.record import Record, Variable
+from vibsim.core.record import Record, Variable
 PARTS, CASES, TIMES = int(sys.argv[2]), 2000, 1000
 number = {"long_name": "a number", "units": "1"}
 def parts():
@@ -173,3 +175,53 @@ def test_memory_is_that_of_a_part_and_not_of_the_file(tmp_path: Path) -> None:
 
     # A part has 16 MB; the file of ten would add 128 MB to that of two.
     assert peak(10) - peak(2) < 24_000
+
+
+def series(cases: int = 40, points: int = 801, **attrs: str) -> Record:
+    """Return a record with smooth series, large enough to be compressed."""
+    record = build(cases=cases, points=points)
+    theta = record.variables["theta"]
+    t, case = record.coords["t"].values, record.coords["case"].values
+    smooth = np.cos(t * (1 + 0.01 * case[:, None])) * np.ones((2, 1, 1))
+    variables = {**record.variables, "theta": replace(theta, values=smooth)}
+    return replace(record, variables=variables, attrs={**record.attrs, **attrs})
+
+
+def filters(path: Path) -> dict[str, bool]:
+    with netCDF4.Dataset(path) as data:
+        return {name: bool(v.filters()["zlib"]) for name, v in data.variables.items() if v.shape}
+
+
+@pytest.mark.parametrize("cuts", [(0, 40), (0, 1, 40), (0, 13, 14, 29, 40), tuple(range(41))])
+def test_compressed_parts_give_the_bytes_of_the_whole(
+    tmp_path: Path, cuts: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Chunks of several members, some of them in two parts."""
+    monkeypatch.setattr(writing, "_CHUNK", 2**16)
+    first, second = tmp_path / "whole.nc", tmp_path / "parts.nc"
+    store.write(first, series(), digest=DIGEST, provenance={})
+    store.write_parts(second, parts(series(), cuts), cases=40, digest=DIGEST, provenance={})
+    with netCDF4.Dataset(second) as data:
+        assert data["theta"].chunking() == [2, 5, 801]
+    assert second.read_bytes() == first.read_bytes()
+    assert same(store.read(second, digest=DIGEST), series())
+    with store.open_level([(second, DIGEST)]) as level:
+        assert same(level.read(3, 12), part(series(), 3, 12))
+
+
+def test_only_large_series_are_compressed(tmp_path: Path) -> None:
+    path = tmp_path / "a.nc"
+    store.write(path, series(), digest=DIGEST, provenance={})
+    assert {name for name, is_packed in filters(path).items() if is_packed} == {"theta"}
+    assert path.stat().st_size < 0.8 * series().variables["theta"].values.nbytes
+
+
+def test_lean_and_large_files_are_not_compressed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.nc"
+    store.write(path, series(storage="lean"), digest=DIGEST, provenance={})
+    assert not any(filters(path).values())
+    monkeypatch.setattr(writing, "PACKED_UP_TO", 2**18)
+    store.write(path, series(), digest=DIGEST, provenance={})
+    assert not any(filters(path).values())

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vibsim import store
-from vibsim.record import Record, Variable
+from vibsim.core.record import Record, Variable
 
 from .conftest import build
 

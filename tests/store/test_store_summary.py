@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vibsim import store
-from vibsim.errors import DamagedFileError, StaleFileError
+from vibsim.core.errors import DamagedFileError, StaleFileError
 
 from .conftest import DIGEST
 
@@ -31,7 +31,7 @@ def test_numbers_that_json_lacks_are_null(summary: Path) -> None:
     assert found["values"] == [1.0, None, None, None, 3]
     assert found["checks"] == [{"interval": [1.5, None]}]
     assert found["array"] == [1.0, None]
-    assert found["vibsim_format"] == 1
+    assert found["vibsim_format"] == 2
     assert next(iter(found)) == "vibsim_format"
 
     def refuse(name: str) -> None:

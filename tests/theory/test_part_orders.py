@@ -29,7 +29,7 @@ def value(mode: Mode, row: Any, h: float) -> float:
     return math.fsum(mode.field.value(x) * h**k for k, x in enumerate(row))
 
 
-# vibration text, sections 4 to 7, and `docs/verdicts.md`: by hand from the closed forms, released from rest
+# vibration text, sections 4 to 7, and `docs/method.md`: by hand from the closed forms, released from rest
 TABLE = [
     ("central", {}, 2.0, INF),
     ("crank_nicolson", {}, 2.0, INF),

@@ -1,16 +1,20 @@
 from __future__ import annotations
 
+import io
 import json
 import os
 import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from vibsim.cli import main
 
 ROOT = Path(__file__).parents[2]
 TEXT = """\
@@ -31,6 +35,14 @@ def vibsim(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedP
     return subprocess.run(
         command, capture_output=True, text=True, check=False, cwd=cwd, timeout=300
     )
+
+
+def here(*arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run a command in this process: one that is refused before it starts a workflow."""
+    out, told = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(told):
+        status = main([*map(str, arguments)])
+    return subprocess.CompletedProcess(arguments, status, out.getvalue(), told.getvalue())
 
 
 @dataclass(frozen=True)

@@ -209,7 +209,8 @@ def test_a_failing_job_is_named_with_its_log_and_the_others_go_on(place: Place, 
     assert ended.returncode == 1
     assert "failed: simulate adhoc/other level_06.nc to level_09.nc" in ended.stdout
     assert "level_06_to_09.log" in ended.stdout
-    assert "adhoc/other, level 7, member 0: [Errno 28] No space left on device" in ended.stdout
+    assert "vibsim: adhoc/other, level 7, member 0: " in ended.stdout
+    assert "adhoc/other/level_07.nc: No space left on device" in ended.stdout
     assert "Another" in (place.tiny / "report.html").read_text()
     assert "other" in (place.results / "index.html").read_text()
 
@@ -228,3 +229,45 @@ def test_a_failing_level_does_not_cost_those_that_share_its_job(place: Place, tr
     # What is written anew is another file, put in the place of the old one.
     assert {path: path.stat().st_ino for path in kept} == kept
     assert (folder / "level_07.nc").is_file()
+
+
+EDITED = """
+import sys
+from pathlib import Path
+from vibsim.cli import main
+from vibsim.cli.run import snakemake as workflow
+
+file, results, old, new = sys.argv[1:]
+run, rounds = workflow.run, []
+
+def edit_first(*arguments):
+    rounds.append(None)
+    Path(file).write_text(Path(file).read_text().replace(old, new))
+    return run(*arguments)
+
+workflow.run = edit_first
+status = main(["run", file, "--results", results, "--cores", "2"])
+print("rounds", len(rounds))
+sys.exit(status)
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "is_refused"),
+    [("theta: 1.0", "theta: 0.5", True), ("title: A tiny", "# a word\ntitle: A tiny", False)],
+)
+def test_a_file_that_is_edited_while_it_is_run_costs_one_round(
+    tmp_path: Path, old: str, new: str, is_refused: bool
+) -> None:
+    file, results = tmp_path / "tiny.yaml", tmp_path / "results"
+    file.write_text(TEXT)
+    ended = subprocess.run(
+        [sys.executable, "-c", EDITED, file, results, old, new],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "rounds 1\n" in ended.stdout
+    assert ended.returncode == int(is_refused)
+    told = f"{file}: was edited while it was run; run it again"
+    assert (told in ended.stderr) == is_refused

@@ -23,7 +23,7 @@ MATRIX = {
     "spelling": ("g: 1.0", "g: 1.00", set()),
     "key order": ("kind: pendulum, g: 1.0, L: 1.0", "L: 1.0, g: 1.0, kind: pendulum", set()),
     "source": ("nowhere", "somewhere", {"report", "index"}),
-    "title": ("A tiny", "Another", {"analyse", "report", "index"}),
+    "title": ("A tiny", "Another", {"report", "index"}),
     "check": ("order: scheme", "order: 2.1", {"analyse", "report", "index"}),
     "finer level": ("8, 9]", "8, 9, 10]", {"level_10", "analyse", "report", "index"}),
     "level left out": ("8, 9]", "8]", {"analyse", "report", "index"}),

@@ -11,8 +11,8 @@ import pytest
 
 from vibsim import store
 from vibsim.analysis import analyse_records
+from vibsim.experiment import Experiment
 from vibsim.simulation import simulate_record
-from vibsim.spec import Experiment
 
 from .conftest import TEXT, Place, vibsim
 
@@ -42,7 +42,7 @@ def small_shards(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Make shards of at most four members in every process."""
     path = tmp_path / "small/sitecustomize.py"
     path.parent.mkdir()
-    path.write_text("from vibsim.spec import cost\ncost.LARGEST_SHARD = 4\n")
+    path.write_text("from vibsim.experiment import cost\ncost.LARGEST_SHARD = 4\n")
     paths = [str(path.parent), *filter(None, [os.environ.get("PYTHONPATH")])]
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(paths))
 

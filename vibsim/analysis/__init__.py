@@ -3,11 +3,11 @@
 Pure: arrays in, arrays out.
 """
 
-from vibsim.analysis.assemble import analyse, analyse_records
-from vibsim.analysis.checks import Verdict, verdicts
-from vibsim.analysis.parts import analyse_parts, joined, kept
-from vibsim.analysis.results import Result
+from vibsim.analysis.blockwise import analyse_parts, joined, kept
+from vibsim.analysis.check_verdicts import Verdict, verdicts
+from vibsim.analysis.compare_levels import analyse, analyse_records
 from vibsim.analysis.summary import summarise
+from vibsim.checks.results import Result
 
 __all__ = [
     "Result",

@@ -1,24 +1,24 @@
-"""The content of ``summary.json`` (design, section 4.4): plain data, None where a number does not exist."""
+"""The content of ``summary.json``, every check with its verdict: plain data, None where a number does not exist."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis.checks import Verdict
-from vibsim.analysis.promise import Columns, columns_of
-from vibsim.record import Record
-from vibsim.vocabulary import FORMAT, jsonable, worst
+from vibsim.analysis.check_verdicts import Verdict
+from vibsim.apriori.formal_orders import Columns, columns_of
+from vibsim.checks.results import Result
+from vibsim.core.record import Record
+from vibsim.core.vocabulary import FORMAT, jsonable, worst
 
 if TYPE_CHECKING:
     import xarray
 
-    from vibsim.spec import Experiment
+    from vibsim.experiment import Experiment
 
 WORST = 10
 """Of a sweep, so many results of a check and so many failures are listed."""
@@ -63,11 +63,17 @@ def summarise(
 def _check(
     experiment: Experiment, record: Record, verdict: Verdict, most: int | None
 ) -> dict[str, Any]:
-    results = verdict.results if most is None else verdict.results.worst(most)
-    rows = [asdict(row) | _member(experiment, record, row.case) for row in results]
+    rows = [
+        {**_plain(row), "sentence": sentence, **_member(experiment, record, row.case)}
+        for row, sentence in verdict.results.told(most)
+    ]
     return {name: getattr(verdict, name) for name in verdict.__dataclass_fields__} | {
         "results": rows
     }
+
+
+def _plain(result: Result) -> dict[str, Any]:
+    return {name: getattr(result, name) for name in ("scheme", "case", "status", "reason", "facts")}
 
 
 def _member(experiment: Experiment, record: Record, case: int) -> dict[str, Any]:

@@ -5,36 +5,50 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from vibsim.cli.arguments import parser
-from vibsim.errors import InputError, VibsimError
-
-PASSED, FAILED, REFUSED, INTERRUPTED = 0, 1, 2, 130
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit status.
 
+    Parameters
+    ----------
+    arguments
+        Those of the command. Without them this is the command itself: it takes those of the command line, and
+        it ends when it is told to, with everything that it has started.
+
     Returns
     -------
     int
-        0 when all went well and every check passed, 1 when a check did not pass or a job failed, 2 when
-        input was refused, 130 when interrupted.
+        0 when all went well and every check passed, 1 when a check did not pass or something failed, 2 when
+        input was refused, 129, 130 or 143 when ended by SIGHUP, SIGINT or SIGTERM.
     """
-    options = parser().parse_args(arguments)
+    if arguments is not None:
+        return _perform(arguments)
     try:
-        status: int = options.command(options)
-        sys.stdout.flush()
-    except InputError as error:
-        print(error, file=sys.stderr)
-        return REFUSED
-    except VibsimError as error:
-        print(f"vibsim: {error}", file=sys.stderr)
-        return FAILED
-    except BrokenPipeError:
-        # The reader of a pipe has gone (``vibsim list | head``); nobody is left to tell.
-        sys.stderr.close()
-        return FAILED
-    except KeyboardInterrupt:
-        print("vibsim: interrupted; the same command goes on from here", file=sys.stderr)
-        return INTERRUPTED
+        from vibsim.cli import limits
+
+        limits.check()
+        from vibsim.cli.run.supervise import supervised
+
+        return supervised(lambda: _perform(sys.argv[1:]))
+    except Exception as error:
+        return _told(error)
+
+
+def _perform(arguments: Sequence[str]) -> int:
+    try:
+        from vibsim.cli.arguments import parser
+
+        try:
+            options = parser().parse_args(arguments)
+            status: int = options.command(options)
+        finally:
+            sys.stdout.flush()
+    except Exception as error:
+        return _told(error)
     return status
+
+
+def _told(error: Exception) -> int:
+    from vibsim.cli.failure import told
+
+    return told(error)

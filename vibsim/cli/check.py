@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from vibsim.cli.plans import plans_of
+from vibsim.cli.chosen_plans import plans_of
 
 
 def check(options: Namespace) -> int:

@@ -84,7 +84,7 @@ def _choices(option: AnyOption) -> str:
 
 
 def _checks() -> Iterable[tuple[str, str]]:
-    from vibsim.spec.values import VALUES
+    from vibsim.experiment.value_names import VALUES
 
     yield "converges", "a quantity converges with an order: {converges: q, order: scheme | number}"
     yield (

@@ -10,10 +10,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from vibsim.cli import room
-from vibsim.cli.common import results_folder
-from vibsim.cli.plans import plans_of
-from vibsim.cli.units import amount, duration, size
+from vibsim.cli import resources
+from vibsim.cli.chosen_plans import plans_of
+from vibsim.cli.jobs.common import results_folder
+from vibsim.cli.sizes import amount, duration, size
 from vibsim.plan import Plan
 
 _WIDTHS = (7, 12, 12, 7, 14, 10, 10, 10)
@@ -32,7 +32,7 @@ def plan(options: Namespace) -> int:
         if len(plans) > 1:
             print(_sum(plans, results))
     sys.stdout.flush()
-    room.check(plans, results)
+    resources.check(plans, results)
     return 0
 
 
@@ -77,5 +77,5 @@ def _sum(plans: Sequence[Plan], results: Path) -> str:
     seconds = sum(item.seconds for item in plans)
     return (
         f"{len(plans)} experiments: {amount(steps)} member-steps, {size(files)} of disk "
-        f"({size(room.free_bytes(results))} free), {duration(seconds)} of one core"
+        f"({size(resources.free_bytes(results))} free), {duration(seconds)} of one core"
     )

@@ -17,9 +17,9 @@ from copy import deepcopy
 from types import FunctionType
 from typing import Any, Literal
 
+from vibsim.core.errors import SimulationError
 from vibsim.elementary import ELEMENTARY
 from vibsim.engine.text import Module, collect, definition, enter
-from vibsim.errors import SimulationError
 from vibsim.schemes import newton
 from vibsim.schemes.base import HANDED
 from vibsim.schemes.newton_system import solver

@@ -14,7 +14,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from vibsim.engine.bound import (
+from vibsim.engine.gather import N_STATS, note_turning
+from vibsim.engine.kernel_stubs import (
     GATHER,
     LOCATED,
     WORK,
@@ -36,7 +37,6 @@ from vibsim.engine.bound import (
     turning,
     with_mode,
 )
-from vibsim.engine.gather import N_STATS, note_turning
 
 # Columns of `stats` behind those of `vibsim.engine.gather`.
 EVENT_COUNT = N_STATS

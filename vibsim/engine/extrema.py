@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from vibsim.engine.bound import called
+from vibsim.engine.kernel_stubs import called
 
 # Rows of `kept` for peaks; those of troughs follow in the same order.
 TIME = 0

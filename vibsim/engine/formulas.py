@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping
 from inspect import signature
 
-from vibsim import expression
+from vibsim import formula as expression
+from vibsim.core.errors import SimulationError
 from vibsim.elementary import ELEMENTARY
 from vibsim.engine.lookup import looked_up
 from vibsim.engine.text import Module, collect
-from vibsim.errors import SimulationError
-from vibsim.expression import Binary, Call, Compare, Expression, Name, Number
+from vibsim.formula import Binary, Call, Compare, Expression, Name, Number
 from vibsim.models import Model
 from vibsim.models.base import Formula, parameter_names, tree
 from vibsim.models.events import Friction, Impact
 from vibsim.models.table import BEND, HEIGHT
 from vibsim.schemes.base import Stepper
 
+MOST_INLINE = 64
+"""Calls of functions up to which each becomes part of the formula: each then takes 0.1 s to compile, and 3 MB."""
 _MODE = "mode"
 _MARK = "_"
 """Behind the names of parameters in a kernel."""
@@ -91,10 +93,22 @@ def put_formulas(
             "_dissipation": put(model.dissipation or "0.0"),
             "_driving": put(model.driving or "0.0"),
         }
+    is_rare = is_rare or _calls(formulas) > MOST_INLINE
     is_scaled = stepper.scaling is not None
     scaled = ("acceleration", "slopes") if is_scaled else ()
     put_functions(module, model, suffix, formulas, is_rare=is_rare, scaled=scaled)
     put_parameters(module, model, 2 if is_scaled else 0, tabulated=stepper.tabulated)
+
+
+def _calls(formulas: Mapping[str, Mapping[str, Expression]]) -> int:
+    """Return how many calls of functions some formulas have."""
+    nodes = (
+        node
+        for part in formulas.values()
+        for each in part.values()
+        for node in expression.walk(each)
+    )
+    return sum(isinstance(node, Call) for node in nodes)
 
 
 def put_energy_with(module: Module, model: Model) -> None:

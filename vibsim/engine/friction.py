@@ -6,7 +6,7 @@ these functions; they know the model by ``drive`` and ``limit``.
 
 from __future__ import annotations
 
-from vibsim.engine.bound import P, drive, limit, mode_of
+from vibsim.engine.kernel_stubs import P, drive, limit, mode_of
 
 
 def slip(u: float, t: float, p: P) -> float:

@@ -15,7 +15,7 @@ import math
 from typing import Any
 
 from vibsim.elementary.rounding import nearest_whole
-from vibsim.engine.bound import SERIES, called
+from vibsim.engine.kernel_stubs import SERIES, called
 
 OVERFLOW = 1e150
 """A member that grows beyond has failed: its energy could no longer be stored."""

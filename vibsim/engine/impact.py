@@ -6,7 +6,7 @@ model by ``impact_of``.
 
 from __future__ import annotations
 
-from vibsim.engine.bound import P, impact_of, mode_of
+from vibsim.engine.kernel_stubs import P, impact_of, mode_of
 
 
 def first_mode(u: float, v: float, t: float, p: P) -> float:

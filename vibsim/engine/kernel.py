@@ -14,9 +14,9 @@ from functools import cache
 from types import FunctionType
 from typing import Any
 
+from vibsim.core.errors import SimulationError
 from vibsim.elementary import primitives
-from vibsim.engine import blocks, friction, gather, impact, loop, observe, rows, system
-from vibsim.engine.cache import Kernel, load
+from vibsim.engine import block_loop, friction, gather, impact, member_loop, observe, rows, system
 from vibsim.engine.formulas import (
     marked,
     n_between,
@@ -26,9 +26,9 @@ from vibsim.engine.formulas import (
     put_functions,
     put_parameters,
 )
+from vibsim.engine.kernel_cache import Kernel, load
 from vibsim.engine.stages import stages
 from vibsim.engine.text import Module, collect, divided, with_quotients
-from vibsim.errors import SimulationError
 from vibsim.models import Model, has_budget
 from vibsim.models.base import Formula
 from vibsim.models.events import Friction
@@ -49,7 +49,7 @@ def step_fast(state, t, dt, p):
     return step(state, t, dt, p)"""
 
 _STEPPING = "f2 f2 f2 f1 i i i i i i f f3 f2 i2 f3 f1"
-"""Arguments of `vibsim.engine.loop.run`, as `vibsim.engine.entry` writes them."""
+"""Arguments of `vibsim.engine.member_loop.run`, as `vibsim.engine.entry` writes them."""
 _OBSERVING = "f2 f2 f1 i i f3 f3"
 """Arguments of `vibsim.engine.observe.run`."""
 
@@ -63,7 +63,7 @@ def kernel(
     with_series: bool = False,
     with_peaks: bool = False,
 ) -> Kernel:
-    """Return the function that steps members of `model` by `stepper` (`vibsim.engine.loop.run`).
+    """Return the function that steps members of `model` by `stepper` (`vibsim.engine.member_loop.run`).
 
     Parameters
     ----------
@@ -136,9 +136,9 @@ def source(
         "SYSTEM": count > 1,
         "COORDINATES": count,
         "STATES": states,
-        "SET": blocks.set_of(states, with_peaks),
+        "SET": block_loop.set_of(states, with_peaks),
         "PARAMETERS": parameters,
-        **blocks.row_numbers(states, parameters, with_peaks),
+        **block_loop.row_numbers(states, parameters, with_peaks),
         **gather.sample_rows(count),
     }
     module = _module(lane, settings)
@@ -166,7 +166,7 @@ def source(
             collect(module, stepper.step, "step_fast", renamed)
         for name, text in rows.texts(states, parameters, settings).items():
             module.put(name, text)
-    collect(module, blocks.run if lane == "blocks" else loop.run, "kernel", {})
+    collect(module, block_loop.run if lane == "blocks" else member_loop.run, "kernel", {})
     return module.text
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from vibsim.engine.bound import SYSTEM, observed, parameters_of, point_of
+from vibsim.engine.kernel_stubs import SYSTEM, observed, parameters_of, point_of
 
 
 def run(

@@ -1,11 +1,11 @@
-"""Text of the functions that move numbers into and out of the rows of `vibsim.engine.blocks`."""
+"""Text of the functions that move numbers into and out of the rows of `vibsim.engine.block_loop`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import deepcopy
 
-from vibsim.engine import blocks, gather
+from vibsim.engine import block_loop, gather
 from vibsim.engine.stages import kept_names, stages
 from vibsim.engine.text import Module, enter
 from vibsim.schemes.base import Stepper
@@ -18,7 +18,7 @@ def texts(states: int, parameters: int, rows: Mapping[str, object]) -> dict[str,
         return f"@compiled\ndef {head}:\n    " + "\n    ".join(lines)
 
     def places(first: object, count: int) -> list[str]:
-        return [f"rows[({first} + {i}) * {blocks.LANES} + j]" for i in range(count)]
+        return [f"rows[({first} + {i}) * {block_loop.LANES} + j]" for i in range(count)]
 
     def get(name: str, argument: str, first: object, count: int) -> str:
         return function(
@@ -45,7 +45,7 @@ def put_stages(
 ) -> None:
     """Write the stages of a step as functions, and the loops over lanes that take all but the last."""
     places = {
-        name: f"rows[({rows['FIRST_KEPT']} + {i}) * {blocks.LANES} + j]"
+        name: f"rows[({rows['FIRST_KEPT']} + {i}) * {block_loop.LANES} + j]"
         for i, name in enumerate(kept_names(stepper.step))
     }
     lines = ["def stages_of(rows, old, filled, n):"]
@@ -55,7 +55,7 @@ def put_stages(
         kept = "".join(f"{places[name]}, " for name in part.before)
         lines += [
             "    for j in range(filled):",
-            f"        h = rows[{rows['DT']} * {blocks.LANES} + j]",
+            f"        h = rows[{rows['DT']} * {block_loop.LANES} + j]",
             f"        p_{i}, state_{i} = parameters_in(rows, j), states_in(rows, old, j)",
             f"        values_{i} = stage_{i}(state_{i}, n * h, h, p_{i}, ({kept}))",
             *(f"        {places[name]} = values_{i}[{k}]" for k, name in enumerate(part.after)),

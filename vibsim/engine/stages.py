@@ -6,7 +6,7 @@ evaluation, and the next one does not wait for it. What a later stage needs of a
 operation on a member's numbers stays the same one, in the same order.
 
 Only a step in straight lines is cut, in which every evaluation stands for itself, ``name = acceleration(...)``, and no
-name gets a second value; `vibsim.schemes.written` writes such steps.
+name gets a second value; `vibsim.schemes.code_generation` writes such steps.
 """
 
 from __future__ import annotations

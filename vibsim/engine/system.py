@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from vibsim.core.errors import SimulationError
 from vibsim.engine import gather
 from vibsim.engine.coordinates import NUMBER, VECTOR, Kind, collect_system
 from vibsim.engine.text import Module, collect
-from vibsim.errors import SimulationError
 from vibsim.schemes.base import Stepper, no_backward
 
 

@@ -14,7 +14,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from vibsim.errors import SimulationError
+from vibsim.core.errors import SimulationError
 from vibsim.schemes.base import HANDED
 
 
@@ -63,7 +63,7 @@ def collect(
     renamed
         Names of the text that stand for others here.
     is_called
-        Whether it is compiled for itself (`vibsim.engine.bound.called`).
+        Whether it is compiled for itself (`vibsim.engine.kernel_stubs.called`).
 
     Raises
     ------
@@ -120,6 +120,9 @@ def _mark(
         return "entry"
     is_marked = is_called or bool(tree.decorator_list)
     tree.decorator_list = []
+    if known := module.parts.get(tree.name):
+        # another function that uses it has brought it already
+        return known.partition("\n")[0].removeprefix("@")
     has_loop = any(isinstance(node, ast.For | ast.While) for node in ast.walk(tree))
     is_elementary = function.__module__.startswith("vibsim.elementary")
     return "called" if is_marked or (has_loop and is_elementary) else "compiled"

@@ -9,20 +9,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.engine import blocks, events, extrema, gather, results
+from vibsim.engine import block_loop, events, extrema, gather, results
 from vibsim.engine.kernel import carried, kernel, observer
 from vibsim.engine.results import Trajectories
 from vibsim.engine.stages import kept_names
+from vibsim.experiment.cost import PLAIN_MEMBER_STEPS
 from vibsim.models import Model, has_budget
 from vibsim.models.base import Formula
 from vibsim.schemes import Scheme
 from vibsim.schemes.base import END_RULES, Options, Stepper
-from vibsim.spec.cost import PLAIN_MEMBER_STEPS
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-TASK = 16 * blocks.LANES
+TASK = 16 * block_loop.LANES
 """Members that a thread takes at a time."""
 
 
@@ -185,8 +185,8 @@ def _check_shapes(model: Model, parameters: Floats, initial: Floats, members: in
 def _scratch(model: Model, stepper: Stepper, n_parameters: int, with_peaks: bool) -> int:
     """Return how many floats of scratch memory a block needs."""
     n_kept = len(kept_names(stepper.step))
-    n_rows = blocks.n_rows(carried(stepper, model), n_parameters, with_peaks, n_kept)
-    return n_rows * blocks.LANES
+    n_rows = block_loop.n_rows(carried(stepper, model), n_parameters, with_peaks, n_kept)
+    return n_rows * block_loop.LANES
 
 
 def _scaled(model: Model, stepper: Stepper, parameters: Floats, dt: Floats) -> Floats:

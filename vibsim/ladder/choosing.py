@@ -18,17 +18,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim import plan
-from vibsim.analysis.climb import Extrapolated, extrapolate_members, level_at, noise_of
-from vibsim.analysis.extrapolation import methods, start_of
-from vibsim.analysis.method import Method, Start
-from vibsim.analysis.tableau import Pair
-from vibsim.errors import Fault, InputError, VibsimError
+from vibsim.comparison.best_solution import methods, start_of
+from vibsim.comparison.extrapolate_members import (
+    Extrapolated,
+    extrapolate_members,
+    level_at,
+    noise_of,
+)
+from vibsim.comparison.member_method import Method, Start
+from vibsim.convergence.romberg import Pair
+from vibsim.core.errors import Fault, InputError, VibsimError
+from vibsim.experiment.schema.fields import MAX_LEVEL
 from vibsim.ladder.solving import climb
 from vibsim.simulation import Members, members
-from vibsim.spec.fields import MAX_LEVEL
 
 if TYPE_CHECKING:
-    from vibsim.spec import Experiment
+    from vibsim.experiment import Experiment
 
 Floats = NDArray[np.float64]
 

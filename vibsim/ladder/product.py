@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from vibsim import plan
-from vibsim.analysis.climb import Extrapolated, joined
-from vibsim.analysis.extrapolation import in_order, methods, record_of, start_of
+from vibsim.comparison.best_solution import in_order, methods, record_of, start_of
+from vibsim.comparison.extrapolate_members import Extrapolated, joined
 from vibsim.ladder.choosing import resolve
 from vibsim.ladder.solving import climb
 from vibsim.simulation import Members, members
@@ -16,7 +16,7 @@ from vibsim.simulation.level import coordinates
 if TYPE_CHECKING:
     import xarray
 
-    from vibsim.spec import Experiment
+    from vibsim.experiment import Experiment
 
 PART = 2**18
 """Points of one level that are held at a time."""

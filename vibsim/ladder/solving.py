@@ -7,15 +7,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis.climb import (
+from vibsim.comparison.extrapolate_members import (
     Extrapolated,
     extrapolate_members,
     inverse_power,
     level_at,
     noise_of,
 )
-from vibsim.analysis.method import Method, Start, rate_of
-from vibsim.analysis.tableau import FLOATS, KNOWN_DIGIT, Circumstances, Pair, best_entry
+from vibsim.comparison.member_method import Method, Start, rate_of
+from vibsim.convergence.romberg import FLOATS, KNOWN_DIGIT, Circumstances, Pair, best_entry
 
 Floats = NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 
 A formula is no function, so that one statement of it serves every reader: the engine compiles it for each lane,
 Newton's method differentiates it, a report prints it. Models that are written down here give text; those that are made
-from the formulas of a user give trees (`vibsim.expression`).
+from the formulas of a user give trees (`vibsim.formula`).
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.expression import Expression, parse
+from vibsim.formula import Expression, parse
 from vibsim.models.events import Events
 from vibsim.models.table import Lookup, Table
 
 if TYPE_CHECKING:
-    from vibsim.models.scales import Scales
+    from vibsim.models.shared.scales import Scales
 
 Floats = NDArray[np.float64]
 Numbers = Mapping[str, Any]
@@ -222,7 +222,7 @@ def declared_parameters(names: Iterable[str]) -> tuple[Parameter, ...]:
 def has_solution(model: Model) -> bool:
     """Tell whether the motion is known: exactly, or to twelve digits by a reference that stops at every corner.
 
-    Of a single motion the reference may not exist (`vibsim.simulation.reference`): its numbers are then NaN.
+    Of a single motion the reference may not exist (`vibsim.simulation.reference.solve`): its numbers are then NaN.
     """
     return model.exact is not None or model.events is None
 

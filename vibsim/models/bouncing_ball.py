@@ -18,7 +18,7 @@ import numpy as np
 
 from vibsim.models.base import Floats, Model, Numbers, Parameter, State
 from vibsim.models.events import Impact
-from vibsim.models.scales import Scales
+from vibsim.models.shared.scales import Scales
 
 
 def natural_frequency(parameters: Numbers) -> Any:

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache, partial
 
-from vibsim.expression import (
+from vibsim.formula import (
     ZERO,
     Expression,
     Name,
@@ -31,9 +31,9 @@ from vibsim.models.base import (
     State,
     declared_parameters,
 )
-from vibsim.models.linear_scales import linear_scales
-from vibsim.models.mechanical import Forces, mechanical
-from vibsim.models.scales import Scales
+from vibsim.models.shared.linear_scales import linear_scales
+from vibsim.models.shared.mechanical import Forces, mechanical
+from vibsim.models.shared.scales import Scales
 
 STATES = (State("i", "A", "current"), State("di_dt", "A s-1", "rate of change of the current"))
 PARAMETERS = (

@@ -4,7 +4,7 @@ Source: I. Kovacic, M. J. Brennan (eds.), The Duffing Equation (Wiley, 2011), ch
 alpha [s-2], beta [m-2 s-2], delta [s-1], gamma [m s-2], omega [rad s-1], energy per mass [m2 s-2]. With beta > 0
 the spring is hardening; with alpha < 0 and beta > 0 there are two wells, around ``u = +-sqrt(-alpha/beta)``; with
 beta < 0 the motion escapes beyond ``sqrt(-alpha/beta)``. Without damping and force the exact motion is one of Jacobi's
-functions (`vibsim.models.cubic`).
+functions (`vibsim.models.shared.cubic`).
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.expression import ZERO, parse
+from vibsim.formula import ZERO, parse
 from vibsim.models.base import Model, Numbers, Parameter
-from vibsim.models.cubic import motion, period
-from vibsim.models.mechanical import Forces, mechanical
-from vibsim.models.scales import Scales
+from vibsim.models.shared.cubic import motion, period
+from vibsim.models.shared.mechanical import Forces, mechanical
+from vibsim.models.shared.scales import Scales
 
 PARAMETERS = (
     Parameter("delta", 0.0, "s-1", "coefficient of the damping", minimum=0.0),

@@ -32,7 +32,7 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.expression import Name, parse, plus, times
+from vibsim.formula import Name, parse, plus, times
 from vibsim.models.base import (
     Damping,
     Floats,
@@ -44,8 +44,8 @@ from vibsim.models.base import (
     State,
     declared_parameters,
 )
-from vibsim.models.harmonic import motion
-from vibsim.models.manufactured import Manufactured
+from vibsim.models.shared.harmonic import motion
+from vibsim.models.shared.manufactured import Manufactured
 
 STATES = (
     State("x", "1", "horizontal position"),

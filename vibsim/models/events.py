@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vibsim.expression import Expression
+from vibsim.formula import Expression
 
 Formula = str | Expression
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Any
 
 from vibsim.models.base import Floats, Model, Numbers
-from vibsim.models.harmonic import motion, period
 from vibsim.models.pendulum import PARAMETERS, SCALES, STATES, natural_frequency
+from vibsim.models.shared.harmonic import motion, period
 
 
 def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:

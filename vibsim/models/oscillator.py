@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.expression import (
+from vibsim.formula import (
     ONE,
     Compare,
     Expression,
@@ -36,10 +36,10 @@ from vibsim.expression import (
     values,
 )
 from vibsim.models.base import Floats, FormulaField, Model, Numbers, Parameter, declared_parameters
-from vibsim.models.dry_friction import friction_motion
 from vibsim.models.events import Friction
-from vibsim.models.manufactured import Manufactured
-from vibsim.models.mechanical import Forces, mechanical
+from vibsim.models.shared.dry_friction import friction_motion
+from vibsim.models.shared.manufactured import Manufactured
+from vibsim.models.shared.mechanical import Forces, mechanical
 
 MASS = Parameter("m", 1.0, "kg", "mass", minimum=0.0, exclusive=True, neutral=1.0)
 COULOMB = "coulomb"

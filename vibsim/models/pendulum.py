@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from vibsim.models.base import Damping, Model, Numbers, Output, Parameter, State
-from vibsim.models.elliptic import pendulum_motion, pendulum_period
-from vibsim.models.scales import Scales
+from vibsim.models.shared.elliptic import pendulum_motion, pendulum_period
+from vibsim.models.shared.scales import Scales
 
 STATES = (
     State("theta", "rad", "angle from the downward vertical"),

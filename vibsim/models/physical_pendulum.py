@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from vibsim.models.base import Damping, Floats, Model, Numbers, Output, Parameter
-from vibsim.models.elliptic import pendulum_motion, pendulum_period
 from vibsim.models.pendulum import STATES
-from vibsim.models.scales import Scales
+from vibsim.models.shared.elliptic import pendulum_motion, pendulum_period
+from vibsim.models.shared.scales import Scales
 
 PARAMETERS = (
     Parameter(

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from vibsim.models.base import Floats, Model, Numbers, Parameter, State
-from vibsim.models.dry_friction import friction_motion, sticking_time
 from vibsim.models.events import Friction
-from vibsim.models.scales import Scales
+from vibsim.models.shared.dry_friction import friction_motion, sticking_time
+from vibsim.models.shared.scales import Scales
 
 _PULL = "where(alpha == 0, (k/m)*u, (k/m)/alpha*tanh(alpha*u))"
 _X = "(alpha*u)"

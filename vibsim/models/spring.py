@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import Any
 
 from vibsim.models.base import Floats, Model, Numbers, Parameter, State
-from vibsim.models.harmonic import motion, period
-from vibsim.models.scales import Scales
+from vibsim.models.shared.harmonic import motion, period
+from vibsim.models.shared.scales import Scales
 
 
 def natural_frequency(parameters: Numbers) -> Any:

@@ -21,7 +21,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.expression import Expression
+from vibsim.formula import Expression
 
 Floats = NDArray[np.float64]
 Formula = str | Expression

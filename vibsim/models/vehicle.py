@@ -14,7 +14,7 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
-from vibsim.expression import (
+from vibsim.formula import (
     ZERO,
     Binary,
     Expression,
@@ -28,9 +28,9 @@ from vibsim.expression import (
     to_formula,
 )
 from vibsim.models.base import FormulaField, Model, Output, Parameter, declared_parameters
-from vibsim.models.linear_scales import linear_scales
-from vibsim.models.mechanical import Forces, mechanical
-from vibsim.models.scales import Scales
+from vibsim.models.shared.linear_scales import linear_scales
+from vibsim.models.shared.mechanical import Forces, mechanical
+from vibsim.models.shared.scales import Scales
 from vibsim.models.table import BEND, HEIGHT, Lookup, Table
 
 PARAMETERS = (

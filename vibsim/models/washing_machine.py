@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.expression import parse
+from vibsim.formula import parse
 from vibsim.models.base import Floats, Model, Numbers, Output, Parameter
-from vibsim.models.linear_scales import linear_scales
-from vibsim.models.mechanical import Forces, mechanical
-from vibsim.models.scales import Scales
+from vibsim.models.shared.linear_scales import linear_scales
+from vibsim.models.shared.mechanical import Forces, mechanical
+from vibsim.models.shared.scales import Scales
 
 PARAMETERS = (
     Parameter("m", 1.0, "kg", "mass", minimum=0.0, exclusive=True),

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from vibsim.errors import SimulationError
+from vibsim.core.errors import SimulationError
 
 INLINE = "compiled"
 """Decorator of a function that becomes part of its callers."""

@@ -8,7 +8,7 @@ from vibsim.plan.cache import load, load_all
 from vibsim.plan.cases import columns, count, option_groups, sampling
 from vibsim.plan.choose import Choice, checkout, choose, experiments
 from vibsim.plan.jobs import Batch, LevelJob, Plan, ShardJob
-from vibsim.plan.names import Names
+from vibsim.plan.workflow_names import Names
 
 __all__ = [
     "Batch",

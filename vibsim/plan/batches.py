@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from vibsim.experiment.cost import JOB_SECONDS
 from vibsim.plan.jobs import Batch, LevelJob
 from vibsim.plan.shards import digest_of
-from vibsim.spec.cost import JOB_SECONDS
 
 CHEAP_SECONDS = 2.0
 """Work that one job does at most where it makes several levels."""

@@ -12,24 +12,26 @@ from collections.abc import Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from vibsim.plan import code
+from vibsim.experiment.cost import analysis_disk, analysis_memory
+from vibsim.plan import code_digest
 from vibsim.plan.batches import batches
+from vibsim.plan.digested_part import analysed, extrapolated, in_numbers
 from vibsim.plan.jobs import LevelJob, Plan
-from vibsim.plan.shards import digest_of, in_numbers, is_bounded, level_jobs, load_of
+from vibsim.plan.shards import digest_of, is_bounded, level_jobs
 from vibsim.plan.versions import DRAWING, NUMERICAL, versions
-from vibsim.spec.cost import analysis_disk, analysis_memory
 
 if TYPE_CHECKING:
-    from vibsim.spec import Experiment
+    from vibsim.experiment import Experiment
 
 
 def build(experiment: Experiment) -> Plan:
     """Return the plan of `experiment`, which has at least one level."""
-    from vibsim.spec import canonical
+    from vibsim.experiment import canonical
+    from vibsim.experiment.level_counts import load_of
 
     content: dict[str, Any] = json.loads(json.dumps(canonical(experiment), allow_nan=False))
     levels = level_jobs(experiment, content)
-    analysis = _analysis(experiment, content, levels)
+    analysis = _analysis(content, levels)
     loads = [load_of(experiment, level) for level in experiment.levels]
     return Plan(
         collection=experiment.collection,
@@ -51,20 +53,13 @@ def build(experiment: Experiment) -> Plan:
     )
 
 
-def _analysis(
-    experiment: Experiment, content: Mapping[str, Any], levels: tuple[LevelJob, ...]
-) -> str:
+def _analysis(content: Mapping[str, Any], levels: tuple[LevelJob, ...]) -> str:
     return digest_of(
         {
             "job": "analyse",
             "levels": _digests(levels),
-            "title": experiment.title,
-            "checks": content.get("checks"),
-            "published": content.get("published"),
-            # How the members lie in the space of parameters is no number of theirs.
-            "sweep": content.get("sweep"),
-            "tolerance": content.get("tolerance"),
-            "code": _analysis_code(),
+            "experiment": in_numbers(analysed(content)),
+            "code": _code("analyse"),
             "versions": versions(NUMERICAL),
         }
     )
@@ -72,32 +67,6 @@ def _analysis(
 
 def _digests(levels: tuple[LevelJob, ...]) -> list[list[str]]:
     return [[shard.digest for shard in level.shards] for level in levels]
-
-
-@cache
-def _analysis_code() -> str:
-    return code.used_by(
-        "vibsim.analysis",
-        "vibsim.spec.values",
-        "vibsim.store.writing",
-        "vibsim.store.level",
-        "vibsim.store.summary",
-    )
-
-
-def extrapolated(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the part of an experiment in normal form that an extrapolation depends on and tells of."""
-    return {key: value for key, value in content.items() if key not in _NOT_EXTRAPOLATED}
-
-
-_NOT_EXTRAPOLATED = ("title", "source", "checks", "published", "units")
-
-
-@cache
-def _extrapolation_code() -> str:
-    return code.used_by(
-        "vibsim.analysis.extrapolation", "vibsim.store.writing", "vibsim.store.level"
-    )
 
 
 def _extrapolation(content: Mapping[str, Any], levels: tuple[LevelJob, ...]) -> str:
@@ -108,7 +77,7 @@ def _extrapolation(content: Mapping[str, Any], levels: tuple[LevelJob, ...]) -> 
             "job": "extrapolate",
             "levels": _digests(levels),
             "experiment": in_numbers(extrapolated(content)),
-            "code": _extrapolation_code(),
+            "code": _code("extrapolate"),
             "versions": versions(NUMERICAL),
         }
     )
@@ -120,13 +89,13 @@ def _report(content: Mapping[str, Any], analysis: str) -> str:
             "job": "report",
             "analysis": analysis,
             "experiment": content,
-            "code": report_code(),
+            "code": _code("report"),
             "versions": versions(DRAWING),
         }
     )
 
 
 @cache
-def report_code() -> str:
-    """Return the digest of the code and the templates of the reports."""
-    return code.of_folder("vibsim.report")
+def _code(command: str) -> str:
+    """Return the digest of the code that a job after the simulation can run."""
+    return code_digest.used_by(f"vibsim.cli.jobs.{command}")

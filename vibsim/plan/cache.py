@@ -1,69 +1,79 @@
 """Plans kept on disk, so that a hundred experiment files do not slow the start.
 
-An entry is keyed by the bytes of the experiment file and by the code of the whole package, and it knows the bytes of
-every table that the file names. An entry that does not fit, or is damaged, is built again.
+An entry of the private cache (`vibsim.core.private_cache`) is named by the digest of the bytes of the experiment file
+and of the code of the whole package, and it knows the bytes of every table that the file names. One that does not fit,
+or is damaged, is built again. A results folder holds no plan: it may come from somebody else, and what a plan says goes
+into commands.
 """
 
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Callable, Iterable
-from contextlib import suppress
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vibsim.errors import Fault, InputError, VibsimError
-from vibsim.plan import code
+from vibsim.core import private_cache
+from vibsim.core.errors import Fault, InputError, VibsimError
+from vibsim.experiment.yaml.file_content import MOST_BYTES, content_of, read_bytes
+from vibsim.plan import code_digest
 from vibsim.plan.choose import Choice
 from vibsim.plan.jobs import Plan, from_json, to_json
 from vibsim.plan.versions import DRAWING, NUMERICAL, versions
-from vibsim.spec.content import MOST_BYTES, content_of, read_bytes
 
 if TYPE_CHECKING:
-    from vibsim.spec import Experiment
+    from vibsim.experiment import Experiment
 
 Resolver = Callable[["Experiment"], "Experiment"]
 """Fills in the levels of an experiment that names a tolerance instead; it runs a pilot, which a plan cannot."""
 
 
-def load(choice: Choice, results: Path | None = None, resolve: Resolver | None = None) -> Plan:
+def load(choice: Choice, resolve: Resolver | None = None, *, cached: bool = False) -> Plan:
     """Return the plan of an experiment file, or of one member of its sweep.
 
     Parameters
     ----------
     choice
         The file and its collection, and the member where one alone is wanted.
-    results
-        The results folder, which keeps the cache; None does without.
     resolve
         What chooses the levels of an experiment with a tolerance.
+    cached
+        Whether a plan that was made before will do, and this one is kept.
 
     Raises
     ------
     InputError
         When the file is refused.
     """
-    key = _key(choice)
-    entry = _entry(choice, results) if results else None
-    if entry and key and (text := _read(entry, key)):
-        kept = from_json(text, _word(choice))
-        if _has_inputs(kept, choice):
-            return kept
+    key = _key(choice) if cached else ""
+    if not key:
+        return _built(choice, resolve)
+
+    def dump(plan: Plan) -> bytes | None:
+        # a file that changed while it was read is not kept under the digest of the old bytes
+        is_same = key == _key(choice) and _has_inputs(plan, choice)
+        return to_json(plan).encode() if is_same else None
+
+    def kept(content: bytes) -> Plan | None:
+        try:
+            plan = from_json(content.decode(), _word(choice), choice.key)
+        except (ValueError, RecursionError):
+            return None
+        return plan if _has_inputs(plan, choice) else None
+
+    return private_cache.kept("plans", key, lambda: _built(choice, resolve), dump, kept)
+
+
+def _built(choice: Choice, resolve: Resolver | None) -> Plan:
     from vibsim.plan.build import build
 
-    plan = replace(build(_experiment(choice, resolve)), file=_word(choice))
-    # A file that changed while it was read is not kept under the digest of the old bytes.
-    if entry and key and key == _key(choice) and _has_inputs(plan, choice):
-        _write(entry, key, to_json(plan))
-    return plan
+    return replace(build(_experiment(choice, resolve)), file=_word(choice))
 
 
 def _experiment(choice: Choice, resolve: Resolver | None) -> Experiment:
-    from vibsim import spec
+    from vibsim import experiment as spec
 
-    experiment = spec.load(choice.file, collection=choice.collection)
+    experiment = spec.Experiment.from_yaml(choice.file, collection=choice.collection)
     wanted = experiment if choice.case is None else experiment.alone(choice.case)
     if experiment.levels:
         return wanted
@@ -74,7 +84,7 @@ def _experiment(choice: Choice, resolve: Resolver | None) -> Experiment:
 
 
 def load_all(
-    choices: Iterable[Choice], results: Path | None = None, resolve: Resolver | None = None
+    choices: Iterable[Choice], resolve: Resolver | None = None, *, cached: bool = False
 ) -> dict[str, Plan]:
     """Return the plans of several experiment files by their keys.
 
@@ -87,7 +97,7 @@ def load_all(
     faults: list[Fault] = []
     for choice in choices:
         try:
-            plan = load(choice, results, resolve)
+            plan = load(choice, resolve, cached=cached)
         except InputError as error:
             faults.extend(error.faults)
         else:
@@ -108,7 +118,7 @@ def _key(choice: Choice) -> str:
         choice.collection,
         choice.name,
         str(choice.case),
-        code.everything(),
+        code_digest.everything(),
         repr(libraries),
         content,
     )
@@ -132,30 +142,5 @@ def _word(choice: Choice) -> str:
     return str(choice.file) if choice.case is None else f"{choice.file}@{choice.case}"
 
 
-def _entry(choice: Choice, results: Path) -> Path:
-    member = "" if choice.case is None else f"@{choice.case}"
-    return results / ".vibsim/plans" / f"{choice.collection}.{choice.name}{member}.json"
-
-
 def _sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
-
-
-def _read(entry: Path, key: str) -> str:
-    """Return the text of an entry; empty when there is none, or it is another's, or damaged."""
-    try:
-        head, _, text = entry.read_bytes().partition(b"\n")
-    except OSError:
-        return ""
-    if head != f"{key} {_sha256(text)}".encode():
-        return ""
-    return text.decode()
-
-
-def _write(entry: Path, key: str, text: str) -> None:
-    temporary = entry.with_name(f".{entry.name}.{os.getpid()}")
-    # Results on a read-only medium have no cache; everything else works without one.
-    with suppress(OSError):
-        entry.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_text(f"{key} {_sha256(text.encode())}\n{text}")
-        temporary.replace(entry)

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from vibsim.spec import Experiment
+    from vibsim.experiment import Experiment
 
 
 def count(experiment: Experiment) -> int:
@@ -36,7 +36,7 @@ def columns(experiment: Experiment, start: int, stop: int) -> dict[str, NDArray[
     """
     if experiment.sweep is None:
         return {}
-    from vibsim.spec.columns import columns as values_of
+    from vibsim.experiment.sweep.columns import columns as values_of
 
     return values_of(experiment.sweep.axes, start, stop)
 
@@ -47,7 +47,7 @@ def sampling(experiment: Experiment, level: int) -> int:
     The first and the last time are always among them, and so are all times of the coarsest level
     unless the file asks for every n-th step of each level.
     """
-    from vibsim.spec.sampling import stride
+    from vibsim.experiment.stored_samples import stride
 
     coarsest = experiment.steps(experiment.levels[0])
     trajectories = len(experiment.schemes) * experiment.members
@@ -77,7 +77,7 @@ def option_groups(
     """
     import numpy as np
 
-    from vibsim.spec.options import as_option
+    from vibsim.experiment.schema.options import as_option
 
     base = experiment.scheme_options(scheme)
     size = len(next(iter(columns.values()))) if columns else 1

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from vibsim.errors import Fault, InputError, VibsimError, nearest
-from vibsim.spec.collection import ENDINGS, collection_of, find_checkout
+from vibsim.core.errors import Fault, InputError, VibsimError, nearest
+from vibsim.experiment.collection import ENDINGS, collection_of, find_checkout
 
 DEFAULT = ("pendulum_lab", "showcase")
 MAX_DIGITS = 18
@@ -26,7 +26,7 @@ class Choice:
 
     @property
     def name(self) -> str:
-        """Name of the experiment: that of `vibsim.spec.Experiment.alone` for one member."""
+        """Name of the experiment: that of `vibsim.experiment.Experiment.alone` for one member."""
         return self.file.stem if self.case is None else f"{self.file.stem}_case_{self.case}"
 
     @property

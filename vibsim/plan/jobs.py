@@ -6,15 +6,20 @@ Paths are relative to the results folder and written with ``/``.
 from __future__ import annotations
 
 import json
+import re
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vibsim.spec.collection import ENDINGS
+from vibsim.experiment.collection import ENDINGS
+from vibsim.plan.typed_json import typed
 
 if TYPE_CHECKING:
-    from vibsim.spec import Experiment
+    from vibsim.experiment import Experiment
+
+_DIGEST = re.compile("[0-9a-f]{64}")
 
 
 @dataclass(frozen=True)
@@ -100,7 +105,7 @@ class Plan:
     @cached_property
     def experiment(self) -> Experiment:
         """The experiment that the digests were made of, also when its file has changed since."""
-        from vibsim.spec import restore
+        from vibsim.experiment import restore
 
         # one member alone is named by the file and its number
         named = self.file if self.file.endswith(ENDINGS) else self.file.rpartition("@")[0]
@@ -182,17 +187,44 @@ def to_json(plan: Plan) -> str:
     return json.dumps(asdict(replace(plan, file="")), allow_nan=False)
 
 
-def from_json(text: str, file: str) -> Plan:
-    """Read what `to_json` wrote."""
-    data = json.loads(text)
-    levels = tuple(
-        LevelJob(**{**level, "shards": tuple(ShardJob(**shard) for shard in level["shards"])})
-        for level in data["levels"]
-    )
-    batches = tuple(
-        Batch(**{**batch, "levels": tuple(batch["levels"])}) for batch in data["batches"]
-    )
-    schemes = tuple(data["schemes"])
-    inputs = tuple((path, digest) for path, digest in data["inputs"])
-    lists = {"levels": levels, "batches": batches, "schemes": schemes, "inputs": inputs}
-    return Plan(**{**data, **lists, "file": file})
+def from_json(text: str, file: str, key: str) -> Plan:
+    """Read what `to_json` wrote.
+
+    Parameters
+    ----------
+    file
+        Where the experiment was read.
+    key
+        The name of the experiment.
+
+    Raises
+    ------
+    ValueError
+        Where it is no plan of that experiment: names and digests go into commands, and paths are written to.
+    """
+    plan = replace(typed(Plan, json.loads(text)), file=file)
+    if plan.key != key or not all(map(_DIGEST.fullmatch, _digests(plan))):
+        raise ValueError(f"{plan.key:.100}: not a plan of {key}")
+    for level in plan.levels:
+        _check_shards(level, key, is_swept=plan.content.get("sweep") is not None)
+    shards = {level.level: len(level.shards) for level in plan.levels}
+    for batch in plan.batches:
+        if any(not 0 <= batch.shard < shards.get(level, 0) for level in batch.levels):
+            raise ValueError(f"{plan.key}: a job for files that no level has")
+    return plan
+
+
+def _digests(plan: Plan) -> Iterator[str]:
+    yield from (plan.analysis, plan.report)
+    if plan.extrapolation:
+        yield plan.extrapolation
+    yield from (shard.digest for shard in plan.shards)
+    yield from (batch.digest for batch in plan.batches)
+
+
+def _check_shards(level: LevelJob, key: str, *, is_swept: bool) -> None:
+    """Refuse other files than those that key, level and number give."""
+    count = len(level.shards) if is_swept else 1
+    wanted = [(k, shard_path(key, level.level, k if is_swept else None)) for k in range(count)]
+    if [(shard.index, shard.path) for shard in level.shards] != wanted:
+        raise ValueError(f"{key}, level {level.level}: other files than its own")

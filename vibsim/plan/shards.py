@@ -9,25 +9,18 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from vibsim.plan import code
-from vibsim.plan.cases import columns, sampling
+from vibsim.plan import code_digest
+from vibsim.plan.cases import sampling
+from vibsim.plan.digested_part import in_numbers, simulated, values_digest
 from vibsim.plan.jobs import LevelJob, ShardJob, shard_path
 from vibsim.plan.versions import NUMERICAL, versions
-from vibsim.spec.cost import COUPLED, EVENTFUL, Load, work
 
 if TYPE_CHECKING:
-    from vibsim.models import Model
-    from vibsim.spec import Experiment
-
-_NOT_SIMULATED = (
-    *("title", "source", "checks", "levels", "samples", "sweep"),
-    *("output", "tolerance", "published", "units"),
-)
+    from vibsim.experiment import Experiment
 
 
 def digest_of(content: Mapping[str, Any]) -> str:
@@ -36,76 +29,16 @@ def digest_of(content: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def simulated(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the part of an experiment in normal form that every member shares."""
-    return {key: value for key, value in content.items() if key not in _NOT_SIMULATED}
-
-
-def in_numbers(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a part of an experiment in normal form with the numbers of its tables alone, wherever they stand."""
-    model = content["model"]
-    if "tables" not in model:
-        return dict(content)
-    tables = {name: table["numbers"] for name, table in model["tables"].items()}
-    return {**content, "model": {**model, "tables": tables}}
-
-
-def _alone(model: Model) -> float | None:
-    """Return what a step takes of a model whose members are stepped one by one (`vibsim.spec.cost.work`)."""
-    if model.events is not None:
-        return EVENTFUL
-    return COUPLED if model.coordinates > 1 or model.lookup is not None else None
-
-
-def load_of(experiment: Experiment, level: int) -> Load:
-    """Return what one member of `experiment` costs at `level`."""
-    from vibsim.models import has_solution
-    from vibsim.schemes import SCHEMES
-    from vibsim.spec.series import extrema_kept
-
-    model, steps = experiment.model.definition, experiment.steps(level)
-    lean = is_bounded(experiment)
-    trajectories = len(experiment.schemes) * experiment.members
-    kinds = [SCHEMES[experiment.schemes[i].kind] for i in experiment.ladder]
-    works = [work(kind.force_evaluations, kind.explicit, _alone(model)) for kind in kinds]
-    return Load(
-        schemes=len(experiment.schemes),
-        steps=steps,
-        samples=steps // sampling(experiment, level) + 1,
-        series=len(_series(experiment)),
-        exact=len(model.states) if has_solution(model) and not lean else 0,
-        work=sum(explicit for explicit, _ in works),
-        iterated=sum(iterated for _, iterated in works),
-        extrema=0 if lean else extrema_kept(steps, trajectories),
-        d2t=experiment.own_velocity or not lean,
-        own=_own_seconds(experiment),
-    )
-
-
-def _own_seconds(experiment: Experiment) -> float:
-    """Return the seconds that schemes which choose their own steps take of a member that is not swept."""
-    from vibsim.schemes import SCHEMES
-    from vibsim.schemes.adaptive import seconds
-
-    model = experiment.model.definition
-    turns = experiment.time.end * float(model.natural_frequency(experiment.model.parameters))
-    return sum(
-        seconds(scheme.kind, float(scheme.options["tolerance"]), turns / (2.0 * math.pi))
-        for scheme in experiment.schemes
-        if SCHEMES[scheme.kind].adaptive
-    )
-
-
 def is_bounded(experiment: Experiment) -> bool:
     """Tell whether `experiment` is so large that its storage is bounded."""
-    from vibsim.spec import series
+    from vibsim.experiment import stored_series as series
 
     return series.is_bounded(experiment)
 
 
 def _series(experiment: Experiment) -> tuple[str, ...]:
     """Name the series that are kept of every scheme and member."""
-    from vibsim.spec.series import stored_series
+    from vibsim.experiment.stored_series import stored_series
 
     return stored_series(experiment)
 
@@ -124,24 +57,15 @@ def level_jobs(experiment: Experiment, content: Mapping[str, Any]) -> tuple[Leve
     return tuple(_level(experiment, content, level, values) for level in experiment.levels)
 
 
-def values_digest(experiment: Experiment, start: int, stop: int) -> str:
-    """Return the SHA-256 of the swept keys and their values for members start..stop-1; empty without a sweep."""
-    if experiment.sweep is None:
-        return ""
-    digest = hashlib.sha256()
-    for key, values in columns(experiment, start, stop).items():
-        words = values.dtype.kind == "U"
-        digest.update(f"{key} {'words' if words else 'numbers'}\n".encode())
-        digest.update(json.dumps(values.tolist()).encode() if words else values.tobytes())
-    return digest.hexdigest()
-
-
 def _level(
     experiment: Experiment,
     content: Mapping[str, Any],
     level: int,
     values: Callable[[int, int], str],
 ) -> LevelJob:
+    # what only asks for digests needs neither models nor schemes
+    from vibsim.experiment.level_counts import load_of
+
     load, members = load_of(experiment, level), experiment.members
     every = sampling(experiment, level)
     shared = digest_of(
@@ -186,17 +110,13 @@ def _simulation_code(experiment: Experiment) -> str:
 
 @cache
 def code_of(model: str, schemes: tuple[str, ...]) -> str:
-    """Return the digest of the code that a simulation runs.
-
-    What works out the members, their ends and their samples is no part of it: what comes out is in the digest itself.
-    """
+    """Return the digest of the code that a simulation can run: of all models and schemes, its own."""
     from vibsim.models import MODELS
     from vibsim.schemes import SCHEMES
 
-    return code.used_by(
-        "vibsim.engine",
-        "vibsim.simulation",
-        "vibsim.store.writing",
-        code.home(MODELS[model], "vibsim.models"),
-        *(code.home(SCHEMES[kind], "vibsim.schemes") for kind in schemes),
-    )
+    homes = [
+        code_digest.home(MODELS[model], "vibsim.models"),
+        *(code_digest.home(SCHEMES[kind], "vibsim.schemes") for kind in schemes),
+    ]
+    used = code_digest.used_by("vibsim.cli.jobs.simulate", *(module for module, _ in homes))
+    return digest_of({"used": used, "entries": homes})

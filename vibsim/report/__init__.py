@@ -6,7 +6,7 @@ imported where they are used, so that importing this package costs next to nothi
 
 from __future__ import annotations
 
-from vibsim.report.index import write_index
-from vibsim.report.page import write
+from vibsim.report.page.index import write_index
+from vibsim.report.page.page import write
 
 __all__ = ["write", "write_index"]

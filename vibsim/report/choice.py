@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.record import Record
+from vibsim.core.record import Record
+from vibsim.core.vocabulary import SEVERITY, TOLERANCE, TYPICAL_NORM
+from vibsim.experiment.stored_series import asked
 from vibsim.report.data import Member, case_name, due, flags, formal_orders, pick, swept
 from vibsim.schemes import SCHEMES
-from vibsim.spec.series import asked
-from vibsim.vocabulary import SEVERITY, TOLERANCE, TYPICAL_NORM
 
 if TYPE_CHECKING:
-    from vibsim.spec import Experiment
-    from vibsim.spec.checks import ConvergesCheck
+    from vibsim.experiment import Experiment
+    from vibsim.experiment.schema.checks import ConvergesCheck
 
 
 def promises(experiment: Experiment, record: Record, quantity: str) -> list[tuple[float, float]]:

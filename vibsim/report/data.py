@@ -13,13 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis.floor import norm_of_floor
-from vibsim.analysis.tables import LEAST_ORDER
-from vibsim.record import Record
+from vibsim.apriori.roundoff_floor import norm_of_floor
+from vibsim.comparison.comparison_variables import LEAST_ORDER
+from vibsim.core.record import Record
+from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.report.style import RAISE
 from vibsim.simulation.scaled import has_time_unit
-from vibsim.vocabulary import TYPICAL_NORM
 
+_LONGEST = 40
+"""Characters of the name of a scheme in the name of a file."""
 Floats = NDArray[np.float64]
 
 
@@ -42,8 +44,9 @@ class Member:
 
     @property
     def stem(self) -> str:
-        """A plain name for files."""
-        plain = "".join(c if c.isascii() and c.isalnum() else "_" for c in self.scheme_name)
+        """A plain name for files, unique by its number; file systems take 255 bytes."""
+        name = self.scheme_name[:_LONGEST]
+        plain = "".join(c if c.isascii() and c.isalnum() else "_" for c in name)
         return f"{self.scheme}_{plain}_{self.role}" if self.role else f"{self.scheme}_{plain}"
 
 
@@ -194,7 +197,7 @@ def promised_text(record: Record, quantity: str, scheme: int) -> str:
 
 
 def is_lean(record: Record) -> bool:
-    """Say whether no series over time are stored (see `vibsim.spec.sampling`)."""
+    """Say whether no series over time are stored (see `vibsim.experiment.stored_samples`)."""
     return record.attrs.get("storage") == "lean"
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from vibsim.record import Record
+    from vibsim.core.record import Record
 
 Floats = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from vibsim.errors import SimulationError
+from vibsim.core.errors import SimulationError
 from vibsim.schemes.base import NumberOption, Options, Scheme, Stepper
 from vibsim.schemes.orders import Orders
 

@@ -277,6 +277,14 @@ class Scheme:
         order = orders.between_events(model)
         return min(order, 1.0) if is_on_the_mesh(options) else order
 
+    def special_order(self, options: Options) -> float:
+        """Return the highest order of any state or energy in a special case of motion, model or numbers of options.
+
+        What vanishes there alone is small near by, also in what it drives: the swing of a wrong energy.
+        """
+        usual = {o.name: o.default for o in self.options if isinstance(o, NumberOption)}
+        return max(self.orders(near).highest for near in (options, {**options, **usual}))
+
     def has_even_powers(self, quantity: str, model: Model, options: Options) -> bool:
         """Tell whether the error of a quantity expands in h^p, h^(p+2), ...
 

@@ -24,7 +24,7 @@ from functools import cache
 from typing import Any
 
 from vibsim.elementary import ELEMENTARY
-from vibsim.schemes.written import written
+from vibsim.schemes.code_generation import written
 
 
 @dataclass(frozen=True)

@@ -38,9 +38,9 @@ from vibsim.schemes.base import (
     Stepper,
     always,
 )
+from vibsim.schemes.code_generation import written
 from vibsim.schemes.one_step import self_starting
 from vibsim.schemes.orders import Orders, depends_on_velocity
-from vibsim.schemes.written import written
 
 KICK, DRIFT = "kick", "drift"
 Substeps = tuple[tuple[str, str], ...]

@@ -14,10 +14,10 @@ from __future__ import annotations
 import math
 
 from vibsim.schemes.base import Options, Scheme, Stepper, always
+from vibsim.schemes.code_generation import written
 from vibsim.schemes.newton import solved_together
 from vibsim.schemes.one_step import self_starting
 from vibsim.schemes.orders import Orders
-from vibsim.schemes.written import written
 
 _FORMULAS = {
     "C_1": "1/2 - sqrt(3)/6",

@@ -22,9 +22,9 @@ from functools import cache
 from typing import Any
 
 from vibsim.schemes.base import Acceleration, Function, Options, Scheme, Stepper
+from vibsim.schemes.code_generation import weighted, written
 from vibsim.schemes.orders import Orders
 from vibsim.schemes.runge_kutta import HEUN, RK3
-from vibsim.schemes.written import weighted, written
 
 heun_step = HEUN.stepper({}).step
 kutta_step = RK3.stepper({}).step

@@ -31,10 +31,10 @@ from functools import cache
 
 from vibsim.models.base import Model
 from vibsim.schemes.base import NumberOption, Options, Scheme, Stepper
+from vibsim.schemes.code_generation import written
 from vibsim.schemes.newton import solved
 from vibsim.schemes.one_step import with_acceleration
 from vibsim.schemes.orders import Orders
-from vibsim.schemes.written import written
 
 _STEP = """\
 def step_newmark(state, t, dt, p, acceleration, slopes):

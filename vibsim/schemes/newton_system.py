@@ -15,8 +15,8 @@ from functools import cache
 from itertools import product
 from typing import Any
 
+from vibsim.schemes.code_generation import written
 from vibsim.schemes.newton import LEAST, MOST_TOGETHER, STALLED, TOLERANCE, alone
-from vibsim.schemes.written import written
 
 _NUMBERS = {
     "LEAST": repr(LEAST),

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from functools import cache
 
 from vibsim.schemes.base import Options, Scheme, Stepper
+from vibsim.schemes.code_generation import weighted, written
 from vibsim.schemes.one_step import self_starting
 from vibsim.schemes.orders import Orders
-from vibsim.schemes.written import weighted, written
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from vibsim.schemes.base import HANDED, Function, Stepper, position_and_velocity
-from vibsim.schemes.written import written
+from vibsim.schemes.code_generation import written
 
 
 def with_acceleration(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Literal
 
-from vibsim.expression import names_in
+from vibsim.formula import names_in
 from vibsim.models.base import BUDGET, Model, tree
 from vibsim.models.events import Friction
 
@@ -71,6 +71,17 @@ class Orders:
         if self.velocity_dependent is not None and depends_on_velocity(model):
             return self.velocity_dependent.between_events(model)
         return min(self.position, self.velocity)
+
+    @property
+    def highest(self) -> float:
+        """The highest order of position, velocity or energy in any case: of models, damping and beginnings."""
+        own = (self.position, self.velocity, self.energy, self.energy_linear)
+        others = (self.velocity_dependent, self.from_rest, self.from_balance)
+        return max(
+            *own,
+            self.position_linear or 0.0,
+            *(case.highest for case in others if case is not None),
+        )
 
     def of(self, quantity: str, model: Model, beginning: Beginning = "any") -> float:
         """Return the order of a quantity of a model.

@@ -1,8 +1,9 @@
 """From an experiment and a level to the data of that level: every scheme, every member, one record.
 
-The record holds what design and files call by name: the states, the energies, their exact values where they are
-known, and what was gathered over every step. Shapes are (scheme, case, t), (case, t), (scheme, case) or (case,). Where
-storage is bounded (`vibsim.spec.sampling.is_lean`), of the series only those of `vibsim.spec.series.lean_series`.
+The record holds what a level file holds: the states, the energies, their exact values where they are known, and what
+was gathered over every step. Shapes are (scheme, case, t), (case, t), (scheme, case) or (case,). Where storage
+is bounded (`vibsim.experiment.stored_samples.is_lean`), of the series only those of
+`vibsim.experiment.stored_series.lean_series`.
 """
 
 from vibsim.simulation.level import simulate, simulate_record

@@ -32,10 +32,10 @@ from vibsim.engine import Trajectories
 from vibsim.engine import integrate as gather_over
 from vibsim.engine.gather import OVERFLOW
 from vibsim.engine.kernel import kernel
+from vibsim.experiment.cost import PLAIN_MEMBER_STEPS
 from vibsim.models import Model
 from vibsim.schemes.base import Acceleration, CarriedState, Options, Scheme, Stepper
-from vibsim.schemes.written import written
-from vibsim.spec.cost import PLAIN_MEMBER_STEPS
+from vibsim.schemes.code_generation import written
 
 Floats = NDArray[np.float64]
 

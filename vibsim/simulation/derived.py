@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.engine import energies, lane_for, observed
-from vibsim.expression import Binary, Expression, Name, Number, derivative
+from vibsim.formula import Binary, Expression, Name, Number, derivative
 from vibsim.models import BUDGET, Model, centred, tree
 from vibsim.models.base import Formula
 from vibsim.simulation.members import Members
@@ -124,17 +124,21 @@ def _series(samples: Samples, wanted: frozenset[str]) -> dict[str, Floats]:
     kinetic, potential = samples.energies(samples.states[samples.model.coordinates :])
     energy = kinetic + potential
     start = energy[:, :1]
+    # an energy that is too large for a number has no deviation
+    with np.errstate(over="ignore", invalid="ignore"):
+        deviation = energy - start
     found = {
         "kinetic_energy": kinetic,
         "potential_energy": potential,
         "energy": energy,
-        "energy_deviation": energy - start,
+        "energy_deviation": deviation,
         "energy_initial": energy[:, 0],
     }
     *_, energy_d2t, deviation_d2t = centred(samples.model)
     if wanted & {energy_d2t, deviation_d2t}:
         found[energy_d2t] = _energy_d2t(samples)
-        found[deviation_d2t] = found[energy_d2t] - start
+        with np.errstate(over="ignore", invalid="ignore"):
+            found[deviation_d2t] = found[energy_d2t] - start
     if wanted & set(BUDGET):
         # of a member that grows without bound, all of them do
         with np.errstate(over="ignore", invalid="ignore"):

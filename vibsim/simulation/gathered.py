@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.core.record import Variable, attributes
 from vibsim.engine import EventTimes, Extrema, Gathered
 from vibsim.models import Model, State
-from vibsim.record import Variable, attributes
 from vibsim.simulation.members import Members
 
 Floats = NDArray[np.float64]

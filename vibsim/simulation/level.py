@@ -10,21 +10,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim import plan
+from vibsim.core.record import Attribute, Record, Variable, attributes
+from vibsim.core.vocabulary import HIGHEST
+from vibsim.experiment.stored_series import (
+    RUNNING,
+    asks_for_peaks,
+    extrema_kept,
+    is_bounded,
+    stored_series,
+)
 from vibsim.models import BUDGET, ENERGIES, Model, State, centred, has_budget, has_solution
-from vibsim.record import Attribute, Record, Variable, attributes
 from vibsim.simulation.derived import derived
 from vibsim.simulation.gathered import event_times, extrema, gathered, of_own_steps
 from vibsim.simulation.members import Members, members
-from vibsim.simulation.reference import method, reference
+from vibsim.simulation.reference.solve import method, reference
 from vibsim.simulation.scaled import in_scales
 from vibsim.simulation.solution import Solution, has_adaptive, solve
-from vibsim.spec.series import RUNNING, asks_for_peaks, extrema_kept, is_bounded, stored_series
-from vibsim.vocabulary import HIGHEST
 
 if TYPE_CHECKING:
     import xarray
 
-    from vibsim.spec import Experiment
+    from vibsim.experiment import Experiment
 
 SERIES = ("scheme", "case", "t")
 MOST_REFERENCES = 1024
@@ -58,7 +64,8 @@ def simulate(experiment: Experiment, level: int, *, threads: int = 1) -> xarray.
     Returns
     -------
     xarray.Dataset
-        What the file ``level_LL.nc`` holds (design, section 4.4).
+        What the file ``level_LL.nc`` holds: states, energies and outputs at the times that are kept, their exact values
+        where they are known, and of every step the extrema, periods and status of each member.
 
     Raises
     ------
@@ -114,6 +121,7 @@ def simulate_record(
         "storage": "lean" if is_lean else "series",
     }
     coords = coordinates(model, names, group, steps, every, same_end=not experiment.end_varies)
+    coords["level"] = Variable((), np.array(level, dtype=np.int16), attributes("level", "1"))
     return in_scales(Record(coords, variables, attrs), experiment)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vibsim import plan
 
 if TYPE_CHECKING:
-    from vibsim.spec import Experiment
+    from vibsim.experiment import Experiment
 
 Floats = NDArray[np.float64]
 

@@ -6,10 +6,10 @@ from collections.abc import Container, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from vibsim.record import Record, Variable
+from vibsim.core.record import Record, Variable
 
 if TYPE_CHECKING:
-    from vibsim.spec import Experiment
+    from vibsim.experiment import Experiment
 
 
 TIMELESS = "time_units"

@@ -23,7 +23,7 @@ from vibsim.simulation import adaptive
 from vibsim.simulation.members import Members
 
 if TYPE_CHECKING:
-    from vibsim.spec import Experiment
+    from vibsim.experiment import Experiment
 
 Floats = NDArray[np.float64]
 

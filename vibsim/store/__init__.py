@@ -1,7 +1,7 @@
 """Everything that vibsim writes to disk and reads back: whole, as it was written, or not at all.
 
 Every file appears under its name in one step, carries a digest of its own bytes and the digest of
-the job that made it. The netCDF library is imported only when such a file is opened (`vibsim.netcdf`);
+the job that made it. The netCDF library is imported only when such a file is opened (`vibsim.core.netcdf`);
 reading a summary imports not even numpy.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vibsim.lazy import loader
+from vibsim.core.lazy import loader
 
 if TYPE_CHECKING:
     from vibsim.store.atomic import replacing, write_bytes, write_text

@@ -13,6 +13,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 _SUFFIX = ".part"
+_BLOCK, _MARGIN = 2**16, 2**22
+"""Bytes that are written at a time, and in all, to find out whether a disk is full."""
 
 
 @contextmanager
@@ -38,6 +40,11 @@ def replacing(path: Path) -> Iterator[Path]:
         yield temporary
         _flush(temporary)
         temporary.replace(path)
+    except OSError as error:
+        # what a full disk raises names no file, and the temporary one is no news
+        if error.filename is None or str(temporary) == str(error.filename):
+            error.filename = str(path)
+        raise
     finally:
         temporary.unlink(missing_ok=True)
     _flush(path.parent)
@@ -52,6 +59,28 @@ def write_bytes(path: Path, content: bytes) -> None:
 def write_text(path: Path, text: str) -> None:
     """Write `text` to `path` in one step, as UTF-8 with the line ends it has."""
     write_bytes(path, text.encode())
+
+
+def check_room(path: Path, size: int) -> None:
+    """Raise what the system says to a file of `size` bytes that could not be written; nothing where it could be.
+
+    Libraries keep the cause to themselves. It is found by writing: at the end that the file was to have, which shows a
+    limit of its size, and some more behind what there is, which shows a full disk. The file is of no use afterwards.
+
+    Raises
+    ------
+    OSError
+        With the cause.
+    """
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT, 0o644)
+    try:
+        os.pwrite(descriptor, b"\0", size)
+        os.lseek(descriptor, 0, os.SEEK_END)
+        for _ in range(_MARGIN // _BLOCK):
+            os.write(descriptor, bytes(_BLOCK))
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _flush(path: Path) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from vibsim.errors import StaleFileError
-from vibsim.vocabulary import FORMAT
+from vibsim.core.errors import StaleFileError
+from vibsim.core.vocabulary import FORMAT
 
 
 def check(path: Path, form: Any, digest: str, wanted: str | None) -> None:
@@ -32,3 +32,15 @@ def check(path: Path, form: Any, digest: str, wanted: str | None) -> None:
         raise StaleFileError(path, f"it is not in vibsim format {FORMAT}")
     if wanted is not None and digest != wanted:
         raise StaleFileError(path, f"it belongs to job {digest[:12]}, wanted is {wanted[:12]}")
+
+
+def check_name(path: Path, found: str, wanted: str | None) -> None:
+    """Compare what a whole file says that it is with what is wanted, None for any.
+
+    Raises
+    ------
+    StaleFileError
+        When it is the file of another place.
+    """
+    if wanted is not None and found != wanted:
+        raise StaleFileError(path, f"it is {found}, wanted is {wanted}")

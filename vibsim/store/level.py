@@ -10,7 +10,7 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
-from vibsim.record import Record
+from vibsim.core.record import Record
 from vibsim.store.reading import naming, opened, read_record
 from vibsim.store.shards import join
 

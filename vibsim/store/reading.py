@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim import netcdf
-from vibsim.errors import DamagedFileError
-from vibsim.record import Attribute, Record, Variable
+from vibsim.core import netcdf
+from vibsim.core.errors import DamagedFileError
+from vibsim.core.record import Attribute, Record, Variable
 from vibsim.store import identity, seal
 
 
@@ -94,10 +94,10 @@ def read_record(
     """
     tables: tuple[dict[str, Variable], dict[str, Variable]] = ({}, {})
     auxiliary = _auxiliary(dataset)
-    for name, variable in dataset.variables.items():
+    for name, variable, group in netcdf.variables(dataset):
         is_data = name not in auxiliary and name not in dataset.dimensions
         if not is_data or names is None or name in names:
-            tables[is_data][name] = _read_variable(variable, cases)
+            tables[is_data][name] = _read_variable(variable, cases, group)
     attrs = {key: _unpack(dataset.getncattr(key)) for key in dataset.ncattrs()}
     attrs.pop("coordinates", None)
     return Record(tables[False], tables[True], attrs)
@@ -106,12 +106,12 @@ def read_record(
 def _auxiliary(dataset: Any) -> set[str]:
     """Name the coordinates that are not those of their own dimension."""
     found = set(getattr(dataset, "coordinates", "").split())
-    for variable in dataset.variables.values():
+    for _, variable, _ in netcdf.variables(dataset):
         found.update(getattr(variable, "coordinates", "").split())
     return found
 
 
-def _read_variable(variable: Any, cases: slice) -> Variable:
+def _read_variable(variable: Any, cases: slice, group: str) -> Variable:
     attrs = {key: _unpack(variable.getncattr(key)) for key in variable.ncattrs()}
     attrs.pop("coordinates", None)
     dims = variable.dimensions
@@ -119,7 +119,7 @@ def _read_variable(variable: Any, cases: slice) -> Variable:
     values = np.asarray(variable[wanted] if dims else variable[...])
     if attrs.pop("_Encoding", None):
         dims, values = dims[:-1], _texts(values)
-    return Variable(tuple(dims), values, attrs)
+    return Variable(tuple(dims), values, attrs, group)
 
 
 def _unpack(value: Any) -> Attribute:

@@ -10,7 +10,8 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-from vibsim.errors import DamagedFileError
+from vibsim.core import regular_files
+from vibsim.core.errors import DamagedFileError
 
 _MARK = b"\nvibsim-sha256:"
 LENGTH = len(_MARK) + 64 + 1
@@ -20,7 +21,7 @@ _BLOCK = 1 << 20
 
 def _seal(path: Path, size: int) -> bytes:
     digest = hashlib.sha256()
-    with path.open("rb", buffering=0) as file:
+    with regular_files.reading(path) as file:
         while size > 0 and (block := file.read(min(_BLOCK, size))):
             digest.update(block)
             size -= len(block)
@@ -34,6 +35,22 @@ def attach(path: Path) -> None:
         file.write(seal)
 
 
+def told(path: Path) -> str:
+    """Return the digest in the seal of `path`, which is not compared.
+
+    Raises
+    ------
+    DamagedFileError
+        When it has no seal.
+    """
+    with path.open("rb") as file:
+        file.seek(max(path.stat().st_size - LENGTH, 0))
+        found = file.read()
+    if not found.startswith(_MARK):
+        raise DamagedFileError(path, "it does not end with a seal: truncated, or not vibsim's")
+    return found[len(_MARK) :].decode().rstrip("\n")
+
+
 def check(path: Path) -> None:
     """Compare `path` with its seal.
 
@@ -45,7 +62,7 @@ def check(path: Path) -> None:
     """
     try:
         size = path.stat().st_size - LENGTH
-        with path.open("rb") as file:
+        with regular_files.reading(path) as file:
             file.seek(max(size, 0))
             found = file.read(LENGTH + 1)
         expected = _seal(path, size)

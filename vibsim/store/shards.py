@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from vibsim.record import Record, Variable
+from vibsim.core.record import Record, Variable
 
 
 def join(records: Sequence[Record]) -> Record:

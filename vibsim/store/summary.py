@@ -8,10 +8,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from vibsim.errors import DamagedFileError
+from vibsim.core import regular_files
+from vibsim.core.errors import DamagedFileError
+from vibsim.core.vocabulary import FORMAT, jsonable
 from vibsim.store import identity
 from vibsim.store.atomic import write_text
-from vibsim.vocabulary import FORMAT, jsonable
 
 
 def write_json(path: Path, content: Mapping[str, Any], *, digest: str) -> None:
@@ -31,7 +32,7 @@ def write_json(path: Path, content: Mapping[str, Any], *, digest: str) -> None:
     write_text(path, _sealed(jsonable(whole)))
 
 
-def read_json(path: Path, *, digest: str | None = None) -> dict[str, Any]:
+def read_json(path: Path, *, digest: str | None = None, name: str | None = None) -> dict[str, Any]:
     """Read what `write_json` wrote.
 
     Parameters
@@ -40,6 +41,8 @@ def read_json(path: Path, *, digest: str | None = None) -> dict[str, Any]:
         The file.
     digest
         Digest of the job whose result is wanted; None takes any.
+    name
+        Collection and name of the experiment whose summary is wanted, with a slash between; None takes any.
 
     Raises
     ------
@@ -49,7 +52,8 @@ def read_json(path: Path, *, digest: str | None = None) -> dict[str, Any]:
         When the file is whole but another job's.
     """
     try:
-        text = path.read_bytes().decode()
+        with regular_files.reading(path) as file:
+            text = file.read().decode()
         content = json.loads(text)
     except OSError as error:
         raise DamagedFileError(path, f"cannot be read: {error.strerror}") from error
@@ -58,6 +62,7 @@ def read_json(path: Path, *, digest: str | None = None) -> dict[str, Any]:
     if not isinstance(content, dict) or text != _sealed(content):
         raise DamagedFileError(path, "its bytes are not those that were written")
     identity.check(path, content.get("vibsim_format"), str(content.get("digest")), digest)
+    identity.check_name(path, f"{content.get('collection')}/{content.get('experiment')}", name)
     return content
 
 

@@ -1,13 +1,14 @@
 """Records as netCDF files: CF conventions, no clock time, the same bytes for the same content.
 
-The data are contiguous and uncompressed: measured, compression takes ten times as long and saves a
-quarter of the space. Each file says which job made it (``digest``) and from what (``provenance``),
-and ends with a seal over all its bytes.
+Series of files of a moderate size are compressed, which saves about half of the space. Everything else is contiguous
+and uncompressed: compression takes ten times as long as writing, which only small data are worth (`_is_packed`). Each
+file says which job made it (``digest``) and from what (``provenance``), and ends with a seal over all its bytes.
 """
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -15,13 +16,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim import __version__, netcdf
-from vibsim.record import Attribute, Record, Variable
+from vibsim import __version__
+from vibsim.core import netcdf
+from vibsim.core.record import Attribute, Record, Variable
+from vibsim.core.vocabulary import FORMAT
+from vibsim.experiment.cost import PACKED_UP_TO
 from vibsim.store import seal
-from vibsim.store.atomic import replacing
-from vibsim.vocabulary import FORMAT
+from vibsim.store.atomic import check_room, replacing
 
 CONVENTIONS = "CF-1.11"
+PACKED_FROM = 2**14
+"""Bytes of a variable from which it is compressed."""
+_CHUNK = 2**18
+"""Bytes of whole members that are compressed together, and read together, at least one."""
 _OURS = (
     *("Conventions", "history", "vibsim_format", "digest", "provenance", "integrity"),
     "coordinates",
@@ -82,19 +89,41 @@ def write_parts(
     ------
     ValueError
         As `write`, and where the parts do not belong together or are not `cases` members.
+    OSError
+        Where the file cannot be written, with the cause.
     """
     with replacing(path) as temporary:
-        with netcdf.create(temporary) as dataset:
-            dataset.set_fill_off()
-            start, part = 0, None
-            for number, part in enumerate(parts):
-                if number == 0:
-                    _define(dataset, path.name, part, cases, digest, provenance)
-                start = _put_cases(dataset, part, start)
-            if part is None or start != cases:
-                raise ValueError(f"{path.name}: {start} members where {cases} are to be written")
-            _put_shared(dataset, part)
+        part = None
+        try:
+            with netcdf.create(temporary) as dataset:
+                dataset.set_fill_off()
+                start = 0
+                for number, part in enumerate(parts):
+                    if number == 0:
+                        _define(dataset, path.name, part, cases, digest, provenance)
+                    start = _put_cases(dataset, part, start)
+                if part is None or start != cases:
+                    text = f"{path.name}: {start} members where {cases} are to be written"
+                    raise ValueError(text)
+                _put_shared(dataset, part)
+        except (OSError, RuntimeError) as error:
+            # what raised it may be a part that is worked out here
+            if netcdf.is_from_library(error):
+                check_room(temporary, _size(part, cases))
+            raise
         seal.attach(temporary)
+
+
+def _size(part: Record | None, cases: int) -> int:
+    """Return how many bytes the values take in a file like `part` of `cases` members, at least about."""
+    if part is None:
+        return 0
+    share = cases / max(part.sizes.get("case", cases), 1)
+    values = [*part.coords.values(), *part.variables.values()]
+    return sum(
+        round(np.asarray(one.values).nbytes * (share if "case" in one.dims else 1))
+        for one in values
+    )
 
 
 def _global_attributes(
@@ -144,11 +173,19 @@ def _define(
     dataset.setncatts(_global_attributes(record, digest, provenance))
     for dim, size in record.sizes.items():
         dataset.createDimension(dim, cases if dim == "case" else size)
+    packed = _is_packed(record, cases)
     for key, variable in (*record.coords.items(), *record.variables.items()):
-        _define_variable(dataset, key, variable, _auxiliary(record, key, variable))
+        _define_variable(dataset, key, variable, _auxiliary(record, key, variable), packed)
 
 
-def _define_variable(dataset: Any, name: str, variable: Variable, auxiliary: list[str]) -> None:
+def _is_packed(record: Record, cases: int) -> bool:
+    """Tell whether what is large in a file is compressed: not where storage is lean, which many members share."""
+    return record.attrs.get("storage") != "lean" and _size(record, cases) <= PACKED_UP_TO
+
+
+def _define_variable(
+    dataset: Any, name: str, variable: Variable, auxiliary: list[str], packed: bool
+) -> None:
     values = np.asarray(variable.values)
     attrs = _attributes(name, variable, values)
     dims, kind = variable.dims, values.dtype
@@ -160,9 +197,9 @@ def _define_variable(dataset: Any, name: str, variable: Variable, auxiliary: lis
             dataset.createDimension(dims[-1], width)
     elif kind.kind not in "fiu":
         raise ValueError(f"{name}: values of type {kind} have no place in a file")
-    # A dimension without points is an unlimited one in netCDF, which excludes contiguous storage.
-    contiguous = {"contiguous": True} if values.size and values.ndim else {}
-    target = dataset.createVariable(name, kind, dims, fill_value=False, **contiguous)
+    storage = _storage(dataset, variable.dims, kind, packed) if values.size and dims else {}
+    group = dataset.createGroup(variable.group) if variable.group else dataset
+    target = group.createVariable(name, kind, dims, fill_value=False, **storage)
     target.set_auto_maskandscale(False)
     target.set_auto_chartostring(False)
     target.setncatts(attrs)
@@ -170,15 +207,39 @@ def _define_variable(dataset: Any, name: str, variable: Variable, auxiliary: lis
         target.coordinates = " ".join(auxiliary)
 
 
+def _storage(
+    dataset: Any, dims: tuple[str, ...], kind: np.dtype[Any], packed: bool
+) -> dict[str, Any]:
+    """Return how the values of a variable lie in the file, which has at least one.
+
+    A dimension without points is an unlimited one in netCDF, which excludes contiguous storage.
+    """
+    sizes = [len(dataset.dimensions[dim]) for dim in dims]
+    size = math.prod(sizes) * kind.itemsize
+    if not packed or kind.kind != "f" or size < PACKED_FROM:
+        return {"contiguous": True}
+    members = sizes[dims.index("case")] if "case" in dims else 1
+    together = max(1, min(members, _CHUNK * members // size))
+    return {
+        "compression": "zlib",
+        "complevel": 1,
+        "shuffle": True,
+        # whole members, in their order, of which none leaves the cache before the file is closed: the bytes are the
+        # same whatever parts they come in
+        "chunksizes": [together if d == "case" else n for d, n in zip(dims, sizes, strict=True)],
+        "chunk_cache": 2 * size,
+    }
+
+
 def _put_cases(dataset: Any, part: Record, start: int) -> int:
     """Write everything along ``case`` for the members from `start` on; return where they stop."""
     table = {**part.coords, **part.variables}
-    if list(table) != list(dataset.variables):
+    if set(table) != {name for name, _, _ in netcdf.variables(dataset)}:
         raise ValueError("parts of one file hold different variables")
     stop = start + part.sizes.get("case", 0)
     for name, variable in table.items():
         if "case" in variable.dims:
-            _put(dataset[name], name, variable, slice(start, stop))
+            _put(dataset[_path(name, variable)], name, variable, slice(start, stop))
     return stop
 
 
@@ -186,7 +247,12 @@ def _put_shared(dataset: Any, part: Record) -> None:
     """Write everything that all members share."""
     for name, variable in (*part.coords.items(), *part.variables.items()):
         if "case" not in variable.dims:
-            _put(dataset[name], name, variable, slice(None))
+            _put(dataset[_path(name, variable)], name, variable, slice(None))
+
+
+def _path(name: str, variable: Variable) -> str:
+    """Return the path of a variable in a file."""
+    return f"{variable.group}/{name}" if variable.group else name
 
 
 def _put(target: Any, name: str, variable: Variable, cases: slice) -> None:

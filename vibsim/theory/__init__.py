@@ -1,6 +1,6 @@
 """What theory predicts of a scheme from its own step, by one piece of code for every scheme.
 
-On the linear problem ``u'' + w^2 u = 0``, `vibsim.theory.units` lets its functions run on unit vectors, and all else
+On the linear problem ``u'' + w^2 u = 0``, `vibsim.theory.basis` lets its functions run on unit vectors, and all else
 follows from the matrix that comes out; with a linear damping, `vibsim.theory.modes` does the same with exact series in
 the step. On polynomials, `vibsim.theory.polynomial` lets them run on such series.
 """
@@ -8,7 +8,7 @@ the step. On polynomials, `vibsim.theory.polynomial` lets them run on such serie
 from vibsim.theory.amplification import Amplification, amplification
 from vibsim.theory.degrees import Miss, Residual, exact_degree, fitted_force, miss, reproduces
 from vibsim.theory.discrete import discrete
-from vibsim.theory.parts import part_orders
+from vibsim.theory.phase_amplitude import part_orders
 from vibsim.theory.roots import (
     Roots,
     dominant,

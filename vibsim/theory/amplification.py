@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vibsim.schemes.base import Stepper
+from vibsim.theory.basis import decimal, unit_steps
 from vibsim.theory.doubled import Doubled, doubled, stacked
-from vibsim.theory.units import decimal, unit_steps
 
 Floats = NDArray[np.float64]
 

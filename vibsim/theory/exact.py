@@ -14,7 +14,7 @@ from functools import lru_cache
 from typing import Any
 
 from vibsim.schemes.base import Stepper
-from vibsim.theory.units import UnitSteps, exact, reads, unit_steps
+from vibsim.theory.basis import UnitSteps, exact, reads, unit_steps
 
 _AT = 0.40625
 """The value of p, not small and below every limit of stability."""

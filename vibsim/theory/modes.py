@@ -22,12 +22,12 @@ from typing import Any
 
 from vibsim.schemes.base import Stepper, handed
 from vibsim.theory import series
+from vibsim.theory.basis import carried, rebound
 from vibsim.theory.division import by_quadratic
 from vibsim.theory.exact import coefficients
 from vibsim.theory.laurent import Field, Laurent
 from vibsim.theory.polynomial import SUBSTITUTES
 from vibsim.theory.series import Series
-from vibsim.theory.units import carried, rebound
 
 KNOWN = 14
 """Power of h from which on nothing is known; what is formed of differences of states loses some of them."""

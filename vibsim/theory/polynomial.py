@@ -20,10 +20,11 @@ from fractions import Fraction
 from typing import Any
 
 from vibsim.elementary import ELEMENTARY
-from vibsim.expression import Expression, names_in
+from vibsim.formula import Expression, names_in
 from vibsim.models.base import Model, tree
 from vibsim.schemes.base import Stepper, handed
 from vibsim.schemes.newton import solved, solved_together
+from vibsim.theory.basis import rebound
 from vibsim.theory.exact import coefficients
 from vibsim.theory.laurent import Field, Laurent
 from vibsim.theory.rational import (
@@ -34,7 +35,6 @@ from vibsim.theory.rational import (
     restoring,
     symbol,
 )
-from vibsim.theory.units import rebound
 
 
 class Forces(IntEnum):

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
-from vibsim.expression import (
+from vibsim.formula import (
     ZERO,
     Binary,
     Call,

@@ -22,9 +22,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from vibsim.schemes.base import UNIT_ROUND_OFF, Stepper
 from vibsim.theory.amplification import matrices
+from vibsim.theory.basis import decimal, unit_steps
 from vibsim.theory.discrete import Scaled, applied, scaled
 from vibsim.theory.doubled import Doubled, doubled, product
-from vibsim.theory.units import decimal, unit_steps
 
 Floats = NDArray[np.float64]
 

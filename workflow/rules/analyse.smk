@@ -16,4 +16,4 @@ rule analyse:
         digest=names.analysis_digest,
         file=names.file,
     shell:
-        "vibsim analyse {params.file:q} --results . --discard --threads {threads} --digest {params.digest} > {log:q} 2>&1"
+        'exec > {log:q} 2>&1; cd / && exec vibsim analyse {params.file:q} --results "$OLDPWD" --discard --threads {threads:q} --digest {params.digest:q}'

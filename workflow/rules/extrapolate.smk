@@ -16,4 +16,4 @@ rule extrapolate:
         digest=names.extrapolation_digest,
         file=names.file,
     shell:
-        "vibsim extrapolate {params.file:q} --results . --discard --digest {params.digest} > {log:q} 2>&1"
+        'exec > {log:q} 2>&1; cd / && exec vibsim extrapolate {params.file:q} --results "$OLDPWD" --discard --digest {params.digest:q}'

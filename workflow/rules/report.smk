@@ -12,7 +12,7 @@ rule index:
     params:
         digest=names.index_digest,
     shell:
-        "vibsim report --results . > {log:q} 2>&1"
+        'exec > {log:q} 2>&1; cd / && exec vibsim report --results "$OLDPWD"'
 
 
 # One page, its figures and its tables.
@@ -32,4 +32,4 @@ rule report:
         digest=names.report_digest,
         file=names.file,
     shell:
-        "vibsim report {params.file:q} --results . --discard --digest {params.digest} > {log:q} 2>&1"
+        'exec > {log:q} 2>&1; cd / && exec vibsim report {params.file:q} --results "$OLDPWD" --discard --digest {params.digest:q}'

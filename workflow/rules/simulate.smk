@@ -19,4 +19,4 @@ for simulation in names.simulations:
             shard=simulation.shard,
             file=simulation.file,
         shell:
-            "vibsim simulate {params.file:q} --level {params.levels} --shard {params.shard} --results . --threads {threads} --digest {params.digest} > {log:q} 2>&1"
+            'exec > {log:q} 2>&1; cd / && exec vibsim simulate {params.file:q} --level {params.levels:q} --shard {params.shard:q} --results "$OLDPWD" --threads {threads:q} --digest {params.digest:q}'

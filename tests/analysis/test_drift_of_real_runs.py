@@ -1,0 +1,69 @@
+"""How the energy of pendulums and springs drifts, level by level: claims that are true, false or open."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from vibsim import Experiment, analyse, simulate, verdicts
+
+DRIFTS = ("none", "bounded", "linear", "quadratic")
+
+
+def found(scheme: str, level: int, **initial: float) -> dict[str, tuple[str, str]]:
+    """Return status and reason of every claim on the drift of the energy at one level."""
+    data: dict[str, Any] = {
+        "title": "t",
+        "model": {"kind": "pendulum" if "theta" in initial else "spring"},
+        "initial": initial,
+        "time": {"end": 50.0},
+        "levels": [level],
+        "schemes": [scheme],
+        "checks": [{"conserves": "energy", "drift": drift} for drift in DRIFTS],
+    }
+    experiment = Experiment.from_dict(data)
+    record = analyse(experiment, [simulate(experiment, level)])
+    told = verdicts(experiment, record)
+    return {drift: (one.status, one.reason) for drift, one in zip(DRIFTS, told, strict=True)}
+
+
+@pytest.mark.parametrize("theta", [0.5, 2.0, 2.9])
+@pytest.mark.parametrize(("scheme", "level"), [("rk4", 10), ("rk4", 13), ("rk3", 16)])
+def test_a_linear_drift_is_seen_as_long_as_it_is_above_the_rounding_of_the_energy(
+    scheme: str, level: int, theta: float
+) -> None:
+    """A disturbance shifts a large swing in time more and more: that is no rounding of its energy."""
+    told = found(scheme, level, theta=theta)
+    assert told["linear"] == ("PASS", "match")
+    assert {told[drift][0] for drift in ("none", "bounded", "quadratic")} == {"FAIL"}
+
+
+@pytest.mark.parametrize("theta", [0.5, 2.0])
+@pytest.mark.parametrize("level", [14, 16])
+def test_a_drift_below_round_off_is_left_open(level: int, theta: float) -> None:
+    told = found("rk4", level, theta=theta)
+    assert told["linear"] == told["quadratic"] == ("INCONCLUSIVE", "round_off")
+    assert told["none"] == told["bounded"] == ("PASS", "match")
+
+
+def test_what_theory_conserves_exactly_does_not_drift() -> None:
+    told = found("gauss4", 12, u=1.0)
+    assert told["none"] == ("PASS", "match")
+    assert told["linear"] == ("FAIL", "mismatch")
+
+
+@pytest.mark.parametrize("level", [10, 12, 14])
+def test_a_drift_behind_an_oscillation_to_the_other_side_is_seen(level: int) -> None:
+    """Heun's energy dips within each swing by as much as it has gained over the whole run."""
+    told = found("heun", level, theta=2.0)
+    assert told["linear"] == ("PASS", "match")
+    assert told["bounded"] == ("FAIL", "mismatch")
+
+
+@pytest.mark.parametrize("scheme", ["velocity_verlet", "central", "crank_nicolson"])
+@pytest.mark.parametrize("level", [8, 11, 14])
+def test_a_symplectic_or_symmetric_scheme_keeps_its_energy_bounded(scheme: str, level: int) -> None:
+    told = found(scheme, level, theta=2.0)
+    assert told["bounded"] == ("PASS", "match")
+    assert {told[drift][0] for drift in ("none", "linear", "quadratic")} == {"FAIL"}

@@ -1,0 +1,106 @@
+"""A promised order with a small coefficient, behind a higher one: no verdict against it until levels decide."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from vibsim import Experiment, Verdict, analyse, simulate, verdicts
+
+SPRING = {"kind": "spring", "w": 9}
+
+
+def judged(
+    model: dict[str, Any],
+    initial: dict[str, float],
+    levels: range,
+    scheme: Any,
+    quantity: str,
+    orders: tuple[Any, ...],
+    end: float = 12.0,
+) -> list[Verdict]:
+    experiment = Experiment.from_dict(
+        {
+            "title": "t",
+            "model": model,
+            "initial": initial,
+            "time": {"end": end},
+            "levels": list(levels),
+            "schemes": [scheme],
+            "checks": [{"converges": quantity, "order": order} for order in orders],
+        }
+    )
+    record = analyse(experiment, [simulate(experiment, level) for level in levels])
+    return verdicts(experiment, record)
+
+
+WEAK = {"kind": "oscillator", "spring": "u", "damping": {"linear": 1e-4}}
+"""A damping that a scheme takes backward, with an error of order 1, and so little of it."""
+
+
+@pytest.mark.parametrize(
+    ("model", "initial", "levels", "scheme", "quantity", "promised", "shown"),
+    [
+        (SPRING, {"u": 1.0, "v": 0.5}, range(7, 12), "euler_cromer", "v", 1, 2),
+        (SPRING, {"u": 1.0, "v": 0.1}, range(8, 13), "euler_cromer", "v", 1, 2),
+        (SPRING, {"u": 1.0, "v": -0.003}, range(9, 13), "euler_cromer", "v", 1, 2),
+        (SPRING, {"u": 0.001, "v": 9.0}, range(8, 12), "euler_cromer_u_first", "u", 1, 2),
+        (WEAK, {"u": 1.0}, range(6, 11), "central_backward_damping", "u", 1, 2),
+        ({"kind": "pendulum"}, {"theta": 0.03}, range(6, 10), "rk4", "energy", 4, 5),
+        (SPRING, {"u": 1.0, "v": 0.01}, range(8, 12), "rkn4", "u_amplitude_error", 4, 5),
+    ],
+)
+def test_levels_that_show_a_higher_order_decide_nothing_against_the_promised_one(
+    model: dict[str, Any],
+    initial: dict[str, float],
+    levels: range,
+    scheme: str,
+    quantity: str,
+    promised: int,
+    shown: int,
+) -> None:
+    told = judged(model, initial, levels, scheme, quantity, (promised, "scheme", shown))
+    assert [(one.status, one.reason) for one in told] == [("INCONCLUSIVE", "pre_asymptotic")] * 3
+    for one in told:
+        assert f"has an error of order {promised} here" in one.text
+        assert f"Add levels {levels[-1] + 1} and" in one.advice
+
+
+def test_what_is_small_in_the_energy_is_small_in_the_motion_that_it_drives() -> None:
+    """Near the top between two wells all that matters is how wrong the energy is, of order 5 where it is linear."""
+    model = {"kind": "oscillator", "spring": "u**3 - u"}
+    told = judged(model, {"u": 0.01}, range(10, 14), "rk4", "u", (4, 5), end=20.0)
+    assert {(one.status, one.reason) for one in told} == {("INCONCLUSIVE", "pre_asymptotic")}
+
+
+def test_finer_levels_decide_for_the_promised_order() -> None:
+    told = judged(
+        SPRING, {"u": 1.0, "v": 0.5}, range(16, 21), "euler_cromer", "v", (1, "scheme", 2)
+    )
+    assert [(one.status, one.reason) for one in told] == [
+        ("PASS", "asymptotic"),
+        ("PASS", "asymptotic"),
+        ("FAIL", "order_low"),
+    ]
+
+
+def test_an_order_above_and_one_below_both_fail_all_the_same() -> None:
+    above, below = judged(SPRING, {"u": 1.0, "v": 0.1}, range(8, 13), "euler_cromer", "v", (3, 0.5))
+    assert (above.status, above.reason) == ("FAIL", "order_low")
+    assert (below.status, below.reason) == ("FAIL", "order_high")
+
+
+def test_a_special_start_has_its_higher_order() -> None:
+    told = judged(SPRING, {"u": 1.0}, range(8, 13), "euler_cromer", "v", ("scheme", 2, 1))
+    assert [one.status for one in told] == ["PASS", "PASS", "FAIL"]
+
+
+def test_levels_that_leave_no_room_for_the_promised_power_fail_it() -> None:
+    """The force has a name and is 0, so that theory promises order 1; six levels exclude it."""
+    model = {"kind": "oscillator", "spring": "u", "force": "A*t", "parameters": {"A": 0.0}}
+    low, high = judged(
+        model, {"u": 1.0}, range(6, 12), "euler_cromer_u_first", "v", (1, 2), end=11.9
+    )
+    assert (low.status, low.reason) == ("FAIL", "order_high")
+    assert (high.status, high.reason) == ("PASS", "asymptotic")

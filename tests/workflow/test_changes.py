@@ -1,0 +1,219 @@
+"""A run notices what became of the results since they were made, and removes what nobody asks for any more."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from .conftest import TEXT, Place, vibsim
+from .test_faults import flip
+from .test_snakemake import by_hand
+
+END_PRODUCTS = {
+    "report.html": ["report", "index"],
+    "figures/thumbnail.svg": ["report", "index"],
+    "tables/best_values.csv": ["report", "index"],
+    "../../index.html": ["index"],
+    "../../summary.csv": ["index"],
+    "summary.json": ["analyse", "report", "index"],
+    "convergence.nc": ["analyse", "report", "index"],
+    "level_07.nc": ["level_07", "analyse", "report", "index"],
+}
+
+
+def same_time(path: Path, harm: Any) -> None:
+    """Change a file and leave its size, its time and its inode as they were."""
+    status = path.stat()
+    harm(path)
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        n if n.startswith(("rep", "fig")) else pytest.param(n, marks=pytest.mark.slow)
+        for n in END_PRODUCTS
+    ],
+)
+def test_a_dry_run_tells_of_every_changed_result_and_deletes_nothing(
+    place: Place, name: str
+) -> None:
+    place.jobs()  # takes the copy for what it is
+    flip(place.tiny / name)
+    before = place.content()
+    ended = place.run("--dry-run", "--json")
+    assert [job["rule"] for job in json.loads(ended.stdout)["jobs"]] == [
+        "simulate" if job.startswith("level") else job for job in END_PRODUCTS[name]
+    ]
+    assert "would be deleted and made again" in ended.stderr
+    assert Path(name).name in ended.stderr
+    assert place.content() == before
+
+
+def test_every_changed_or_missing_result_comes_back_with_its_bytes(
+    place: Place, finished: Place
+) -> None:
+    for name in END_PRODUCTS:
+        flip(place.tiny / name)
+    (place.tiny / "figures/thumbnail.svg").unlink()
+    ended = place.run()
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    for name in ("report.html", "index.html", "summary.csv", "convergence.nc", "level_07.nc"):
+        assert name in ended.stderr
+    assert place.content() == finished.content()
+    assert place.jobs() == []
+
+
+def test_the_index_is_made_again_for_its_table_alone(place: Place, finished: Place) -> None:
+    flip(place.results / "summary.csv")
+    assert place.run().returncode == 0
+    assert place.content() == finished.content()
+
+
+def test_a_missing_table_is_made_again(place: Place, finished: Place) -> None:
+    next((place.tiny / "tables").glob("*.csv")).unlink()
+    ended = place.run()
+    assert "is missing" in ended.stderr
+    assert place.content() == finished.content()
+
+
+def test_verify_compares_every_digest(place: Place) -> None:
+    place.jobs()
+    same_time(place.tiny / "figures/thumbnail.svg", flip)
+    same_time(place.tiny / "level_08.nc", flip)
+    assert place.jobs() == []
+    ended = place.run("--verify", "--dry-run")
+    assert "thumbnail.svg" in ended.stderr
+    assert "level_08.nc" in ended.stderr
+    assert [line.split()[0] for line in ended.stdout.splitlines()] == [
+        *("simulate", "analyse", "report", "index:"),
+    ]
+
+
+def test_a_copy_without_its_times_is_read_and_not_computed_again(
+    finished: Place, tmp_path: Path
+) -> None:
+    shutil.copytree(finished.folder, tmp_path / "copy", copy_function=shutil.copyfile)
+    copy = Place(tmp_path / "copy")
+    times = {path: path.stat().st_mtime_ns for path in finished.tiny.glob("*.nc")}
+    assert copy.jobs() == []
+    assert {p: (copy.tiny / p.name).stat().st_mtime_ns for p in times} == times
+
+
+def test_results_made_by_hand_are_on_record(tmp_path: Path, finished: Place) -> None:
+    place = Place(tmp_path)
+    place.file.parent.mkdir()
+    place.file.write_text(TEXT)
+    assert by_hand(place).returncode == 0
+    ended = place.run("--dry-run")
+    assert ended.stdout.strip() == "nothing to do"
+    assert ended.stderr == ""
+    flip(place.tiny / "report.html")
+    assert place.jobs() == ["report", "index"]
+
+
+def test_without_a_record_seals_are_compared_and_the_rest_is_made_again(
+    place: Place, finished: Place
+) -> None:
+    """So it is after a kill between a file and its entry, and with a record that is no record."""
+    for path in (place.results / ".vibsim/made").iterdir():
+        path.write_text('{"../../x": [1, 2, 3, "a"]}\n[]\n{"level_06.nc": [1]}\nnull\n{')
+    assert place.jobs() == ["report", "index"]
+    assert place.run().returncode == 0
+    assert place.content() == finished.content()
+    assert place.jobs() == []
+
+
+def test_what_is_as_it_was_is_not_read(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    from vibsim.cli import made_files
+    from vibsim.cli.chosen_plans import plans_of
+    from vibsim.cli.run import changes
+
+    plans = plans_of([str(place.file)])
+    assert changes.changed(plans, place.results, every=False) == []
+    monkeypatch.setattr(made_files, "content", None)
+    assert changes.changed(plans, place.results, every=False) == []
+
+
+def test_after_another_title_only_the_page_is_made_again(place: Place) -> None:
+    place.jobs()
+    before = {p: (p.read_bytes(), p.stat()) for p in place.tiny.glob("*.nc")}
+    summary = (place.tiny / "summary.json").read_text()
+    place.change("A tiny pendulum", "Another")
+    assert place.jobs() == ["report", "index"]
+    ended = place.run("--json")
+    assert json.loads(ended.stdout)["experiments"][0]["title"] == "Another"
+    for path, (content, status) in before.items():
+        now = path.stat()
+        assert path.read_bytes() == content
+        assert (now.st_ino, now.st_mtime_ns) == (status.st_ino, status.st_mtime_ns)
+    assert "Another" in (place.tiny / "report.html").read_text()
+    assert "Another" in (place.results / "index.html").read_text()
+    assert place.jobs() == []
+    place.change("Another", "A tiny pendulum")
+    assert place.run().returncode == 0
+    assert (place.tiny / "summary.json").read_text() == summary
+
+
+def touch(path: Path) -> Path:
+    path.parent.mkdir(exist_ok=True)
+    path.write_text("x")
+    return path
+
+
+def test_levels_that_were_left_out_are_removed_and_nothing_else(place: Place) -> None:
+    place.change("8, 9]", "8]")
+    shards = [touch(place.tiny / f"level_07/shard_000{n}.nc") for n in (0, 1)]
+    other = touch(place.tiny / "level_09/mine.txt")
+    users = [touch(place.tiny / name) for name in ("level_9.nc", "level_06.txt", "my.nc")]
+    ended = place.run("--dry-run")
+    assert "would be removed" in ended.stderr
+    assert (place.tiny / "level_09.nc").is_file()
+    ended = place.run()
+    assert ended.returncode == 0, ended.stderr
+    assert "removed, no longer asked for: " in ended.stderr
+    assert not (place.tiny / "level_09.nc").exists()
+    assert not shards[0].parent.exists()
+    assert all(path.is_file() for path in (*users, other))
+
+
+def test_best_is_removed_with_its_mention(place: Place, finished: Place) -> None:
+    place.change("levels:", "output: best\nlevels:")
+    assert place.run().returncode == 0
+    assert (place.tiny / "best.nc").is_file()
+    place.change("output: best\n", "")
+    assert place.run().returncode == 0
+    assert place.content() == finished.content()
+
+
+def test_two_files_of_one_name_do_not_replace_each_other(place: Place) -> None:
+    assert place.run().returncode == 0
+    other = place.folder / "elsewhere/tiny.yaml"
+    other.parent.mkdir()
+    other.write_text(TEXT.replace("g: 1.0", "g: 1.5"))
+    before = place.content()
+    for options in ([], ["--dry-run"]):
+        ended = place.run(*options, files=[other])
+        assert ended.returncode == 2
+        assert str(other) in ended.stderr
+        assert str(place.file) in ended.stderr
+        assert "--results" in ended.stderr
+    assert place.content() == before
+    place.file.unlink()
+    assert place.run(files=[other]).returncode == 0
+
+
+def test_another_spelling_of_a_path_is_the_same_file(place: Place) -> None:
+    assert place.run().returncode == 0
+    link = place.folder / "link"
+    link.symlink_to(place.file.parent)
+    assert place.jobs(files=[link / "tiny.yaml"]) == []
+    ended = vibsim(
+        "run", "tiny.yaml", "--results", place.results, "--dry-run", cwd=place.file.parent
+    )
+    assert (ended.returncode, ended.stdout.strip()) == (0, "nothing to do")

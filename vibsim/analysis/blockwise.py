@@ -1,0 +1,129 @@
+"""Sweeps in parts: range after range of members, so that memory is bounded and the arrays stay in the cache.
+
+The parts are made side by side by threads (the array operations let other threads run), and come in order. The files
+are read by the calling thread alone: the netCDF library knows one thread only.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vibsim import plan
+from vibsim.analysis.compare_levels import analyse_records
+from vibsim.checks.order.phase_amplitude_text import is_told
+from vibsim.checks.tolerance_check import is_bound
+from vibsim.checks.value.units import UNITS, units_in
+from vibsim.comparison.exact_availability import known_errors
+from vibsim.core.record import Record, Variable
+from vibsim.core.vocabulary import HIGHEST
+
+if TYPE_CHECKING:
+    from vibsim.experiment import Experiment
+
+Reader = Callable[[int, int], Record]
+"""Returns the level Record of members start..stop-1."""
+
+SAMPLES = 2**17
+"""Samples of one variable in a part: a few arrays of them fit into the cache of a core."""
+
+
+def analyse_parts(
+    experiment: Experiment,
+    readers: Mapping[int, Reader],
+    *,
+    size: int | None = None,
+    threads: int = 1,
+) -> Iterator[Record]:
+    """Compare the levels of an experiment, range after range of its members.
+
+    Parameters
+    ----------
+    readers
+        For every level, what returns its Record for a range of members.
+    size
+        Members of a part; by default as many as make `SAMPLES` samples. No number depends on it.
+    threads
+        How many parts are made at the same time; at most one more is kept. No number depends on it.
+
+    Yields
+    ------
+    Record
+        What `analyse_records` returns, for consecutive ranges of members.
+
+    Raises
+    ------
+    VibsimError
+        As `analyse_records`.
+    """
+    given = _read(experiment, readers, size or part_size(experiment))
+    if threads == 1:
+        for records in given:
+            yield analyse_records(experiment, records)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        pending: deque[Future[Record]] = deque()
+        for records in given:
+            pending.append(pool.submit(analyse_records, experiment, records))
+            if len(pending) > threads:
+                yield pending.popleft().result()
+        while pending:
+            yield pending.popleft().result()
+
+
+def part_size(experiment: Experiment) -> int:
+    """Return the number of members of a part."""
+    coarsest = experiment.levels[0]
+    points = experiment.steps(coarsest) // plan.sampling(experiment, coarsest) + 1
+    return max(SAMPLES // (points * len(experiment.schemes)), 1)
+
+
+def _read(
+    experiment: Experiment, readers: Mapping[int, Reader], size: int
+) -> Iterator[dict[int, Record]]:
+    count = experiment.members
+    for start in range(0, count, size):
+        stop = min(start + size, count)
+        yield {level: read(start, stop) for level, read in readers.items()}
+
+
+_DECISIVE = ("status", "failure_time", "last_step", "omega_dt", HIGHEST, "measured_growth")
+
+
+def _is_kept(name: str) -> bool:
+    return (
+        name in _DECISIVE
+        or name.startswith(("check_", "corner_"))
+        or is_bound(name)
+        or is_told(name)
+    )
+
+
+def kept(parts: Iterable[Record], thin: list[Record]) -> Iterator[Record]:
+    """Pass parts on, and keep of each in `thin` what `verdicts` and `summarise` need of it."""
+    for part in parts:
+        names = [n for n in part.variables if _is_kept(n)]
+        attrs = {**part.attrs, UNITS: json.dumps(units_in(part))}
+        thinned = {n: part.variables[n] for n in names} | known_errors(part)
+        thin.append(Record(part.coords, thinned, attrs))
+        yield part
+
+
+def joined(parts: Sequence[Record]) -> Record:
+    """Return consecutive parts as one Record."""
+
+    def join(name: str) -> Variable:
+        first = parts[0].variable(name)
+        if "case" not in first.dims:
+            return first
+        values = [part[name] for part in parts]
+        joint = np.concatenate(values, axis=first.dims.index("case"))
+        return Variable(first.dims, joint, first.attrs)
+
+    coords = {name: join(name) for name in parts[0].coords}
+    return Record(coords, {name: join(name) for name in parts[0].variables}, parts[0].attrs)

@@ -1,0 +1,252 @@
+"""The convergence Record: every comparison between the levels of an experiment, on their coarsest common grid."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.analysis.check_variables import definition, measured
+from vibsim.analysis.motion_variables import motion
+from vibsim.apriori.force_discontinuities import corner_variables, switches_of
+from vibsim.checks.fields import flags
+from vibsim.checks.order.phase_amplitude_text import at_start
+from vibsim.checks.tolerance_check import bounds
+from vibsim.comparison import best_values
+from vibsim.comparison.comparison_variables import SERIES, Table, in_precision, numbers, over_time
+from vibsim.comparison.order_evidence import judgement
+from vibsim.comparison.quantity_comparison import Comparison, comparisons
+from vibsim.comparison.work_precision import work_precision
+from vibsim.convergence import differences
+from vibsim.core.errors import VibsimError
+from vibsim.core.record import Record, Variable, attributes
+from vibsim.core.vocabulary import HIGHEST, REASON_NAMES, STATUSES, TYPICAL_NORM
+from vibsim.experiment.stored_series import RUNNING, asked, lean_series
+from vibsim.models import centred
+from vibsim.models.events import TREATMENTS
+from vibsim.models.shared.phase_amplitude_names import is_error_part
+from vibsim.observe.input_consistency import SAME_AT_EVERY_LEVEL
+from vibsim.observe.member_block import CENTRED, Part, part_of
+from vibsim.observe.missed_pulses import missed_variables
+from vibsim.observe.stiffness import applies as motion_decides
+from vibsim.observe.stiffness import is_damped
+from vibsim.schemes import SCHEMES
+from vibsim.simulation.reference.missed_pulses import varies_in_time
+from vibsim.simulation.scaled import in_scales
+
+if TYPE_CHECKING:
+    import xarray
+
+    from vibsim.experiment import Experiment
+
+__all__ = ["analyse", "analyse_records", "asked", "compared"]
+
+Floats = NDArray[np.float64]
+
+ONCE = SAME_AT_EVERY_LEVEL | {"energy_initial"}
+"""What is taken from the finest level alone; the first energy differs between levels by its rounding only."""
+
+
+def analyse(
+    experiment: Experiment, datasets: Mapping[int, xarray.Dataset] | Sequence[xarray.Dataset]
+) -> xarray.Dataset:
+    """Compare the levels of an experiment.
+
+    Parameters
+    ----------
+    datasets
+        What `simulate` returned for every level, by level or in any order.
+
+    Returns
+    -------
+    xarray.Dataset
+        The content of ``convergence.nc``: every quantity compared between levels, norms, orders, and what was measured
+        for each check; each variable says in its ``long_name`` what it is.
+
+    Raises
+    ------
+    VibsimError
+        Where there is no level, a level is given twice, the levels have no times in common, or they are not levels of
+        one and the same problem, that of the experiment.
+    """
+    rows = datasets.values() if isinstance(datasets, Mapping) else datasets
+    records = [Record.from_xarray(dataset) for dataset in rows]
+    levels = [int(np.asarray(record.attrs["level"]).item()) for record in records]
+    twice = sorted({level for level in levels if levels.count(level) > 1})
+    if twice:
+        raise VibsimError(f"level {twice[0]} is given more than once")
+    return analyse_records(experiment, dict(zip(levels, records, strict=True))).to_xarray()
+
+
+def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Record:
+    """Compare the levels of some members, or all, given and returned as plain arrays; see `analyse`.
+
+    What is found of a member does not depend on the members beside it.
+    """
+    part = part_of(experiment, records)
+    found = comparisons(part, compared(experiment, part.lean) + _centred(part))
+    table: Table = {}
+    asked_for = asked(experiment)
+    for q in found.values():
+        if is_error_part(q.name) and q.name not in asked_for:
+            table |= _verdict(q) | at_start(q)
+            continue
+        table |= numbers(q) | _verdict(q) | at_start(q)
+        if not part.lean:
+            table |= over_time(q)
+    table |= _scalars(part) | measured(part, found) | motion(part, found)
+    if switches_of(part.model):
+        table |= corner_variables(part.corners)
+    if varies_in_time(part.model):
+        table |= missed_variables(part.missed)
+    if is_damped(part.model):
+        words = "largest rate at which damping takes a velocity away"
+        of_rate = attributes(words, "1/s")
+        table["decay_rate"] = Variable(("scheme", "case"), part.decay, of_rate)
+    table |= best_values.table(part, found)
+    if experiment.tolerance is not None:
+        table |= bounds(part)
+    if not part.lean:
+        table |= _scaled_deviation(found["energy_deviation"]) | work_precision(part, found)
+    attrs: dict[str, Any] = {
+        "title": experiment.title,
+        "model": experiment.model.kind,
+        "end_included": int(part.grid.end_included),
+        "storage": "lean" if part.lean else "series",
+        "checks": definition(experiment),
+    }
+    return in_scales(Record(_coords(part), table, attrs), experiment)
+
+
+def compared(experiment: Experiment, lean: bool = False) -> tuple[str, ...]:
+    """Name the quantities that are compared between levels: states, energy, and what a check asks for."""
+    if lean:
+        return tuple(dict.fromkeys([*lean_series(experiment), *asked(experiment)]))
+    states = (state.name for state in experiment.model.definition.states)
+    return tuple(dict.fromkeys([*states, "energy", "energy_deviation", *asked(experiment)]))
+
+
+def _centred(part: Part) -> tuple[str, ...]:
+    """Name what is made with ``[D_2t u]``, where series are kept and a scheme has another velocity."""
+    names = () if part.lean else centred(part.model)
+    return tuple(name for name in names if name in part.finest)
+
+
+def _coords(part: Part) -> Table:
+    grid = part.grid
+    levels = np.array(grid.levels, dtype=np.int64)
+    kept = ("scheme",), ("case",)
+    coords = {n: _widened(part, v) for n, v in part.finest.coords.items() if v.dims in kept}
+    coords["t"] = Variable(("t",), grid.t, part.finest.coords["t"].attrs)
+    coords["level"] = Variable(("level",), levels, attributes("level", "1"))
+    if len(levels) > 1:
+        words = "coarser level of two successive ones"
+        coords["pair"] = Variable(("pair",), levels[:-1], attributes(words, "1"))
+    if len(levels) > 2:
+        words = "coarsest level of three successive ones"
+        coords["triple"] = Variable(("triple",), levels[:-2], attributes(words, "1"))
+    coords["norm"] = Variable(("norm",), np.array(part.norms), attributes("norm over time", "1"))
+    ids = [check.id for check in part.experiment.checks]
+    if ids:
+        coords["check"] = Variable(("check",), np.array(ids), attributes("name of the check", "1"))
+    coords |= best_values.coordinate(part)
+    steps = np.array(grid.steps, dtype=np.int64)
+    coords["steps"] = Variable(("level",), steps, attributes("number of time steps", "1"))
+    dims = ("level", "case") if "end" in part.finest else ("level",)
+    dt = grid.dt if "end" in part.finest else grid.dt[:, 0]
+    coords["dt"] = Variable(dims, dt, attributes("time step", "s"))
+    return coords
+
+
+def _widened(part: Part, variable: Variable) -> Variable:
+    """Give swept words the same width in every part of a sweep."""
+    if variable.values.dtype.kind != "U" or "sweep_key" not in variable.attrs:
+        return variable
+    schemes = (SCHEMES[scheme.kind] for scheme in part.experiment.schemes)
+    words = [choice for scheme in schemes for option in scheme.words for choice in option.choices]
+    width = max(map(len, (*words, *TREATMENTS)))
+    return Variable(variable.dims, variable.values.astype(f"U{width}"), variable.attrs)
+
+
+def _scaled_deviation(q: Comparison) -> Table:
+    """Return dE_l (2^p)^k, which coincide where the energy converges to conservation (A, section 2.6)."""
+    levels, p = q.part.grid.levels, q.power[..., None]
+    # an energy that grew without bound stays without bound
+    with np.errstate(over="ignore", invalid="ignore"):
+        scaled = [
+            u * differences.gap_ratio(p, level - levels[0])
+            for u, level in zip(q.values, levels, strict=True)
+        ]
+    dims = ("scheme", "case", "level", "t")
+    attrs = attributes(f"{q.long_name}, rescaled", q.units)
+    return {f"{q.name}_scaled": Variable(dims, np.stack(scaled, 2), attrs)}
+
+
+def _scalars(part: Part) -> Table:
+    """Gather what the levels hold once per member, and the last value of every series."""
+    rows = [part.records[level] for level in part.grid.levels]
+    table: Table = {}
+    for name, variable in rows[-1].variables.items():
+        attrs, dims = dict(variable.attrs), variable.dims
+        if dims == SERIES and name.endswith((CENTRED, RUNNING)):
+            # neither has a value of its own at the end
+            continue
+        if dims == SERIES:
+            attrs["long_name"] = f"{attrs.get('long_name', name)} at the last stored time"
+            last = np.stack([row[name][..., -1] for row in rows], -1)
+            table[f"{name}_end"] = Variable(("scheme", "case", "level"), last, attrs)
+        elif dims not in (("scheme", "case"), ("case",)) or (part.lean and not _kept(part, name)):
+            continue
+        elif name in ONCE:
+            table[name] = variable
+        else:
+            stacked = np.stack([row[name] for row in rows], -1)
+            table[name] = Variable((*dims, "level"), stacked, attrs)
+    if motion_decides(part.model):
+        words = "angular frequency that a step has to resolve along the motion times the time step"
+        table[HIGHEST] = Variable(("case", "level"), part.fastest, attributes(words, "1"))
+    return table
+
+
+def _kept(part: Part, name: str) -> bool:
+    """Tell whether a number that the levels hold of every member is kept where storage is bounded."""
+    largest = {f"{state.name}_max" for state in part.model.states}
+    return name in _LEAN | ONCE | largest
+
+
+_LEAN = frozenset(
+    {
+        "status",
+        "failure_time",
+        "omega_dt",
+        HIGHEST,
+        "period",
+        "amplitude",
+        "energy_deviation_max_abs",
+    }
+)
+
+
+def _verdict(q: Comparison) -> Table:
+    """Judge a quantity by the formal order; the order in every norm, status and window in the typical norm."""
+    name, norms, typical = q.name, q.part.norms, judgement(q, TYPICAL_NORM)
+    member = ("scheme", "case")
+    table: Table = {}
+    words = {"order": "stated order", "order_low": "its lower end", "order_high": "its upper end"}
+    for key, field in (("order", "order"), ("order_low", "low"), ("order_high", "high")):
+        values = np.stack([getattr(judgement(q, kind), field) for kind in norms], axis=-1)
+        attrs = attributes(f"{name}: {words[key]}", "1")
+        table[f"{name}_{key}"] = Variable((*member, "norm"), in_precision(q, values), attrs)
+    for key, levels in (("first", typical.first), ("last", typical.last)):
+        words_ = f"{name}: {key} level that the order rests on, -1 for none"
+        kept = levels.astype(np.int16)
+        table[f"{name}_window_{key}"] = Variable(member, kept, attributes(words_, "1"))
+    for key, codes, names in (
+        ("status", typical.status, STATUSES),
+        ("reason", typical.reason, REASON_NAMES),
+    ):
+        attrs = attributes(f"{name}: {key} of the verdict on its order", "1", **flags(names))
+        table[f"{name}_{key}"] = Variable(member, codes, attrs)
+    return table

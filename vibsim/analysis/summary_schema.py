@@ -1,0 +1,140 @@
+"""The JSON Schema of ``summary.json``: ``python -m vibsim.analysis.summary_schema [--check]``.
+
+What a result may state follows from the fields of each kind of check.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vibsim.analysis.check_variables import FIELDS
+from vibsim.checks.fields import MEMBERS, Field
+from vibsim.checks.order.judge import EXPECTED
+from vibsim.checks.tolerance_check import BOUND
+from vibsim.core.vocabulary import BY_TOLERANCE, FORMAT, REASON_NAMES, STATUSES
+
+FILE = Path("workflow") / "schemas" / "summary.schema.json"
+"""Where the schema is kept, in the checkout."""
+
+TEXT = {"type": "string"}
+NUMBER = {"type": ["number", "null"]}
+COUNT = {"type": "integer", "minimum": 0}
+STATUS = {"enum": list(STATUSES)}
+REASON = {"enum": list(REASON_NAMES)}
+
+
+def _object(
+    properties: Mapping[str, Any], optional: Iterable[str] = (), **more: Any
+) -> dict[str, Any]:
+    """Return the schema of an object that has these keys and no others."""
+    return {
+        "type": "object",
+        "properties": dict(properties),
+        "required": [name for name in properties if name not in optional],
+        "additionalProperties": False,
+        **more,
+    }
+
+
+def _fact(field: Field) -> dict[str, Any]:
+    """Return the schema of a fact."""
+    if field.words:
+        return {"enum": list(field.words), "description": field.meaning}
+    kind = "integer" if np.issubdtype(field.type, np.integer) else "number"
+    kind = "boolean" if np.issubdtype(field.type, np.bool_) else kind
+    if len(field.dims) > len(MEMBERS):
+        items: dict[str, Any] = {"type": ["array", "null"], "items": {"type": kind}}
+        return items | {"description": field.meaning}
+    return {"type": [kind, "null"], "description": field.meaning}
+
+
+def _facts(kind: str, fields: Mapping[str, Field]) -> dict[str, Any]:
+    """Return the schema of the facts of a kind of check."""
+    stated = {
+        name: _fact(field)
+        for name, field in fields.items()
+        if not field.of_figure and name not in ("status", "reason")
+    }
+    return _object(stated, title=f"facts of a check `{kind}`")
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of a summary."""
+    kinds = {kind: dict(fields) for kind, fields in FIELDS.items()}
+    kinds["converges"]["expected"] = EXPECTED
+    facts = [_facts(kind, fields) for kind, fields in kinds.items()]
+    reached = {"error_bound": _fact(BOUND), "state": TEXT}
+    facts.append(_object(reached, title=f"facts of the check `{BY_TOLERANCE}`"))
+    member = {"values": {"type": "object"}, "command": TEXT}
+    result = {
+        "scheme": TEXT,
+        "case": COUNT,
+        "status": STATUS,
+        "reason": REASON,
+        "facts": {"anyOf": facts},
+        "sentence": TEXT,
+        **member,
+    }
+    check = {
+        "id": TEXT,
+        "kind": {"enum": [*FIELDS, "claim", BY_TOLERANCE]},
+        "text": TEXT,
+        "quantity": {"type": ["string", "null"]},
+        "expected": TEXT,
+        "status": STATUS,
+        "reason": REASON,
+        "advice": TEXT,
+        "results": {"type": "array", "items": _object(result, member)},
+        "counts": _object(dict.fromkeys(STATUSES, COUNT)),
+        "where": {"type": "object"},
+        "note": {"type": ["string", "null"]},
+    }
+    failure = {
+        "scheme": TEXT,
+        "level": COUNT,
+        "case": COUNT,
+        "t": NUMBER,
+        "step": COUNT,
+        "error": TEXT,
+        **member,
+    }
+    whole = {
+        "vibsim_format": {"const": FORMAT},
+        "collection": TEXT,
+        "experiment": TEXT,
+        "title": TEXT,
+        "status": STATUS,
+        "checks": {"type": "array", "items": _object(check)},
+        "failures": {"type": "array", "items": _object(failure, member)},
+        "failure_count": COUNT,
+        "digest": TEXT,
+        "integrity": TEXT,
+    }
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "summary.json"}
+    return head | _object(whole, ("digest", "integrity"))
+
+
+def text() -> str:
+    """Return the schema as it is kept."""
+    return json.dumps(schema(), indent=2, ensure_ascii=False) + "\n"
+
+
+def main(arguments: list[str], root: Path) -> int:
+    """Write the schema, or with ``--check`` tell whether the one kept is current (0) or not (1)."""
+    path = root / FILE
+    if "--check" in arguments:
+        is_current = path.is_file() and path.read_text(encoding="utf-8") == text()
+        print(f"{FILE} is {'current' if is_current else 'not current'}")
+        return 0 if is_current else 1
+    path.write_text(text(), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:], Path(__file__).resolve().parents[2]))

@@ -1,0 +1,59 @@
+"""What is known exactly of a quantity: from the exact states, from conservation, or from its definition."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.formula import values
+from vibsim.models import BUDGET, Model, tree
+from vibsim.models.base import Formula
+from vibsim.models.table import BEND, HEIGHT
+from vibsim.simulation.members import Members
+
+Floats = NDArray[np.float64]
+
+
+def formulas_of(model: Model) -> dict[str, Formula]:
+    """Return the quantities that follow from the states at one time, with their formulas."""
+    energies = {
+        "kinetic_energy": model.kinetic_energy,
+        "potential_energy": model.potential_energy,
+    }
+    return energies | {row.name: row.formula for row in model.outputs}
+
+
+def known_values(
+    model: Model, name: str, states: Mapping[str, Floats], t: Floats, group: Members
+) -> Floats | None:
+    """Return the exact values of a quantity other than a state, shape (case, t); None where nothing is known.
+
+    Parameters
+    ----------
+    states
+        The exact states at times `t`, shape (case, t); empty where they are not known.
+    group
+        The members.
+    """
+    if name == BUDGET[2] or (name == "energy_deviation" and model.conservative):
+        return np.zeros(t.shape)
+    if not states:
+        return None
+    formulas = formulas_of(model)
+    parameters = {row.name: group.parameters[row.key][:, None] for row in model.parameters}
+    numbers = {**parameters, **states, "t": t}
+    if model.lookup is not None:
+        place = np.broadcast_to(values(tree(model, model.lookup.place), numbers), t.shape)
+        numbers |= zip((HEIGHT, BEND), model.lookup.table.read(place), strict=True)
+
+    def of(formula: Formula) -> Floats:
+        return np.broadcast_to(values(tree(model, formula), numbers), t.shape)
+
+    if name in formulas:
+        return of(formulas[name])
+    if name in ("energy", "energy_deviation"):
+        energy = of(model.kinetic_energy) + of(model.potential_energy)
+        return energy if name == "energy" else energy - energy[:, :1]
+    return None

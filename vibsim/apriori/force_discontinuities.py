@@ -1,0 +1,262 @@
+"""Where the force of a model has its first corner within a step, and which power of dt that leaves of errors.
+
+A step across a jump of the k-th derivative of the force has an error of dt^(k+1) that depends on where in the step the
+jump lies: another place at each level. So no order above k + 1 is regular, wherever the motion meets such a place: 1
+for a jump of the force, 2 for ``abs(u)``, 3 for quadratic damping ``abs(v) v`` where the velocity vanishes. At a grid
+point only a jump of the force matters: of its two values a step that begins there and one that ends there take the
+same. Switches
+(`vibsim.formula.switches`) are followed along the samples of the finest level; k is read off the difference of the
+two formulas on either side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.core.record import Record, Variable, attributes
+from vibsim.formula import Name, Switch, names_in, to_formula
+from vibsim.models import Model
+from vibsim.models.events import Friction
+from vibsim.simulation import Members
+from vibsim.simulation.reference.one_sided_forces import TABLE, Sides, sides
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+ON_A_POINT = 1e-6
+"""Part of a step within which a corner is at its end."""
+FAR, NEAR = 1.0 / 16.0, 1.0 / 128.0
+"""Distances from the corner at which both formulas are compared, over the largest value of the quantity."""
+HALVINGS = 40
+MOST_SMOOTH = 8
+"""A jump of a higher derivative is none."""
+
+
+@dataclass(frozen=True)
+class Corners:
+    """The first corner that steps feel of every scheme and member, shape (scheme, case)."""
+
+    power: Floats
+    """The highest power of dt that stays regular, k + 1; NaN where there is no corner."""
+    time: Floats
+    switch: Ints
+    """Index into `switches_of`, -1 for none."""
+
+
+@dataclass(frozen=True)
+class _Path:
+    """The samples around a corner, flat over schemes and members; the straight line through them is the path."""
+
+    held: Sides
+    states: Floats
+    """Shape (2 samples, state, n)."""
+    times: Floats
+    """Shape (2, n)."""
+    modes: Floats
+    """Before and behind, shape (2, switch, n)."""
+
+    def at(self, s: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return positions, velocities and times after a part s of the way."""
+        y = self.states[0] + s * (self.states[1] - self.states[0])
+        u, v = np.split(y, 2)
+        return u, v, self.times[0] + s * (self.times[1] - self.times[0])
+
+
+@cache
+def switches_of(model: Model) -> tuple[Switch, ...]:
+    """Return the switches of a model's force but for those of its table, which `has_corners` is about."""
+    return tuple(row for row in sides(model, {}).switches if row.mode != TABLE)
+
+
+def _is_left_to_steps(model: Model, switch: Switch) -> bool:
+    """Tell whether steps go across a switch: not where friction turns, as that is an event (`Model.events`)."""
+    turns = isinstance(model.events, Friction) and switch.quantity == Name(model.velocity)
+    return switch.mode != TABLE and not turns
+
+
+def words_of(model: Model, index: int) -> str:
+    """Say what happens at a corner: which quantity passes which value."""
+    switch = switches_of(model)[index]
+    if any(name.startswith("_") for name in names_in(switch.quantity)):
+        return "a condition in the formula of the force changes"
+    if switch.quantity == Name(model.velocity):
+        return f"the velocity {model.velocity} passes zero"
+    passed = "a whole number" if switch.whole else "zero"
+    return f"{to_formula(switch.quantity)} passes {passed}"
+
+
+def corners_of(model: Model, finest: Record, group: Members, dt: Floats) -> Corners:
+    """Find the first corner that lies within a step, or jump of the force in time that lies at a grid point.
+
+    Parameters
+    ----------
+    finest
+        Record of the finest level.
+    group
+        Its members.
+    dt
+        Step of the coarsest level, of which every other one is a part, shape (case,).
+    """
+    states = np.stack([np.asarray(finest[state.name], dtype=float) for state in model.states])
+    _, schemes, cases, samples = states.shape
+    none = np.full((schemes, cases), np.nan)
+    if not switches_of(model) or samples < 2:
+        return Corners(none, none, np.full(none.shape, -1))
+    number = np.arange(samples) * int(np.asarray(finest.attrs["every"]).item())
+    t = number * (group.end / int(np.asarray(finest.attrs["steps"]).item()))[:, None]
+    numbers = {row.name: group.parameters[row.key] for row in model.parameters}
+    held = sides(model, {name: np.repeat(x, samples) for name, x in numbers.items()})
+    with np.errstate(all="ignore"):
+        rows = [_of_scheme(held, states[:, k], t, numbers, dt) for k in range(schemes)]
+    power, time, switch = (np.stack(column) for column in zip(*rows, strict=True))
+    return Corners(power, time, switch)
+
+
+def _of_scheme(
+    held: Sides, states: Floats, t: Floats, numbers: Mapping[str, Floats], dt: Floats
+) -> tuple[Floats, Floats, Ints]:
+    """Return power, time and switch of the first corner of every member, each of shape (case,)."""
+    cases, samples = t.shape
+    q, modes = _modes(held, states.reshape(len(states), -1), t.ravel())
+    q, modes = (row.reshape(len(q), cases, samples) for row in (q, modes))
+    edge = np.maximum(modes[..., :-1], modes[..., 1:])
+    edge = np.where(held.whole[:, None, None], edge, 0.0)
+    part = (edge - q[..., :-1]) / (q[..., 1:] - q[..., :-1])
+    at = t[:, :-1] + part * np.diff(t)
+    passed = np.diff(modes) != 0.0
+    passed &= np.array([_is_left_to_steps(held.model, row) for row in held.switches])[:, None, None]
+    is_within = ~is_on_a_point(at, dt[:, None])
+    of_time = np.array(_of_time(held))[:, None, None]
+    followed = _Followed(held, states, t, numbers, q, modes, edge)
+    within = followed.first(np.where(passed & is_within, at, np.inf))
+    on_point = followed.first(np.where(passed & of_time & ~is_within, at, np.inf))
+    is_first = (on_point[0] == 1.0) & ~(within[1] <= on_point[1])
+    power, time, switch = (np.where(is_first, *pair) for pair in zip(on_point, within, strict=True))
+    return power, time, np.asarray(switch, dtype=np.int64)
+
+
+def is_on_a_point(t: Floats, dt: Floats) -> NDArray[np.bool_]:
+    """Tell whether times are grid points of step dt."""
+    place = t / dt
+    return np.asarray(np.abs(place - np.round(place)) <= ON_A_POINT)
+
+
+def _of_time(held: Sides) -> list[bool]:
+    """Tell of every switch whether time alone moves it."""
+    state_names = {state.name for state in held.model.states}
+    moved = set(state_names)
+    found = []
+    for row in held.switches:
+        found.append(moved.isdisjoint(names_in(row.quantity)))
+        if not found[-1]:
+            moved.add(row.mode)
+    return found
+
+
+@dataclass(frozen=True)
+class _Followed:
+    """What all switches look at along the samples of every member."""
+
+    held: Sides
+    states: Floats
+    t: Floats
+    numbers: Mapping[str, Floats]
+    q: Floats
+    """Shape (switch, case, sample)."""
+    modes: Floats
+    edge: Floats
+    """The value that is passed between two samples, shape (switch, case, sample - 1)."""
+
+    def first(self, when: Floats) -> tuple[Floats, Floats, Ints]:
+        """Return power, time and switch of the first corner of every member, each of shape (case,).
+
+        Parameters
+        ----------
+        when
+            The times of those that count, infinite elsewhere, shape (switch, case, sample - 1).
+        """
+        held, own = self.held, np.arange(len(self.t))
+        first = np.argmin(np.min(when, axis=0), axis=-1)
+        switch = np.argmin(when[:, own, first], axis=0)
+        exists = np.isfinite(when[switch, own, first])
+        around = np.stack([first, first + 1])
+        own_modes = np.stack([self.modes[:, own, i] for i in around])
+        # what else changes between these two samples is another corner
+        behind = own_modes[0].copy()
+        behind[switch, own] = own_modes[1][switch, own]
+        path = _Path(
+            Sides(held.model, held.formulas, held.switches, self.numbers),
+            np.stack([self.states[:, own, i] for i in around]),
+            np.stack([self.t[own, i] for i in around]),
+            np.stack([own_modes[0], behind]),
+        )
+        size = np.nanmax(np.abs(self.q), axis=-1)[switch, own]
+        power = _power(path, switch, self.edge[switch, own, first], size)
+        power = np.where(exists, power, np.nan)
+        exists &= np.isfinite(power)
+        return (
+            power,
+            np.where(exists, when[switch, own, first], np.nan),
+            np.where(exists, switch - len(held.switches) + len(switches_of(held.model)), -1),
+        )
+
+
+def _modes(held: Sides, states: Floats, t: Floats) -> tuple[Floats, Floats]:
+    """Return what all switches look at, and their modes, shape (switch, sample)."""
+    u, v = np.split(states, 2)
+    modes = np.zeros((len(held.switches), len(t)))
+    q = np.zeros(modes.shape)
+    for k, is_whole in enumerate(held.whole):
+        # a switch may look at the modes of those before it
+        q[k] = held.quantity(k, modes, u, v, t)
+        modes[k] = np.floor(q[k]) if is_whole else np.where(q[k] > 0.0, 0.0, -1.0)
+    return q, modes
+
+
+def _power(path: _Path, switch: Ints, edge: Floats, size: Floats) -> Floats:
+    """Return the power of dt that a corner leaves, shape (n,); NaN where both formulas are the same."""
+    s = _crossing(path, switch, edge)
+    slope = _quantity(path, switch, np.ones(len(s))) - _quantity(path, switch, np.zeros(len(s)))
+    gaps = []
+    for distance in (FAR, NEAR):
+        u, v, t = path.at(s + distance * size / slope)
+        before, behind = (path.held.force(modes)(u, v, t) for modes in path.modes)
+        gaps.append(np.max(np.abs(behind - before), axis=0))
+    k = np.round(np.log(gaps[0] / gaps[1]) / np.log(FAR / NEAR))
+    return np.where((gaps[0] > 0.0) & (k < MOST_SMOOTH), np.maximum(k, 0.0) + 1.0, np.nan)
+
+
+def _quantity(path: _Path, switch: Ints, s: Floats) -> Floats:
+    u, v, t = path.at(s)
+    return path.held.quantities(path.modes[0], u, v, t)[switch, np.arange(len(s))]
+
+
+def _crossing(path: _Path, switch: Ints, edge: Floats) -> Floats:
+    """Return after which part of the way a switch has the value `edge`, by bisection."""
+    low, high = np.zeros(len(edge)), np.ones(len(edge))
+    start = _quantity(path, switch, low) > edge
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        is_before = (_quantity(path, switch, middle) > edge) == start
+        low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
+    return 0.5 * (low + high)
+
+
+def corner_variables(corners: Corners) -> dict[str, Variable]:
+    """Return the corners as variables of the convergence Record."""
+    dims = ("scheme", "case")
+    words = "first time at which the force has a corner within a step"
+    return {
+        "corner_time": Variable(dims, corners.time, attributes(words, "s")),
+        "corner_power": Variable(
+            dims, corners.power, attributes("power of dt that this corner leaves of errors", "1")
+        ),
+        "corner_switch": Variable(
+            dims, corners.switch.astype(np.int16), attributes("number of its condition, or -1", "1")
+        ),
+    }

@@ -1,0 +1,1 @@
+"""The check ``value``: a number against its bound."""

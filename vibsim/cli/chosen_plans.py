@@ -1,0 +1,37 @@
+"""Plans of what a user names, with everything that a plan may need and the plan itself must not know."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from vibsim.plan import Plan, checkout, choose, load_all
+
+if TYPE_CHECKING:
+    from vibsim.experiment import Experiment
+
+
+def resolve(experiment: Experiment) -> Experiment:
+    """Choose the levels of an experiment that names a tolerance."""
+    from vibsim import ladder
+
+    resolved: Experiment = ladder.resolve(experiment)
+    return resolved
+
+
+def plans_of(words: Sequence[str], *, cached: bool = False) -> list[Plan]:
+    """Return the plans of the experiments that `words` name.
+
+    Parameters
+    ----------
+    words
+        Files, names of experiments or collections; none means the default collections.
+    cached
+        Whether plans that were made before will do.
+
+    Raises
+    ------
+    InputError
+        With every word that names nothing and the faults of all files.
+    """
+    return list(load_all(choose(words, checkout()), resolve, cached=cached).values())

@@ -1,0 +1,44 @@
+"""The job that compares all levels of an experiment; usable by hand."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from contextlib import ExitStack
+from typing import TYPE_CHECKING
+
+from vibsim.cli import made_files
+from vibsim.cli.jobs.common import check_digest, one_plan, provenance, titled
+from vibsim.cli.jobs.levels import check_levels, readers
+from vibsim.plan.digested_part import analysed
+
+if TYPE_CHECKING:
+    from vibsim.core.record import Record
+
+
+def analyse(options: Namespace) -> int:
+    """Compare all levels; write ``convergence.nc`` and ``summary.json``."""
+    plan, results = one_plan(options)
+    check_digest(plan, options.digest, plan.analysis)
+    from vibsim import store
+    from vibsim.analysis import analyse_parts, joined, kept, summarise, verdicts
+
+    check_levels(plan, options, results)
+    experiment = plan.experiment
+    folder = options.out or results / plan.key
+    thin: list[Record] = []
+    with ExitStack() as stack:
+        levels = readers(plan, results, stack)
+        parts = kept(analyse_parts(experiment, levels, threads=options.threads), thin)
+        store.write_parts(
+            folder / "convergence.nc",
+            (titled(part, f"{plan.key}: comparison of levels") for part in parts),
+            cases=plan.cases,
+            digest=plan.analysis,
+            provenance=provenance(plan, analysed(plan.content)),
+        )
+    record = joined(thin)
+    summary = summarise(experiment, verdicts(experiment, record), record)
+    store.write_json(folder / "summary.json", summary, digest=plan.analysis)
+    if options.out is None:
+        made_files.add(results, plan.key, ["convergence.nc", "summary.json"])
+    return 0

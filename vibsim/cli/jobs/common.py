@@ -1,0 +1,102 @@
+"""What all jobs of the workflow share.
+
+A job reads the plan of its experiment and refuses when it is not the plan that it was started for. It
+reads no file without its digest; one that is damaged or another job's is named and never used.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import Namespace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import vibsim
+from vibsim.cli import results_folder as plain
+from vibsim.cli.chosen_plans import resolve
+from vibsim.cli.jobs.deleted import delete
+from vibsim.core.errors import Fault, FileError, InputError, VibsimError
+from vibsim.plan import Plan, checkout, choose, load
+
+if TYPE_CHECKING:
+    from vibsim.core.record import Record
+
+
+def results_folder(options: Namespace) -> Path:
+    """Return the results folder that was asked for, else that of the checkout."""
+    folder: Path = options.results or checkout() / "results"
+    try:
+        is_other = folder.exists() and not folder.is_dir()
+    except OSError as error:
+        # a name that is too long, a folder on the way that may not be entered
+        raise refusal(
+            "--results", f"{str(folder)[:80]} ...", f"cannot be used: {error.strerror}"
+        ) from None
+    if is_other:
+        raise refusal("--results", folder, "must be a folder, this is a file")
+    return folder.absolute()
+
+
+def one_plan(options: Namespace) -> tuple[Plan, Path]:
+    """Return the plan of the experiment of a job, and the results folder."""
+    results = results_folder(options)
+    choices = choose([options.experiment], checkout())
+    if len(choices) != 1:
+        raise refusal("EXPERIMENT", options.experiment, "must be one experiment, not a collection")
+    plan = load(choices[0], resolve, cached=True)
+    plain.check_folders(results, plan.key)
+    return plan, results
+
+
+def check_digest(plan: Plan, wanted: str | None, found: str) -> None:
+    """Refuse to do another job than the one that was planned."""
+    if wanted is not None and wanted != found:
+        rule = "the experiment or the code changed after this job was planned; run again"
+        raise InputError([Fault(plan.file, 0, "", "", rule)])
+
+
+def refusal(key: str, value: Any, rule: str, hint: str = "") -> InputError:
+    """Return the error of a command line."""
+    return InputError([Fault("command line", 0, key, str(value), rule, hint)])
+
+
+def read_all(
+    options: Namespace, results: Path, readers: Mapping[str, Callable[[Path], Any]]
+) -> dict[str, Any]:
+    """Read every file, and only then refuse: a run makes all that are bad again in one go."""
+    found: dict[str, Any] = {}
+    errors: list[FileError] = []
+    for path, read in readers.items():
+        try:
+            found[path] = read(results / path)
+        except FileError as error:
+            errors.append(error)
+    if errors:
+        kept = _discard(errors, results) if options.discard else []
+        raise VibsimError("\n".join([*map(str, errors), *kept]))
+    return found
+
+
+def _discard(errors: Sequence[FileError], results: Path) -> list[str]:
+    """Delete every bad file; return why some could not be."""
+    kept: list[str] = []
+    for bad in errors:
+        try:
+            delete(bad, results)
+        except VibsimError as error:
+            kept.append(str(error))
+    return kept
+
+
+def titled(record: Record, title: str) -> Record:
+    """Return `record` with the title that its file needs."""
+    return replace(record, attrs={**record.attrs, "title": title})
+
+
+def provenance(plan: Plan, uses: dict[str, Any]) -> dict[str, Any]:
+    """Return what a file says of its making."""
+    python = ".".join(map(str, sys.version_info[:3]))
+    versions = {"vibsim": vibsim.__version__, "python": python, **plan.versions}
+    return {"experiment": uses, "versions": versions}

@@ -1,0 +1,53 @@
+"""The job that extrapolates the solution of an experiment over all its levels; usable by hand."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import ExitStack
+
+from vibsim.cli import made_files
+from vibsim.cli.jobs.common import check_digest, one_plan, provenance, refusal, titled
+from vibsim.cli.jobs.levels import check_levels, readers
+from vibsim.plan import Plan
+from vibsim.plan.digested_part import extrapolated
+
+PART_BYTES = 64 * 10**6
+"""Bytes of all levels together that an extrapolation reads at a time."""
+
+
+def extrapolate(options: Namespace) -> int:
+    """Extrapolate the solution over all levels; write ``best.nc``."""
+    plan, results = one_plan(options)
+    if plan.best is None:
+        raise refusal("EXPERIMENT", options.experiment, "does not ask for `output: best`")
+    check_digest(plan, options.digest, plan.extrapolation)
+    from vibsim import store
+    from vibsim.comparison.best_solution import best_record
+
+    check_levels(plan, options, results)
+    with ExitStack() as stack:
+        levels = readers(plan, results, stack)
+        parts = (
+            best_record(
+                plan.experiment, {level: read(start, stop) for level, read in levels.items()}
+            )
+            for start, stop in _ranges(plan)
+        )
+        store.write_parts(
+            options.out or results / plan.best,
+            (titled(part, f"{plan.key}: extrapolated over all levels") for part in parts),
+            cases=plan.cases,
+            digest=plan.extrapolation,
+            provenance=provenance(plan, extrapolated(plan.content)),
+        )
+    if options.out is None:
+        made_files.add(results, plan.key, ["best.nc"])
+    return 0
+
+
+def _ranges(plan: Plan) -> Iterator[tuple[int, int]]:
+    """Yield ranges of members whose levels fit into memory together."""
+    size = max(1, PART_BYTES * plan.cases // plan.bytes)
+    for start in range(0, plan.cases, size):
+        yield start, min(start + size, plan.cases)

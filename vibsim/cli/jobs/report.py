@@ -1,0 +1,91 @@
+"""The job that draws the report of an experiment, or the index over all results; usable by hand."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from vibsim.cli import made_files
+from vibsim.cli.jobs.common import (
+    check_digest,
+    one_plan,
+    provenance,
+    read_all,
+    refusal,
+    results_folder,
+)
+from vibsim.core.errors import nearest
+
+FORMATS = ("svg", "png", "pdf")
+"""Formats of figures, as in `vibsim.report.style`, which takes long to import."""
+
+
+def report(options: Namespace) -> int:
+    """Write the report of one experiment, or the index over all results."""
+    if options.experiment is None:
+        return _index(options)
+    formats = _formats(options)
+    plan, results = one_plan(options)
+    check_digest(plan, options.digest, plan.report)
+    from vibsim import store
+    from vibsim.report import write
+
+    readers: dict[str, Callable[[Path], Any]] = {
+        plan.convergence: partial(store.read, digest=plan.analysis),
+        plan.summary: partial(store.read_json, digest=plan.analysis, name=plan.key),
+    }
+    found = read_all(options, results, readers)
+    summary = found[plan.summary]
+    if summary["title"] != plan.title:
+        summary["title"] = plan.title
+        if options.out is None:
+            # No number depends on the title: after another one the analysis need not run again.
+            store.write_json(results / plan.summary, summary, digest=plan.analysis)
+            made_files.add(results, plan.key, ["summary.json"])
+    write(
+        plan,
+        found[plan.convergence],
+        summary,
+        options.out or results / plan.key,
+        formats=formats,
+        provenance=provenance(plan, plan.content) | {"digest": plan.analysis},
+    )
+    if options.out is None:
+        made_files.add(results, plan.key, _written(results / plan.key))
+    return 0
+
+
+def _written(folder: Path) -> list[str]:
+    """Name the files of a report, which has its folders to itself."""
+    beside = (path for part in made_files.BESIDE for path in sorted((folder / part).glob("[!.]*")))
+    return ["report.html", *(p.relative_to(folder).as_posix() for p in beside if p.is_file())]
+
+
+def _index(options: Namespace) -> int:
+    """Write the page over all results, which takes none of the options of one report."""
+    for name in ("digest", "discard", "formats"):
+        value = getattr(options, name)
+        if value:
+            text = "" if value is True else value
+            raise refusal(f"--{name}", text, "belongs to the report of one experiment: name it")
+    from vibsim.report import write_index
+
+    results = results_folder(options)
+    write_index(options.out or results)
+    if options.out is None:
+        made_files.add(results, made_files.INDEX, ["index.html", "summary.csv"])
+    return 0
+
+
+def _formats(options: Namespace) -> list[str]:
+    """Return the formats of the figures, each of them known."""
+    chosen = (options.formats or "svg").split(",")
+    unknown = [name for name in chosen if name not in FORMATS]
+    if unknown:
+        raise refusal(
+            "--formats", ",".join(unknown), "unknown format", nearest(unknown[0], FORMATS)
+        )
+    return chosen

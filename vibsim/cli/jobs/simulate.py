@@ -1,0 +1,118 @@
+"""The job that simulates: one shard of one level, or several cheap levels one after the other.
+
+A file that is whole and up to date is kept, and a level that fails costs no other: Snakemake starts a job again as a
+whole, and what it has made already need not be made twice.
+"""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Sequence
+from pathlib import Path
+
+from vibsim.cli import made_files
+from vibsim.cli.failure import sentence
+from vibsim.cli.jobs.common import check_digest, one_plan, provenance, refusal, titled
+from vibsim.core.errors import FileError, VibsimError
+from vibsim.plan import Plan, ShardJob
+from vibsim.plan.batches import batch_digest
+
+
+def simulate(options: Namespace) -> int:
+    """Simulate one shard of one level to a file, or of several levels to the places of the plan."""
+    plan, results = one_plan(options)
+    jobs = _jobs(plan, options.level, options.shard)
+    check_digest(plan, options.digest, batch_digest([job.digest for job in jobs]))
+    if options.out is not None:
+        if len(jobs) > 1:
+            raise refusal("--out", options.out, "is one file, and several levels are several")
+        _make(plan, options.level[0], jobs[0], options.out, options.threads)
+        return 0
+    failed = [
+        problem
+        for level, job in zip(options.level, jobs, strict=True)
+        if (problem := _try(plan, level, job, results, options.threads))
+    ]
+    if failed:
+        raise VibsimError("\n".join(failed))
+    return 0
+
+
+def _jobs(plan: Plan, levels: Sequence[int], shard: int) -> list[ShardJob]:
+    known = [level.level for level in plan.levels]
+    for level in levels:
+        if level not in known:
+            raise refusal("--level", level, f"must be one of {', '.join(map(str, known))}")
+        last = len(plan.level(level).shards) - 1
+        if not 0 <= shard <= last:
+            raise refusal("--shard", shard, f"must be from 0 to {last}")
+    return [plan.level(level).shards[shard] for level in levels]
+
+
+def _try(plan: Plan, level: int, job: ShardJob, results: Path, threads: int) -> str:
+    """Make a file unless it is there; return what went wrong, for the end of the log."""
+    path = results / job.path
+    if is_made(path, job):
+        print(f"{job.path}: is up to date", flush=True)
+        return ""
+    try:
+        _make(plan, level, job, path, threads)
+        made_files.add(results, plan.key, [job.path.removeprefix(f"{plan.key}/")])
+    except VibsimError as error:
+        return str(error)
+    except Exception as error:
+        return f"{_named(plan, level, job)}: {sentence(error)}"
+    return ""
+
+
+def is_made(path: Path, job: ShardJob) -> bool:
+    """Tell whether a file is whole and that of `job`."""
+    from vibsim import store
+
+    if not path.exists():
+        return False
+    try:
+        store.check(path, digest=job.digest)
+    except FileError:
+        return False
+    return True
+
+
+def _make(plan: Plan, level: int, job: ShardJob, path: Path, threads: int) -> None:
+    """Simulate the members of a file and write it.
+
+    Raises
+    ------
+    VibsimError
+        With the level and the members.
+    """
+    from vibsim import store
+    from vibsim.plan.digested_part import simulated, values_digest
+    from vibsim.simulation import simulate_record
+
+    # Should the process be killed, its log ends with what it was at.
+    print(_named(plan, level, job), flush=True)
+    experiment = plan.experiment
+    keys = list(experiment.sweep.keys) if experiment.sweep else []
+    uses = {
+        **simulated(plan.content),
+        "level": level,
+        "cases": [job.start, job.stop],
+        "swept": keys,
+        "values": values_digest(experiment, job.start, job.stop),
+    }
+    try:
+        record = simulate_record(experiment, level, job.start, job.stop, threads=threads)
+        store.write(
+            path,
+            titled(record, f"{plan.key}: level {level}"),
+            digest=job.digest,
+            provenance=provenance(plan, uses),
+        )
+    except (VibsimError, MemoryError, OSError) as error:
+        raise VibsimError(f"{_named(plan, level, job)}: {sentence(error)}") from error
+
+
+def _named(plan: Plan, level: int, job: ShardJob) -> str:
+    members = f"members {job.start} to {job.stop - 1}" if job.stop - job.start > 1 else ""
+    return f"{plan.key}, level {level}, {members or f'member {job.start}'}"

@@ -1,0 +1,120 @@
+"""A results folder holds files and folders only, so that nothing is written outside of it, and no pipe is waited for.
+
+It may come from somebody else, who put a link where a run writes. Such a folder is refused. The results folder itself
+may be a link, which its user has named.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from vibsim import store
+from vibsim.core.errors import Fault, InputError, VibsimError
+
+_OURS = (".vibsim", ".snakemake", "index.html", "summary.csv")
+_IN_PLACE = ("logs", "benchmarks", "figures", "tables")
+"""Folders of an experiment where the shell and Snakemake write to files that are there."""
+_NEEDED = ("incomplete", "log", "metadata")
+"""What a run needs of Snakemake's own folder: its records, which are JSON, and its logs."""
+
+
+def check(results: Path, keys: Iterable[str]) -> None:
+    """Refuse a results folder with anything else where runs of the experiments `keys` read and write.
+
+    Raises
+    ------
+    InputError
+        With every path that is neither a file nor a folder.
+    """
+    places = [results / name for name in (*_OURS, *keys)]
+    with _naming():
+        strange = _strange({*places, *(place.parent for place in places)} - {results})
+        for place in places:
+            strange += [entry.path for entry in _entries(place, deep=True) if not _is_plain(entry)]
+    _refuse(strange)
+
+
+def check_folders(results: Path, key: str) -> None:
+    """Refuse the same among the folders that the jobs of the experiment `key` write to."""
+    folder = results / key
+    with _naming():
+        strange = _strange([results / ".vibsim", folder.parent, folder])
+        strange += [entry.path for entry in _entries(folder) if not _is_plain(entry)]
+    _refuse(strange)
+
+
+def clean(results: Path, keys: Iterable[str]) -> None:
+    """Make a checked folder one that Snakemake may be started in.
+
+    Of Snakemake's own folder only what a run needs stays: Snakemake would import modules from there, and a lock in it
+    belongs to a run that is no more. A file that is written in place and has another name elsewhere becomes one of its
+    own.
+    """
+    # jobs do without it
+    from shutil import rmtree
+
+    records = results / ".snakemake"
+    written = [results / key / name for key in keys for name in _IN_PLACE]
+    with _naming():
+        for entry in _entries(records):
+            if entry.name not in _NEEDED:
+                rmtree(entry) if entry.is_dir() else Path(entry).unlink()
+        for folder in (results / ".vibsim", records, *written):
+            for entry in _entries(folder, deep=True):
+                if not entry.is_dir() and entry.stat().st_nlink > 1:
+                    store.write_bytes(Path(entry), Path(entry).read_bytes())
+
+
+def _refuse(paths: Iterable[str]) -> None:
+    advice = "remove it, or choose another folder with --results"
+    if faults := [Fault(path, 0, "", "", _rule(path), advice) for path in paths]:
+        raise InputError(faults)
+
+
+_KINDS = {
+    stat.S_IFLNK: "a symbolic link",
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
+
+
+def _rule(path: str) -> str:
+    """Say what a path is, and that it may not be."""
+    with _naming():
+        kind = _KINDS.get(stat.S_IFMT(os.lstat(path).st_mode), "no file and no folder")
+    return f"is {kind}, and vibsim writes to real files and folders only"
+
+
+def _strange(paths: Iterable[Path]) -> list[str]:
+    return [
+        str(path)
+        for path in paths
+        if path.is_symlink() or (path.exists() and not path.is_file() and not path.is_dir())
+    ]
+
+
+def _is_plain(entry: os.DirEntry[str]) -> bool:
+    return entry.is_file(follow_symlinks=False) or entry.is_dir(follow_symlinks=False)
+
+
+def _entries(folder: Path | str, *, deep: bool = False) -> Iterator[os.DirEntry[str]]:
+    """Yield what is in a folder, with `deep` also what is in the folders there; nothing where it is no folder."""
+    with suppress(FileNotFoundError, NotADirectoryError), os.scandir(folder) as entries:
+        for entry in entries:
+            yield entry
+            if deep and entry.is_dir(follow_symlinks=False):
+                yield from _entries(entry.path, deep=True)
+
+
+@contextmanager
+def _naming() -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise VibsimError(f"{error.filename}: cannot be used ({error.strerror})") from error

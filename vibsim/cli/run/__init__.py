@@ -1,0 +1,1 @@
+"""``vibsim run``: from experiment files to verdicts."""

@@ -1,0 +1,115 @@
+"""Which results are no longer as they were made: by size, time and inode, and where one of these differs by content."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from vibsim.cli import made_files
+from vibsim.cli.made_files import BESIDE, Entry
+from vibsim.core.errors import DamagedFileError, FileError
+from vibsim.plan import Plan
+
+_OVER_ALL = ("index.html", "summary.csv")
+_SEALED = (".nc", ".json")
+"""Files that say themselves whether they are whole."""
+
+
+def changed(plans: Sequence[Plan], results: Path, *, every: bool) -> list[FileError]:
+    """Return the files to be made again; what only was copied or touched gets its time back.
+
+    Parameters
+    ----------
+    plans
+        The experiments.
+    results
+        The results folder, whose lock is held.
+    every
+        Compare every file with its digest, not only those whose size, time or inode differs.
+    """
+    found: list[FileError] = []
+    for plan in plans:
+        own = [path.removeprefix(f"{plan.key}/") for path in plan.files]
+        found.extend(_changed(results, plan.key, own, every))
+    found.extend(_changed(results, made_files.INDEX, _OVER_ALL, every))
+    return found
+
+
+def _changed(results: Path, key: str, own: Iterable[str], every: bool) -> Iterator[FileError]:
+    folder, known = results / key, made_files.load(results, key)
+    now = dict(known)
+    bad = {name: problem for name in own if (problem := _problem(folder, name, now, every))}
+    page = folder / "report.html"
+    if page.exists() and page.name not in bad:
+        for name in filter(lambda name: name.startswith(BESIDE), known):
+            if problem := _problem(folder, name, now, every) or _missing(folder / name):
+                # A report is made as a whole.
+                bad[page.name] = f"its file {name}: {problem}"
+    yield from (DamagedFileError(folder / name, problem) for name, problem in bad.items())
+    if now != known:
+        made_files.replace(results, key, now)
+
+
+def _missing(path: Path) -> str:
+    return "" if path.exists() else "is missing"
+
+
+def _problem(folder: Path, name: str, entries: dict[str, Entry], every: bool) -> str:
+    """Say what is wrong with a file, if there is one, and bring its entry up to date."""
+    path, known = folder / name, entries.get(name)
+    try:
+        status = path.lstat()
+        if not every and known and known.fits(status):
+            return ""
+        if not stat.S_ISREG(status.st_mode):
+            return "is no file"
+        if not known and path.suffix not in _SEALED:
+            return "nothing on record says that it is as it was made"
+        digest = made_files.content(path)
+    except FileNotFoundError:
+        return ""
+    except OSError as error:
+        return f"cannot be read: {error.strerror}"
+    except FileError as error:
+        return error.reason
+    if known is None:
+        entries[name] = made_files.entry(status, digest)
+    elif digest != known.digest:
+        return "its bytes are not those that were written"
+    else:
+        entries[name] = known._replace(inode=status.st_ino)
+        _give_back(path, status, known.time)
+    return ""
+
+
+def _give_back(path: Path, status: os.stat_result, time: int) -> None:
+    """Set the time at which the file was made: what follows from it is as old as it was, too."""
+    if status.st_mtime_ns != time:
+        # Where it cannot be set, only time is lost: Snakemake makes anew what seems older than its input.
+        with suppress(OSError):
+            os.utime(path, ns=(status.st_atime_ns, time), follow_symlinks=False)
+
+
+def settle(plans: Sequence[Plan], results: Path, outputs: Iterable[str]) -> None:
+    """Take the times of the files that jobs have just made: Snakemake sets them anew when a job has ended."""
+    fresh = set(outputs)
+    for key in (*(plan.key for plan in plans), made_files.INDEX):
+        known = made_files.load(results, key)
+        now = {name: _settled(results, key, name, known[name], fresh) for name in known}
+        if now != known:
+            made_files.replace(results, key, now)
+
+
+def _settled(results: Path, key: str, name: str, known: Entry, fresh: set[str]) -> Entry:
+    path = Path(key, name).as_posix()
+    if path not in fresh:
+        return known
+    try:
+        status = (results / path).lstat()
+    except OSError:
+        return known
+    same = (status.st_size, status.st_ino) == (known.size, known.inode)
+    return known._replace(time=status.st_mtime_ns) if same else known

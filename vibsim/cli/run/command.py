@@ -1,0 +1,209 @@
+"""``vibsim run``: from experiment files to verdicts, again and again until nothing is left to do."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from argparse import Namespace
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from vibsim.cli import failure, resources
+from vibsim.cli import results_folder as plain
+from vibsim.cli.chosen_plans import plans_of
+from vibsim.cli.jobs import deleted
+from vibsim.cli.jobs.common import results_folder
+from vibsim.cli.jobs.simulate import is_made
+from vibsim.cli.run import changes, lock, outcome, snakemake, sources, supervise
+from vibsim.cli.run.leftovers import leftovers, remove
+from vibsim.cli.run.progress import Progress, describe
+from vibsim.core import private_cache
+from vibsim.core.errors import VibsimError
+from vibsim.plan import Plan, checkout
+
+_STAGES = 4
+"""How often the workflow is started at most: once, and once for each kind of file found bad."""
+
+
+def run(options: Namespace) -> int:
+    """Run the chosen experiments and show every verdict."""
+    with private_cache.provided() as problem:
+        if problem:
+            text = f"the cache is not used ({problem}); this run has one of its own until it ends"
+            print(f"vibsim: {text}", file=sys.stderr, flush=True)
+        return _run(options)
+
+
+def _run(options: Namespace) -> int:
+    root, results = checkout(), results_folder(options)
+    # Everything is validated before anything is written but the cache of plans.
+    plans = plans_of(options.experiments, cached=True)
+    plain.check(results, [plan.key for plan in plans])
+    resources.check(plans, results)
+    arguments = ["--cores", str(options.cores or len(os.sched_getaffinity(0)))]
+    arguments += ["--resources", f"mem_mb={resources.megabytes(plans)}"]
+    if options.dry_run:
+        return _dry_run(plans, results, root, arguments, options)
+    _prepare(results)
+    held = lock.hold(results)
+    sources.claim(plans, results)
+    progress = Progress()
+    deleted.take(results)
+    _clear(plans, results, options.verify)
+    jobs: list[snakemake.Job] = []
+    for _ in range(_STAGES):
+        ended = snakemake.run(plans, results, root, held, arguments, progress)
+        if ended.jobs:
+            _refuse_edited(plans, options)
+        findings = outcome.collect(plans, results)
+        progress.clear()
+        jobs.extend(ended.jobs)
+        changes.settle(plans, results, (path for job in ended.jobs for path in job.outputs))
+        if not _tell_deleted(results):
+            break
+    return _show(options, findings, ended, results, bool(jobs))
+
+
+def _clear(plans: Sequence[Plan], results: Path, every: bool) -> None:
+    """Delete what is no longer as it was made, and remove what no experiment asks for any more."""
+    for error in changes.changed(plans, results, every=every):
+        deleted.delete(error, results)
+    _tell_deleted(results)
+    for path in _leftovers(plans, results):
+        remove(path)
+        print(f"vibsim: removed, no longer asked for: {path}", file=sys.stderr)
+
+
+def _leftovers(plans: Sequence[Plan], results: Path) -> list[Path]:
+    return [path for plan in plans for path in leftovers(plan, results)]
+
+
+def _tell_deleted(results: Path) -> bool:
+    """Say what was deleted; tell whether anything was."""
+    notes = deleted.take(results)
+    for note in notes:
+        print(f"vibsim: deleted, to be made again: {note}", file=sys.stderr)
+    return bool(notes)
+
+
+def _refuse_edited(plans: Sequence[Plan], options: Namespace) -> None:
+    """Refuse to go on with plans of files that say something else now: their results would be those of neither."""
+    now = plans_of(options.experiments, cached=True)
+    files = dict.fromkeys(plan.file for plan in plans if plan not in now)
+    if files:
+        rule = "was edited while it was run; run it again"
+        raise VibsimError("\n".join(f"{file}: {rule}" for file in files))
+
+
+def _dry_run(
+    plans: Sequence[Plan], results: Path, root: Path, arguments: list[str], options: Namespace
+) -> int:
+    """Show the jobs; a results folder that does not exist yet is not made for that."""
+    with ExitStack() as stack:
+        if not results.exists():
+            results = Path(stack.enter_context(TemporaryDirectory(prefix="vibsim-")))
+        _prepare(results)
+        held = lock.hold(results)
+        sources.check(plans, results)
+        bad = changes.changed(plans, results, every=options.verify)
+        for error in bad:
+            print(f"vibsim: would be deleted and made again: {error}", file=sys.stderr)
+        for path in _leftovers(plans, results):
+            print(f"vibsim: would be removed, no longer asked for: {path}", file=sys.stderr)
+        arguments = [*arguments, "--dry-run"]
+        if bad:
+            paths = dict.fromkeys(error.path.relative_to(results).as_posix() for error in bad)
+            arguments += ["--forcerun", *paths]
+        return _show_jobs(plans, results, root, held, arguments, options.json)
+
+
+def _prepare(results: Path) -> None:
+    try:
+        (results / ".vibsim").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise VibsimError(f"{results}: cannot be written ({error.strerror})") from error
+
+
+def _show_jobs(
+    plans: Sequence[Plan], results: Path, root: Path, held: int, arguments: list[str], as_json: bool
+) -> int:
+    ended = snakemake.run(plans, results, root, held, arguments, lambda *_: None)
+    _check(ended)
+    jobs = list(_one_by_one(ended.jobs, plans, results))
+    if as_json:
+        entries = [{"job": describe(job), "rule": job.rule, "reason": job.reason} for job in jobs]
+        print(json.dumps({"jobs": entries}, indent=1))
+        return 0
+    for job in jobs:
+        print(f"{describe(job)}: {job.reason}")
+    if not jobs:
+        print("nothing to do")
+    return 0
+
+
+def _one_by_one(
+    jobs: Sequence[snakemake.Job], plans: Sequence[Plan], results: Path
+) -> Iterator[snakemake.Job]:
+    """Yield what a run would make, file by file: a job keeps those of its files that are up to date."""
+    shards = {shard.path: shard for plan in plans for shard in plan.shards}
+    for job in jobs:
+        if not job.simulates:
+            yield job
+            continue
+        for path in job.outputs:
+            if not is_made(results / path, shards[path]):
+                yield replace(job, rule="simulate", output=path)
+
+
+def _check(ended: snakemake.Outcome) -> None:
+    """Refuse to go on where Snakemake itself broke down, rather than one of its jobs."""
+    if ended.status and not ended.failed:
+        raise VibsimError(f"the workflow broke down: {ended.cause} {failure.kept(ended.text)}")
+
+
+def _show(
+    options: Namespace,
+    findings: list[outcome.Finding],
+    ended: snakemake.Outcome,
+    results: Path,
+    worked: bool,
+) -> int:
+    _check(ended)
+    failures = [
+        outcome.Failure(
+            describe(job),
+            str(results / job.log),
+            # a job on a full disk cannot say so in its log
+            outcome.tail(results / job.log) or resources.obstacle(results),
+        )
+        for job in ended.failed
+    ]
+    has_index = not failures or _write_index(results)
+    if options.json:
+        print(outcome.as_json(findings, failures, results))
+    else:
+        if not worked:
+            print("nothing to do: all results are up to date\n")
+        for line in outcome.as_text(findings, failures, _columns()):
+            print(line)
+        if has_index:
+            print(f"report: {results / 'index.html'}")
+    return 0 if outcome.passed(findings, failures) else 1
+
+
+def _write_index(results: Path) -> bool:
+    """Write the index, which waits for every report, from what there is after a failure; tell whether it is there."""
+    command = [sys.executable, "-P", "-m", "vibsim", "report", "--results", str(results)]
+    ended = subprocess.run(command, check=False, env=os.environ | supervise.environment())
+    return ended.returncode == 0
+
+
+def _columns() -> int:
+    """Return the width of the terminal; what goes to a file is not cut."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else 10_000

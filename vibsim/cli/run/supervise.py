@@ -1,0 +1,222 @@
+"""A command in two processes: one works, and the other ends it when it is told to, however busy it is.
+
+The first process takes signals only where it waits for them, so that none arrives at a wrong moment. It asks the
+worker to end, and kills it when it does not. Each process of a run ends with the one that started it, by a signal
+that the kernel sends (``PR_SET_PDEATHSIG``): whoever is killed, nothing works on, and the lock of the results
+folder is free.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import NoReturn
+
+from vibsim.core.errors import VibsimError
+
+ENDS = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)
+"""Signals that ask a command to end."""
+_GRACE = 3.0
+"""Seconds that a worker has to end by itself, and then its children."""
+_PARENT = "VIBSIM_PARENT"
+_SET_PARENT_DEATH_SIGNAL, _SET_CHILD_SUBREAPER = 1, 36
+
+Work = Callable[[], int]
+
+
+class Interrupted(KeyboardInterrupt):
+    """A request to end, by signal `number`."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+        super().__init__(number)
+
+
+def supervised(work: Work) -> int:
+    """Return the exit status of `work`, which ends when this process is told to, or is killed.
+
+    Parameters
+    ----------
+    work
+        The command. It may raise `Interrupted`.
+
+    Returns
+    -------
+    int
+        That of the command; 128 and the number of the signal that ended it.
+    """
+    if parent := os.environ.pop(_PARENT, ""):
+        return _as_child(int(parent), work)
+    ends = _heeded()
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ends | {signal.SIGCHLD})
+    _control(_SET_CHILD_SUBREAPER, 1)
+    supervisor = os.getpid()
+    reading, writing = os.pipe()
+    worker = os.fork()
+    if not worker:
+        _work(supervisor, ends, before, work, writing)
+    os.close(writing)
+    status, number = _watch(worker, ends)
+    _wait_for_children()
+    return _told(status, number, orderly=os.read(reading, 1) != b"")
+
+
+def children_end_with_this() -> None:
+    """Have the commands that this process starts from now on end with it."""
+    os.environ[_PARENT] = str(os.getpid())
+
+
+def environment() -> dict[str, str]:
+    """Return what tells a command to end with this process, which starts it."""
+    return {_PARENT: str(os.getpid())}
+
+
+def end_with(parent: int) -> None:
+    """Have the kernel kill this process when `parent`, which started it, has ended.
+
+    Raises
+    ------
+    VibsimError
+        When it has ended already.
+    """
+    _control(_SET_PARENT_DEATH_SIGNAL, signal.SIGKILL)
+    if os.getppid() != parent:
+        raise VibsimError("the run that started this job has ended")
+
+
+def end_at_once() -> None:
+    """End this process as soon as it is told to, whatever handlers are set later.
+
+    The signals are blocked in every thread but one, which does nothing else than wait for them: a handler would
+    run in the middle of whatever the main thread does, locks held.
+    """
+    ends = _heeded()
+    signal.pthread_sigmask(signal.SIG_BLOCK, ends)
+
+    def wait() -> None:
+        os._exit(128 + signal.sigwait(ends))
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+def ended_by(status: int) -> int:
+    """Return the signal of `ENDS` that ended a process with exit status `status`, as `subprocess` tells it; else 0."""
+    number = -status if status < 0 else status - 128
+    return number if number in ENDS else 0
+
+
+def known_pid() -> int:
+    """Return the process that a user knows as this command, and may send a signal to."""
+    return _supervisor or os.getpid()
+
+
+_supervisor = 0
+
+
+def _control(option: int, value: int) -> None:
+    library = ctypes.CDLL(None, use_errno=True)
+    if library.prctl(option, value, 0, 0, 0):
+        number = ctypes.get_errno()
+        raise OSError(number, f"prctl: {os.strerror(number)}")
+
+
+def _heeded() -> set[signal.Signals]:
+    """Return the signals that end this process: those that it was started to ignore (``nohup``) stay ignored."""
+    return {number for number in ENDS if signal.getsignal(number) is not signal.SIG_IGN}
+
+
+def _as_child(parent: int, work: Work) -> int:
+    """Work as a job of a run, which a signal ends on the spot: its files appear whole or not at all."""
+    ends = _heeded()
+    for number in ends:
+        signal.signal(number, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, ends)
+    end_with(parent)
+    return work()
+
+
+def _work(
+    supervisor: int, ends: set[signal.Signals], mask: set[int], work: Work, end: int
+) -> NoReturn:
+    """Work in the second process and leave it for good; a byte in the pipe `end` tells that it has come to its end."""
+    global _supervisor
+    _supervisor = supervisor
+    status = 1
+    try:
+        for number in ends:
+            signal.signal(number, _interrupt)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        end_with(supervisor)
+        status = work()
+    except Interrupted as request:
+        status = 128 + request.number
+    except SystemExit as left:
+        status = int(left.code or 0)
+    finally:
+        os.write(end, b".")
+        # Threads that compute are not waited for.
+        os._exit(status)
+
+
+def _interrupt(number: int, _: object) -> None:
+    """Unwind the stack, once; what falls on the way out is no news."""
+    for other in ENDS:
+        signal.signal(other, signal.SIG_IGN)
+    sys.unraisablehook = lambda _: None
+    raise Interrupted(number)
+
+
+def _watch(worker: int, ends: set[signal.Signals]) -> tuple[int, int]:
+    """Return the wait status of the worker, and the signal by which it was to end, 0 without one."""
+    asked, deadline = 0, 0.0
+    while True:
+        left = max(deadline - time.monotonic(), 0) if asked else 3600.0
+        found = signal.sigtimedwait(ends | {signal.SIGCHLD}, left)
+        ended, status = os.waitpid(worker, os.WNOHANG)
+        if ended:
+            return status, asked
+        if found and found.si_signo == signal.SIGCHLD:
+            continue
+        if found and not asked:
+            asked, deadline = found.si_signo, time.monotonic() + _GRACE
+            os.kill(worker, signal.SIGTERM)
+        elif asked:
+            # out of time, or asked again
+            os.kill(worker, signal.SIGKILL)
+
+
+def _wait_for_children() -> None:
+    """Wait until everything is gone that the worker started: the kernel kills it, and gives it to this process."""
+    deadline = time.monotonic() + _GRACE
+    with suppress(ChildProcessError):
+        while time.monotonic() < deadline:
+            if not os.waitpid(-1, os.WNOHANG)[0]:
+                time.sleep(0.01)
+
+
+def _told(status: int, asked: int, orderly: bool) -> int:
+    """Say how the worker ended, unless it has said so itself; return the exit status."""
+    code = os.waitstatus_to_exitcode(status)
+    if number := asked or ended_by(code):
+        _say("interrupted; the same command goes on from here")
+        return 128 + number
+    if not orderly:
+        # killed by the system, or left by a library that was given no memory
+        how = f"killed by {signal.Signals(-code).name}" if code < 0 else "ended by a library"
+        _say(f"{how}, perhaps for lack of memory; the same command goes on from here")
+        return 1
+    return code
+
+
+def _say(text: str) -> None:
+    # a line of progress may stand there; and where the terminal has gone, nobody is left to tell
+    with suppress(OSError):
+        start = "\r\033[K" if sys.stderr.isatty() else ""
+        print(f"{start}vibsim: {text}", file=sys.stderr, flush=True)

@@ -1,0 +1,1 @@
+"""Quantities, numbers and solutions of an experiment compared between its levels."""

@@ -1,0 +1,186 @@
+"""``best.nc``: the best solution that a ladder holds, extrapolated over all its levels, with a bound of its error."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim import plan
+from vibsim.comparison.extrapolate_members import (
+    Extrapolated,
+    extrapolate_members,
+    joined,
+    noise_of,
+)
+from vibsim.comparison.member_method import Method, Start
+from vibsim.convergence.romberg import Pair
+from vibsim.core.record import Attribute, Record, Variable, attributes
+from vibsim.observe.common_grid import Grid, common_grid, take
+from vibsim.observe.input_consistency import check_belonging
+from vibsim.schemes import SCHEMES
+from vibsim.simulation import Members, members
+from vibsim.simulation.scaled import in_scales
+
+if TYPE_CHECKING:
+    from vibsim.experiment import Experiment
+
+Floats = NDArray[np.float64]
+
+SERIES = ("scheme", "case", "t")
+REACHED = ("no", "yes")
+"""Meaning of the variable ``reached``."""
+
+
+def best_record(experiment: Experiment, records: Mapping[int, Record]) -> Record:
+    """Extrapolate the solution of every scheme with equal steps, and every member, over all levels.
+
+    Parameters
+    ----------
+    records
+        Level Records of the same members by level.
+
+    Returns
+    -------
+    Record
+        What ``best.nc`` holds: dims scheme, case, t; every state, and ``<state>_error``, the bound of its error;
+        ``level_first`` and ``level_last``, between which the levels lie that were used; where the experiment has a
+        tolerance, ``reached(scheme, case)``: whether no bound exceeds it. The numbers of a member do not depend on the
+        others in the Records.
+
+    Raises
+    ------
+    VibsimError
+        Where the Records do not belong together, or have no times in common.
+    """
+    grid = common_grid(records)
+    check_belonging(experiment, records)
+    finest = records[grid.levels[-1]]
+    t = Variable(("t",), grid.t, finest.coords["t"].attrs)
+    rows = extrapolated(experiment, records, grid)
+    return record_of(experiment, grid.levels, {**finest.coords, "t": t}, rows)
+
+
+def extrapolated(
+    experiment: Experiment, records: Mapping[int, Record], grid: Grid
+) -> list[Extrapolated]:
+    """Extrapolate level Records over all levels, at their common times: one row for each scheme of the ladder."""
+    finest = records[grid.levels[-1]]
+    group = members(experiment, int(finest["case"][0]), int(finest["case"][-1]) + 1)
+    states = [state.name for state in experiment.model.definition.states]
+    levels = [tuple(take(grid, records[level], name) for name in states) for level in grid.levels]
+    rows = []
+    for i in experiment.ladder:
+        parts = [
+            (_of_method(method, start_of(method, group, where), grid, levels, i, where), where)
+            for method, where in methods(experiment, i, group)
+        ]
+        rows.append(in_order(parts))
+    return rows
+
+
+def methods(
+    experiment: Experiment, scheme: int, group: Members
+) -> list[tuple[Method, NDArray[np.int64]]]:
+    """Return the methods of one scheme, which differ where options are swept, and the members that have each."""
+    model, kind = experiment.model.definition, experiment.schemes[scheme].kind
+    return [
+        (Method(model, SCHEMES[kind], options), where)
+        for options, where in plan.option_groups(experiment, scheme, group.columns)
+    ]
+
+
+def start_of(method: Method, group: Members, where: NDArray[np.int64]) -> Start:
+    """Return the numbers of the members at the places `where` of `group`."""
+    model = method.model
+    end = group.end[where]
+    parameters = {name: values[where] for name, values in group.parameters.items()}
+    table = np.empty((len(end), len(model.parameters)))
+    for i, parameter in enumerate(model.parameters):
+        table[:, i] = parameters[parameter.key]
+    initial = np.stack([group.initial[state.name][where] for state in model.states], axis=-1)
+    frequency = np.broadcast_to(np.asarray(model.natural_frequency(parameters)), end.shape)
+    return Start(table, initial, end, frequency)
+
+
+def _of_method(
+    method: Method,
+    start: Start,
+    grid: Grid,
+    levels: Sequence[tuple[Floats, ...]],
+    scheme: int,
+    where: NDArray[np.int64],
+) -> Extrapolated:
+    # in memory time comes first, and all members are taken without a copy
+    some = slice(None) if len(where) == levels[0][0].shape[1] else where
+    pairs: list[Pair] = [
+        (position[scheme].T[:, some], velocity[scheme].T[:, some]) for position, velocity in levels
+    ]
+    t = (np.arange(len(grid.t)) * grid.apart / grid.steps[0])[:, None]
+    every = [grid.apart * n // grid.steps[0] for n in grid.steps]
+    noise = noise_of(method, start, grid.steps, every, pairs)
+    return extrapolate_members(method, start, grid.steps, t, pairs, noise)
+
+
+def in_order(parts: Sequence[tuple[Extrapolated, NDArray[np.int64]]]) -> Extrapolated:
+    """Put members that were stepped with different options where they belong."""
+    if len(parts) == 1:
+        return parts[0][0]
+    order = np.argsort(np.concatenate([where for _, where in parts]))
+    return joined([part for part, _ in parts], order)
+
+
+def record_of(
+    experiment: Experiment,
+    levels: tuple[int, ...],
+    coords: Mapping[str, Variable],
+    rows: Sequence[Extrapolated],
+) -> Record:
+    """Name what was extrapolated, one row for each scheme."""
+    model = experiment.model.definition
+    kept = {name: v for name, v in coords.items() if v.dims in (("scheme",), ("case",), ("t",))}
+    names = np.asarray([experiment.schemes[i].name for i in experiment.ladder])
+    kept["scheme"] = Variable(("scheme",), names, coords["scheme"].attrs)
+    variables: dict[str, Variable] = {}
+
+    def add(name: str, values: Sequence[NDArray[Any]], words: str, units: str, **more: Any) -> None:
+        stacked = np.stack([np.ascontiguousarray(row.T) for row in values])
+        variables[name] = Variable(SERIES, stacked, attributes(words, units, **more))
+
+    fields = ("position", "velocity")
+    for state, field in zip(model.states, fields, strict=True):
+        words = f"{state.long_name}, extrapolated over the levels"
+        add(state.name, [getattr(row, field) for row in rows], words, state.unit)
+    for state, field in zip(model.states, fields, strict=True):
+        words = f"{state.long_name}: bound of the error of the extrapolation"
+        add(
+            f"{state.name}_error",
+            [getattr(row, f"{field}_error") for row in rows],
+            words,
+            state.unit,
+        )
+    for name, words in (("first", "coarsest"), ("last", "finest")):
+        places = [np.array([*levels, -1], dtype=np.int8)[getattr(row, name)] for row in rows]
+        words = f"{words} level used for the {model.states[0].long_name}, -1 for none"
+        add(f"level_{name}", places, words, "1")
+    if experiment.tolerance is not None:
+        variables["reached"] = _reached(rows, experiment.tolerance)
+    attrs: dict[str, Attribute] = {
+        "title": experiment.title,
+        "model": model.kind,
+        "levels": list(levels),
+    }
+    return in_scales(Record(kept, variables, attrs), experiment)
+
+
+def _reached(rows: Sequence[Extrapolated], tolerance: float) -> Variable:
+    reached = np.stack([np.maximum(*row.largest_bounds()) <= tolerance for row in rows])
+    words = f"whether every bound of the member is at most {tolerance:g} in the unit of its state"
+    flags = {
+        "flag_values": np.arange(len(REACHED), dtype=np.int8),
+        "flag_meanings": " ".join(REACHED),
+    }
+    attrs = {**attributes(words, "1"), **flags}
+    return Variable(("scheme", "case"), reached.astype(np.int8), attrs)

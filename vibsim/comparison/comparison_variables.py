@@ -1,0 +1,218 @@
+"""What is kept of a comparison, as variables of the convergence Record."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.apriori.formal_orders import orders_vary
+from vibsim.apriori.phase_amplitude_orders import is_promised
+from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.convergence import differences
+from vibsim.convergence.gci import of_order
+from vibsim.convergence.local_order import local_order, window_points
+from vibsim.convergence.scalar_extrapolation import ORDINARY
+from vibsim.core.record import Variable, attributes
+from vibsim.core.vocabulary import TYPICAL_NORM
+from vibsim.models import ENERGIES
+from vibsim.models.shared.phase_amplitude_names import is_error_part
+from vibsim.observe.member_block import CENTRED, by_level, plain_name
+from vibsim.observe.period_scale import swing
+
+Floats = NDArray[np.float64]
+Table = dict[str, Variable]
+Add = Callable[..., None]
+
+LEAST_ORDER = (
+    "order that the scheme promises for the position, at least that of a part of its error"
+)
+"""What is said of the order of a part of an error of which theory says nothing."""
+SERIES = ("scheme", "case", "t")
+_IN_NORM = "{} in a norm over time (times s for l1, times the square root of s for l2)"
+
+
+def _adder(table: Table, q: Comparison) -> Add:
+    """Return the function that puts values into a table under the quantity's name."""
+
+    def add(name: str, dims: tuple[str, ...], values: Floats, words: str, units: str) -> None:
+        attrs = attributes(f"{q.long_name}: {words}", units)
+        if dims[-1] == "t" and q.name.endswith(CENTRED):
+            values = np.array(values)
+            values[..., q.part.ends()] = np.nan
+        table[f"{q.name}_{name}"] = Variable(dims, np.ascontiguousarray(values), attrs)
+
+    return add
+
+
+def numbers(q: Comparison) -> Table:
+    """Return the numbers that a quantity is compared by: norms, orders, bounds."""
+    table: Table = {}
+    add = _adder(table, q)
+    part, levels = q.part, len(q.part.grid.levels)
+    of_level = ("scheme", "case", "level")
+
+    def stacked(kind: str) -> Floats:
+        return np.stack([getattr(q.in_norm(norm), kind) for norm in part.norms], axis=-1)
+
+    add("error_norm", (*of_level, "norm"), stacked("error"), _IN_NORM.format("true error"), q.units)
+    words = _IN_NORM.format("true error of the extrapolation")
+    add(
+        "richardson_error_norm",
+        ("scheme", "case", "norm"),
+        stacked("extrapolation"),
+        words,
+        q.units,
+    )
+    if part.lean:
+        words = "largest error bound of the extrapolation"
+        add("richardson_error_max", ("scheme", "case"), q.largest_bound, words, q.units)
+    add("floor", of_level, q.floor, "predicted round-off", q.units)
+    words = "order that the scheme promises, infinite for what is exact"
+    if is_error_part(q.name) and not is_promised(part.experiment, q.name):
+        words = LEAST_ORDER
+    if orders_vary(part.experiment, q.name):
+        add("formal_order", ("scheme", "case"), np.broadcast_to(q.order, part.shape), words, "1")
+    else:
+        add("formal_order", ("scheme",), q.order[:, 0], words, "1")
+    if levels > 1:
+        words = _IN_NORM.format("difference")
+        add(
+            "difference_norm",
+            ("scheme", "case", "pair", "norm"),
+            stacked("difference"),
+            words,
+            q.units,
+        )
+    if levels > 2:
+        _triples(q, add)
+    if levels > 1 and not part.lean:
+        words = _IN_NORM.format("grid convergence index of the finest level")
+        rows = [_index(q, norm, q.in_norm(norm).difference[..., -1]) for norm in part.norms]
+        add("gci_norm", ("scheme", "case", "norm"), np.stack(rows, axis=-1), words, q.units)
+    return table
+
+
+def _index(q: Comparison, norm: str, change: Floats) -> Floats:
+    """Return the grid convergence index of a change between the finest two levels, by the order in a norm.
+
+    Parameters
+    ----------
+    change
+        Shape (scheme, case), or (scheme, case, t).
+    """
+    levels = q.part.grid.levels
+    promised = np.where(np.isfinite(q.order), q.order, ORDINARY)
+    seen = np.full(q.part.shape, np.nan)
+    if len(levels) > 2:
+        seen = q.observed_orders(norm)[..., -1]
+    if change.ndim > seen.ndim:
+        promised, seen = promised[..., None], seen[..., None]
+    return of_order(change, levels[-1] - levels[-2], seen, promised)
+
+
+def _triples(q: Comparison, add: Add) -> None:
+    """Add the numbers of triples of levels; where storage is bounded, all but the order in single precision."""
+    dims = ("scheme", "case", "triple", "norm")
+
+    def stacked(of: Callable[[str], Floats]) -> Floats:
+        return np.stack([of(norm) for norm in q.part.norms], axis=-1)
+
+    words = "ratio of successive differences in a norm over time"
+    add("ratio_norm", dims, in_precision(q, stacked(q.ratios)), words, "1")
+    add("observed_order", dims, stacked(q.observed_orders), "observed order", "1")
+    words = "relative distance of the rescaled differences"
+    add("coincidence", dims[:-1], in_precision(q, q.coincidence), words, "1")
+
+
+def in_precision(q: Comparison, values: Floats) -> NDArray[np.floating]:
+    """Return values in the type in which they are kept: infinite where they are beyond its range."""
+    with np.errstate(over="ignore"):
+        return values.astype(precision_of(q))
+
+
+def precision_of(q: Comparison) -> type[np.floating]:
+    """Return the type in which ratios and orders are kept: seven digits are more than they have."""
+    return np.float32 if q.part.lean else np.float64
+
+
+def over_time(q: Comparison) -> Table:
+    """Return the series of a quantity: differences, errors, estimates, ratios, extrapolation."""
+    table: Table = {}
+    add = _adder(table, q)
+    value, bound = q.extrapolation
+    add("richardson", SERIES, value, "Richardson extrapolation", q.units)
+    add("richardson_error", SERIES, bound, "error bound of the extrapolation", q.units)
+    add("finest", SERIES, q.values[-1], "finest level", q.units)
+    if q.exact is not None:
+        if plain_name(q.name) in ENERGIES:
+            add("exact", SERIES, np.broadcast_to(q.exact, value.shape), "exact", q.units)
+        else:
+            add("exact", SERIES[1:], q.exact[0], "exact", q.units)
+    if q.differences:
+        _pairs(q, add)
+    if len(q.differences) > 1:
+        _ratios(q, add)
+        _local_orders(q, add)
+    return table
+
+
+def _pairs(q: Comparison, add: Add) -> None:
+    dims = ("scheme", "case", "pair", "t")
+    levels, d, p = q.part.grid.levels, q.differences, q.power[..., None]
+    unknown = [np.full_like(x, np.nan) for x in d]
+    rescaled = [x * differences.rescaling(p, levels[: i + 2]) for i, x in enumerate(d)]
+    errors = unknown if q.errors is None else q.errors[:-1]
+    # where a difference passes zero, the error does not
+    around = np.where(np.isfinite(d[-1]), differences.local_scale(d[-1]), np.nan)
+    words = "grid convergence index of the finest level"
+    add("gci", SERIES, _index(q, TYPICAL_NORM, around), words, q.units)
+    add("difference", dims, np.stack(d, 2), "level minus next level", q.units)
+    add("rescaled", dims, np.stack(rescaled, 2), "difference, rescaled", q.units)
+    add("error_estimate", dims, np.stack(estimates(q), 2), "estimated error", q.units)
+    add("error", dims, np.stack(errors, 2), "true error", q.units)
+
+
+def estimates(q: Comparison) -> list[Floats]:
+    """Return the estimated error of every level but the finest, each of shape (scheme, case, t)."""
+    levels, p = q.part.grid.levels, q.order[..., None]
+    return [
+        x * differences.error_factor(p, levels[i + 1] - levels[i])
+        for i, x in enumerate(q.differences)
+    ]
+
+
+def _ratios(q: Comparison, add: Add) -> None:
+    of_triple = ("scheme", "case", "triple")
+    ratio, factor = [], []
+    for i, (first, second) in enumerate(pairwise(q.differences)):
+        floor = (q.floor[..., i + 1] + q.floor[..., i + 2])[..., None]
+        ratio.append(differences.masked_ratio(first, second, floor))
+        factor.append(differences.proportionality(first, second))
+    words = "ratio of successive differences"
+    add("ratio", (*of_triple, "t"), np.stack(ratio, 2), words, "1")
+    words = "least-squares factor between successive differences"
+    add("proportionality", of_triple, by_level(factor), words, "1")
+
+
+WINDOW = 0.5
+"""Length of the window of a local order, in periods."""
+
+
+def _local_orders(q: Comparison, add: Add) -> None:
+    """Add the order of every triple as a function of time, with its interval, in single precision."""
+    grid = q.part.grid
+    counts = window_points(WINDOW * swing(q.part), grid.spacing, len(grid.t))
+    floor = [q.floor[..., i] + q.floor[..., i + 1] for i in range(len(q.differences))]
+    rows = [
+        local_order(
+            a, b, grid.levels[i : i + 3], (floor[i], floor[i + 1]), counts, grid.end_included
+        )
+        for i, (a, b) in enumerate(pairwise(q.differences))
+    ]
+    words = {"": "order over time", "_low": "its lower end", "_high": "its upper end"}
+    for k, (end, text) in enumerate(words.items()):
+        found = np.stack([row[k] for row in rows], 2).astype(np.float32)
+        add(f"local_order{end}", ("scheme", "case", "triple", "t"), found, text, "1")

@@ -1,0 +1,238 @@
+"""One quantity compared between levels: its series, and the numbers that are made of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.apriori.formal_orders import even_powers, formal_orders, special_orders
+from vibsim.apriori.roundoff_floor import solution_size
+from vibsim.convergence import differences as series
+from vibsim.convergence.richardson import extrapolate
+from vibsim.convergence.verdict import Judgement
+from vibsim.observe.member_block import Part, by_level, energy_at_start
+from vibsim.observe.phase_amplitude_error import parts_of_errors, wanted
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+ROUND_OFF_SAFETY = 10.0
+"""Factor on the predicted round-off in an error bound: the prediction is an order of magnitude."""
+IRREGULAR = 2.0
+"""Factor on an error bound behind events: where they lie in a step makes the second power another at each level."""
+FEW = 3
+"""With so many levels the directions of the true errors are needed as evidence, too."""
+VANISHING = 1e-3
+"""A point at which a difference is a smaller part of its largest value does not count."""
+TWO = 2
+"""Series that differ at no more points have no shape."""
+NOTHING_LEFT = 16.0
+"""Order with which a quantity that is promised to be exact is extrapolated: the finest level then stands as it is."""
+
+
+@dataclass(frozen=True)
+class InNorm:
+    """A quantity in a norm over time."""
+
+    difference: Floats
+    """Of successive levels, shape (scheme, case, pair)."""
+    scatter: Floats
+    """Of successive differences (`series.scatters`), shape (scheme, case, triple)."""
+    error: Floats
+    """Exact less computed, shape (scheme, case, level); NaN where the exact solution is not known."""
+    extrapolation: Floats
+    """Exact less extrapolated, shape (scheme, case)."""
+    error_scatter: Floats | None
+    """Of the errors of successive levels, shape (scheme, case, pair); None unless there are `FEW` levels and errors."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One quantity at every level, on the common grid; series have the shape (scheme, case, t)."""
+
+    part: Part
+    name: str
+    long_name: str
+    units: str
+    values: list[Floats]
+    """Per level, coarse to fine."""
+    exact: Floats | None
+    """Broadcasts against a series."""
+    order: Floats
+    """Formal order, shape (scheme, 1 or case)."""
+    floor: Floats
+    """Predicted round-off at one point, shape (scheme, case, level)."""
+    scale: Floats
+    """Size that round-off is relative to, shape (scheme, case)."""
+    blur: Floats | None = None
+    """What the measurement of the quantity is off by, rounding apart, shape (scheme, case, level); None for nothing."""
+    judged: dict[tuple[str, str, float], Judgement] = field(default_factory=dict, repr=False)
+    """Judgements made so far, by norm, order and tolerance."""
+    _norms: dict[str, InNorm] = field(default_factory=dict, repr=False)
+
+    @property
+    def power(self) -> Floats:
+        """Order by which differences are rescaled: 0 where the quantity is promised to be exact."""
+        return np.where(np.isinf(self.order), 0.0, self.order)
+
+    @cached_property
+    def special(self) -> Floats:
+        """Highest order of the scheme in a special case, shape (scheme, 1 or case)."""
+        return special_orders(self.part.experiment, self.name, self.part.columns)
+
+    @cached_property
+    def differences(self) -> list[Floats]:
+        """Level minus next level; NaN for a scheme that has no levels."""
+        # two levels without bound have no difference
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = [coarse - fine for coarse, fine in pairwise(self.values)]
+        if self.part.adaptive.any():
+            for d in found:
+                d[self.part.adaptive] = np.nan
+        return found
+
+    @cached_property
+    def errors(self) -> list[Floats] | None:
+        """Exact minus level; None where the exact solution is not known."""
+        if self.exact is None:
+            return None
+        with np.errstate(over="ignore", invalid="ignore"):
+            return [self.exact - u for u in self.values]
+
+    @cached_property
+    def extrapolation(self) -> tuple[Floats, Floats]:
+        """Extrapolation to a vanishing step, and the bound of its error; for a lean part its largest value only."""
+        part = self.part
+        even = even_powers(part.experiment, self.name, part.columns)
+        order = np.where(np.isinf(self.order), NOTHING_LEFT, self.order)
+        value, bound = extrapolate(self.values, part.grid.levels, order, even, largest=part.lean)
+        if part.model.events is not None:
+            bound = IRREGULAR * bound
+        return value, bound + ROUND_OFF_SAFETY * self.floor[..., -1:]
+
+    @property
+    def largest_bound(self) -> Floats:
+        """The largest bound over time, shape (scheme, case)."""
+        # a bound never falls with time
+        return self.extrapolation[1][..., -1]
+
+    @cached_property
+    def are_numbers(self) -> Flags:
+        """Whether the levels differ at no more than two points, shape (scheme, case)."""
+        if not self.differences:
+            return np.zeros(self.part.shape, dtype=bool)
+        d = self.differences[-1]
+        least = VANISHING * series.largest(d)[..., None]
+        return np.asarray(np.count_nonzero((d > least) | (d < -least), axis=-1) <= TWO)
+
+    def in_norm(self, kind: str) -> InNorm:
+        """Measure the quantity in a norm."""
+        if kind not in self._norms:
+            self._norms[kind] = self._measured(kind)
+        return self._norms[kind]
+
+    def combined(self, kind: str, rows: Flags, first: int, weights: Floats) -> Floats:
+        """Return the norm of a weighted sum of successive differences, shape (count of rows,).
+
+        Parameters
+        ----------
+        rows
+            Which schemes and members, shape (scheme, case).
+        first
+            The difference that the first weight belongs to.
+        """
+        grid = self.part.grid
+        parts = zip(weights, self.differences[first:], strict=False)
+        whole = sum((w * d[rows] for w, d in parts), np.zeros(1))
+        spacing = np.broadcast_to(grid.spacing, self.part.shape)[rows]
+        return series.norm(whole, kind, spacing, grid.end_included)
+
+    def _measured(self, kind: str) -> InNorm:
+        grid, shape = self.part.grid, self.part.shape
+        none = np.empty((*shape, 0))
+
+        def size(of: Floats) -> Floats:
+            return series.norm(of, kind, grid.spacing, grid.end_included)
+
+        levels, d = len(grid.levels), self.differences
+        unknown = np.full((*shape, levels), np.nan)
+        scatters = series.scatters(d, kind, grid.end_included) if len(d) > 1 else []
+        errors = self.errors if levels == FEW else None
+        return InNorm(
+            difference=by_level([size(x) for x in d]) if d else none,
+            scatter=by_level(scatters) if scatters else none,
+            error=unknown if self.errors is None else by_level([size(e) for e in self.errors]),
+            extrapolation=(
+                unknown[..., 0] if self.exact is None else size(self.exact - self.extrapolation[0])
+            ),
+            error_scatter=(
+                None
+                if errors is None
+                else by_level(series.scatters(errors, kind, grid.end_included))
+            ),
+        )
+
+    @cached_property
+    def coincidence(self) -> Floats:
+        """Relative distance of the rescaled differences, shape (scheme, case, triple); NaN without a finite order."""
+        levels = self.part.grid.levels
+        order = np.where(np.isinf(self.order), np.nan, self.order)
+        return by_level(
+            [
+                series.coincidence(a, b, series.target_ratio(order, levels[i : i + 3]))
+                for i, (a, b) in enumerate(pairwise(self.differences))
+            ]
+        )
+
+    def ratios(self, kind: str) -> Floats:
+        """Return the ratio of successive differences in a norm, shape (scheme, case, triple)."""
+        norms = self.in_norm(kind).difference
+        return series.safe_ratio(norms[..., :-1], norms[..., 1:])
+
+    def observed_orders(self, kind: str) -> Floats:
+        """Return the order of every triple in a norm, shape (scheme, case, triple)."""
+        levels, ratio = self.part.grid.levels, self.ratios(kind)
+        return by_level(
+            [
+                series.order_of_ratio(ratio[..., i], levels[i : i + 3])
+                for i in range(ratio.shape[-1])
+            ]
+        )
+
+
+def comparisons(part: Part, names: tuple[str, ...]) -> Mapping[str, Comparison]:
+    """Compare quantities between the levels of a part."""
+    positions = part.model.positions
+    apart = wanted(part, names)
+    names = tuple(name for name in names if name not in apart)
+    values = {name: part.series(name) for name in dict.fromkeys((*positions, *names))}
+    sizes = {"energy": _energy_size(part)}
+    # what is rounded in one coordinate is felt by the others
+    whole = [part.size(name, values[name], sizes) for name in positions]
+    sizes |= {name: np.asarray(np.maximum.reduce(whole)) for name in positions}
+    found: dict[str, Comparison] = {}
+    for name in names:
+        scale = part.size(name, values[name], sizes)
+        attrs = part.finest.variables[name].attrs if name in part.finest else {}
+        found[name] = Comparison(
+            part=part,
+            name=name,
+            long_name=str(attrs.get("long_name", name)),
+            units=str(attrs.get("units", "1")),
+            values=values[name],
+            exact=part.exact_of(name),
+            order=formal_orders(part.experiment, name, part.columns),
+            floor=part.floor_of(name, scale),
+            scale=scale,
+        )
+    return found | parts_of_errors(part, found, apart, Comparison)
+
+
+def _energy_size(part: Part) -> Floats:
+    """Return the size of the energy, shape (scheme, case): what it was plus what became of it."""
+    return np.abs(energy_at_start(part.finest)) + solution_size(part.series("energy_deviation"))

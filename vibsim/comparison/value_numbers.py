@@ -1,0 +1,328 @@
+"""The numbers that a ``value`` check asks for, worked out for every scheme and member at once.
+
+Names, quantities and places are those of `vibsim.experiment.value_names`. A number that does not exist is NaN.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.comparison.comparison_variables import estimates
+from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.comparison.solution_distance import discrete_error, exact_series
+from vibsim.convergence.differences import largest, safe_ratio
+from vibsim.core.record import Record
+from vibsim.observe import oscillation, predicted_oscillation
+from vibsim.observe.member_block import Part, energy_at_start
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a value is taken, and what it may be taken from."""
+
+    part: Part
+    """The members."""
+    compared: Mapping[str, Comparison]
+    """Quantities that were compared between levels."""
+    quantity: str
+    """Empty where the value is of none."""
+    level: int | str | None
+    t: float | None
+    step: int | None
+
+    @property
+    def missing(self) -> Floats:
+        """NaN for every scheme and member, shape (scheme, case)."""
+        return np.full(self.part.shape, np.nan)
+
+    @property
+    def levels(self) -> tuple[int, ...]:
+        """The levels."""
+        return self.part.grid.levels
+
+    @property
+    def at_level(self) -> int | None:
+        """The level that is asked for, by default the finest; None for one that is not there."""
+        level = self.levels[-1] if self.level is None else self.level
+        return level if isinstance(level, int) and level in self.part.records else None
+
+    def data(self) -> Record | None:
+        """Return the level Record that is asked for."""
+        return None if self.at_level is None else self.part.records[self.at_level]
+
+    def comparison(self) -> Comparison | None:
+        """Return the quantity as it was compared between levels."""
+        return self.compared.get(self.quantity)
+
+
+def value(name: str, place: Place) -> Floats:
+    """Return the number `name` at `place`, shape (scheme, case)."""
+    found = np.asarray(KNOWN[name](place), dtype=np.float64)
+    return np.array(np.broadcast_to(found, place.missing.shape))
+
+
+def _sample(p: Place) -> Floats:
+    """Return the value of a series at a time, by default the last one."""
+    data = p.data()
+    if data is None or p.quantity not in data:
+        return p.missing
+    index = _index(p, data["t"], int(np.asarray(data.attrs["every"]).item()))
+    return p.missing if index is None else np.asarray(data[p.quantity][..., index], dtype=float)
+
+
+def samples(p: Place) -> list[Floats]:
+    """Return the value of a series at a common time, by default the last one, at every level."""
+    q, grid = p.comparison(), p.part.grid
+    index = _index(p, grid.t, grid.apart)
+    if q is None or index is None:
+        return [p.missing for _ in p.levels]
+    return [values[..., index] for values in q.values]
+
+
+def _index(p: Place, t: Floats, every: int) -> int | None:
+    """Return the index of the sample that is asked for; None where it was not stored."""
+    if p.step is not None:
+        index, rest = divmod(p.step, every)
+        return index if rest == 0 and index < len(t) else None
+    if p.t is None:
+        return len(t) - 1
+    index = int(np.argmin(np.abs(t - p.t)))
+    return index if abs(float(t[index]) - p.t) <= 1e-9 * float(t[-1]) else None
+
+
+def _gathered(name: str) -> Callable[[Place], Floats]:
+    def take(p: Place) -> Floats:
+        data = p.data()
+        return (
+            p.missing if data is None or name not in data else np.asarray(data[name], dtype=float)
+        )
+
+    return take
+
+
+def _of_quantity(which: str) -> Callable[[Place], Floats]:
+    """Return what was gathered of the quantity over every step."""
+
+    def take(p: Place) -> Floats:
+        return _gathered(f"{p.quantity}_{which}")(p)
+
+    return take
+
+
+def _extreme(which: str, of_series: Callable[..., Floats]) -> Callable[[Place], Floats]:
+    """Return what was gathered of a state over every step; of an output, that of its samples."""
+
+    def take(p: Place) -> Floats:
+        data = p.data()
+        outputs = {output.name for output in p.part.model.outputs}
+        if data is None or p.quantity not in outputs or p.quantity not in data:
+            return _of_quantity(which)(p)
+        # NaN where a member has failed
+        return np.asarray(of_series(data[p.quantity], axis=-1), dtype=float)
+
+    return take
+
+
+def _max_abs(p: Place) -> Floats:
+    """Return the largest absolute value: gathered as such, or from the least and the largest value."""
+    data, name = p.data(), f"{p.quantity}_max_abs"
+    if data is not None and name in data:
+        return _gathered(name)(p)
+    low, high = (_of_quantity(which)(p) for which in ("min", "max"))
+    return np.asarray(np.maximum(np.abs(low), np.abs(high)))
+
+
+def _fall(of: Callable[[Place], Floats]) -> Callable[[Place], Floats]:
+    """Return how many times smaller a number is at the next finer level; by default the last two are compared."""
+
+    def take(p: Place) -> Floats:
+        levels = p.levels
+        level = levels[max(len(levels) - 2, 0)] if p.level is None else p.level
+        if level not in levels[:-1]:
+            return p.missing
+        finer = levels[levels.index(int(level)) + 1]
+        coarse, fine = (of(replace(p, level=which)) for which in (level, finer))
+        return safe_ratio(coarse, fine)
+
+    return take
+
+
+def _quotient(top: str, bottom: str) -> Callable[[Place], Floats]:
+    def take(p: Place) -> Floats:
+        return safe_ratio(*np.broadcast_arrays(_gathered(top)(p), _gathered(bottom)(p)))
+
+    return take
+
+
+def _measured(of: Callable[[Record], Floats]) -> Callable[[Place], Floats]:
+    """Return what is measured of the Record of a level."""
+
+    def take(p: Place) -> Floats:
+        data = p.data()
+        return p.missing if data is None else of(data)
+
+    return take
+
+
+def _at_level(of: Callable[[Part, int], Floats]) -> Callable[[Place], Floats]:
+    """Return what belongs to a level of the members."""
+
+    def take(p: Place) -> Floats:
+        return p.missing if p.at_level is None else of(p.part, p.at_level)
+
+    return take
+
+
+def _own_norm(p: Place) -> Floats:
+    """Return ``sqrt(dt sum (u_exact - u)^2 / T)`` over the stored points of a level (vibration text, section 2.2)."""
+    data = p.data()
+    if data is None or p.at_level is None:
+        return p.missing
+    error = exact_series(p.part, p.at_level, p.quantity) - np.asarray(data[p.quantity], dtype=float)
+    return np.asarray(np.sqrt(np.sum(error**2, axis=-1) / (error.shape[-1] - 1)))
+
+
+def _second_difference(p: Place) -> Floats:
+    """Return ``E = [D_tD_t u]/u''`` of the exact position by least squares (vibration text, exercise 7)."""
+    data, position = p.data(), p.part.model.position
+    if data is None or f"{position}_exact" not in data or int(np.asarray(data.attrs["every"])) != 1:
+        return p.missing
+    exact = np.asarray(data[f"{position}_exact"])
+    inner = exact[..., 1:-1]
+    ahead, behind = exact[..., 2:] - inner, inner - exact[..., :-2]
+    squares = np.sum(inner**2, axis=-1) * np.asarray(data["omega_dt"]) ** 2
+    return safe_ratio(-np.sum((ahead - behind) * inner, axis=-1), squares)
+
+
+def _running_max(p: Place) -> Floats:
+    """Return the largest deviation so far; at the end it is the largest of all, which is there without the series."""
+    data, name = p.data(), f"{p.quantity}_running_max"
+    at_end = p.t is None and p.step is None
+    return _max_abs(p) if at_end or data is None else _sample(replace(p, quantity=name))
+
+
+def _over_initial(of: Callable[[Place], Floats]) -> Callable[[Place], Floats]:
+    """Return a number over the size of the energy at the start."""
+
+    def take(p: Place) -> Floats:
+        data = p.data()
+        if data is None:
+            return p.missing
+        return safe_ratio(*np.broadcast_arrays(of(p), np.abs(energy_at_start(data))))
+
+    return take
+
+
+def _energy_error_d2t(p: Place) -> Floats:
+    data = p.data()
+    return p.missing if data is None else oscillation.energy_error_d2t(p.part, data)
+
+
+def _discrete_error(p: Place) -> Floats:
+    return p.missing if p.at_level is None else discrete_error(p.part, p.at_level, p.quantity)
+
+
+def _period_error(p: Place) -> Floats:
+    return _quotient("period", "exact_period")(p) - 1.0
+
+
+def _error(norm: str) -> Callable[[Place], Floats]:
+    def take(p: Place) -> Floats:
+        q = p.comparison()
+        if q is None:
+            return p.missing
+        if p.level == "best":
+            return q.in_norm(norm).extrapolation
+        return _along(p, q.in_norm(norm).error)
+
+    return take
+
+
+def _along(p: Place, found: Floats) -> Floats:
+    """Return the entry at the level that is asked for, by default the last one; entries begin at the coarsest level."""
+    levels = p.levels[: found.shape[-1]]
+    level = levels[-1] if p.level is None and levels else p.level
+    return found[..., levels.index(level)] if level in levels else p.missing
+
+
+def _of_triple(of: Callable[[Comparison], Floats]) -> Callable[[Place], Floats]:
+    def take(p: Place) -> Floats:
+        q = p.comparison()
+        return p.missing if q is None or len(p.levels) < 3 else _along(p, of(q))
+
+    return take
+
+
+def _estimate_defect(p: Place) -> Floats:
+    """Return ``max |estimate - true error| / max |true error|``."""
+    q, coarser = p.comparison(), p.levels[:-1]
+    level = coarser[-1] if p.level is None and coarser else p.level
+    if q is None or q.errors is None or level not in coarser:
+        return p.missing
+    index = coarser.index(level)
+    estimate, error = estimates(q)[index], q.errors[index]
+    return safe_ratio(largest(estimate - error), largest(error))
+
+
+def _richardson_error(p: Place) -> Floats:
+    q = p.comparison()
+    return p.missing if q is None else q.largest_bound
+
+
+KNOWN: Mapping[str, Callable[[Place], Any]] = {
+    "end": _sample,
+    "at": _sample,
+    "min": _extreme("min", np.min),
+    "max": _extreme("max", np.max),
+    "max_abs": _max_abs,
+    "max_abs_interior": _of_quantity("max_abs_interior"),
+    "max_abs_ratio": _fall(_max_abs),
+    "max_abs_interior_ratio": _fall(_of_quantity("max_abs_interior")),
+    "period": _gathered("period"),
+    "period_grid": _gathered("period_grid"),
+    "exact_period": _gathered("exact_period"),
+    "period_error": _period_error,
+    "running_max": _running_max,
+    "relative_running_max": _over_initial(_running_max),
+    "frequency": _at_level(oscillation.frequency),
+    "predicted_frequency": _at_level(predicted_oscillation.frequency),
+    "error_of_frequency": _at_level(oscillation.error_of_frequency),
+    "phase_error_per_period": _at_level(oscillation.phase_error),
+    "predicted_phase_error": _at_level(predicted_oscillation.phase_error),
+    "phase_error_slope": _measured(oscillation.phase_error_slope),
+    "amplitude": _gathered("amplitude"),
+    "amplitude_error": _measured(oscillation.amplitude_error),
+    "growth_factor": _measured(oscillation.growth_factor),
+    "growth_per_period": _at_level(oscillation.growth_per_period),
+    "predicted_growth_per_period": _at_level(predicted_oscillation.growth_per_period),
+    "stability_limit": lambda p: predicted_oscillation.limits(p.part),
+    "exact_degree": lambda p: predicted_oscillation.exact_degrees(p.part),
+    "relative_energy_error": _over_initial(_gathered("energy_deviation_max_abs")),
+    "relative_energy_error_d2t": _over_initial(_energy_error_d2t),
+    "event_count": _gathered("event_count"),
+    "first_event_time": _gathered("first_event_time"),
+    "last_event_time": _gathered("last_event_time"),
+    "rest_time": _gathered("rest_time"),
+    "accepted_steps": _at_level(oscillation.steps_taken),
+    "force_evaluations": _at_level(oscillation.force_evaluations),
+    "error_rate": lambda p: np.log2(_fall(_own_norm)(p)),
+    "second_difference_fraction": _second_difference,
+    "discrete_error": _discrete_error,
+    "error_l1": _error("l1"),
+    "error_l2": _error("l2"),
+    "error_linf": _error("linf"),
+    "error_linf_interior": _error("linf_interior"),
+    "error_estimate_defect": _estimate_defect,
+    "observed_order": _of_triple(lambda q: q.observed_orders("l2")),
+    "ratio": _of_triple(lambda q: q.ratios("l2")),
+    "coincidence": _of_triple(lambda q: q.coincidence),
+    "richardson_error": _richardson_error,
+}
+"""How every value name is worked out."""

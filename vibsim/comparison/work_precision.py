@@ -1,0 +1,103 @@
+"""What an error costs: the error of every scheme and level against its steps and its evaluations of the force.
+
+The error is the largest one over the common times, of the position. Its reference is the exact solution; where that is
+not known, the extrapolation of a ladder to a vanishing step that has the smallest bound of all schemes, and no error
+below that bound means anything. Times are no part of it: they are measured by `bench.work_precision`.
+
+An adaptive scheme has a tolerance and no levels: one point, which stands at the finest level.
+
+Source: E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, section II.10 (diagrams of
+error against work); vibration text (B), section 5 and exercise 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.comparison.comparison_variables import Table
+from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.core.record import Variable, attributes
+from vibsim.observe.member_block import Part, by_level
+from vibsim.schemes import SCHEMES
+
+Floats = NDArray[np.float64]
+
+OF_LEVEL = ("scheme", "case", "level")
+
+
+def work_precision(part: Part, found: Mapping[str, Comparison]) -> Table:
+    """Return the data of a work-precision diagram.
+
+    Parameters
+    ----------
+    found
+        The comparisons of `part`, that of the position among them.
+
+    Returns
+    -------
+    dict
+        ``work_steps``, ``work_force_evaluations`` and ``work_error``, shape (scheme, case, level), and
+        ``work_reference_error``, shape (case,): 0 where the exact solution is known, else the bound of the reference.
+    """
+    position = found[part.model.position]
+    reference, bound = reference_of(position)
+    errors = by_level([np.max(np.abs(u - reference), axis=-1) for u in position.values])
+    steps, forces = _work(part)
+    is_exact = position.exact is not None
+    for values in (steps, forces, errors):
+        values[part.adaptive, :, :-1] = np.nan
+    words = "the exact solution" if is_exact else "the best extrapolation"
+    once = "; of an adaptive scheme once, at the finest level"
+    units = position.units
+    rows = {
+        "work_steps": (steps, attributes(f"steps that were taken{once}", "1")),
+        "work_force_evaluations": (
+            forces,
+            attributes(
+                f"evaluations of the acceleration, of an implicit scheme per iteration{once}", "1"
+            ),
+        ),
+        "work_error": (
+            errors,
+            attributes(
+                f"largest distance of the {position.long_name} from {words}{once}",
+                units,
+                reference="exact" if is_exact else "Richardson",
+            ),
+        ),
+    }
+    table = {name: Variable(OF_LEVEL, values, attrs) for name, (values, attrs) in rows.items()}
+    attrs = attributes(f"largest error bound of {words}", units)
+    return table | {"work_reference_error": Variable(("case",), bound, attrs)}
+
+
+def reference_of(position: Comparison) -> tuple[Floats, Floats]:
+    """Return what errors are relative to, shape (case, t) or (1, t), and the bound of its error, shape (case,)."""
+    cases = position.part.shape[1]
+    if position.exact is not None:
+        return position.exact[0], np.zeros(cases)
+    value, bound = position.extrapolation
+    usable = np.isfinite(bound[..., -1]) & ~position.part.adaptive[:, None]
+    bounds = np.where(usable, bound[..., -1], np.inf)
+    best, case = np.argmin(bounds, axis=0), np.arange(cases)
+    smallest = bounds[best, case]
+    known = np.isfinite(smallest)
+    reference = np.where(known[:, None], value[best, case], np.nan)
+    return reference, np.where(known, smallest, np.nan)
+
+
+def _work(part: Part) -> tuple[Floats, Floats]:
+    """Return steps and evaluations of the acceleration, shape (scheme, case, level)."""
+    schemes = [SCHEMES[scheme.kind] for scheme in part.experiment.schemes]
+    shape = (*part.shape, len(part.grid.levels))
+    steps = np.broadcast_to(np.asarray(part.grid.steps, dtype=np.float64), shape).copy()
+    per_step = np.array([scheme.force_evaluations for scheme in schemes], dtype=np.float64)
+    forces = steps * per_step[:, None, None]
+    if part.adaptive.any():
+        own = part.adaptive
+        steps[own] = part.finest["accepted_steps"][own][..., None]
+        forces[own] = part.finest["force_evaluations_total"][own][..., None]
+    return steps, forces

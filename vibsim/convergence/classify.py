@@ -1,0 +1,303 @@
+"""The rules that read the evidence on ladders, for any number of ladders at once.
+
+The order in which the rules apply, and why, stands at the head of `vibsim.convergence.verdict`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.convergence.asymptotic_range import Trend, mismatches
+from vibsim.convergence.hidden_order import is_promise_hidden
+from vibsim.convergence.ladder_statistics import (
+    ORDINARY,
+    Evidence,
+    at_rest,
+    at_round_off,
+    far_from_exact,
+    truly_exact,
+    unresolved,
+)
+from vibsim.convergence.ratio_test import SINGLE, below, little_left, two_ratios
+from vibsim.convergence.roundoff_onset import FLAT_FIRST, INCOHERENT, LOG2, QUIET
+from vibsim.convergence.settled_orders import (
+    COINCIDENT,
+    FADING,
+    GROWS,
+    HIDDEN,
+    OF_SCATTER,
+    SINGLE_WIDTH,
+)
+from vibsim.convergence.true_errors import (
+    contradicts,
+    errors_agree,
+    errors_confirm,
+    errors_leave,
+    errors_stay,
+    errors_vouch,
+    irregular,
+    limit_is_missed,
+)
+from vibsim.core.vocabulary import TOLERANCE
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+UNRELATED = 0.7
+"""Series with so much scatter have nothing to do with each other, and a change from there says nothing."""
+STEADY = 1.0 / 3.0
+"""Orders are steady that change by less than this part of the tolerance: three more changes do not leave it."""
+NARROW = 0.2
+"""Half the width of the interval of an order that is called too high, at most."""
+PURE = 1e-3
+"""Scatter, or change of the order, below which a ladder is one pure power, whatever the power."""
+MOVES = QUIET / 2
+"""A smaller last change of the order is no movement away: half of what is too small to read a trend from."""
+DEPARTED = 0.012
+"""An order no further from p has not left it: a little more than `QUIET`, so that p + QUIET still counts as p."""
+REACH = 0.05
+"""An order this near a multiple of 1/2 may be that multiple: a tenth of the distance between two of them."""
+REACH_SETTLED = 0.1
+"""The same for a whole number that several triples support: a tenth of the distance between whole numbers."""
+OF_SINGLE = 2.0
+"""A single order may be so many times its scatter (over log 2) from the whole number that it stands for."""
+SUNK = 0.9
+"""Orders that are lower than p by more and fall leave p behind: of h^(p-1), too little h^p is left to be counted."""
+LEAST_CANDIDATE = 0.5
+"""The least order that an expansion has: a solution that stays away from its limit has none."""
+BELOW_CORNER = 0.25
+"""An order further below the power that a corner leaves is not the corner's: half the distance of two orders."""
+MOST_ABOVE = 2.0
+"""A superconvergent quantity gains at most the next even power."""
+
+
+def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Floats]:
+    """Return the rules for ladders of three levels and more, first to last, and the lower end of the interval.
+
+    It reaches down to a lower power that may be hiding.
+    """
+    exactly, tol = np.isinf(e.order), e.tolerance
+    # the rules of an order do not reach those ladders
+    p = np.where(exactly, ORDINARY, e.order)
+    nothing = t.count == 0
+    exact = (exactly | nothing) & truly_exact(e)
+    right = _right(e, t, p)
+    doubtful = ~right & two_ratios(e, t, p)
+    right |= doubtful
+    low = np.where(doubtful, below(t), t.low)
+    # neither that order nor a failure of the promised one, until the levels exclude this or show it
+    promised = e.order if e.promised is None else e.promised
+    hidden = is_promise_hidden(e, t)
+    low = np.where(hidden, np.minimum(low, promised), low)
+    hidden &= p >= promised - tol
+    right &= ~hidden
+    excluded = (t.high < p - tol) | (t.low > p + tol)
+    above = t.order > p
+    wrong = excluded & (_pure(t) | _plausible(t, p, tol)) & ~_on_the_way(t, p, tol)
+    wrong &= ~t.open | above | (t.local <= p - SUNK)
+    wrong &= ~t.gap & ~t.turning & ~(t.scatter_before > UNRELATED)
+    # a lower power may hide below or emerge from a higher one, not the other way round
+    several, likely = t.several, np.round(2.0 * t.order) / 2
+    together = np.abs(t.scatter) <= np.where(several, COINCIDENT, SINGLE)
+    wrong &= np.where(
+        above,
+        together & (t.width <= NARROW) & ~t.drifting & ~t.hiding & _alone(e, t, likely),
+        several | (np.abs(t.scatter) <= COINCIDENT),
+    )
+    wrong |= _settled_elsewhere(e, t, p)
+    wrong &= ~(hidden & above)
+    too_large, too_small = contradicts(e, t)
+    accidental = irregular(e, t)
+    sure = several | (np.abs(t.scatter) <= HIDDEN)
+    # one pure power to another limit is at fault whatever its errors look like
+    missed = too_large & (right | (wrong & sure & (errors_stay(e, t) | _pure(t))))
+    missed |= right & limit_is_missed(e, t, p) & ~accidental
+    wrong &= errors_agree(e, t)
+    left = np.full(p.shape, np.nan) if e.left_to_the_mesh is None else e.left_to_the_mesh
+    rough = ~np.isnan(left)
+    # any other power is the accident of where events or corners lie between grid points
+    regular = ~rough | ((np.abs(t.order - left) <= tol) & ~t.alternating)
+    kinked, deeper = _kinked(e, t, p)
+    # where no triple is left although the differences are above round-off, the corner has made them unlike each other
+    unlike = np.zeros(p.shape, dtype=bool) if e.corner is None else nothing & (p >= e.corner)
+    kinked |= unlike | (too_small & accidental)
+    swings = t.alternating & ~rough & ~kinked & ~doubtful
+    still = at_rest(e) & (exactly | nothing)
+    pulse, jumps = _missed(e)
+    # what no level sees, no difference tells of: an exact solution alone would say that it does not matter
+    blind = pulse & (missed | ((exact | nothing | exactly) & far_from_exact(e)) | _unknown(e))
+    # an implicit scheme with steps as long goes on with a velocity that has gone, and that is no fault of it
+    coarse = unresolved(e) & (exact | missed | (wrong & ~right))
+    return [
+        (blind & jumps, "non_smooth"),
+        (blind, "pre_asymptotic"),
+        # at rest on every level, and away from a motion: steps as long as that see nothing of it
+        (still & far_from_exact(e), "pre_asymptotic"),
+        (still, "not_applicable"),
+        (coarse, "pre_asymptotic"),
+        (exact & far_from_exact(e), "wrong_limit"),
+        (exact, "exact"),
+        (exactly & ~at_round_off(e), "order_low"),
+        (nothing & ~exactly & _lies_still(e) & far_from_exact(e), "pre_asymptotic"),
+        (nothing & ~exactly & ~(rough | unlike) & _opposite(e), "oscillating"),
+        (exactly | (nothing & (at_round_off(e) | ~(rough | unlike))), "round_off"),
+        # orders that swing into a floor do so by noise
+        (swings & t.cut & ~np.signbit(t.scatter), "round_off"),
+        (swings, "oscillating"),
+        (missed & regular, "wrong_limit"),
+        (right & ~too_small & regular, "asymptotic"),
+        (wrong & ~above & regular & (~kinked | deeper), "order_low"),
+        (kinked, "non_smooth"),
+        (wrong & above & ~rough, "order_high"),
+        (pulse & jumps, "non_smooth"),
+        (pulse, "pre_asymptotic"),
+        (rough, "non_smooth"),
+        (t.cut, "round_off"),
+    ], low
+
+
+def _right(e: Evidence, t: Trend, p: Floats) -> Flags:
+    """Say where the order is p, surely enough to say so.
+
+    The last two local orders, or their limit with its interval, are within the tolerance; the curves coincide; and no
+    lower power can be hiding: what is left besides h^p fades, or is less than a tenth of a lower power would make.
+    """
+    several, tol = t.several, e.tolerance
+    both = several & (np.abs(t.local - p) <= tol) & (np.abs(t.local - t.change - p) <= tol)
+    both &= t.width <= NARROW
+    both |= several & t.fading & (np.abs(t.local - p) <= tol) & (np.abs(t.change) <= tol)
+    both |= errors_confirm(e, t, p) & (np.abs(t.local - p) <= tol)
+    near = (np.abs(t.order - p) <= tol) & ((t.width <= tol) | both | ~several)
+    together = np.abs(t.scatter) <= np.where(several, COINCIDENT, SINGLE)
+    clear = _alone(e, t, p)
+    right = near & together & clear & ~np.signbit(t.scatter)
+    right &= ~t.gap & ~t.turning
+    right &= (~t.drifting & ~_leaving(t, p)) | t.irregular | little_left(t, p)
+    return np.asarray(right)
+
+
+def _settled_elsewhere(e: Evidence, t: Trend, p: Floats) -> Flags:
+    """Say where the ladder would pass as one of another order, whose interval excludes p.
+
+    What is enough to believe an order is enough to say that it is not p.
+    """
+    likely = np.maximum(np.round(2.0 * t.order) / 2, LEAST_CANDIDATE)
+    usual = replace(e, tolerance=min(e.tolerance, TOLERANCE))
+    settled = _right(usual, t, likely)
+    doubtful = ~settled & two_ratios(usual, t, likely)
+    low = np.where(doubtful, below(t), t.low)
+    excluded = (t.high < p - e.tolerance) | (low > p + e.tolerance)
+    return np.asarray((settled | doubtful) & excluded & (np.abs(likely - p) > e.tolerance))
+
+
+def _kinked(e: Evidence, t: Trend, p: Floats) -> tuple[Flags, Flags]:
+    """Say where a corner of the force within a step explains an order below p, and where it is lower than that.
+
+    A corner leaves all powers up to its own: a ladder that settles lower has another cause.
+    """
+    if e.corner is None:
+        nothing = np.zeros(p.shape, dtype=bool)
+        return nothing, nothing
+    low = (t.order < p - e.tolerance) | (t.local < p - e.tolerance)
+    low |= t.several & (t.local - t.change < p - e.tolerance)
+    kinked = ~np.isnan(e.corner) & (p >= e.corner) & (low | t.alternating)
+    return kinked, np.asarray(t.order < e.corner - np.maximum(e.tolerance, BELOW_CORNER))
+
+
+def _missed(e: Evidence) -> tuple[Flags, Flags]:
+    """Say where the force has a pulse that no level sees, and where it jumps there."""
+    none = np.zeros(e.order.shape, dtype=bool)
+    return (none if e.missed is None else e.missed), (none if e.jumps is None else e.jumps)
+
+
+def _unknown(e: Evidence) -> Flags:
+    """Say where the true error of the finest level is not known."""
+    if e.error is None:
+        return np.ones(e.order.shape, dtype=bool)
+    return np.asarray(np.isnan(e.error[..., -1]))
+
+
+def _lies_still(e: Evidence) -> Flags:
+    """Say where nothing moves at the common times behind the start."""
+    return np.zeros(e.order.shape, dtype=bool) if e.moved is None else np.asarray(e.moved == 0.0)
+
+
+def _opposite(e: Evidence) -> Flags:
+    """Say where differences change their sign from level to level and fall: those of an error do, of noise do not."""
+    opposite = np.signbit(e.scatter) & (np.abs(e.scatter) <= INCOHERENT)
+    falls = e.difference[..., 1:] <= e.difference[..., :-1] * 2.0**-FLAT_FIRST
+    return np.asarray(np.all(opposite & falls, axis=-1) & ~at_round_off(e))
+
+
+def _pure(t: Trend) -> Flags:
+    """Say where a ladder is one pure power, whatever the power."""
+    return np.asarray(t.several & (np.abs(t.scatter) <= PURE) & (np.abs(t.change) <= PURE))
+
+
+def _alone(e: Evidence, t: Trend, p: Floats) -> Flags:
+    """Say where h^p stands alone: what is left fades, or is less than a tenth of a lower power would make."""
+    mismatch, before = mismatches(t, p)
+    clear = little_left(t, p)
+    clear |= t.several & ((t.fading & ~t.slow) | t.irregular)
+    # as much as one triple alone may show, where it does not grow: the interval then reaches to a lower power
+    steady = t.several & (np.abs(t.change) <= STEADY * e.tolerance)
+    clear |= steady & (mismatch <= np.minimum(SINGLE, GROWS * before))
+    # one order alone: two terms of one shape tell from a power by nothing but the number
+    own = np.abs(t.local - p) <= np.maximum(SINGLE_WIDTH, OF_SCATTER * np.abs(t.scatter) / LOG2)
+    clear |= t.several & (mismatch <= SINGLE) & (mismatch <= FADING * before)
+    # one triple says too little for an order that few schemes have
+    own &= (p == np.round(p)) | (np.abs(t.local - p) <= SINGLE_WIDTH)
+    clear = np.where(t.several, clear | errors_confirm(e, t, p), own | errors_vouch(e, p))
+    return np.asarray(clear & ~errors_leave(e, t, p))
+
+
+def _leaving(t: Trend, p: Floats) -> Flags:
+    """Say where the local orders move away from p, on one side of it: a lower power may be emerging."""
+    away = t.local - p
+    before = t.local - t.change - p
+    return (
+        t.several
+        & (away * before > 0)
+        & (np.abs(away) > np.abs(before))
+        & (np.abs(t.change) > MOVES)
+        & (np.abs(away) > DEPARTED)
+        & ~t.noisy
+    )
+
+
+def _plausible(t: Trend, p: Floats, tol: float) -> Flags:
+    """Say where an order that an expansion can have, a multiple of 1/2 other than p, is near.
+
+    A ladder that only passes by (towards p, and away from that multiple) has not settled there. An order that is no
+    whole number is believed where the series are nearly proportional only.
+    """
+    several = t.several
+    before = t.local - t.change
+    alone = np.hypot(t.scatter, LOG2 * (t.order - np.round(2.0 * t.order) / 2)) <= HIDDEN
+    towards_p = np.abs(t.local - p) < np.abs(before - p)
+    found = np.zeros(p.shape, dtype=bool)
+    for candidate in (np.floor(2.0 * t.order) / 2, np.ceil(2.0 * t.order) / 2):
+        whole = candidate == np.round(candidate)
+        passing = several & towards_p
+        passing &= np.abs(t.local - candidate) > np.abs(before - candidate) + QUIET
+        # one triple tells a pure power from two proportional terms by nothing but the number
+        least = np.where(whole, REACH_SETTLED, REACH)
+        wide = np.where(whole, OF_SINGLE * np.abs(t.scatter) / LOG2, np.minimum(t.width, REACH))
+        reach = np.where(several, np.maximum(t.width, least), np.maximum(wide, SINGLE_WIDTH))
+        near = (np.abs(t.order - candidate) <= reach) & (np.abs(candidate - p) > tol)
+        near &= (candidate >= LEAST_CANDIDATE) & (several | alone | (candidate <= p + MOST_ABOVE))
+        pure = np.abs(t.order - candidate) <= SINGLE_WIDTH
+        found |= (
+            near & ~passing & (whole | np.where(several, np.abs(t.scatter) <= 2 * SINGLE, pure))
+        )
+    return found
+
+
+def _on_the_way(t: Trend, p: Floats, tol: float) -> Flags:
+    """Say where the local orders approach p so fast that they may reach it: three last changes cover the way."""
+    way = np.abs(t.local - p) - tol
+    approach = np.abs(t.local - t.change - p) - np.abs(t.local - p)
+    return np.asarray(t.several & (3 * approach >= way))

@@ -1,0 +1,189 @@
+r"""The grid convergence index: the field's known error bar, beside the bound of
+`vibsim.convergence.scalar_extrapolation`.
+
+Of the finest two levels, ``GCI = F |u_fine - u_coarse|/(r^p - 1)`` with the refinement ratio r (P. J. Roache,
+Perspective: a method for uniform reporting of grid refinement studies, J. Fluids Eng. 116, 1994). It belongs to the
+finest level, not to an extrapolation. The factor F is 1.25 where the observed order of three levels is within a tenth
+of the promised one; elsewhere it is 3, with the observed order kept between 1/2 and the promised one (W. L. Oberkampf
+and C. J. Roy, Verification and Validation in Scientific Computing, 2010, section 8.7). Two levels show no order: F = 3.
+
+Where levels do not converge monotonically, four and more of them are fitted by ``u + c h^p`` with least squares, and
+the index is what L. Eca and M. Hoekstra (J. Comput. Phys. 262, 2014) make of the fit and its scatter; three levels get
+three times their range, as there. Where they do, with another order than the promised one, it is at least that.
+
+It is absolute, in the unit of the number, so that a number may be negative or pass zero; `relative` divides by the
+number where it is not near zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.convergence.differences import gap_ratio, order_of_ratio, safe_ratio
+from vibsim.convergence.scalar_extrapolation import ORDINARY, triple_at
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Codes = NDArray[np.int8]
+
+CLASSES = (
+    "unknown",
+    "monotone",
+    "oscillating",
+    "monotone_divergence",
+    "oscillating_divergence",
+    "round_off",
+)
+"""How the finest three levels above round-off follow each other; files hold a position here."""
+UNKNOWN, MONOTONE, OSCILLATING, DIVERGING, SWINGING, ROUND_OFF = range(len(CLASSES))
+
+TRUSTED, CAUTIOUS = 1.25, 3.0
+"""The factor F."""
+AGREES = 0.1
+"""Part of the promised order that the observed one may be off."""
+LEAST_ORDER = 0.5
+"""The least order that is used."""
+FITTED = 5
+"""So many of the finest levels are fitted at most."""
+EXPONENTS = 16
+"""So many exponents from `LEAST_ORDER` to the promised order are tried in a fit."""
+NEAR_ZERO = 0.05
+"""A number below this part of its scale is near zero."""
+
+
+def classify(values: Floats, levels: Sequence[int], floor: Floats) -> Codes:
+    """Say how numbers converge, as positions in `CLASSES`.
+
+    ``R`` is the last difference over the one before, of equally spaced levels: monotone for 0 < R < 1, oscillating for
+    -1 < R < 0, diverging beyond.
+
+    Parameters
+    ----------
+    values, levels, floor
+        As `vibsim.convergence.scalar_extrapolation.limit` takes them.
+    """
+    found = np.full(values.shape[:-1], UNKNOWN, dtype=np.int8)
+    if len(levels) < 3:
+        return found
+    found[np.all(np.isfinite(values[..., -3:]), axis=-1)] = ROUND_OFF
+    for i in range(len(levels) - 2):
+        (first, second), clean = triple_at(values, floor, i)
+        # of levels that do not follow each other, per level
+        a, b = levels[i + 1] - levels[i], levels[i + 2] - levels[i + 1]
+        ratio = safe_ratio(second / b, first / a)
+        kind = np.select(
+            [ratio >= 1, ratio > 0, ratio <= -1, ratio < 0],
+            [DIVERGING, MONOTONE, SWINGING, OSCILLATING],
+            UNKNOWN,
+        )
+        found = np.where(clean, kind, found).astype(np.int8)
+    return found
+
+
+def index(values: Floats, levels: Sequence[int], order: Floats, kinds: Codes) -> Floats:
+    """Return the grid convergence index of the finest level, shape (...), in the unit of the numbers.
+
+    Parameters
+    ----------
+    values, levels
+        As `vibsim.convergence.scalar_extrapolation.limit` takes them.
+    order
+        Promised order, shape (...).
+    kinds
+        What `classify` returned.
+
+    Returns
+    -------
+    array
+        NaN with one level, and where a number does not exist.
+    """
+    n = len(levels)
+    if n == 1:
+        return np.full(values.shape[:-1], np.nan)
+    promised = np.where(np.isfinite(order), order, ORDINARY)
+    with np.errstate(all="ignore"):
+        change = np.abs(values[..., -1] - values[..., -2])
+        gap = levels[-1] - levels[-2]
+        if n == 2:
+            return np.asarray(CAUTIOUS * change / (gap_ratio(promised, gap) - 1.0))
+        last = -np.diff(values[..., -3:], axis=-1)
+        seen = order_of_ratio(safe_ratio(last[..., 0], last[..., 1]), levels[-3:])
+        regular = of_order(change, gap, seen, promised)
+        rough = _fitted(values, levels, promised) if n > 3 else _range(values)
+        exact = (kinds == ROUND_OFF) & (change == 0.0)
+        sure = _agrees(seen, promised)
+        cautious = np.fmax(regular, rough) if n > 3 else regular
+        regular = np.where(sure, regular, cautious)
+        return np.where(exact, 0.0, np.where(seen > 0, regular, rough))
+
+
+def of_order(change: Floats, gap: int, seen: Floats, promised: Floats) -> Floats:
+    """Return ``F |change|/(r^p - 1)`` of two levels that are `gap` levels apart.
+
+    Parameters
+    ----------
+    change
+        Size of the difference of the finest two levels.
+    seen, promised
+        Observed and promised order; NaN for one that is not known.
+    """
+    agrees = _agrees(seen, promised)
+    factor = np.where(agrees, TRUSTED, CAUTIOUS)
+    capped = np.clip(np.where(np.isfinite(seen), seen, promised), LEAST_ORDER, None)
+    p = np.where(agrees, promised, np.minimum(capped, promised))
+    return np.asarray(factor * change / (gap_ratio(p, gap) - 1.0))
+
+
+def _agrees(seen: Floats, promised: Floats) -> Flags:
+    return np.asarray(np.abs(seen - promised) <= AGREES * promised)
+
+
+def relative(index: Floats, value: Floats, scale: Floats) -> Floats:
+    """Return the index over the size of the number; NaN where the number is near zero.
+
+    Parameters
+    ----------
+    scale
+        Size that such a number has: of the solution, or of the number itself.
+    """
+    size = np.abs(value)
+    usable = (size > index) & (size > NEAR_ZERO * scale)
+    return np.where(usable, safe_ratio(*np.broadcast_arrays(index, size)), np.nan)
+
+
+def _range(values: Floats) -> Floats:
+    recent = values[..., -FITTED:]
+    return np.asarray(CAUTIOUS * (np.max(recent, axis=-1) - np.min(recent, axis=-1)))
+
+
+def _fitted(values: Floats, levels: Sequence[int], promised: Floats) -> Floats:
+    """Return the index of the best fit of ``u + c h^p``, p between `LEAST_ORDER` and the promised order."""
+    m = min(len(levels), FITTED)
+    u = values[..., -m:]
+    h = np.exp2(-(np.array(levels[-m:], dtype=np.float64) - levels[-1]))
+    mean = np.mean(u, axis=-1)
+    least = np.full(mean.shape, np.inf)
+    index = np.full(mean.shape, np.nan)
+    typical = (np.max(u, axis=-1) - np.min(u, axis=-1)) / (m - 1)
+    for part in np.linspace(0.0, 1.0, EXPONENTS):
+        p = LEAST_ORDER + part * np.maximum(promised - LEAST_ORDER, 0.0)
+        x = h ** p[..., None]
+        away = x - np.mean(x, axis=-1)[..., None]
+        slope = np.sum(away * (u - mean[..., None]), axis=-1) / np.sum(away * away, axis=-1)
+        rest = u - mean[..., None] - slope[..., None] * away
+        # three numbers are fitted
+        sigma = np.sqrt(np.sum(rest * rest, axis=-1) / (m - 3))
+        error = np.abs(slope) * x[..., -1]
+        off = np.abs(rest[..., -1])
+        good = sigma < typical
+        now = np.where(
+            good,
+            TRUSTED * error + sigma + off,
+            CAUTIOUS * sigma / typical * (error + sigma + off),
+        )
+        better = sigma < least
+        least, index = np.where(better, sigma, least), np.where(better, now, index)
+    return np.where(typical > 0, index, 0.0 * typical)

@@ -1,0 +1,74 @@
+r"""A promised power that levels do not show yet: how large a part of the error it can be at the finest of them.
+
+A motion near a special case, in which a scheme has a higher order (a start nearly at rest, a weak damping, a small
+swing), has the promised power h^r with a small coefficient, behind a higher one h^p: levels then show p, and finer ones
+r. So p is believed only where the data leave no room for h^r, not by the ratios, which a small part does not move.
+
+Differences ``d_k = b h_k^r + a h_k^p + c h_k^q + ...`` are combined so that h^p and as many of the further powers as
+there are differences vanish, and h^r keeps the size that it has in the last one. What is left is b, and powers behind:
+its norm bounds b, but for cancellation. Of all such combinations the least one counts, with p + 1, p + 2, ... or
+p + 2, p + 4, ... as further powers, and what rounding makes of it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.convergence.asymptotic_range import Trend
+from vibsim.convergence.ladder_statistics import Evidence, floor_of_pairs, pick
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+EXCLUDED = 1e-6
+"""A part of the error that is no larger takes h^(p-1) twenty levels to decide: more than any ladder has."""
+APART = 0.25
+"""Orders further apart are different ones: half the distance of two of them."""
+POWERS = 4
+"""Higher powers that are taken away, at most."""
+
+
+def is_promise_hidden(e: Evidence, t: Trend) -> Flags:
+    """Say where levels show a higher order than the promised one, which may be there with a small coefficient."""
+    shape = t.order.shape
+    if e.promised is None or e.special is None or e.combined is None:
+        return np.zeros(shape, dtype=bool)
+    with np.errstate(invalid="ignore"):
+        shown = np.round(2.0 * t.order) / 2
+        maybe = (t.count > 0) & np.isfinite(shown) & (shown > e.promised + APART)
+        maybe &= e.special > e.promised + APART
+    hidden = maybe.copy()
+    last = t.last + 1
+    groups = np.stack([last, shown, np.broadcast_to(e.promised, shape)], axis=-1)
+    for pair, p, r in np.unique(groups[maybe], axis=0):
+        rows = maybe & np.all(groups == (pair, p, r), axis=-1)
+        hidden[rows] = ~(_most(e, rows, int(pair), float(p), float(r)) <= EXCLUDED)
+    return hidden
+
+
+def _most(e: Evidence, rows: Flags, last: int, p: float, r: float) -> Floats:
+    """Return the largest part of an error of h^p at a pair of levels that h^r can be, shape (rows,)."""
+    assert e.combined is not None
+    size = pick(e.difference[rows], np.full(np.count_nonzero(rows), last))
+    noise = floor_of_pairs(e)[rows]
+    # the differences of h^p are steeper than those of h^r
+    steeper = np.expm1(p * np.log(2.0)) / np.expm1(r * np.log(2.0))
+    least = np.full(size.shape, np.inf)
+    for step in (1.0, 2.0):
+        for count in range(1, min(last, POWERS) + 1):
+            powers = np.array([r, *(p + step * k for k in range(count))])
+            weights = _weights(e.levels, last, powers)
+            first = last + 1 - len(weights)
+            left = e.combined(rows, first, weights) + noise[:, first : last + 1] @ np.abs(weights)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                least = np.fmin(least, steeper * left / size)
+    return least
+
+
+def _weights(levels: tuple[int, ...], last: int, powers: Floats) -> Floats:
+    """Return weights of the differences up to `last` that keep the first power in that one, and no other power."""
+    depth = np.array(levels[last - len(powers) + 1 : last + 2], dtype=np.float64)
+    sizes = np.exp2(-powers[:, None] * (depth - depth[-1]))
+    falls = sizes[:, :-1] - sizes[:, 1:]
+    return np.asarray(np.linalg.solve(falls / falls[:, -1:], np.eye(len(powers))[0]))

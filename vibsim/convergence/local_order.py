@@ -1,0 +1,182 @@
+r"""The order of convergence as a function of time, from the differences of three successive levels.
+
+The ratio of two differences at one time means nothing where they change their sign, which those of an oscillation do
+twice in a period. So the order at t is that of their sizes in a window around t, half a period long, which holds a zero
+crossing and what lies between two of them:
+
+    p(t) = log2 R(t),     R(t) = ||d_k|| / ||d_(k+1)||,     ||d||^2 = sum of d^2 over the window
+
+(for successive levels; `series.order_of_ratio` in general). Its interval is that of ``R (1 - e)`` to ``R/(1 - e)`` with
+
+    e = || d_k/||d_k|| - d_(k+1)/||d_(k+1)|| ||  +  noise_k/rms_k  +  noise_(k+1)/rms_(k+1)
+
+How far the two curves are from having one shape in the window, and how much of them may be round-off, for which ten
+times the predicted floor is allowed. Where the order
+changes, or two powers of dt are of one size, the curves differ in shape and the interval is wide; it is unbounded where
+e is 1 or more. It tells how well this ratio is known, not what finer levels would show: for that there are the triples.
+
+The last point of a run has a formula of its own in some schemes (a one-sided velocity). It stands for itself, and the
+other windows leave it out.
+
+Source: pendulum lecture, section 2.5 (ratios of differences); the windows are our own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.convergence.differences import ABOVE_FLOOR, largest, order_of_ratio, safe_ratio
+
+Floats = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+FEWEST = 3
+"""Points of the shortest window."""
+ALONE = 0.5
+"""The last point counts for itself where its differences are at least this part of those before it."""
+
+
+def window_points(width: Floats, spacing: Floats, points: int) -> Counts:
+    """Return how many points the window of each member has, an odd number, shape (case,).
+
+    Parameters
+    ----------
+    width
+        Length of the window in time, shape (case,).
+    spacing
+        Distance between points, shape (case,) or (1,).
+    points
+        Number of points of the series.
+    """
+    half = np.rint(0.5 * width / spacing)
+    most = max((points - 1) // 2, FEWEST // 2)
+    return np.asarray(2 * np.clip(half, FEWEST // 2, most).astype(np.int64) + 1)
+
+
+def local_order(
+    first: Floats,
+    second: Floats,
+    levels: Sequence[int],
+    floors: tuple[Floats, Floats],
+    counts: Counts,
+    end_included: bool = True,
+) -> tuple[Floats, Floats, Floats]:
+    """Return the order at every time, and the ends of its interval.
+
+    Parameters
+    ----------
+    first, second
+        Differences of the coarser and the finer pair, shape (scheme, case, t).
+    levels
+        The three levels.
+    floors
+        Predicted round-off of the two differences at one point, shape (scheme, case).
+    counts
+        Points of the window, odd, shape (case,).
+    end_included
+        Whether the last point is the end of the run.
+
+    Returns
+    -------
+    tuple of array
+        Order, lower end, upper end, shape (scheme, case, t). All are NaN where the finer difference is, in the whole
+        window, below what may be round-off, or one of them vanishes or is not finite; an end is infinite where the
+        interval is unbounded.
+    """
+    inner = slice(None, -1) if end_included and first.shape[-1] > FEWEST else slice(None)
+    scale = _scale(first)
+    scaled = first * scale, second * scale
+    sums = _by_count([d[..., inner] for d in scaled], counts)
+    noise = tuple(ABOVE_FLOOR * floor[..., None] * scale for floor in floors)
+    ratio, unsure = _compared(sums, noise)
+    if inner.stop is not None:
+        ratio, unsure = _with_end(ratio, unsure, scaled, sums, noise)
+    return _interval(ratio, unsure, levels)
+
+
+def _scale(series: Floats) -> Floats:
+    """Return a power of two that brings a series to the size of 1, so that squares do not overflow."""
+    size = largest(np.nan_to_num(series, posinf=0.0, neginf=0.0))[..., None]
+    return np.ldexp(1.0, -np.frexp(np.where(size > 0, size, 1.0))[1])
+
+
+def _by_count(pair: list[Floats], counts: Counts) -> Floats:
+    """Return means of d_k^2, d_(k+1)^2 and d_k d_(k+1) over the window, shape (3, scheme, case, t)."""
+    first, second = pair
+    found = np.empty((3, *first.shape))
+    for count in np.unique(counts).tolist():
+        chosen = counts == count
+        a, b = first[:, chosen], second[:, chosen]
+        held = box_sum(np.ones(a.shape[-1]), count)
+        with np.errstate(over="ignore", invalid="ignore"):
+            for row, product in enumerate((a * a, b * b, a * b)):
+                found[row][:, chosen] = box_sum(product, count) / held
+    return found
+
+
+def box_sum(values: Floats, count: int) -> Floats:
+    """Return the sum over a window of `count` points around every point, an odd number; 0 is beyond the ends.
+
+    Sums of 2, 4, 8, ... points are put together, so that no sum is the small difference of two large ones.
+    """
+    edge = [(0, 0)] * (values.ndim - 1) + [(count // 2, count // 2)]
+    power, size, offset = np.pad(values, edge), 1, 0
+    length = values.shape[-1]
+    total = np.zeros(values.shape)
+    while count:
+        if count & 1:
+            total = total + power[..., offset : offset + length]
+            offset += size
+        count >>= 1
+        if count:
+            power = power[..., :-size] + power[..., size:]
+            size *= 2
+    return total
+
+
+def _compared(sums: Floats, noise: Sequence[Floats]) -> tuple[Floats, Floats]:
+    """Return the ratio of the sizes, and how unsure it is; NaN where there is nothing to compare."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first, second = np.sqrt(sums[0]), np.sqrt(sums[1])
+        cosine = np.clip(sums[2] / (first * second), -1.0, 1.0)
+        unsure = np.sqrt(2.0 - 2.0 * cosine) + noise[0] / first + noise[1] / second
+        usable = (first > 0) & (second > noise[1])
+    return np.where(usable, safe_ratio(first, second), np.nan), np.where(usable, unsure, np.nan)
+
+
+def _with_end(
+    ratio: Floats,
+    unsure: Floats,
+    pair: tuple[Floats, Floats],
+    sums: Floats,
+    noise: Sequence[Floats],
+) -> tuple[Floats, Floats]:
+    """Append the last point: alone, or with the window before it where it is near a zero crossing."""
+    ends = [np.abs(series[..., -1:]) for series in pair]
+    alone = np.ones(ends[0].shape, dtype=bool)
+    for end, square in zip(ends, sums, strict=False):
+        alone &= end > ALONE * np.sqrt(square[..., -1:])
+    signs = np.sign(pair[0][..., -1:]) * np.sign(pair[1][..., -1:])
+    one_point = np.stack([ends[0] ** 2, ends[1] ** 2, signs * ends[0] * ends[1]])
+    own = _compared(one_point, noise)
+    last = [np.where(alone, x, y[..., -1:]) for x, y in zip(own, (ratio, unsure), strict=True)]
+    joined = [np.concatenate(rows, axis=-1) for rows in ((ratio, last[0]), (unsure, last[1]))]
+    return joined[0], joined[1]
+
+
+def _interval(
+    ratio: Floats, unsure: Floats, levels: Sequence[int]
+) -> tuple[Floats, Floats, Floats]:
+    order = order_of_ratio(ratio, levels)
+    bounded = unsure < 1.0
+    rest = np.where(bounded, 1.0 - unsure, 1.0)
+    ends = []
+    for end, beyond in ((ratio * rest, -np.inf), (ratio / rest, np.inf)):
+        found = order_of_ratio(end, levels)
+        # an end outside of all orders that are sought is none, too
+        found = np.where(bounded & np.isfinite(found), found, beyond)
+        ends.append(np.where(np.isfinite(order), found, np.nan))
+    return order, ends[0], ends[1]

@@ -1,0 +1,232 @@
+r"""Extrapolation over all levels of a ladder: the tableau, and which of its entries to believe how far.
+
+A level with the step h has ``u_h = u + c_1 h^p + c_2 h^(p+q) + c_3 h^(p+2q) + ...``. Column 0 of the tableau holds the
+levels; an entry of column j combines j + 1 neighbouring levels so that the first j powers vanish,
+
+    T[i][j] = T[i][j-1] + f (T[i][j-1] - T[i-1][j-1]),
+
+with f from the steps of the levels alone (Aitken and Neville for p = q; C. Brezinski's E-algorithm otherwise). The
+levels need not be neighbours: f is worked out in whole fractions. Source: W. Romberg (1955); R. Bulirsch and J. Stoer
+(1966); E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, section II.9.
+
+What is known of the error of an entry, besides round-off:
+
+- the change ``T[i][j-1] - T[i-1][j-1]`` and the factor K by which it must fall in its column give the error that
+  ``T[i][j-1]`` still has. What was seen to fall by another factor, more or less, is trusted less: `trust` is the worst
+  agreement, a factor, of all columns of the row so far.
+- extrapolating once more divides that error by about as much as extrapolating the last time did, times what the
+  coarser level costs; never by more than `LARGEST_GAIN`.
+- an entry that a finer row contradicts is as wrong as the contradiction says.
+
+Position and velocity count together, as the larger of du and dv/w: a time at which the error of one happens to cross
+zero is then no time at which it is thought small. For the same reason a change is as large as it has been so far.
+
+The same text works on floats (one member, one time, without numpy's overhead) and on arrays, with the same bits.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vibsim.convergence.romberg_weights import Entry, Tableau
+
+SAFETY = 2.0
+"""Factor on the estimated error of truncation."""
+GAIN_SAFETY = 5.0
+"""Factor on what one more extrapolation leaves of an error, ..."""
+FIRST_GAIN_SAFETY = 100.0
+"""... and where three levels are all there is, so that no gain was seen before."""
+LARGEST_GAIN = 1e-3
+"""One more extrapolation is never believed to leave less of an error."""
+LEAST_FALL = 1.25
+"""A change that falls by less counts as one that falls by this factor: four times itself is then left."""
+ROUND_OFF_SAFETY = 10.0
+"""Factor on the round-off of the levels: one run's difference to another is one draw of it."""
+KNOWN_DIGIT = 0.1
+"""An error beyond this part of the solution's size is no longer small; then nothing is known of it."""
+
+LASTING = 2.0**-52
+"""Relative error of what every level has in common: parameters, the step, the elementary functions."""
+
+_TINY = 1e-200
+
+
+@dataclass(frozen=True)
+class Arithmetic:
+    """The few functions that floats and arrays do not share. The larger and the smaller ignore NaN."""
+
+    larger: Callable[[Any, Any], Any]
+    smaller: Callable[[Any, Any], Any]
+    choose: Callable[[Any, Any, Any], Any]
+    so_far: Callable[[Any], Any]
+    """The largest value up to each time; may change what it is given."""
+    holds_anywhere: Callable[[Any], Any]
+
+
+def _larger(a: float, b: float) -> float:
+    return a if a > b or b != b else b
+
+
+def _smaller(a: float, b: float) -> float:
+    return a if a < b or b != b else b
+
+
+def _choose(condition: bool, a: Any, b: Any) -> Any:
+    return a if condition else b
+
+
+def _itself(value: float) -> float:
+    return value
+
+
+def _so_far(values: Any) -> Any:
+    if values.shape[1] < MANY:
+        return np.fmax.accumulate(values, axis=0)
+    for before, now in pairwise(values):
+        np.fmax(before, now, out=now)
+    return values
+
+
+MANY = 16
+"""From so many members on numpy's own loop over times is slower than one of ours over rows of members."""
+
+FLOATS = Arithmetic(_larger, _smaller, _choose, _itself, bool)
+"""For one member at one time."""
+ARRAYS = Arithmetic(np.fmax, np.fmin, np.where, _so_far, np.any)
+"""For arrays of shape (t, case)."""
+
+
+@dataclass(frozen=True)
+class Circumstances:
+    """What is known of the members besides their levels; floats, or arrays that broadcast against (t, case)."""
+
+    rate: Any
+    """w: dv/w counts like du."""
+    size: Any
+    """Size of the solution over the whole time."""
+    limit: Any
+    """An estimated error beyond it is not believed."""
+    phase: Any
+    """w t."""
+    response: Any
+    """``1/(w end)^p``, which `Tableau.amplification` is to be multiplied with; 0 where disturbances do not grow."""
+    noise: Any
+    """Round-off so far over its prediction relative to 1; at least `size`."""
+    spread: Any
+    """Part of the response to a lasting disturbance that is the response to one passing: ``max(1, w t)``, or 1 where
+    the noise was not measured."""
+
+
+class Best(NamedTuple):
+    """The best entry at every time of every member; floats, or arrays of shape (t, case)."""
+
+    position: Any
+    velocity: Any
+    error: Any
+    """Bound of the error of the position, and over w of the velocity; infinite where nothing is known."""
+    entry: Any
+    """Which entry: its row times the number of levels, plus its column. Where nothing is known of the error, the finest
+    level; -1 where that has failed."""
+
+
+Pair = tuple[Any, Any]
+"""Position and velocity."""
+
+
+class _Row(NamedTuple):
+    """One row of the tableau; lists over the columns."""
+
+    values: list[Pair]
+    changes: list[Any]
+    """From the row before, so far."""
+    bounds: list[Any]
+    """Bounds of the errors of truncation of columns 1, 2, ..."""
+
+
+def best_entry(
+    table: Tableau, levels: Sequence[Pair], known: Circumstances, of: Arithmetic = ARRAYS
+) -> Best:
+    """Extrapolate, and choose the entry with the least bound at every time of every member.
+
+    Parameters
+    ----------
+    levels
+        Position and velocity of every level, from coarse to fine; NaN where a level has failed.
+    """
+    row = _Row([levels[0]], [], [])
+    found: list[tuple[int, Pair, Any]] = []
+    response: Any = 0.0
+    noise = lasting = response
+    for i, level in enumerate(levels[1:], start=1):
+        finer = _next_row(table.entries[i], level, row, known, of)
+        for j in range(1, i):
+            # at least as wrong as the finer row says
+            bound = of.larger(row.bounds[j - 1], finer.changes[j])
+            floor = noise * table.entries[i - 1][j - 1].round_off + lasting
+            found.append(((i - 1) * len(levels) + j, row.values[j], bound + floor))
+        response = of.larger(table.amplification[i] * known.response * finer.changes[0], response)
+        noise = of.larger(response / known.spread, known.noise) * ROUND_OFF_SAFETY
+        lasting = LASTING * (known.size * (1.0 + known.phase) + response)
+        row = finer
+    last = len(levels) - 1
+    for j in range(1, last + 1):
+        floor = noise * table.entries[last][j - 1].round_off + lasting
+        found.append((last * len(levels) + j, row.values[j], row.bounds[j - 1] + floor))
+    return _least(found, levels[-1], last * len(levels), of)
+
+
+def _least(found: Sequence[tuple[int, Pair, Any]], finest: Pair, code: int, of: Arithmetic) -> Best:
+    """Return the entries with the least bounds; among equals that of the finest row and the last column."""
+    position, velocity = finest
+    is_finite = (position - position) + (velocity - velocity) == 0.0
+    entry, error = of.choose(is_finite, code, -1), of.choose(is_finite, math.inf, math.inf)
+    for number, (x, y), bound in reversed(found):
+        better = bound < error
+        if of.holds_anywhere(better):
+            # what is not finite fails the comparison
+            better = better & ((x - x) + (y - y) == 0.0)
+            position, velocity = of.choose(better, x, position), of.choose(better, y, velocity)
+            error, entry = of.choose(better, bound, error), of.choose(better, number, entry)
+    return Best(position, velocity, error, entry)
+
+
+def _next_row(
+    entries: Sequence[Entry], level: Pair, row: _Row, known: Circumstances, of: Arithmetic
+) -> _Row:
+    """Return the row of a level from the row of the level before, without its round-off."""
+    values, changes, bounds = [level], list[Any](), list[Any]()
+    lefts: list[Any] = []
+    trust: Any = 1.0
+    for j, entry in enumerate(entries):
+        (x, y), (x_before, y_before) = values[j], row.values[j]
+        dx, dy = x - x_before, y - y_before
+        change = of.so_far(of.larger(abs(dx), abs(dy) / known.rate)) + _TINY
+        changes.append(change)
+        values.append((x + entry.factor * dx, y + entry.factor * dy))
+        left = change
+        if entry.change_fall:
+            fall = row.changes[j] / (change * entry.change_fall) + _TINY
+            trust = of.smaller(of.smaller(fall, 1.0 / fall), trust)
+            seen = fall == fall
+        if j or entry.change_fall:
+            left = change / (of.larger(entry.fall * trust, LEAST_FALL) - 1.0)
+        if j == 0 and entry.change_fall:
+            left = of.choose(seen, left, change)
+        if j > 1:
+            gain = of.smaller(entry.coarser * lefts[-1] / lefts[-2], 1.0)
+            left = of.larger(lefts[-1] * gain, left)
+        bound = of.choose(SAFETY * left > known.limit, math.inf, SAFETY * left)
+        if j:
+            safety = GAIN_SAFETY if len(entries) > 2 or entry.change_fall else FIRST_GAIN_SAFETY
+            gain = safety * entry.coarser * left / (lefts[-1] * trust)
+            bound = bound * of.larger(of.smaller(gain, 1.0), LARGEST_GAIN)
+            bounds[-1] = of.larger(entry.factor * change, bounds[-1])
+        lefts.append(left)
+        bounds.append(bound / (trust * trust + _TINY))
+    return _Row(values, changes, bounds)

@@ -1,0 +1,110 @@
+"""The one family of errors.
+
+A message carries the value, the rule it broke, the nearest valid choice, and where it stands (file, line, key), so
+that a user can mend the input without reading code.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+
+class VibsimError(Exception):
+    """Base of every error that vibsim raises on purpose.
+
+    An error that takes more than its message hands on what it takes, and tells its message by ``__str__``: a copy, such
+    as the one that another process sends, is made of the same arguments again.
+    """
+
+
+@dataclass(frozen=True, order=True)
+class Fault:
+    """One fault of an input, with the place where it stands."""
+
+    file: str
+    """Name of the file as the user gave it."""
+    line: int
+    """Line number, from 1; 0 where the fault has no line of its own."""
+    key: str
+    """Dotted path of the key, e.g. ``initial.theta`` or ``checks[2].order``."""
+    value: str
+    """The value as written, shortened; empty where there is none."""
+    rule: str
+    """The rule that the value breaks."""
+    hint: str = ""
+    """The nearest valid choice, or the choices."""
+
+    def __str__(self) -> str:
+        place = f"{self.file}:{self.line}" if self.line else self.file
+        parts = [place, self.key, self.value, self.rule, self.hint]
+        return ": ".join(part for part in parts if part)
+
+
+class InputError(VibsimError):
+    """Input that is refused: every fault that was found, at once.
+
+    Parameters
+    ----------
+    faults
+        At least one fault; they are reported in the order of file and line.
+    """
+
+    def __init__(self, faults: Iterable[Fault]) -> None:
+        self.faults: tuple[Fault, ...] = tuple(sorted(faults))
+        super().__init__(self.faults)
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.faults))
+
+
+class SimulationError(VibsimError):
+    """A simulation that could not be run or compiled; a run that overflows is a result, not an error."""
+
+
+class FileError(VibsimError):
+    """A stored file that must not be used.
+
+    Parameters
+    ----------
+    path
+        The file.
+    reason
+        What is wrong with it.
+    """
+
+    def __init__(self, path: Path, reason: str) -> None:
+        self.path = path
+        self.reason = reason
+        super().__init__(path, reason)
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.reason}"
+
+
+class DamagedFileError(FileError):
+    """A file whose bytes are not those that were written."""
+
+
+class StaleFileError(FileError):
+    """A whole file that belongs to another job, another experiment or other code."""
+
+
+def nearest(value: object, choices: Sequence[str]) -> str:
+    """Name the choice nearest to `value`, or list all of them.
+
+    Parameters
+    ----------
+    value
+        What the user wrote.
+    choices
+        What would have been right.
+    """
+    if not choices:
+        return ""
+    close = difflib.get_close_matches(str(value), choices, n=1, cutoff=0.6)
+    if close:
+        return f"did you mean '{close[0]}'?"
+    return "choose from " + ", ".join(choices)

@@ -1,0 +1,84 @@
+"""The words and numbers that every part of vibsim must agree on: statuses, reasons, norms, and the file format.
+
+This module imports nothing of vibsim and no library, so that any command may have it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, Literal, get_args
+
+Status = Literal["PASS", "FAIL", "INCONCLUSIVE"]
+STATUSES: tuple[Status, ...] = get_args(Status)
+"""Every status; files hold its position here."""
+SEVERITY: Mapping[str, int] = MappingProxyType({"PASS": 0, "INCONCLUSIVE": 1, "FAIL": 2})
+"""How bad each of `STATUSES` is, the mildest first."""
+
+REASONS: Mapping[str, Status] = MappingProxyType(
+    {
+        "asymptotic": "PASS",
+        "exact": "PASS",
+        "match": "PASS",
+        "order_low": "FAIL",
+        "order_high": "FAIL",
+        "mismatch": "FAIL",
+        "wrong_limit": "FAIL",
+        "unstable": "FAIL",
+        "non_finite": "FAIL",
+        "pre_asymptotic": "INCONCLUSIVE",
+        "round_off": "INCONCLUSIVE",
+        "oscillating": "INCONCLUSIVE",
+        "non_smooth": "INCONCLUSIVE",
+        "too_few_levels": "INCONCLUSIVE",
+        "not_applicable": "INCONCLUSIVE",
+    }
+)
+"""Every reason of a verdict, with the status that it belongs to."""
+REASON_NAMES = tuple(REASONS)
+"""The same without statuses; files hold a reason's position here."""
+
+DRIFTS = ("none", "bounded", "linear", "quadratic", "exponential", "unclear")
+"""How the error of an energy grows with time; files hold a position here."""
+
+Norm = Literal["l1", "l2", "linf", "linf_interior"]
+NORMS: tuple[Norm, ...] = get_args(Norm)
+"""Every norm over time; ``linf_interior`` leaves the last point out."""
+TYPICAL_NORM: Norm = "l2"
+"""The norm of a check that names none, and of the verdict on a quantity."""
+TOLERANCE = 0.1
+"""How far from the promised order a measured one may be where a check does not say."""
+BY_TOLERANCE = "tolerance"
+"""Name and kind of the verdict that an experiment with a tolerance has beside those of its checks."""
+
+FORMAT = 2
+"""Version of the file format, ``vibsim_format`` in every file."""
+
+
+def worst(statuses: Iterable[str]) -> str:
+    """Return the status of a whole: FAIL before INCONCLUSIVE before PASS; of nothing, nothing is concluded.
+
+    Raises
+    ------
+    KeyError
+        For a word that is no status.
+    """
+    return max(statuses, key=SEVERITY.__getitem__, default="INCONCLUSIVE")
+
+
+def jsonable(value: Any) -> Any:
+    """Return plain data as JSON has them: lists and mappings, and None for numbers that are not finite."""
+    if hasattr(value, "tolist"):  # numbers and arrays of numpy, which quick readers do not import
+        value = value.tolist()
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): jsonable(entry) for key, entry in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [jsonable(entry) for entry in value]
+    return value
+
+
+HIGHEST = "highest_omega_dt"
+"""Name of the highest angular frequency of small oscillations times the step, where it is not that of a period."""

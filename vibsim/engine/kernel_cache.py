@@ -1,0 +1,54 @@
+"""Compiled kernels on disk: machine code under the digest of the text that it was compiled from.
+
+What is kept is an object file, and beside it its text, to be read by people. A file is written once and never changed:
+a kernel of other text, another compiler or another processor is another file. Loading one runs it, so that they lie in
+the private cache alone (`vibsim.core.private_cache`); without one, kernels are compiled in memory.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+
+from vibsim.core import private_cache
+from vibsim.engine.entry import bind
+
+Kernel = Callable[..., None]
+
+ENTRY = "kernel"
+"""Name of the function that is called."""
+
+
+def load(text: str, kinds: str) -> Kernel:
+    """Return the function ``kernel`` of the module `text`, compiled now or before.
+
+    Parameters
+    ----------
+    kinds
+        Kinds of its arguments (`vibsim.engine.entry`).
+
+    Raises
+    ------
+    SimulationError
+        Where the text cannot be compiled.
+    """
+    # what only plans, analyses or draws needs no LLVM
+    from vibsim.native.linking import identity, link
+
+    key = "\n".join((text, kinds, identity()))
+    name = hashlib.sha256(key.encode()).hexdigest()
+
+    def make() -> bytes:
+        if folder := private_cache.opened("kernels"):
+            folder.put(f"{name}.py", text.encode())
+        return _compile(text, kinds)
+
+    code = private_cache.kept("kernels", f"{name}.o", make, bytes, bytes)
+    return bind(link(code, ENTRY), kinds)
+
+
+def _compile(text: str, kinds: str) -> bytes:
+    # what finds its kernel needs no compiler
+    from vibsim.native.machine import machine_code
+
+    return machine_code(text, ENTRY, kinds)

@@ -1,0 +1,226 @@
+"""What a level costs: bytes on disk and in memory, seconds; found from counts alone, without allocating anything.
+
+The constants are measured (`docs/benchmarks.md`). The size of a shard depends on the cost of one member at its level
+and on nothing else, so that neither more members nor another machine move the border between two shards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+PLAIN_MEMBER_STEPS = 40_000
+"""Member-steps of one scheme up to which plain Python takes less time than a compiled kernel takes to be loaded."""
+PLAIN_SECONDS = 1.2e-6
+"""Of one member-step in plain Python."""
+ONE_SECONDS = 12e-9
+"""Of one compiled step of a member that is alone: a chain in which each operation waits for the one before."""
+MANY_SECONDS = 3e-9
+"""Of one compiled member-step among many members."""
+EVALUATION = 0.45
+"""Part of an explicit step with one evaluation of the acceleration that each further evaluation takes as well; the rest
+is what every step has: the scheme's arithmetic, energies, extrema."""
+ITERATED = 3.0
+"""Steps with one evaluation that an implicit step takes as long as, for each evaluation of an iteration."""
+EVENTFUL = 2.5
+"""Steps of a smooth motion that one takes as long as where an event may be."""
+COUPLED = 2.0
+"""Steps of one coordinate that one of several takes as long as, and one with a force from a table."""
+WRITTEN_SECONDS = 4e-9
+"""Of one byte that is made, written, sealed and flushed."""
+JOB_SECONDS = 0.5
+"""Of a job before and after its steps: start, imports, kernels from the disk."""
+
+GATHERED = 160
+"""Bytes that are kept of a scheme and member beside its series: extremes, peaks, periods, status."""
+GATHERED_D2T = 8
+"""Bytes beside these where a scheme has another velocity than the centred difference."""
+EXTREMUM = 64
+"""Bytes of a peak and a trough: time and height, of the parabola and of the grid."""
+CONSTANT = 48
+"""Bytes that are kept of a member whatever the schemes: index, frequency, swept values."""
+FILE = 33_000
+"""Bytes of a file beside its data."""
+SERIES_FILE = 11_000
+"""Bytes of a file beside these where every series is kept, and extrema."""
+
+PACKED_UP_TO = 2**25
+"""Bytes of a file with every series up to which it is compressed, in a second, and until then kept in memory."""
+
+PLAIN_MEMORY = 68 * 10**6
+"""Bytes of a simulate job without its arrays, in plain Python."""
+COMPILED_MEMORY = 120 * 10**6
+"""Bytes of a simulate job without its arrays, with a compiled kernel."""
+ADAPTIVE_MEMORY = 160 * 10**6
+"""Bytes of a simulate job with an adaptive scheme beside all others: SciPy, and the runs that are kept."""
+TABULATED = 64
+"""Bytes that such a job holds of each point of a level."""
+SCRATCH = 520
+"""Bytes that a job holds of a scheme and member beside its series: what is gathered, as it is and as it is kept."""
+EXACT_SCRATCH = 5
+"""Arrays that a job holds for each series of the exact solution while it works it out."""
+
+SHARD_SECONDS = 4.0
+"""Work of one core that a shard is meant to hold."""
+SHARD_BYTES = 320 * 10**6
+"""Arrays that a shard may hold."""
+LARGEST_SHARD = 2**20
+"""Members of a shard at most."""
+
+ANALYSIS_MEMORY = 92 * 10**6
+"""Bytes of an analysis without its arrays."""
+ANALYSED = 3.8
+"""Bytes that an analysis holds at its peak for each byte that it reads of the members at hand."""
+PART_SAMPLES = 2**17
+"""Samples of one variable that an analysis takes at a time (`vibsim.analysis`)."""
+PARTS = 3
+"""Ranges of members that an analysis holds at a time: one for each of two threads, and one that is written."""
+RESULT = 100
+"""Bytes that an analysis keeps of each scheme and member until its end."""
+
+COMPARED = (116, 190)
+"""Bytes that an analysis writes of a scheme and member: once, and for each level; two norms, and no series."""
+COMPARED_SERIES = (-48, 184)
+"""Bytes beside these of a scheme, member and sample, where an analysis writes series."""
+COMPARED_NUMBERS = 785
+"""Bytes beside these of a scheme and member: the limits of numbers (`vibsim.comparison.best_values`)."""
+COMPARED_FILE = 130_000
+"""Bytes of the file of an analysis beside its data."""
+COMPARED_SERIES_FILE = 60_000
+"""Bytes beside these where an analysis writes series."""
+
+
+def work(force_evaluations: int, explicit: bool, alone: float | None = None) -> tuple[float, float]:
+    """Return what a step of a scheme takes in explicit steps with one evaluation: as such steps, and as iterations.
+
+    Parameters
+    ----------
+    force_evaluations
+        Of a step; of an implicit scheme, of an iteration.
+    alone
+        Where members are stepped one by one whatever the scheme: how many steps of one coordinate without events a step
+        takes as long as, `EVENTFUL` or `COUPLED`.
+    """
+    one, iterated = 1.0 + EVALUATION * (force_evaluations - 1), 0.0
+    if not explicit:
+        one, iterated = 0.0, ITERATED * force_evaluations
+    return (one, iterated) if alone is None else (0.0, alone * (one + iterated))
+
+
+@dataclass(frozen=True)
+class Load:
+    """What one level asks of a job, apart from the number of members."""
+
+    schemes: int
+    steps: int
+    samples: int
+    """Samples that are kept of each series of a member."""
+    series: int
+    """Series that are kept of a scheme and member."""
+    exact: int = 0
+    """Series that are kept of a member whatever the schemes: the states of the exact solution."""
+    work: float | None = None
+    """Work of a step of all explicit schemes together (`work`); a step with one evaluation each where None."""
+    iterated: float = 0.0
+    """Work of a step of all implicit schemes together, which one member takes as long as many."""
+    extrema: int = 0
+    """Peaks, and troughs, that are kept of a scheme and member."""
+    d2t: bool = False
+    """Whether a scheme has another velocity than the centred difference."""
+    own: float = 0.0
+    """Seconds that the schemes which choose their own steps take of a member (`vibsim.schemes.adaptive`)."""
+
+    @property
+    def stored(self) -> int:
+        """Bytes on disk of one member."""
+        series = self.schemes * self.series + self.exact
+        numbers = GATHERED + EXTREMUM * self.extrema + (GATHERED_D2T if self.d2t else 0)
+        return 8 * self.samples * series + numbers * self.schemes + CONSTANT
+
+    @property
+    def held(self) -> int:
+        """Bytes in memory of one member at the peak of a job."""
+        series = self.schemes * self.series + EXACT_SCRATCH * self.exact
+        # extrema of several schemes are held twice while they are put together
+        extrema = EXTREMUM * self.extrema * (2 if self.schemes > 1 else 1)
+        return 8 * self.samples * series + (SCRATCH + extrema) * self.schemes
+
+    @property
+    def shard(self) -> int:
+        """Members of a shard: a power of two, so that another measured constant seldom changes it."""
+        by_time = SHARD_SECONDS / (self.steps * self._step(MANY_SECONDS, ONE_SECONDS) + self.own)
+        most = max(1, min(int(by_time), SHARD_BYTES // self.held, LARGEST_SHARD))
+        return 1 << (most.bit_length() - 1)
+
+    def shards(self, members: int) -> int:
+        """Return the number of shards that `members` fill."""
+        return -(-members // self.shard)
+
+    def disk(self, members: int) -> int:
+        """Return the bytes of the files of `members`, before any of them is compressed."""
+        each = FILE + (SERIES_FILE if self.extrema else 0)
+        return members * self.stored + self.shards(members) * each
+
+    def memory(self, members: int) -> int:
+        """Return the bytes that a job with `members` holds at its peak."""
+        base = PLAIN_MEMORY if self._is_plain(members) else COMPILED_MEMORY
+        base += ADAPTIVE_MEMORY + TABULATED * self.steps if self.own else 0
+        return base + members * self.held + _packed(members * self.stored, self.extrema)
+
+    def seconds(self, members: int) -> float:
+        """Return the seconds of one core that the steps and the files of `members` take."""
+        compiled = MANY_SECONDS + (ONE_SECONDS - MANY_SECONDS) / members
+        step = self._step(compiled, ONE_SECONDS)
+        if self._is_plain(members):
+            step = self._step(PLAIN_SECONDS, PLAIN_SECONDS)
+        return members * (self.steps * step + self.own + self.stored * WRITTEN_SECONDS)
+
+    def _step(self, explicit: float, iterated: float) -> float:
+        """Return the seconds of a step of all schemes, where one with one evaluation takes so many."""
+        units = self.schemes if self.work is None else self.work
+        return units * explicit + self.iterated * iterated
+
+    def _is_plain(self, members: int) -> bool:
+        return members * self.steps <= PLAIN_MEMBER_STEPS
+
+
+def _packed(size: int, extrema: int) -> int:
+    """Return the bytes of a file that are in memory until it is closed; lean ones keep no extrema."""
+    return size if extrema and size <= PACKED_UP_TO else 0
+
+
+def analysis_memory(loads: Sequence[Load], members: int) -> int:
+    """Return the bytes that an analysis of `members` holds at its peak.
+
+    Parameters
+    ----------
+    loads
+        Of every level.
+    """
+    part = max(1, PART_SAMPLES // (loads[0].samples * loads[0].schemes))
+    at_hand = min(members, PARTS * part)
+    read = at_hand * sum(load.stored for load in loads)
+    written = _packed(analysis_disk(loads, members, is_lean=False), loads[0].extrema)
+    return ANALYSIS_MEMORY + round(ANALYSED * read) + RESULT * loads[0].schemes * members + written
+
+
+def analysis_disk(loads: Sequence[Load], members: int, is_lean: bool) -> int:
+    """Return the bytes that an analysis of `members` writes, before they are compressed.
+
+    Parameters
+    ----------
+    loads
+        Of every level.
+    members
+        Their number.
+    is_lean
+        Whether series are left out.
+    """
+    once, each = COMPARED
+    size = once + each * len(loads)
+    if not is_lean:
+        once, each = COMPARED_SERIES
+        size += loads[0].samples * (once + each * len(loads))
+        size += EXTREMUM * len(loads) * max(load.extrema for load in loads) + COMPARED_NUMBERS
+    file = COMPARED_FILE + (0 if is_lean else COMPARED_SERIES_FILE)
+    return loads[0].schemes * members * size + file

@@ -1,0 +1,279 @@
+"""A validated experiment as data: every default filled in, every number a number, nothing that could change.
+
+What reads an experiment or makes another one of it stands above: see `vibsim.experiment.experiment`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import AfterValidator, Field, PrivateAttr, StrictBool
+
+from vibsim.core.errors import VibsimError
+from vibsim.experiment.collection import ADHOC
+from vibsim.experiment.schema.axes import Axis
+from vibsim.experiment.schema.checks import Check
+from vibsim.experiment.schema.fields import (
+    DECLARED,
+    Count,
+    FrozenDict,
+    Identifier,
+    Level,
+    Output,
+    Positive,
+    Section,
+    Text,
+)
+from vibsim.experiment.schema.published import PublishedTable
+from vibsim.models import MODELS, Model, natural_end, quantities
+from vibsim.models.table import Table
+from vibsim.schemes import SCHEMES
+
+Numbers = Annotated[dict[str, float], AfterValidator(FrozenDict)]
+Options = Annotated[dict[str, StrictBool | float | str], AfterValidator(FrozenDict)]
+
+
+class TableSpec(Section):
+    """A table in place of a formula: where it stands, and which numbers it had when the experiment was read."""
+
+    file: Text
+    """Path of the file, relative to the folder of the experiment file."""
+    place: Text
+    value: Text
+    """Names of the columns of places and values."""
+    numbers: Text
+    """SHA-256 of the numbers (`vibsim.models.table.Table.digest`), on which results depend alone."""
+    is_met: bool = False
+    """Whether a step of every member ends at every point (`vibsim.models.table.Lookup.is_met`)."""
+    _table: Table | None = PrivateAttr(default=None)
+    _content: str = PrivateAttr(default="")
+
+    def hold(self, table: Table, content: str) -> None:
+        """Take the numbers of the file, and the SHA-256 of its bytes, which are no part of an experiment's identity."""
+        self._table, self._content = table, content
+
+    @property
+    def content(self) -> str:
+        """SHA-256 of the bytes of the file, as it was read."""
+        return self._content
+
+    @property
+    def table(self) -> Table:
+        """The numbers, which `vibsim.experiment.tables.attach.attach` puts there."""
+        if self._table is None:
+            raise VibsimError(f"the table {self.file} was not read")
+        return self._table
+
+
+class ModelSpec(Section):
+    """The model, with every parameter."""
+
+    kind: Text
+    parameters: Numbers
+    """By the place of each in the section: ``m``, ``damping.linear``, ``parameters.k``."""
+    formulas: Annotated[dict[str, str], AfterValidator(FrozenDict)] = FrozenDict()
+    """What the file writes as formulas, by the names of `vibsim.models.Model.formulas`."""
+    tables: Annotated[dict[str, TableSpec], AfterValidator(FrozenDict)] = FrozenDict()
+    """Tables that stand in place of formulas, by the same names."""
+    terms: tuple[Text, ...] = ()
+    """Which of `vibsim.models.Model.optional` the equation has: those that are not neutral, or are swept."""
+
+    @property
+    def definition(self) -> Model:
+        """The equation of motion that this section describes."""
+        model = MODELS[self.kind]
+        if model.written is not None:
+            declared = (key.partition(".") for key in self.parameters)
+            names = (name for section, _, name in declared if section == DECLARED)
+            model = model.written(self.formulas, tuple(names))
+        for own in self.tables.values():
+            if model.with_table is not None:
+                model = model.with_table(own.table, own.is_met)
+        return model.variant(frozenset(self.terms)) if model.variant is not None else model
+
+
+class TimeSpec(Section):
+    """The time interval and the number of steps at level 0."""
+
+    end: Positive
+    """The last time of a member that is not swept."""
+    base_steps: Count
+    """Steps at level 0."""
+    periods: float | None = None
+    """The end in natural periods, where the file gives it so: each member then has its own end."""
+
+
+class Scaling(Section):
+    """What leads back from a run in characteristic units; the numbers of the run itself are dimensionless."""
+
+    scales: Numbers
+    """The characteristic scales: ``t``, every state, ``energy``."""
+    parameters: Numbers
+    """As in the file, in the units of the model."""
+    initial: Numbers
+    end: Positive
+
+
+class SchemeSpec(Section):
+    """A scheme, with every option."""
+
+    name: Text
+    """The label, else the kind."""
+    kind: Text
+    options: Options
+
+    @property
+    def adaptive(self) -> bool:
+        """Whether it chooses its own steps, outside the ladder."""
+        return SCHEMES[self.kind].adaptive
+
+    @property
+    def own_velocity(self) -> bool:
+        """Whether it has another velocity than the centred difference ``[D_2t u]``, which is then kept beside it."""
+        return not self.adaptive and SCHEMES[self.kind].stepper(self.options).own_velocity
+
+
+class Sweep(Section):
+    """Parameters that vary: a grid, the last axis fastest."""
+
+    axes: tuple[Axis, ...]
+    """In the order written."""
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Dotted keys of everything that varies, in the order written."""
+        return tuple(key for axis in self.axes for key in axis.keys)
+
+    @property
+    def count(self) -> int:
+        """Number of members."""
+        return math.prod(axis.count for axis in self.axes)
+
+
+def end_varies(swept: Iterable[tuple[str, bool]], by_periods: bool) -> bool:
+    """Tell whether the end time differs between members.
+
+    Parameters
+    ----------
+    swept
+        Dotted keys of the sweep, each with whether its values differ.
+    by_periods
+        Whether the end is a number of natural periods: it then counts as different as soon as a parameter of the
+        model is.
+    """
+    keys = [key for key, differs in swept if differs]
+    return "time.end" in keys or (by_periods and any(key.startswith("model.") for key in keys))
+
+
+class ExperimentSpec(Section):
+    """The fields of an experiment, and what follows from them alone."""
+
+    collection: Identifier
+    name: Identifier
+    title: Text
+    source: Text | None
+    model: ModelSpec
+    initial: Numbers
+    """Initial value of every state."""
+    time: TimeSpec
+    levels: tuple[Level, ...]
+    """Strictly increasing; none where `tolerance` is still to choose them."""
+    schemes: tuple[SchemeSpec, ...]
+    sweep: Sweep | None = None
+    samples: Annotated[int, Field(ge=1)] | Literal["auto", "common", "all"] = "auto"
+    """Which steps are stored; a number n stands for every n-th of each level."""
+    output: Output = "verdict"
+    """``best`` where the extrapolated solution is wanted beside the verdict."""
+    tolerance: float | None = None
+    """Error bound that chooses the levels; None where the file gives them."""
+    checks: tuple[Check, ...] = ()
+    """As written, and behind them one claim for every row of `published`."""
+    published: tuple[PublishedTable, ...] = ()
+    """Tables of numbers that a source printed."""
+    units: Annotated[dict[str, str], AfterValidator(FrozenDict)] = FrozenDict()
+    """Units that the file defines, in SI base units; every number is converted already."""
+    scaling: Scaling | None = None
+    """Present where the run is made in the characteristic units of the model."""
+    _file: Path | None = PrivateAttr(default=None)
+
+    @property
+    def file(self) -> Path | None:
+        """Where the experiment was read; not part of its identity."""
+        return self._file
+
+    @property
+    def word(self) -> str:
+        """How a command line names the experiment.
+
+        One that comes with vibsim is named by its collection, any other by its file, in the folder of that file:
+        results hold no path of a machine, and are the same wherever they are made.
+        """
+        stem = self._file.stem if self._file else self.name
+        word = f"{self.collection}/{stem}"
+        if self.collection == ADHOC:
+            word = self._file.name if self._file else f"{self.name}.yaml"
+        return word if self.name == stem else f"{word}@{self.name.removeprefix(f'{stem}_case_')}"
+
+    @property
+    def members(self) -> int:
+        """Number of members of the sweep, 1 without one."""
+        return self.sweep.count if self.sweep else 1
+
+    @property
+    def end_varies(self) -> bool:
+        """Whether the end time differs between members, so that ``t`` is the fraction 0 to 1 of it."""
+        axes = self.sweep.axes if self.sweep else ()
+        swept = (pair for axis in axes for pair in zip(axis.keys, axis.varies, strict=True))
+        return end_varies(swept, self.time.periods is not None)
+
+    @property
+    def written(self) -> tuple[Check, ...]:
+        """The checks without those of `published`."""
+        rows = sum(len(table.rows) for table in self.published)
+        return self.checks[: len(self.checks) - rows]
+
+    @property
+    def ladder(self) -> tuple[int, ...]:
+        """Numbers of the schemes that take equal steps, and so have levels to compare; at least one."""
+        return tuple(i for i, scheme in enumerate(self.schemes) if not scheme.adaptive)
+
+    @property
+    def own_velocity(self) -> bool:
+        """Whether some scheme has another velocity than the centred difference ``[D_2t u]``, without events."""
+        smooth = self.model.definition.events is None
+        return smooth and any(scheme.own_velocity for scheme in self.schemes)
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of every quantity that is kept as a series where storage is not bounded."""
+        return quantities(self.model.definition, self.own_velocity)
+
+    def scheme_options(self, scheme: int) -> Mapping[str, str | float | bool]:
+        """Return the options of scheme number `scheme`, apart from those that are swept.
+
+        `vibsim.plan.option_groups` gives the options of each member.
+        """
+        return self.schemes[scheme].options
+
+    def natural_end(self, parameters: Mapping[str, Any]) -> Any:
+        """Return the end time of a member with these `parameters` (numbers or arrays), unless swept."""
+        if self.time.periods is None:
+            return self.time.end
+        return natural_end(self.model.definition, self.time.periods, parameters)
+
+    def steps(self, level: int) -> int:
+        """Return the number of steps at `level`: ``base_steps * 2**level``."""
+        return self.time.base_steps << level
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ExperimentSpec) and self.__dict__ == other.__dict__
+
+    def __hash__(self) -> int:
+        return hash(tuple(self.__dict__.values()))
+
+
+AnyExperiment = TypeVar("AnyExperiment", bound=ExperimentSpec)
+"""The class of an experiment, which stays the same where one is made of another."""

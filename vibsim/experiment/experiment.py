@@ -1,0 +1,121 @@
+"""`Experiment`: an experiment with the ways to read one, to make another one of it, and to store it as JSON.
+
+The modules behind the ways are imported when they are taken: a job, which restores its experiment, needs none of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Self
+
+from vibsim.experiment.collection import ADHOC
+from vibsim.experiment.data import ExperimentSpec
+from vibsim.experiment.schema.checks import Check
+
+
+class Experiment(ExperimentSpec):
+    """One experiment. Build it with `from_yaml` or `from_dict`, which check everything."""
+
+    @classmethod
+    def from_yaml(
+        cls, path: str | Path, *, collection: str | None = None, configs: Path | None = None
+    ) -> Self:
+        """Read an experiment file.
+
+        Parameters
+        ----------
+        path
+            A YAML file; its name without the ending is the experiment's.
+        collection
+            Name of the collection; by default that of `vibsim.experiment.collection_of`.
+        configs
+            The folder of collections; by default that of the checkout.
+
+        Raises
+        ------
+        InputError
+            With every fault of the file.
+        """
+        from vibsim.experiment.reading import from_file
+
+        return from_file(cls, Path(path), collection, configs)
+
+    @classmethod
+    def from_dict(
+        cls, data: Mapping[str, Any], *, name: str = "experiment", collection: str = ADHOC
+    ) -> Self:
+        """Build an experiment from what a file would hold.
+
+        Raises
+        ------
+        InputError
+            With every fault of `data`.
+        """
+        from vibsim.experiment.reading import from_content
+
+        return from_content(cls, data, name, collection)
+
+    def alone(self, case: int) -> Self:
+        """Return the experiment of one member, without a sweep; see `vibsim.experiment.single_member`."""
+        from vibsim.experiment.single_member import alone
+
+        return alone(self, case)
+
+    def with_levels(self, levels: Sequence[int]) -> Self:
+        """Return the experiment with the `levels` chosen by its tolerance; see `vibsim.experiment.with_levels`."""
+        from vibsim.experiment.with_levels import with_levels
+
+        return with_levels(self, levels)
+
+
+def canonical(experiment: Experiment) -> dict[str, Any]:
+    """Return `experiment` as JSON-able data: the same for files that mean the same.
+
+    The sections stand apart, so that a digest can take those that a job uses: ``collection``, ``name``, ``title``,
+    ``source``, ``model``, ``initial``, ``time``, ``levels``, ``schemes``, ``sweep``, ``samples``, ``output``,
+    ``tolerance``, ``checks``, and ``published``, ``units`` and ``scaling`` where there is any.
+    """
+    data = experiment.model_dump(mode="json", exclude={"checks"})
+    data["sweep"] = data["sweep"] and data["sweep"]["axes"]
+    data["checks"] = [_check(check) for check in experiment.checks]
+    for name in ("published", "units", "scaling"):
+        if not getattr(experiment, name):
+            del data[name]
+    if not experiment.model.tables:
+        del data["model"]["tables"]
+    return data
+
+
+def restore(content: Mapping[str, Any], file: Path | None = None) -> Experiment:
+    """Return the experiment that `content`, made by `canonical`, describes; `file` is where it was read, if known.
+
+    Raises
+    ------
+    InputError
+        Where a table of it cannot be read, or has other numbers than it had.
+    """
+    data = dict(content)
+    data["sweep"] = data["sweep"] and {"axes": data["sweep"]}
+    data["checks"] = [_without_kind(check) for check in data["checks"]]
+    experiment = Experiment.model_validate(data)
+    experiment._file = file
+    if experiment.model.tables:
+        from vibsim.experiment.tables.attach import attach
+
+        attach(experiment)
+    return experiment
+
+
+def _without_kind(check: Mapping[str, Any]) -> dict[str, Any]:
+    data = {key: value for key, value in check.items() if key != "kind"}
+    if "that" in data:
+        data["that"] = _without_kind(data["that"])
+    return data
+
+
+def _check(check: Check) -> dict[str, Any]:
+    data: dict[str, Any] = {"kind": check.kind, **check.model_dump(mode="json")}
+    if check.kind == "claim":
+        data["that"] = _check(check.that)
+    return data

@@ -1,0 +1,1 @@
+"""What an experiment must be besides well-formed, section by section."""

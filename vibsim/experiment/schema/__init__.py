@@ -1,0 +1,1 @@
+"""The experiment file as it is written: one class per section, and the JSON Schema of them."""

@@ -1,0 +1,251 @@
+"""What a file may claim about its outcome: the checks, as written and as used."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    StrictBool,
+    Tag,
+    WithJsonSchema,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
+
+from vibsim.core.vocabulary import REASONS, TOLERANCE, TYPICAL_NORM, Norm, Status
+from vibsim.experiment.schema.fields import (
+    MAX_LEVEL,
+    GivenId,
+    Index,
+    NonNegative,
+    Number,
+    Positive,
+    Section,
+    Text,
+    number,
+    tag,
+    whole,
+)
+from vibsim.experiment.schema.scheme_checks import (
+    ConservesCheck,
+    EqualCheck,
+    MeasuringCheck,
+    StableCheck,
+)
+from vibsim.experiment.value_names import VALUES
+
+
+class Expect(Section):
+    """The verdict that a check should get."""
+
+    status: Status = "PASS"
+    """The expected status."""
+    reason: Annotated[str, Field(json_schema_extra={"enum": list(REASONS)})] | None = None
+    """The expected reason; any reason when left out."""
+
+
+def _order(value: Any) -> Any:
+    if value == "scheme":
+        return value
+    order = number(value)
+    if order <= 0.0:
+        raise PydanticCustomError("order", "must be 'scheme' or a number greater than 0")
+    return order
+
+
+def _level(value: Any) -> Any:
+    if value == "best":
+        return value
+    level = whole(value)
+    if not 0 <= level <= MAX_LEVEL:
+        raise PydanticCustomError("level", f"must be a level from 0 to {MAX_LEVEL}, or best")
+    return level
+
+
+Order = Annotated[
+    Literal["scheme"] | float,
+    BeforeValidator(_order),
+    WithJsonSchema({"anyOf": [{"const": "scheme"}, {"type": ["number", "string"]}]}),
+]
+LevelOrBest = Annotated[
+    Literal["best"] | int,
+    BeforeValidator(_level),
+    WithJsonSchema({"anyOf": [{"const": "best"}, {"type": "integer", "minimum": 0}]}),
+]
+
+
+def _describe_best(schema: dict[str, Any]) -> None:
+    description = "`best: true` is the same as `level: best`."
+    schema["properties"]["best"] = {"const": True, "description": description}
+
+
+class At(Section):
+    """Where a value is taken; left out means every scheme, every case, the finest level."""
+
+    model_config = ConfigDict(json_schema_extra=_describe_best)
+
+    t: Number | None = None
+    """A stored sample time; where the end differs between members, the fraction 0 to 1 of it."""
+    step: Index | None = None
+    """A stored step of the level, from 0."""
+    level: LevelOrBest | None = None
+    """A level, or `best` for the Richardson-extrapolated solution."""
+    scheme: Text | None = None
+    """Name of a scheme."""
+    case: Index | None = None
+    """Index of a member of the sweep, from 0."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _best(cls, data: Any) -> Any:
+        if not isinstance(data, dict) or "best" not in data:
+            return data
+        rest = {key: value for key, value in data.items() if key != "best"}
+        if data["best"] is not True:
+            raise PydanticCustomError("best", "best must be true, or left out")
+        if rest.setdefault("level", "best") != "best":
+            raise PydanticCustomError("best", "must have a level or best, not both")
+        return rest
+
+
+class ConvergesCheck(MeasuringCheck):
+    """A quantity converges with an order, and the verdict can be trusted."""
+
+    kind: ClassVar[Literal["converges"]] = "converges"
+    converges: Text
+    """The quantity: a state, energy, energy_deviation, kinetic_energy, potential_energy, or the part of an error
+    `<position>_phase_error` or `<position>_amplitude_error`."""
+    order: Order = "scheme"
+    """The order: `scheme` for the order that the scheme promises, or a number."""
+    tolerance: Positive = TOLERANCE
+    """How far the observed order may be from the expected one."""
+    norm: Norm = TYPICAL_NORM
+    """The norm over time in which differences are measured."""
+    schemes: Annotated[tuple[Text, ...], Field(min_length=1)] | None = None
+    """Names of the schemes; every scheme when left out."""
+    expect: Expect = Expect()
+    """The verdict that passes; PASS when left out."""
+
+    @property
+    def about(self) -> str | None:
+        """The quantity that must be known over time."""
+        return self.converges
+
+
+DEFAULT_RTOL, DEFAULT_ATOL = 1e-9, 1e-12
+"""Tolerances of ``equals`` where a check gives none; the second of numbers without a unit, and of 0, alone."""
+PLAIN = ("none", "count")
+"""Measures of numbers without a unit."""
+
+
+class ValueCheck(MeasuringCheck):
+    """A number of the outcome equals, is below or is above a given one."""
+
+    kind: ClassVar[Literal["value"]] = "value"
+    value: Annotated[str, Field(json_schema_extra={"enum": sorted(VALUES)})]
+    """Name of the number, see `vibsim list checks`."""
+    quantity: Text | None = None
+    """The quantity that it is of, where it is of one."""
+    at: At = At()
+    """Where it is taken."""
+    equals: Number | None = None
+    """The number that it must equal, within `rtol` and `atol`."""
+    below: Number | None = None
+    """The number that it must be below."""
+    above: Number | None = None
+    """The number that it must be above."""
+    rtol: NonNegative | None = None
+    """Relative tolerance of `equals`."""
+    atol: NonNegative | None = None
+    """Absolute tolerance of `equals`."""
+
+    @property
+    def allowed(self) -> float:
+        """How far the number may be from `equals`; NaN where the check has a border."""
+        if self.equals is None:
+            return math.nan
+        plain = self.rtol is None and self.atol is None
+        rtol = DEFAULT_RTOL if plain else self.rtol or 0.0
+        # what has a unit may be as small as it likes
+        sized = self.equals != 0.0 and VALUES[self.value].measure not in PLAIN
+        atol = (0.0 if sized else DEFAULT_ATOL) if plain else self.atol or 0.0
+        return atol + rtol * abs(self.equals)
+
+    @property
+    def about(self) -> str | None:
+        """The quantity that must be known over time."""
+        return self.quantity
+
+
+def _which(value: Any) -> str | None:
+    """Tell the kind of a check from its leading key."""
+    if isinstance(value, ClaimCheck | Measurement):
+        return tag(value.kind)
+    keys = value if isinstance(value, dict) else ()
+    return next((tag(key) for key in CLASSES if key in keys), None)
+
+
+def _keys(*more: str) -> str:
+    """Say in words which key a check must have."""
+    *others, last = (*MEASURED, *more)
+    return f"must be a mapping with the key {', '.join(others)} or {last}"
+
+
+MEASURED: Mapping[str, type[Section]] = MappingProxyType(
+    {row.kind: row for row in (ConvergesCheck, ValueCheck, StableCheck, ConservesCheck, EqualCheck)}
+)
+"""The checks that measure something, by their leading key."""
+
+Measurement = ConvergesCheck | ValueCheck | StableCheck | ConservesCheck | EqualCheck
+Measured = Annotated[
+    Annotated[ConvergesCheck, Tag(tag("converges"))]
+    | Annotated[ValueCheck, Tag(tag("value"))]
+    | Annotated[StableCheck, Tag(tag("stable"))]
+    | Annotated[ConservesCheck, Tag(tag("conserves"))]
+    | Annotated[EqualCheck, Tag(tag("equal"))],
+    Discriminator(_which, custom_error_type="check", custom_error_message=_keys()),
+]
+
+
+class ClaimCheck(Section):
+    """A statement of a source, true or false, and the measurement that decides it."""
+
+    kind: ClassVar[Literal["claim"]] = "claim"
+    id: GivenId = ""
+    """Name of the check, unique in the file; `check_1` and so on when left out."""
+    claim: Text
+    """The statement, in words."""
+    source: Text | None = None
+    """Where the statement stands."""
+    that: Measured
+    """The check that measures it."""
+    holds: StrictBool = True
+    """Whether the statement is expected to be true."""
+    note: Text | None = None
+    """What a reader of the report should know of it."""
+
+    @property
+    def measured(self) -> Measurement:
+        """The check that is measured: the one that decides the claim."""
+        return self.that
+
+
+CLASSES: Mapping[str, type[Section]] = MappingProxyType({"claim": ClaimCheck, **MEASURED})
+"""Every kind of check by its leading key."""
+
+Check = Annotated[
+    Annotated[ConvergesCheck, Tag(tag("converges"))]
+    | Annotated[ValueCheck, Tag(tag("value"))]
+    | Annotated[StableCheck, Tag(tag("stable"))]
+    | Annotated[ConservesCheck, Tag(tag("conserves"))]
+    | Annotated[EqualCheck, Tag(tag("equal"))]
+    | Annotated[ClaimCheck, Tag(tag("claim"))],
+    Discriminator(_which, custom_error_type="check", custom_error_message=_keys("claim")),
+]

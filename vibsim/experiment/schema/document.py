@@ -1,0 +1,195 @@
+"""The experiment file as it is written: one class per section, built from the registries."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Union
+
+from pydantic import (
+    ConfigDict,
+    Discriminator,
+    Field,
+    StrictBool,
+    Tag,
+    WithJsonSchema,
+)
+
+from vibsim.experiment.schema.checks import Check
+from vibsim.experiment.schema.fields import (
+    MAX_ENTRIES,
+    MAX_LEVEL,
+    Count,
+    Fraction,
+    Level,
+    Number,
+    Output,
+    Positive,
+    Section,
+    Text,
+    short,
+    tag,
+)
+from vibsim.experiment.schema.model_section import model_section
+from vibsim.experiment.schema.published import PublishedTable
+from vibsim.experiment.schema.scheme_section import scheme_section
+from vibsim.experiment.schema.sweep_section import SweepSection
+from vibsim.models import MODELS
+from vibsim.schemes import SCHEMES
+
+
+def _kind(value: Any) -> str | None:
+    kind = value.get("kind") if isinstance(value, Mapping) else getattr(value, "kind", None)
+    return tag(kind) if isinstance(kind, str) else None
+
+
+def _scheme_tag(value: Any) -> str | None:
+    return tag("name") if isinstance(value, str) else _kind(value)
+
+
+def _by_kind(sections: Mapping[str, type[Section]], more: tuple[Any, ...] = ()) -> Any:
+    return Union[(*more, *(Annotated[s, Tag(tag(kind))] for kind, s in sections.items()))]
+
+
+_SCHEME_NAME = Annotated[
+    str,
+    Field(json_schema_extra={"enum": sorted(SCHEMES)}, description="A scheme with its defaults."),
+    Tag(tag("name")),
+]
+MODEL_SECTIONS = {kind: model_section(model) for kind, model in MODELS.items()}
+SCHEME_SECTIONS = {kind: scheme_section(scheme) for kind, scheme in SCHEMES.items()}
+AnyModel: Any = Annotated[_by_kind(MODEL_SECTIONS), Discriminator(_kind)]
+AnyScheme: Any = Annotated[_by_kind(SCHEME_SECTIONS, (_SCHEME_NAME,)), Discriminator(_scheme_tag)]
+
+
+class TimeSection(Section):
+    """The time interval and the number of steps at level 0; level l has 2**l times as many."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "oneOf": [
+                {
+                    "required": ["end"],
+                    "not": {
+                        "anyOf": [
+                            {"required": ["periods"]},
+                            {"required": ["steps_per_period"]},
+                            {"required": ["base_steps", "base_dt"]},
+                        ]
+                    },
+                },
+                {
+                    "required": ["periods", "steps_per_period"],
+                    "not": {
+                        "anyOf": [
+                            {"required": ["end"]},
+                            {"required": ["base_steps"]},
+                            {"required": ["base_dt"]},
+                        ]
+                    },
+                },
+            ]
+        }
+    )
+
+    end: Positive | None = None
+    """The last time; the first one is 0."""
+    base_steps: Count | None = None
+    """Number of steps at level 0; 1 when left out."""
+    base_dt: Positive | None = None
+    """Step at level 0, instead of `base_steps`; the end must be a whole number of it."""
+    periods: Positive | None = None
+    """Length in natural periods of the model (small oscillations), instead of `end`."""
+    steps_per_period: Positive | None = None
+    """Steps per natural period at level 0, with `periods`."""
+
+
+class LevelRange(Section):
+    """Consecutive levels, both ends included."""
+
+    from_: Level = Field(alias="from")
+    """The coarsest level."""
+    to: Level
+    """The finest level."""
+
+
+class Every(Section):
+    """Store every n-th step of each level."""
+
+    every: Count
+    """n; it must divide the number of steps of the coarsest level, whose stored times are those of the comparison."""
+
+
+def _shape(value: Any) -> str:
+    return tag("mapping") if isinstance(value, Mapping | Section) else tag("other")
+
+
+Levels = Annotated[
+    Annotated[LevelRange, Tag(tag("mapping"))]
+    | Annotated[tuple[Level, ...], Field(min_length=1), short(MAX_LEVEL + 1), Tag(tag("other"))],
+    Discriminator(_shape),
+]
+Samples = Annotated[
+    Annotated[Every, Tag(tag("mapping"))]
+    | Annotated[Literal["auto", "common", "all"], Tag(tag("other"))],
+    Discriminator(_shape),
+]
+
+
+def _initial_schema() -> dict[str, Any]:
+    """Describe the initial values of every model's states, for editors."""
+    states = {state.name: state for model in MODELS.values() for state in model.states}
+    properties = {
+        name: {
+            "type": ["number", "string"],
+            "default": 0.0,
+            "description": f"{state.long_name} [{state.unit}]",
+        }
+        for name, state in states.items()
+    }
+    return {"type": "object", "properties": properties, "additionalProperties": False}
+
+
+UNITS_SCHEMA = {
+    "type": "object",
+    "additionalProperties": {"type": ["number", "string"]},
+    "propertyNames": {"pattern": "^[^0-9\\s]+$"},
+}
+
+
+class Document(Section):
+    """An experiment of vibsim: what is simulated, and what is claimed about the outcome."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"oneOf": [{"required": ["levels"]}, {"required": ["tolerance"]}]}
+    )
+
+    title: Text
+    """What the experiment shows, in a line."""
+    source: Text | None = None
+    """What the experiment comes from."""
+    units: Annotated[dict[str, str], WithJsonSchema(UNITS_SCHEMA)] = Field({})
+    """Units of the file's own, such as ``rod: 4.9 m``: every number with a unit may name them."""
+    model: AnyModel
+    """The equation of motion and its parameters."""
+    initial: Annotated[dict[str, Number], WithJsonSchema(_initial_schema())] = Field({})
+    """Initial values of the states; 0 for those left out."""
+    time: TimeSection
+    """The time interval and the number of steps."""
+    levels: Levels | None = None
+    """The levels of refinement: each halves the time step of the one before."""
+    tolerance: Fraction | None = None
+    """Error bound that the extrapolated solution must reach, instead of `levels`: they are then chosen."""
+    scaled: StrictBool = False
+    """Whether the run is made in the characteristic units of the model, where it has a scaled equation."""
+    schemes: Annotated[tuple[AnyScheme, ...], Field(min_length=1), short(MAX_ENTRIES)]
+    """The schemes, each a kind or a mapping with its options."""
+    sweep: SweepSection | None = None
+    """Parameters that vary, by dotted path; several make a grid, the last one fastest."""
+    samples: Samples = "auto"
+    """Which steps are stored."""
+    output: Output = "verdict"
+    """What the experiment is for: a verdict, or beside it the best solution, extrapolated over the levels."""
+    checks: Annotated[tuple[Check, ...], short(MAX_ENTRIES)] = ()
+    """What must come out; when left out, that the position converges as the scheme promises."""
+    published: Annotated[tuple[PublishedTable, ...], short(MAX_ENTRIES)] = ()
+    """Tables that a source printed: every row is a claim, shown beside our number."""

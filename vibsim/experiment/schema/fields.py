@@ -1,0 +1,194 @@
+"""Types of single values: numbers that may be written as constant formulas, whole numbers, names.
+
+A rule is worded for the person who wrote the file.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from numbers import Integral, Real
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    GetJsonSchemaHandler,
+)
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from vibsim.experiment.schema.unit_text import split
+from vibsim.formula import ExpressionError, constant
+
+IDENTIFIER = r"^[a-z0-9_]+$"
+_CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
+MAX_LEVEL = 40
+MAX_FORMULAS = 1000
+"""Values of one list that are not plain numbers."""
+MAX_ENTRIES = 1000
+"""Schemes or checks of one experiment."""
+NO_UNIT = {
+    "rule": "must be a number without a unit: only model, initial, time and a sweep of these take units",
+    "hint": "write the number alone, in the unit of the table of models (of a scaled run: over its scale)",
+}
+DECLARED = "parameters"
+"""The key of the section ``model`` under which a file declares the names of its formulas."""
+TABLE = "table"
+"""The key of the path of a table."""
+FORMULA_NOTE = "a number, or a constant formula such as 2*pi/30"
+
+
+class Section(BaseModel):
+    """A part of an experiment: frozen, and without unknown keys."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, use_attribute_docstrings=True, allow_inf_nan=False
+    )
+
+
+class MadeSection(Section):
+    """A part that is made from a registry: its descriptions are given, and not looked for in a source file."""
+
+    model_config = ConfigDict(use_attribute_docstrings=False)
+
+
+class FrozenDict(dict[str, Any]):
+    """A dictionary that does not change, and therefore has a hash."""
+
+    def __hash__(self) -> int:  # type: ignore[override]
+        return hash(frozenset(self.items()))
+
+    def _refuse(self, *_: object, **__: object) -> Any:
+        raise TypeError("an experiment does not change; build another one")
+
+    __setitem__ = __delitem__ = __ior__ = _refuse
+    clear = pop = popitem = setdefault = update = _refuse
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (FrozenDict, (dict(self),))
+
+    def __copy__(self) -> FrozenDict:
+        return self
+
+    def __deepcopy__(self, memo: object) -> FrozenDict:
+        return self
+
+
+def tag(name: str) -> str:
+    """Mark the name of a union's member, so that it can be told from a key in the place of a fault."""
+    return f"\0{name}"
+
+
+def number(value: Any) -> float:
+    """Return `value` as a finite float; text is worked out as a constant formula."""
+    if isinstance(value, str):
+        try:
+            return constant(value)
+        except ExpressionError as error:
+            if split(value) is not None:
+                raise PydanticCustomError("unit", "{rule}", NO_UNIT) from None
+            rule = f"must be {FORMULA_NOTE} ({error.rule})"
+            raise PydanticCustomError(
+                "number", "{rule}", {"rule": rule, "hint": error.hint}
+            ) from None
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise PydanticCustomError("number", f"must be {FORMULA_NOTE}")
+    try:
+        result = float(value)
+    except OverflowError:
+        result = math.inf
+    if not math.isfinite(result):
+        raise PydanticCustomError("finite", "must be a finite number")
+    return result
+
+
+def whole(value: Any) -> int:
+    """Return `value` as an int; ``6.0`` is 6."""
+    if isinstance(value, bool):
+        raise PydanticCustomError("whole", "must be a whole number")
+    if isinstance(value, Integral):
+        return int(value)
+    if isinstance(value, float) and value.is_integer():
+        return int(value)
+    raise PydanticCustomError("whole", "must be a whole number")
+
+
+def short(limit: int) -> BeforeValidator:
+    """Refuse a list of more than `limit` entries before they are looked at."""
+
+    def check(values: Any) -> Any:
+        if isinstance(values, list | tuple) and len(values) > limit:
+            rule = f"must not have more than {limit} entries, has {len(values)}"
+            raise PydanticCustomError("long", "{rule}", {"rule": rule})
+        return values
+
+    return BeforeValidator(check)
+
+
+def plain(values: Any) -> Any:
+    """Refuse a list with more formulas than a person would write."""
+    if isinstance(values, list | tuple):
+        others = sum(not isinstance(value, int | float) for value in values)
+        if others > MAX_FORMULAS:
+            rule = f"must not hold more than {MAX_FORMULAS} formulas, holds {others}"
+            raise PydanticCustomError("formulas", "{rule}", {"rule": rule})
+    return values
+
+
+def _printable(text: str) -> str:
+    """Refuse what no page and no figure can show: XML 1.0 (2008), section 2.2, and the controls."""
+    found = _CONTROL.search(text)
+    if found:
+        rule = f"must not hold control characters, holds U+{ord(found.group()):04X}"
+        raise PydanticCustomError("control", "{rule}", {"rule": rule})
+    return text
+
+
+def _one_line(text: str) -> str:
+    if len(text.splitlines()) > 1 or set("\t\r\n") & set(text):
+        raise PydanticCustomError("line", "must be on one line, without tabs")
+    return text
+
+
+class _Formula:
+    """Marks a float that may be written as text; editors then accept both."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(number, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        result = handler(schema)
+        if result.get("type") == "number":
+            result["type"] = ["number", "string"]
+        return result
+
+
+FORMULA = _Formula()
+Number = Annotated[float, FORMULA]
+Positive = Annotated[float, Field(gt=0), FORMULA]
+Fraction = Annotated[float, Field(gt=0, lt=1), FORMULA]
+NonNegative = Annotated[float, Field(ge=0), FORMULA]
+Whole = Annotated[int, BeforeValidator(whole)]
+Level = Annotated[int, Field(ge=0, le=MAX_LEVEL), BeforeValidator(whole)]
+Count = Annotated[int, Field(ge=1), BeforeValidator(whole)]
+Index = Annotated[int, Field(ge=0), BeforeValidator(whole)]
+Identifier = Annotated[str, Field(pattern=IDENTIFIER)]
+
+
+def _no_default(schema: dict[str, Any]) -> None:
+    """Leave the default out of the schema: an empty id stands for a generated one."""
+    schema.pop("default", None)
+
+
+GivenId = Annotated[Identifier, Field(json_schema_extra=_no_default)]
+"""The id of a check; empty where the file gives none."""
+Text = Annotated[str, Field(min_length=1), AfterValidator(_printable)]
+"""Text that may have several lines."""
+Line = Annotated[Text, AfterValidator(_one_line)]
+"""Text on one line."""
+Output = Literal["verdict", "best"]

@@ -1,0 +1,105 @@
+"""The numbers of a sweep: what each key is of any range of members, in time and memory of that range.
+
+Every number is made with ``+ - * /`` of floats, or with arithmetic of whole numbers and decimals, so that it is the
+same on every machine; and member i is the same whatever range is asked.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from decimal import Context, Decimal
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.experiment.schema.axes import Axis, Draw, Linspace, Logspace, Values
+from vibsim.experiment.sweep.sample_points import scatter
+
+Column = NDArray[Any]
+"""Values of one key, float64 or text."""
+_DIGITS = 60
+"""Of the decimals in between: enough for the double next to the true value of any power that a double can hold."""
+
+
+def columns(axes: Sequence[Axis], start: int, stop: int) -> dict[str, Column]:
+    """Return the values of members start..stop-1 by dotted key, each of shape (stop - start,).
+
+    Parameters
+    ----------
+    axes
+        The axes of a grid, the last one fastest.
+    start, stop
+        Range of members, within the grid.
+    """
+    found: dict[str, Column] = {}
+    member = np.arange(start, stop, dtype=np.int64)
+    inner = math.prod(axis.count for axis in axes)
+    for axis in axes:
+        inner //= axis.count
+        found.update(_along(axis, inner, member))
+    return found
+
+
+def _along(axis: Axis, inner: int, member: NDArray[np.int64]) -> dict[str, Column]:
+    """Return the columns of one axis, on each value of which `inner` members follow each other."""
+    turn = member // inner
+    first, last = (int(turn[0]), int(turn[-1])) if len(turn) else (0, -1)
+    if last - first + 1 >= axis.count:
+        blocks, place = _block(axis, 0, axis.count), turn % axis.count
+    elif first % axis.count <= last % axis.count:
+        blocks, place = _block(axis, first % axis.count, last % axis.count + 1), turn - first
+    else:
+        # the range ends in the next turn of the axis
+        parts = _block(axis, first % axis.count, axis.count), _block(axis, 0, last % axis.count + 1)
+        blocks, place = [np.concatenate(pair) for pair in zip(*parts, strict=True)], turn - first
+    return {key: block[place] for key, block in zip(axis.keys, blocks, strict=True)}
+
+
+def _block(axis: Axis, start: int, stop: int) -> list[Column]:
+    """Return values number start..stop-1 along an axis, for every key."""
+    if isinstance(axis.values, Draw):
+        return scatter(axis.values, start, stop)
+    return [part(values, start, stop) for values in axis.values]
+
+
+def part(values: Values, start: int, stop: int) -> Column:
+    """Return values number start..stop-1 of one key."""
+    if isinstance(values, tuple):
+        return np.asarray(values)[start:stop]
+    if isinstance(values, Linspace):
+        return line(*values.linspace, start, stop)
+    if isinstance(values, Logspace):
+        return power(*values.logspace, start, stop)
+    first, _, step = values.range
+    return first + np.arange(start, stop) * step
+
+
+def line(
+    first: float, last: float, n: int, start: int = 0, stop: int | None = None
+) -> NDArray[np.float64]:
+    """Return values of a line, ``first + (last - first)*i/(n - 1)``, with exact ends."""
+    i = np.arange(start, n if stop is None else stop)
+    found = first + (last - first) * i / (n - 1)
+    found[i == n - 1] = last
+    return found
+
+
+def power(first: float, last: float, n: int, start: int, stop: int) -> NDArray[np.float64]:
+    """Return values of a geometric line, ``first*(last/first)**(i/(n - 1))``, each rounded to the nearest double.
+
+    The powers are taken in decimals, whose ``ln`` and ``exp`` are rounded correctly on every machine; the ends come
+    out exact.
+    """
+    context = Context(prec=_DIGITS)
+    rise = context.divide(
+        context.subtract(context.ln(Decimal(last)), context.ln(Decimal(first))), Decimal(n - 1)
+    )
+    ratio = context.exp(rise)
+    value = context.multiply(Decimal(first), context.exp(context.multiply(rise, Decimal(start))))
+    found = np.empty(stop - start)
+    for i in range(stop - start):
+        found[i] = value
+        value = context.multiply(value, ratio)
+    return found

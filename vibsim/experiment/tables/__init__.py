@@ -1,0 +1,1 @@
+"""Tables beside an experiment file."""

@@ -1,0 +1,236 @@
+"""Tables beside an experiment file: equally spaced places and a value at each, from CSV text or a netCDF file.
+
+A CSV file is UTF-8 text (`vibsim.experiment.tables.csv_text`). A netCDF file has two variables of one dimension.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.core import netcdf
+from vibsim.core.errors import nearest
+from vibsim.experiment.tables import csv_text
+from vibsim.experiment.yaml.file_content import MOST_BYTES, content_of
+from vibsim.models.table import FEWEST, Table
+
+Floats = NDArray[np.float64]
+
+ENDINGS = (".csv", ".nc")
+MOST_POINTS = 2**20
+EVEN = 1e-3
+"""How far a place may be from where equal spacing has it, in spacings: a file may have rounded it."""
+UNIT = "m"
+MOST_LISTED = 8
+"""Files that a message lists, at most."""
+MOST_SHOWN = 40
+"""Characters of a name that a message shows, at most."""
+
+
+class TableError(ValueError):
+    """A table that is refused.
+
+    Parameters
+    ----------
+    key
+        The key of the section that is at fault: ``table``, or that of the name of a column.
+    rule, hint
+        The rule that is broken, and the nearest valid choice.
+    """
+
+    def __init__(self, key: str, rule: str, hint: str = "") -> None:
+        self.key, self.rule, self.hint = key, rule, hint
+        super().__init__(rule)
+
+
+@dataclass(frozen=True)
+class Columns:
+    """The two columns of a file, and how its points are counted in messages."""
+
+    place: Floats
+    value: Floats
+    lines: NDArray[np.int64]
+    """Line of every point in a text, else its index from 0."""
+    word: str
+    """``line`` or ``index``."""
+
+    def at(self, i: Any) -> str:
+        """Say where point number i stands."""
+        return f"{self.word} {self.lines[int(i)]}"
+
+
+def read(path: Path, keys: tuple[str, str], names: tuple[str, str]) -> tuple[Table, str]:
+    """Return the table in the file at `path`, and the SHA-256 of its bytes.
+
+    Parameters
+    ----------
+    keys, names
+        Of the columns of places and values: the keys under which an experiment names them, and their names.
+
+    Raises
+    ------
+    TableError
+        Where it is none, or cannot be read.
+    """
+    content = _content(path)
+    if names[0] == names[1]:
+        rule = f"must be another column than '{names[0]}', which holds the places"
+        raise TableError(keys[1], rule)
+    of_kind = _from_text if path.suffix.lower() == ".csv" else _from_netcdf
+    columns = of_kind(content, keys, names)
+    return _table(columns, names), hashlib.sha256(content).hexdigest()
+
+
+def _content(path: Path) -> bytes:
+    if path.suffix.lower() not in ENDINGS:
+        raise TableError("table", f"the name of a table must end with {' or '.join(ENDINGS)}")
+    if path.is_dir():
+        raise TableError("table", "is a folder, and must be a file")
+    try:
+        content = content_of(path, MOST_BYTES)
+    except FileNotFoundError:
+        raise TableError("table", "there is no such file", _alike(path)) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise TableError("table", f"cannot be read ({reason})") from None
+    if len(content) > MOST_BYTES:
+        raise TableError("table", f"must not be larger than {MOST_BYTES >> 20} MiB")
+    return content
+
+
+def _alike(path: Path) -> str:
+    """Name the nearest table beside a file that is missing."""
+    try:
+        beside = [p.name for p in path.parent.iterdir() if p.suffix.lower() in ENDINGS]
+    except (OSError, ValueError):
+        return "there is no such folder"
+    if not beside:
+        return "there is no table in that folder"
+    hint = nearest(path.name, sorted(beside))
+    is_close = hint.startswith("did") or len(beside) <= MOST_LISTED
+    return hint if is_close else f"there are {len(beside)} tables in that folder"
+
+
+def _from_text(content: bytes, keys: tuple[str, str], names: tuple[str, str]) -> Columns:
+    def choose(header: csv_text.Header) -> list[int]:
+        return [
+            _found(header.names, name, key, "column", is_told=header.is_of_numbers)
+            for key, name in zip(keys, names, strict=True)
+        ]
+
+    try:
+        found = csv_text.read(content, choose, MOST_POINTS)
+    except csv_text.CsvError as error:
+        raise TableError("table", _told(error), error.hint) from None
+    _check_count(len(found.lines))
+    place, value = found.columns
+    return Columns(place, value, found.lines, "line")
+
+
+def _told(error: csv_text.CsvError) -> str:
+    """Return the rule, with the cell where that may be shown: the file may be anything that a link leads to."""
+    if not error.line:
+        return error.rule
+    cell = f"'{error.cell}' " if error.cell and csv_text.is_shown(error.cell) else ""
+    place = f", in column '{error.column}'" if error.column else ""
+    what = "" if cell or not error.column else "the cell "
+    return f"line {error.line}: {cell}{what}{error.rule}{place}"
+
+
+def _found(names: list[str], name: str, key: str, word: str, *, is_told: bool = True) -> int:
+    """Return the number of the column `name`; `is_told`: a message may tell the others."""
+    if name not in names:
+        hint = nearest(name, [known[:MOST_SHOWN] for known in names]) if is_told else ""
+        if len(names) > MOST_LISTED and not hint.startswith("did"):
+            hint = f"it has {len(names)}"
+        raise TableError(key, f"the table has no {word} '{name}'", hint)
+    if names.count(name) > 1:
+        raise TableError(key, f"the table has more than one {word} '{name}'")
+    return names.index(name)
+
+
+def _from_netcdf(content: bytes, keys: tuple[str, str], names: tuple[str, str]) -> Columns:
+    try:
+        with netcdf.in_memory(content) as dataset:
+            found = [_variable(dataset, *pair) for pair in zip(keys, names, strict=True)]
+    except (OSError, RuntimeError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise TableError("table", f"the netCDF library cannot read it ({reason})") from None
+    place, value = found
+    if len(place) != len(value):
+        rule = f"'{names[0]}' has {len(place)} points, '{names[1]}' has {len(value)}"
+        raise TableError("table", f"both variables must be of one dimension: {rule}")
+    return Columns(place, value, np.arange(len(place)), "index")
+
+
+def _variable(dataset: Any, key: str, name: str) -> Floats:
+    """Return a variable of one dimension as numbers; what is missing in it is NaN."""
+    known = list(dataset.variables)
+    variable = dataset.variables[known[_found(known, name, key, "variable")]]
+    if len(variable.dimensions) != 1:
+        dims = len(variable.dimensions)
+        raise TableError(key, f"variable '{name}' must have one dimension, and has {dims}")
+    unit = str(getattr(variable, "units", UNIT)).strip()
+    if unit not in (UNIT, "metre", "meter", "metres", "meters"):
+        raise TableError(key, f"variable '{name}' is in '{unit}', and must be in {UNIT}")
+    _check_count(variable.size)
+    if variable.dtype is str or variable.dtype.kind not in "fiu":
+        raise TableError(key, f"variable '{name}' must hold numbers")
+    values = np.ma.asarray(variable[:])
+    return np.ma.filled(values.astype(np.float64), np.nan)
+
+
+def _check_count(points: int) -> None:
+    if points < FEWEST:
+        raise TableError("table", f"must have at least {FEWEST} points, has {points}")
+    if points > MOST_POINTS:
+        raise TableError("table", f"must not have more than {MOST_POINTS} points, has {points}")
+
+
+def _table(columns: Columns, names: tuple[str, str]) -> Table:
+    """Return the table of two columns that can be one."""
+    x, h = columns.place, columns.value
+    for name, values in zip(names, (x, h), strict=True):
+        wrong = np.flatnonzero(~np.isfinite(values))
+        if len(wrong):
+            rule = f"{columns.at(wrong[0])}: '{name}' is {values[wrong[0]]:g}, and must be finite"
+            raise TableError("table", rule)
+    falling = np.flatnonzero(np.diff(x) <= 0.0)
+    if len(falling):
+        i = int(falling[0])
+        rule = f"'{names[0]}' must increase, but is {x[i]:.10g} and then {x[i + 1]:.10g}"
+        raise TableError("table", f"{columns.at(i + 1)}: {rule}")
+    spacing = float(x[-1] - x[0]) / (len(x) - 1)
+    if not 0.0 < spacing < np.inf:
+        raise TableError("table", f"'{names[0]}' must span a finite length")
+    _check_spacing(columns, names[0])
+    if x[0] > EVEN * spacing:
+        rule = f"'{names[0]}' must begin at 0 or below, where the motion starts; it begins at {x[0]:.10g}"
+        raise TableError("table", rule)
+    table = Table(float(x[0]), spacing, h)
+    with np.errstate(all="ignore"):
+        if not np.isfinite(table.rows).all():
+            raise TableError("table", "its second differences are too large to be numbers")
+    return table
+
+
+def _check_spacing(columns: Columns, name: str) -> None:
+    """Refuse places that are not equally spaced, and say where they leave the spacing that most of them have."""
+    x = columns.place
+    gaps = np.diff(x)
+    spacing = float(np.median(gaps))
+    even = x[0] + np.arange(len(x)) * ((x[-1] - x[0]) / (len(x) - 1))
+    if np.all(np.abs(x - even) <= EVEN * spacing):
+        return
+    odd = np.flatnonzero(np.abs(gaps - spacing) > EVEN * spacing)
+    i = int(odd[0]) if len(odd) else int(np.argmax(np.abs(x - even)))
+    i = min(i, len(gaps) - 1)
+    rule = f"'{name}' must be equally spaced, but is {gaps[i]:.10g} further than the point before"
+    raise TableError(
+        "table", f"{columns.at(i + 1)}: {rule}", f"the others are {spacing:.10g} apart"
+    )

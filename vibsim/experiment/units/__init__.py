@@ -1,0 +1,1 @@
+"""Numbers with units, and runs in characteristic units."""

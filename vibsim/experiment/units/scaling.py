@@ -1,0 +1,92 @@
+"""A run in the characteristic units of its model: dimensionless numbers in, and the factors that lead back.
+
+Source: vibration text (B), section 10.1; pendulum lecture (A), section 1.2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from vibsim.experiment.data import Scaling, TimeSpec
+from vibsim.experiment.faults import Report
+from vibsim.models import MODELS, Model, natural_end
+from vibsim.models.shared.scales import scaled_parameters, scales
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """What a run starts from."""
+
+    parameters: Mapping[str, float]
+    initial: Mapping[str, float]
+    time: TimeSpec | None
+    scaling: Scaling | None = None
+
+
+def characteristic(
+    given: Numbers, model: Model | None, swept: Iterable[str], report: Report
+) -> Numbers:
+    """Return the dimensionless numbers of a run, with what leads back; as `given`, and a fault, where there are none.
+
+    Parameters
+    ----------
+    swept
+        The dotted keys of the sweep.
+    """
+    for key in swept:
+        if not key.startswith("schemes."):
+            rule = (
+                f"must not be given where {key} is swept: every member would have scales of its own"
+            )
+            report.add(("scaled",), rule, at_key=True)
+            return given
+    if model is None or given.time is None or not given.parameters:
+        return given
+    if model.scales is None or model.scales.parameters is None:
+        rule, hint = _refusal(model)
+        report.add(("scaled",), rule, hint, at_key=True)
+        return given
+    rows = {row.name: float(row.value) for row in scales(model, given.parameters, given.initial)}
+    if not all(math.isfinite(value) and value > 0.0 for value in rows.values()):
+        rule = "the scales have no finite values with these parameters and initial values"
+        report.add(("scaled",), rule, at_key=True)
+        return given
+    found = scaled_parameters(model, given.parameters, given.initial)
+    parameters = {name: float(value) for name, value in found.items()}
+    initial = {name: value / rows[name] for name, value in given.initial.items()}
+    end = given.time.end / rows["t"]
+    if given.time.periods is not None:
+        end = float(natural_end(model, given.time.periods, parameters))
+    if not (0.0 < end < math.inf and all(map(math.isfinite, initial.values()))):
+        report.add(("scaled",), "the scaled end or initial values are not finite", at_key=True)
+        return given
+    kept = Scaling(
+        scales=rows,
+        parameters=dict(given.parameters),
+        initial=dict(given.initial),
+        end=given.time.end,
+    )
+    changed: dict[str, Any] = {"end": end}
+    return Numbers(parameters, initial, given.time.model_copy(update=changed), kept)
+
+
+def _refusal(model: Model) -> tuple[str, str]:
+    """Return why a model has no scaled equation, and what helps."""
+    rule = f"the model {model.kind} has no scaled equation"
+    if model.dimensionless:
+        return f"{rule}: it is dimensionless already", "leave it out"
+    if model.scales is not None and model.scales.refusal:
+        return f"{rule}: {model.scales.refusal}", "write k*u, say, with k under parameters"
+    if model.lookup is not None:
+        what = f"{rule} here: the numbers of its table have units, and stay what they are"
+        return what, "leave it out, or write the table's curve as a formula"
+    if model.formulas:
+        return (
+            f"{rule}: its spring has no stiffness at u = 0, by which time would be measured",
+            "leave it out",
+        )
+    able = [row.kind for row in MODELS.values() if row.scales and row.scales.parameters]
+    return rule, "choose from " + ", ".join(able)

@@ -1,0 +1,1 @@
+"""From the bytes of a file to plain data that remembers its lines."""

@@ -1,0 +1,89 @@
+"""Formulas as text: read safely, kept as a frozen tree, written out for the engine.
+
+A formula is read with Python's grammar (``**`` binds tighter than a sign on its left, ``-x**2`` is ``-(x**2)``) and an
+allow-list of what it may hold: numbers, declared names, ``+ - * / **``, comparisons, also in chains and joined by
+``and``, ``or`` and ``not``, ``yes if condition else no``, and calls of `FUNCTIONS`. Text of a user is never compiled or
+evaluated as Python.
+"""
+
+from vibsim.formula.algebra import (
+    is_multiple,
+    is_smooth,
+    is_zero,
+    minus,
+    over,
+    plus,
+    put,
+    tidied,
+    times,
+)
+from vibsim.formula.arrays import values
+from vibsim.formula.derivative import ONE, ZERO, derivative
+from vibsim.formula.faults import MAX_DEPTH, ExpressionError
+from vibsim.formula.integral import integral
+from vibsim.formula.intervals import bounds
+from vibsim.formula.parser import MAX_CHARACTERS, MAX_POWER, literal, parse
+from vibsim.formula.pulses import Pulses, hidden_pulses
+from vibsim.formula.render import constant, evaluate, to_formula, to_python, to_statements
+from vibsim.formula.switches import Switch, held
+from vibsim.formula.tree import (
+    CONSTANTS,
+    FUNCTIONS,
+    Binary,
+    Call,
+    Compare,
+    Expression,
+    Name,
+    Negate,
+    Number,
+    names_in,
+    rebuilt,
+    size,
+    walk,
+)
+
+__all__ = [
+    "CONSTANTS",
+    "FUNCTIONS",
+    "MAX_CHARACTERS",
+    "MAX_DEPTH",
+    "MAX_POWER",
+    "ONE",
+    "ZERO",
+    "Binary",
+    "Call",
+    "Compare",
+    "Expression",
+    "ExpressionError",
+    "Name",
+    "Negate",
+    "Number",
+    "Pulses",
+    "Switch",
+    "bounds",
+    "constant",
+    "derivative",
+    "evaluate",
+    "held",
+    "hidden_pulses",
+    "integral",
+    "is_multiple",
+    "is_smooth",
+    "is_zero",
+    "literal",
+    "minus",
+    "names_in",
+    "over",
+    "parse",
+    "plus",
+    "put",
+    "rebuilt",
+    "size",
+    "tidied",
+    "times",
+    "to_formula",
+    "to_python",
+    "to_statements",
+    "values",
+    "walk",
+]

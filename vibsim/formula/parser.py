@@ -1,0 +1,236 @@
+"""Read a formula: Python's `ast` for the grammar, an allow-list for the content."""
+
+from __future__ import annotations
+
+import ast
+import math
+import re
+import warnings
+from collections.abc import Collection
+
+from vibsim.core.errors import nearest
+from vibsim.formula.faults import (
+    INSTEAD,
+    MAX_DEPTH,
+    OTHER_NAMES,
+    REFUSED,
+    TOO_DEEP,
+    ExpressionError,
+    place_of_fault,
+    shorten,
+)
+from vibsim.formula.tree import (
+    CONSTANTS,
+    FUNCTIONS,
+    Binary,
+    Call,
+    Compare,
+    Expression,
+    Name,
+    Negate,
+    Number,
+    children,
+    walk,
+)
+
+MAX_CHARACTERS = 2000
+MAX_POWER = 1024
+"""Largest whole exponent: it is written out as multiplications."""
+
+_BINARY: dict[type[ast.operator], str] = {
+    ast.Add: "+",
+    ast.Sub: "-",
+    ast.Mult: "*",
+    ast.Div: "/",
+    ast.Pow: "**",
+}
+_COMPARE: dict[type[ast.cmpop], str] = {
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
+    ast.Eq: "==",
+    ast.NotEq: "!=",
+}
+_FOREIGN = re.compile(r"[^A-Za-z0-9_.+\-*/()<>=!, ]")
+_NUMBER = re.compile(r"(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+
+
+def parse(text: str, names: Collection[str]) -> Expression:
+    """Read a formula.
+
+    Parameters
+    ----------
+    text
+        The formula, at most `MAX_CHARACTERS` long.
+    names
+        What it may name besides `CONSTANTS` and `FUNCTIONS`: states, time, parameters.
+
+    Raises
+    ------
+    ExpressionError
+        Where the text is no formula, or holds anything outside the allow-list.
+    """
+    if len(text) > MAX_CHARACTERS:
+        rule = f"must have at most {MAX_CHARACTERS} characters, has {len(text)}"
+        raise ExpressionError(text, MAX_CHARACTERS, rule)
+    plain = re.sub(r"[\t\r\n]", " ", text)
+    if foreign := _FOREIGN.search(plain):
+        character = foreign.group()
+        rule = f"character {character!r} is not allowed in a formula"
+        raise ExpressionError(text, foreign.start(), rule, INSTEAD.get(character, ""))
+    if not plain.strip():
+        raise ExpressionError(text, 0, "is empty; expected a number, a name or '('")
+    reader = _Reader(text, plain, frozenset(names))
+    return reader.convert(reader.tree(), 0)
+
+
+class _Reader:
+    """One formula on its way from Python's tree to ours; remembers the text for messages."""
+
+    def __init__(self, text: str, plain: str, names: frozenset[str]) -> None:
+        self.text = text
+        self.names = names
+        self.body = plain.lstrip()
+        self.shift = len(plain) - len(self.body)
+
+    def fault(self, node: ast.expr, rule: str, hint: str = "") -> ExpressionError:
+        return self.at(node.col_offset, rule, hint)
+
+    def tree(self) -> ast.expr:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                return ast.parse(self.body, mode="eval").body
+        except SyntaxError as error:
+            raise self.at(*place_of_fault(self.body.rstrip(), error)) from None
+        except (ValueError, RecursionError, MemoryError, Warning):
+            raise ExpressionError(self.text, 0, "is not a formula, or nested too deeply") from None
+
+    def at(self, position: int, rule: str, hint: str = "") -> ExpressionError:
+        return ExpressionError(self.text, position + self.shift, rule, hint)
+
+    def convert(self, node: ast.expr, depth: int) -> Expression:
+        if depth >= MAX_DEPTH:
+            raise self.fault(node, TOO_DEEP, "group long sums with parentheses")
+        match node:
+            case ast.Constant():
+                return self.number(node)
+            case ast.Name():
+                return self.name(node)
+            case ast.UnaryOp(op=ast.USub()):
+                return Negate(self.convert(node.operand, depth + 1))
+            case ast.UnaryOp(op=ast.UAdd()):
+                return self.convert(node.operand, depth + 1)
+            case ast.UnaryOp(op=ast.Not()):
+                return Binary("-", Number(1.0), self.condition(node.operand, depth + 1))
+            case ast.BoolOp():
+                return self.joined(node, depth)
+            case ast.IfExp():
+                parts = (node.test, node.body, node.orelse)
+                return Call("where", tuple(self.convert(part, depth + 1) for part in parts))
+            case ast.BinOp() if type(node.op) in _BINARY:
+                return self.binary(node, depth)
+            case ast.Compare():
+                return self.compare(node, depth)
+            case ast.Call():
+                return self.call(node, depth)
+        kind = type(node.op) if isinstance(node, ast.BinOp) else type(node)
+        what = REFUSED.get(kind, "this operation is not allowed")
+        raise self.fault(node, what, "a formula has numbers, names, + - * / ** and functions")
+
+    def number(self, node: ast.Constant) -> Number:
+        text = self.body[node.col_offset : node.end_col_offset]
+        if not _NUMBER.fullmatch(text):
+            raise self.fault(node, f"'{shorten(text)}' is not a number")
+        value = float(text)
+        if not math.isfinite(value):
+            raise self.fault(node, f"the number {shorten(text)} is too large")
+        return Number(value)
+
+    def name(self, node: ast.Name) -> Expression:
+        if node.id in self.names:
+            return Name(node.id)
+        if node.id in CONSTANTS:
+            return Number(CONSTANTS[node.id])
+        if node.id in FUNCTIONS:
+            raise self.fault(node, f"'{node.id}' is a function", f"write {node.id}(...)")
+        rule = f"unknown name '{shorten(node.id)}'"
+        raise self.fault(node, rule, nearest(node.id, sorted({*self.names, *CONSTANTS})))
+
+    def binary(self, node: ast.BinOp, depth: int) -> Expression:
+        left = self.convert(node.left, depth + 1)
+        right = self.convert(node.right, depth + 1)
+        exponent = literal(right) if isinstance(node.op, ast.Pow) else None
+        if exponent is not None and abs(exponent) > MAX_POWER:
+            raise self.fault(
+                node.right, f"an exponent must be at most {MAX_POWER}, is {exponent:g}"
+            )
+        return Binary(_BINARY[type(node.op)], left, right)
+
+    def compare(self, node: ast.Compare, depth: int) -> Expression:
+        """Read a comparison; a chained one is the product of its links."""
+        if any(type(operator) not in _COMPARE for operator in node.ops):
+            raise self.fault(node, "'in' and 'is' are not allowed", "compare with < <= > >= == !=")
+        # a tree as deep as the product of the links
+        below = depth + 1 + (len(node.ops) - 1).bit_length()
+        sides = [self.convert(side, below) for side in (node.left, *node.comparators)]
+        for side, written in zip(sides[1:-1], node.comparators, strict=False):
+            # it stands in two links: chains within chains would double and double
+            if any(isinstance(part, Compare) for part in walk(side)):
+                hint = "join two comparisons with and"
+                raise self.fault(written, "a comparison within a chain of comparisons", hint)
+        signs = [_COMPARE[type(operator)] for operator in node.ops]
+        return _paired("*", list(map(Compare, signs, sides[:-1], sides[1:])))
+
+    def joined(self, node: ast.BoolOp, depth: int) -> Expression:
+        """Read ``and`` as a product, ``or`` as the largest."""
+        below = depth + (len(node.values) - 1).bit_length()
+        values = [self.condition(value, below) for value in node.values]
+        return _paired("*" if isinstance(node.op, ast.And) else "max", values)
+
+    def condition(self, node: ast.expr, depth: int) -> Expression:
+        """Read what is 1 or 0."""
+        match node:
+            case ast.Compare() | ast.BoolOp() | ast.UnaryOp(op=ast.Not()):
+                return self.convert(node, depth)
+        raise self.fault(
+            node, "'and', 'or' and 'not' need comparisons", "write x != 0 for a number"
+        )
+
+    def call(self, node: ast.Call, depth: int) -> Expression:
+        if not isinstance(node.func, ast.Name):
+            raise self.fault(node, "only a function can be called", nearest("", sorted(FUNCTIONS)))
+        function = node.func.id
+        if function not in FUNCTIONS:
+            rule = f"unknown function '{shorten(function)}'"
+            known = OTHER_NAMES.get(function)
+            hint = f"write {known}" if known else nearest(function, sorted(FUNCTIONS))
+            raise self.fault(node, rule, hint)
+        if node.keywords:
+            raise self.fault(node, f"{function} takes no arguments by keyword")
+        wanted = FUNCTIONS[function][0]
+        if len(node.args) != wanted:
+            raise self.fault(node, f"{function} takes {wanted} argument(s), has {len(node.args)}")
+        return Call(function, tuple(self.convert(argument, depth + 1) for argument in node.args))
+
+
+def _paired(operation: str, terms: list[Expression]) -> Expression:
+    """Return terms joined in pairs, so that the tree stays flat: by ``*``, or a function of two arguments."""
+    while len(terms) > 1:
+        pairs = zip(terms[::2], terms[1::2], strict=False)
+        odd = terms[len(terms) - len(terms) % 2 :]
+        terms = [
+            Binary("*", *pair) if operation == "*" else Call(operation, pair) for pair in pairs
+        ] + odd
+    return terms[0]
+
+
+def literal(node: Expression) -> float | None:
+    """Return the value of a number with signs before it, None for anything else."""
+    if isinstance(node, Number):
+        return node.value
+    if isinstance(node, Negate):
+        value = literal(children(node)[0])
+        return None if value is None else -value
+    return None

@@ -1,0 +1,239 @@
+"""What becomes of a formula: a number, or source text for the engine.
+
+Both take the operations in the formula's own order, whole powers by multiplication, so that a constant has the same
+bits whether it was worked out here or in the engine.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable, Mapping
+from itertools import accumulate
+
+from vibsim.elementary import ELEMENTARY
+from vibsim.formula.faults import ExpressionError
+from vibsim.formula.parser import literal, parse
+from vibsim.formula.tree import FUNCTIONS, Binary, Call, Compare, Expression, Name, Negate, Number
+
+MAX_SOURCE = 10_000
+"""Longest factor, in characters, that `to_python` repeats."""
+MAX_NESTING = 120
+"""Parentheses in each other from which `to_statements` gives a part a name: Python reads 200, derivatives have more."""
+
+_OPERATORS: Mapping[str, Callable[[float, float], float]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    ">=": operator.ge,
+    "==": operator.eq,
+    "!=": operator.ne,
+}
+
+
+def constant(text: str) -> float:
+    """Work out a formula without names, e.g. ``2*pi/30``.
+
+    Raises
+    ------
+    ExpressionError
+        Where the text is no formula, names something, or has no finite value.
+    """
+    value = evaluate(parse(text, ()), {}, text)
+    if not math.isfinite(value):
+        raise ExpressionError(text, 0, "has no finite value")
+    return value
+
+
+def evaluate(expression: Expression, values: Mapping[str, float], text: str = "") -> float:
+    """Return the value of `expression` at the given `values` of its names.
+
+    Raises
+    ------
+    ExpressionError
+        Where the value does not exist: division by zero, overflow, root of a negative number.
+    """
+    try:
+        return float(_value(expression, values))
+    except ZeroDivisionError:
+        raise ExpressionError(text, 0, "has no finite value", "it divides by zero") from None
+    except OverflowError:
+        raise ExpressionError(text, 0, "has no finite value", "it is too large") from None
+    except (ValueError, TypeError):
+        hint = "a function or power does not exist there"
+        raise ExpressionError(text, 0, "has no finite value", hint) from None
+
+
+def _value(node: Expression, values: Mapping[str, float]) -> float:
+    match node:
+        case Number(value):
+            return value
+        case Name(name):
+            return values[name]
+        case Negate(operand):
+            return -_value(operand, values)
+        case Binary("**", base, exponent):
+            return _power(_value(base, values), _value(exponent, values), literal(exponent))
+        case Binary(symbol, left, right) | Compare(symbol, left, right):
+            return float(_OPERATORS[symbol](_value(left, values), _value(right, values)))
+        case Call("where", (condition, yes, no)):
+            # the other one need not exist
+            chosen = _value(condition, values)
+            if math.isnan(chosen):
+                raise ValueError
+            return _value(yes if chosen != 0.0 else no, values)
+        case Call(function, arguments):
+            found = [_value(argument, values) for argument in arguments]
+            return _existing(FUNCTIONS[function][1](*found))
+
+
+def _existing(value: float) -> float:
+    """Return what a function gave; raise where it does not exist, as the operators of Python do."""
+    if math.isnan(value):
+        raise ValueError
+    if math.isinf(value):
+        raise OverflowError
+    return value
+
+
+def _power(base: float, exponent: float, written: float | None) -> float:
+    """Return a power: by multiplication where a whole exponent is written as a number, as in the engine."""
+    if written is None or not exponent.is_integer():
+        return _existing(ELEMENTARY["power"].full(base, exponent))
+    if exponent == 0.0:
+        return 1.0
+    result = base
+    for bit in bin(abs(int(exponent)))[3:]:
+        result = result * result
+        if bit == "1":
+            result = result * base
+    return result if exponent > 0.0 else 1.0 / result
+
+
+def to_formula(expression: Expression) -> str:
+    """Write `expression` as a formula, with no more parentheses than needed: `parse` gives the same tree again."""
+    return _written(expression)[0]
+
+
+_BINDING = {"+": 2, "-": 2, "*": 3, "/": 3}
+_COMPARED, _NEGATED, _POWER, _ATOM = 1, 4, 5, 6
+"""How tightly a comparison, a sign, a power and anything that cannot be taken apart bind."""
+
+
+def _written(node: Expression) -> tuple[str, int]:
+    """Return the text of a formula and how tightly its last operation binds."""
+    match node:
+        case Number(value):
+            return f"{value:.0f}" if value < 1e15 and value.is_integer() else repr(value), _ATOM
+        case Name(name):
+            return name, _ATOM
+        case Negate(operand):
+            return f"-{_within(operand, _NEGATED)}", _NEGATED
+        case Binary("**", base, exponent):
+            # a power takes a sign behind it, and is itself taken from right to left
+            return f"{_within(base, _ATOM)}**{_within(exponent, _NEGATED)}", _POWER
+        case Binary(symbol, left, right):
+            own = _BINDING[symbol]
+            gap = " " if own == _BINDING["+"] else ""
+            text = f"{_within(left, own)}{gap}{symbol}{gap}{_within(right, own + 1)}"
+            return text, own
+        case Compare(symbol, left, right):
+            least = _COMPARED + 1
+            return f"{_within(left, least)} {symbol} {_within(right, least)}", _COMPARED
+        case Call(function, arguments):
+            return f"{function}({', '.join(_within(a, 0) for a in arguments)})", _ATOM
+
+
+def _within(node: Expression, least: int) -> str:
+    text, binding = _written(node)
+    return text if binding >= least else f"({text})"
+
+
+def to_python(expression: Expression) -> str:
+    """Write `expression` as one Python expression for the engine.
+
+    The text is fully parenthesised, so that the evaluation order is the formula's. It holds numbers, names,
+    ``+ - * /``, comparisons, and calls by name: of `FUNCTIONS`, and of ``power(base, exponent)`` where an exponent is
+    not a whole number. A whole power is squared and multiplied from the exponent's leading bit on: ``x**2`` is
+    ``(x * x)``, ``x**3`` is ``((x * x) * x)``, ``x**-2`` is ``(1.0 / (x * x))``. A factor is repeated as text: where
+    it is costly, use `to_statements`, which gives the same bits.
+
+    Raises
+    ------
+    ExpressionError
+        Where powers of powers would be written out at a length of more than `MAX_SOURCE` characters.
+    """
+    return _source(expression, _repeated)
+
+
+def to_statements(expression: Expression, result: str) -> list[str]:
+    """Write `expression` as assignments, the last one to `result`; every factor of a power is worked out once.
+
+    ``sin(x)**2`` becomes ``_1 = sin(x)`` and ``result = (_1 * _1)``. The operations and their order are those of
+    `to_python`; no name of a formula begins with ``_``.
+    """
+    lines: list[str] = []
+
+    def named(source: str) -> str:
+        if _is_plain(source):
+            return source
+        lines.append(f"_{len(lines) + 1} = {source}")
+        return f"_{len(lines)}"
+
+    last = _source(expression, named)
+    return [*lines, f"{result} = {last}"]
+
+
+def _source(node: Expression, share: Callable[[str], str]) -> str:
+    source = _source_of(node, share)
+    is_deep = source.count("(") > MAX_NESTING and _nesting(source) > MAX_NESTING
+    return share(source) if is_deep else source
+
+
+def _nesting(source: str) -> int:
+    return max(accumulate((c == "(") - (c == ")") for c in source))
+
+
+def _source_of(node: Expression, share: Callable[[str], str]) -> str:
+    match node:
+        case Number(value):
+            return repr(value)
+        case Name(name):
+            return name
+        case Negate(operand):
+            return f"(-{_source(operand, share)})"
+        case Binary("**", base, exponent):
+            return _power_source(base, exponent, share)
+        case Binary(symbol, left, right) | Compare(symbol, left, right):
+            return f"({_source(left, share)} {symbol} {_source(right, share)})"
+        case Call(function, arguments):
+            return f"{function}({', '.join(_source(argument, share) for argument in arguments)})"
+
+
+def _power_source(base: Expression, exponent: Expression, share: Callable[[str], str]) -> str:
+    whole = literal(exponent)
+    if whole is None or not whole.is_integer():
+        return f"power({_source(base, share)}, {_source(exponent, share)})"
+    if whole == 0.0:
+        return "1.0"
+    factor = result = share(_source(base, share))
+    for bit in bin(abs(int(whole)))[3:]:
+        half = share(result)
+        result = f"({half} * {half})"
+        if bit == "1":
+            result = f"({result} * {factor})"
+    return result if whole > 0.0 else f"(1.0 / {result})"
+
+
+def _repeated(source: str) -> str:
+    if len(source) > MAX_SOURCE:
+        raise ExpressionError(source, 0, "powers of powers are too long to be written out")
+    return source
+
+
+def _is_plain(source: str) -> bool:
+    return source.isidentifier() or source.replace(".", "", 1).isdigit()

@@ -1,0 +1,67 @@
+r"""Models that are ``u'' + c u' + w^2 (u - r) = 0``: linear, damped linearly if at all, and free of forces in time.
+
+Their schemes are matrices, of which theory can say everything (`vibsim.theory`). Source: vibration text (B), sections 1
+and 8.1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from vibsim.formula import ZERO, derivative, names_in, put, values
+from vibsim.models.base import Floats, Model, Numbers, tree
+
+
+@dataclass(frozen=True)
+class FreeOscillation:
+    """The numbers of members; every array has shape (case,)."""
+
+    frequency: Floats
+    """w, NaN where the spring does not pull back."""
+    damping: Floats
+    """c/w."""
+    position: Floats
+    """Initial position, measured from rest."""
+    velocity: Floats
+    """Initial velocity over w."""
+
+
+@cache
+def why_not_free(model: Model) -> str:
+    """Return what makes a model another one, as the end of a sentence that it begins; empty where it is such a one."""
+    if model.coordinates > 1:
+        return "has several coordinates"
+    if model.events is not None or model.lookup is not None:
+        return "has a force with corners"
+    if not model.linear:
+        return "is nonlinear"
+    force = tree(model, model.acceleration)
+    if "t" in names_in(force):
+        return "has a force that depends on time"
+    is_linear = model.damping is not None and model.damping.kind == "linear"
+    if model.velocity in names_in(force) and not is_linear:
+        return "has a damping that is not linear"
+    return ""
+
+
+def free_oscillation(model: Model, initial: Numbers, parameters: Numbers) -> FreeOscillation:
+    """Return the numbers of members of a model for which `why_not_free` is empty.
+
+    Parameters
+    ----------
+    initial, parameters
+        By the names of the states, and by `vibsim.models.base.Parameter.key`; numbers or arrays of shape (case,).
+    """
+    named = {row.name: np.asarray(parameters[row.key], float) for row in model.parameters}
+    force = tree(model, model.acceleration)
+    at_rest = put(put(force, model.position, ZERO), model.velocity, ZERO)
+    stiffness = -values(derivative(force, model.position), named)
+    rate = values(tree(model, model.damping.rate), named) if model.damping is not None else 0.0
+    with np.errstate(all="ignore"):
+        w = np.sqrt(np.where(stiffness > 0.0, stiffness, np.nan))
+        rest = values(at_rest, named) / stiffness
+    numbers = w, rate / w, initial[model.position] - rest, initial[model.velocity] / w
+    return FreeOscillation(*np.broadcast_arrays(*(np.atleast_1d(x) for x in numbers)))

@@ -1,0 +1,78 @@
+r"""Manufactured solutions: a motion that is written down, and the forces with which it solves the equations.
+
+Source: vibration text (B), section 2.2, and exercises 1, 9 and 23.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from vibsim.formula import Expression, ExpressionError, derivative, minus, put, size, values
+from vibsim.models.base import Floats, Numbers, Parameter
+
+MAX_NODES = 20_000
+"""Longest force of an exact solution, in operations and names."""
+
+
+@dataclass(frozen=True)
+class Manufactured:
+    """A motion that is written down as formulas in ``t`` and the parameters."""
+
+    positions: tuple[Expression, ...]
+    """Of every coordinate."""
+    texts: tuple[str, ...]
+    """As they were written, to be shown where they cannot be worked with."""
+    names: tuple[str, ...]
+    """The states: all positions, then all velocities."""
+    parameters: tuple[Parameter, ...]
+
+    @cached_property
+    def velocities(self) -> tuple[Expression, ...]:
+        """Derivatives of the positions.
+
+        Raises
+        ------
+        ExpressionError
+            Where they are too long to be worked with.
+        """
+        return tuple(self._short(derivative(u, "t"), MAX_NODES // 10) for u in self.positions)
+
+    @cached_property
+    def accelerations(self) -> tuple[Expression, ...]:
+        """Derivatives of the velocities."""
+        return tuple(self._short(derivative(v, "t"), MAX_NODES) for v in self.velocities)
+
+    def along(self, formula: Expression) -> Expression:
+        """Return a formula in the states at the motion, which depends on ``t`` and the parameters."""
+        for name, motion in zip(self.names, (*self.positions, *self.velocities), strict=True):
+            formula = put(formula, name, motion)
+        return self._short(formula, MAX_NODES)
+
+    def forces(self, accelerations: Sequence[Expression]) -> tuple[Expression, ...]:
+        """Return what must be added to the accelerations so that this is the motion."""
+        pairs = zip(self.accelerations, accelerations, strict=True)
+        return tuple(minus(wanted, self.along(given)) for wanted, given in pairs)
+
+    def exact(self, t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
+        """Return the states at times `t`, whatever the initial values: see `Model.exact`."""
+        named = {row.name: parameters[row.key] for row in self.parameters}
+        numbers = {**named, "t": t}
+        shape = np.broadcast_shapes(*(np.shape(value) for value in numbers.values()))
+        motion = zip(self.names, (*self.positions, *self.velocities), strict=True)
+        return {name: np.broadcast_to(values(row, numbers), shape) for name, row in motion}
+
+    def start(self, parameters: Numbers) -> dict[str, Any]:
+        """Return the initial values: see `Model.start`."""
+        return self.exact(np.asarray(0.0), {}, parameters)
+
+    def _short(self, node: Expression, most: int) -> Expression:
+        """Refuse a motion whose derivatives or forces are too long to be worked with."""
+        if size(node, most) > most:
+            rule = "its derivatives are too long to be written out as a force"
+            raise ExpressionError(" and ".join(self.texts), 0, rule, "write a simpler formula")
+        return node

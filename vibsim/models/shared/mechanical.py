@@ -1,0 +1,242 @@
+r"""From the terms of ``m u'' + f(u') + s(u) = F(t)`` to a model: acceleration, energies, powers, exact solution.
+
+Source: vibration text (B), section 8, equation (59). A model that is such an equation gives its four terms and gets
+everything else that follows from them; it may say more about itself than follows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from vibsim.formula import (
+    ONE,
+    ZERO,
+    Binary,
+    Call,
+    Expression,
+    Name,
+    Negate,
+    Number,
+    derivative,
+    integral,
+    is_multiple,
+    is_zero,
+    minus,
+    names_in,
+    over,
+    times,
+    values,
+)
+from vibsim.models.base import Damping, Floats, Model, Numbers, Parameter, State
+from vibsim.models.shared.dimensions import Powers
+from vibsim.models.shared.forced import exponentials, forced_motion, is_sum_of_exponentials
+from vibsim.models.shared.harmonic import period
+from vibsim.models.shared.linear_scales import linear_scales, with_scaled_run
+from vibsim.models.shared.scales import Scales
+
+STATES = (State("u", "m", "displacement"), State("v", "m s-1", "velocity"))
+
+
+@dataclass(frozen=True)
+class Forces:
+    """The terms of the equation, in the states, ``t`` and the parameters."""
+
+    spring: Expression
+    """The force s(u)."""
+    damping: Expression = ZERO
+    """The force f(v)."""
+    force: Expression = ZERO
+    """The force F(t)."""
+    mass: Expression = ONE
+    potential: Expression | None = None
+    """The integral of the spring from 0; worked out where None."""
+    position: str = "u"
+    velocity: str = "v"
+
+    @cached_property
+    def stiffness(self) -> Expression:
+        """Slope of the spring, ds/du."""
+        return derivative(self.spring, self.position)
+
+    @cached_property
+    def is_linear(self) -> bool:
+        """Whether s(u) is a number times u."""
+        return is_multiple(self.spring, self.stiffness, self.position)
+
+    @property
+    def is_damped(self) -> bool:
+        """Whether there is a damping force."""
+        return not is_zero(self.damping)
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether there is a driving force."""
+        return not is_zero(self.force)
+
+    @cached_property
+    def known_damping(self) -> tuple[str, Expression] | None:
+        """Kind and coefficient of the damping force, where it is linear or quadratic; None where it is another one."""
+        return damping_of(self.damping, self.velocity) if self.is_damped else None
+
+    def over_mass(self, node: Expression) -> Expression:
+        """Return ``(1/m) node``: the quotient of parameters is worked out once."""
+        if self.mass == ONE or node == ZERO:
+            return node
+        inverse = over(ONE, self.mass)
+        if isinstance(node, Negate):
+            return Negate(Binary("*", inverse, node.operand))
+        return Binary("*", inverse, node)
+
+
+def mechanical(
+    forces: Forces,
+    parameters: tuple[Parameter, ...],
+    *,
+    states: tuple[State, State] = STATES,
+    energy_unit: str = "J",
+    kind: str,
+    title: str,
+    source: str,
+    equation: str,
+    scales: Callable[[Forces], Scales | None] = linear_scales,
+    powers: Mapping[str, Powers] | None = None,
+    **more: Any,
+) -> Model:
+    """Return the model of some forces.
+
+    Parameters
+    ----------
+    parameters
+        Every parameter, in the order of the engine.
+    scales
+        From the forces, where they are others than those of a linear spring.
+    powers
+        The powers of mass, position and time of parameters, where the forces alone do not tell them.
+    more
+        Whatever else `Model` has: it takes the place of what follows from the forces.
+    """
+    known = forces.known_damping
+    acceleration = forces.over_mass(minus(minus(forces.force, forces.damping), forces.spring))
+    velocity = Name(forces.velocity)
+    kinetic = times(times(Number(0.5), forces.mass), Binary("**", velocity, Number(2.0)))
+    numbers = _by_name(parameters)
+    natural_frequency = _natural_frequency(forces, numbers)
+    own = scales(forces)
+    is_free = not forces.is_driven and not forces.is_damped
+    facts: dict[str, Any] = {
+        "potential_energy": forces.potential or integral(forces.spring, forces.position),
+        "kinetic_energy": kinetic,
+        "linear": forces.is_linear,
+        "conservative": is_free,
+        "natural_frequency": natural_frequency,
+        "dissipation": times(forces.damping, velocity) if forces.is_damped else None,
+        "driving": times(forces.force, velocity) if forces.is_driven else None,
+        "exact": linear_motion(forces, numbers),
+        "scales": own and with_scaled_run(own, forces, parameters, powers or {}),
+        "exact_period": _period(forces, natural_frequency)
+        if is_free and forces.is_linear
+        else None,
+    }
+    if known is not None:
+        word, rate = known
+        facts["damping"] = Damping(
+            kind="linear" if word == "linear" else "quadratic",
+            rate=forces.over_mass(rate),
+        )
+    return Model(
+        kind=kind,
+        title=title,
+        source=source,
+        equation=equation,
+        states=states,
+        parameters=parameters,
+        acceleration=acceleration,
+        energy_unit=energy_unit,
+        **(facts | more),
+    )
+
+
+def _by_name(parameters: tuple[Parameter, ...]) -> Callable[[Numbers], dict[str, Any]]:
+    """Return what gives the values of the parameters by the names that formulas use."""
+    keys = {row.name: row.key for row in parameters}
+    return lambda given: {name: given[key] for name, key in keys.items()}
+
+
+def _natural_frequency(
+    forces: Forces, numbers: Callable[[Numbers], dict[str, Any]]
+) -> Callable[[Numbers], Any]:
+    def natural_frequency(parameters: Numbers) -> Any:
+        """Return ``sqrt(s'(0)/m)`` [rad s-1]; NaN where the spring has no slope at 0, or none that pulls back."""
+        named = numbers(parameters)
+        stiffness = values(forces.stiffness, {**named, forces.position: 0.0})
+        with np.errstate(invalid="ignore"):
+            ratio = stiffness / values(forces.mass, named)
+            found = np.sqrt(np.where((ratio > 0.0) & (ratio < np.inf), ratio, np.nan))
+        # of numbers alone it is one number, whatever the shape of the parameters
+        return np.broadcast_to(found, np.broadcast_shapes(*(np.shape(x) for x in named.values())))
+
+    return natural_frequency
+
+
+def _period(
+    forces: Forces, natural_frequency: Callable[[Numbers], Any]
+) -> Callable[[Numbers, Numbers], Any]:
+    return lambda initial, p: period(
+        natural_frequency(p), initial[forces.position], initial[forces.velocity]
+    )
+
+
+def linear_motion(
+    forces: Forces, numbers: Callable[[Numbers], dict[str, Any]]
+) -> Callable[[Floats, Numbers, Numbers], dict[str, Floats]] | None:
+    """Return the exact solution of linear forces, driven by exponentials if at all (exercise 11); None otherwise."""
+    known = forces.known_damping
+    is_solvable = forces.is_linear and is_sum_of_exponentials(forces.force)
+    if not is_solvable or (forces.is_damped and (known is None or known[0] != "linear")):
+        return None
+    rate = known[1] if known is not None else ZERO
+
+    def motion(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
+        named = numbers(parameters)
+        mass = values(forces.mass, named)
+        half = 0.5 * values(rate, named) / mass
+        stiffness = values(forces.stiffness, named) / mass
+        terms = [(c / mass, s) for c, s in exponentials(forces.force, named) if np.any(c)]
+        start = initial[forces.position], initial[forces.velocity]
+        u, v = forced_motion(t, stiffness, half, *start, terms)
+        return {forces.position: u, forces.velocity: v}
+
+    return motion
+
+
+def damping_of(node: Expression, velocity: str = "v") -> tuple[str, Expression] | None:
+    """Return kind and coefficient of a linear or a quadratic damping force; None for any other one."""
+    slope = derivative(node, velocity)
+    if is_multiple(node, slope, velocity):
+        return "linear", slope
+    factors = list(_factors(node))
+    speed, size = Name(velocity), Call("abs", (Name(velocity),))
+    if factors.count(speed) != 1 or factors.count(size) != 1:
+        return None
+    rest = [factor for factor in factors if factor not in (speed, size)]
+    if any(velocity in names_in(factor) for factor in rest):
+        return None
+    rate: Expression = ONE
+    for factor in rest:
+        rate = times(rate, factor)
+    return "quadratic", rate
+
+
+def _factors(node: Expression) -> list[Expression]:
+    if isinstance(node, Binary) and node.operator == "*":
+        return [*_factors(node.left), *_factors(node.right)]
+    if isinstance(node, Binary) and node.operator == "/":
+        return [*_factors(node.left), over(ONE, node.right)]
+    if isinstance(node, Negate) and node.operand != ONE:
+        return [Negate(ONE), *_factors(node.operand)]
+    return [node]

@@ -1,0 +1,161 @@
+"""Characteristic scales of a model, and the dimensionless numbers that are left of its parameters.
+
+Source: vibration text (B), sections 2.3, 10.1 and 10.2; pendulum lecture (A), section 1.2. A quantity over its scale
+is dimensionless: ``t/t_c``, ``u/u_c``, ``v t_c/u_c``, ``E/E_c``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vibsim.formula import Expression, Name, names_in, parse, rebuilt, to_formula, values
+from vibsim.models.base import Formula, Model, Numbers, parameter_names
+
+T_C, X_C = Name("@t"), Name("@x")
+"""The scales of time and position inside trees, where no name of a user is like them."""
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Formulas in the parameters and the initial values, which have the names of their states.
+
+    All but the first may name the scale of time, as text ``t_c``, and those after the second that of the position, such
+    as ``u_c``.
+    """
+
+    time: Formula
+    position: Formula
+    """Where it is 0, nothing moves, and the scale is 1."""
+    energy: Formula
+    numbers: tuple[tuple[str, Formula], ...] = ()
+    """Dimensionless numbers by name."""
+    parameters: tuple[tuple[str, Formula], ...] | None = None
+    """The parameters of the scaled equation, by key; None where a run cannot be made in these scales."""
+    refusal: str = ""
+    """Why not, where that is so of some formulas only."""
+    outputs: tuple[tuple[str, Formula], ...] = ()
+    """Scales of the model's outputs."""
+
+
+@dataclass(frozen=True)
+class Characteristic:
+    """One scale or one dimensionless number."""
+
+    name: str
+    """``t``, a state, ``energy`` or an output for a scale; ``u(0)`` for an initial value; else that of the number."""
+    words: str
+    formula: str
+    unit: str
+    value: Any
+    """A number or an array over members; NaN where it is not defined."""
+
+
+def scales(model: Model, parameters: Numbers, initial: Numbers) -> tuple[Characteristic, ...]:
+    """Return the scales of time, position, velocity, energy and outputs; none where a model states none.
+
+    Parameters
+    ----------
+    parameters, initial
+        Numbers, or arrays that broadcast: by the keys of the parameters and the names of the states.
+    """
+    own = model.scales
+    if own is None:
+        return ()
+    numbers = _numbers(model, own, parameters, initial)
+    energy = _value(model, own.energy, numbers)
+    x, v = model.states
+    with np.errstate(all="ignore"):
+        speed = numbers[X_C.name] / numbers[T_C.name]
+    over, size = f"{x.name}_c/t_c", numbers[X_C.name]
+    formulas = dict(own.outputs)
+    outputs = (
+        Characteristic(
+            row.name,
+            row.long_name,
+            _text(model, formula),
+            row.unit,
+            _value(model, formula, numbers),
+        )
+        for row in model.outputs
+        if (formula := formulas.get(row.name)) is not None
+    )
+    return (
+        Characteristic("t", "time", _text(model, own.time), "s", numbers[T_C.name]),
+        Characteristic(x.name, x.long_name, _text(model, own.position), x.unit, size),
+        Characteristic(v.name, v.long_name, over, v.unit, speed),
+        Characteristic("energy", "energy", _text(model, own.energy), model.energy_unit, energy),
+        *outputs,
+    )
+
+
+def dimensionless(
+    model: Model, parameters: Numbers, initial: Numbers
+) -> tuple[Characteristic, ...]:
+    """Return the scaled initial values, and the dimensionless numbers that a model names; see `scales`."""
+    if model.scales is None:
+        return ()
+    sizes = {row.name: row.value for row in scales(model, parameters, initial)}
+    found = []
+    for state in model.states:
+        words, text = f"scaled initial {state.long_name}", f"{state.name}(0)/{state.name}_c"
+        with np.errstate(all="ignore"):
+            ratio = np.asarray(initial[state.name], dtype=np.float64) / sizes[state.name]
+        found.append(Characteristic(f"{state.name}(0)", words, text, "1", ratio))
+    numbers = _numbers(model, model.scales, parameters, initial)
+    for name, formula in model.scales.numbers:
+        value, words = _value(model, formula, numbers), "dimensionless number of the model"
+        found.append(Characteristic(name, words, _text(model, formula), "1", value))
+    return tuple(found)
+
+
+def scaled_parameters(model: Model, parameters: Numbers, initial: Numbers) -> dict[str, Any]:
+    """Return the parameters of the scaled equation by their keys.
+
+    Raises
+    ------
+    ValueError
+        Where the model has no scaled equation.
+    """
+    own = model.scales
+    if own is None or own.parameters is None:
+        raise ValueError(f"the model {model.kind} has no scaled equation")
+    numbers = _numbers(model, own, parameters, initial)
+    return {key: _value(model, formula, numbers) for key, formula in own.parameters}
+
+
+def _numbers(model: Model, own: Scales, parameters: Numbers, initial: Numbers) -> dict[str, Any]:
+    """Return what the formulas may name: parameters, initial values, scales of time and position."""
+    numbers = {row.name: parameters[row.key] for row in model.parameters} | dict(initial)
+    numbers[T_C.name] = _value(model, own.time, numbers)
+    size = _value(model, own.position, numbers)
+    numbers[X_C.name] = np.where(size == 0.0, 1.0, size)
+    return numbers
+
+
+def _tree(model: Model, formula: Formula) -> Expression:
+    if not isinstance(formula, str):
+        return formula
+    named = {"t_c": T_C, f"{model.position}_c": X_C}
+    states = [state.name for state in model.states]
+    node = parse(formula, (*states, *parameter_names(model), *named))
+    return _renamed(node, {Name(name): inner for name, inner in named.items()})
+
+
+def _value(model: Model, formula: Formula, numbers: Numbers) -> Any:
+    node = _tree(model, formula)
+    shape = np.broadcast_shapes(*(np.shape(numbers[name]) for name in names_in(node)))
+    return np.broadcast_to(values(node, numbers), shape)
+
+
+def _text(model: Model, formula: Formula) -> str:
+    """Write a formula with its initial values as such: ``abs(u(0))``."""
+    names = {Name(state.name): Name(f"{state.name}(0)") for state in model.states}
+    names |= {T_C: Name("t_c"), X_C: Name(f"{model.position}_c")}
+    return to_formula(_renamed(_tree(model, formula), names))
+
+
+def _renamed(node: Expression, names: dict[Name, Name]) -> Expression:
+    return rebuilt(node, lambda part: names.get(part, part) if isinstance(part, Name) else part)

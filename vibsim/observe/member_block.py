@@ -1,0 +1,328 @@
+"""The level data of some members on their common grid, and what all quantities of these members have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.apriori.exact_values import known_values
+from vibsim.apriori.force_discontinuities import Corners, corners_of
+from vibsim.apriori.formal_orders import (
+    Columns,
+    columns_of,
+    left_to_the_mesh,
+    relative_floors,
+    stability_limits,
+)
+from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, solution_size, stored_floor
+from vibsim.convergence.differences import laid_out, largest
+from vibsim.core.record import Record
+from vibsim.core.vocabulary import HIGHEST, NORMS, TYPICAL_NORM
+from vibsim.models import BUDGET, ENERGIES, Model
+from vibsim.observe.common_grid import Grid, common_grid, take
+from vibsim.observe.input_consistency import check_belonging
+from vibsim.observe.missed_pulses import Missed, missed_pulses
+from vibsim.observe.sensitivity import sensitivity
+from vibsim.observe.stiffness import decay_rate, stiffest
+from vibsim.schemes import SCHEMES
+from vibsim.simulation import Members, members
+
+if TYPE_CHECKING:
+    from vibsim.experiment import Experiment
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+FEW_RADIANS = 0.5
+"""Common times further apart, in units of 1/w, may miss the turns of a motion: the largest by more than an eighth."""
+CENTRED = "_d2t"
+"""What follows the name of a velocity or an energy that is made with ``[D_2t u]``."""
+
+
+def plain_name(name: str) -> str:
+    """Return the name of a quantity without the mark of the velocity that it is made with."""
+    return name.removesuffix(CENTRED)
+
+
+@dataclass(frozen=True)
+class Part:
+    """Some members of an experiment, or all; s, c and l stand for schemes, cases and levels."""
+
+    experiment: Experiment
+    records: Mapping[int, Record]
+    """Level Records."""
+    grid: Grid
+    lean: bool
+    """Whether no series are kept."""
+    norms: tuple[str, ...]
+    """The norms that are kept."""
+    columns: Columns
+    exact: Mapping[str, Floats]
+    """Exact states on the common grid, shape (c, t); empty where they are not known."""
+    magnified: Floats
+    """Factor by which disturbances grow, shape (c,)."""
+    relative_floor: Floats
+    """Predicted round-off relative to the solution, shape (s, 1 or c, l)."""
+    stored_floor: Floats
+    """Round-off of storing relative to the solution, shape (l,): 0 for double precision, which the above knows."""
+    omega_dt: Floats
+    """w dt, shape (c, l)."""
+    fastest: Floats
+    """The same of the highest frequency, which a step has to resolve."""
+    decay: Floats
+    """The largest rate at which damping takes a velocity away, shape (s, c)."""
+    failed: Flags
+    """Whether a level broke down, shape (s, c, l)."""
+    group: Members
+    """The numbers of the members."""
+    stability_limit: Floats
+    """Largest stable w dt, infinite for none, shape (s, 1 or c)."""
+    adaptive: Flags
+    """Whether a scheme chooses its own steps and so has no levels, shape (s,)."""
+    left_to_the_mesh: Floats
+    """The power that is left of errors where the mesh decides what steps see, NaN elsewhere, shape (s, 1 or c)."""
+    corners: Corners
+    """Where the force has its first corner within a step."""
+    missed: Missed
+    """Pulses of the force between the points of every level."""
+    growth: Floats
+    """Largest position over that of the exact motion, shape (s, c, l); NaN where not known."""
+
+    @property
+    def model(self) -> Model:
+        """The model."""
+        return self.experiment.model.definition
+
+    @property
+    def finest(self) -> Record:
+        """The Record of the finest level."""
+        return self.records[self.grid.levels[-1]]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of schemes and of members."""
+        schemes, cases, _ = self.failed.shape
+        return schemes, cases
+
+    def series(self, name: str) -> list[Floats]:
+        """Return a quantity at every level, coarse to fine, each of shape (s, c, t); NaN where it is not stored.
+
+        ``[D_2t u]`` does not exist at the first and the last step. There both the quantity and its exact values count
+        as 0, so that differences and errors vanish and norms are those of the other points.
+        """
+        if any(name not in self.records[level] for level in self.grid.levels):
+            return [np.full((*self.shape, len(self.grid.t)), np.nan) for _ in self.grid.levels]
+        found = [take(self.grid, self.records[level], name) for level in self.grid.levels]
+        return [self._closed(values) for values in found] if name.endswith(CENTRED) else found
+
+    def ends(self) -> list[int]:
+        """Return the places on the common grid of the first and the last step, as far as they are on it."""
+        return [0, -1] if self.grid.end_included else [0]
+
+    def _closed(self, values: Floats) -> Floats:
+        """Return a series with 0 at `ends`, where it has a value anywhere."""
+        values = values.copy(order="K")
+        exists = np.any(np.isfinite(values), axis=-1)
+        for place in self.ends():
+            values[..., place] = np.where(exists, 0.0, np.nan)
+        return values
+
+    def exact_of(self, name: str) -> Floats | None:
+        """Return a quantity's exact values, which broadcast against (s, c, t); None where they are not known."""
+        plain = plain_name(name)
+        if plain in self.exact:
+            found = self.exact[plain][None]
+        elif self.model.conservative and plain == "energy":
+            found = energy_at_start(self.finest)[..., None]
+        elif self.model.conservative and plain == "energy_deviation":
+            return np.zeros((1, 1, 1))
+        else:
+            t = self.grid.times(self.group.end)
+            known = known_values(self.model, plain, self.exact, t, self.group)
+            if known is None:
+                return None
+            found = known[None]
+        if plain == name:
+            return found
+        # as the series itself, see `series`
+        inside = np.ones(len(self.grid.t))
+        inside[self.ends()] = 0.0
+        # without a bound there is none at the ends either
+        with np.errstate(invalid="ignore"):
+            return np.asarray(found * inside)
+
+    def size(self, name: str, values: list[Floats], sizes: Mapping[str, Floats]) -> Floats:
+        """Return the size that round-off is relative to, shape (s, c).
+
+        What is left of an energy is known no better than the energy itself; a velocity is known no better than what
+        the rounding of the position leaves of it over the run, or over a swing.
+
+        Parameters
+        ----------
+        name, values
+            A quantity at every level.
+        sizes
+            Sizes of the solutions that are known already.
+        """
+        plain = plain_name(name)
+        if plain in ENERGIES:
+            return sizes["energy"]
+        own = solution_size(values)
+        if plain in BUDGET:
+            return np.asarray(np.maximum(own, sizes["energy"]))
+        if plain in self.model.positions:
+            return np.asarray(np.maximum(own, sizes.get(plain, own)))
+        if plain not in self.model.velocities:
+            return own
+        duration = self.grid.dt[0] * self.grid.steps[0]
+        # a motion without small oscillations has no frequency
+        rate = np.fmax(self.finest["natural_frequency"], 1.0 / duration)
+        position = self.model.positions[self.model.velocities.index(plain)]
+        return np.asarray(np.maximum(own, sizes[position] * rate))
+
+    def floor_of(self, name: str, size: Floats) -> Floats:
+        """Return the predicted round-off of a quantity of a size, shape (s, c, l), or what its storing leaves of it.
+
+        A motion magnifies the former alone.
+        ``[D_2t u]`` divides the last digit of the position by dt: eps/(w dt) of the velocity's size.
+        """
+        relative = self.relative_floor
+        if name.endswith(CENTRED):
+            with np.errstate(divide="ignore"):
+                relative = relative + SPACING_AT_ONE / self.omega_dt
+        # what grew without bound has a floor without bound
+        with np.errstate(over="ignore", invalid="ignore"):
+            computed = relative * (size * self.magnified)[..., None]
+            return np.asarray(np.maximum(computed, self.stored_floor * size[..., None]))
+
+
+def part_of(experiment: Experiment, records: Mapping[int, Record]) -> Part:
+    """Bring the level Records of some members together.
+
+    Raises
+    ------
+    VibsimError
+        Where there is no level, the levels have no times in common, or they do not belong together.
+    """
+    grid = common_grid(records)
+    check_belonging(experiment, records)
+    finest = records[grid.levels[-1]]
+    lean = any(record.attrs.get("storage") == "lean" for record in records.values())
+    columns, states = columns_of(finest), experiment.model.definition.states
+    case = np.asarray(finest["case"], dtype=np.int64)
+    group = members(experiment, int(case[0]), int(case[-1]) + 1)
+    t = grid.times(group.end)
+    exact = _exact(experiment, t, group) if lean else _stored(experiment, grid, finest)
+    return Part(
+        experiment=experiment,
+        records=records,
+        grid=grid,
+        lean=lean,
+        norms=_norms(experiment) if lean else NORMS,
+        columns=columns,
+        exact=exact,
+        magnified=sensitivity(experiment, t, group, exact if lean else None),
+        relative_floor=relative_floors(experiment, grid.steps, columns),
+        stored_floor=stored_floor(records, grid.levels, [state.name for state in states]),
+        omega_dt=by_level([records[level]["omega_dt"] for level in grid.levels]),
+        fastest=_fastest(experiment.model.definition, records, grid, group, exact),
+        decay=decay_rate(experiment.model.definition, grid, finest, group, exact),
+        group=group,
+        failed=by_level([records[level]["status"] for level in grid.levels]) != 0,
+        stability_limit=stability_limits(experiment, columns),
+        adaptive=np.array([SCHEMES[scheme.kind].adaptive for scheme in experiment.schemes]),
+        left_to_the_mesh=left_to_the_mesh(experiment, columns),
+        corners=corners_of(experiment.model.definition, finest, group, grid.dt[0]),
+        missed=missed_pulses(experiment.model.definition, finest, group),
+        growth=_growth(experiment, grid, records, exact),
+    )
+
+
+def by_level(values: list[Floats]) -> Floats:
+    """Return arrays side by side along a new last dimension, which is the outermost one in memory."""
+    return np.moveaxis(np.stack([np.asarray(row, dtype=np.float64) for row in values]), 0, -1)
+
+
+def fastest(record: Record) -> Floats:
+    """Return the highest angular frequency of small oscillations times the step."""
+    return np.asarray(record[HIGHEST if HIGHEST in record else "omega_dt"], dtype=np.float64)
+
+
+def _fastest(
+    model: Model,
+    records: Mapping[int, Record],
+    grid: Grid,
+    group: Members,
+    exact: Mapping[str, Floats],
+) -> Floats:
+    """Return the angular frequency that a step has to resolve times the step of every level, shape (case, level)."""
+    natural = by_level([fastest(records[level]) for level in grid.levels])
+    finest = records[grid.levels[-1]]
+    w = stiffest(model, grid, finest, group, exact)
+    own = np.asarray(finest["natural_frequency"], dtype=float)
+    steps = np.array(grid.steps, dtype=np.float64)
+    return np.where((w == own)[:, None], natural, (w * group.end)[:, None] / steps)
+
+
+def energy_at_start(record: Record) -> Floats:
+    """Return the energy that members of a level start with, shape (scheme, case)."""
+    return np.asarray(record["energy_initial"], dtype=np.float64)
+
+
+def _norms(experiment: Experiment) -> tuple[str, ...]:
+    """Name the norms that a lean analysis keeps: the typical one, and those that checks ask for."""
+    named: set[str] = {TYPICAL_NORM}
+    for check in experiment.checks:
+        inner = check.measured
+        if inner.kind == "converges":
+            named.add(inner.norm)
+        elif inner.kind == "value":
+            named.add(inner.value.removeprefix("error_"))
+    return tuple(norm for norm in NORMS if norm in named)
+
+
+def _stored(experiment: Experiment, grid: Grid, finest: Record) -> dict[str, Floats]:
+    names = (state.name for state in experiment.model.definition.states)
+    return {n: take(grid, finest, f"{n}_exact") for n in names if f"{n}_exact" in finest}
+
+
+def _exact(experiment: Experiment, t: Floats, group: Members) -> dict[str, Floats]:
+    """Work the exact states out at times t, shape (c, t), once for all levels."""
+    model = experiment.model.definition
+    if model.exact is None:
+        return {}
+    initial, parameters = (
+        {name: values[:, None] for name, values in table.items()}
+        for table in (group.initial, group.parameters)
+    )
+    return {n: laid_out(values) for n, values in model.exact(t, initial, parameters).items()}
+
+
+def _growth(
+    experiment: Experiment, grid: Grid, records: Mapping[int, Record], exact: Mapping[str, Floats]
+) -> Floats:
+    """Compare the largest position of every level with the largest exact one; NaN without an exact solution.
+
+    Levels alone do not tell a growth that is the motion's own, as on the way to an escape. Where times that all levels
+    have are few to a period, they may all lie where the exact motion passes through 0: the amplitude that its velocity
+    has there counts as well.
+    """
+    position = experiment.model.definition.position
+    low, high = (
+        by_level([records[level][f"{position}_{name}"] for level in grid.levels])
+        for name in ("min", "max")
+    )
+    most = np.maximum(np.abs(low), np.abs(high))
+    if position not in exact:
+        return np.full(most.shape, np.nan)
+    w = np.asarray(records[grid.levels[-1]]["natural_frequency"], dtype=np.float64)
+    velocity = experiment.model.definition.velocity
+    with np.errstate(all="ignore"):
+        swung = np.where(w * grid.dt[0] > FEW_RADIANS, largest(exact[velocity]) / w, 0.0)
+    reference = np.fmax(largest(exact[position]), swung)[:, None]
+    usable = np.isfinite(most) & (reference > 0)
+    return np.where(usable, most, np.nan) / np.where(usable, reference, 1.0)

@@ -1,0 +1,111 @@
+"""The frequency and the decay that a step has to resolve: those of the place where the motion is.
+
+Small oscillations about 0 have the natural frequency. Of a nonlinear spring it counts where the motion is as stiff for
+a while; elsewhere (a motion about another place, a formula that is singular at 0) the mean stiffness along the motion
+takes its place: ``w^2 = mean of -da/du``, NaN where it does not pull back in the mean.
+
+Damping takes velocities away at the rate ``-da/dv``. Where that is large for a moment only, an implicit scheme with
+long steps keeps what should have gone within it: the largest rate along the motion counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.core.record import Record
+from vibsim.formula import derivative, names_in, values
+from vibsim.models.base import Model, tree
+from vibsim.observe.common_grid import Grid, take
+from vibsim.simulation import Members
+
+Floats = NDArray[np.float64]
+
+A_WHILE = 0.1
+"""Part of the time for which the motion is at least a quarter as stiff as at 0, half the frequency, where 0 counts."""
+
+
+def applies(model: Model) -> bool:
+    """Tell whether the motion of a model decides on the frequency: one coordinate, a nonlinear force, no events."""
+    return not model.linear and model.coordinates == 1 and model.events is None
+
+
+def stiffest(
+    model: Model, grid: Grid, finest: Record, group: Members, exact: Mapping[str, Floats]
+) -> Floats:
+    """Return the angular frequency that a step has to resolve, shape (case,).
+
+    Parameters
+    ----------
+    finest
+        Record of the finest level: the motion of the first scheme which did not break down, at the common times.
+    exact
+        The exact states at these times, shape (case, t); they take its place where they are known.
+    """
+    natural = np.asarray(finest["natural_frequency"], dtype=np.float64)
+    if not applies(model):
+        return natural
+    stiffness = _along(model, grid, finest, group, exact)
+    known = np.isfinite(stiffness)
+    count = np.maximum(np.count_nonzero(known, axis=-1), 1)
+    with np.errstate(all="ignore"):
+        usual = np.count_nonzero(stiffness >= 0.25 * natural[:, None] ** 2, axis=-1)
+        mean = np.sum(np.where(known, stiffness, 0.0), axis=-1) / count
+        of_motion = np.sqrt(np.where(mean > 0.0, mean, np.nan))
+    return np.where((natural > 0.0) & (usual >= A_WHILE * count), natural, of_motion)
+
+
+def _along(
+    model: Model, grid: Grid, finest: Record, group: Members, exact: Mapping[str, Floats]
+) -> Floats:
+    """Return ``-da/du`` along the motion, shape (case, t)."""
+    sound = np.argmin(np.asarray(finest["status"]) != 0, axis=0)
+    states = {}
+    for state in model.states:
+        own = take(grid, finest, state.name)[sound, np.arange(len(sound))]
+        known = np.asarray(exact.get(state.name, own))
+        states[state.name] = np.where(np.isfinite(known).all(axis=-1, keepdims=True), known, own)
+    t = grid.times(group.end)
+    numbers = {row.name: group.parameters[row.key][:, None] for row in model.parameters}
+    pull = derivative(tree(model, model.acceleration), model.position)
+    return np.broadcast_to(-values(pull, {**numbers, **states, "t": t}), t.shape)
+
+
+def is_damped(model: Model) -> bool:
+    """Tell whether the force depends on velocities."""
+    velocities = set(model.velocities)
+    return any(not velocities.isdisjoint(names_in(tree(model, row))) for row in model.accelerations)
+
+
+def decay_rate(
+    model: Model, grid: Grid, finest: Record, group: Members, exact: Mapping[str, Floats]
+) -> Floats:
+    """Return the largest rate at which the force takes a velocity away, 0 for none, shape (scheme, case).
+
+    Parameters
+    ----------
+    finest
+        Record of the finest level: the motion, at the common times.
+    exact
+        The exact states at these times, shape (case, t); they take its place where they are known.
+    """
+    if not is_damped(model):
+        return np.zeros(np.shape(finest["status"]))
+    states = {}
+    for state in model.states:
+        own = take(grid, finest, state.name)
+        known = np.asarray(exact.get(state.name, own))
+        states[state.name] = np.where(np.isfinite(known), known, own)
+    numbers = {row.name: group.parameters[row.key][:, None] for row in model.parameters}
+    shape = np.shape(next(iter(states.values())))
+    fastest = np.zeros(shape[:-1])
+    with np.errstate(all="ignore"):
+        for row, velocity in zip(model.accelerations, model.velocities, strict=True):
+            rate = derivative(tree(model, row), velocity)
+            found = -values(rate, {**numbers, **states, "t": grid.times(group.end)})
+            found = np.broadcast_to(found, shape)
+            largest = np.max(np.where(np.isfinite(found), found, 0.0), axis=-1)
+            fastest = np.maximum(fastest, largest)
+    return fastest

@@ -1,0 +1,172 @@
+"""Digests of the code that a job can run, so that a changed module reruns what it touches and no more.
+
+The code is found from the module of the command: every import in it is followed, at any depth, those inside functions
+and those of lazy names too (their twins under ``TYPE_CHECKING`` say where they stand). It is read, never executed. A
+package counts with its ``__init__``, with what this uses itself, and with the modules whose names are asked of it.
+
+Two things are no part of it, because what comes out of them is in every digest itself: the making of plans
+(`_PLANNING`), whose outcome a job compares with the digest that it was given, before it starts; and the lists of all
+models and schemes (`_LISTS`), of which a job uses its own entries (`vibsim.plan.shards.code_of`). What only describes
+types runs nothing.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib
+from collections.abc import Iterable, Iterator
+from functools import cache, lru_cache
+from pathlib import Path
+
+import vibsim
+
+PACKAGE = Path(vibsim.__file__).parent
+_LISTS = ("vibsim.models", "vibsim.schemes")
+_PLANNING = (
+    "vibsim.cli",
+    "vibsim.cli.arguments",
+    "vibsim.cli.chosen_plans",
+    "vibsim.plan.batches",
+    "vibsim.plan.build",
+    "vibsim.plan.cache",
+    "vibsim.plan.choose",
+    "vibsim.plan.workflow_names",
+    "vibsim.experiment.single_member",
+    "vibsim.experiment.with_levels",
+    "vibsim.experiment.reading",
+)
+"""From what a user writes to a plan; no job runs any of it once it has its plan (a test traces that)."""
+
+
+@lru_cache
+def everything() -> str:
+    """Return the digest of the whole package: of every file in it that is not made by Python."""
+    return _digest(p for p in PACKAGE.rglob("*") if p.is_file() and "__pycache__" not in p.parts)
+
+
+def used_by(*names: str) -> str:
+    """Return the digest of the modules `names` and of all that they can run of this package, templates included."""
+    modules = reached(*names)
+    folders = {_file(module).parent for module in modules if _is_package(module)}
+    templates = (p for folder in folders for p in (folder / "templates").rglob("*") if p.is_file())
+    return _digest([*map(_file, modules), *templates])
+
+
+def reached(*names: str) -> set[str]:
+    """Name the modules that the modules `names` can run, and themselves."""
+    todo, done = set(names), set[str]()
+    while todo:
+        module = todo.pop()
+        done.add(module)
+        todo |= {found for found in _imports(module) - done if found not in (*_LISTS, *_PLANNING)}
+    return done
+
+
+def of_folder(name: str) -> str:
+    """Return the digest of every file of package `name`."""
+    folder = _file(name).parent
+    return _digest(p for p in folder.rglob("*") if p.is_file() and "__pycache__" not in p.parts)
+
+
+def home(item: object, package: str) -> tuple[str, str]:
+    """Name a module of `package` that has `item`, an entry of its list, and the name that it has there."""
+    for module in _modules(package):
+        for name, value in vars(importlib.import_module(module)).items():
+            if module != package and value is item:
+                return module, name
+    return package, ""
+
+
+def _digest(files: Iterable[Path]) -> str:
+    digest = hashlib.sha256()
+    for file in sorted(files):
+        content = file.read_bytes()
+        name = file.relative_to(PACKAGE).as_posix()
+        digest.update(f"{name} {len(content)}\n".encode())
+        digest.update(content)
+    return digest.hexdigest()
+
+
+def _file(module: str) -> Path:
+    path = PACKAGE.joinpath(*module.split(".")[1:])
+    return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+
+
+def _is_package(module: str) -> bool:
+    return _file(module).name == "__init__.py"
+
+
+def _exists(module: str) -> bool:
+    return module.split(".")[0] == "vibsim" and _file(module).is_file()
+
+
+def _modules(package: str) -> list[str]:
+    found = sorted(_file(package).parent.glob("*.py"))
+    return [f"{package}.{path.stem}".removesuffix(".__init__") for path in found]
+
+
+def _tree(module: str) -> ast.Module:
+    return ast.parse(_file(module).read_bytes())
+
+
+@cache
+def _imports(module: str) -> frozenset[str]:
+    """Name the modules that `module` hands work to, and the packages that Python runs before it."""
+    parts = module.split(".")
+    found = {".".join(parts[:size]) for size in range(1, len(parts))}
+    nodes = list(_run(_tree(module)))
+    asked = {node.id for node in nodes if isinstance(node, ast.Name)}
+    bound = {as_: place for node in nodes for as_, place in _bound(node)}
+    for name, place in bound.items():
+        if not _is_package(module) or name in asked:
+            found |= _homes(*place)
+    for node in nodes:
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            package, name = bound.get(node.value.id, ("", ""))
+            if package and _exists(whole := f"{package}.{name}".rstrip(".")):
+                found |= _homes(whole, node.attr)
+    return frozenset(found)
+
+
+def _run(tree: ast.AST, types: bool = False) -> Iterator[ast.AST]:
+    """Yield every node that runs; those that only describe types, too, where `types` are wanted."""
+    todo = [tree]
+    while todo:
+        node = todo.pop()
+        yield node
+        if not types and isinstance(node, ast.If) and _is_for_types(node.test):
+            todo.extend(node.orelse)
+        else:
+            todo.extend(ast.iter_child_nodes(node))
+
+
+def _is_for_types(test: ast.expr) -> bool:
+    return isinstance(test, ast.Name) and test.id == "TYPE_CHECKING"
+
+
+def _bound(node: ast.AST) -> Iterator[tuple[str, tuple[str, str]]]:
+    """Yield the names that an import of this package binds, each with the module and the name in it."""
+    if isinstance(node, ast.Import):
+        for alias in node.names:
+            if _exists(alias.name):
+                yield alias.asname or alias.name.split(".")[0], (alias.name, "")
+    elif isinstance(node, ast.ImportFrom) and node.module and _exists(node.module):
+        for alias in node.names:
+            yield alias.asname or alias.name, (node.module, alias.name)
+
+
+def _homes(module: str, name: str) -> set[str]:
+    """Name the modules behind a name: where a package hands it on, that from which it comes."""
+    if name and _exists(deeper := f"{module}.{name}"):
+        return {deeper}
+    if not name or not _is_package(module):
+        return {module}
+    handed_on = _handed_on(module)
+    return {module} | (_homes(*handed_on[name]) if name in handed_on else set())
+
+
+@cache
+def _handed_on(package: str) -> dict[str, tuple[str, str]]:
+    """Return the names that a package has from elsewhere, those that it loads on first use too."""
+    return dict(bound for node in _run(_tree(package), types=True) for bound in _bound(node))

@@ -1,0 +1,197 @@
+"""What the rules of the workflow ask: names of files, digests of jobs; nothing else."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain, count
+from pathlib import Path
+from typing import Any
+
+from vibsim.plan import code_digest
+from vibsim.plan.cache import Resolver, load_all
+from vibsim.plan.choose import choose
+from vibsim.plan.jobs import Batch, Plan
+from vibsim.plan.shards import digest_of
+
+_LARGE = 32 * 10**6
+"""Bytes of level files from which an analysis has work for more threads than one."""
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A rule: some levels; where they have several shards, a job for each, told apart by the wildcard ``shard``."""
+
+    plan: Plan
+    batches: tuple[Batch, ...]
+    rule: str
+    """Name of the rule."""
+
+    @property
+    def levels(self) -> list[int]:
+        """The levels."""
+        return list(self.batches[0].levels)
+
+    @property
+    def paths(self) -> list[str]:
+        """The files of one job."""
+        shards = self.plan.made_by(self.batches[0])
+        if len(self.batches) == 1:
+            return [shard.path for shard in shards]
+        folders = [Path(shard.path).parent.as_posix() for shard in shards]
+        return [f"{folder}/shard_{{shard}}.nc" for folder in folders]
+
+    @property
+    def log(self) -> str:
+        """Path of the log."""
+        return f"{self.plan.key}/logs/{self._stem}.log"
+
+    @property
+    def benchmark(self) -> str:
+        """Path of the measured time and memory."""
+        return f"{self.plan.key}/benchmarks/{self._stem}.tsv"
+
+    @property
+    def _stem(self) -> str:
+        levels = self.batches[0].levels
+        stem = f"level_{levels[0]:02d}" + (f"_to_{levels[-1]:02d}" if len(levels) > 1 else "")
+        return stem + ("_shard_{shard}" if len(self.batches) > 1 else "")
+
+    @property
+    def threads(self) -> int:
+        """Threads of a job."""
+        return _cores() if self.batches[0].is_divisible else 1
+
+    @property
+    def memory(self) -> int:
+        """Megabytes of a job."""
+        return -(-max(batch.memory for batch in self.batches) // 10**6)
+
+    def shard(self, wildcards: Any) -> int:
+        """Return the number of the shard."""
+        return int(getattr(wildcards, "shard", 0))
+
+    def digest(self, wildcards: Any) -> str:
+        """Return the digest of a job."""
+        return self.batches[self.shard(wildcards)].digest
+
+    def file(self, wildcards: Any, input: Any) -> str:  # noqa: A002
+        """Return the experiment file; see `Names.file`."""
+        return self.plan.file
+
+
+@dataclass(frozen=True)
+class Names:
+    """The plans of the chosen experiments, asked by wildcard."""
+
+    plans: Mapping[str, Plan]
+    results: Path
+
+    @staticmethod
+    def of(
+        experiments: Sequence[str], results: str, root: Path, resolve: Resolver | None = None
+    ) -> Names:
+        """Load the plans of `experiments` (files, names, collections; none means the default)."""
+        folder = Path(results).absolute()
+        return Names(load_all(choose(experiments, root), resolve, cached=True), folder)
+
+    @property
+    def experiment_pattern(self) -> str:
+        """Regular expression for exactly the chosen experiments."""
+        return "|".join(map(re.escape, self.plans))
+
+    def file(self, wildcards: Any, input: Any) -> str:  # noqa: A002
+        """Return the experiment file.
+
+        Snakemake compares no parameter that is derived from the input, so that an experiment that
+        moved to another folder is not run again.
+        """
+        return self.plans[wildcards.experiment].file
+
+    @property
+    def simulations(self) -> list[Simulation]:
+        """The rules that make the level files."""
+        groups: dict[tuple[str, tuple[int, ...]], list[Batch]] = {}
+        for key, plan in self.plans.items():
+            for batch in plan.batches:
+                groups.setdefault((key, batch.levels), []).append(batch)
+        names = _different(_rule(key, levels) for key, levels in groups)
+        return [
+            Simulation(self.plans[key], tuple(found), name)
+            for name, ((key, _), found) in zip(names, groups.items(), strict=True)
+        ]
+
+    def shards(self, wildcards: Any) -> list[str]:
+        """Return the level files of an experiment."""
+        return [shard.path for shard in self.plans[wildcards.experiment].shards]
+
+    @property
+    def best_pattern(self) -> str:
+        """Regular expression for the experiments with an extrapolated solution; it may match nothing."""
+        return "|".join(re.escape(key) for key, plan in self.plans.items() if plan.best) or "(?!)"
+
+    def extrapolation_digest(self, wildcards: Any) -> str:
+        """Return the digest of an extrapolation."""
+        return self.plans[wildcards.experiment].extrapolation
+
+    def analysis_threads(self, wildcards: Any) -> int:
+        """Return the threads of an analysis."""
+        return _cores() if self.plans[wildcards.experiment].bytes > _LARGE else 1
+
+    def analysis_memory(self, wildcards: Any) -> int:
+        """Return the megabytes of an analysis."""
+        return -(-self.plans[wildcards.experiment].analysis_memory // 10**6)
+
+    def analysis_digest(self, wildcards: Any) -> str:
+        """Return the digest of an analysis."""
+        return self.plans[wildcards.experiment].analysis
+
+    def report_digest(self, wildcards: Any) -> str:
+        """Return the digest of a report."""
+        return self.plans[wildcards.experiment].report
+
+    @property
+    def files(self) -> list[str]:
+        """Every file of the chosen experiments: also one that only others are made from is kept."""
+        return [path for plan in self.plans.values() for path in plan.files]
+
+    @property
+    def indexed(self) -> list[str]:
+        """What the index shows: the chosen experiments, and the others found among the results."""
+        chosen = {path for plan in self.plans.values() for path in (plan.summary, plan.page)}
+        shown = (self.results.glob(f"*/*/{name}") for name in ("summary.json", "report.html"))
+        found = {
+            path.relative_to(self.results).as_posix()
+            for paths in shown
+            for path in paths
+            if path.is_file()
+        }
+        return sorted(chosen | found)
+
+    @property
+    def index_digest(self) -> str:
+        """Digest of the page over all experiments."""
+        return digest_of({"job": "index", "code": code_digest.everything()})
+
+
+def _rule(key: str, levels: Sequence[int]) -> str:
+    """Return a name such as ``simulate_pendulum_lab__period_map__levels_06_09``: an identifier, as its parts are."""
+    ends = [f"{level:02d}" for level in dict.fromkeys((levels[0], levels[-1]))]
+    made = "_".join(["level" if len(ends) == 1 else "levels", *ends])
+    return "__".join([f"simulate_{key.replace('/', '__')}", made])
+
+
+def _different(names: Iterable[str]) -> list[str]:
+    """Number names that are there already: ``a__b/c`` and ``a/b__c`` give one."""
+    found: dict[str, None] = {}
+    for name in names:
+        numbered = (f"{name}__{number}" for number in count(2))
+        found[next(one for one in chain([name], numbered) if one not in found)] = None
+    return list(found)
+
+
+def _cores() -> int:
+    """Return how many cores there are; the workflow gives a job no more than it may use itself."""
+    return len(os.sched_getaffinity(0))

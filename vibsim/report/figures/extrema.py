@@ -1,0 +1,274 @@
+"""Local periods and amplitudes against their number, and the phase error of every peak.
+
+Source: vibration text, section 3.5 (figure 2) and exercise 2. The local period number m is the time from the m-th
+peak to the next one, the local amplitude half the height from a peak to the trough behind it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vibsim.core.record import Record
+from vibsim.report import frame, style
+from vibsim.report.choice import position
+from vibsim.report.data import Floats, Member, at, exact_periods, pick, time_unit, unit, whole
+from vibsim.report.figures.panels import figure_of, panels
+from vibsim.report.style import Picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from vibsim.experiment import Experiment
+
+CURVES = 6
+"""Most curves; more lie on one another."""
+MARKED = 40
+"""Most numbers of one curve that get a marker each."""
+MOSTLY = 0.5
+"""Where fewer than this part of the curves stay so small for two peaks or more, the scale is logarithmic."""
+EXACT: dict[str, Any] = {"color": "black", "linestyle": (0, (4, 3)), "linewidth": 1.0, "zorder": 1}
+WILD = 10.0
+"""Amplitudes and periods beyond so many times the exact one are cut off, and the panel says so."""
+
+
+def local(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
+    """Draw local periods, amplitudes and the phase error of one member; None where there are fewer than two periods."""
+    if "peak_time" not in record or not shown:
+        return None
+    case = shown[0].case
+    runs = _runs(record, [member for member in shown if member.case == case])
+    if not runs:
+        return None
+    axes = panels([2.1, 2.1, 2.1])
+    exact = float(exact_periods(record)[case])
+    start = first_peak(experiment, record, case, exact)
+    schemes = {member.scheme for _, member, _ in runs}
+    drawn: list[list[Any]] = [[], [], []]
+    for label, member, level in runs:
+        look = _look(member, level, len(schemes) > 1, runs)
+        lines = _draw(axes, record, member, level, style.entry(label), look, exact, start)
+        for part, line in zip(drawn, lines, strict=True):
+            part.append(line)
+    where = position(experiment)
+    size = _amplitude(experiment, record, case)
+    for ax, value in ((axes[0], exact), (axes[1], size), (axes[2], 0.0)):
+        if math.isfinite(value):
+            ax.axhline(value, label="exact" if ax is axes[0] else "", **EXACT)
+    leaves = _ranges(axes, drawn, exact, size)
+    for ax in axes:
+        # amplitudes that hardly differ need long numbers
+        ax.yaxis.set_label_coords(-0.115, 0.5)
+    time = time_unit(record)
+    axes[0].set_ylabel(style.label("local period", time))
+    axes[1].set_ylabel(style.label("local amplitude", unit(record, f"{where}_finest")))
+    axes[2].set_ylabel(style.label("peak early by", time))
+    axes[0].set_title("Local period")
+    axes[1].set_title("Local amplitude")
+    axes[2].set_title("Phase error of the peaks")
+    axes[2].set_xlabel("number of the peak")
+    for ax, lines in zip(axes, drawn, strict=True):
+        _tell_alike(ax, lines, [label for label, _, _ in runs])
+    style.beside(axes[0], fontsize=8)
+    reference = "its exact time" if math.isfinite(start) else "its time after the first peak"
+    return Picture(
+        name=f"extrema_{case}",
+        title="Local periods and amplitudes, and the phase error from peak to peak",
+        caption="Lines with markers: peaks interpolated by a parabola; faint circles: the same from grid points alone, "
+        "whose period jumps by a whole dt. Dashed: exact. Bottom: how much earlier than "
+        f"{reference} each peak comes; a straight line means the same phase error in every period. Of curves that "
+        "coincide the first is wide and pale, and the legend says which they are."
+        f"{f' {frame.LEAVING}' if leaves else ''}",
+        alt="Local period, local amplitude and phase error against the number of the peak",
+        figure=figure_of(axes[0]),
+    )
+
+
+def _runs(record: Record, members: list[Member]) -> list[tuple[str, Member, int]]:
+    """Choose the curves: of one or two schemes several levels, of more schemes the coarsest level."""
+    levels = whole(record, "level")
+    each = max(1, min(len(levels), 4, CURVES // max(1, len(members))))
+    found = []
+    for member in members[:CURVES]:
+        for i in range(each):
+            if np.isfinite(at(record, "peak_time", member, level=i)).sum() >= 2:
+                who = member.scheme_name if len(members) > 1 else ""
+                label = ", ".join(filter(None, [who, f"level {levels[i]}" if each > 1 else ""]))
+                found.append((label or f"level {levels[i]}", member, i))
+    return found
+
+
+def _draw(
+    axes: list[Axes],
+    record: Record,
+    member: Member,
+    level: int,
+    label: str,
+    look: dict[str, Any],
+    exact: float,
+    start: float,
+) -> list[Any]:
+    """Draw a run in the three panels and return its lines."""
+    time, peak, trough = (
+        at(record, name, member, level=level) for name in ("peak_time", "peak", "trough")
+    )
+    trough_time = at(record, "trough_time", member, level=level)
+    keep = np.isfinite(time)
+    number, time, peak = np.arange(1, keep.sum() + 1), time[keep], peak[keep]
+    line = look | {"linewidth": 1.1, "markersize": 4}
+    line |= {"marker": look["marker"] if number.size <= MARKED else ""}
+    grid = at(record, "peak_time_grid", member, level=level)[keep]
+    faint: dict[str, Any] = {
+        "color": look["color"],
+        "linestyle": "none",
+        "marker": "o",
+        "markerfacecolor": "none",
+        "alpha": 0.45,
+    }
+    axes[0].plot(number[:-1], np.diff(grid), **faint, markersize=6.5, zorder=1.5)
+    offset = time[0] - exact if math.isnan(start) else start - exact
+    return [
+        *axes[0].plot(number[:-1], np.diff(time), label=label, **line),
+        *axes[1].plot(number, heights(time, peak, trough_time, trough), **line),
+        *axes[2].plot(number, offset + number * exact - time, **line),
+    ]
+
+
+def _look(
+    member: Member, level: int, several: bool, runs: list[tuple[str, Member, int]]
+) -> dict[str, Any]:
+    """Return the look of a run: of several schemes a colour is a scheme, and dashes and marker are a level."""
+    if not several:
+        return style.look([run[1:] for run in runs].index((member, level)))
+    look = style.look(member.scheme)
+    if len({i for _, _, i in runs}) == 1:
+        return look
+    place = sorted({i for _, _, i in runs}).index(level)
+    return look | {"linestyle": style.DASHES[place], "marker": style.MARKERS[place]}
+
+
+def _tell_alike(ax: Axes, lines: list[Any], labels: list[str]) -> None:
+    """Say beside a panel which curves lie on one another there, and draw the first of them wide and pale beneath."""
+    low, high = ax.get_ylim()
+    curves = [
+        np.where((y >= low) & (y <= high), y, np.nan)
+        for y in (np.asarray(line.get_ydata(), dtype=np.float64) for line in lines)
+    ]
+    texts: list[tuple[Any, str]] = []
+    for i, first in enumerate(frame.same_as(curves, high - low)):
+        if first is None:
+            continue
+        lines[first].set(linewidth=3.4, alpha=0.5)
+        lines[i].set(zorder=3.0 + 0.01 * i)
+        text = style.entry(f"{labels[i]}:\n  same as {labels[first]}")
+        texts.append((lines[i], text))
+        if lines[i].get_label()[:1] != "_":
+            # the panel with the legend of all
+            lines[i].set_label(text)
+    if texts and lines[0].get_label()[:1] == "_":
+        handles, words = zip(*texts, strict=True)
+        place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.03)}
+        ax.legend(list(handles), list(words), borderaxespad=0.0, fontsize=7.5, **place)
+
+
+def heights(time: Floats, peak: Floats, trough_time: Floats, trough: Floats) -> Floats:
+    """Return half the height from every peak to the trough behind it, else to the one before; NaN without one."""
+    known = np.isfinite(trough_time)
+    if not known.any():
+        return np.full(peak.shape, np.nan)
+    times, values = trough_time[known], trough[known]
+    after = np.minimum(np.searchsorted(times, time), times.size - 1)
+    return np.asarray(0.5 * (peak - values[after]))
+
+
+def first_peak(experiment: Experiment, record: Record, case: int, period: float) -> float:
+    """Return the time of the first exact peak after the start; NaN where no formula gives it.
+
+    It is known of a linear model, and of any motion that starts at rest: there it is one period, or half of one.
+    """
+    u, v = _start(experiment, record, case)
+    if not math.isfinite(period) or u == v == 0.0:
+        return math.nan
+    if v == 0.0:
+        return period if u > 0.0 else period / 2.0
+    if not experiment.model.definition.linear:
+        return math.nan
+    angle = math.atan2(v * period / (2.0 * math.pi), u) % (2.0 * math.pi)
+    return angle / (2.0 * math.pi) * period
+
+
+def _start(experiment: Experiment, record: Record, case: int) -> tuple[float, float]:
+    """Return the first position and velocity of a member."""
+    model = experiment.model.definition
+    u, v = (
+        float(at(record, f"{n}_finest", Member(0, case, ""))[0])
+        for n in (model.position, model.velocity)
+    )
+    return u, v
+
+
+def _amplitude(experiment: Experiment, record: Record, case: int) -> float:
+    """Return the exact amplitude where it is known: of a linear model, or of a start at rest."""
+    u, v = _start(experiment, record, case)
+    if v == 0.0:
+        return abs(u)
+    model = experiment.model.definition
+    if not model.linear or "natural_frequency" not in record:
+        return math.nan
+    w = float(np.ravel(pick(record, "natural_frequency", case=case))[0])
+    return math.hypot(u, v / w)
+
+
+def _ranges(axes: list[Axes], drawn: list[list[Any]], exact: float, size: float) -> bool:
+    """Hold what is drawn; cut off what grows far beyond the exact number, with a mark; say whether anything is."""
+    from matplotlib.ticker import MaxNLocator
+
+    leaves = False
+    for ax, lines, value in zip(axes, drawn, (exact, size, math.nan), strict=True):
+        values = np.concatenate(
+            [np.asarray(line.get_ydata(), dtype=np.float64) for line in ax.lines]
+        )
+        beyond = np.isfinite(values) & (np.abs(values) > WILD * abs(value))
+        kept = values[~beyond]
+        if not np.isfinite(kept).any() or not beyond.any():
+            ax.set_ylim(*style.limits(values))
+            continue
+        shown = [_within(line, WILD * abs(value)) for line in lines]
+        if sum(shown) < MOSTLY * len(shown):
+            # most of them would not be seen
+            _grow(ax, lines, abs(value))
+        else:
+            ax.set_ylim(*style.limits(kept))
+            note = f"cut off beyond {WILD:g} times the exact one"
+            ax.text(0.99, 0.9, note, transform=ax.transAxes, ha="right", fontsize=8.5)
+        found = [
+            frame.mark_leaving(
+                ax,
+                np.asarray(line.get_xdata(), dtype=np.float64),
+                np.asarray(line.get_ydata(), dtype=np.float64),
+                line.get_color(),
+            )
+            for line in lines
+        ]
+        leaves |= any(found)
+    axes[0].xaxis.set_major_locator(MaxNLocator(nbins=10, integer=True))
+    return leaves
+
+
+def _within(line: Any, most: float) -> bool:
+    """Say whether at least two points of a line are finite and not beyond `most`."""
+    values = np.abs(np.asarray(line.get_ydata(), dtype=np.float64))
+    return int(np.sum(values <= most)) > 1
+
+
+def _grow(ax: Axes, lines: list[Any], size: float) -> None:
+    """Show on a logarithmic scale how numbers grow, as far as a frame has room."""
+    for line in lines:
+        line.set_ydata(style.no_zeros(np.asarray(line.get_ydata(), dtype=np.float64)))
+    values = np.concatenate([np.asarray(line.get_ydata()) for line in lines] + [np.array([size])])
+    shown = values[(values <= frame.WILD * size) & (values >= size / frame.WILD)]
+    style.log_axis(ax, "y", float(shown.min()) / 2.0, 2.0 * float(shown.max()))
+    note = "size, logarithmic"
+    ax.text(0.99, 0.9, note, transform=ax.transAxes, ha="right", fontsize=8.5)

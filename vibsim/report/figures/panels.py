@@ -1,0 +1,190 @@
+"""Panels that share a time axis, and curves that may coincide."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vibsim.report import frame, style
+from vibsim.report.data import Floats
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WILD = 1e6
+"""Curves whose largest value is so many times a usual one are drawn on a logarithmic scale."""
+APART = 8.0
+"""Spreads that differ by more than this are drawn on a logarithmic scale."""
+
+LONG = 36
+"""Letters of a label above which its unit stands in a line of its own."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One curve of an overlay."""
+
+    label: str
+    values: Floats
+    sound: bool = True
+    """Whether it stands above round-off."""
+    lost: str = ""
+    """Why it does not, in words; round-off where nothing is said."""
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the runs behind it lasted to the end; at the first and last time a centred formula has no value."""
+        inner = self.values[1:-1] if self.values.size > 2 else self.values
+        return self.lost != frame.BROKE_DOWN and bool(np.isfinite(inner).all())
+
+    @property
+    def fate(self) -> str:
+        """What the legend says of a curve that is not sound or not whole; else empty."""
+        if not self.is_whole:
+            return frame.BROKE_DOWN
+        return "" if self.sound else self.lost or frame.ROUND_OFF
+
+
+def figure_of(axes: Axes) -> Figure:
+    """Return the figure that holds `axes`.
+
+    Raises
+    ------
+    ValueError
+        Where they were taken out of it.
+    """
+    figure = axes.get_figure(root=True)
+    if figure is None:
+        raise ValueError("these axes belong to no figure")
+    return figure
+
+
+def panels(heights: list[float]) -> list[Axes]:
+    """Return axes below each other with one common axis of abscissae; room for a legend at the right."""
+    total = sum(heights) + 0.28 * len(heights) + 0.42
+    figure = style.canvas(total)
+    axes: list[Any] = []
+    top = total
+    for height in heights:
+        top -= 0.28
+        box = (0.088, (top - height) / total, 0.652, height / total)
+        axes.append(figure.add_axes(box, sharex=axes[0] if axes else None))
+        top -= height
+        axes[-1].yaxis.set_label_coords(-0.088, 0.5)
+    for ax in axes[:-1]:
+        ax.tick_params(labelbottom=False)
+    return axes
+
+
+def draw_curves(ax: Axes, t: Floats, curves: list[Curve], text: str, measure: str) -> None:
+    """Draw curves that may coincide: from wide and solid below to narrow and dashed above, markers in turn.
+
+    The range is that of the sound curves that last to the end: a run that blew up would hide all others.
+    """
+    sound = [curve for curve in curves if curve.sound] or curves
+    shown = [curve.values for curve in sound if curve.is_whole] or [curve.values for curve in sound]
+    wild = explosive(shown)
+    exponent = 0 if wild else style.scale(*shown)
+    for i, curve in enumerate(curves):
+        values = style.no_zeros(curve.values) if wild else curve.values / 10.0**exponent
+        x, y = style.thin(t, values)
+        note = f"\n({curve.fate})" if curve.fate else ""
+        look = _look(i, len(curves), x.size)
+        if not curve.sound and any(c.sound for c in curves):
+            look = {"color": "#a0a0a0", "linewidth": 0.6, "zorder": 1.5}
+        ax.plot(x, y, label=curve.label + note, **look)
+    stop_at_breakdown(ax, t, [curve.values for curve in curves])
+    if wild:
+        style.log_axis(ax, "y", *decades(shown))
+    else:
+        ax.set_ylim(*style.limits(*(values / 10.0**exponent for values in shown)))
+    words = style.label(f"|{text}|" if wild else text, measure, exponent)
+    # a long label would run into the panel below
+    ax.set_ylabel(words.replace(f"{text} [", f"{text}\n[") if len(words) > LONG else words)
+    style.beside(ax)
+
+
+def stop_at_breakdown(ax: Axes, t: Floats, series: list[Floats]) -> None:
+    """Let the time end with the last finite value of all series, and say so where that is not the end."""
+    finite = np.flatnonzero(np.any([np.isfinite(values) for values in series], axis=0))
+    last = max(int(finite[-1]), 1) if finite.size else t.size - 1
+    # a centred formula has no value at the last time
+    last = t.size - 1 if last >= t.size - 2 else last
+    ax.set_xlim(float(t[0]), float(t[last]))
+    if last < t.size - 1:
+        note = f"ends with the breakdown, of {t[-1]:g} in all"
+        ax.text(0.99, 0.03, note, transform=ax.transAxes, ha="right", fontsize=8.5)
+
+
+def explosive(series: list[Floats]) -> bool:
+    """Say whether values grow beyond all bounds, so that on a linear scale only the last of them would be seen."""
+    sizes = [part for values in series if (part := _sizes(values)).size]
+    return bool(sizes) and max(s.max() for s in sizes) > WILD * min(np.median(s) for s in sizes)
+
+
+def decades(series: list[Floats]) -> tuple[float, float]:
+    """Return limits of a logarithmic axis over values that grow, from what they begin with."""
+    sizes = [part for values in series if (part := _sizes(values)).size]
+    high = min(max(float(s.max()) for s in sizes), style.LARGEST)
+    low = min(float(s[:2].max()) for s in sizes)
+    return max(min(low, high) / 2, style.TINIEST), 2 * high
+
+
+def _sizes(values: Floats) -> Floats:
+    kept: Floats = np.abs(values[np.isfinite(values) & (values != 0.0)])
+    return kept
+
+
+def _look(i: int, count: int, points: int) -> dict[str, Any]:
+    """Return a line's look such that later lines leave earlier ones visible beneath them."""
+    part = i / max(1, count - 1)
+    every = max(1, points // 9)
+    return {
+        "color": style.COLOURS[i],
+        "linestyle": style.DASHES[i],
+        "linewidth": 4.6 - 3.4 * part if count > 1 else 1.6,
+        "alpha": 0.55 + 0.45 * part if count > 1 else 1.0,
+        "marker": style.MARKERS[i],
+        "markersize": 5.0,
+        "markerfacecolor": "white",
+        "markeredgewidth": 1.0,
+        "markevery": (i * every // count, every),
+        "zorder": 2 + 0.1 * i,
+    }
+
+
+def comparable(curves: list[Curve]) -> bool:
+    """Say whether at least two curves stand above round-off and last to the end, so that a spread has a meaning."""
+    return sum(curve.sound and curve.is_whole for curve in curves) > 1
+
+
+def draw_spread(ax: Axes, t: Floats, curves: list[Curve], measure: str) -> None:
+    """Draw how far every comparable curve is from the finest of them; logarithmic where they differ much."""
+    sound = [i for i, curve in enumerate(curves) if curve.sound and curve.is_whole]
+    reference = curves[sound[-1]]
+    gaps = {i: curves[i].values - reference.values for i in sound[:-1]}
+    shown = list(gaps.values())
+    sizes = [size for gap in shown if (size := _typical(gap)) > 0]
+    logarithmic = bool(sizes) and max(sizes) > APART * min(sizes)
+    exponent = 0 if logarithmic else style.scale(*shown)
+    for i, gap in gaps.items():
+        values = style.no_zeros(gap) if logarithmic else gap / 10.0**exponent
+        x, y = style.thin(t, values)
+        look = _look(i, len(curves), x.size) | {"linewidth": 1.3, "alpha": 1.0, "markersize": 4.0}
+        ax.plot(x, y, **look)
+    if logarithmic:
+        highest = min(max(float(np.nanmax(np.abs(gap))) for gap in shown), style.LARGEST)
+        style.log_axis(ax, "y", max(0.02 * min(sizes), style.TINIEST), 2 * highest)
+    else:
+        ax.axhline(0.0, color=style.GREY, linewidth=0.7, zorder=1)
+        ax.set_ylim(*style.limits(*(gap / 10.0**exponent for gap in shown)))
+    ax.set_ylabel(style.label("|spread|" if logarithmic else "spread", measure, exponent))
+    ax.set_title(f"Spread: distance from {reference.label}", fontweight="normal", fontsize=9)
+
+
+def _typical(values: Floats) -> float:
+    """Return a size that nine tenths of the values stay below: an end point of its own kind does not count."""
+    return float(np.nanquantile(np.abs(values), 0.9))

@@ -1,0 +1,106 @@
+"""Work and precision: the error against steps, evaluations of the force and estimated time.
+
+Source: E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, section II.10 (diagrams of
+error against work); vibration text, exercise 4.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vibsim.core.record import Record
+from vibsim.report import frame, style
+from vibsim.report.choice import position
+from vibsim.report.data import case_name, known, unit
+from vibsim.report.figures.panels import figure_of
+from vibsim.report.style import Picture
+from vibsim.report.tables.work import Line, lines
+from vibsim.report.text import words
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from vibsim.experiment import Experiment
+
+BOTTOM, HEIGHT = 0.55, 3.1
+"""Of the panels [inch]."""
+FONT = 8
+"""Size of the legend [point]."""
+
+
+def precision(experiment: Experiment, record: Record, case: int) -> Picture | None:
+    """Draw the error against steps, evaluations and time; None for fewer than two lines with several points."""
+    found = lines(experiment, record, case)
+    if sum(line.error.size > 1 for line in found) < 2:
+        return None
+    names = [line.name for line in found] + ["error of the reference"]
+    columns = frame.columns(names, FONT, 0.92 * style.WIDTH)
+    top = 0.35 + 0.19 * math.ceil(len(names) / columns)
+    total = BOTTOM + HEIGHT + top
+    figure = style.canvas(total)
+    axes: list[Any] = []
+    for i in range(3):
+        box = (0.075 + 0.315 * i, BOTTOM / total, 0.285, HEIGHT / total)
+        axes.append(figure.add_axes(box, sharey=axes[0] if axes else None))
+    floor = float(known(record, "work_reference_error", ("case",))[case])
+    for k, ax in enumerate(axes):
+        for i, line in enumerate(found):
+            look = style.look(i) | {"markersize": 4.5, "linewidth": 1.0}
+            look |= {"markerfacecolor": "white"} if line.is_adaptive else {}
+            ax.plot(line.work[k], style.no_zeros(line.error), label=style.entry(line.name), **look)
+        if floor > 0.0:
+            ax.axhline(floor, color=style.GREY, linestyle=":", label="error of the reference")
+    _ranges(axes, found)
+    letter = words.symbol(position(experiment))
+    axes[0].set_ylabel(style.label(f"largest error of {letter}", unit(record, "work_error")))
+    for ax, text in zip(axes, ("steps", "force evaluations", "estimated time [s]"), strict=True):
+        ax.set_xlabel(text)
+    for ax in axes[1:]:
+        ax.tick_params(labelleft=False)
+    handles, texts = axes[0].get_legend_handles_labels()
+    figure.legend(
+        handles,
+        texts,
+        loc="upper left",
+        bbox_to_anchor=(0.065, 1.0),
+        ncols=columns,
+        fontsize=FONT,
+    )
+    name = case_name(record, case)
+    adaptive = (
+        " Hollow: adaptive methods over their tolerances."
+        if any(line.is_adaptive for line in found)
+        else ""
+    )
+    below = (
+        " Below the dotted line the reference is no better than the solution."
+        if floor > 0.0
+        else ""
+    )
+    return Picture(
+        name=f"work_precision_{case}",
+        title=f"Work and precision{f': {name}' if name else ''}",
+        caption="Lower left is better: a small error for little work. The slope of a line is minus the order, until "
+        f"round-off.{adaptive}{below} Of an implicit scheme the evaluations of one iteration per step are counted. The "
+        "time is that of the cost model: one compiled member alone, and SciPy's own pace for adaptive methods.",
+        alt="Largest error against steps, force evaluations and estimated time, all axes logarithmic",
+        figure=figure_of(axes[0]),
+    )
+
+
+def _ranges(axes: list[Axes], found: list[Line]) -> None:
+    errors = np.concatenate([line.error for line in found])
+    errors = errors[np.isfinite(errors) & (errors > 0.0)]
+    if errors.size:
+        # an unstable level has an error without bound, which would hide all others
+        high = min(float(errors.max()), 1e3 * float(np.quantile(errors, 0.75)))
+        style.log_axis(axes[0], "y", float(errors.min()) / 3.0, 3.0 * high)
+    for k, ax in enumerate(axes):
+        work = np.concatenate([line.work[k] for line in found])
+        work = work[np.isfinite(work) & (work > 0.0)]
+        if work.size:
+            style.log_axis(ax, "x", float(work.min()) / 1.5, float(work.max()) * 1.5)
+            style.log_ticks(ax.xaxis, float(work.min()) / 1.5, float(work.max()) * 1.5, 5)

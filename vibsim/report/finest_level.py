@@ -1,0 +1,136 @@
+"""What is known of every member at the finest level, each number with its error bar.
+
+The error of the finest of two levels follows from their difference d and the order p: ``d/(r^p - 1)``, where r is the
+ratio of their steps (pendulum lecture, section 2.5, for the finer level). The interval of p gives that of the error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vibsim.core.record import Record
+from vibsim.core.vocabulary import TYPICAL_NORM
+from vibsim.report.data import (
+    Floats,
+    Member,
+    at,
+    exact_periods,
+    formal_orders,
+    known,
+    pick,
+    unit,
+    whole,
+)
+from vibsim.report.style import no_zeros
+
+MEMBER = ("scheme", "case")
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One number of every scheme and member with its error bar; arrays have the shape (scheme, case)."""
+
+    name: str
+    unit: str
+    value: Floats
+    error: Floats
+    """Estimated from the two finest levels; NaN with a single level."""
+
+
+@dataclass(frozen=True)
+class Error:
+    """The norm of the error of the finest level; arrays have the shape (scheme, case)."""
+
+    true: Floats
+    """Against the exact solution; NaN where there is none."""
+    estimate: Floats
+    low: Floats
+    high: Floats
+    """Estimate with the ends of the interval of the order; NaN where no interval is stated."""
+
+    @property
+    def is_known(self) -> bool:
+        """Whether any member has an exact solution to compare with."""
+        return bool(np.isfinite(self.true).any())
+
+    @property
+    def best(self) -> Floats:
+        """The true error where it is known, else the estimate."""
+        return np.where(np.isfinite(self.true), self.true, self.estimate)
+
+
+def error(record: Record, quantity: str) -> Error:
+    """Return the error of a quantity at the finest level, in the typical norm."""
+    norm = record.words("norm").index(TYPICAL_NORM)
+    true = known(record, f"{quantity}_error_norm", MEMBER, norm=norm, level=-1)
+    if not whole(record, "pair"):
+        nothing = np.full_like(true, np.nan)
+        return Error(true, nothing, nothing, nothing)
+    last = pick(record, f"{quantity}_difference_norm", norm=norm, pair=-1)
+    formal = formal_orders(record, quantity)
+    order, low, high = orders(record, quantity)
+    stated = np.where(np.isfinite(order), order, formal)
+    estimate, least, most = (last * _part(record, p) for p in (stated, high, low))
+    return Error(true, estimate, least, most)
+
+
+def norms(record: Record, quantity: str, member: Member) -> Floats:
+    """Return the true error of a member at every level, or the differences of its levels where it is not known."""
+    norm = record.words("norm").index(TYPICAL_NORM)
+    true = no_zeros(at(record, f"{quantity}_error_norm", member, norm=norm))
+    if np.isfinite(true).any() or not whole(record, "pair"):
+        return true
+    last = no_zeros(at(record, f"{quantity}_difference_norm", member, norm=norm))
+    return np.append(last, np.nan)
+
+
+def orders(record: Record, quantity: str) -> tuple[Floats, Floats, Floats]:
+    """Return the stated order of every scheme and member and the ends of its interval, shape (scheme, case)."""
+    norm = record.words("norm").index(TYPICAL_NORM)
+    order, low, high = (
+        np.asarray(pick(record, f"{quantity}_order{end}", norm=norm), dtype=np.float64)
+        for end in ("", "_low", "_high")
+    )
+    return order, low, high
+
+
+def deviation(record: Record, quantity: str) -> Floats:
+    """Return the stated order minus the promised one, shape (scheme, case)."""
+    return np.asarray(orders(record, quantity)[0] - formal_orders(record, quantity))
+
+
+def _part(record: Record, order: Floats) -> Floats:
+    """Return the part of the difference of the two finest levels that is left as error of the finest."""
+    levels = whole(record, "level")
+    with np.errstate(divide="ignore", over="ignore"):
+        rest = 2.0 ** (order * (levels[-1] - levels[-2])) - 1.0
+        return np.where(rest > 0.0, 1.0 / rest, np.where(np.isnan(rest), np.nan, np.inf))
+
+
+def period(record: Record, position: str) -> Measured:
+    """Return the period of the finest level."""
+    return _measured(record, "period", position)
+
+
+def amplitude(record: Record, position: str) -> Measured:
+    """Return the amplitude of the finest level: the peak of a run that grows without bound may have either sign."""
+    return _measured(record, "amplitude", position)
+
+
+def _measured(record: Record, name: str, position: str) -> Measured:
+    value = np.abs(known(record, name, MEMBER, level=-1))
+    error = np.full(value.shape, np.nan)
+    if whole(record, "pair"):
+        coarser = np.abs(known(record, name, MEMBER, level=-2))
+        error = np.abs(value - coarser) * _part(record, formal_orders(record, position))
+    return Measured(name, unit(record, name), value, error)
+
+
+def period_error(record: Record, level: int) -> Floats:
+    """Return the relative error of the period at a position of `level`, shape (scheme, case); NaN where not known."""
+    measured, exact = known(record, "period", MEMBER, level=level), exact_periods(record)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        # on the separatrix there is no period to be wrong about
+        return np.asarray(np.where(np.isinf(exact), np.nan, np.abs(measured / exact - 1.0)))

@@ -1,0 +1,1 @@
+"""The report of one experiment, and the index over all of them."""

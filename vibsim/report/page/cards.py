@@ -1,0 +1,277 @@
+"""The words of a page: the verdict on every check, what was computed, and where it came from."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from shlex import quote
+from typing import TYPE_CHECKING, Any
+
+from vibsim.checks.value.units import unit_of
+from vibsim.core.record import Record
+from vibsim.core.vocabulary import BY_TOLERANCE
+from vibsim.experiment.collection import ADHOC, ENDINGS
+from vibsim.experiment.schema.checks import ClaimCheck
+from vibsim.plan.versions import DRAWING, versions
+from vibsim.report import data
+from vibsim.report.evidence import figure
+from vibsim.report.tables import orders, published
+from vibsim.report.tables.table import Cell, Column, Table, Written
+from vibsim.report.text import assertions, briefs, reasons, setting, words
+
+if TYPE_CHECKING:
+    from vibsim.experiment import Experiment
+    from vibsim.experiment.schema.checks import Measurement
+
+
+def context(
+    experiment: Experiment,
+    record: Record,
+    summary: Mapping[str, Any],
+    provenance: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Return the words of a page by the names that its template uses."""
+    checks = _carded(experiment, summary)
+    asserted = {spec.id: spec for spec in experiment.checks}
+    plain = [check for check in checks if briefs.is_plain(asserted.get(check["id"]), check)]
+    plain = plain if len(checks) >= briefs.MANY else []
+    full = [check for check in checks if check not in plain]
+    return {
+        "collection": experiment.collection,
+        "name": experiment.name,
+        "title": experiment.title,
+        "source": experiment.source,
+        "status": summary["status"],
+        "sentence": words.overall(summary),
+        "unsettled": words.unsettled(summary),
+        "checks": [card(experiment, record, check) for check in full],
+        "plain": [
+            card(experiment, record, check) | briefs.row(asserted[check["id"]], check)
+            for check in plain
+        ],
+        "brief": len(checks) > BRIEF,
+        "failures": orders.failures(summary, record),
+        "unlisted": _unlisted(summary),
+        "setup": list(setting.setup(experiment, record)),
+        "provenance": list(_provenance(provenance)),
+        "used": json.dumps(provenance.get("experiment"), indent=1, ensure_ascii=False, default=str)
+        if provenance.get("experiment")
+        else "",
+        "target": quote(experiment.word),
+        "python": _python(experiment),
+    }
+
+
+def _carded(experiment: Experiment, summary: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return the checks that get a card: of printed numbers those that did not come out as expected."""
+    in_tables = published.ids(experiment)
+    return [
+        check
+        for check in summary["checks"]
+        if check["id"] not in in_tables or check["status"] != "PASS"
+    ]
+
+
+SETTLED = ("asymptotic", "order_low", "order_high")
+"""Reasons of a result whose order is known: any other has at most an estimate that may be an accident."""
+BRIEF = 3
+"""With more checks than this, the evidence of those that passed is folded away."""
+PYTHON = """\
+from vibsim import Experiment, analyse, simulate, verdicts
+
+experiment = Experiment.from_yaml("{file}"){alone}
+convergence = analyse(experiment, {{level: simulate(experiment, level) for level in experiment.levels}})
+for verdict in verdicts(experiment, convergence):
+    print(verdict.id, verdict.status, verdict.reason)"""
+
+
+def _python(experiment: Experiment) -> str:
+    """Return the lines of Python that do the same as the command."""
+    word, is_ours = experiment.word, experiment.collection != ADHOC
+    file, at, case = word.rpartition("@")
+    if not at or word.endswith(ENDINGS):
+        file, case = word, ""
+    named = f"configs/{file}.yaml" if is_ours else file
+    return PYTHON.format(file=named, alone=f".alone({case})" if case else "")
+
+
+def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the page says of one check."""
+    asserted = next((spec for spec in experiment.checks if spec.id == check["id"]), None)
+    measured = asserted.measured if asserted else None
+    explained = reasons.reason(
+        check["reason"],
+        measured.kind if measured else check["kind"],
+        value=measured.value if measured and measured.kind == "value" else "",
+        levels=len(data.whole(record, "level")),
+        is_promised=_keeps_promise(record, measured, check),
+    )
+    unit = (
+        data.pretty_unit(unit_of(experiment, record, measured)).replace("sqrt(s)", "√s")
+        if measured and measured.kind == "value"
+        else ""
+    )
+    if asserted:
+        heading = assertions.heading(asserted)
+    elif check["kind"] == BY_TOLERANCE:
+        heading = assertions.of_tolerance(check["expected"])
+    else:
+        heading = words.told(check)
+    return {
+        "id": check["id"],
+        "kind": check["kind"],
+        "heading": heading,
+        "background": assertions.background(asserted) if asserted else "",
+        "note": (getattr(asserted, "note", None) or "") if asserted else "",
+        "text": words.told(check).removeprefix(heading).lstrip(". "),
+        "status": check["status"],
+        "reason": check["reason"] or "–",
+        "meaning": _meaning(asserted, check, explained),
+        "needs": explained.needs,
+        "advice": words.told(check, "advice"),
+        "expected": words.readable(words.expectation(check.get("expected"))),
+        "factor": _factor(check),
+        "results": _results(record, check, unit),
+        "more": _more(check),
+        "where": _where(check),
+        "alone": _alone(check),
+        "picture": figure.picture(experiment, record, asserted, check),
+    }
+
+
+def _keeps_promise(record: Record, measured: Measurement | None, check: Mapping[str, Any]) -> bool:
+    """Say whether the result that decides has the order of its scheme, and the check asks for another one."""
+    decisive: Mapping[str, Any] = next(iter(check.get("results") or []), {})
+    order, place = words.fact(decisive, "order"), data.place_of(record, decisive.get("case", -1))
+    if measured is None or measured.kind != "converges" or measured.order == "scheme":
+        return False
+    if order is None or place is None:
+        return False
+    promised = data.formal_orders(record, measured.converges)
+    own = promised[record.words("scheme").index(decisive["scheme"]), place]
+    is_due = data.due(record, measured.converges) == "promised"
+    return bool(is_due and abs(own - order) <= measured.tolerance)
+
+
+def _meaning(asserted: object, check: Mapping[str, Any], explained: reasons.Reason) -> str:
+    """Return what the reason means; of a claim that is refuted as expected, what it does not say is the point."""
+    is_refuted = (
+        isinstance(asserted, ClaimCheck) and not asserted.holds and check["reason"] == "match"
+    )
+    return reasons.REFUTED if is_refuted else explained.meaning
+
+
+def _factor(check: Mapping[str, Any]) -> str:
+    """Say by what factor halving the step shrinks the error, where the result that decides has a settled order."""
+    decisive: Mapping[str, Any] = next(iter(check.get("results") or []), {})
+    settled = check["status"] != "INCONCLUSIVE" and decisive.get("reason") in SETTLED
+    return words.ratio(words.fact(decisive, "order")) if settled else ""
+
+
+def _results(record: Record, check: Mapping[str, Any], unit: str) -> Table | None:
+    """Return the table of what was measured, with the unit of its numbers."""
+    results: Sequence[Mapping[str, Any]] = check.get("results") or []
+    if not results:
+        return None
+    sweep = bool(data.swept(record))
+    measured = check.get("kind") == "converges" or any(
+        words.fact(r, "order") is not None for r in results
+    )
+    valued = any(words.decisive_number(r) is not None for r in results)
+    columns = [Column("scheme")]
+    columns += [Column("case", form="integer"), Column("member")] if sweep else []
+    columns += [Column("measured"), Column("reason")]
+    columns += (
+        [Column("order", form="order"), Column("interval"), Column("levels")] if measured else []
+    )
+    # how far apart two solutions are has no digits worth reading, a number that a check names may have
+    form = "small" if check.get("kind") == "equal" else "value"
+    columns += [Column("value", unit, form)] if valued else []
+    rows = [tuple(_cells(record, r, sweep, measured, valued)) for r in results]
+    return Table(f"results_{check['id']}", "Measured", tuple(columns), tuple(rows))
+
+
+def _cells(
+    record: Record, result: Mapping[str, Any], sweep: bool, measured: bool, valued: bool
+) -> Iterator[Cell]:
+    yield result.get("scheme")
+    if sweep:
+        place = data.place_of(record, result.get("case", -1))
+        yield from (result.get("case"), "all" if place is None else data.case_name(record, place))
+    yield result.get("status")
+    yield result.get("reason")
+    if measured:
+        yield from (
+            words.fact(result, "order"),
+            words.interval(words.interval_of(result)),
+            words.levels(words.levels_of(result)),
+        )
+    if valued:
+        yield _value(words.decisive_number(result))
+
+
+ROUND_OFF = 1e-12
+"""Numbers no larger than this have two digits: more would be noise."""
+
+
+def _value(value: float | None) -> Cell:
+    """Return a measured number, with two digits where it is round-off."""
+    is_noise = value is not None and 0.0 < abs(value) <= ROUND_OFF
+    return Written(value, words.number(value, "brief")) if is_noise and value else value
+
+
+def _where(check: Mapping[str, Any]) -> list[str]:
+    """Return the sentences on where in a sweep results lie, but for one that the check's own text has."""
+    found: Mapping[str, Mapping[str, Any]] = check.get("where") or {}
+    return [f"{place['text']}." for place in found.values() if place["text"] not in check["text"]]
+
+
+def _alone(check: Mapping[str, Any]) -> str:
+    """Return the commands that run the listed members alone, a line for each; of a check that passes the first."""
+    listed = (check.get("results") or [])[: 1 if check["status"] == "PASS" else None]
+    lines: dict[str, str] = {}
+    for result in listed:
+        if result.get("command"):
+            # of the schemes of a member the worst comes first
+            found = f"{result['status']} {result['reason']}"
+            lines.setdefault(f".venv/bin/{result['command']}", found)
+    width = max(map(len, lines), default=0)
+    return "\n".join(f"{command:{width}}  # {found}" for command, found in lines.items())
+
+
+def _more(check: Mapping[str, Any]) -> str:
+    """Say how many members the listed results stand for."""
+    counts: Mapping[str, Any] = check.get("counts") or {}
+    told = ", ".join(
+        f"{count} {word}" for word, count in counts.items() if isinstance(count, int) and count
+    )
+    total = sum(count for count in counts.values() if isinstance(count, int))
+    listed = len(check.get("results") or [])
+    return f"In all: {told}. Listed are the {listed} worst." if total > listed else ""
+
+
+def _unlisted(summary: Mapping[str, Any]) -> str:
+    """Say how many failures the summary counts but does not list."""
+    total, listed = words.broken(summary), len(summary.get("failures") or [])
+    return (
+        f"In all {total} runs broke down; listed are the first {listed}." if total > listed else ""
+    )
+
+
+def _provenance(provenance: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield the versions of all software in one line, then what else is known of where the results came from."""
+    found = {**provenance.get("versions", {}), **versions(DRAWING)}
+    named = {"python": "Python"}
+    yield "Versions", ", ".join(f"{named.get(name, name)} {found[name]}" for name in found)
+    yield from flat({k: v for k, v in provenance.items() if k not in {"experiment", "versions"}})
+
+
+def flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    """Yield the entries of a nested mapping with dotted keys."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from flat(value, f"{prefix}{key}.")
+        elif isinstance(value, list | tuple):
+            yield f"{prefix}{key}", ", ".join(map(str, value))
+        else:
+            yield f"{prefix}{key}", str(value)

@@ -1,0 +1,227 @@
+"""How the members of a sweep lie: along a line, on a grid of two swept parameters, or as a cloud.
+
+Everything is found out from the swept values, so that it does not matter how a file wrote them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, reduce
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.core.record import Record
+from vibsim.report.data import Floats, swept, swept_label
+from vibsim.report.style import label
+
+FARTHEST = 1e100
+"""Swept values from here on are not drawn to scale."""
+WIDE = 30.0
+"""Positive values are drawn on a logarithmic axis only where the largest is so many times the least."""
+
+
+@dataclass(frozen=True)
+class Key:
+    """One swept key; option words are numbered in the order of the alphabet."""
+
+    key: str
+    """Dotted."""
+    unit: str
+    values: Floats
+    """Of every member, shape (case,)."""
+    distinct: Floats
+    """Ascending."""
+    words: tuple[str, ...] = ()
+    """What the numbers stand for, where they are words."""
+
+    @property
+    def label(self) -> str:
+        """Dotted key with its unit, for an axis."""
+        return label(self.key, self.unit)
+
+    @cached_property
+    def is_log(self) -> bool:
+        """Whether the values are more even on a logarithmic axis."""
+        return not self.words and is_geometric(self.distinct)
+
+    def text(self, value: float) -> str:
+        """Write a value of this key."""
+        return self.words[int(value)] if self.words else f"{value:.6g}"
+
+
+def keys(record: Record) -> list[Key]:
+    """Return the swept keys that do vary, in the order written."""
+    found = [_key(record, name) for name in swept(record)]
+    return [key for key in found if key.distinct.size > 1]
+
+
+def _key(record: Record, name: str) -> Key:
+    key, unit = swept_label(record, name)
+    values = np.asarray(record[name])
+    if np.issubdtype(values.dtype, np.number):
+        numbers = np.asarray(values, dtype=np.float64)
+        distinct, place = np.unique(numbers, return_inverse=True)
+        if np.max(np.abs(distinct)) < FARTHEST:
+            return Key(key, unit, numbers, distinct)
+        # no axis reaches so far: the values are numbered like words
+        names = tuple(f"{value:.6g}" for value in distinct.tolist())
+        return Key(
+            key,
+            unit,
+            place.ravel().astype(np.float64),
+            np.arange(distinct.size, dtype=np.float64),
+            names,
+        )
+    known, place = np.unique(values.astype(str), return_inverse=True)
+    numbers = place.ravel().astype(np.float64)
+    return Key(key, unit, numbers, np.arange(known.size, dtype=np.float64), tuple(known.tolist()))
+
+
+def is_geometric(distinct: Floats) -> bool:
+    """Say whether ascending values spread over decades, and more evenly in their logarithm than as they are."""
+    low, high = float(distinct[0]), float(distinct[-1])
+    if low <= 0.0 or high < WIDE * low:
+        return False
+    even = np.linspace(0.0, 1.0, distinct.size)
+    linear = np.max(np.abs((distinct - low) / (high - low) - even))
+    logarithmic = np.max(np.abs(np.log(distinct / low) / np.log(high / low) - even))
+    return bool(logarithmic <= linear)
+
+
+def edges(distinct: Floats, logarithmic: bool) -> Floats:
+    """Return the borders of cells around ascending values, shape (n + 1,): halfway, and as far again at the ends."""
+    x = np.log(distinct) if logarithmic else distinct
+    half = 0.5 * np.diff(x)
+    borders = np.concatenate([[x[0] - half[0]], x[:-1] + half, [x[-1] + half[-1]]])
+    return np.asarray(np.exp(borders) if logarithmic else borders)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Members in the cells of a map over two keys, one or several in a cell."""
+
+    x: Key
+    y: Key
+    borders: tuple[Floats, Floats]
+    """Of the cells along x and y."""
+    cell: NDArray[np.intp]
+    """Position of every member in the table (y, x) of cells, shape (case,)."""
+    note: str = ""
+    """What a cell stands for, where it is not one member."""
+
+    def worst(self, values: NDArray[Any], badness: NDArray[Any] | None = None) -> Floats:
+        """Return the value of every cell's worst member, shape (y, x): the one of most `badness`.
+
+        Without `badness` the largest value is the worst. A cell is NaN where no member has a finite value.
+        """
+        bad = np.asarray(values if badness is None else badness, dtype=np.float64)
+        there = np.flatnonzero(np.isfinite(values) & ~np.isnan(bad))
+        columns, rows = (border.size - 1 for border in self.borders)
+        most = np.full(rows * columns, -np.inf)
+        np.maximum.at(most, self.cell[there], bad[there])
+        worst = there[bad[there] == most[self.cell[there]]]
+        table = np.full((rows, columns), np.nan)
+        table.ravel()[self.cell[worst]] = values[worst]
+        return table
+
+
+CELLS = 400
+"""Most cells along each side of a map: more than its pixels could show."""
+BINS = 8, 100
+"""Least and most cells along each side of a map of members that lie on no grid."""
+
+
+def grid_of(found: list[Key]) -> Grid | None:
+    """Return the map of members that differ in two `keys`; None where they differ in one, or in more.
+
+    Members on a full grid have a cell each, or are gathered in square blocks where they are too many to be seen;
+    members anywhere in the plane are gathered in as many cells as there are members for.
+    """
+    if len(found) != 2 or _moves_together(found):
+        return None
+    x, y = found
+    size = x.distinct.size * y.distinct.size
+    column, row = (np.searchsorted(key.distinct, key.values) for key in (x, y))
+    if np.any(
+        np.bincount(row * x.distinct.size + column, minlength=size) != 1
+        if size == x.values.size
+        else True
+    ):
+        return _binned(x, y)
+    block = -(-max(x.distinct.size, y.distinct.size) // CELLS)
+    across, up = (edges(key.distinct, key.is_log) for key in (x, y))
+    across, up = (np.append(border[:-1:block], border[-1]) for border in (across, up))
+    cell = row // block * (across.size - 1) + column // block
+    note = f"A cell shows the worst of {block} × {block} members." if block > 1 else ""
+    return Grid(x, y, (across, up), cell, note)
+
+
+def _binned(x: Key, y: Key) -> Grid:
+    count = int(np.clip(np.sqrt(x.values.size) / 2.0, *BINS))
+    borders = [bins(key, count) for key in (x, y)]
+    column, row = (place_in(key, border) for key, border in zip((x, y), borders, strict=True))
+    note = "A cell shows the worst of the members within it; some cells have none."
+    return Grid(x, y, (borders[0], borders[1]), row * (borders[0].size - 1) + column, note)
+
+
+def bins(key: Key, count: int) -> Floats:
+    """Return the borders of bins over a key: around each value where these are few, else `count` even ones."""
+    if key.distinct.size <= count:
+        return edges(key.distinct, key.is_log)
+    low, high = float(key.distinct[0]), float(key.distinct[-1])
+    return np.asarray((np.geomspace if key.is_log else np.linspace)(low, high, count + 1))
+
+
+def place_in(key: Key, borders: Floats) -> NDArray[np.intp]:
+    """Return the bin of every member, shape (case,)."""
+    found = np.searchsorted(borders, key.values, side="right") - 1
+    return np.clip(found, 0, borders.size - 2)
+
+
+LINES = 6
+"""Most lines that the other parameters of a sweep may make."""
+
+
+@dataclass(frozen=True)
+class Along:
+    """Members laid out along one key."""
+
+    key: Key
+    lines: tuple[tuple[str, NDArray[np.intp]], ...]
+    """Members that belong to one line, in ascending order of the key, with a name; without where there is one line."""
+    follows: bool = False
+    """Whether other keys change with this one."""
+
+
+def along_of(found: list[Key]) -> Along | None:
+    """Lay members out along the key with most values, one line per value of the others; None for too many lines."""
+    if not found:
+        return None
+    longest = max(found, key=lambda key: key.distinct.size)
+    others = [key for key in found if key is not longest]
+    order = np.argsort(longest.values, kind="stable")
+    if not others or longest.distinct.size == longest.values.size:
+        # of keys that move together one says it all
+        return Along(longest, (("", order),), bool(others)) if _moves_together(found) else None
+    if int(np.prod([key.distinct.size for key in others])) > LINES:
+        return None
+    number: NDArray[np.intp] = reduce(
+        lambda code, key: code * key.distinct.size + np.searchsorted(key.distinct, key.values),
+        others,
+        np.zeros(longest.values.size, dtype=np.intp),
+    )
+    lines = []
+    for code in np.unique(number):
+        members = order[number[order] == code]
+        name = ", ".join(f"{key.key} = {key.text(float(key.values[members[0]]))}" for key in others)
+        lines.append((name, members))
+    return Along(longest, tuple(lines))
+
+
+def _moves_together(found: list[Key]) -> bool:
+    """Say whether every key rises or falls steadily with the first: the members lie on one curve."""
+    order = np.argsort(found[0].values, kind="stable")
+    steps = [np.diff(key.values[order]) for key in found]
+    return all(bool(np.all(step >= 0) or np.all(step <= 0)) for step in steps)

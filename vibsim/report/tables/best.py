@@ -1,0 +1,162 @@
+"""The table of the most accurate values that the ladder holds, each with two error bars.
+
+One belongs to the extrapolated value (a calibrated bound, `vibsim.convergence.scalar_extrapolation`), the other to the
+value of the finest level (the grid convergence index, `vibsim.convergence.gci`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from vibsim.core.record import Record
+from vibsim.report.data import Member, at, exact_periods, exact_series, flags, swept, unit, whole
+from vibsim.report.style import power
+from vibsim.report.tables.orders import without
+from vibsim.report.tables.table import Cell, Column, Table, Written
+from vibsim.report.text import words
+
+LEAN = ("period", "amplitude")
+"""Numbers of which limits are kept where storage is bounded."""
+CLASSES = {
+    "unknown": "–",
+    "monotone": "monotone",
+    "oscillating": "oscillating",
+    "monotone_divergence": "moving apart",
+    "oscillating_divergence": "swinging apart",
+    "round_off": "round-off",
+}
+"""How the levels follow each other, in words."""
+MOST_DIGITS = 16
+"""Significant digits of a double."""
+PER_NUMBER = ("finest level", "GCI", "GCI relative", "order", "levels", "convergence")
+"""Columns that are kept with series only."""
+
+
+def table(record: Record, shown: Sequence[Member]) -> Table | None:
+    """Return the limit of every number of the members; None where there is none, or one level only."""
+    if len(whole(record, "level")) < 2 or "period_richardson" not in record:
+        return None
+    several = bool(swept(record))
+    columns = (
+        Column("number"), Column("scheme"), *([Column("member")] if several else []),
+        Column("finest level", form="full"), Column("GCI", form="small"), Column("GCI relative", form="small"),
+        Column("best value", form="full"), Column("bound", form="small"), Column("true error", form="small"),
+        Column("order", form="order"), Column("levels"), Column("convergence"),
+    )  # fmt: skip
+    rows = list(_rows(record, shown, several))
+    if not rows:
+        return None
+    headers = [column.header for column in columns]
+    error = headers.index("true error")
+    missing = [] if any(math.isfinite(_float(row[error])) for row in rows) else ["true error"]
+    missing += [] if "scalar" in record else PER_NUMBER
+    columns, rows = without(missing, columns, rows)
+    return Table("best_values", _caption(missing), columns, tuple(rows), heads=1)
+
+
+def _caption(missing: Sequence[str]) -> str:
+    """Say what the columns are."""
+    text = (
+        "Best values from the ladder: extrapolated over the levels named, with a bound of the error that held in more "
+        "than 95 % of a large random set; “unknown” where the levels do not approach each other"
+    )
+    if "GCI" not in missing:
+        text += (
+            "; “as it is” where no extrapolation can be trusted. The grid convergence index (GCI) is the usual error "
+            "bar of the finest level's value, not of the best one; relative to it where it is not near zero"
+        )
+    return text
+
+
+def _float(cell: Cell) -> float:
+    return float(cell) if isinstance(cell, int | float) else math.nan
+
+
+def _rows(record: Record, shown: Sequence[Member], several: bool) -> Iterator[tuple[Cell, ...]]:
+    names = record.words("scalar") if "scalar" in record else list(LEAN)
+    for k, name in enumerate(names):
+        for member in shown:
+            value = float(at(record, f"{name}_richardson", member))
+            bound = float(at(record, f"{name}_richardson_error", member))
+            if not math.isfinite(value):
+                continue
+            finest = _finest(record, name, k, member)
+            known = bound if math.isfinite(bound) else _float(finest[1])
+            who = [member.scheme_name, *([member.case_name] if several else [])]
+            exact = _exact(record, name, member)
+            yield (
+                _name(record, name),
+                *who,
+                *finest,
+                _rounded(value, known),
+                Written(bound, "unknown") if math.isnan(bound) else _error(bound),
+                _error(abs(value - exact)),
+                *_approach(record, k, member),
+            )
+
+
+def _name(record: Record, name: str) -> str:
+    words_ = str(record.variable(f"{name}_richardson").attrs["long_name"]).rpartition(":")[0]
+    quantity, _, which = name.rpartition("_")
+    letter = words.SYMBOLS.get(quantity)
+    text = f"{letter} {words_.rpartition(', ')[2]}" if letter and which in ENDINGS else words_
+    measure = unit(record, f"{name}_richardson")
+    return f"{text} [{measure}]" if measure else text
+
+
+ENDINGS = ("end", "min", "max")
+"""What follows the name of a quantity in the name of a number of it."""
+
+
+def _finest(record: Record, name: str, k: int, member: Member) -> tuple[Cell, ...]:
+    """Return the value of the finest level and its grid convergence index, absolute and relative."""
+    if "scalar" not in record:
+        return None, None, None
+    index = float(at(record, f"{name}_gci", member))
+    value = float(at(record, "scalar_finest", member, scalar=k))
+    relative = float(at(record, "scalar_gci", member, scalar=k))
+    return _rounded(value, index), _error(index), _error(relative)
+
+
+def _error(size: float) -> Written | None:
+    """Write the size of an error with two digits; nothing where there is none."""
+    if not math.isfinite(size):
+        return None
+    mantissa, exponent = f"{size:.1e}".split("e")
+    return Written(size, f"{mantissa}·{power(int(exponent))}" if size else "0")
+
+
+def _rounded(value: float, error: float) -> Written:
+    """Write a number with one digit beyond the first that its error touches."""
+    if not (math.isfinite(error) and error > 0.0):
+        return Written(value, f"{value:.12g}".replace("-", "−"))
+    size = math.floor(math.log10(abs(value))) if value else 0
+    decimals = max(min(1 - math.floor(math.log10(error)), MOST_DIGITS - 1 - size), 0)
+    if abs(value) >= 1e-3 or value == 0.0:
+        return Written(value, f"{value:.{decimals}f}".replace("-", "−"))
+    digits = max(decimals + size, 0)
+    return Written(value, words.readable(f"{value:.{digits}e}").replace("-", "−"))
+
+
+def _approach(record: Record, k: int, member: Member) -> tuple[Cell, ...]:
+    """Return the observed order, the levels that were used, and how the levels follow each other."""
+    if "scalar" not in record:
+        return None, None, None
+    first, last = (int(at(record, f"scalar_{end}", member, scalar=k)) for end in ("first", "last"))
+    used = words.levels((first, last)) if first < last else f"{last} as it is"
+    order = float(at(record, "scalar_order", member, scalar=k))
+    kind = str(flags(record, "scalar_convergence")[k, member.scheme, member.case])
+    return order if math.isfinite(order) else None, used, CLASSES[kind]
+
+
+def _exact(record: Record, name: str, member: Member) -> float:
+    """Return the exact value of a number, NaN where it is not known."""
+    if name == "period":
+        return float(exact_periods(record)[member.case])
+    quantity, _, which = name.rpartition("_")
+    # a coarse grid need not end at the end
+    is_there = which == "end" and record.attrs.get("end_included")
+    if not is_there or f"{quantity}_exact" not in record:
+        return math.nan
+    return float(exact_series(record, quantity, member)[-1])

@@ -1,0 +1,143 @@
+"""Table of the polynomials that every scheme reproduces exactly, and of what it is off by on the next degree.
+
+Source: vibration text, sections 2.2 and 8.5, problem 1 and exercise 9.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from vibsim import theory
+from vibsim.formula import Binary, Expression, Name, Negate, literal, names_in, parse
+from vibsim.models import Model
+from vibsim.report.tables.table import Column, Table
+from vibsim.schemes import SCHEMES, Stepper
+from vibsim.theory.degrees import HIGHEST, applies
+
+if TYPE_CHECKING:
+    from vibsim.experiment import Experiment
+    from vibsim.theory import Miss, Residual
+
+LONGEST = 40
+"""Characters of a coefficient that a table shows."""
+DIGITS = 6
+"""Digits of whole numbers in a coefficient above which it is written with decimals."""
+EXACT, NOTHING = "exact", "–"
+CAUSES: Mapping[str, str] = MappingProxyType(
+    {
+        "": "the first step alone",
+        "differences": "its formulas for u' and u''",
+        "force": "the force, taken at a point that is off the solution",
+        "damping": "its treatment of damping",
+    }
+)
+"""Where the blame lies, by `vibsim.theory.Miss.cause`."""
+
+
+def table(experiment: Experiment) -> Table | None:
+    """Return one row per scheme, on the model of the experiment with a force for each polynomial.
+
+    None where the experiment is not about polynomials: none is its solution, and no check asks for `exact_degree`.
+    Schemes with swept options and those that choose their own steps have no row.
+    """
+    model = experiment.model.definition
+    if not (_asks(experiment) or is_polynomial(_solution(experiment))) or not applies(model):
+        return None
+    columns = (
+        Column("scheme"), Column("exact up to degree", form="integer"), Column("first miss at degree", form="integer"),
+        Column("first step off by"), Column("a step at t off by"), Column("because of"),
+    )  # fmt: skip
+    rows = []
+    for spec in experiment.schemes:
+        if not (spec.adaptive or _is_swept(experiment, spec.name)):
+            stepper = SCHEMES[spec.kind].stepper_for(model, spec.options)
+            rows.append((spec.name, *_row(stepper, model)))
+    caption = (
+        "Polynomials c₀ + c₁ t + c₂ t² + … that schemes reproduce exactly, as solutions of "
+        f"{_plain(model)} with a force for each, while the velocity keeps its sign; and the first term of what they "
+        "are off by (computed less exact) on the next degree"
+    )
+    return Table("exact_degrees", caption, columns, tuple(rows)) if rows else None
+
+
+def _row(stepper: Stepper, model: Model) -> tuple[str | int | None, ...]:
+    degree = theory.exact_degree(stepper, model)
+    if degree == HIGHEST:
+        return degree, None, EXACT, EXACT, NOTHING
+    found = theory.miss(stepper, model, degree + 1)
+    return degree, found.degree, told(found.start), told(found.step), _blame(found)
+
+
+def _blame(found: Miss) -> str:
+    """Say where it is wrong; a first step may be wrong beside the others, in its own way."""
+    cause = CAUSES[found.cause]
+    is_apart = found.start is not None and (
+        found.step is None or found.start.power < found.step.power
+    )
+    return f"the first step, and {cause}" if is_apart and found.cause else cause
+
+
+def told(residual: Residual | None) -> str:
+    """Write a residual as text: ``-c_3 dt^3``; a long coefficient is left out."""
+    if residual is None:
+        return EXACT
+    power = f"dt^{residual.power}"
+    text = coefficient(residual)
+    factors = {"1": power, "-1": f"-{power}"}.get(text, f"{text} {power}")
+    shown = factors if len(text) <= LONGEST else f"order {power}"
+    return shown if residual.of == "position" else f"{residual.of}: {shown}"
+
+
+def coefficient(residual: Residual) -> str:
+    """Write a coefficient as text, in decimals where its numbers are long or have roots."""
+    from sympy import N
+
+    text = str(residual.coefficient)
+    if re.search(rf"\d{{{DIGITS + 1},}}|\*\*\(", text) is not None:
+        text = str(N(residual.coefficient, DIGITS))
+    return text.replace("**", "^").replace("*", " ")
+
+
+def _asks(experiment: Experiment) -> bool:
+    measured = (check.measured for check in experiment.checks)
+    return any(getattr(check, "value", None) == "exact_degree" for check in measured)
+
+
+def _is_swept(experiment: Experiment, scheme: str) -> bool:
+    keys = experiment.sweep.keys if experiment.sweep is not None else ()
+    return any(key.startswith(f"schemes.{scheme}.") for key in keys)
+
+
+def _solution(experiment: Experiment) -> Expression | None:
+    """Return the exact solution that the file states."""
+    text = experiment.model.formulas.get("exact")
+    if text is None:
+        return None
+    model = experiment.model.definition
+    return parse(text, ("t", *(row.name for row in model.parameters)))
+
+
+def is_polynomial(node: Expression | None) -> bool:
+    """Tell whether a formula is a polynomial in ``t``."""
+    match node:
+        case None:
+            return False
+        case Negate(operand):
+            return is_polynomial(operand)
+        case Binary("**", base, exponent):
+            power = literal(exponent)
+            is_whole = power is not None and power >= 0.0 and power.is_integer()
+            return "t" not in names_in(node) or (is_whole and is_polynomial(base))
+        case Binary("/", left, right):
+            return "t" not in names_in(right) and is_polynomial(left)
+        case Binary(_, left, right):
+            return is_polynomial(left) and is_polynomial(right)
+    return node == Name("t") or "t" not in names_in(node)
+
+
+def _plain(model: Model) -> str:
+    """Return the equation without the force, as the force is another one for each polynomial."""
+    return model.equation.partition(" = ")[0]

@@ -1,0 +1,61 @@
+"""The table of characteristic scales and dimensionless numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vibsim.core.record import Record
+from vibsim.models.shared.scales import dimensionless, scales
+from vibsim.report import data
+from vibsim.report.tables.table import Cell, Column, Table
+
+if TYPE_CHECKING:
+    from vibsim.experiment import Experiment
+
+
+def table(experiment: Experiment, record: Record) -> Table | None:
+    """Return scales and dimensionless numbers of every member, as a range; None where the model states none."""
+    model, scaling = experiment.model.definition, experiment.scaling
+    if model.scales is None:
+        return None
+    if scaling is None:
+        parameters = _members("model", experiment.model.parameters, record)
+        initial = _members("initial", experiment.initial, record)
+    else:
+        parameters, initial = dict(scaling.parameters), dict(scaling.initial)
+    sizes, numbers = scales(model, parameters, initial), dimensionless(model, parameters, initial)
+    named = [(f"{row.name}_c", f"scale of the {row.words}", row) for row in sizes]
+    named += [(row.name, row.words, row) for row in numbers]
+    ends = [_ends(row.value) for _, _, row in named]
+    values = ("least", "largest") if any(low < high for low, high in ends) else ("value",)
+    rows: list[tuple[Cell, ...]] = []
+    for (name, words, row), span in zip(named, ends, strict=True):
+        shown = span[: len(values)]
+        rows.append((name, words, row.formula, *shown, data.pretty_unit(row.unit) or "1"))
+    columns = (
+        *(Column("name"), Column("what it is"), Column("formula")),
+        *(Column(value, form="value") for value in values),
+        Column("unit"),
+    )
+    caption = "Scales and dimensionless numbers"
+    if scaling is not None:
+        caption += "; the run is made in these scales: its numbers times them are those of the file"
+    return Table("scales", caption, columns, tuple(rows))
+
+
+def _members(section: str, values: Mapping[str, float], record: Record) -> dict[str, Any]:
+    """Return the values of every member: swept ones as arrays."""
+    names = {str(record.coords[name].attrs["sweep_key"]): name for name in data.swept(record)}
+    return {
+        key: record[names[f"{section}.{key}"]] if f"{section}.{key}" in names else value
+        for key, value in values.items()
+    }
+
+
+def _ends(value: Any) -> tuple[float, float]:
+    """Return the least and the largest value that is defined; NaN where none is."""
+    known = np.asarray(value)[np.isfinite(value)]
+    return (float(known.min()), float(known.max())) if known.size else (np.nan, np.nan)

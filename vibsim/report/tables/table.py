@@ -1,0 +1,184 @@
+"""Tables: one object, written for reading (HTML, LaTeX) and for computing (CSV with every digit)."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from vibsim.report.style import LOWER, SUPERSCRIPTS
+from vibsim.report.text import words
+
+Cell = str | int | float | None
+_FORMULA = ("=", "+", "-", "@", "\t", "\n", "\uff1d", "\uff0b", "\uff0d", "\uff20")
+"""With what a formula of a spreadsheet begins; the last four are such signs in full width."""
+
+
+class Written(float):
+    """A number with the text that a reader sees in place of it; files for computing hold the number."""
+
+    text: str
+
+    def __new__(cls, value: float, text: str) -> Written:
+        """Return the number `value`, written as `text`."""
+        made = super().__new__(cls, value)
+        made.text = text
+        return made
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column."""
+
+    header: str
+    unit: str = ""
+    form: str = "text"
+    """``text``, ``printed`` (text of a printed number, `words.printed`), or a form of
+    `vibsim.report.text.words.number`."""
+
+    @property
+    def title(self) -> str:
+        """Header with the unit in brackets."""
+        return f"{self.header} [{self.unit}]" if self.unit else self.header
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table with a caption; every row has one cell per column."""
+
+    name: str
+    caption: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    heads: int = 0
+    """So many columns at the left are long and repeat: a page shows them once, above each block of rows."""
+
+    def __post_init__(self) -> None:
+        if any(len(row) != len(self.columns) for row in self.rows):
+            raise ValueError(f"table {self.name}: a row does not have {len(self.columns)} cells")
+
+    def text_rows(self) -> Iterator[list[str]]:
+        """Yield every row as it is read."""
+        forms = [self._form(i) for i in range(len(self.columns))]
+        for row in self.rows:
+            yield [_text(cell, form) for cell, form in zip(row, forms, strict=True)]
+
+    def _form(self, i: int) -> str:
+        """Return the form of a column: norms have a power of ten where one of them needs it, so that they compare."""
+        form = self.columns[i].form
+        sizes = [abs(row[i]) for row in self.rows if isinstance(row[i], float)]  # type: ignore[arg-type]
+        nonzero = [size for size in sizes if 0 < size < math.inf]
+        return (
+            "small"
+            if form == "norm" and nonzero and not 0.1 <= min(nonzero) <= max(nonzero) < 1e4
+            else form
+        )
+
+
+def _text(cell: Cell, form: str) -> str:
+    if cell is None:
+        return "–"
+    if isinstance(cell, Written):
+        return cell.text
+    if isinstance(cell, str):
+        return words.printed(cell) if form == "printed" and cell else cell
+    return words.number(cell, form)
+
+
+def to_csv(table: Table) -> str:
+    """Return a table as CSV: units in the header, floats with every digit, empty where nothing applies."""
+    lines = [csv_line([column.title for column in table.columns])]
+    lines += [csv_line([_exact(cell) for cell in row]) for row in table.rows]
+    return "".join(lines)
+
+
+def csv_line(cells: Sequence[str]) -> str:
+    """Return a line of CSV; a text that a spreadsheet would run as a formula gets an apostrophe before it.
+
+    Source: OWASP, CSV injection.
+    """
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerow([_harmless(cell) for cell in cells])
+    return stream.getvalue()
+
+
+def _harmless(text: str) -> str:
+    # a lone carriage return would be the end of a line, and has no quotes around it
+    cell = text.replace("\r\n", "\n").replace("\r", "\n")
+    if not cell.startswith(_FORMULA):
+        return cell
+    try:
+        float(cell)
+    except ValueError:
+        return f"'{cell}"
+    return cell
+
+
+def _exact(cell: Cell) -> str:
+    if cell is None or (isinstance(cell, float) and math.isnan(cell)):
+        return ""
+    return repr(float(cell)) if isinstance(cell, float) else str(cell)
+
+
+def to_latex(table: Table) -> str:
+    r"""Return a table as LaTeX for the package ``booktabs``: ``\input`` it into a document."""
+    alignment = "".join("l" if column.form == "text" else "r" for column in table.columns)
+    head = " & ".join(escape(column.title) for column in table.columns)
+    body = [" & ".join(escape(text) for text in row) + r" \\" for row in table.text_rows()]
+    lines = [
+        r"\begin{table}",
+        r"\centering",
+        rf"\caption{{{escape(table.caption)}}}",
+        rf"\begin{{tabular}}{{{alignment}}}",
+        r"\toprule",
+        head + r" \\",
+        r"\midrule",
+        *body,
+        r"\bottomrule",
+        r"\end{tabular}",
+        r"\end{table}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+_SPECIAL = {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "&": r"\&",
+    "%": r"\%",
+    "$": r"\$",
+    "#": r"\#",
+    "_": r"\_",
+    "{": r"\{",
+    "}": r"\}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "|": r"\textbar{}",
+    '"': r"\textquotedbl{}",
+    "\n": " ",
+    "\r": " ",
+    "\t": " ",
+    "–": "--",
+    "−": "$-$",
+    "±": r"$\pm$",
+    "·": r"$\cdot$",
+    "∞": r"$\infty$",
+    "θ": r"$\theta$",
+    "ω": r"$\omega$",
+    "Δ": r"$\Delta$",
+    "\N{NARROW NO-BREAK SPACE}": r"\,",
+}
+
+
+def escape(text: str) -> str:
+    """Return text that LaTeX prints as it stands."""
+    parts = re.split(f"([{SUPERSCRIPTS}]+)", text)
+    raised = [rf"$^{{{part.translate(LOWER)}}}$" for part in parts[1::2]]
+    plain = [
+        "".join(_SPECIAL.get(character, character) for character in part) for part in parts[::2]
+    ]
+    return "".join(a + b for a, b in zip(plain, [*raised, ""], strict=True))

@@ -1,0 +1,187 @@
+"""What the reason of a verdict means and what would settle the question, for who meets it for the first time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from vibsim.checks.value.advice import COUNTED, depends_on_level
+from vibsim.core.vocabulary import BY_TOLERANCE
+
+
+@dataclass(frozen=True)
+class Reason:
+    """What a reason means and what would settle the question."""
+
+    meaning: str
+    needs: str
+
+
+REASONS = {
+    "asymptotic": Reason(
+        "The error shrinks from level to level with the order that is asked for: the rescaled differences fall on top "
+        "of each other, and more closely so on finer levels.",
+        "Three levels at least, curves that coincide, ratios that settle, and differences well above round-off: all "
+        "four are met on the levels named.",
+    ),
+    "exact": Reason(
+        "The levels differ by round-off only: the scheme makes no truncation error here to measure.",
+        "Nothing more, if exactness is expected here; otherwise a problem on which the scheme does make an error.",
+    ),
+    "match": Reason(
+        "The outcome is the expected one. Expected was something other than plain convergence, for instance a trap "
+        "that the check is meant to notice.",
+        "The measured verdict and the expected one agree; look at the measured reason to see what was noticed.",
+    ),
+    "order_low": Reason(
+        "The error does shrink, but more slowly than the scheme promises. A first-order start, a one-sided formula at "
+        "the end, or a mistake in the code does this.",
+        "The ratios have settled, at the wrong number; more levels will not change it. Look for a step of lower order.",
+    ),
+    "order_high": Reason(
+        "The error shrinks faster than promised. Either the leading error term vanishes for this problem, or the order "
+        "was stated too low.",
+        "A problem without special symmetry, or the higher order stated as the expected one.",
+    ),
+    "mismatch": Reason(
+        "The measured outcome is not the expected one.",
+        "Compare the expected value with the measured one: one of the two is wrong.",
+    ),
+    "wrong_limit": Reason(
+        "The levels approach each other, but not the exact solution: the scheme converges to something else.",
+        "The differences alone cannot show this; the exact solution does. Check the equation that is being solved.",
+    ),
+    "unstable": Reason(
+        "The numerical solution grows where the exact one does not: w dt is beyond the limit of the scheme, or the "
+        "next finer level grows no less.",
+        "A smaller step (w dt below the stability limit), or a scheme without such a limit.",
+    ),
+    "non_finite": Reason(
+        "The calculation overflowed or met an undefined number; nothing after that moment means anything.",
+        "A smaller step, or a look at the member, level and time listed under Failures.",
+    ),
+    "pre_asymptotic": Reason(
+        "The step is still too coarse: the ratios have not settled, so the order read from them is an accident.",
+        "Finer levels, until the ratios settle and the rescaled curves coincide.",
+    ),
+    "round_off": Reason(
+        "The differences have reached the floor of the arithmetic: what is left is rounding noise, which says nothing "
+        "about the scheme.",
+        "Coarser levels, or an arithmetic with a lower floor (increment or compensated).",
+    ),
+    "oscillating": Reason(
+        "The ratios swing from level to level instead of settling.",
+        "More levels, another norm, or a comparison at times where the error does not change its sign.",
+    ),
+    "non_smooth": Reason(
+        "The problem is not smooth, so its error has no regular expansion in powers of dt.",
+        "Location of the events, an interval that ends before the corner of the force, or an expected order that takes "
+        "it into account.",
+    ),
+    "too_few_levels": Reason(
+        "An order cannot be judged from two levels: one difference has nothing to be compared with.",
+        "Three levels at least; four or more let the trend of the ratios be seen.",
+    ),
+    "not_applicable": Reason(
+        "The measured number does not exist here, so there is nothing to judge.",
+        "A quantity, scheme or time for which the number exists.",
+    ),
+}
+
+_UNKNOWN = Reason("", "")
+_SAYS = "The measured number is what the check says."
+_NUMBER = Reason(
+    _SAYS,
+    "A number that finer levels do not change, and that is not just inside its bound: the tables show both.",
+)
+_NUMBER_OF_ONE = Reason(
+    _SAYS,
+    "More levels: on one alone nothing shows how much of the number is the step's.",
+)
+_NUMBER_OF_SCHEME = Reason(
+    _SAYS,
+    "Nothing more: no level enters it. It comes from the equations of the scheme or the model, not from a run.",
+)
+_NUMBER_COUNTED = Reason(
+    _SAYS,
+    "Nothing more: it is counted, and exact.",
+)
+_BY_KIND = {
+    "stable": Reason(
+        "The scheme grows, or does not, as the check says.",
+        "A growth factor that agrees with the predicted one. Where the scheme has a limit, a w dt well within it, or "
+        "well beyond it; where it has none, a finer level on which the growth is smaller, or is not.",
+    ),
+    "conserves": Reason(
+        "The error of the energy changes with time as the check says.",
+        "A run of many periods: a slow drift below a larger oscillation shows late. The figure of the running maximum "
+        "has it at every time.",
+    ),
+    "equal": Reason(
+        "The two solutions are as near to each other as the check says.",
+        "A distance well below what is allowed, at every stored time; what is allowed without `atol` are the rounding "
+        "errors of both.",
+    ),
+}
+
+
+_OF_PROMISE = {
+    "order_low": Reason(
+        "The error does shrink, with the order that the scheme promises here, which is lower than the one asked for.",
+        "Nothing more: the ratios have settled where they should. Ask for the order of the scheme, or take a scheme of "
+        "a higher one.",
+    ),
+    "order_high": Reason(
+        "The error shrinks faster than asked for, as the scheme promises here.",
+        "Nothing more: the ratios have settled where they should. Ask for the order of the scheme.",
+    ),
+}
+"""What an order means that is not the one of the check, but the one of the scheme."""
+
+REFUTED = "The measurement contradicts the statement, as was expected of it."
+"""What it means that a claim matches which is expected to be false."""
+
+_OF_TOLERANCE = {
+    "match": Reason(
+        "The levels, extrapolated, bound the error of every scheme and member at every stored time by the tolerance.",
+        "The bound is an estimate that has been tested, no proof: best.nc has it for every time (output: best).",
+    ),
+    "mismatch": Reason(
+        "The levels were chosen by a pilot of a few members. Another member is harder, and its error is not known to "
+        "be within the tolerance.",
+        "Finer levels, or a pilot that tries such members; those listed below are the worst.",
+    ),
+}
+
+
+def reason(
+    word: str | None, kind: str, value: str = "", levels: int = 2, is_promised: bool = False
+) -> Reason:
+    """Return the explanation of a reason for a kind of measurement; empty words for one that has none.
+
+    Parameters
+    ----------
+    value
+        What a ``value`` check measures.
+    levels
+        How many levels the page has.
+    is_promised
+        Whether an order that is not the one of the check is the one that the scheme promises.
+    """
+    if is_promised and word in _OF_PROMISE:
+        return _OF_PROMISE[word]
+    if kind == BY_TOLERANCE and word in _OF_TOLERANCE:
+        return _OF_TOLERANCE[word]
+    if word == "match" and kind in _BY_KIND:
+        return _BY_KIND[kind]
+    if word == "match" and kind != "converges":
+        return _number(value, levels)
+    return REASONS.get(word or "", _UNKNOWN)
+
+
+def _number(value: str, levels: int) -> Reason:
+    """Return the words on a number that is as it should be."""
+    if value in COUNTED:
+        return _NUMBER_COUNTED
+    if value and not depends_on_level(value):
+        return _NUMBER_OF_SCHEME
+    return _NUMBER if levels > 1 else _NUMBER_OF_ONE

@@ -1,0 +1,303 @@
+"""The words of a report: statuses, reasons, symbols and numbers, for a reader who meets them for the first time."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
+
+from vibsim.models.shared.phase_amplitude_names import AMPLITUDE, PHASE, is_error_part, whole_of
+from vibsim.report.style import power
+
+SYMBOLS = {
+    "theta": "θ",
+    "omega": "ω",
+    "energy": "E",
+    "kinetic_energy": "T",
+    "potential_energy": "V",
+    "energy_deviation": "dE",
+}
+NAMES = {
+    "theta": "the angle θ",
+    "omega": "the angular velocity ω",
+    "energy": "the energy E",
+    "kinetic_energy": "the kinetic energy T",
+    "potential_energy": "the potential energy V",
+    "energy_deviation": "the energy deviation dE = E(t) − E(0)",
+}
+
+
+CENTRED = "_d2t"
+"""Ends the name of a quantity that is made with the centred difference ``[D_2t u]`` of the position."""
+
+
+PARTS = {PHASE: ("φ({})", "phase error of {}"), AMPLITUDE: ("a({})", "amplitude error of {}")}
+"""Of a part of a position's error, by the end of its name: letter and words."""
+
+
+def _part(quantity: str, form: int) -> str:
+    """Write a part of a position's error as a letter (0) or in words (1)."""
+    whole = whole_of(quantity)
+    return PARTS[quantity.removeprefix(whole)][form].format(SYMBOLS.get(whole, whole))
+
+
+def title(quantity: str) -> str:
+    """Return a quantity as it stands in the title of a figure, and in a sentence: its letter, or a part in words."""
+    return _part(quantity, 1) if is_error_part(quantity) else symbol(quantity)
+
+
+def symbol(quantity: str) -> str:
+    """Return the letter of a quantity; its name where it has none."""
+    if is_error_part(quantity):
+        return _part(quantity, 0)
+    plain = quantity.removesuffix(CENTRED)
+    letter = SYMBOLS.get(plain, plain)
+    return letter if plain == quantity else f"{letter} by [D₂ₜu]"
+
+
+def name(quantity: str) -> str:
+    """Return a quantity in words."""
+    if is_error_part(quantity):
+        return f"the {_part(quantity, 1)}, {_part(quantity, 0)}"
+    plain = quantity.removesuffix(CENTRED)
+    text = NAMES.get(plain, plain)
+    return text if plain == quantity else f"{text} by the centred difference [D₂ₜu]"
+
+
+STATUS = {
+    "PASS": "Every check came out as it should.",
+    "INCONCLUSIVE": "No check failed, but at least one could not be decided: treat its number as unproven.",
+    "FAIL": "At least one check came out wrong.",
+}
+
+
+def overall(summary: Mapping[str, Any]) -> str:
+    """Return the verdict on a whole experiment in one or two sentences."""
+    checks: Sequence[Mapping[str, Any]] = summary["checks"]
+    total = len(checks)
+    passed = sum(check["status"] == "PASS" for check in checks)
+    failures = broken(summary)
+    told = f"{passed} of {total} {'check' if total == 1 else 'checks'} passed."
+    parts = [STATUS.get(summary["status"], ""), told if total > 1 else ""]
+    if not total:
+        parts = ["There is no check, so nothing was decided."]
+    if failures:
+        parts.append(f"{failures} {'run' if failures == 1 else 'runs'} broke down (see Failures).")
+    return " ".join(part for part in parts if part)
+
+
+def broken(summary: Mapping[str, Any]) -> int:
+    """Return the number of runs that broke down, listed or not."""
+    return int(summary.get("failure_count") or len(summary.get("failures") or []))
+
+
+def told(check: Mapping[str, Any], field: str = "text") -> str:
+    """Return a text of a check with the letter of its quantity; a claim's own words and code stay as they are."""
+    text, quantity = str(check[field] or ""), check.get("quantity")
+    claim, mark, measured = text.rpartition(_MEASURED)
+    parts = measured.split("`")
+    if quantity:
+        letter = title(quantity)
+        parts[::2] = [re.sub(rf"\b{re.escape(quantity)}\b", letter, p) for p in parts[::2]]
+    parts[::2] = map(readable, parts[::2])
+    return claim + mark + sentence("`".join(parts))
+
+
+_POWER = re.compile(r"(?<![\w.])(-?)(\d+(?:\.\d+)?)e([-+]?\d+)(?!\w)")
+_LONG = re.compile(r"(?<![\w.])\d+\.(?:0\b|\d{9,})(?![\w.]*\w)")
+_NAMED = re.compile(r"(?<!scheme )\b[a-z0-9]+(?:_[a-z0-9]+)+(?=(?: of | is | at ))")
+
+
+def sentence(text: str) -> str:
+    """Begin sentences that begin with the name of a value, or of a part of an error, with a capital letter."""
+    from vibsim.experiment.value_names import VALUES
+
+    names = {spoken(value).split()[0] for value in VALUES} | {"phase"}
+    first = "|".join(sorted(name for name in names if name.isalpha()))
+    return re.sub(rf"(^|[.] )({first})(?= )", lambda m: m[1] + m[2].capitalize(), text)
+
+
+def readable(text: str) -> str:
+    """Return a machine's sentence with no more digits than say something, powers of ten and names in words."""
+    text = re.sub(
+        r"\bstability_limit is 0;", "it grows at every step, so its stability_limit is 0;", text
+    )
+    text = _NAMED.sub(lambda found: spoken(found[0]), text)
+    text = _LONG.sub(lambda found: f"{float(found[0]):.10g}", text)
+    return _POWER.sub(_raised, text)
+
+
+def spoken(value: str) -> str:
+    """Write the name of a value as words; what is no such name stays as it is."""
+    from vibsim.experiment.value_names import VALUES
+
+    return value.replace("_d2t", " by [D₂ₜu]").replace("_", " ") if value in VALUES else value
+
+
+def _raised(found: re.Match[str]) -> str:
+    sign, mantissa, exponent = found.groups()
+    shown = mantissa if len(mantissa) <= MOST_DIGITS else f"{float(mantissa):.10g}"
+    ten = power(int(exponent))
+    return f"{sign}{ten}" if float(mantissa) == 1.0 else f"{sign}{shown}·{ten}"
+
+
+MOST_DIGITS = 11
+"""Characters of a mantissa that are read."""
+
+
+_MEASURED = " Measured: the statement "
+"""What separates a claim from what was measured of it."""
+
+
+def unsettled(summary: Mapping[str, Any]) -> list[str]:
+    """Return the texts of the checks that did not pass, with status and reason, while there are several checks."""
+    checks: Sequence[Mapping[str, Any]] = summary["checks"]
+    open_ones = [check for check in checks if check["status"] != "PASS"] if len(checks) > 1 else []
+    return [f"{check['status']} ({check['reason']}): {told(check)}" for check in open_ones]
+
+
+def number(value: Any, form: str = "norm") -> str:
+    """Write a number for reading.
+
+    Parameters
+    ----------
+    value
+        A number, or None; NaN and None give a dash.
+    form
+        ``norm``: 4 significant digits; ``small``: the same, always with a power of ten; ``order``: 3 decimals;
+        ``integer``; ``close``, ``full``: 7 and 10 significant digits; ``brief``: 2; ``step``, ``value``: up to 6 and
+        12 significant digits, no trailing zeros.
+    """
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return "–"
+    if isinstance(value, float) and math.isinf(value):
+        return "∞" if value > 0 else "−∞"
+    if form == "integer":
+        return f"{int(value):,}".replace(",", "\N{NARROW NO-BREAK SPACE}").replace("-", "−")
+    if form == "order":
+        return f"{value:.3f}".replace("-", "−") if abs(value) < 1e4 else number(value)
+    text = _significant(float(value), DIGITS.get(form, 4), fixed=form != "small")
+    if form not in {"step", "value"} or "." not in text:
+        return text
+    mantissa, dot, exponent = text.partition("·")
+    return mantissa.rstrip("0").rstrip(".") + dot + exponent
+
+
+DIGITS: Mapping[str, int] = MappingProxyType(
+    {"brief": 2, "close": 7, "full": 10, "step": 6, "value": 12}
+)
+"""Significant digits of forms."""
+
+
+def printed(text: str) -> str:
+    """Write a number as a source printed it, digit by digit, a power of ten in Unicode: ``1.120e8``."""
+    found = re.fullmatch(r"\s*(.+?)\s*(?:[eE]|[x*·×]?\s*10\s*\^\s*)\{?([-+]?\d+)\}?\s*", text)
+    if found is None:
+        return text.strip().replace("-", "−")
+    return f"{found[1]}·{power(int(found[2]))}".replace("-", "−")
+
+
+def like(value: float, text: str, more: int = 2) -> str:
+    """Write a number in the manner of a printed one, with `more` digits behind those of `text`."""
+    if not math.isfinite(value):
+        return number(value)
+    mantissa, _, _ = printed(text).partition("·")
+    places = len(mantissa.partition(".")[2])
+    if "·" in printed(text) and value != 0.0:
+        head, exponent = f"{value:.{places + more}e}".split("e")
+        return f"{head}·{power(int(exponent))}".replace("-", "−", 1)
+    return f"{value:.{places + more}f}".replace("-", "−")
+
+
+def _significant(value: float, digits: int, fixed: bool) -> str:
+    if value == 0.0:
+        return "0"
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    if fixed and -3 <= int(exponent) < digits:
+        return f"{value:.{digits - 1 - int(exponent)}f}".replace("-", "−")
+    return f"{mantissa}·{power(int(exponent))}".replace("-", "−", 1)
+
+
+def lowered(level: int) -> str:
+    """Write a level as a subscript."""
+    return str(level).translate(str.maketrans("-0123456789", "₋₀₁₂₃₄₅₆₇₈₉"))
+
+
+def raised(exponent: float) -> str:
+    """Write an exponent: in Unicode where it is whole."""
+    return power(int(exponent))[2:] if exponent == int(exponent) else f"^{exponent:g}"
+
+
+def factor(value: float, base: float) -> str:
+    """Write the factor of a rescaled curve, a large one as a power of `base` where it is one; empty for 1."""
+    if value == 1.0:
+        return ""
+    exponent = round(math.log(value, base)) if base > 1.0 and value > 0.0 else 0
+    is_power = base == int(base) and math.isclose(value, base**exponent, rel_tol=1e-9)
+    if value < 1e3 or not is_power:
+        return f"{number(float(value), 'step')} "
+    return f"{int(base)}{raised(exponent)} "
+
+
+def interval(bounds: Sequence[float | None] | None) -> str:
+    """Write the interval of an order."""
+    if not bounds or any(b is None or math.isnan(b) for b in bounds):
+        return "–"
+    return f"{number(bounds[0], 'order')} to {number(bounds[1], 'order')}"
+
+
+def levels(window: Sequence[int] | None) -> str:
+    """Write the levels that a verdict rests on."""
+    found = [level for level in window or () if level is not None]
+    if not found:
+        return "–"
+    return str(found[0]) if len(found) == 1 else f"{min(found)} to {max(found)}"
+
+
+def expectation(expected: Any) -> str:
+    """Write what a check expected: text as it stands, a mapping as ``key value`` pairs."""
+    if expected is None:
+        return "–"
+    if isinstance(expected, Mapping):
+        return ", ".join(
+            f"{key} {expectation(value)}" for key, value in expected.items() if value is not None
+        )
+    if isinstance(expected, bool):
+        return "true" if expected else "false"
+    return number(expected, "step") if isinstance(expected, float) else str(expected)
+
+
+def ratio(order: float | None) -> str:
+    """Say by what factor the error falls when the step is halved."""
+    if order is None or math.isnan(order):
+        return ""
+    return f"Halving the step divides the error by about {2.0**order:.3g}."
+
+
+NUMBERS = ("value", "growth", "energy_error", "distance", "error_bound")
+"""Facts that decide a check of their kind."""
+
+
+def fact(result: Mapping[str, Any], name: str) -> Any:
+    """Return a fact of a result in a summary; None where it has none."""
+    return (result.get("facts") or {}).get(name)
+
+
+def decisive_number(result: Mapping[str, Any]) -> float | None:
+    """Return the number that decides a result, where no order does."""
+    found = result.get("facts") or {}
+    return next((found[name] for name in NUMBERS if name in found), None)
+
+
+def interval_of(result: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Return the interval of the order of a result."""
+    low, high = fact(result, "order_low"), fact(result, "order_high")
+    has_order = None not in (fact(result, "order"), low, high)
+    return (low, high) if has_order else None
+
+
+def levels_of(result: Mapping[str, Any]) -> Sequence[int] | None:
+    """Return the first and the last level that the order of a result rests on."""
+    return None if fact(result, "order") is None else fact(result, "levels")

@@ -1,0 +1,1 @@
+"""Reference solutions by piecewise collocation, for models without a known exact solution."""

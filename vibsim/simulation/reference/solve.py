@@ -1,0 +1,221 @@
+r"""A reference solution to about twelve digits, of models whose exact solution is not known.
+
+Collocation (`vibsim.simulation.reference.collocation`), and the step halved until two solutions agree. Smooth forces
+take equal steps (`vibsim.simulation.reference.smooth_collocation`); forces with corners or jumps are smooth from one to
+the next, and each of these pieces has equal steps of its own (`vibsim.simulation.reference.piecewise_collocation`). It
+shares no arithmetic with the schemes and their kernels: formulas are evaluated by numpy. What is left between the last
+two solutions bounds the error of the last one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.models import Model
+from vibsim.simulation.members import Members
+from vibsim.simulation.reference.collocation import Floats
+from vibsim.simulation.reference.missed_pulses import pulses_of_force, varies_in_time
+from vibsim.simulation.reference.one_sided_forces import Sides, sides
+from vibsim.simulation.reference.pieces import Pieces, Plan, planned
+from vibsim.simulation.reference.piecewise_collocation import ENDLESS, SLIDING, walk_pieces
+from vibsim.simulation.reference.reference_cache import digest_of, kept
+from vibsim.simulation.reference.smooth_collocation import Solved, solve
+
+METHOD = "collocation at 12 Gauss points of a step, halved until two solutions agree"
+PIECEWISE = f"{METHOD}; a step ends at every corner of the force"
+FEWEST, MOST = 8, 2**11
+"""Steps over the whole interval; where there are corners, of a motion without any."""
+COMPARED = 64
+"""At so many equal times, and at t = 0, two solutions are compared."""
+ACCURATE = 1e-12
+"""A solution is accepted whose bound is smaller, relative to its largest value."""
+SETTLED = 2e-14
+"""No more is to be had from halving the step."""
+SLOW = 32.0
+"""A smooth motion that is resolved gains far more by halving the step; one that gains less twice is none."""
+RESOLVED = 1e-3
+"""A relative difference below says that the steps see the motion."""
+LOOKS = 8
+"""Equal parts of a step, no longer than the distances of its points, between which a force may not have a pulse."""
+ROUND_OFF = 16.0 * 2.0**-52
+"""Relative bound of the rounding errors, beside one that grows with the root of the number of steps."""
+
+Solution = Solved | Pieces
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """The solutions that were accepted."""
+
+    parts: tuple[tuple[NDArray[np.int64], Solution], ...]
+    """Each with its members."""
+    bounds: Floats
+    """Bounds of the errors, NaN where there is no solution, shape (state, case)."""
+
+
+def method(model: Model) -> str:
+    """Say how the reference of a model is found."""
+    return PIECEWISE if sides(model, {}).switches else METHOD
+
+
+def reference(
+    model: Model, group: Members, fraction: Floats
+) -> tuple[dict[str, Floats], dict[str, Floats]]:
+    """Return the states at fractions of the end time, shape (case, time), and bounds of their errors, shape (case,).
+
+    NaN stands where the accuracy is not reached: of motions that are too sensitive, that are not smooth between the
+    corners of their force, or that a force holds at a jump.
+    """
+    names = [state.name for state in model.states]
+    parameters = {row.name: group.parameters[row.key] for row in model.parameters}
+    columns = (*(group.initial[name] for name in names), group.end, *parameters.values())
+    numbers = tuple(np.ascontiguousarray(column, dtype=float).tobytes() for column in columns)
+    chosen = choose(model, numbers)
+    series = np.full((len(names), len(group.end), len(fraction)), np.nan)
+    for members, solved in chosen.parts:
+        series[:, members] = solved.at(fraction)
+    return dict(zip(names, series, strict=True)), dict(zip(names, chosen.bounds, strict=True))
+
+
+@lru_cache(maxsize=8)
+def choose(model: Model, numbers: tuple[bytes, ...]) -> Chosen:
+    """Return the solutions that are accepted, computed now or before (`vibsim.simulation.reference.reference_cache`).
+
+    Parameters
+    ----------
+    numbers
+        The initial values, the end times and the parameters of all members, in the order of the model.
+    """
+    arrays = kept(digest_of(model, numbers), lambda: _arrays(computed(model, numbers)))
+    count = sum(name.startswith("members_") for name in arrays)
+    parts = tuple((arrays[f"members_{i}"], _solution(arrays, i)) for i in range(count))
+    return Chosen(parts, arrays["bounds"])
+
+
+def _arrays(chosen: Chosen) -> dict[str, NDArray[Any]]:
+    """Return the arrays of solutions by names."""
+    found: dict[str, NDArray[Any]] = {"bounds": chosen.bounds}
+    for i, (members, solved) in enumerate(chosen.parts):
+        found[f"members_{i}"] = members
+        for field in fields(solved):
+            found[f"{field.name}_{i}"] = getattr(solved, field.name)
+    return found
+
+
+def _solution(arrays: Mapping[str, NDArray[Any]], index: int) -> Solution:
+    kind = Pieces if f"begin_{index}" in arrays else Solved
+    return kind(**{field.name: arrays[f"{field.name}_{index}"] for field in fields(kind)})
+
+
+def computed(model: Model, numbers: tuple[bytes, ...]) -> Chosen:
+    """Compute the solutions of some members; see `choose`."""
+    states = len(model.states)
+    columns = [np.frombuffer(column) for column in numbers]
+    start, end, rest = np.array(columns[:states]), columns[states], columns[states + 1 :]
+    names = [row.name for row in model.parameters]
+    held = sides(model, dict(zip(names, rest, strict=True)))
+    with np.errstate(all="ignore"):
+        return _accepted(_Refined(held, start, end))
+
+
+@dataclass
+class _Refined:
+    """Solutions of some members, each finer than the one before."""
+
+    held: Sides
+    start: Floats
+    end: Floats
+    plan: Plan | None = None
+    slid: NDArray[np.bool_] | None = None
+
+    def next(self, steps: int) -> tuple[Solution, NDArray[np.bool_]]:
+        """Return the next solution, and for which members no further one is of use."""
+        none = np.zeros(len(self.end), dtype=bool)
+        if not self.held.switches:
+            force = self.held.force(np.empty((0, len(self.end))))
+            return solve(force, self.start, self.end, steps), none
+        found, self.plan, why = walk_pieces(
+            self.held, self.start, self.end, self.end / steps, self.plan
+        )
+        before, self.slid = self.slid, why == SLIDING
+        # what seems to slide in steps that are too long does so once
+        return found, (why == ENDLESS) | (none if before is None else self.slid & before)
+
+    def missed(self, solved: Solution, members: NDArray[np.bool_]) -> Floats:
+        """Return how long a pulse of the force in time lasts that the steps of some members miss, shape (case,).
+
+        Two solutions may agree without it. 0 where there is none, and for other members.
+        """
+        model, found = self.held.model, np.zeros(len(members))
+        if not (members.any() and varies_in_time(model)):
+            return found
+        states, begin, length = solved.of(members).steps()
+        fraction = np.arange(LOOKS) / LOOKS
+        t = (begin[..., None] + length[..., None] * fraction).reshape(len(begin), -1)
+        t = np.append(t, np.full((len(t), 1), np.nan), axis=1)
+        parameters = {name: x[members] for name, x in self.held.parameters.items()}
+        states = np.repeat(states, LOOKS, axis=-1)
+        pulses = pulses_of_force(model, parameters, states, t, smooth=True)
+        found[members] = np.nan_to_num(pulses.width)
+        return found
+
+    def keep(self, members: NDArray[np.bool_]) -> None:
+        """Go on with some members."""
+        self.held, self.start = self.held.of(members), self.start[:, members]
+        self.end = self.end[members]
+        self.plan = planned(self.plan, members) if self.plan else None
+        self.slid = None if self.slid is None else self.slid[members]
+
+
+def _accepted(refined: _Refined) -> Chosen:
+    """Refine until two solutions agree, each member on its own."""
+    bounds = np.full((len(refined.start), len(refined.end)), np.nan)
+    times = np.arange(COMPARED + 1) / COMPARED
+    left, accepted = np.arange(len(refined.end)), []
+    before, gap, slow = None, np.full(len(left), np.inf), np.zeros(len(left), dtype=np.int64)
+    for steps in _doubled():
+        if not len(left):
+            break
+        solved, hopeless = refined.next(steps)
+        now, goes_on = solved.at(times), ~hopeless
+        if before is not None:
+            size = np.max(np.abs(now), axis=-1)
+            error = np.max(np.abs(now - before), axis=-1)
+            relative = np.max(error / np.where(size > 0.0, size, 1.0), axis=0)
+            gain = gap / relative
+            slow = np.where((gain < SLOW) & (relative < RESOLVED), slow + 1, 0)
+            rounding = ROUND_OFF * (1.0 + 0.25 * _most_steps(solved, steps) ** 0.5)
+            settled = relative <= np.maximum(rounding, SETTLED)
+            is_there = settled | ((relative <= ACCURATE) & (gain < SLOW))
+            missed = refined.missed(solved, is_there)
+            is_there &= missed == 0.0
+            # no steps will be short enough
+            goes_on &= ~((missed > 0.0) & (missed * MOST < refined.end))
+            if is_there.any():
+                accepted.append((left[is_there], solved.of(is_there)))
+                bounds[:, left[is_there]] = (error + rounding * size)[:, is_there]
+            goes_on &= ~is_there & (slow < 2)
+            gap = relative
+        refined.keep(goes_on)
+        before, left, gap, slow = now[:, goes_on], left[goes_on], gap[goes_on], slow[goes_on]
+    return Chosen(tuple(accepted), bounds)
+
+
+def _doubled() -> Iterator[int]:
+    steps = FEWEST
+    while steps <= MOST:
+        yield steps
+        steps *= 2
+
+
+def _most_steps(solved: Solution, steps: int) -> Floats | float:
+    """Return the number of steps, of each member where they have their own."""
+    if isinstance(solved, Solved):
+        return float(steps)
+    return np.asarray(np.sum(np.isfinite(solved.length), axis=0), dtype=float)
