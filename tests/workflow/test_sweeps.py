@@ -149,7 +149,11 @@ def test_a_tolerance_that_a_member_does_not_reach_is_told(empty: Place) -> None:
         assert alone[name][:, 0].tobytes() == best[name][:, 22].tobytes(), name
     one = store.read(empty.results / "adhoc/tiny_case_22/convergence.nc")
     of_sweep = store.read(empty.tiny / "convergence.nc")
-    assert one["omega_best_error"][0, 0] == of_sweep["omega_best_error"][0, 22] == worst["value"]
+    assert (
+        one["omega_best_error"][0, 0]
+        == of_sweep["omega_best_error"][0, 22]
+        == worst["facts"]["error_bound"]
+    )
 
 
 def test_a_member_that_fails_costs_no_other(empty: Place) -> None:
