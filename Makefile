@@ -20,8 +20,7 @@ lint: set-up-dev  ## check style, types, layers, workflow and generated files
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m vibsim.experiment.schema.json_schema --check
-	$(BIN)/python -m vibsim.analysis.summary_schema --check
+	$(BIN)/python workflow/schemas.py --check
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/python workflow/lint.py
 

@@ -1,14 +1,11 @@
-"""The JSON Schema of ``summary.json``: ``python -m vibsim.analysis.summary_schema [--check]``.
+"""The JSON Schema of ``summary.json`` (`workflow/schemas.py` writes its file).
 
 What a result may state follows from the fields of each kind of check.
 """
 
 from __future__ import annotations
 
-import json
-import sys
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,9 +15,6 @@ from vibsim.checks.fields import MEMBERS, Field
 from vibsim.checks.order.judge import EXPECTED
 from vibsim.checks.tolerance_check import BOUND
 from vibsim.core.vocabulary import BY_TOLERANCE, FORMAT, REASON_NAMES, STATUSES
-
-FILE = Path("workflow") / "schemas" / "summary.schema.json"
-"""Where the schema is kept, in the checkout."""
 
 TEXT = {"type": "string"}
 NUMBER = {"type": ["number", "null"]}
@@ -118,23 +112,3 @@ def schema() -> dict[str, Any]:
     }
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "summary.json"}
     return head | _object(whole, ("digest", "integrity"))
-
-
-def text() -> str:
-    """Return the schema as it is kept."""
-    return json.dumps(schema(), indent=2, ensure_ascii=False) + "\n"
-
-
-def main(arguments: list[str], root: Path) -> int:
-    """Write the schema, or with ``--check`` tell whether the one kept is current (0) or not (1)."""
-    path = root / FILE
-    if "--check" in arguments:
-        is_current = path.is_file() and path.read_text(encoding="utf-8") == text()
-        print(f"{FILE} is {'current' if is_current else 'not current'}")
-        return 0 if is_current else 1
-    path.write_text(text(), encoding="utf-8")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:], Path(__file__).resolve().parents[2]))

@@ -21,15 +21,14 @@ from numpy.typing import NDArray
 
 from vibsim.checks.order.verdict_context import ALIKE
 from vibsim.convergence.ladder_statistics import BLOWN_UP
-from vibsim.observe import oscillation
-from vibsim.observe import predicted_oscillation as predicted
+from vibsim.observe import oscillation, predicted_oscillation
 from vibsim.observe.member_block import Part
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 LIMIT_ROUNDING = 1e-9
-"""w dt within this part of the limit is at the limit, as in `rules.breakdown`."""
+"""w dt within this part of the limit is at the limit, as in `ladder_statistics.breakdown`."""
 NEAR = 0.1
 """How far the logarithm of a growth may be from the predicted one, as a part of it."""
 
@@ -42,7 +41,7 @@ class Growth:
     escaped: Flags
     """Whether the motion itself, not the step, ends the calculation: an escape, or a formula without a value."""
     contradicted: Flags
-    """Whether a linear model beyond the limit grows otherwise than predicted."""
+    """Whether a linear model beyond the limit grows otherwise than predicted_oscillation."""
     measured: Floats
     """Growth factor of the amplitude per period; NaN below two peaks, and of several coordinates."""
     predicted: Floats
@@ -60,8 +59,8 @@ def growth_at(part: Part, level: int) -> Growth:
     growth = part.growth[..., index]
     grown = (growth > BLOWN_UP) & (at_limit | ~_removed(part, index))
     measured = _measured(part, level)
-    expected = predicted.dominant_growth(part, level)
-    short = ~broken & predicted.is_simple(part) & beyond
+    expected = predicted_oscillation.dominant_growth(part, level)
+    short = ~broken & predicted_oscillation.is_simple(part) & beyond
     return Growth(
         unstable=(broken & ~escaped) | beyond | grown,
         escaped=escaped & ~grown,
@@ -101,7 +100,7 @@ def _removed(part: Part, index: int) -> Flags:
 
 
 def _differs(part: Part, index: int, measured: Floats, expected: Floats) -> Flags:
-    periods = predicted.natural_frequency(part) * part.group.end / (2.0 * np.pi)
+    periods = predicted_oscillation.natural_frequency(part) * part.group.end / (2.0 * np.pi)
     with np.errstate(divide="ignore", invalid="ignore"):
         apart = np.abs(np.log(measured) - np.log(expected)) * periods
         whole = np.log(expected) * periods

@@ -12,7 +12,7 @@ from typing import Any
 
 from vibsim.cli import resources
 from vibsim.cli.chosen_plans import plans_of
-from vibsim.cli.jobs.common import results_folder
+from vibsim.cli.jobs.common import chosen_results
 from vibsim.cli.sizes import amount, duration, size
 from vibsim.plan import Plan
 
@@ -22,7 +22,7 @@ _HEAD = ("level", "steps", "kept every", "files", "member-steps", "disk", "memor
 
 def plan(options: Namespace) -> int:
     """Show members, jobs, steps, memory, disk space and time; refuse what does not fit on this machine."""
-    results = results_folder(options)
+    results = chosen_results(options)
     plans = plans_of(options.experiments)
     if options.json:
         print(json.dumps([_entry(item) for item in plans], indent=1))

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.apriori.formal_orders import even_powers, formal_orders
-from vibsim.comparison import value_numbers as values
+from vibsim.comparison import value_numbers
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.convergence import gci
 from vibsim.convergence.scalar_extrapolation import LOUD, Limit, limit, observed_order
@@ -82,13 +82,13 @@ def has_limit(name: str, level: int | str | None) -> bool:
     return level == "best" and name in HAVE_LIMITS
 
 
-def value(name: str, place: values.Place) -> tuple[Floats, Floats]:
+def value(name: str, place: value_numbers.Place) -> tuple[Floats, Floats]:
     """Return the number `name` at `place`, and the bound of its error, shape (scheme, case).
 
     The bound is NaN where the number is not a limit, or nothing is known of its error.
     """
     if not has_limit(name, place.level):
-        return values.value(name, place), place.missing
+        return value_numbers.value(name, place), place.missing
     found = _ladder(name, place).limit()
     return found.value, found.bound
 
@@ -111,7 +111,7 @@ class _Ladder:
         return replace(found, bound=found.bound + self.missed)
 
 
-def _ladder(name: str, place: values.Place) -> _Ladder:
+def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
     """Return the ladder of the number `name`; NaN for schemes that have no levels."""
     found = _at_levels(name, place)
     found[place.part.adaptive] = np.nan
@@ -120,7 +120,7 @@ def _ladder(name: str, place: values.Place) -> _Ladder:
     return _Ladder(found, order, even, floor, _missed(name, place, found, floor), place.levels)
 
 
-def _missed(name: str, place: values.Place, found: Floats, floor: Floats) -> Floats:
+def _missed(name: str, place: value_numbers.Place, found: Floats, floor: Floats) -> Floats:
     """Return how much of an extremum lies between grid points: ``w^2 dt^2/8`` of its size at most.
 
     How much differs from level to level by accident, which no extrapolation takes away. Nothing is missed where the
@@ -136,7 +136,7 @@ def _missed(name: str, place: values.Place, found: Floats, floor: Floats) -> Flo
     return np.where(same, nothing, MISSED * p**2 * _scale(name, place, found))
 
 
-def best(name: str, place: values.Place) -> Best:
+def best(name: str, place: value_numbers.Place) -> Best:
     """Return the limit of the number `name`, and how its levels approach it."""
     one = _ladder(name, place)
     kinds = gci.classify(one.values, one.levels, one.floor)
@@ -151,17 +151,17 @@ def best(name: str, place: values.Place) -> Best:
     )
 
 
-def _at_levels(name: str, place: values.Place) -> Floats:
+def _at_levels(name: str, place: value_numbers.Place) -> Floats:
     """Return the number at every level, shape (scheme, case, level); those of a series at a common time."""
     if name in ("end", "at"):
-        found = values.samples(place)
+        found = value_numbers.samples(place)
     else:
         rows = (replace(place, level=level) for level in place.levels)
-        found = [values.value(name, row) for row in rows]
+        found = [value_numbers.value(name, row) for row in rows]
     return np.stack(found, axis=-1)
 
 
-def _promised(name: str, place: values.Place) -> tuple[Floats, NDArray[np.bool_]]:
+def _promised(name: str, place: value_numbers.Place) -> tuple[Floats, NDArray[np.bool_]]:
     """Return the order that a number should have, and whether its powers are even, shape (scheme, case)."""
     part, experiment = place.part, place.part.experiment
     quantity = place.quantity or part.model.position
@@ -176,7 +176,7 @@ def _promised(name: str, place: values.Place) -> tuple[Floats, NDArray[np.bool_]
     return np.broadcast_to(order, part.shape), np.broadcast_to(even, part.shape)
 
 
-def _floor(name: str, place: values.Place, found: Floats) -> Floats:
+def _floor(name: str, place: value_numbers.Place, found: Floats) -> Floats:
     """Return the predicted round-off of a number at every level, in its unit."""
     part, comparison = place.part, place.comparison()
     if comparison is not None and name in ("end", "at"):
@@ -188,19 +188,19 @@ def _floor(name: str, place: values.Place, found: Floats) -> Floats:
     return np.broadcast_to(relative * size[..., None], found.shape)
 
 
-def _scale(name: str, place: values.Place, found: Floats) -> Floats:
+def _scale(name: str, place: value_numbers.Place, found: Floats) -> Floats:
     """Return the size that such a number has: of the solution, or of the number itself."""
     if name in ("end", "at", "min", "max", "max_abs"):
         q, part = place.comparison(), place.part
         if q is not None:
             return q.scale
-        rows = [values.value(which, replace(place, level=part.grid.levels[-1]))
+        rows = [value_numbers.value(which, replace(place, level=part.grid.levels[-1]))
                 for which in ("min", "max")]  # fmt: skip
         return np.asarray(np.maximum(*np.abs(rows)))
     if name in ("period", "frequency", "amplitude", "growth_per_period", "growth_factor"):
         return np.abs(found[..., -1])
     if name == "phase_error_per_period":
-        return values.value("period", replace(place, level=place.levels[-1]))
+        return value_numbers.value("period", replace(place, level=place.levels[-1]))
     # relative errors
     return np.ones(found.shape[:-1])
 
@@ -239,7 +239,7 @@ def table(part: Part, compared: Mapping[str, Comparison]) -> Table:
     found: Table = {}
     kept = []
     for row in scalars(part):
-        place = values.Place(part, compared, row.quantity, "best", None, None)
+        place = value_numbers.Place(part, compared, row.quantity, "best", None, None)
         if part.lean:
             found |= _of_limit(row, _ladder(row.value, place).limit())
             continue

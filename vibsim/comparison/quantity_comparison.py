@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vibsim.apriori.formal_orders import even_powers, formal_orders, special_orders
 from vibsim.apriori.roundoff_floor import solution_size
-from vibsim.convergence import differences as series
+from vibsim.convergence import differences
 from vibsim.convergence.richardson import extrapolate
 from vibsim.convergence.verdict import Judgement
 from vibsim.observe.member_block import Part, by_level, energy_at_start
@@ -42,7 +42,7 @@ class InNorm:
     difference: Floats
     """Of successive levels, shape (scheme, case, pair)."""
     scatter: Floats
-    """Of successive differences (`series.scatters`), shape (scheme, case, triple)."""
+    """Of successive differences (`differences.scatters`), shape (scheme, case, triple)."""
     error: Floats
     """Exact less computed, shape (scheme, case, level); NaN where the exact solution is not known."""
     extrapolation: Floats
@@ -127,7 +127,7 @@ class Comparison:
         if not self.differences:
             return np.zeros(self.part.shape, dtype=bool)
         d = self.differences[-1]
-        least = VANISHING * series.largest(d)[..., None]
+        least = VANISHING * differences.largest(d)[..., None]
         return np.asarray(np.count_nonzero((d > least) | (d < -least), axis=-1) <= TWO)
 
     def in_norm(self, kind: str) -> InNorm:
@@ -150,18 +150,18 @@ class Comparison:
         parts = zip(weights, self.differences[first:], strict=False)
         whole = sum((w * d[rows] for w, d in parts), np.zeros(1))
         spacing = np.broadcast_to(grid.spacing, self.part.shape)[rows]
-        return series.norm(whole, kind, spacing, grid.end_included)
+        return differences.norm(whole, kind, spacing, grid.end_included)
 
     def _measured(self, kind: str) -> InNorm:
         grid, shape = self.part.grid, self.part.shape
         none = np.empty((*shape, 0))
 
         def size(of: Floats) -> Floats:
-            return series.norm(of, kind, grid.spacing, grid.end_included)
+            return differences.norm(of, kind, grid.spacing, grid.end_included)
 
         levels, d = len(grid.levels), self.differences
         unknown = np.full((*shape, levels), np.nan)
-        scatters = series.scatters(d, kind, grid.end_included) if len(d) > 1 else []
+        scatters = differences.scatters(d, kind, grid.end_included) if len(d) > 1 else []
         errors = self.errors if levels == FEW else None
         return InNorm(
             difference=by_level([size(x) for x in d]) if d else none,
@@ -173,7 +173,7 @@ class Comparison:
             error_scatter=(
                 None
                 if errors is None
-                else by_level(series.scatters(errors, kind, grid.end_included))
+                else by_level(differences.scatters(errors, kind, grid.end_included))
             ),
         )
 
@@ -184,7 +184,7 @@ class Comparison:
         order = np.where(np.isinf(self.order), np.nan, self.order)
         return by_level(
             [
-                series.coincidence(a, b, series.target_ratio(order, levels[i : i + 3]))
+                differences.coincidence(a, b, differences.target_ratio(order, levels[i : i + 3]))
                 for i, (a, b) in enumerate(pairwise(self.differences))
             ]
         )
@@ -192,14 +192,14 @@ class Comparison:
     def ratios(self, kind: str) -> Floats:
         """Return the ratio of successive differences in a norm, shape (scheme, case, triple)."""
         norms = self.in_norm(kind).difference
-        return series.safe_ratio(norms[..., :-1], norms[..., 1:])
+        return differences.safe_ratio(norms[..., :-1], norms[..., 1:])
 
     def observed_orders(self, kind: str) -> Floats:
         """Return the order of every triple in a norm, shape (scheme, case, triple)."""
         levels, ratio = self.part.grid.levels, self.ratios(kind)
         return by_level(
             [
-                series.order_of_ratio(ratio[..., i], levels[i : i + 3])
+                differences.order_of_ratio(ratio[..., i], levels[i : i + 3])
                 for i in range(ratio.shape[-1])
             ]
         )

@@ -2,7 +2,7 @@
 
 What may be called equal follows from the arithmetic: each side is known no better than its accumulated rounding errors.
 For the states of a linear model theory bounds them (`vibsim.theory.rounding_bound`); elsewhere, and for energies,
-it is `rules.BLAME` times the predicted floor, an order of magnitude.
+it is `BLAME` times the predicted floor, an order of magnitude.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@ r"""The window of a ladder: which of its local orders count, where they settle, 
 
 ``d_k = a(t) h^p + b(t) h^q`` has local orders that approach p, and successive differences whose directions (as vectors
 over time) approach each other, both like ``x_k = |b| h^(q-p)/|a|``. So the *change* of the order and the *scatter* of
-the triples (`series.scatter`) measure what is left of the next power, and the trend of the scatter says whether it
+the triples (`differences.scatter`) measure what is left of the next power, and the trend of the scatter says whether it
 fades (the first power takes over) or grows (a lower power emerges, or noise).
 
 What is left, and the interval, are worked out in `vibsim.convergence.settled_orders`.

@@ -45,7 +45,7 @@ class Evidence:
     difference: Floats
     """Norms of the differences, shape (..., n-1)."""
     scatter: Floats
-    """Signed scatter of the triples in the same norm (`series.scatter`), shape (..., n-2)."""
+    """Signed scatter of the triples in the same norm (`differences.scatter`), shape (..., n-2)."""
     floor: Floats
     """Predicted round-off at every level in the same norm, shape (..., n)."""
     order: Floats

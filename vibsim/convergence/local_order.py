@@ -6,7 +6,8 @@ crossing and what lies between two of them:
 
     p(t) = log2 R(t),     R(t) = ||d_k|| / ||d_(k+1)||,     ||d||^2 = sum of d^2 over the window
 
-(for successive levels; `series.order_of_ratio` in general). Its interval is that of ``R (1 - e)`` to ``R/(1 - e)`` with
+(for successive levels; `differences.order_of_ratio` in general). Its interval is that of ``R (1 - e)`` to
+``R/(1 - e)`` with
 
     e = || d_k/||d_k|| - d_(k+1)/||d_(k+1)|| ||  +  noise_k/rms_k  +  noise_(k+1)/rms_(k+1)
 

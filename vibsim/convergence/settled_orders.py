@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 COINCIDENT = 0.2
-"""Largest scatter (see `series.scatter`) of curves that count as proportional."""
+"""Largest scatter (see `differences.scatter`) of curves that count as proportional."""
 FADING = 0.75
 """The scatter fades when it falls at least to this part of itself per level (1/2 and 1/4 are usual)."""
 QUICK, SLOW = 0.62, 0.05

@@ -1,6 +1,6 @@
 """The way into compiled code: arrays as pointers and lengths, numbers as they are.
 
-`kinds` says what a function takes, a word for each argument (`vibsim.native.machine_code`). Arrays are C-contiguous, of
+`kinds` says what a function takes, a word for each argument (`vibsim.native`). Arrays are C-contiguous, of
 64 bits an entry.
 """
 

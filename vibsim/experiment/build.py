@@ -14,10 +14,11 @@ from vibsim.experiment.data import AnyExperiment, ModelSpec, SchemeSpec, Sweep, 
 from vibsim.experiment.faults import Report
 from vibsim.experiment.partial_validation import sections
 from vibsim.experiment.rules import jumps, size_limits, tables
-from vibsim.experiment.rules import model as model_rules
 from vibsim.experiment.rules import schemes as scheme_rules
 from vibsim.experiment.rules.check_places import Ladder, kinds_of
 from vibsim.experiment.rules.checks import finish_checks
+from vibsim.experiment.rules.model import Equation
+from vibsim.experiment.rules.model import equation as read_equation
 from vibsim.experiment.rules.published import check_published
 from vibsim.experiment.rules.timing import time_spec
 from vibsim.experiment.schema.checks import ConvergesCheck
@@ -55,7 +56,7 @@ def build(kind: type[AnyExperiment], source: Source, place: Place, report: Repor
     swept = frozenset(_keys(source.data.get("sweep")))
     folder = place.file.parent if place.file else Path()
     of_kind = _model(source)
-    equation = model_rules.equation(part.model, of_kind, swept, folder, report)
+    equation = read_equation(part.model, of_kind, swept, folder, report)
     model, parameters = equation.model, equation.parameters
     levels = _levels(part, source, report)
     schemes = scheme_rules.finish_schemes(part.schemes, model, report)
@@ -121,7 +122,7 @@ def build(kind: type[AnyExperiment], source: Source, place: Place, report: Repor
 
 
 def _check_members(
-    equation: model_rules.Equation, time: TimeSpec, varied: sweep.SweepAxes, report: Report
+    equation: Equation, time: TimeSpec, varied: sweep.SweepAxes, report: Report
 ) -> None:
     """Check what must hold for every member: tables are long enough, and what is differentiated has no jumps."""
     if equation.model is None or not equation.parameters:

@@ -46,7 +46,7 @@ def _known(low: Any, high: Any) -> Interval:
 def _bounds(node: Expression, numbers: Mapping[str, Any]) -> Interval:
     match node:
         case Number(value):
-            return np.float64(value), np.float64(value)  # type: ignore[return-value]
+            return np.asarray(value, dtype=float), np.asarray(value, dtype=float)
         case Name(name):
             found = numbers[name]
             return found if isinstance(found, tuple) else (np.asarray(found), np.asarray(found))

@@ -4,7 +4,7 @@ What is fitted is M(t), the largest absolute deviation at every step so far. Let
 [T/2, T], [T/4, T/2] and [T/8, T/4]. Where ``M = a + b t^k``, whatever a and b, ``(m1 - m2)/(m2 - m3) = 2^k``: a means
 smooths the stairs in which a drift climbs under an oscillation, and the oscillation itself is a. So, in this order:
 
-- ``none``: M(T) is no more than `rules.BLAME` times the predicted round-off of the energy;
+- ``none``: M(T) is no more than `BLAME` times the predicted round-off of the energy;
 - ``unclear``: fewer than `LEAST_PERIODS` periods, in which the window from T/8 on would not see the whole of an
   oscillation, or fewer than `LEAST_SAMPLES` samples;
 - ``exponential``: the energy itself has changed by more than a factor e^`LARGE` and the k of ``|ln(E/E(0))|`` is nearer

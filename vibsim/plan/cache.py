@@ -71,9 +71,9 @@ def _built(choice: Choice, resolve: Resolver | None) -> Plan:
 
 
 def _experiment(choice: Choice, resolve: Resolver | None) -> Experiment:
-    from vibsim import experiment as spec
+    from vibsim.experiment import Experiment
 
-    experiment = spec.Experiment.from_yaml(choice.file, collection=choice.collection)
+    experiment = Experiment.from_yaml(choice.file, collection=choice.collection)
     wanted = experiment if choice.case is None else experiment.alone(choice.case)
     if experiment.levels:
         return wanted

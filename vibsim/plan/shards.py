@@ -31,9 +31,9 @@ def digest_of(content: Mapping[str, Any]) -> str:
 
 def is_bounded(experiment: Experiment) -> bool:
     """Tell whether `experiment` is so large that its storage is bounded."""
-    from vibsim.experiment import stored_series as series
+    from vibsim.experiment import stored_series
 
-    return series.is_bounded(experiment)
+    return stored_series.is_bounded(experiment)
 
 
 def _series(experiment: Experiment) -> tuple[str, ...]:

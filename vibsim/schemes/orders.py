@@ -11,7 +11,7 @@ from vibsim.models.base import BUDGET, Model, tree
 from vibsim.models.events import Friction
 
 ORDER_OF_WORK = 4.0
-"""Order of the sum by which the work of forces is found (`vibsim.simulation.budget`)."""
+"""Order of the sum by which the work of forces is found (`vibsim.simulation.derived`)."""
 
 
 Beginning = Literal["any", "rest", "balance"]

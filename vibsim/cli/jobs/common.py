@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import vibsim
-from vibsim.cli import results_folder as plain
+from vibsim.cli import results_folder
 from vibsim.cli.chosen_plans import resolve
 from vibsim.cli.jobs.deleted import delete
 from vibsim.core.errors import Fault, FileError, InputError, VibsimError
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from vibsim.core.record import Record
 
 
-def results_folder(options: Namespace) -> Path:
+def chosen_results(options: Namespace) -> Path:
     """Return the results folder that was asked for, else that of the checkout."""
     folder: Path = options.results or checkout() / "results"
     try:
@@ -41,12 +41,12 @@ def results_folder(options: Namespace) -> Path:
 
 def one_plan(options: Namespace) -> tuple[Plan, Path]:
     """Return the plan of the experiment of a job, and the results folder."""
-    results = results_folder(options)
+    results = chosen_results(options)
     choices = choose([options.experiment], checkout())
     if len(choices) != 1:
         raise refusal("EXPERIMENT", options.experiment, "must be one experiment, not a collection")
     plan = load(choices[0], resolve, cached=True)
-    plain.check_folders(results, plan.key)
+    results_folder.check_folders(results, plan.key)
     return plan, results
 
 

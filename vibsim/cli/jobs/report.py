@@ -11,11 +11,11 @@ from typing import Any
 from vibsim.cli import made_files
 from vibsim.cli.jobs.common import (
     check_digest,
+    chosen_results,
     one_plan,
     provenance,
     read_all,
     refusal,
-    results_folder,
 )
 from vibsim.core.errors import nearest
 
@@ -73,7 +73,7 @@ def _index(options: Namespace) -> int:
             raise refusal(f"--{name}", text, "belongs to the report of one experiment: name it")
     from vibsim.report import write_index
 
-    results = results_folder(options)
+    results = chosen_results(options)
     write_index(options.out or results)
     if options.out is None:
         made_files.add(results, made_files.INDEX, ["index.html", "summary.csv"])

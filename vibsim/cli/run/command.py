@@ -14,11 +14,10 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from vibsim.cli import failure, resources
-from vibsim.cli import results_folder as plain
+from vibsim.cli import failure, resources, results_folder
 from vibsim.cli.chosen_plans import plans_of
 from vibsim.cli.jobs import deleted
-from vibsim.cli.jobs.common import results_folder
+from vibsim.cli.jobs.common import chosen_results
 from vibsim.cli.jobs.simulate import is_made
 from vibsim.cli.run import changes, lock, outcome, snakemake, sources, supervise
 from vibsim.cli.run.leftovers import leftovers, remove
@@ -41,10 +40,10 @@ def run(options: Namespace) -> int:
 
 
 def _run(options: Namespace) -> int:
-    root, results = checkout(), results_folder(options)
+    root, results = checkout(), chosen_results(options)
     # Everything is validated before anything is written but the cache of plans.
     plans = plans_of(options.experiments, cached=True)
-    plain.check(results, [plan.key for plan in plans])
+    results_folder.check(results, [plan.key for plan in plans])
     resources.check(plans, results)
     arguments = ["--cores", str(options.cores or len(os.sched_getaffinity(0)))]
     arguments += ["--resources", f"mem_mb={resources.megabytes(plans)}"]

@@ -25,7 +25,7 @@ from vibsim.report.data import (
 )
 from vibsim.report.evidence.frame import COLOUR, Picture, level_ticks, of_levels, over_time, ticks
 from vibsim.report.evidence.svg_plot import BAND, Panel, document
-from vibsim.report.figures import time as figures_time
+from vibsim.report.figures.time import differences as curves_of_differences
 from vibsim.report.text import words
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def _label(quantity: str) -> str:
 
 def _differences(record: Record, quantity: str, member: Member) -> Panel:
     """Return a panel with the rescaled differences over time."""
-    t, curves = times(record, member.case), figures_time.differences(record, quantity, member)
+    t, curves = times(record, member.case), curves_of_differences(record, quantity, member)
     shown = [curve for curve in curves if curve.is_whole and curve.sound] or curves
     low, high = style.limits(*(curve.values for curve in shown), margin=0.05)
     panel = over_time(t, low, high)

@@ -165,7 +165,7 @@ def differences(record: Record, quantity: str, member: Member) -> list[Curve]:
 
 
 def _lost(record: Record, quantity: str, member: Member, levels: list[int]) -> str:
-    """Say why values of these positions of levels would mean nothing (see `figures_frame.why_lost`)."""
+    """Say why values of these positions of levels would mean nothing (see `frame.why_lost`)."""
     pairs = [i for i in levels if i < len(whole(record, "pair"))]
     found = [at(record, f"{quantity}_difference", member, pair=i) for i in pairs[:1]]
     if f"{quantity}_scaled" in record and len(levels) == 1:

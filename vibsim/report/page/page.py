@@ -31,7 +31,7 @@ from vibsim.report.tables import (
     theory,
     work,
 )
-from vibsim.report.tables import scales as contents_scales
+from vibsim.report.tables.scales import table as scales_table
 from vibsim.report.tables.table import Table, to_csv, to_latex
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def write(
     listed, folded = _tables(experiment, convergence, summary)
     beside = [orders.checks(summary), orders.failures(summary, convergence)]
     beside.append(members.table(convergence, position))
-    scales = contents_scales.table(experiment, convergence)
+    scales = scales_table(experiment, convergence)
     beside.append(scales)
     printed = published.tables(experiment, convergence, summary)
     everything = [*printed, *listed, *(table for _, group in folded for table in group)]

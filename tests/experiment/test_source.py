@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 import pytest
-from spec_files import GOOD, file_faults, write
+from experiment_files import GOOD, file_faults, write
 
 from vibsim.core.errors import InputError
 from vibsim.experiment import Experiment

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from spec_files import build, faults_of, only_fault
+from experiment_files import build, faults_of, only_fault
 
 from vibsim.analysis import analyse_records
 from vibsim.experiment import canonical, restore

@@ -10,7 +10,7 @@ from typing import Any
 import netCDF4
 import numpy as np
 import pytest
-from spec_files import write
+from experiment_files import write
 
 from vibsim.core.errors import Fault, InputError
 from vibsim.experiment import Experiment, canonical, restore

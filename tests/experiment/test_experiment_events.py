@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from spec_files import build, only_fault
+from experiment_files import build, only_fault
 
 from vibsim.schemes import FIXED_STEP
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from spec_files import build, calls_at_most, faults_of, only_fault, write
+from experiment_files import build, calls_at_most, faults_of, only_fault, write
 
 from vibsim import simulate
 from vibsim.cli import main

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from spec_files import GOOD, build, content, faults_of, file_faults, only_fault
+from experiment_files import GOOD, build, content, faults_of, file_faults, only_fault
 
 from vibsim.analysis import analyse_records
 from vibsim.core.errors import InputError

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from spec_files import calls_at_most
+from experiment_files import calls_at_most
 
 from vibsim.core.errors import Fault, InputError
 from vibsim.engine.kernel import source

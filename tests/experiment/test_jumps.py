@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from spec_files import build, only_fault
+from experiment_files import build, only_fault
 
 from vibsim import simulate
 

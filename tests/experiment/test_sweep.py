@@ -10,7 +10,7 @@ import tracemalloc
 from typing import Any
 
 import pytest
-from spec_files import build, calls_at_most, faults_of
+from experiment_files import build, calls_at_most, faults_of
 
 from vibsim.experiment import Experiment, canonical, restore
 from vibsim.experiment.rules.size_limits import MAX_MEMBERS

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from spec_files import GOOD, build, faults_of, file_faults, only_fault
+from experiment_files import GOOD, build, faults_of, file_faults, only_fault
 
 from vibsim import plan
 from vibsim.experiment import Experiment, canonical, restore

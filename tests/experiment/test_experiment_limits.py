@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from spec_files import build, faults_of, only_fault
+from experiment_files import build, faults_of, only_fault
 
 from vibsim.experiment.cost import Load
 from vibsim.experiment.stored_series import FEWEST_EXTREMA, MOST_EXTREMA

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from experiment_files import content
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from spec_files import content
 
 from vibsim import plan
 from vibsim.core.errors import InputError

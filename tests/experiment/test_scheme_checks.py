@@ -6,8 +6,8 @@ import json
 from typing import Any
 
 import pytest
-from spec_files import build, faults_of, only_fault
-from test_spec_faults import change_model
+from experiment_files import build, faults_of, only_fault
+from test_experiment_faults import change_model
 
 from vibsim.experiment import VALUES, Experiment, canonical, restore
 from vibsim.experiment.check_scheme_selection import schemes_of

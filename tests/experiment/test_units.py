@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from experiment_files import build, content, faults_of, file_faults, only_fault, write
 from hypothesis import given
 from hypothesis import strategies as st
-from spec_files import build, content, faults_of, file_faults, only_fault, write
-from test_spec_fuzz import QUIET, attempt
+from test_fuzz import QUIET, attempt
 
 from vibsim import plan
 from vibsim.experiment import Experiment

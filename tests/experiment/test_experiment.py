@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from experiment_files import GOOD, build, content, only_fault, write
 from pydantic import ValidationError
-from spec_files import GOOD, build, content, only_fault, write
 
 from vibsim.core.errors import InputError
 from vibsim.experiment import Experiment, canonical, collection_of, restore

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from spec_files import write
+from experiment_files import write
 
 from vibsim.core.errors import Fault, InputError
 from vibsim.experiment import Experiment

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from experiment_files import GOOD, build, content, faults_of, file_faults, only_fault, write
 from hypothesis import given
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
-from spec_files import GOOD, build, content, faults_of, file_faults, only_fault, write
 
 from vibsim.experiment import Experiment, canonical, restore
 from vibsim.experiment.schema.json_schema import schema

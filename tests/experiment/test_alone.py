@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 import pytest
-from spec_files import GOOD, build, write
+from experiment_files import GOOD, build, write
 
 from vibsim import plan
 from vibsim.core.errors import InputError

@@ -1,0 +1,46 @@
+"""The JSON Schemas of ``workflow/schemas``: ``python workflow/schemas.py [--check]``.
+
+Written from the code that reads experiment files and writes summaries, for editors and for programs that read results.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from vibsim.analysis import summary_schema
+from vibsim.experiment.schema import json_schema
+
+SCHEMAS: Mapping[str, Callable[[], dict[str, Any]]] = {
+    "experiment": json_schema.schema,
+    "summary": summary_schema.schema,
+}
+FOLDER = Path(__file__).resolve().parent / "schemas"
+
+
+def text(name: str) -> str:
+    """Return a schema as its file holds it."""
+    return json.dumps(SCHEMAS[name](), indent=2, ensure_ascii=False) + "\n"
+
+
+def main(arguments: list[str], folder: Path = FOLDER) -> int:
+    """Write the schemas, or with ``--check`` say which files are not current; return 1 if one is not."""
+    files = {folder / f"{name}.schema.json": text(name) for name in SCHEMAS}
+    if "--check" not in arguments:
+        for path, content in files.items():
+            path.write_text(content, encoding="utf-8")
+        return 0
+    stale = [
+        f"{path.name} is not current"
+        for path, content in files.items()
+        if not path.is_file() or path.read_text("utf-8") != content
+    ]
+    print(*stale or ["the JSON Schemas are current"], sep="\n")
+    return 1 if stale else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
