@@ -145,7 +145,7 @@ def test_verdicts_need_only_what_is_kept_of_parts() -> None:
     records = simulated(experiment)
     whole = analyse_records(experiment, records)
     thin: list[Record] = []
-    (part,) = kept([whole], thin)
+    (part,) = kept(experiment, [whole], thin)
     assert part is whole
     assert not any("t" in variable.dims for variable in thin[0].variables.values())
     expected = summarise(experiment, verdicts(experiment, whole), whole)
@@ -272,7 +272,7 @@ def test_what_no_level_can_tell_is_said_of_what_is_kept_of_parts() -> None:
         experiment = Experiment.from_dict(data)
         whole = analyse_records(experiment, simulated(experiment))
         thin: list[Record] = []
-        list(kept([whole], thin))
+        list(kept(experiment, [whole], thin))
         (found,) = verdicts(experiment, thin[0])
         assert found.status == "PASS"
         assert ("a wrong limit would not be noticed" in found.text) == is_said

@@ -96,7 +96,7 @@ def test_the_verdict_needs_only_what_is_kept_of_parts(
     swept: Experiment, convergence: Record
 ) -> None:
     thin: list[Record] = []
-    list(kept([convergence], thin))
+    list(kept(swept, [convergence], thin))
     expected = summarise(swept, verdicts(swept, convergence), convergence)
     assert summarise(swept, verdicts(swept, thin[0]), thin[0]) == expected
 

@@ -90,7 +90,7 @@ def test_what_a_run_keeps_of_its_parts_tells_the_same(changes):
     checks = {"converges": "theta", "order": "scheme"}, {"value": "period", "above": 0.0}
     experiment, record = run(*checks, QUANTITIES, **changes)
     thin = []
-    assert list(kept([record], thin)) == [record]
+    assert list(kept(experiment, [record], thin)) == [record]
     whole, left = (list(verdicts(experiment, row)) for row in (record, joined(thin)))
     assert [(v.text, v.advice) for v in left] == [(v.text, v.advice) for v in whole]
     assert "rad s-1" in whole[2].text

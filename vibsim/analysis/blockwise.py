@@ -22,6 +22,7 @@ from vibsim.checks.value.units import UNITS, units_in
 from vibsim.comparison.exact_availability import known_errors
 from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import HIGHEST
+from vibsim.experiment.schema.checks import ConvergesCheck
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
@@ -92,24 +93,37 @@ def _read(
         yield {level: read(start, stop) for level, read in readers.items()}
 
 
-_DECISIVE = ("status", "failure_time", "last_step", "omega_dt", HIGHEST, "measured_growth")
+_OF_VERDICTS = (
+    *("status", "failure_time", "last_step", "omega_dt", "stability_limit", "measured_growth"),
+    *("decay_rate", "pulse_time", "pulse_width", HIGHEST),
+)
+"""Variables that every verdict and the summary may read, beside those that a check or its quantity has of its own."""
 
 
-def _is_kept(name: str) -> bool:
-    return (
-        name in _DECISIVE
+def verdict_variables(experiment: Experiment, record: Record) -> list[str]:
+    """Name the variables of a convergence Record from which `verdicts` and `summarise` make what they say."""
+    orders = {
+        f"{check.converges}_observed_order"
+        for check in experiment.checks
+        if isinstance(check, ConvergesCheck)
+    }
+    return [
+        name
+        for name in record.variables
+        if name in _OF_VERDICTS
+        or name in orders
         or name.startswith(("check_", "corner_"))
         or is_bound(name)
         or is_told(name)
-    )
+    ]
 
 
-def kept(parts: Iterable[Record], thin: list[Record]) -> Iterator[Record]:
+def kept(experiment: Experiment, parts: Iterable[Record], thin: list[Record]) -> Iterator[Record]:
     """Pass parts on, and keep of each in `thin` what `verdicts` and `summarise` need of it."""
     for part in parts:
-        names = [n for n in part.variables if _is_kept(n)]
         attrs = {**part.attrs, UNITS: json.dumps(units_in(part))}
-        thinned = {n: part.variables[n] for n in names} | known_errors(part)
+        names = verdict_variables(experiment, part)
+        thinned = {name: part.variables[name] for name in names} | known_errors(part)
         thin.append(Record(part.coords, thinned, attrs))
         yield part
 

@@ -28,7 +28,7 @@ def analyse(options: Namespace) -> int:
     thin: list[Record] = []
     with ExitStack() as stack:
         levels = readers(plan, results, stack)
-        parts = kept(analyse_parts(experiment, levels, threads=options.threads), thin)
+        parts = kept(experiment, analyse_parts(experiment, levels, threads=options.threads), thin)
         store.write_parts(
             folder / "convergence.nc",
             (titled(part, f"{plan.key}: comparison of levels") for part in parts),
