@@ -1,7 +1,7 @@
 """The most accurate value of every number that a ladder holds: extrapolated, with a bound of its error.
 
 Numbers are those that a ``value`` check may ask for at ``level: best``. Each is worked out at every level first
-(`vibsim.comparison.value_numbers`), and its limit taken from these (`vibsim.convergence.scalar_extrapolation`): an
+(`vibsim.comparison.value_numbers`), and its limit taken from these (`vibsim.convergence.number_extrapolation`): an
 extrapolated solution has no peaks of its own. Beside the bound stands the grid convergence index of the finest level
 (`vibsim.convergence.gci`).
 """
@@ -19,7 +19,7 @@ from vibsim.apriori.formal_orders import even_powers, formal_orders
 from vibsim.comparison import value_numbers
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.convergence import gci
-from vibsim.convergence.scalar_extrapolation import LOUD, Limit, limit, observed_order
+from vibsim.convergence.number_extrapolation import LOUD, Limit, limit, observed_order
 from vibsim.core.record import Variable, attributes
 from vibsim.experiment.value_names import HAVE_LIMITS
 from vibsim.observe import oscillation

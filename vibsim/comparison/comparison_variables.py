@@ -14,7 +14,7 @@ from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.convergence import differences
 from vibsim.convergence.gci import of_order
 from vibsim.convergence.local_order import local_order, window_points
-from vibsim.convergence.scalar_extrapolation import ORDINARY
+from vibsim.convergence.number_extrapolation import ORDINARY
 from vibsim.core.record import Variable, attributes
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.models import ENERGIES

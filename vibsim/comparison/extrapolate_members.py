@@ -1,10 +1,10 @@
 """Members extrapolated over the levels of a ladder, and what the tableau has to know about them.
 
-`vibsim.convergence.romberg` chooses at every time of every member. It must know the powers in which the errors of a
-scheme expand, and how large the round-off of the levels is. Schemes predict that relative to the solution, from the
-arithmetic and the number of steps, but a motion may magnify it a millionfold: near the separatrix of the pendulum. So
-it is measured. The coarsest level is run once more in another arithmetic, which is the same method with other rounding
-errors, and the difference of the two runs says what this motion makes of them.
+`vibsim.convergence.state_extrapolation` chooses at every time of every member. It must know the powers in which the
+errors of a scheme expand, and how large the round-off of the levels is. Schemes predict that relative to the solution,
+from the arithmetic and the number of steps, but a motion may magnify it a millionfold: near the separatrix of the
+pendulum. So it is measured. The coarsest level is run once more in another arithmetic, which is the same method with
+other rounding errors, and the difference of the two runs says what this motion makes of them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.comparison.member_method import Method, Start, rate_of
-from vibsim.convergence.romberg import KNOWN_DIGIT, Best, Circumstances, Pair, best_entry
+from vibsim.convergence.state_extrapolation import (
+    KNOWN_DIGIT,
+    Best,
+    Circumstances,
+    Pair,
+    best_entry,
+)
 from vibsim.engine import integrate
 from vibsim.schemes.base import Options
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.convergence.romberg_weights import Tableau, tableau
+from vibsim.convergence.state_extrapolation import Tableau, tableau
 from vibsim.models import Model
 from vibsim.schemes import Options, Scheme
 

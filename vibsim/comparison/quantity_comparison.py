@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vibsim.apriori.formal_orders import even_powers, formal_orders, special_orders
 from vibsim.apriori.roundoff_floor import solution_size
 from vibsim.convergence import differences
-from vibsim.convergence.richardson import extrapolate
+from vibsim.convergence.extrapolation import extrapolate_series
 from vibsim.convergence.verdict import Judgement
 from vibsim.observe.member_block import Part, by_level, energy_at_start
 from vibsim.observe.phase_amplitude_error import parts_of_errors, wanted
@@ -110,7 +110,9 @@ class Comparison:
         part = self.part
         even = even_powers(part.experiment, self.name, part.columns)
         order = np.where(np.isinf(self.order), NOTHING_LEFT, self.order)
-        value, bound = extrapolate(self.values, part.grid.levels, order, even, largest=part.lean)
+        value, bound = extrapolate_series(
+            self.values, part.grid.levels, order, even, largest=part.lean
+        )
         if part.model.events is not None:
             bound = IRREGULAR * bound
         return value, bound + ROUND_OFF_SAFETY * self.floor[..., -1:]

@@ -1,5 +1,5 @@
 r"""The grid convergence index: the field's known error bar, beside the bound of
-`vibsim.convergence.scalar_extrapolation`.
+`vibsim.convergence.number_extrapolation`.
 
 Of the finest two levels, ``GCI = F |u_fine - u_coarse|/(r^p - 1)`` with the refinement ratio r (P. J. Roache,
 Perspective: a method for uniform reporting of grid refinement studies, J. Fluids Eng. 116, 1994). It belongs to the
@@ -23,7 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.convergence.differences import gap_ratio, order_of_ratio, safe_ratio
-from vibsim.convergence.scalar_extrapolation import ORDINARY, triple_at
+from vibsim.convergence.extrapolation import error_left
+from vibsim.convergence.number_extrapolation import ORDINARY, triple_at
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -63,7 +64,7 @@ def classify(values: Floats, levels: Sequence[int], floor: Floats) -> Codes:
     Parameters
     ----------
     values, levels, floor
-        As `vibsim.convergence.scalar_extrapolation.limit` takes them.
+        As `vibsim.convergence.number_extrapolation.limit` takes them.
     """
     found = np.full(values.shape[:-1], UNKNOWN, dtype=np.int8)
     if len(levels) < 3:
@@ -89,7 +90,7 @@ def index(values: Floats, levels: Sequence[int], order: Floats, kinds: Codes) ->
     Parameters
     ----------
     values, levels
-        As `vibsim.convergence.scalar_extrapolation.limit` takes them.
+        As `vibsim.convergence.number_extrapolation.limit` takes them.
     order
         Promised order, shape (...).
     kinds
@@ -108,7 +109,7 @@ def index(values: Floats, levels: Sequence[int], order: Floats, kinds: Codes) ->
         change = np.abs(values[..., -1] - values[..., -2])
         gap = levels[-1] - levels[-2]
         if n == 2:
-            return np.asarray(CAUTIOUS * change / (gap_ratio(promised, gap) - 1.0))
+            return np.asarray(error_left(CAUTIOUS * change, gap_ratio(promised, gap)))
         last = -np.diff(values[..., -3:], axis=-1)
         seen = order_of_ratio(safe_ratio(last[..., 0], last[..., 1]), levels[-3:])
         regular = of_order(change, gap, seen, promised)
@@ -134,7 +135,7 @@ def of_order(change: Floats, gap: int, seen: Floats, promised: Floats) -> Floats
     factor = np.where(agrees, TRUSTED, CAUTIOUS)
     capped = np.clip(np.where(np.isfinite(seen), seen, promised), LEAST_ORDER, None)
     p = np.where(agrees, promised, np.minimum(capped, promised))
-    return np.asarray(factor * change / (gap_ratio(p, gap) - 1.0))
+    return np.asarray(error_left(factor * change, gap_ratio(p, gap)))
 
 
 def _agrees(seen: Floats, promised: Floats) -> Flags:

@@ -26,7 +26,7 @@ from vibsim.comparison.extrapolate_members import (
     noise_of,
 )
 from vibsim.comparison.member_method import Method, Start
-from vibsim.convergence.romberg import Pair
+from vibsim.convergence.state_extrapolation import Pair
 from vibsim.core.errors import Fault, InputError, VibsimError
 from vibsim.experiment.schema.fields import MAX_LEVEL
 from vibsim.ladder.solving import climb

@@ -15,7 +15,13 @@ from vibsim.comparison.extrapolate_members import (
     noise_of,
 )
 from vibsim.comparison.member_method import Method, Start, rate_of
-from vibsim.convergence.romberg import FLOATS, KNOWN_DIGIT, Circumstances, Pair, best_entry
+from vibsim.convergence.state_extrapolation import (
+    FLOATS,
+    KNOWN_DIGIT,
+    Circumstances,
+    Pair,
+    best_entry,
+)
 
 Floats = NDArray[np.float64]
 

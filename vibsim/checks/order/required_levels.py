@@ -22,7 +22,7 @@ from vibsim.comparison.order_evidence import evidence
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.convergence.classify import LEAST_CANDIDATE, MOST_ABOVE
 from vibsim.convergence.hidden_order import APART
-from vibsim.convergence.scalar_extrapolation import LOUD, ORDINARY
+from vibsim.convergence.number_extrapolation import LOUD, ORDINARY
 from vibsim.convergence.verdict import Judgement
 from vibsim.core.vocabulary import REASON_NAMES
 

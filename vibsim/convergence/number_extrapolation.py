@@ -1,12 +1,7 @@
-r"""The limit of one number over a ladder: its most accurate value, and a bound of the error of that.
+"""The limit of one number over a ladder: its most accurate value, and a bound of the error of that.
 
-A number at level l, with ``h = 2^-l``, is ``u_l = u + c_1 h^p + c_2 h^(p+q) + ...``. Column 0 of a tableau holds the
-levels; each further one takes the next power away,
-
-    T[i][j] = T[i][j-1] + (T[i][j-1] - T[i-1][j-1])/(K - 1),
-
-with K the factor by which that power falls between the two levels. A single number has no curve whose shape would tell
-an accident from an order, so that nothing is believed but what was seen:
+The scheme and the error bar are those of `vibsim.convergence.extrapolation`. A single number has no curve whose shape
+would tell an accident from an order, so that nothing is believed but what was seen:
 
 - one more extrapolation is believed where the last changes of the column before it have the ratio of its power;
 - its error is as much as it has changed from row to row, times a safety; a part of that only where the changes fall as
@@ -18,9 +13,6 @@ an accident from an order, so that nothing is believed but what was seen:
 
 Round-off is added with the weights of the combination. The entry with the least bound is taken. The factors are
 calibrated: ``docs/method.md``.
-
-Source: L. F. Richardson (1911); W. Romberg (1955); E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary
-Differential Equations I, section II.9.
 """
 
 from __future__ import annotations
@@ -31,7 +23,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.convergence.differences import gap_ratio, order_of_ratio, safe_ratio, target_ratio
+from vibsim.convergence.differences import order_of_ratio, safe_ratio
+from vibsim.convergence.extrapolation import (
+    Scheme,
+    error_left,
+    next_row,
+    steps_of,
+    triangular_scheme,
+)
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -103,10 +102,15 @@ def limit(
     finest = np.full(values.shape[:-1], n - 1)
     with np.errstate(all="ignore"):
         bound = _bound_of_finest(values, floor)
-        best = Limit(values[..., -1], np.where(np.isnan(bound), np.inf, bound), finest, finest)
+        best = Limit(
+            values[..., -1].copy(),
+            np.where(np.isnan(bound), np.inf, bound),
+            finest,
+            finest.copy(),
+        )
         if n > 2:
             p = _leading(observed_order(values, levels, floor), order)
-            best = _Tableau(values, levels, p, np.where(even, 2.0, 1.0), floor).least(best)
+            best = _extrapolated(values, levels, p, np.where(even, 2, 1), floor, best)
     known = np.isfinite(best.bound) & np.isfinite(best.value)
     return Limit(best.value, np.where(known, best.bound, np.nan), best.first, best.last)
 
@@ -160,47 +164,47 @@ def _bound_of_finest(values: Floats, floor: Floats) -> Floats:
     return np.where(ragged, np.fmin(found, wide), found)
 
 
-class _Tableau:
-    """The tableau of some ladders: lists over columns j of arrays of shape (..., n)."""
+def _extrapolated(
+    values: Floats, levels: Sequence[int], p: Floats, q: Integers, floor: Floats, best: Limit
+) -> Limit:
+    """Extrapolate the numbers of each expansion together."""
+    expansions = np.stack([p, np.broadcast_to(q, p.shape)], axis=-1)
+    for order, step in np.unique(expansions[p > 0], axis=0).tolist():
+        own = np.all(expansions == (order, step), axis=-1)
+        scheme = triangular_scheme(steps_of(levels), order, int(step), COLUMNS + 1)
+        found = _Rows(values[own], scheme, floor[own])
+        rows = found.least(Limit(*(of[own] for of in vars(best).values())))
+        for of, new in zip(vars(best).values(), vars(rows).values(), strict=True):
+            of[own] = new
+    return best
 
-    def __init__(
-        self, values: Floats, levels: Sequence[int], p: Floats, q: Floats, floor: Floats
-    ) -> None:
-        self.levels, self.p, self.q = levels, p, q
-        self.entries, self.noise = [values], [floor]
-        self.changes = [_changes(values)]
-        few = len(levels) == THREE
+
+class _Rows:
+    """The triangular scheme of numbers of one expansion: rows over levels, lists over columns, arrays of shape (m,)."""
+
+    def __init__(self, values: Floats, scheme: Scheme, floor: Floats) -> None:
+        self.scheme, self.floor = scheme, floor
+        self.entries: list[list[Floats]] = []
+        self.changes: list[list[Floats]] = []
+        for i, entries in enumerate(scheme):
+            before = self.entries[-1] if i else []
+            row, changes = next_row(entries[:COLUMNS], values[..., i], before)
+            self.entries.append(row)
+            self.changes.append(changes)
+        few = len(scheme) == THREE
         self.agrees_alone = AGREES_OF_THREE if few else AGREES_ALONE
         self.safety_alone = SAFETY_OF_THREE if few else SAFETY_ALONE
         self.least_part = LEAST_PART_OF_THREE if few else LEAST_PART
-        for j in range(1, min(len(levels) - 1, COLUMNS) + 1):
-            self._extrapolate(j)
-
-    def _extrapolate(self, j: int) -> None:
-        """Add column j."""
-        before, noise = self.entries[-1], self.noise[-1]
-        entries, carried = np.full_like(before, np.nan), np.full_like(before, np.nan)
-        for i in range(j, len(self.levels)):
-            part = 1.0 / (self.fall(j - 1, i) - 1.0)
-            entries[..., i] = before[..., i] + part * self.changes[-1][..., i]
-            carried[..., i] = noise[..., i] + part * (noise[..., i] + noise[..., i - 1])
-        self.entries.append(entries)
-        self.noise.append(carried)
-        self.changes.append(_changes(entries))
-
-    def fall(self, j: int, i: int) -> Floats:
-        """Return the factor by which the error of column j falls from row i - 1 to row i."""
-        return gap_ratio(self.p + j * self.q, self.levels[i] - self.levels[i - 1])
 
     def _apart(self, j: int, i: int) -> Floats:
         """Return how far the ratio of the changes of column j at rows i - 1 and i is from that of its power."""
-        wanted = target_ratio(self.p + j * self.q, self.levels[i - 2 : i + 1])
-        return np.abs(self.changes[j][..., i - 1] / (self.changes[j][..., i] * wanted) - 1.0)
+        wanted = self.scheme[i][j].change_fall
+        return np.abs(self.changes[i - 1][j] / (self.changes[i][j] * wanted) - 1.0)
 
     def _agrees(self, j: int, i: int) -> Flags:
         """Say where the changes of column j up to row i have the ratio of its power."""
         if i < j + 2:
-            return np.zeros(self.p.shape, dtype=bool)
+            return np.zeros(self.floor.shape[:-1], dtype=bool)
         alone = i == j + 2
         agrees = self._apart(j, i) <= (self.agrees_alone if alone else AGREES)
         if not alone:
@@ -209,38 +213,33 @@ class _Tableau:
 
     def _error(self, j: int, i: int) -> Floats:
         """Return a bound of the error of the entry at row i and column j, j > 0, without round-off."""
-        change, alone = np.abs(self.changes[j][..., i]), i == j + 1
+        change, fall, alone = np.abs(self.changes[i][j]), self.scheme[i][j].fall, i == j + 1
         if alone:
-            taken = np.abs(self.entries[j][..., i] - self.entries[j - 1][..., i])
+            taken = np.abs(self.entries[i][j] - self.entries[i][j - 1])
             change = np.maximum(change, self.least_part * taken)
         else:
-            change = np.maximum(change, np.abs(self.changes[j][..., i - 1]) / self.fall(j, i))
+            change = np.maximum(change, np.abs(self.changes[i - 1][j]) / fall)
         error = (self.safety_alone if alone else SAFETY) * change
-        error = np.where(self._agrees(j, i), error / (self.fall(j, i) - 1.0), error)
-        for finer in range(i + 1, len(self.levels)):
-            contradiction = np.abs(self.entries[j][..., i] - self.entries[j][..., finer])
-            error = np.fmax(error, contradiction)
+        error = np.where(self._agrees(j, i), error_left(error, fall), error)
+        for finer in self.entries[i + 1 :]:
+            error = np.fmax(error, np.abs(self.entries[i][j] - finer[j]))
         return error
 
     def least(self, best: Limit) -> Limit:
         """Return the entry with the least bound, or what there is already."""
-        for i in range(2, len(self.levels)):
-            believed = np.ones(self.p.shape, dtype=bool)
-            for j in range(1, min(i - 1, len(self.entries) - 1) + 1):
+        for i in range(2, len(self.entries)):
+            believed = np.ones(self.floor.shape[:-1], dtype=bool)
+            for j in range(1, min(i - 1, COLUMNS) + 1):
                 believed = believed & self._agrees(j - 1, i)
-                bound = self._error(j, i) + ROUND_OFF_SAFETY * self.noise[j][..., i]
+                noise = self.scheme[i][j - 1].round_off(
+                    [self.floor[..., k] for k in range(i - j, i + 1)]
+                )
+                bound = self._error(j, i) + ROUND_OFF_SAFETY * noise
                 take = believed & (bound < best.bound)
                 best = Limit(
-                    np.where(take, self.entries[j][..., i], best.value),
+                    np.where(take, self.entries[i][j], best.value),
                     np.where(take, bound, best.bound),
                     np.where(take, i - j, best.first),
                     np.where(take, i, best.last),
                 )
         return best
-
-
-def _changes(entries: Floats) -> Floats:
-    """Return what every entry of a column differs by from the row before; NaN in the first row."""
-    found = np.full_like(entries, np.nan)
-    found[..., 1:] = np.diff(entries, axis=-1)
-    return found
