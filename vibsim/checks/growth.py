@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.checks.order.verdict_context import ALIKE
-from vibsim.convergence.ladder_statistics import BLOWN_UP
+from vibsim.convergence.thresholds import BLOWN_UP
 from vibsim.observe import oscillation, predicted_oscillation
 from vibsim.observe.member_block import Part
 

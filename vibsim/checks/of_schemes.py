@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vibsim.checks.fields import Facts
 from vibsim.checks.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
-from vibsim.convergence.ladder_statistics import BLAME
+from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASON_NAMES
 from vibsim.experiment.check_scheme_selection import schemes_of
@@ -50,7 +50,7 @@ def level_of(part: Part, check: StableCheck | ConservesCheck | EqualCheck) -> in
 def lies_still(part: Part, level: int) -> NDArray[np.bool_]:
     """Say where no position moves by more than round-off at any step of a level, shape (scheme, case)."""
     record, still = part.records[level], np.ones(part.shape, dtype=bool)
-    floor = BLAME * part.relative_floor[..., part.grid.levels.index(level)]
+    floor = ABOVE_ROUND_OFF * part.relative_floor[..., part.grid.levels.index(level)]
     for name in part.model.positions:
         if f"{name}_min" not in record:
             return np.zeros(part.shape, dtype=bool)

@@ -19,7 +19,8 @@ from vibsim.apriori.formal_orders import even_powers, formal_orders
 from vibsim.comparison import value_numbers
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.convergence import gci
-from vibsim.convergence.number_extrapolation import LOUD, Limit, limit, observed_order
+from vibsim.convergence.number_extrapolation import Limit, limit, observed_order
+from vibsim.convergence.thresholds import ORDER_ABOVE_ROUND_OFF
 from vibsim.core.record import Variable, attributes
 from vibsim.experiment.value_names import HAVE_LIMITS
 from vibsim.observe import oscillation
@@ -132,7 +133,7 @@ def _missed(name: str, place: value_numbers.Place, found: Floats, floor: Floats)
     p = np.minimum(place.part.omega_dt[:, -1], 1.0)
     apart = np.abs(np.diff(found[..., -3:], axis=-1))
     with np.errstate(invalid="ignore"):
-        same = np.all(apart <= LOUD * floor[..., -1:], axis=-1)
+        same = np.all(apart <= ORDER_ABOVE_ROUND_OFF * floor[..., -1:], axis=-1)
     return np.where(same, nothing, MISSED * p**2 * _scale(name, place, found))
 
 

@@ -14,7 +14,7 @@ from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.convergence import differences
 from vibsim.convergence.gci import of_order
 from vibsim.convergence.local_order import local_order, window_points
-from vibsim.convergence.number_extrapolation import ORDINARY
+from vibsim.convergence.thresholds import ORDINARY_ORDER
 from vibsim.core.record import Variable, attributes
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.models import ENERGIES
@@ -104,7 +104,7 @@ def _index(q: Comparison, norm: str, change: Floats) -> Floats:
         Shape (scheme, case), or (scheme, case, t).
     """
     levels = q.part.grid.levels
-    promised = np.where(np.isfinite(q.order), q.order, ORDINARY)
+    promised = np.where(np.isfinite(q.order), q.order, ORDINARY_ORDER)
     seen = np.full(q.part.shape, np.nan)
     if len(levels) > 2:
         seen = q.observed_orders(norm)[..., -1]

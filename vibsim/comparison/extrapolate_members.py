@@ -17,13 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.comparison.member_method import Method, Start, rate_of
-from vibsim.convergence.state_extrapolation import (
-    KNOWN_DIGIT,
-    Best,
-    Circumstances,
-    Pair,
-    best_entry,
-)
+from vibsim.convergence.state_extrapolation import Best, Circumstances, Pair, best_entry
+from vibsim.convergence.thresholds import KNOWN_DIGIT
 from vibsim.engine import integrate
 from vibsim.schemes.base import Options
 

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from vibsim.comparison.order_evidence import evidence, judgement
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.convergence.differences import largest, safe_ratio
-from vibsim.convergence.ladder_statistics import BLAME, at_rest, floor_of_pairs, unresolved
+from vibsim.convergence.ladder_statistics import at_rest, floor_of_pairs, unresolved
+from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.convergence.verdict import Judgement
 from vibsim.core.vocabulary import NORMS, REASON_NAMES
 from vibsim.observe import predicted_oscillation
@@ -85,7 +86,7 @@ def causes(
     lost = judged.reason == REASON_NAMES.index("round_off")
     if np.any(lost):
         e = evidence(q, norm, order, tolerance)
-        found[lost & (e.difference[..., -1] > BLAME * floor_of_pairs(e)[..., -1])] = NOISE
+        found[lost & (e.difference[..., -1] > ABOVE_ROUND_OFF * floor_of_pairs(e)[..., -1])] = NOISE
     if q.part.stored_floor[-1] > 0.0:
         found[lost] = STORED
     unseen = np.isin(judged.reason, [REASON_NAMES.index(word) for word in UNSEEN])

@@ -14,7 +14,7 @@ from vibsim.apriori.formal_orders import even_powers, formal_orders, special_ord
 from vibsim.apriori.roundoff_floor import solution_size
 from vibsim.convergence import differences
 from vibsim.convergence.extrapolation import extrapolate_series
-from vibsim.convergence.verdict import Judgement
+from vibsim.convergence.verdict import Judgement, local_orders
 from vibsim.observe.member_block import Part, by_level, energy_at_start
 from vibsim.observe.phase_amplitude_error import parts_of_errors, wanted
 
@@ -198,13 +198,7 @@ class Comparison:
 
     def observed_orders(self, kind: str) -> Floats:
         """Return the order of every triple in a norm, shape (scheme, case, triple)."""
-        levels, ratio = self.part.grid.levels, self.ratios(kind)
-        return by_level(
-            [
-                differences.order_of_ratio(ratio[..., i], levels[i : i + 3])
-                for i in range(ratio.shape[-1])
-            ]
-        )
+        return local_orders(self.in_norm(kind).difference, self.part.grid.levels)
 
 
 def comparisons(part: Part, names: tuple[str, ...]) -> Mapping[str, Comparison]:

@@ -2,7 +2,7 @@
 
 What may be called equal follows from the arithmetic: each side is known no better than its accumulated rounding errors.
 For the states of a linear model theory bounds them (`vibsim.theory.rounding_bound`); elsewhere, and for energies,
-it is `BLAME` times the predicted floor, an order of magnitude.
+it is `ABOVE_ROUND_OFF` times the predicted floor, an order of magnitude.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from vibsim import theory
 from vibsim.apriori.exact_values import known_values
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE
 from vibsim.comparison.quantity_comparison import Comparison
-from vibsim.convergence.ladder_statistics import BLAME
+from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.models import ENERGIES
 from vibsim.observe.member_block import CENTRED, Part, energy_at_start, plain_name
 from vibsim.observe.predicted_oscillation import is_simple, natural_frequency, steppers
@@ -52,7 +52,7 @@ def apart(part: Part, compared: Mapping[str, Comparison], check: EqualCheck) -> 
     record = part.records[level]
     missing = np.full((*part.shape, len(record["t"])), np.nan)
     values = np.asarray(record[name], dtype=float) if name in record else missing
-    floor = BLAME * compared[name].floor[..., part.grid.levels.index(level)]
+    floor = ABOVE_ROUND_OFF * compared[name].floor[..., part.grid.levels.index(level)]
     bound = rounding(part, level, name, first, floor[first])
     if check.second in names:
         second = names.index(check.second)

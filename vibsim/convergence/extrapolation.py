@@ -41,11 +41,9 @@ from numpy.typing import NDArray
 
 from vibsim.convergence.differences import largest as absolute
 from vibsim.convergence.differences import norm, safe_ratio
+from vibsim.convergence.thresholds import SERIES_SAFETY
 
 Floats = NDArray[np.float64]
-
-SERIES_SAFETY = 1.25
-"""Factor on a bound that rests on a fall seen once; the usual one of grid convergence indices (P. J. Roache, 1994)."""
 
 
 @dataclass(frozen=True)

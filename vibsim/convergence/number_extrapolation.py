@@ -31,39 +31,34 @@ from vibsim.convergence.extrapolation import (
     steps_of,
     triangular_scheme,
 )
+from vibsim.convergence.thresholds import (
+    COLUMNS,
+    DECLINE,
+    FALL_ABOVE_ROUND_OFF,
+    HIGHEST_ORDER,
+    LEAST_SHARE,
+    LEAST_SHARE_OF_THREE,
+    NEAR_HALF,
+    NUMBER_SAFETY,
+    NUMBER_SAFETY_ALONE,
+    ORDER_ABOVE_ROUND_OFF,
+    ORDINARY_ORDER,
+    OTHER_ORDER,
+    RAGGED,
+    RATIO_AGREES,
+    RATIO_ALONE_AGREES,
+    RATIO_BEFORE_AGREES,
+    RATIO_OF_THREE,
+    ROUND_OFF_SAFETY,
+    SAFETY_OF_THREE,
+    SPREAD,
+    SPREAD_OF_THREE,
+    SPREAD_OF_TWO,
+)
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
-
-COLUMNS = 5
-"""So many powers are taken away at most."""
-AGREES, AGREED, AGREES_ALONE = 0.3, 0.6, 0.2
-"""Relative distance of a ratio of changes from that of the power: of the last, of the one before, of a single one."""
-SAFETY, SAFETY_ALONE = 2.0, 4.0
-"""Factor on the change of an entry: where two ratios agree, and where there is one only."""
-LEAST_PART = 0.01
-"""The least part of what was taken away that is left, where one change supports the extrapolation."""
-SPREAD, SPREAD_OF_THREE, SPREAD_OF_TWO = 3.0, 3.5, 4.0
-"""Factor on what the last three levels differ by, three levels that are all there are, and two."""
-AGREES_OF_THREE, SAFETY_OF_THREE, LEAST_PART_OF_THREE = 0.05, 6.0, 0.03
-"""The same as `AGREES_ALONE`, `SAFETY_ALONE` and `LEAST_PART` of three levels: their only ratio may be an accident."""
-THREE = 3
-RAGGED, DECLINE = 5, 0.5
-"""Of so many levels and more, changes may fall raggedly, where the last two are at most this part of those before."""
-ROUND_OFF_SAFETY = 10.0
-"""Factor on the predicted round-off, which is an order of magnitude."""
-LOUD = 30.0
-"""A difference of less than so many times the round-off has no order."""
-BLAME = 200.0
-"""Differences of less than so many times the round-off need not fall."""
-SAME_ORDER, NEAR = 0.3, 0.15
-"""An order further than the first from the promised one is another one, where it is as near as the second to a multiple
-of 1/2."""
-HIGHEST_ORDER = 12.0
-"""No higher order is looked for."""
-ORDINARY = 2.0
-"""Order that is tried where the scheme promises none."""
 
 
 @dataclass(frozen=True)
@@ -128,15 +123,15 @@ def triple_at(values: Floats, floor: Floats, i: int) -> tuple[tuple[Floats, Floa
     """Return the two differences of the triple that begins at place i, and whether they are above round-off."""
     with np.errstate(invalid="ignore"):
         first, second = (values[..., k] - values[..., k + 1] for k in (i, i + 1))
-        noise = LOUD * (floor[..., i + 1] + floor[..., i + 2])
+        noise = ORDER_ABOVE_ROUND_OFF * (floor[..., i + 1] + floor[..., i + 2])
         return (first, second), (np.abs(second) > noise) & (np.abs(first) > noise)
 
 
 def _leading(seen: Floats, promised: Floats) -> Floats:
     """Return the order to extrapolate with: the promised one, or another one that the levels show."""
-    p = np.where(np.isfinite(promised), promised, ORDINARY)
+    p = np.where(np.isfinite(promised), promised, ORDINARY_ORDER)
     likely = np.clip(np.round(2.0 * seen) / 2, 0.5, HIGHEST_ORDER)
-    other = (np.abs(seen - p) > SAME_ORDER) & (np.abs(seen - likely) <= NEAR)
+    other = (np.abs(seen - p) > OTHER_ORDER) & (np.abs(seen - likely) <= NEAR_HALF)
     return np.where(other, likely, p)
 
 
@@ -150,10 +145,10 @@ def _bound_of_finest(values: Floats, floor: Floats) -> Floats:
     if n == 2:
         return np.asarray(SPREAD_OF_TWO * change[..., 0] + noise)
     recent = values[..., -3:]
-    spread = SPREAD_OF_THREE if n == THREE else SPREAD
+    spread = SPREAD_OF_THREE if n == 3 else SPREAD
     bound = spread * (np.max(recent, axis=-1) - np.min(recent, axis=-1)) + noise
     falls = np.all(np.diff(change[..., -3:], axis=-1) < 0, axis=-1)
-    rounding = np.max(change[..., -2:], axis=-1) <= BLAME * floor[..., -1]
+    rounding = np.max(change[..., -2:], axis=-1) <= FALL_ABOVE_ROUND_OFF * floor[..., -1]
     found = np.where(falls | rounding, bound, np.nan)
     if n < RAGGED:
         return found
@@ -191,10 +186,10 @@ class _Rows:
             row, changes = next_row(entries[:COLUMNS], values[..., i], before)
             self.entries.append(row)
             self.changes.append(changes)
-        few = len(scheme) == THREE
-        self.agrees_alone = AGREES_OF_THREE if few else AGREES_ALONE
-        self.safety_alone = SAFETY_OF_THREE if few else SAFETY_ALONE
-        self.least_part = LEAST_PART_OF_THREE if few else LEAST_PART
+        few = len(scheme) == 3
+        self.agrees_alone = RATIO_OF_THREE if few else RATIO_ALONE_AGREES
+        self.safety_alone = SAFETY_OF_THREE if few else NUMBER_SAFETY_ALONE
+        self.least_part = LEAST_SHARE_OF_THREE if few else LEAST_SHARE
 
     def _apart(self, j: int, i: int) -> Floats:
         """Return how far the ratio of the changes of column j at rows i - 1 and i is from that of its power."""
@@ -206,9 +201,9 @@ class _Rows:
         if i < j + 2:
             return np.zeros(self.floor.shape[:-1], dtype=bool)
         alone = i == j + 2
-        agrees = self._apart(j, i) <= (self.agrees_alone if alone else AGREES)
+        agrees = self._apart(j, i) <= (self.agrees_alone if alone else RATIO_AGREES)
         if not alone:
-            agrees &= self._apart(j, i - 1) <= AGREED
+            agrees &= self._apart(j, i - 1) <= RATIO_BEFORE_AGREES
         return np.asarray(agrees)
 
     def _error(self, j: int, i: int) -> Floats:
@@ -219,7 +214,7 @@ class _Rows:
             change = np.maximum(change, self.least_part * taken)
         else:
             change = np.maximum(change, np.abs(self.changes[i - 1][j]) / fall)
-        error = (self.safety_alone if alone else SAFETY) * change
+        error = (self.safety_alone if alone else NUMBER_SAFETY) * change
         error = np.where(self._agrees(j, i), error_left(error, fall), error)
         for finer in self.entries[i + 1 :]:
             error = np.fmax(error, np.abs(self.entries[i][j] - finer[j]))

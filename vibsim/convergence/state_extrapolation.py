@@ -29,21 +29,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vibsim.convergence.extrapolation import Entry, error_left, next_row, triangular_scheme
-
-SAFETY = 2.0
-"""Factor on the estimated error of truncation."""
-GAIN_SAFETY = 5.0
-"""Factor on what one more extrapolation leaves of an error, ..."""
-FIRST_GAIN_SAFETY = 100.0
-"""... and where three levels are all there is, so that no gain was seen before."""
-LARGEST_GAIN = 1e-3
-"""One more extrapolation is never believed to leave less of an error."""
-LEAST_FALL = 1.25
-"""A change that falls by less counts as one that falls by this factor: four times itself is then left."""
-ROUND_OFF_SAFETY = 10.0
-"""Factor on the round-off of the levels: one run's difference to another is one draw of it."""
-KNOWN_DIGIT = 0.1
-"""An error beyond this part of the solution's size is no longer small; then nothing is known of it."""
+from vibsim.convergence.thresholds import (
+    FIRST_GAIN_SAFETY,
+    GAIN_SAFETY,
+    LARGEST_GAIN,
+    LEAST_FALL,
+    ROUND_OFF_SAFETY,
+    STATE_SAFETY,
+)
 
 LASTING = 2.0**-52
 """Relative error of what every level has in common: parameters, the step, the elementary functions."""
@@ -246,7 +239,7 @@ def _next_row(
         if j > 1:
             gain = of.smaller(entry.coarser * lefts[-1] / lefts[-2], 1.0)
             left = of.larger(lefts[-1] * gain, left)
-        bound = of.choose(SAFETY * left > known.limit, math.inf, SAFETY * left)
+        bound = of.choose(STATE_SAFETY * left > known.limit, math.inf, STATE_SAFETY * left)
         if j:
             safety = GAIN_SAFETY if len(entries) > 2 or entry.change_fall else FIRST_GAIN_SAFETY
             gain = safety * entry.coarser * left / (lefts[-1] * trust)

@@ -15,13 +15,8 @@ from vibsim.comparison.extrapolate_members import (
     noise_of,
 )
 from vibsim.comparison.member_method import Method, Start, rate_of
-from vibsim.convergence.state_extrapolation import (
-    FLOATS,
-    KNOWN_DIGIT,
-    Circumstances,
-    Pair,
-    best_entry,
-)
+from vibsim.convergence.state_extrapolation import FLOATS, Circumstances, Pair, best_entry
+from vibsim.convergence.thresholds import KNOWN_DIGIT
 
 Floats = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ What is fitted is M(t), the largest absolute deviation at every step so far. Let
 [T/2, T], [T/4, T/2] and [T/8, T/4]. Where ``M = a + b t^k``, whatever a and b, ``(m1 - m2)/(m2 - m3) = 2^k``: a means
 smooths the stairs in which a drift climbs under an oscillation, and the oscillation itself is a. So, in this order:
 
-- ``none``: M(T) is no more than `BLAME` times the predicted round-off of the energy;
+- ``none``: M(T) is no more than `ABOVE_ROUND_OFF` times the predicted round-off of the energy;
 - ``unclear``: fewer than `LEAST_PERIODS` periods, in which the window from T/8 on would not see the whole of an
   oscillation, or fewer than `LEAST_SAMPLES` samples;
 - ``exponential``: the energy itself has changed by more than a factor e^`LARGE` and the k of ``|ln(E/E(0))|`` is nearer
@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.convergence.differences import safe_ratio
-from vibsim.convergence.ladder_statistics import BLAME
+from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.vocabulary import DRIFTS
 
 Floats = NDArray[np.float64]
@@ -110,7 +110,7 @@ def drift_of(
         last = change[..., -2]
         gone = (np.abs(ratio * energy[..., None])[..., -2] < SMALLEST) & (np.abs(energy) > SMALLEST)
     size = np.where(np.isfinite(end) & (end > 0), end, 1.0)
-    allowed = np.broadcast_to(BLAME * floor, end.shape)
+    allowed = np.broadcast_to(ABOVE_ROUND_OFF * floor, end.shape)
     still = _is_still(rise, k, size)
     if deviation is not None:
         # M stands still until a drift has overtaken an oscillation to the other side, and is of no power then

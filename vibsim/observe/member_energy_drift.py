@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, solution_size
 from vibsim.convergence.differences import largest, safe_ratio
-from vibsim.convergence.ladder_statistics import BLAME
+from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.formula import derivative, plus, values
 from vibsim.models.base import tree
 from vibsim.observe.energy_drift import Drift, drift_of
@@ -83,8 +83,9 @@ def _conditioned(part: Part, level: int, size: Floats) -> Floats:
 
 
 def _of_steps(part: Part, level: int) -> Floats:
-    """Return what rounding adds to the energy in proportion to the size of a step, over `BLAME`, (scheme, case).
+    """Return what rounding adds to the energy in proportion to the size of a step, shape (scheme, case).
 
+    It is relative to the energy, over `ABOVE_ROUND_OFF`.
     Rounded coefficients make every step, of the size p = w dt, larger or smaller by the same: N p. Steps larger than a
     radian are differences of numbers p^2 large, which are rounded otherwise each time: ``N^(1/2) p^2``. Centred
     differences have a prediction of their own for each way of writing them.
@@ -94,7 +95,7 @@ def _of_steps(part: Part, level: int) -> Floats:
     index = part.grid.levels.index(level)
     p, steps = part.omega_dt[:, index], part.grid.steps[index]
     size = STEPPED * UNIT_ROUND_OFF * (steps * p + steps**0.5 * p * p)
-    return np.where(plain[:, None], np.minimum(size, MOST_ROUNDED), 0.0) / BLAME
+    return np.where(plain[:, None], np.minimum(size, MOST_ROUNDED), 0.0) / ABOVE_ROUND_OFF
 
 
 def _running(part: Part, level: int, name: str, deviation: Floats) -> Floats:

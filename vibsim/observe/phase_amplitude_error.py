@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vibsim.apriori.formal_orders import formal_orders
 from vibsim.apriori.phase_amplitude_orders import is_promised
-from vibsim.convergence.ladder_statistics import BLAME, MEASURED
+from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, MEASUREMENT_FACTOR
 from vibsim.experiment.stored_series import asked
 from vibsim.formula import values
 from vibsim.models import tree
@@ -95,7 +95,8 @@ def parts_of_errors(
                 values=[row[k] for row in told],
                 exact=_nothing(known, told[0][k].shape) if known.any() else None,
                 order=_order(part, name),
-                floor=part.floor_of(name, scale) + MEASURED / BLAME * between[k],
+                floor=part.floor_of(name, scale)
+                + MEASUREMENT_FACTOR / ABOVE_ROUND_OFF * between[k],
                 scale=scale,
                 blur=between[k],
             )
