@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from vibsim.apriori.formal_orders import even_powers, formal_orders
 from vibsim.comparison import value_numbers
 from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.comparison.thresholds import MISSED_EXTREMUM, OF_GRID, OF_PARABOLA
 from vibsim.convergence import gci
 from vibsim.convergence.number_extrapolation import Limit, limit, observed_order
 from vibsim.convergence.thresholds import ORDER_ABOVE_ROUND_OFF
@@ -29,17 +30,11 @@ from vibsim.observe.member_block import Part
 Floats = NDArray[np.float64]
 Table = dict[str, Variable]
 
-OF_PARABOLA = 3.0
-"""Order of a peak that is interpolated by a parabola: its next term vanishes (docs/decisions.md)."""
-OF_GRID = 2.0
-"""Order of an extremum over the points of the grid."""
 MEMBER = ("scheme", "case")
 
 _INTERPOLATED = frozenset(
     {"period", "period_error", "amplitude", "amplitude_error", "growth_factor"}
 )
-MISSED = 0.125
-"""An extremum lies half a step from the next grid point at most: the part of w^2 dt^2 that is missed."""
 _AT_POINTS = frozenset({"min", "max", "max_abs"})
 _ON_THE_GRID = frozenset({"min", "max", "max_abs", "relative_energy_error"})
 _OF_ROOTS = frozenset(
@@ -134,7 +129,7 @@ def _missed(name: str, place: value_numbers.Place, found: Floats, floor: Floats)
     apart = np.abs(np.diff(found[..., -3:], axis=-1))
     with np.errstate(invalid="ignore"):
         same = np.all(apart <= ORDER_ABOVE_ROUND_OFF * floor[..., -1:], axis=-1)
-    return np.where(same, nothing, MISSED * p**2 * _scale(name, place, found))
+    return np.where(same, nothing, MISSED_EXTREMUM * p**2 * _scale(name, place, found))
 
 
 def best(name: str, place: value_numbers.Place) -> Best:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from vibsim.apriori.formal_orders import orders_vary
 from vibsim.apriori.phase_amplitude_orders import is_promised
 from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.comparison.thresholds import ORDER_WINDOW
 from vibsim.convergence import differences
 from vibsim.convergence.gci import of_order
 from vibsim.convergence.local_order import local_order, window_points
@@ -197,14 +198,10 @@ def _ratios(q: Comparison, add: Add) -> None:
     add("proportionality", of_triple, by_level(factor), words, "1")
 
 
-WINDOW = 0.5
-"""Length of the window of a local order, in periods."""
-
-
 def _local_orders(q: Comparison, add: Add) -> None:
     """Add the order of every triple as a function of time, with its interval, in single precision."""
     grid = q.part.grid
-    counts = window_points(WINDOW * swing(q.part), grid.spacing, len(grid.t))
+    counts = window_points(ORDER_WINDOW * swing(q.part), grid.spacing, len(grid.t))
     floor = [q.floor[..., i] + q.floor[..., i + 1] for i in range(len(q.differences))]
     rows = [
         local_order(

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.comparison.member_method import Method, Start, rate_of
+from vibsim.comparison.thresholds import RECENT, RESOLVED_STEP
 from vibsim.convergence.state_extrapolation import Best, Circumstances, Pair, best_entry
 from vibsim.convergence.thresholds import KNOWN_DIGIT
 from vibsim.engine import integrate
@@ -26,10 +27,6 @@ Floats = NDArray[np.float64]
 
 PIECE = 2**14
 """Points extrapolated at a time, so that the tableau stays in cache."""
-RESOLVED = 1.0
-"""Largest w dt at which rounding errors are measured: with a longer step, the scheme itself may magnify them."""
-RECENT = 16
-"""So many of the last times guard an end formula of its own against zero crossings."""
 
 
 @dataclass(frozen=True)
@@ -123,14 +120,14 @@ def noise_of(
     if method.twin is None:
         return None
     turned = rate_of(start) * start.end
-    if np.all(turned <= RESOLVED * steps[0]):
+    if np.all(turned <= RESOLVED_STEP * steps[0]):
         sampling = steps[0], every[0], levels[0]
         found = _apart(method, start, *sampling, threads=threads, lane=lane)
         return found[:: (len(found) - 1) // (len(levels[-1][0]) - 1)]
     noise = np.full(levels[-1][0].shape, np.nan)
     left = np.arange(len(turned))
     for n, stride, (u, v) in zip(steps, every, levels, strict=True):
-        is_resolved = turned[left] <= RESOLVED * n
+        is_resolved = turned[left] <= RESOLVED_STEP * n
         now, left = left[is_resolved], left[~is_resolved]
         if len(now):
             sampling = n, stride, (u[:, now], v[:, now])

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 
 from vibsim.comparison.order_evidence import evidence, judgement
 from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.comparison.thresholds import THEORY_ROUNDING, VANISHING_RATE
 from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.convergence.ladder_statistics import at_rest, floor_of_pairs, unresolved
-from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
+from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING
 from vibsim.convergence.verdict import Judgement
 from vibsim.core.vocabulary import NORMS, REASON_NAMES
 from vibsim.observe import predicted_oscillation
@@ -52,10 +53,6 @@ UNSEEN = ("pre_asymptotic", "not_applicable")
 """What is said of a motion that lies still wherever levels are compared."""
 ROUGH = ("pre_asymptotic", "non_smooth")
 """What is said where the force has a pulse that no level sees."""
-VANISHES = 1e-3
-"""A rate of change that is no larger a part of its largest value, at every common time, vanishes there."""
-CLOSE = 0.25
-"""An order of theory this near is the measured one."""
 
 
 def causes(
@@ -191,7 +188,7 @@ def _at_rest(q: Comparison, others: Mapping[str, Comparison]) -> Flags:
         rate = others[name].extrapolation[0]
     most = _largest(part, name)
     with np.errstate(invalid="ignore"):
-        return np.asarray((most > 0) & (largest(rate) <= VANISHES * most))
+        return np.asarray((most > 0) & (largest(rate) <= VANISHING_RATE * most))
 
 
 def _largest(part: Part, name: str) -> Floats:
@@ -213,14 +210,10 @@ def _in_theory(q: Comparison, judged: Judgement) -> Flags:
         errors = [np.abs(of(part, level)) for level in (coarse, fine)]
         with np.errstate(divide="ignore", invalid="ignore"):
             fall = np.log2(safe_ratio(errors[0], errors[1])) / (fine - coarse)
-        exact = (errors[0] <= ROUNDING) & (errors[1] <= ROUNDING)
+        exact = (errors[0] <= THEORY_ROUNDING) & (errors[1] <= THEORY_ROUNDING)
         orders.append(np.where(exact, np.inf, fall))
     with np.errstate(invalid="ignore"):
-        return np.asarray(np.abs(np.minimum(*orders) - judged.order) <= CLOSE)
-
-
-ROUNDING = 1e-12
-"""An error of the theory that is no larger is rounding."""
+        return np.asarray(np.abs(np.minimum(*orders) - judged.order) <= HALF_SPACING)
 
 
 def _phase(part: Part, level: int) -> Floats:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, norm_of_floor
 from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.comparison.thresholds import STRAIGHT
 from vibsim.convergence.differences import largest
 from vibsim.convergence.ladder_statistics import Evidence
 from vibsim.convergence.verdict import Judgement, judge
@@ -23,9 +24,6 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-STRAIGHT = 1e-3
-"""Second differences of a straight line are at most this part of all that it changes by."""
 
 
 def judgement(q: Comparison, norm: str) -> Judgement:

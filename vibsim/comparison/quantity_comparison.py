@@ -12,27 +12,22 @@ from numpy.typing import NDArray
 
 from vibsim.apriori.formal_orders import even_powers, formal_orders, special_orders
 from vibsim.apriori.roundoff_floor import solution_size
+from vibsim.comparison.thresholds import (
+    EXACT_ORDER,
+    FEW_LEVELS,
+    IRREGULAR,
+    SHAPELESS_POINTS,
+    VANISHING_POINT,
+)
 from vibsim.convergence import differences
 from vibsim.convergence.extrapolation import extrapolate_series
+from vibsim.convergence.thresholds import ROUND_OFF_SAFETY
 from vibsim.convergence.verdict import Judgement, local_orders
 from vibsim.observe.member_block import Part, by_level, energy_at_start
 from vibsim.observe.phase_amplitude_error import parts_of_errors, wanted
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-ROUND_OFF_SAFETY = 10.0
-"""Factor on the predicted round-off in an error bound: the prediction is an order of magnitude."""
-IRREGULAR = 2.0
-"""Factor on an error bound behind events: where they lie in a step makes the second power another at each level."""
-FEW = 3
-"""With so many levels the directions of the true errors are needed as evidence, too."""
-VANISHING = 1e-3
-"""A point at which a difference is a smaller part of its largest value does not count."""
-TWO = 2
-"""Series that differ at no more points have no shape."""
-NOTHING_LEFT = 16.0
-"""Order with which a quantity that is promised to be exact is extrapolated: the finest level then stands as it is."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +43,7 @@ class InNorm:
     extrapolation: Floats
     """Exact less extrapolated, shape (scheme, case)."""
     error_scatter: Floats | None
-    """Of the errors of successive levels, shape (scheme, case, pair); None unless there are `FEW` levels and errors."""
+    """Of the errors of successive levels, shape (scheme, case, pair); None without `FEW_LEVELS` levels and errors."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +104,7 @@ class Comparison:
         """Extrapolation to a vanishing step, and the bound of its error; for a lean part its largest value only."""
         part = self.part
         even = even_powers(part.experiment, self.name, part.columns)
-        order = np.where(np.isinf(self.order), NOTHING_LEFT, self.order)
+        order = np.where(np.isinf(self.order), EXACT_ORDER, self.order)
         value, bound = extrapolate_series(
             self.values, part.grid.levels, order, even, largest=part.lean
         )
@@ -129,8 +124,8 @@ class Comparison:
         if not self.differences:
             return np.zeros(self.part.shape, dtype=bool)
         d = self.differences[-1]
-        least = VANISHING * differences.largest(d)[..., None]
-        return np.asarray(np.count_nonzero((d > least) | (d < -least), axis=-1) <= TWO)
+        least = VANISHING_POINT * differences.largest(d)[..., None]
+        return np.asarray(np.count_nonzero((d > least) | (d < -least), axis=-1) <= SHAPELESS_POINTS)
 
     def in_norm(self, kind: str) -> InNorm:
         """Measure the quantity in a norm."""
@@ -164,7 +159,7 @@ class Comparison:
         levels, d = len(grid.levels), self.differences
         unknown = np.full((*shape, levels), np.nan)
         scatters = differences.scatters(d, kind, grid.end_included) if len(d) > 1 else []
-        errors = self.errors if levels == FEW else None
+        errors = self.errors if levels == FEW_LEVELS else None
         return InNorm(
             difference=by_level([size(x) for x in d]) if d else none,
             scatter=by_level(scatters) if scatters else none,

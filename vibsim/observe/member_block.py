@@ -28,6 +28,7 @@ from vibsim.observe.input_consistency import check_belonging
 from vibsim.observe.missed_pulses import Missed, missed_pulses
 from vibsim.observe.sensitivity import sensitivity
 from vibsim.observe.stiffness import decay_rate, stiffest
+from vibsim.observe.thresholds import FEW_RADIANS
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import Members, members
 
@@ -37,8 +38,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-FEW_RADIANS = 0.5
-"""Common times further apart, in units of 1/w, may miss the turns of a motion: the largest by more than an eighth."""
 CENTRED = "_d2t"
 """What follows the name of a velocity or an energy that is made with ``[D_2t u]``."""
 

@@ -12,15 +12,11 @@ from vibsim.formula import derivative, plus, values
 from vibsim.models.base import tree
 from vibsim.observe.energy_drift import Drift, drift_of
 from vibsim.observe.member_block import CENTRED, Part, energy_at_start
+from vibsim.observe.thresholds import MOST_ROUNDED, STEPPED
 from vibsim.schemes import SCHEMES
 from vibsim.schemes.base import UNIT_ROUND_OFF, round_off
 
 Floats = NDArray[np.float64]
-
-STEPPED = 4.0
-"""How often ``N p + N^(1/2) p^2`` round-offs may be in the energy of a scheme that keeps it: 1.02 at most was seen."""
-MOST_ROUNDED = 1e-3
-"""Part of the energy above which a deviation is never called rounding, however large the step."""
 
 
 def drift_at(part: Part, level: int, name: str = "energy_deviation") -> Drift:

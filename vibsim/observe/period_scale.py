@@ -8,11 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.observe.member_block import Part
+from vibsim.observe.thresholds import PIECES_OF_TIME
 
 Floats = NDArray[np.float64]
-
-PARTS = 8
-"""A motion without a period is looked at in so many parts of its whole time."""
 
 
 def swing(part: Part) -> Floats:
@@ -27,7 +25,7 @@ def swing(part: Part) -> Floats:
     with np.errstate(divide="ignore"):
         small = np.where(w > 0, 2.0 * math.pi / w, np.nan)
     found = np.where(np.isfinite(exact) & (exact > 0), exact, small)
-    return np.asarray(np.where(np.isfinite(found), found, end / PARTS))
+    return np.asarray(np.where(np.isfinite(found), found, end / PIECES_OF_TIME))
 
 
 def _of_case(part: Part, name: str) -> Floats:

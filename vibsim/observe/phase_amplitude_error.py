@@ -30,6 +30,7 @@ from vibsim.models.shared.phase_amplitude_names import (
 from vibsim.observe.member_block import Part
 from vibsim.observe.period_scale import swing
 from vibsim.observe.quintic_interpolant import template
+from vibsim.observe.thresholds import MOST_UNASKED
 from vibsim.observe.waveform_fit import shift, strides
 
 if TYPE_CHECKING:
@@ -42,8 +43,6 @@ LONG_NAMES = {
     PHASE: "time by which {} is early",
     AMPLITUDE: "part by which the amplitude of {} is too large",
 }
-ALWAYS = 2**14
-"""Samples of all schemes, members and levels up to which the parts are looked at without being asked for."""
 
 Make = Callable[..., "Comparison"]
 
@@ -56,7 +55,7 @@ def wanted(part: Part, names: tuple[str, ...]) -> tuple[str, ...]:
     named = [name for name in names if is_error_part(name)]
     schemes, cases = part.shape
     size = schemes * cases * len(part.grid.t) * len(part.grid.levels)
-    small = not part.lean and len(part.grid.levels) > 2 and size <= ALWAYS
+    small = not part.lean and len(part.grid.levels) > 2 and size <= MOST_UNASKED
     small &= {*part.model.positions, *part.model.velocities} <= {*names}
     more = part.model.positions if small and has_error_parts(part.model) else ()
     return tuple(
