@@ -48,7 +48,7 @@ def plain_name(name: str) -> str:
 
 
 @dataclass(frozen=True)
-class Part:
+class MemberBlock:
     """Some members of an experiment, or all; s, c and l stand for schemes, cases and levels."""
 
     experiment: Experiment
@@ -199,7 +199,7 @@ class Part:
             return np.asarray(np.maximum(computed, self.stored_floor * size[..., None]))
 
 
-def part_of(experiment: Experiment, records: Mapping[int, Record]) -> Part:
+def block_of(experiment: Experiment, records: Mapping[int, Record]) -> MemberBlock:
     """Bring the level Records of some members together.
 
     Raises
@@ -216,7 +216,7 @@ def part_of(experiment: Experiment, records: Mapping[int, Record]) -> Part:
     group = members(experiment, int(case[0]), int(case[-1]) + 1)
     t = grid.times(group.end)
     exact = _exact(experiment, t, group) if lean else _stored(experiment, grid, finest)
-    return Part(
+    return MemberBlock(
         experiment=experiment,
         records=records,
         grid=grid,

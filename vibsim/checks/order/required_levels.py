@@ -69,7 +69,7 @@ def more_levels(q: Comparison, judged: Judgement, order: Floats, tolerance: floa
     aim = _aim(q, orders[..., -1], np.broadcast_to(order, shape))
     away = np.abs(orders - aim[..., None])
     with np.errstate(all="ignore"):
-        promised = np.where(even_powers(q.part.experiment, q.name, q.part.columns), 0.25, 0.5)
+        promised = np.where(even_powers(q.block.experiment, q.name, q.block.columns), 0.25, 0.5)
         seen = away[..., -1] / away[..., -2] if orders.shape[-1] > 1 else promised
         # what was seen once may be an accident; no power falls faster than the next one
         factor = np.maximum(seen, promised)
@@ -137,7 +137,7 @@ def _clean_difference(q: Comparison, norm: str, p: Floats) -> tuple[Floats, Floa
 
     Where none is above it, the coarsest difference is taken, which is noise: what can be read is then too much.
     """
-    levels = q.part.grid.levels
+    levels = q.block.grid.levels
     e = evidence(q, norm, q.order, ORDINARY_ORDER)
     place = np.zeros(p.shape, dtype=np.int64)
     for i in range(len(levels) - 1):
@@ -153,16 +153,16 @@ def _clean_difference(q: Comparison, norm: str, p: Floats) -> tuple[Floats, Floa
 
 def _noise(q: Comparison, norm: str, arithmetic: str | None) -> Callable[[int], Floats]:
     """Return what gives the predicted round-off of a level in a norm, shape (scheme, case)."""
-    part = q.part
+    block = q.block
     e = evidence(q, norm, q.order, ORDINARY_ORDER)
-    if part.stored_floor[-1] > 0.0:
+    if block.stored_floor[-1] > 0.0:
         # what storing leaves is the same at every level, in any arithmetic
         return lambda level: e.floor[..., -1]
-    base = e.floor[..., -1] / part.relative_floor[..., -1]
+    base = e.floor[..., -1] / block.relative_floor[..., -1]
 
     def at(level: int) -> Floats:
-        steps = (part.experiment.steps(level),)
-        floors = relative_floors(part.experiment, steps, part.columns, arithmetic)
+        steps = (block.experiment.steps(level),)
+        floors = relative_floors(block.experiment, steps, block.columns, arithmetic)
         return np.asarray(base * floors[..., 0])
 
     return at
