@@ -15,7 +15,7 @@ from vibsim.comparison import value_numbers as values
 from vibsim.comparison.order_evidence import evidence
 from vibsim.comparison.quantity_comparison import comparisons
 from vibsim.experiment import VALUES
-from vibsim.observe.member_block import part_of
+from vibsim.observe.member_block import block_of
 
 T = np.linspace(0.0, 8.0, 17)
 
@@ -134,8 +134,8 @@ def test_values(check: dict[str, Any], value: float) -> None:
 def test_without_every_step_the_frequency_is_that_of_the_period() -> None:
     """That of the recurrence is tested in `test_analysis_recurrence`."""
     exp = experiment()
-    part = part_of(exp, level_records(exp, every={4: 2}))
-    place = values.Place(part, {}, "", 4, None, None)
+    block = block_of(exp, level_records(exp, every={4: 2}))
+    place = values.Place(block, {}, "", 4, None, None)
     assert values.value("frequency", place) == pytest.approx(1 / (1 + 4.0**-4), rel=1e-15)
 
 
@@ -164,9 +164,9 @@ def test_extrema_and_energies_over_every_step() -> None:
 
 def test_what_was_not_gathered_over_every_step_is_not_made_up_from_samples() -> None:
     exp = experiment()
-    part = part_of(exp, level_records(exp))
+    block = block_of(exp, level_records(exp))
     for name in ("min", "max", "max_abs", "max_abs_interior"):
-        place = values.Place(part, {}, "energy", None, None, None)
+        place = values.Place(block, {}, "energy", None, None, None)
         assert np.isnan(values.value(name, place)).all(), name
 
 
@@ -384,7 +384,7 @@ def test_the_summary_has_null_and_never_nan() -> None:
 
 def test_the_floor_is_measured_in_the_norm_of_the_check() -> None:
     exp = experiment()
-    (theta,) = comparisons(part_of(exp, level_records(exp)), ("theta",)).values()
+    (theta,) = comparisons(block_of(exp, level_records(exp)), ("theta",)).values()
     at_a_point = theta.floor[0, 0]
     assert np.all(at_a_point >= 2.2e-16)
     factor = {"linf": 1.0, "linf_interior": 1.0, "l2": np.sqrt(0.5 * 17), "l1": 0.5 * 17}

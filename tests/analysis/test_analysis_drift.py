@@ -9,7 +9,8 @@ import pytest
 from spring_runs import registered, spring
 
 from vibsim.core.vocabulary import DRIFTS
-from vibsim.observe.energy_drift import STILL, drift_of
+from vibsim.observe.energy_drift import drift_of
+from vibsim.observe.thresholds import STILL
 from vibsim.schemes import SCHEMES
 from vibsim.schemes.implicit import step_crank_nicolson
 from vibsim.schemes.one_step import self_starting

@@ -7,7 +7,7 @@ import pytest
 from ladders import random_truth, shape_in_time
 from reference_pendulum import pendulum
 
-from vibsim.convergence.richardson import extrapolate
+from vibsim.convergence.extrapolation import extrapolate_series
 
 T = np.linspace(0.0, 20.0, 65)
 LADDERS = [(3, 4, 5), (3, 5, 6), (2, 5, 6), (3, 4, 5, 6), (3, 5, 6, 9), (2, 4, 5, 6, 8)]
@@ -24,7 +24,7 @@ def ladder(levels: tuple[int, ...], terms: list[tuple[float, np.ndarray]]) -> li
 def run(
     fields: list[np.ndarray], levels: tuple[int, ...], p: float, even: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    return extrapolate(fields, levels, np.array([p]), np.array([even]))
+    return extrapolate_series(fields, levels, np.array([p]), np.array([even]))
 
 
 @pytest.mark.parametrize("levels", LADDERS)

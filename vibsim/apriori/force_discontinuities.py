@@ -18,6 +18,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.apriori.thresholds import FAR, HALVINGS, MOST_SMOOTH, NEAR, ON_A_POINT
 from vibsim.core.record import Record, Variable, attributes
 from vibsim.formula import Name, Switch, names_in, to_formula
 from vibsim.models import Model
@@ -27,14 +28,6 @@ from vibsim.simulation.reference.one_sided_forces import TABLE, Sides, sides
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-ON_A_POINT = 1e-6
-"""Part of a step within which a corner is at its end."""
-FAR, NEAR = 1.0 / 16.0, 1.0 / 128.0
-"""Distances from the corner at which both formulas are compared, over the largest value of the quantity."""
-HALVINGS = 40
-MOST_SMOOTH = 8
-"""A jump of a higher derivative is none."""
 
 
 @dataclass(frozen=True)

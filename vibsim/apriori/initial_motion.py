@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.apriori.thresholds import BALANCED
 from vibsim.formula import values
 from vibsim.models import Model, tree
 from vibsim.models.base import Numbers
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 BEGINNINGS: tuple[Beginning, ...] = get_args(Beginning)
-BALANCED = 1e-12
-"""A force that makes so little of the velocity within a radian is rounding."""
 
 
 def beginning_matters(experiment: Experiment) -> bool:

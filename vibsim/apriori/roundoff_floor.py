@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.apriori.thresholds import STORED
 from vibsim.convergence.differences import largest
 from vibsim.core.record import Record
 from vibsim.schemes import Options, Scheme
@@ -22,10 +23,6 @@ SPACING_AT_ONE = float(np.finfo(np.float64).eps)
 
 No stored number is known better than this, relative to its size.
 """
-
-
-STORED = 1.0 / 7.0
-"""Root mean square of the error that storing leaves of numbers from 1/2 to 1: half a spacing over root 12."""
 
 
 def relative_floor(scheme: Scheme, options: Options, steps: tuple[int, ...]) -> Floats:

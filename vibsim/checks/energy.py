@@ -28,7 +28,7 @@ from vibsim.checks.outcome import Outcome
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import DRIFTS, REASON_NAMES
 from vibsim.experiment.schema.scheme_checks import Drift
-from vibsim.observe.member_block import Part
+from vibsim.observe.member_block import MemberBlock
 from vibsim.observe.member_energy_drift import drift_at
 
 if TYPE_CHECKING:
@@ -57,16 +57,16 @@ FIELDS = {
 }
 
 
-def measure(part: Part, check: ConservesCheck) -> Mapping[str, Any]:
+def measure(block: MemberBlock, check: ConservesCheck) -> Mapping[str, Any]:
     """Return what a check measures."""
-    level = level_of(part, check)
-    found = drift_at(part, level, check.about or "")
+    level = level_of(block, check)
+    found = drift_at(block, level, check.about or "")
     return {
         "drift": found.kind,
         "drift_rate": found.rate,
         "drift_power": found.power,
         "energy_error": found.largest,
-        "motion": lies_still(part, level),
+        "motion": lies_still(block, level),
         "level": level,
         "window_means": found.means,
         "round_off": found.round_off,

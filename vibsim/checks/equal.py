@@ -30,7 +30,7 @@ from vibsim.comparison.solution_distance import apart
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASON_NAMES
 from vibsim.experiment.schema.scheme_checks import SOLUTIONS
-from vibsim.observe.member_block import Part
+from vibsim.observe.member_block import MemberBlock
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
@@ -54,26 +54,28 @@ PLACES = 241
 """Most places in time of a distance: as many as a figure has pixels."""
 
 
-def measure(part: Part, compared: Mapping[str, Comparison], check: EqualCheck) -> Mapping[str, Any]:
+def measure(
+    block: MemberBlock, compared: Mapping[str, Comparison], check: EqualCheck
+) -> Mapping[str, Any]:
     """Return what a check measures."""
-    level = level_of(part, check)
-    found = apart(part, compared, check)
-    distance, allowed = (np.full(part.shape, np.nan) for _ in range(2))
-    still, names = lies_still(part, level), [row.name for row in part.experiment.schemes]
+    level = level_of(block, check)
+    found = apart(block, compared, check)
+    distance, allowed = (np.full(block.shape, np.nan) for _ in range(2))
+    still, names = lies_still(block, level), [row.name for row in block.experiment.schemes]
     second = names.index(check.second) if check.second in names else found.scheme
     distance[found.scheme], allowed[found.scheme] = found.largest, found.allowed
     return {
         "distance": distance,
         "allowed": allowed,
-        "motion": np.broadcast_to(still[found.scheme] & still[second], part.shape),
+        "motion": np.broadcast_to(still[found.scheme] & still[second], block.shape),
         "level": level,
-        "distance_over_time": by_place(found.over_time, places(part)),
+        "distance_over_time": by_place(found.over_time, places(block)),
     }
 
 
-def places(part: Part) -> int:
+def places(block: MemberBlock) -> int:
     """Return at how many places in time a distance is kept."""
-    return min(PLACES, max(len(record["t"]) for record in part.records.values()))
+    return min(PLACES, max(len(record["t"]) for record in block.records.values()))
 
 
 def by_place(values: Floats, count: int) -> Floats:

@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.checks.order.verdict_context import ALIKE
-from vibsim.convergence.ladder_statistics import BLOWN_UP
+from vibsim.convergence.thresholds import BLOWN_UP
 from vibsim.observe import oscillation, predicted_oscillation
-from vibsim.observe.member_block import Part
+from vibsim.observe.member_block import MemberBlock
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -48,61 +48,61 @@ class Growth:
     """The same by theory, of the fastest small oscillations; NaN for adaptive schemes."""
 
 
-def growth_at(part: Part, level: int) -> Growth:
+def growth_at(block: MemberBlock, level: int) -> Growth:
     """Find whether schemes and members are stable at a level."""
-    index = part.grid.levels.index(level)
-    p = np.broadcast_to(part.fastest[:, index], part.shape)
-    beyond = p > part.stability_limit * (1.0 + LIMIT_ROUNDING)
-    at_limit = ~beyond & (p >= part.stability_limit * (1.0 - LIMIT_ROUNDING))
-    broken = part.failed[..., index]
-    escaped = broken & ~beyond & _breaks_down_alike(part)
-    growth = part.growth[..., index]
-    grown = (growth > BLOWN_UP) & (at_limit | ~_removed(part, index))
-    measured = _measured(part, level)
-    expected = predicted_oscillation.dominant_growth(part, level)
-    short = ~broken & predicted_oscillation.is_simple(part) & beyond
+    index = block.grid.levels.index(level)
+    p = np.broadcast_to(block.fastest[:, index], block.shape)
+    beyond = p > block.stability_limit * (1.0 + LIMIT_ROUNDING)
+    at_limit = ~beyond & (p >= block.stability_limit * (1.0 - LIMIT_ROUNDING))
+    broken = block.failed[..., index]
+    escaped = broken & ~beyond & _breaks_down_alike(block)
+    growth = block.growth[..., index]
+    grown = (growth > BLOWN_UP) & (at_limit | ~_removed(block, index))
+    measured = _measured(block, level)
+    expected = predicted_oscillation.dominant_growth(block, level)
+    short = ~broken & predicted_oscillation.is_simple(block) & beyond
     return Growth(
         unstable=(broken & ~escaped) | beyond | grown,
         escaped=escaped & ~grown,
-        contradicted=short & _differs(part, index, measured, expected),
+        contradicted=short & _differs(block, index, measured, expected),
         measured=measured,
         predicted=expected,
     )
 
 
-def _measured(part: Part, level: int) -> Floats:
+def _measured(block: MemberBlock, level: int) -> Floats:
     """Return the growth as `convergence.nc` has it, and where a run is too short for that the one over all of it."""
-    found = oscillation.growth_of_motion(part, level)
-    if len(part.model.positions) > 1:
+    found = oscillation.growth_of_motion(block, level)
+    if len(block.model.positions) > 1:
         return found
     return np.where(
-        np.isfinite(found), found, oscillation.growth_over_run(part, part.records[level])
+        np.isfinite(found), found, oscillation.growth_over_run(block, block.records[level])
     )
 
 
-def _breaks_down_alike(part: Part) -> Flags:
+def _breaks_down_alike(block: MemberBlock) -> Flags:
     """Say where the two finest levels broke down at the same time, which a finer one does not move, shape (s, c)."""
-    finest = [part.records[level] for level in part.grid.levels[-2:]]
+    finest = [block.records[level] for level in block.grid.levels[-2:]]
     if len(finest) == 1 or any("failure_time" not in record for record in finest):
-        return np.zeros(part.shape, dtype=bool)
+        return np.zeros(block.shape, dtype=bool)
     before, last = (np.asarray(record["failure_time"], dtype=float) for record in finest)
     alike = np.abs(before - last) <= ALIKE * before
-    return np.asarray(np.all(part.failed[..., -2:], axis=-1) & alike)
+    return np.asarray(np.all(block.failed[..., -2:], axis=-1) & alike)
 
 
-def _removed(part: Part, index: int) -> Flags:
+def _removed(block: MemberBlock, index: int) -> Flags:
     """Say where the next finer level, or the step from the next coarser one, at least halves the growth."""
-    growth = part.growth
+    growth = block.growth
     if growth.shape[-1] == 1:
-        return np.zeros(part.shape, dtype=bool)
+        return np.zeros(block.shape, dtype=bool)
     coarse = min(index, growth.shape[-1] - 2)
     return np.asarray(growth[..., coarse + 1] < 0.5 * growth[..., coarse])
 
 
-def _differs(part: Part, index: int, measured: Floats, expected: Floats) -> Flags:
-    periods = predicted_oscillation.natural_frequency(part) * part.group.end / (2.0 * np.pi)
+def _differs(block: MemberBlock, index: int, measured: Floats, expected: Floats) -> Flags:
+    periods = predicted_oscillation.natural_frequency(block) * block.group.end / (2.0 * np.pi)
     with np.errstate(divide="ignore", invalid="ignore"):
         apart = np.abs(np.log(measured) - np.log(expected)) * periods
         whole = np.log(expected) * periods
-    late = np.log(4.0 + 2.0 * part.grid.steps[index])
+    late = np.log(4.0 + 2.0 * block.grid.steps[index])
     return np.asarray(apart > NEAR * np.abs(whole) + late)

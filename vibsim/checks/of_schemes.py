@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from vibsim.checks.fields import Facts
 from vibsim.checks.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
-from vibsim.convergence.ladder_statistics import BLAME
+from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASON_NAMES
 from vibsim.experiment.check_scheme_selection import schemes_of
-from vibsim.observe.member_block import Part
+from vibsim.observe.member_block import MemberBlock
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
@@ -42,18 +42,18 @@ MOVE = "Choose `initial:` values, or a force, with which something moves."
 """Advice where nothing moves."""
 
 
-def level_of(part: Part, check: StableCheck | ConservesCheck | EqualCheck) -> int:
+def level_of(block: MemberBlock, check: StableCheck | ConservesCheck | EqualCheck) -> int:
     """Return the level that a check is about: the finest one where it names none."""
-    return part.grid.levels[-1] if check.level is None else check.level
+    return block.grid.levels[-1] if check.level is None else check.level
 
 
-def lies_still(part: Part, level: int) -> NDArray[np.bool_]:
+def lies_still(block: MemberBlock, level: int) -> NDArray[np.bool_]:
     """Say where no position moves by more than round-off at any step of a level, shape (scheme, case)."""
-    record, still = part.records[level], np.ones(part.shape, dtype=bool)
-    floor = BLAME * part.relative_floor[..., part.grid.levels.index(level)]
-    for name in part.model.positions:
+    record, still = block.records[level], np.ones(block.shape, dtype=bool)
+    floor = ABOVE_ROUND_OFF * block.relative_floor[..., block.grid.levels.index(level)]
+    for name in block.model.positions:
         if f"{name}_min" not in record:
-            return np.zeros(part.shape, dtype=bool)
+            return np.zeros(block.shape, dtype=bool)
         low, high = (np.asarray(record[f"{name}_{end}"], dtype=float) for end in ("min", "max"))
         with np.errstate(invalid="ignore"):
             still &= high - low <= floor * np.maximum(np.abs(low), np.abs(high))

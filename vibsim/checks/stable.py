@@ -24,7 +24,7 @@ from vibsim.checks.of_schemes import (
 from vibsim.checks.outcome import FAIL, PASS, Outcome
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASON_NAMES, STATUSES
-from vibsim.observe.member_block import Part
+from vibsim.observe.member_block import MemberBlock
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
@@ -44,17 +44,17 @@ FIELDS = {
 }
 
 
-def measure(part: Part, check: StableCheck) -> Mapping[str, Any]:
+def measure(block: MemberBlock, check: StableCheck) -> Mapping[str, Any]:
     """Return what a check measures."""
-    level = level_of(part, check)
-    found = growth_at(part, level)
+    level = level_of(block, check)
+    found = growth_at(block, level)
     reason = np.select([found.unstable, found.escaped], [UNSTABLE, NON_FINITE], MATCH)
     return {
         "status": np.where((reason != MATCH) | found.contradicted, FAIL, PASS),
         "reason": np.where(found.contradicted, MISMATCH, reason),
         "growth": found.measured,
         "predicted_growth": found.predicted,
-        "omega_dt": np.broadcast_to(part.fastest[:, part.grid.levels.index(level)], part.shape),
+        "omega_dt": np.broadcast_to(block.fastest[:, block.grid.levels.index(level)], block.shape),
         "level": level,
     }
 

@@ -17,7 +17,7 @@ from vibsim.comparison.best_solution import extrapolated
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record, Variable, attributes
 from vibsim.core.vocabulary import REASON_NAMES
-from vibsim.observe.member_block import Part
+from vibsim.observe.member_block import MemberBlock
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
@@ -34,20 +34,20 @@ def is_bound(name: str) -> bool:
     return name.endswith(_BOUND)
 
 
-def bounds(part: Part) -> dict[str, Variable]:
+def bounds(block: MemberBlock) -> dict[str, Variable]:
     """Return the largest bound over time of every extrapolated state, shape (scheme, case); infinite without one.
 
     It is NaN of schemes that choose their own steps, and so have no levels.
     """
-    rows = extrapolated(part.experiment, part.records, part.grid)
+    rows = extrapolated(block.experiment, block.records, block.grid)
     bounds = np.stack([row.largest_bounds() for row in rows], axis=1)
-    largest = np.full((len(bounds), *part.shape), np.nan)
-    largest[:, list(part.experiment.ladder)] = bounds
+    largest = np.full((len(bounds), *block.shape), np.nan)
+    largest[:, list(block.experiment.ladder)] = bounds
     return {
         f"{state.name}{_BOUND}": Variable(
             ("scheme", "case"), values, attributes(f"{state.long_name}: {_WORDS}", state.unit)
         )
-        for state, values in zip(part.model.states, largest, strict=True)
+        for state, values in zip(block.model.states, largest, strict=True)
     }
 
 

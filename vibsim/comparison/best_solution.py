@@ -16,7 +16,7 @@ from vibsim.comparison.extrapolate_members import (
     noise_of,
 )
 from vibsim.comparison.member_method import Method, Start
-from vibsim.convergence.romberg import Pair
+from vibsim.convergence.state_extrapolation import Pair
 from vibsim.core.record import Attribute, Record, Variable, attributes
 from vibsim.observe.common_grid import Grid, common_grid, take
 from vibsim.observe.input_consistency import check_belonging

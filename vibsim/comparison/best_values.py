@@ -1,7 +1,7 @@
 """The most accurate value of every number that a ladder holds: extrapolated, with a bound of its error.
 
 Numbers are those that a ``value`` check may ask for at ``level: best``. Each is worked out at every level first
-(`vibsim.comparison.value_numbers`), and its limit taken from these (`vibsim.convergence.scalar_extrapolation`): an
+(`vibsim.comparison.value_numbers`), and its limit taken from these (`vibsim.convergence.number_extrapolation`): an
 extrapolated solution has no peaks of its own. Beside the bound stands the grid convergence index of the finest level
 (`vibsim.convergence.gci`).
 """
@@ -18,27 +18,23 @@ from numpy.typing import NDArray
 from vibsim.apriori.formal_orders import even_powers, formal_orders
 from vibsim.comparison import value_numbers
 from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.comparison.thresholds import MISSED_EXTREMUM, OF_GRID, OF_PARABOLA
 from vibsim.convergence import gci
-from vibsim.convergence.scalar_extrapolation import LOUD, Limit, limit, observed_order
+from vibsim.convergence.number_extrapolation import Limit, limit, observed_order
+from vibsim.convergence.thresholds import ORDER_ABOVE_ROUND_OFF
 from vibsim.core.record import Variable, attributes
 from vibsim.experiment.value_names import HAVE_LIMITS
 from vibsim.observe import oscillation
-from vibsim.observe.member_block import Part
+from vibsim.observe.member_block import MemberBlock
 
 Floats = NDArray[np.float64]
 Table = dict[str, Variable]
 
-OF_PARABOLA = 3.0
-"""Order of a peak that is interpolated by a parabola: its next term vanishes (docs/decisions.md)."""
-OF_GRID = 2.0
-"""Order of an extremum over the points of the grid."""
 MEMBER = ("scheme", "case")
 
 _INTERPOLATED = frozenset(
     {"period", "period_error", "amplitude", "amplitude_error", "growth_factor"}
 )
-MISSED = 0.125
-"""An extremum lies half a step from the next grid point at most: the part of w^2 dt^2 that is missed."""
 _AT_POINTS = frozenset({"min", "max", "max_abs"})
 _ON_THE_GRID = frozenset({"min", "max", "max_abs", "relative_energy_error"})
 _OF_ROOTS = frozenset(
@@ -114,7 +110,7 @@ class _Ladder:
 def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
     """Return the ladder of the number `name`; NaN for schemes that have no levels."""
     found = _at_levels(name, place)
-    found[place.part.adaptive] = np.nan
+    found[place.block.adaptive] = np.nan
     order, even = _promised(name, place)
     floor = _floor(name, place, found)
     return _Ladder(found, order, even, floor, _missed(name, place, found, floor), place.levels)
@@ -129,11 +125,11 @@ def _missed(name: str, place: value_numbers.Place, found: Floats, floor: Floats)
     nothing = np.zeros(found.shape[:-1])
     if name not in _AT_POINTS:
         return nothing
-    p = np.minimum(place.part.omega_dt[:, -1], 1.0)
+    p = np.minimum(place.block.omega_dt[:, -1], 1.0)
     apart = np.abs(np.diff(found[..., -3:], axis=-1))
     with np.errstate(invalid="ignore"):
-        same = np.all(apart <= LOUD * floor[..., -1:], axis=-1)
-    return np.where(same, nothing, MISSED * p**2 * _scale(name, place, found))
+        same = np.all(apart <= ORDER_ABOVE_ROUND_OFF * floor[..., -1:], axis=-1)
+    return np.where(same, nothing, MISSED_EXTREMUM * p**2 * _scale(name, place, found))
 
 
 def best(name: str, place: value_numbers.Place) -> Best:
@@ -163,27 +159,27 @@ def _at_levels(name: str, place: value_numbers.Place) -> Floats:
 
 def _promised(name: str, place: value_numbers.Place) -> tuple[Floats, NDArray[np.bool_]]:
     """Return the order that a number should have, and whether its powers are even, shape (scheme, case)."""
-    part, experiment = place.part, place.part.experiment
-    quantity = place.quantity or part.model.position
+    block, experiment = place.block, place.block.experiment
+    quantity = place.quantity or block.model.position
     if name == "relative_energy_error":
         quantity = "energy_deviation"
-    order = formal_orders(experiment, quantity, part.columns)
-    even = even_powers(experiment, quantity, part.columns)
+    order = formal_orders(experiment, quantity, block.columns)
+    even = even_powers(experiment, quantity, block.columns)
     if name in _INTERPOLATED:
         order, even = np.minimum(order, OF_PARABOLA), np.zeros_like(even)
     elif name in _ON_THE_GRID:
         order, even = np.minimum(order, OF_GRID), np.zeros_like(even)
-    return np.broadcast_to(order, part.shape), np.broadcast_to(even, part.shape)
+    return np.broadcast_to(order, block.shape), np.broadcast_to(even, block.shape)
 
 
 def _floor(name: str, place: value_numbers.Place, found: Floats) -> Floats:
     """Return the predicted round-off of a number at every level, in its unit."""
-    part, comparison = place.part, place.comparison()
+    block, comparison = place.block, place.comparison()
     if comparison is not None and name in ("end", "at"):
         return comparison.floor
-    relative = part.relative_floor * part.magnified[:, None]
-    if name in _OF_ROOTS and oscillation.has_recurrence(part, place.levels[-1]):
-        relative = relative / np.minimum(part.omega_dt, 1.0) ** 2
+    relative = block.relative_floor * block.magnified[:, None]
+    if name in _OF_ROOTS and oscillation.has_recurrence(block, place.levels[-1]):
+        relative = relative / np.minimum(block.omega_dt, 1.0) ** 2
     size = _scale(name, place, found)
     return np.broadcast_to(relative * size[..., None], found.shape)
 
@@ -191,10 +187,10 @@ def _floor(name: str, place: value_numbers.Place, found: Floats) -> Floats:
 def _scale(name: str, place: value_numbers.Place, found: Floats) -> Floats:
     """Return the size that such a number has: of the solution, or of the number itself."""
     if name in ("end", "at", "min", "max", "max_abs"):
-        q, part = place.comparison(), place.part
+        q, block = place.comparison(), place.block
         if q is not None:
             return q.scale
-        rows = [value_numbers.value(which, replace(place, level=part.grid.levels[-1]))
+        rows = [value_numbers.value(which, replace(place, level=block.grid.levels[-1]))
                 for which in ("min", "max")]  # fmt: skip
         return np.asarray(np.maximum(*np.abs(rows)))
     if name in ("period", "frequency", "amplitude", "growth_per_period", "growth_factor"):
@@ -205,15 +201,15 @@ def _scale(name: str, place: value_numbers.Place, found: Floats) -> Floats:
     return np.ones(found.shape[:-1])
 
 
-def scalars(part: Part) -> tuple[Scalar, ...]:
+def scalars(block: MemberBlock) -> tuple[Scalar, ...]:
     """Name the numbers whose limits are kept; where storage is bounded, period and amplitude."""
-    model = part.model
+    model = block.model
     first = model.states[0]
     whole = [
         Scalar("period", "period", "", "s", "period"),
         Scalar("amplitude", "amplitude", "", first.unit, "amplitude"),
     ]
-    if part.lean:
+    if block.lean:
         return tuple(whole)
     whole += [
         Scalar("frequency", "frequency", "", "rad s-1", "angular frequency"),
@@ -234,13 +230,13 @@ def _of(name: str, unit: str, words: str, which: tuple[str, ...]) -> list[Scalar
     return [Scalar(f"{name}_{w}", w, name, unit, f"{words}, {_WORDS[w]}") for w in which]
 
 
-def table(part: Part, compared: Mapping[str, Comparison]) -> Table:
+def table(block: MemberBlock, compared: Mapping[str, Comparison]) -> Table:
     """Return the limits of all numbers, as variables of the convergence Record."""
     found: Table = {}
     kept = []
-    for row in scalars(part):
-        place = value_numbers.Place(part, compared, row.quantity, "best", None, None)
-        if part.lean:
+    for row in scalars(block):
+        place = value_numbers.Place(block, compared, row.quantity, "best", None, None)
+        if block.lean:
             found |= _of_limit(row, _ladder(row.value, place).limit())
             continue
         one = best(row.value, place)
@@ -248,7 +244,7 @@ def table(part: Part, compared: Mapping[str, Comparison]) -> Table:
         index = Variable(MEMBER, one.index, attributes(words, row.units))
         found |= _of_limit(row, one.limit) | {f"{row.variable}_gci": index}
         kept.append(one)
-    return found | _stacked(part, kept) if kept else found
+    return found | _stacked(block, kept) if kept else found
 
 
 def _of_limit(row: Scalar, found: Limit) -> Table:
@@ -261,9 +257,9 @@ def _of_limit(row: Scalar, found: Limit) -> Table:
     }
 
 
-def _stacked(part: Part, kept: list[Best]) -> Table:
+def _stacked(block: MemberBlock, kept: list[Best]) -> Table:
     """Return what is kept along the numbers: the finest level, the relative index, order, class, levels."""
-    levels = np.array(part.grid.levels, dtype=np.int16)
+    levels = np.array(block.grid.levels, dtype=np.int16)
     dims = ("scalar", *MEMBER)
     flags: dict[str, Any] = {
         "flag_values": np.arange(len(gci.CLASSES), dtype=np.int8),
@@ -286,10 +282,10 @@ def _stacked(part: Part, kept: list[Best]) -> Table:
     return found | {"scalar_convergence": Variable(dims, flagged.values, attrs)}
 
 
-def coordinate(part: Part) -> Table:
+def coordinate(block: MemberBlock) -> Table:
     """Return the coordinate of the numbers; empty where only their limits are kept."""
-    if part.lean:
+    if block.lean:
         return {}
-    names = np.array([row.variable for row in scalars(part)])
+    names = np.array([row.variable for row in scalars(block)])
     words = "numbers of which the limit was sought"
     return {"scalar": Variable(("scalar",), names, attributes(words, "1"))}

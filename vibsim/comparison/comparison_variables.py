@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from vibsim.apriori.formal_orders import orders_vary
 from vibsim.apriori.phase_amplitude_orders import is_promised
 from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.comparison.thresholds import ORDER_WINDOW
 from vibsim.convergence import differences
 from vibsim.convergence.gci import of_order
 from vibsim.convergence.local_order import local_order, window_points
-from vibsim.convergence.scalar_extrapolation import ORDINARY
+from vibsim.convergence.thresholds import ORDINARY_ORDER
 from vibsim.core.record import Variable, attributes
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.models import ENERGIES
@@ -41,7 +42,7 @@ def _adder(table: Table, q: Comparison) -> Add:
         attrs = attributes(f"{q.long_name}: {words}", units)
         if dims[-1] == "t" and q.name.endswith(CENTRED):
             values = np.array(values)
-            values[..., q.part.ends()] = np.nan
+            values[..., q.block.ends()] = np.nan
         table[f"{q.name}_{name}"] = Variable(dims, np.ascontiguousarray(values), attrs)
 
     return add
@@ -51,11 +52,11 @@ def numbers(q: Comparison) -> Table:
     """Return the numbers that a quantity is compared by: norms, orders, bounds."""
     table: Table = {}
     add = _adder(table, q)
-    part, levels = q.part, len(q.part.grid.levels)
+    block, levels = q.block, len(q.block.grid.levels)
     of_level = ("scheme", "case", "level")
 
     def stacked(kind: str) -> Floats:
-        return np.stack([getattr(q.in_norm(norm), kind) for norm in part.norms], axis=-1)
+        return np.stack([getattr(q.in_norm(norm), kind) for norm in block.norms], axis=-1)
 
     add("error_norm", (*of_level, "norm"), stacked("error"), _IN_NORM.format("true error"), q.units)
     words = _IN_NORM.format("true error of the extrapolation")
@@ -66,15 +67,15 @@ def numbers(q: Comparison) -> Table:
         words,
         q.units,
     )
-    if part.lean:
+    if block.lean:
         words = "largest error bound of the extrapolation"
         add("richardson_error_max", ("scheme", "case"), q.largest_bound, words, q.units)
     add("floor", of_level, q.floor, "predicted round-off", q.units)
     words = "order that the scheme promises, infinite for what is exact"
-    if is_error_part(q.name) and not is_promised(part.experiment, q.name):
+    if is_error_part(q.name) and not is_promised(block.experiment, q.name):
         words = LEAST_ORDER
-    if orders_vary(part.experiment, q.name):
-        add("formal_order", ("scheme", "case"), np.broadcast_to(q.order, part.shape), words, "1")
+    if orders_vary(block.experiment, q.name):
+        add("formal_order", ("scheme", "case"), np.broadcast_to(q.order, block.shape), words, "1")
     else:
         add("formal_order", ("scheme",), q.order[:, 0], words, "1")
     if levels > 1:
@@ -88,9 +89,9 @@ def numbers(q: Comparison) -> Table:
         )
     if levels > 2:
         _triples(q, add)
-    if levels > 1 and not part.lean:
+    if levels > 1 and not block.lean:
         words = _IN_NORM.format("grid convergence index of the finest level")
-        rows = [_index(q, norm, q.in_norm(norm).difference[..., -1]) for norm in part.norms]
+        rows = [_index(q, norm, q.in_norm(norm).difference[..., -1]) for norm in block.norms]
         add("gci_norm", ("scheme", "case", "norm"), np.stack(rows, axis=-1), words, q.units)
     return table
 
@@ -103,9 +104,9 @@ def _index(q: Comparison, norm: str, change: Floats) -> Floats:
     change
         Shape (scheme, case), or (scheme, case, t).
     """
-    levels = q.part.grid.levels
-    promised = np.where(np.isfinite(q.order), q.order, ORDINARY)
-    seen = np.full(q.part.shape, np.nan)
+    levels = q.block.grid.levels
+    promised = np.where(np.isfinite(q.order), q.order, ORDINARY_ORDER)
+    seen = np.full(q.block.shape, np.nan)
     if len(levels) > 2:
         seen = q.observed_orders(norm)[..., -1]
     if change.ndim > seen.ndim:
@@ -118,7 +119,7 @@ def _triples(q: Comparison, add: Add) -> None:
     dims = ("scheme", "case", "triple", "norm")
 
     def stacked(of: Callable[[str], Floats]) -> Floats:
-        return np.stack([of(norm) for norm in q.part.norms], axis=-1)
+        return np.stack([of(norm) for norm in q.block.norms], axis=-1)
 
     words = "ratio of successive differences in a norm over time"
     add("ratio_norm", dims, in_precision(q, stacked(q.ratios)), words, "1")
@@ -135,7 +136,7 @@ def in_precision(q: Comparison, values: Floats) -> NDArray[np.floating]:
 
 def precision_of(q: Comparison) -> type[np.floating]:
     """Return the type in which ratios and orders are kept: seven digits are more than they have."""
-    return np.float32 if q.part.lean else np.float64
+    return np.float32 if q.block.lean else np.float64
 
 
 def over_time(q: Comparison) -> Table:
@@ -161,7 +162,7 @@ def over_time(q: Comparison) -> Table:
 
 def _pairs(q: Comparison, add: Add) -> None:
     dims = ("scheme", "case", "pair", "t")
-    levels, d, p = q.part.grid.levels, q.differences, q.power[..., None]
+    levels, d, p = q.block.grid.levels, q.differences, q.power[..., None]
     unknown = [np.full_like(x, np.nan) for x in d]
     rescaled = [x * differences.rescaling(p, levels[: i + 2]) for i, x in enumerate(d)]
     errors = unknown if q.errors is None else q.errors[:-1]
@@ -177,7 +178,7 @@ def _pairs(q: Comparison, add: Add) -> None:
 
 def estimates(q: Comparison) -> list[Floats]:
     """Return the estimated error of every level but the finest, each of shape (scheme, case, t)."""
-    levels, p = q.part.grid.levels, q.order[..., None]
+    levels, p = q.block.grid.levels, q.order[..., None]
     return [
         x * differences.error_factor(p, levels[i + 1] - levels[i])
         for i, x in enumerate(q.differences)
@@ -197,14 +198,10 @@ def _ratios(q: Comparison, add: Add) -> None:
     add("proportionality", of_triple, by_level(factor), words, "1")
 
 
-WINDOW = 0.5
-"""Length of the window of a local order, in periods."""
-
-
 def _local_orders(q: Comparison, add: Add) -> None:
     """Add the order of every triple as a function of time, with its interval, in single precision."""
-    grid = q.part.grid
-    counts = window_points(WINDOW * swing(q.part), grid.spacing, len(grid.t))
+    grid = q.block.grid
+    counts = window_points(ORDER_WINDOW * swing(q.block), grid.spacing, len(grid.t))
     floor = [q.floor[..., i] + q.floor[..., i + 1] for i in range(len(q.differences))]
     rows = [
         local_order(

@@ -1,10 +1,10 @@
 """Members extrapolated over the levels of a ladder, and what the tableau has to know about them.
 
-`vibsim.convergence.romberg` chooses at every time of every member. It must know the powers in which the errors of a
-scheme expand, and how large the round-off of the levels is. Schemes predict that relative to the solution, from the
-arithmetic and the number of steps, but a motion may magnify it a millionfold: near the separatrix of the pendulum. So
-it is measured. The coarsest level is run once more in another arithmetic, which is the same method with other rounding
-errors, and the difference of the two runs says what this motion makes of them.
+`vibsim.convergence.state_extrapolation` chooses at every time of every member. It must know the powers in which the
+errors of a scheme expand, and how large the round-off of the levels is. Schemes predict that relative to the solution,
+from the arithmetic and the number of steps, but a motion may magnify it a millionfold: near the separatrix of the
+pendulum. So it is measured. The coarsest level is run once more in another arithmetic, which is the same method with
+other rounding errors, and the difference of the two runs says what this motion makes of them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.comparison.member_method import Method, Start, rate_of
-from vibsim.convergence.romberg import KNOWN_DIGIT, Best, Circumstances, Pair, best_entry
+from vibsim.comparison.thresholds import RECENT, RESOLVED_STEP
+from vibsim.convergence.state_extrapolation import Best, Circumstances, Pair, best_entry
+from vibsim.convergence.thresholds import KNOWN_DIGIT
 from vibsim.engine import integrate
 from vibsim.schemes.base import Options
 
@@ -25,10 +27,6 @@ Floats = NDArray[np.float64]
 
 PIECE = 2**14
 """Points extrapolated at a time, so that the tableau stays in cache."""
-RESOLVED = 1.0
-"""Largest w dt at which rounding errors are measured: with a longer step, the scheme itself may magnify them."""
-RECENT = 16
-"""So many of the last times guard an end formula of its own against zero crossings."""
 
 
 @dataclass(frozen=True)
@@ -122,14 +120,14 @@ def noise_of(
     if method.twin is None:
         return None
     turned = rate_of(start) * start.end
-    if np.all(turned <= RESOLVED * steps[0]):
+    if np.all(turned <= RESOLVED_STEP * steps[0]):
         sampling = steps[0], every[0], levels[0]
         found = _apart(method, start, *sampling, threads=threads, lane=lane)
         return found[:: (len(found) - 1) // (len(levels[-1][0]) - 1)]
     noise = np.full(levels[-1][0].shape, np.nan)
     left = np.arange(len(turned))
     for n, stride, (u, v) in zip(steps, every, levels, strict=True):
-        is_resolved = turned[left] <= RESOLVED * n
+        is_resolved = turned[left] <= RESOLVED_STEP * n
         now, left = left[is_resolved], left[~is_resolved]
         if len(now):
             sampling = n, stride, (u[:, now], v[:, now])

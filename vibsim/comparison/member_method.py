@@ -9,14 +9,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.convergence.romberg_weights import Tableau, tableau
+from vibsim.comparison.thresholds import LONG_RUN
+from vibsim.convergence.state_extrapolation import Tableau, tableau
 from vibsim.models import Model
 from vibsim.schemes import Options, Scheme
 
 Floats = NDArray[np.float64]
-
-LONG = 2**20
-"""Number of steps for which arithmetics are compared."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +51,9 @@ class Method:
         for option in self.scheme.words:
             for choice in option.choices:
                 other = {**self.options, option.name: choice}
-                if self.scheme.round_off(other, LONG) != self.scheme.round_off(self.options, LONG):
+                if self.scheme.round_off(other, LONG_RUN) != self.scheme.round_off(
+                    self.options, LONG_RUN
+                ):
                     return other
         return None
 

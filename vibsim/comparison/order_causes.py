@@ -17,12 +17,14 @@ from numpy.typing import NDArray
 
 from vibsim.comparison.order_evidence import evidence, judgement
 from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.comparison.thresholds import THEORY_ROUNDING, VANISHING_RATE
 from vibsim.convergence.differences import largest, safe_ratio
-from vibsim.convergence.ladder_statistics import BLAME, at_rest, floor_of_pairs, unresolved
+from vibsim.convergence.ladder_statistics import at_rest, floor_of_pairs, unresolved
+from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING
 from vibsim.convergence.verdict import Judgement
 from vibsim.core.vocabulary import NORMS, REASON_NAMES
 from vibsim.observe import predicted_oscillation
-from vibsim.observe.member_block import Part
+from vibsim.observe.member_block import MemberBlock
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -51,10 +53,6 @@ UNSEEN = ("pre_asymptotic", "not_applicable")
 """What is said of a motion that lies still wherever levels are compared."""
 ROUGH = ("pre_asymptotic", "non_smooth")
 """What is said where the force has a pulse that no level sees."""
-VANISHES = 1e-3
-"""A rate of change that is no larger a part of its largest value, at every common time, vanishes there."""
-CLOSE = 0.25
-"""An order of theory this near is the measured one."""
 
 
 def causes(
@@ -85,8 +83,8 @@ def causes(
     lost = judged.reason == REASON_NAMES.index("round_off")
     if np.any(lost):
         e = evidence(q, norm, order, tolerance)
-        found[lost & (e.difference[..., -1] > BLAME * floor_of_pairs(e)[..., -1])] = NOISE
-    if q.part.stored_floor[-1] > 0.0:
+        found[lost & (e.difference[..., -1] > ABOVE_ROUND_OFF * floor_of_pairs(e)[..., -1])] = NOISE
+    if q.block.stored_floor[-1] > 0.0:
         found[lost] = STORED
     unseen = np.isin(judged.reason, [REASON_NAMES.index(word) for word in UNSEEN])
     if np.any(unseen):
@@ -96,11 +94,11 @@ def causes(
         coarse &= unresolved(evidence(q, norm, order, tolerance))
         found[coarse & (found == NONE)] = DECAY
     rough = np.isin(judged.reason, [REASON_NAMES.index(word) for word in ROUGH])
-    found[rough & np.isfinite(q.part.missed.time)] = PULSE
+    found[rough & np.isfinite(q.block.missed.time)] = PULSE
     if not np.any(low | high):
         return found
     beside = _other_states(q, others, norm, tolerance, wanted)
-    positions = {name: others[name] for name in q.part.model.positions if name in others}
+    positions = {name: others[name] for name in q.block.model.positions if name in others}
     of_positions = q, positions, norm, tolerance, wanted
     if np.any(low):
         inside = _near(judgement(q, "linf_interior"), wanted, tolerance)
@@ -138,8 +136,8 @@ def _other_states(
     q: Comparison, others: Mapping[str, Comparison], norm: str, tolerance: float, order: Floats
 ) -> Flags:
     """Say where a state other than the quantity has the expected order."""
-    names = [state.name for state in q.part.model.states if state.name != q.name]
-    found = np.zeros(q.part.shape, dtype=bool)
+    names = [state.name for state in q.block.model.states if state.name != q.name]
+    found = np.zeros(q.block.shape, dtype=bool)
     for name in names:
         if name in others:
             found |= _near(judgement(others[name], norm), order, tolerance)
@@ -148,7 +146,7 @@ def _other_states(
 
 def _other_norms(q: Comparison, norm: str, order: Floats, tolerance: float) -> Flags:
     """Say where the quantity has the expected order in another norm."""
-    found = np.zeros(q.part.shape, dtype=bool)
+    found = np.zeros(q.block.shape, dtype=bool)
     for other in NORMS:
         if other != norm:
             found |= _near(judgement(q, other), order, tolerance)
@@ -159,8 +157,8 @@ def _alike(
     q: Comparison, others: Mapping[str, Comparison], judged: Judgement, norm: str, tolerance: float
 ) -> Flags:
     """Say where every state has the order of the quantity: one of which nothing is known need not."""
-    found = np.ones(q.part.shape, dtype=bool)
-    for state in q.part.model.states:
+    found = np.ones(q.block.shape, dtype=bool)
+    for state in q.block.model.states:
         if state.name != q.name and state.name in others:
             found &= _near(judgement(others[state.name], norm), judged.order, tolerance)
     return found
@@ -168,7 +166,7 @@ def _alike(
 
 def _same_norms(q: Comparison, judged: Judgement, tolerance: float) -> Flags:
     """Say where the quantity has the same order in every norm."""
-    found = np.ones(q.part.shape, dtype=bool)
+    found = np.ones(q.block.shape, dtype=bool)
     for other in NORMS:
         found &= _near(judgement(q, other), judged.order, tolerance)
     return found
@@ -176,7 +174,7 @@ def _same_norms(q: Comparison, judged: Judgement, tolerance: float) -> Flags:
 
 def _at_rest(q: Comparison, others: Mapping[str, Comparison]) -> Flags:
     """Say where the rate of change of a state vanishes at every common time, but not between them."""
-    part, model = q.part, q.part.model
+    block, model = q.block, q.block.model
     name = ""
     if q.name in model.positions:
         name = model.velocities[model.positions.index(q.name)]
@@ -184,50 +182,46 @@ def _at_rest(q: Comparison, others: Mapping[str, Comparison]) -> Flags:
         # u'' = -w^2 u
         name = model.positions[model.velocities.index(q.name)]
     if name not in others:
-        return np.zeros(part.shape, dtype=bool)
+        return np.zeros(block.shape, dtype=bool)
     rate = others[name].exact
     if rate is None:
         rate = others[name].extrapolation[0]
-    most = _largest(part, name)
+    most = _largest(block, name)
     with np.errstate(invalid="ignore"):
-        return np.asarray((most > 0) & (largest(rate) <= VANISHES * most))
+        return np.asarray((most > 0) & (largest(rate) <= VANISHING_RATE * most))
 
 
-def _largest(part: Part, name: str) -> Floats:
+def _largest(block: MemberBlock, name: str) -> Floats:
     """Return the largest absolute value of a state over every step; NaN where data of other programs do not tell."""
-    if f"{name}_min" not in part.finest or f"{name}_max" not in part.finest:
-        return np.full(part.shape, np.nan)
-    low, high = (np.abs(np.asarray(part.finest[f"{name}_{which}"])) for which in ("min", "max"))
+    if f"{name}_min" not in block.finest or f"{name}_max" not in block.finest:
+        return np.full(block.shape, np.nan)
+    low, high = (np.abs(np.asarray(block.finest[f"{name}_{which}"])) for which in ("min", "max"))
     return np.asarray(np.maximum(low, high))
 
 
 def _in_theory(q: Comparison, judged: Judgement) -> Flags:
     """Say where the theory of the scheme has the measured order too: of its frequency and its growth."""
-    part = q.part
-    if not predicted_oscillation.is_simple(part) or len(part.grid.levels) < 2:
-        return np.zeros(part.shape, dtype=bool)
-    coarse, fine = part.grid.levels[-2:]
+    block = q.block
+    if not predicted_oscillation.is_simple(block) or len(block.grid.levels) < 2:
+        return np.zeros(block.shape, dtype=bool)
+    coarse, fine = block.grid.levels[-2:]
     orders = []
     for of in (_phase, _growth):
-        errors = [np.abs(of(part, level)) for level in (coarse, fine)]
+        errors = [np.abs(of(block, level)) for level in (coarse, fine)]
         with np.errstate(divide="ignore", invalid="ignore"):
             fall = np.log2(safe_ratio(errors[0], errors[1])) / (fine - coarse)
-        exact = (errors[0] <= ROUNDING) & (errors[1] <= ROUNDING)
+        exact = (errors[0] <= THEORY_ROUNDING) & (errors[1] <= THEORY_ROUNDING)
         orders.append(np.where(exact, np.inf, fall))
     with np.errstate(invalid="ignore"):
-        return np.asarray(np.abs(np.minimum(*orders) - judged.order) <= CLOSE)
+        return np.asarray(np.abs(np.minimum(*orders) - judged.order) <= HALF_SPACING)
 
 
-ROUNDING = 1e-12
-"""An error of the theory that is no larger is rounding."""
-
-
-def _phase(part: Part, level: int) -> Floats:
+def _phase(block: MemberBlock, level: int) -> Floats:
     """Return the phase error in units of 1/w: a time would be small in small units alone."""
-    return predicted_oscillation.phase_error(part, level) * predicted_oscillation.natural_frequency(
-        part
-    )
+    return predicted_oscillation.phase_error(
+        block, level
+    ) * predicted_oscillation.natural_frequency(block)
 
 
-def _growth(part: Part, level: int) -> Floats:
-    return np.asarray(predicted_oscillation.growth_per_period(part, level) - 1.0)
+def _growth(block: MemberBlock, level: int) -> Floats:
+    return np.asarray(predicted_oscillation.growth_per_period(block, level) - 1.0)

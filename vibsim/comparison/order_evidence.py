@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, norm_of_floor
 from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.comparison.thresholds import STRAIGHT
 from vibsim.convergence.differences import largest
 from vibsim.convergence.ladder_statistics import Evidence
 from vibsim.convergence.verdict import Judgement, judge
@@ -23,9 +24,6 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-STRAIGHT = 1e-3
-"""Second differences of a straight line are at most this part of all that it changes by."""
 
 
 def judgement(q: Comparison, norm: str) -> Judgement:
@@ -67,8 +65,8 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
     Evidence
         Arrays of shape (scheme, case, ...).
     """
-    part, measured = q.part, q.in_norm(norm)
-    grid, shape = part.grid, part.shape
+    block, measured = q.block, q.in_norm(norm)
+    grid, shape = block.grid, block.shape
     points = len(grid.t)
     size, exists = _size(q.values[-1])
     if plain_name(q.name) in ENERGIES or is_error_part(q.name):
@@ -83,7 +81,7 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
 
     moved, straight = _motion(q, order, size)
     steps = np.array(grid.steps, dtype=np.float64)
-    worst = SPACING_AT_ONE * steps**2 * (q.scale * part.magnified)[..., None]
+    worst = SPACING_AT_ONE * steps**2 * (q.scale * block.magnified)[..., None]
     return Evidence(
         levels=grid.levels,
         difference=measured.difference,
@@ -100,24 +98,24 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
         error_scatter=measured.error_scatter,
         numbers=q.are_numbers,
         size=in_norm(size),
-        failed=part.failed,
+        failed=block.failed,
         # where nothing oscillates, no order is promised of a part of an error
-        applicable=(exists | np.any(part.failed, axis=-1))
-        & ~part.adaptive[:, None]
+        applicable=(exists | np.any(block.failed, axis=-1))
+        & ~block.adaptive[:, None]
         & ~np.isnan(order),
-        omega_dt=np.broadcast_to(part.fastest, (*shape, len(grid.levels))),
-        stability_limit=np.broadcast_to(part.stability_limit, shape),
-        growth=part.growth,
-        left_to_the_mesh=np.broadcast_to(part.left_to_the_mesh, shape),
-        corner=part.corners.power,
-        missed=np.broadcast_to(np.isfinite(part.missed.time), shape),
-        jumps=np.broadcast_to(part.missed.jumps, shape),
-        decay=part.decay * part.group.end / grid.steps[-1],
+        omega_dt=np.broadcast_to(block.fastest, (*shape, len(grid.levels))),
+        stability_limit=np.broadcast_to(block.stability_limit, shape),
+        growth=block.growth,
+        left_to_the_mesh=np.broadcast_to(block.left_to_the_mesh, shape),
+        corner=block.corners.power,
+        missed=np.broadcast_to(np.isfinite(block.missed.time), shape),
+        jumps=np.broadcast_to(block.missed.jumps, shape),
+        decay=block.decay * block.group.end / grid.steps[-1],
         steps=float(grid.steps[0]),
         moved=moved,
         straight=straight,
-        span=np.broadcast_to(part.omega_dt[:, 0] * float(grid.steps[0]), shape),
-        relative_floor=np.broadcast_to(part.relative_floor[..., 0], shape),
+        span=np.broadcast_to(block.omega_dt[:, 0] * float(grid.steps[0]), shape),
+        relative_floor=np.broadcast_to(block.relative_floor[..., 0], shape),
     )
 
 
@@ -127,14 +125,14 @@ def _motion(q: Comparison, order: Floats, size: Floats) -> tuple[Floats, Flags]:
     What is promised to stay as it is, or is a part of an error, shows a scheme where the positions move.
     """
     moved, straight = _moved(q.values[-1], size)
-    part = q.part
-    whole = [name for name in part.model.positions if f"{name}_max" in part.finest]
+    block = q.block
+    whole = [name for name in block.model.positions if f"{name}_max" in block.finest]
     if not whole:
         return moved, straight
-    ends = [[part.finest[f"{name}_{end}"] for end in ("min", "max")] for name in whole]
+    ends = [[block.finest[f"{name}_{end}"] for end in ("min", "max")] for name in whole]
     with np.errstate(all="ignore"):
         of_states = [(high - low) / np.maximum(np.abs(low), np.abs(high)) for low, high in ends]
-    exactly = np.broadcast_to(np.isinf(order) | is_error_part(q.name), part.shape)
+    exactly = np.broadcast_to(np.isinf(order) | is_error_part(q.name), block.shape)
     return np.where(exactly, np.fmax.reduce(of_states), moved), straight & ~exactly
 
 

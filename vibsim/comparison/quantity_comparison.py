@@ -12,27 +12,22 @@ from numpy.typing import NDArray
 
 from vibsim.apriori.formal_orders import even_powers, formal_orders, special_orders
 from vibsim.apriori.roundoff_floor import solution_size
+from vibsim.comparison.thresholds import (
+    EXACT_ORDER,
+    FEW_LEVELS,
+    IRREGULAR,
+    SHAPELESS_POINTS,
+    VANISHING_POINT,
+)
 from vibsim.convergence import differences
-from vibsim.convergence.richardson import extrapolate
-from vibsim.convergence.verdict import Judgement
-from vibsim.observe.member_block import Part, by_level, energy_at_start
+from vibsim.convergence.extrapolation import extrapolate_series
+from vibsim.convergence.thresholds import ROUND_OFF_SAFETY
+from vibsim.convergence.verdict import Judgement, local_orders
+from vibsim.observe.member_block import MemberBlock, by_level, energy_at_start
 from vibsim.observe.phase_amplitude_error import parts_of_errors, wanted
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-ROUND_OFF_SAFETY = 10.0
-"""Factor on the predicted round-off in an error bound: the prediction is an order of magnitude."""
-IRREGULAR = 2.0
-"""Factor on an error bound behind events: where they lie in a step makes the second power another at each level."""
-FEW = 3
-"""With so many levels the directions of the true errors are needed as evidence, too."""
-VANISHING = 1e-3
-"""A point at which a difference is a smaller part of its largest value does not count."""
-TWO = 2
-"""Series that differ at no more points have no shape."""
-NOTHING_LEFT = 16.0
-"""Order with which a quantity that is promised to be exact is extrapolated: the finest level then stands as it is."""
 
 
 @dataclass(frozen=True)
@@ -48,14 +43,14 @@ class InNorm:
     extrapolation: Floats
     """Exact less extrapolated, shape (scheme, case)."""
     error_scatter: Floats | None
-    """Of the errors of successive levels, shape (scheme, case, pair); None unless there are `FEW` levels and errors."""
+    """Of the errors of successive levels, shape (scheme, case, pair); None without `FEW_LEVELS` levels and errors."""
 
 
 @dataclass(frozen=True)
 class Comparison:
     """One quantity at every level, on the common grid; series have the shape (scheme, case, t)."""
 
-    part: Part
+    block: MemberBlock
     name: str
     long_name: str
     units: str
@@ -83,7 +78,7 @@ class Comparison:
     @cached_property
     def special(self) -> Floats:
         """Highest order of the scheme in a special case, shape (scheme, 1 or case)."""
-        return special_orders(self.part.experiment, self.name, self.part.columns)
+        return special_orders(self.block.experiment, self.name, self.block.columns)
 
     @cached_property
     def differences(self) -> list[Floats]:
@@ -91,9 +86,9 @@ class Comparison:
         # two levels without bound have no difference
         with np.errstate(over="ignore", invalid="ignore"):
             found = [coarse - fine for coarse, fine in pairwise(self.values)]
-        if self.part.adaptive.any():
+        if self.block.adaptive.any():
             for d in found:
-                d[self.part.adaptive] = np.nan
+                d[self.block.adaptive] = np.nan
         return found
 
     @cached_property
@@ -107,11 +102,13 @@ class Comparison:
     @cached_property
     def extrapolation(self) -> tuple[Floats, Floats]:
         """Extrapolation to a vanishing step, and the bound of its error; for a lean part its largest value only."""
-        part = self.part
-        even = even_powers(part.experiment, self.name, part.columns)
-        order = np.where(np.isinf(self.order), NOTHING_LEFT, self.order)
-        value, bound = extrapolate(self.values, part.grid.levels, order, even, largest=part.lean)
-        if part.model.events is not None:
+        block = self.block
+        even = even_powers(block.experiment, self.name, block.columns)
+        order = np.where(np.isinf(self.order), EXACT_ORDER, self.order)
+        value, bound = extrapolate_series(
+            self.values, block.grid.levels, order, even, largest=block.lean
+        )
+        if block.model.events is not None:
             bound = IRREGULAR * bound
         return value, bound + ROUND_OFF_SAFETY * self.floor[..., -1:]
 
@@ -125,10 +122,10 @@ class Comparison:
     def are_numbers(self) -> Flags:
         """Whether the levels differ at no more than two points, shape (scheme, case)."""
         if not self.differences:
-            return np.zeros(self.part.shape, dtype=bool)
+            return np.zeros(self.block.shape, dtype=bool)
         d = self.differences[-1]
-        least = VANISHING * differences.largest(d)[..., None]
-        return np.asarray(np.count_nonzero((d > least) | (d < -least), axis=-1) <= TWO)
+        least = VANISHING_POINT * differences.largest(d)[..., None]
+        return np.asarray(np.count_nonzero((d > least) | (d < -least), axis=-1) <= SHAPELESS_POINTS)
 
     def in_norm(self, kind: str) -> InNorm:
         """Measure the quantity in a norm."""
@@ -146,14 +143,14 @@ class Comparison:
         first
             The difference that the first weight belongs to.
         """
-        grid = self.part.grid
+        grid = self.block.grid
         parts = zip(weights, self.differences[first:], strict=False)
         whole = sum((w * d[rows] for w, d in parts), np.zeros(1))
-        spacing = np.broadcast_to(grid.spacing, self.part.shape)[rows]
+        spacing = np.broadcast_to(grid.spacing, self.block.shape)[rows]
         return differences.norm(whole, kind, spacing, grid.end_included)
 
     def _measured(self, kind: str) -> InNorm:
-        grid, shape = self.part.grid, self.part.shape
+        grid, shape = self.block.grid, self.block.shape
         none = np.empty((*shape, 0))
 
         def size(of: Floats) -> Floats:
@@ -162,7 +159,7 @@ class Comparison:
         levels, d = len(grid.levels), self.differences
         unknown = np.full((*shape, levels), np.nan)
         scatters = differences.scatters(d, kind, grid.end_included) if len(d) > 1 else []
-        errors = self.errors if levels == FEW else None
+        errors = self.errors if levels == FEW_LEVELS else None
         return InNorm(
             difference=by_level([size(x) for x in d]) if d else none,
             scatter=by_level(scatters) if scatters else none,
@@ -180,7 +177,7 @@ class Comparison:
     @cached_property
     def coincidence(self) -> Floats:
         """Relative distance of the rescaled differences, shape (scheme, case, triple); NaN without a finite order."""
-        levels = self.part.grid.levels
+        levels = self.block.grid.levels
         order = np.where(np.isinf(self.order), np.nan, self.order)
         return by_level(
             [
@@ -196,43 +193,37 @@ class Comparison:
 
     def observed_orders(self, kind: str) -> Floats:
         """Return the order of every triple in a norm, shape (scheme, case, triple)."""
-        levels, ratio = self.part.grid.levels, self.ratios(kind)
-        return by_level(
-            [
-                differences.order_of_ratio(ratio[..., i], levels[i : i + 3])
-                for i in range(ratio.shape[-1])
-            ]
-        )
+        return local_orders(self.in_norm(kind).difference, self.block.grid.levels)
 
 
-def comparisons(part: Part, names: tuple[str, ...]) -> Mapping[str, Comparison]:
+def comparisons(block: MemberBlock, names: tuple[str, ...]) -> Mapping[str, Comparison]:
     """Compare quantities between the levels of a part."""
-    positions = part.model.positions
-    apart = wanted(part, names)
+    positions = block.model.positions
+    apart = wanted(block, names)
     names = tuple(name for name in names if name not in apart)
-    values = {name: part.series(name) for name in dict.fromkeys((*positions, *names))}
-    sizes = {"energy": _energy_size(part)}
+    values = {name: block.series(name) for name in dict.fromkeys((*positions, *names))}
+    sizes = {"energy": _energy_size(block)}
     # what is rounded in one coordinate is felt by the others
-    whole = [part.size(name, values[name], sizes) for name in positions]
+    whole = [block.size(name, values[name], sizes) for name in positions]
     sizes |= {name: np.asarray(np.maximum.reduce(whole)) for name in positions}
     found: dict[str, Comparison] = {}
     for name in names:
-        scale = part.size(name, values[name], sizes)
-        attrs = part.finest.variables[name].attrs if name in part.finest else {}
+        scale = block.size(name, values[name], sizes)
+        attrs = block.finest.variables[name].attrs if name in block.finest else {}
         found[name] = Comparison(
-            part=part,
+            block=block,
             name=name,
             long_name=str(attrs.get("long_name", name)),
             units=str(attrs.get("units", "1")),
             values=values[name],
-            exact=part.exact_of(name),
-            order=formal_orders(part.experiment, name, part.columns),
-            floor=part.floor_of(name, scale),
+            exact=block.exact_of(name),
+            order=formal_orders(block.experiment, name, block.columns),
+            floor=block.floor_of(name, scale),
             scale=scale,
         )
-    return found | parts_of_errors(part, found, apart, Comparison)
+    return found | parts_of_errors(block, found, apart, Comparison)
 
 
-def _energy_size(part: Part) -> Floats:
+def _energy_size(block: MemberBlock) -> Floats:
     """Return the size of the energy, shape (scheme, case): what it was plus what became of it."""
-    return np.abs(energy_at_start(part.finest)) + solution_size(part.series("energy_deviation"))
+    return np.abs(energy_at_start(block.finest)) + solution_size(block.series("energy_deviation"))

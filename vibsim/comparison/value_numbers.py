@@ -18,7 +18,7 @@ from vibsim.comparison.solution_distance import discrete_error, exact_series
 from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.core.record import Record
 from vibsim.observe import oscillation, predicted_oscillation
-from vibsim.observe.member_block import Part, energy_at_start
+from vibsim.observe.member_block import MemberBlock, energy_at_start
 
 Floats = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 class Place:
     """Where a value is taken, and what it may be taken from."""
 
-    part: Part
+    block: MemberBlock
     """The members."""
     compared: Mapping[str, Comparison]
     """Quantities that were compared between levels."""
@@ -40,22 +40,22 @@ class Place:
     @property
     def missing(self) -> Floats:
         """NaN for every scheme and member, shape (scheme, case)."""
-        return np.full(self.part.shape, np.nan)
+        return np.full(self.block.shape, np.nan)
 
     @property
     def levels(self) -> tuple[int, ...]:
         """The levels."""
-        return self.part.grid.levels
+        return self.block.grid.levels
 
     @property
     def at_level(self) -> int | None:
         """The level that is asked for, by default the finest; None for one that is not there."""
         level = self.levels[-1] if self.level is None else self.level
-        return level if isinstance(level, int) and level in self.part.records else None
+        return level if isinstance(level, int) and level in self.block.records else None
 
     def data(self) -> Record | None:
         """Return the level Record that is asked for."""
-        return None if self.at_level is None else self.part.records[self.at_level]
+        return None if self.at_level is None else self.block.records[self.at_level]
 
     def comparison(self) -> Comparison | None:
         """Return the quantity as it was compared between levels."""
@@ -79,7 +79,7 @@ def _sample(p: Place) -> Floats:
 
 def samples(p: Place) -> list[Floats]:
     """Return the value of a series at a common time, by default the last one, at every level."""
-    q, grid = p.comparison(), p.part.grid
+    q, grid = p.comparison(), p.block.grid
     index = _index(p, grid.t, grid.apart)
     if q is None or index is None:
         return [p.missing for _ in p.levels]
@@ -121,7 +121,7 @@ def _extreme(which: str, of_series: Callable[..., Floats]) -> Callable[[Place], 
 
     def take(p: Place) -> Floats:
         data = p.data()
-        outputs = {output.name for output in p.part.model.outputs}
+        outputs = {output.name for output in p.block.model.outputs}
         if data is None or p.quantity not in outputs or p.quantity not in data:
             return _of_quantity(which)(p)
         # NaN where a member has failed
@@ -171,11 +171,11 @@ def _measured(of: Callable[[Record], Floats]) -> Callable[[Place], Floats]:
     return take
 
 
-def _at_level(of: Callable[[Part, int], Floats]) -> Callable[[Place], Floats]:
+def _at_level(of: Callable[[MemberBlock, int], Floats]) -> Callable[[Place], Floats]:
     """Return what belongs to a level of the members."""
 
     def take(p: Place) -> Floats:
-        return p.missing if p.at_level is None else of(p.part, p.at_level)
+        return p.missing if p.at_level is None else of(p.block, p.at_level)
 
     return take
 
@@ -185,13 +185,15 @@ def _own_norm(p: Place) -> Floats:
     data = p.data()
     if data is None or p.at_level is None:
         return p.missing
-    error = exact_series(p.part, p.at_level, p.quantity) - np.asarray(data[p.quantity], dtype=float)
+    error = exact_series(p.block, p.at_level, p.quantity) - np.asarray(
+        data[p.quantity], dtype=float
+    )
     return np.asarray(np.sqrt(np.sum(error**2, axis=-1) / (error.shape[-1] - 1)))
 
 
 def _second_difference(p: Place) -> Floats:
     """Return ``E = [D_tD_t u]/u''`` of the exact position by least squares (vibration text, exercise 7)."""
-    data, position = p.data(), p.part.model.position
+    data, position = p.data(), p.block.model.position
     if data is None or f"{position}_exact" not in data or int(np.asarray(data.attrs["every"])) != 1:
         return p.missing
     exact = np.asarray(data[f"{position}_exact"])
@@ -222,11 +224,11 @@ def _over_initial(of: Callable[[Place], Floats]) -> Callable[[Place], Floats]:
 
 def _energy_error_d2t(p: Place) -> Floats:
     data = p.data()
-    return p.missing if data is None else oscillation.energy_error_d2t(p.part, data)
+    return p.missing if data is None else oscillation.energy_error_d2t(p.block, data)
 
 
 def _discrete_error(p: Place) -> Floats:
-    return p.missing if p.at_level is None else discrete_error(p.part, p.at_level, p.quantity)
+    return p.missing if p.at_level is None else discrete_error(p.block, p.at_level, p.quantity)
 
 
 def _period_error(p: Place) -> Floats:
@@ -302,8 +304,8 @@ KNOWN: Mapping[str, Callable[[Place], Any]] = {
     "growth_factor": _measured(oscillation.growth_factor),
     "growth_per_period": _at_level(oscillation.growth_per_period),
     "predicted_growth_per_period": _at_level(predicted_oscillation.growth_per_period),
-    "stability_limit": lambda p: predicted_oscillation.limits(p.part),
-    "exact_degree": lambda p: predicted_oscillation.exact_degrees(p.part),
+    "stability_limit": lambda p: predicted_oscillation.limits(p.block),
+    "exact_degree": lambda p: predicted_oscillation.exact_degrees(p.block),
     "relative_energy_error": _over_initial(_gathered("energy_deviation_max_abs")),
     "relative_energy_error_d2t": _over_initial(_energy_error_d2t),
     "event_count": _gathered("event_count"),

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from vibsim.comparison.comparison_variables import Table
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.core.record import Variable, attributes
-from vibsim.observe.member_block import Part, by_level
+from vibsim.observe.member_block import MemberBlock, by_level
 from vibsim.schemes import SCHEMES
 
 Floats = NDArray[np.float64]
@@ -28,13 +28,13 @@ Floats = NDArray[np.float64]
 OF_LEVEL = ("scheme", "case", "level")
 
 
-def work_precision(part: Part, found: Mapping[str, Comparison]) -> Table:
+def work_precision(block: MemberBlock, found: Mapping[str, Comparison]) -> Table:
     """Return the data of a work-precision diagram.
 
     Parameters
     ----------
     found
-        The comparisons of `part`, that of the position among them.
+        The comparisons of `block`, that of the position among them.
 
     Returns
     -------
@@ -42,13 +42,13 @@ def work_precision(part: Part, found: Mapping[str, Comparison]) -> Table:
         ``work_steps``, ``work_force_evaluations`` and ``work_error``, shape (scheme, case, level), and
         ``work_reference_error``, shape (case,): 0 where the exact solution is known, else the bound of the reference.
     """
-    position = found[part.model.position]
+    position = found[block.model.position]
     reference, bound = reference_of(position)
     errors = by_level([np.max(np.abs(u - reference), axis=-1) for u in position.values])
-    steps, forces = _work(part)
+    steps, forces = _work(block)
     is_exact = position.exact is not None
     for values in (steps, forces, errors):
-        values[part.adaptive, :, :-1] = np.nan
+        values[block.adaptive, :, :-1] = np.nan
     words = "the exact solution" if is_exact else "the best extrapolation"
     once = "; of an adaptive scheme once, at the finest level"
     units = position.units
@@ -76,11 +76,11 @@ def work_precision(part: Part, found: Mapping[str, Comparison]) -> Table:
 
 def reference_of(position: Comparison) -> tuple[Floats, Floats]:
     """Return what errors are relative to, shape (case, t) or (1, t), and the bound of its error, shape (case,)."""
-    cases = position.part.shape[1]
+    cases = position.block.shape[1]
     if position.exact is not None:
         return position.exact[0], np.zeros(cases)
     value, bound = position.extrapolation
-    usable = np.isfinite(bound[..., -1]) & ~position.part.adaptive[:, None]
+    usable = np.isfinite(bound[..., -1]) & ~position.block.adaptive[:, None]
     bounds = np.where(usable, bound[..., -1], np.inf)
     best, case = np.argmin(bounds, axis=0), np.arange(cases)
     smallest = bounds[best, case]
@@ -89,15 +89,15 @@ def reference_of(position: Comparison) -> tuple[Floats, Floats]:
     return reference, np.where(known, smallest, np.nan)
 
 
-def _work(part: Part) -> tuple[Floats, Floats]:
+def _work(block: MemberBlock) -> tuple[Floats, Floats]:
     """Return steps and evaluations of the acceleration, shape (scheme, case, level)."""
-    schemes = [SCHEMES[scheme.kind] for scheme in part.experiment.schemes]
-    shape = (*part.shape, len(part.grid.levels))
-    steps = np.broadcast_to(np.asarray(part.grid.steps, dtype=np.float64), shape).copy()
+    schemes = [SCHEMES[scheme.kind] for scheme in block.experiment.schemes]
+    shape = (*block.shape, len(block.grid.levels))
+    steps = np.broadcast_to(np.asarray(block.grid.steps, dtype=np.float64), shape).copy()
     per_step = np.array([scheme.force_evaluations for scheme in schemes], dtype=np.float64)
     forces = steps * per_step[:, None, None]
-    if part.adaptive.any():
-        own = part.adaptive
-        steps[own] = part.finest["accepted_steps"][own][..., None]
-        forces[own] = part.finest["force_evaluations_total"][own][..., None]
+    if block.adaptive.any():
+        own = block.adaptive
+        steps[own] = block.finest["accepted_steps"][own][..., None]
+        forces[own] = block.finest["force_evaluations_total"][own][..., None]
     return steps, forces

@@ -15,24 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.convergence.last_triples import Tail, at, last_triples
+from vibsim.convergence.ladder_statistics import pick
 from vibsim.convergence.level_jitter import Uneven, accidents
-from vibsim.convergence.roundoff_onset import (
-    LOG2,
-    LOUD,
-    QUIET,
-    SHOWS,
-    before_round_off,
-    noise_share,
-)
+from vibsim.convergence.roundoff_onset import before_round_off, noise_share
 from vibsim.convergence.settled_orders import (
-    GROWS,
-    HIDDEN,
-    NEXT,
-    PASSING,
-    QUICK,
-    SETTLED,
-    SLOW,
     fades,
     left,
     lowest,
@@ -41,25 +27,64 @@ from vibsim.convergence.settled_orders import (
     with_errors,
     with_nearest,
 )
+from vibsim.convergence.thresholds import (
+    GROWS,
+    HIDDEN,
+    JUMP,
+    LOG2,
+    NEXT,
+    PASSING,
+    QUICK,
+    QUIET,
+    READABLE,
+    ROUND_OFF_SAFETY,
+    SETTLED_MISMATCH,
+    SHOWS,
+    SLOW,
+    SUSPECT,
+    TRIPLES_AGREE,
+)
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 
-SUSPECT = 1.0 / 3.0
-"""From this part of what would be too much on, what grows is told as a lower power that may be hiding."""
-
 
 @dataclass(frozen=True)
-class Trend:
-    """The window of every ladder and the order in it; arrays of shape (...)."""
+class Tail:
+    """The last triples of every ladder before round-off; arrays of shape (...)."""
 
     count: Integers
     """Number of triples before round-off."""
+    last: Integers
+    """The last of them, and the last that the order rests on."""
+    several: Flags
+    """Whether the one before belongs to the window, too, so that the order rests on several triples."""
+    local: Floats
+    """The last local order."""
+    change: Floats
+    """Its change from the triple before; 0 where there is one triple only."""
+    earlier: Floats
+    """The change before that; NaN where the order rests on two triples only."""
+    scatter: Floats
+    """Signed scatter of the last triple."""
+    before: Floats
+    """That of the triple before; 0 where there is one triple only."""
+    noise: Floats
+    """How much of the last triple the predicted round-off may be."""
+
+    @property
+    def scatter_before(self) -> Floats:
+        """Size of the scatter of the triple before."""
+        return np.abs(self.before)
+
+
+@dataclass(frozen=True)
+class Trend(Tail):
+    """The window of every ladder and the order in it; arrays of shape (...)."""
+
     first: Integers
     """First triple that the order rests on."""
-    last: Integers
-    """Last triple that the order rests on."""
     cut: Flags
     """Whether round-off cut finer triples off."""
     order: Floats
@@ -70,14 +95,6 @@ class Trend:
     """Lower end of the interval; lower by `NEXT` where a lower power may be hiding."""
     high: Floats
     """Upper end of the interval; higher by `NEXT` where the orders have not settled."""
-    local: Floats
-    """The last local order."""
-    change: Floats
-    """Its change from the triple before; 0 where there is one triple only."""
-    scatter: Floats
-    """Signed scatter of the last triple."""
-    scatter_before: Floats
-    """Its size at the triple before; 0 where there is one triple only."""
     drifting: Flags
     """Whether the scatter grows although round-off does not explain it."""
     alternating: Flags
@@ -92,16 +109,10 @@ class Trend:
     """Whether what is left of the next power fades from triple to triple."""
     open: Flags
     """Whether the orders have not settled."""
-    noise: Floats
-    """How much of the last triple the predicted round-off may be."""
     hiding: Flags
     """Whether a lower power may be hiding in what is left besides the first."""
-    several: Flags
-    """Whether the order rests on several triples."""
     irregular: Flags
     """Whether the last orders swing about their mean: accidents of the levels."""
-    earlier: Floats
-    """The change of the order before the last one; NaN where the order rests on two triples only."""
     slow: Flags
     """Whether what is left is not small, and fades no faster than h^(1/2)."""
 
@@ -111,7 +122,6 @@ def trend(
     scatter: Floats,
     difference: Floats,
     floor: Floats,
-    blame: float,
     tolerance: float,
     ceiling: Floats | None = None,
     of_errors: Floats | None = None,
@@ -128,8 +138,6 @@ def trend(
         Norms of the differences, shape (..., m+1).
     floor
         Predicted round-off at every level, shape (..., m+2).
-    blame
-        Differences up to so many times the floor are suspect.
     tolerance
         How far from the stated order the local orders of a window may be.
     ceiling
@@ -144,12 +152,12 @@ def trend(
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         noise = noise_share(difference, floor)
         possible = noise if ceiling is None else noise_share(difference, ceiling)
-        clean = before_round_off(orders, scatter, difference, noise, possible, 1.0 / blame, numbers)
-        tail = last_triples(orders, scatter, clean, noise)
+        clean = before_round_off(orders, scatter, difference, noise, possible, numbers)
+        tail = _last_triples(orders, scatter, clean, noise)
         to_come, width = _settled(tail, tolerance)
-        beside = left(tail.spread, tail.before, tail.change, tail.earlier, to_come)
+        beside = left(tail.scatter, tail.before, tail.change, tail.earlier, to_come)
         onward = tail.change * tail.earlier > 0
-        fading = tail.several & fades(beside, tail.spread, tail.before, to_come, onward, tolerance)
+        fading = tail.several & fades(beside, tail.scatter, tail.before, to_come, onward, tolerance)
         uneven = accidents(orders, scatter, tail.last, tail.several, tolerance)
         limit = tail.local + to_come
         order = np.where(uneven.found, uneven.mean, limit)
@@ -160,41 +168,62 @@ def trend(
             reach = with_errors(width, tail.local, of_errors, tail.several)
         reach, width = (np.where(uneven.found, uneven.width, x) for x in (reach, width))
         low, high = _interval(tail, order, reach, open_, hiding, ~uneven.found)
-        size, change = np.abs(tail.spread), np.abs(tail.change)
+        size, change = np.abs(tail.scatter), np.abs(tail.change)
         return Trend(
-            count=tail.count,
+            **vars(tail),
             first=_first(orders, order, np.maximum(width, tolerance), tail.last),
-            last=tail.last,
             cut=tail.count < orders.shape[-1],
             order=order,
             width=width,
             low=low,
             high=high,
             open=open_,
-            local=tail.local,
-            change=tail.change,
-            earlier=tail.earlier,
-            scatter=tail.spread,
-            scatter_before=np.abs(tail.before),
             drifting=tail.several
             & (size > GROWS * np.abs(tail.before))
             & (size > np.maximum(QUIET, 3 * tail.noise)),
             alternating=_alternating(scatter, tail, tolerance) & ~uneven.found,
             turning=(_turned(tail) | _speeds_up(tail)) & ~uneven.found,
             gap=np.any(clean & np.isnan(orders), axis=-1),
-            noisy=change <= np.minimum(LOUD * tail.noise, SHOWS * size) / LOG2,
+            noisy=change <= np.minimum(ROUND_OFF_SAFETY * tail.noise, SHOWS * size) / LOG2,
             fading=fading,
-            noise=tail.noise,
             hiding=hiding,
-            several=tail.several,
             irregular=uneven.found,
             slow=~(beside[0] <= np.maximum(QUICK * beside[1], SLOW)),
         )
 
 
+def _last_triples(orders: Floats, scatter: Floats, clean: Flags, noise: Floats) -> Tail:
+    """Return the last triples of ladders; all arrays of shape (..., m), of which the `clean` ones come first."""
+    count = np.sum(clean, axis=-1)
+    last = np.maximum(count - 1, 0)
+    local, spread, rest = (pick(x, last) for x in (orders, scatter, noise))
+    jump = np.abs(local - pick(orders, last - 1))
+    several = (count > 1) & ~_starts_here(jump, np.abs(spread), rest)
+    before = np.where(several, pick(scatter, last - 1), 0.0)
+    change = np.where(several, local - pick(orders, last - 1), 0.0)
+    known = several & (count > 2)
+    earlier = np.where(known, pick(orders, last - 1) - pick(orders, last - 2), np.nan)
+    earlier = np.where(_starts_before(before, change, earlier), np.nan, earlier)
+    return Tail(count, last, several, local, change, earlier, spread, before, rest)
+
+
+def _starts_here(jump: Floats, size: Floats, noise: Floats) -> Flags:
+    """Say where the window begins with the last triple: it is proportional, and the one before has another order.
+
+    A power that fades would have left more in the scatter than there is. The coarser levels are of another range:
+    they have blown up, or their errors are as large as the solution.
+    """
+    return (jump > JUMP) & (size <= HIDDEN) & (size > np.maximum(READABLE, 3 * noise))
+
+
+def _starts_before(before: Floats, change: Floats, earlier: Floats) -> Flags:
+    """Say where the window begins with the last triple but one: the last two agree, and the one before is far away."""
+    return (np.abs(earlier) > JUMP) & (np.hypot(before, LOG2 * change) <= TRIPLES_AGREE)
+
+
 def _settled(tail: Tail, tolerance: float) -> tuple[Floats, Floats]:
     """Return what the last order still lacks of its limit, and half the width of the interval of that limit."""
-    size = np.abs(tail.spread)
+    size = np.abs(tail.scatter)
     to_come, width = settling(size, np.abs(tail.before), tail.change, tail.earlier, tail.several)
     width = np.maximum(width, np.minimum(tail.noise, SHOWS * size) / LOG2)
     # what is so far away is not known to be reached
@@ -216,7 +245,7 @@ def _speeds_up(tail: Tail) -> Flags:
 def _opens(tail: Tail, beside: tuple[Floats, Floats], fading: Flags) -> Flags:
     """Say where the orders have not settled."""
     moves = ~fading & (np.abs(tail.change) > PASSING)
-    return _turned(tail) | (beside[0] > SETTLED) | np.signbit(tail.spread) | moves
+    return _turned(tail) | (beside[0] > SETTLED_MISMATCH) | np.signbit(tail.scatter) | moves
 
 
 def _hides(
@@ -245,7 +274,7 @@ def _interval(
 ) -> tuple[Floats, Floats]:
     """Return the ends of the interval of the order; `trend`: whether the last change is more than an accident."""
     # where orders fall, a higher one is behind
-    falls = trend & tail.several & (tail.change < 0) & ~np.signbit(tail.spread) & ~_turned(tail)
+    falls = trend & tail.several & (tail.change < 0) & ~np.signbit(tail.scatter) & ~_turned(tail)
     low = lowest(order - reach, np.where(open_ | hiding, NEXT, 0.0))
     high = np.where(falls, np.maximum(order, tail.local), order) + reach
     high += np.where(open_ & ~falls, NEXT, 0.0)
@@ -260,8 +289,8 @@ def mismatches(t: Trend, p: Floats) -> tuple[Floats, Floats]:
 
 def _alternating(scatter: Floats, tail: Tail, tolerance: float) -> Flags:
     """Say where differences alternate in sign, or orders swing without settling."""
-    now = tail.spread
-    before = at(scatter, tail.last - 1)
+    now = tail.scatter
+    before = pick(scatter, tail.last - 1)
     signs = np.signbit(now) & np.where(tail.several, np.signbit(before), now > -0.5)
     swings = tail.change * tail.earlier < 0
     size = np.abs(tail.change)

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from vibsim.convergence.asymptotic_range import Trend, mismatches
 from vibsim.convergence.hidden_order import is_promise_hidden
 from vibsim.convergence.ladder_statistics import (
-    ORDINARY,
     Evidence,
     at_rest,
     at_round_off,
@@ -21,15 +20,36 @@ from vibsim.convergence.ladder_statistics import (
     truly_exact,
     unresolved,
 )
-from vibsim.convergence.ratio_test import SINGLE, below, little_left, two_ratios
-from vibsim.convergence.roundoff_onset import FLAT_FIRST, INCOHERENT, LOG2, QUIET
-from vibsim.convergence.settled_orders import (
+from vibsim.convergence.roundoff_onset import steepest
+from vibsim.convergence.settled_orders import lowest, most_left
+from vibsim.convergence.thresholds import (
     COINCIDENT,
+    DEPARTED,
     FADING,
+    FARTHEST,
     GROWS,
+    HALF_SPACING,
     HIDDEN,
+    INCOHERENT,
+    JUMP,
+    LEAST_CANDIDATE,
+    LOG2,
+    MOST_ABOVE,
+    MOVES,
+    NARROW,
     OF_SCATTER,
+    OF_SINGLE,
+    ORDINARY_ORDER,
+    PROPORTIONAL_ALONE,
+    PURE,
+    QUIET,
+    REACH,
+    REACH_SETTLED,
+    READABLE,
     SINGLE_WIDTH,
+    STEADY,
+    SUNK,
+    UNRELATED,
 )
 from vibsim.convergence.true_errors import (
     contradicts,
@@ -46,33 +66,6 @@ from vibsim.core.vocabulary import TOLERANCE
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-UNRELATED = 0.7
-"""Series with so much scatter have nothing to do with each other, and a change from there says nothing."""
-STEADY = 1.0 / 3.0
-"""Orders are steady that change by less than this part of the tolerance: three more changes do not leave it."""
-NARROW = 0.2
-"""Half the width of the interval of an order that is called too high, at most."""
-PURE = 1e-3
-"""Scatter, or change of the order, below which a ladder is one pure power, whatever the power."""
-MOVES = QUIET / 2
-"""A smaller last change of the order is no movement away: half of what is too small to read a trend from."""
-DEPARTED = 0.012
-"""An order no further from p has not left it: a little more than `QUIET`, so that p + QUIET still counts as p."""
-REACH = 0.05
-"""An order this near a multiple of 1/2 may be that multiple: a tenth of the distance between two of them."""
-REACH_SETTLED = 0.1
-"""The same for a whole number that several triples support: a tenth of the distance between whole numbers."""
-OF_SINGLE = 2.0
-"""A single order may be so many times its scatter (over log 2) from the whole number that it stands for."""
-SUNK = 0.9
-"""Orders that are lower than p by more and fall leave p behind: of h^(p-1), too little h^p is left to be counted."""
-LEAST_CANDIDATE = 0.5
-"""The least order that an expansion has: a solution that stays away from its limit has none."""
-BELOW_CORNER = 0.25
-"""An order further below the power that a corner leaves is not the corner's: half the distance of two orders."""
-MOST_ABOVE = 2.0
-"""A superconvergent quantity gains at most the next even power."""
-
 
 def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Floats]:
     """Return the rules for ladders of three levels and more, first to last, and the lower end of the interval.
@@ -81,13 +74,13 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Floats]:
     """
     exactly, tol = np.isinf(e.order), e.tolerance
     # the rules of an order do not reach those ladders
-    p = np.where(exactly, ORDINARY, e.order)
+    p = np.where(exactly, ORDINARY_ORDER, e.order)
     nothing = t.count == 0
     exact = (exactly | nothing) & truly_exact(e)
     right = _right(e, t, p)
-    doubtful = ~right & two_ratios(e, t, p)
+    doubtful = ~right & _two_ratios(e, t, p)
     right |= doubtful
-    low = np.where(doubtful, below(t), t.low)
+    low = np.where(doubtful, _below(t), t.low)
     # neither that order nor a failure of the promised one, until the levels exclude this or show it
     promised = e.order if e.promised is None else e.promised
     hidden = is_promise_hidden(e, t)
@@ -101,7 +94,7 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Floats]:
     wrong &= ~t.gap & ~t.turning & ~(t.scatter_before > UNRELATED)
     # a lower power may hide below or emerge from a higher one, not the other way round
     several, likely = t.several, np.round(2.0 * t.order) / 2
-    together = np.abs(t.scatter) <= np.where(several, COINCIDENT, SINGLE)
+    together = np.abs(t.scatter) <= np.where(several, COINCIDENT, PROPORTIONAL_ALONE)
     wrong &= np.where(
         above,
         together & (t.width <= NARROW) & ~t.drifting & ~t.hiding & _alone(e, t, likely),
@@ -171,11 +164,11 @@ def _right(e: Evidence, t: Trend, p: Floats) -> Flags:
     both |= several & t.fading & (np.abs(t.local - p) <= tol) & (np.abs(t.change) <= tol)
     both |= errors_confirm(e, t, p) & (np.abs(t.local - p) <= tol)
     near = (np.abs(t.order - p) <= tol) & ((t.width <= tol) | both | ~several)
-    together = np.abs(t.scatter) <= np.where(several, COINCIDENT, SINGLE)
+    together = np.abs(t.scatter) <= np.where(several, COINCIDENT, PROPORTIONAL_ALONE)
     clear = _alone(e, t, p)
     right = near & together & clear & ~np.signbit(t.scatter)
     right &= ~t.gap & ~t.turning
-    right &= (~t.drifting & ~_leaving(t, p)) | t.irregular | little_left(t, p)
+    right &= (~t.drifting & ~_leaving(t, p)) | t.irregular | _little_left(t, p)
     return np.asarray(right)
 
 
@@ -187,8 +180,8 @@ def _settled_elsewhere(e: Evidence, t: Trend, p: Floats) -> Flags:
     likely = np.maximum(np.round(2.0 * t.order) / 2, LEAST_CANDIDATE)
     usual = replace(e, tolerance=min(e.tolerance, TOLERANCE))
     settled = _right(usual, t, likely)
-    doubtful = ~settled & two_ratios(usual, t, likely)
-    low = np.where(doubtful, below(t), t.low)
+    doubtful = ~settled & _two_ratios(usual, t, likely)
+    low = np.where(doubtful, _below(t), t.low)
     excluded = (t.high < p - e.tolerance) | (low > p + e.tolerance)
     return np.asarray((settled | doubtful) & excluded & (np.abs(likely - p) > e.tolerance))
 
@@ -204,7 +197,7 @@ def _kinked(e: Evidence, t: Trend, p: Floats) -> tuple[Flags, Flags]:
     low = (t.order < p - e.tolerance) | (t.local < p - e.tolerance)
     low |= t.several & (t.local - t.change < p - e.tolerance)
     kinked = ~np.isnan(e.corner) & (p >= e.corner) & (low | t.alternating)
-    return kinked, np.asarray(t.order < e.corner - np.maximum(e.tolerance, BELOW_CORNER))
+    return kinked, np.asarray(t.order < e.corner - np.maximum(e.tolerance, HALF_SPACING))
 
 
 def _missed(e: Evidence) -> tuple[Flags, Flags]:
@@ -228,7 +221,7 @@ def _lies_still(e: Evidence) -> Flags:
 def _opposite(e: Evidence) -> Flags:
     """Say where differences change their sign from level to level and fall: those of an error do, of noise do not."""
     opposite = np.signbit(e.scatter) & (np.abs(e.scatter) <= INCOHERENT)
-    falls = e.difference[..., 1:] <= e.difference[..., :-1] * 2.0**-FLAT_FIRST
+    falls = e.difference[..., 1:] <= e.difference[..., :-1] * 2.0**-HALF_SPACING
     return np.asarray(np.all(opposite & falls, axis=-1) & ~at_round_off(e))
 
 
@@ -240,14 +233,14 @@ def _pure(t: Trend) -> Flags:
 def _alone(e: Evidence, t: Trend, p: Floats) -> Flags:
     """Say where h^p stands alone: what is left fades, or is less than a tenth of a lower power would make."""
     mismatch, before = mismatches(t, p)
-    clear = little_left(t, p)
+    clear = _little_left(t, p)
     clear |= t.several & ((t.fading & ~t.slow) | t.irregular)
     # as much as one triple alone may show, where it does not grow: the interval then reaches to a lower power
     steady = t.several & (np.abs(t.change) <= STEADY * e.tolerance)
-    clear |= steady & (mismatch <= np.minimum(SINGLE, GROWS * before))
+    clear |= steady & (mismatch <= np.minimum(PROPORTIONAL_ALONE, GROWS * before))
     # one order alone: two terms of one shape tell from a power by nothing but the number
     own = np.abs(t.local - p) <= np.maximum(SINGLE_WIDTH, OF_SCATTER * np.abs(t.scatter) / LOG2)
-    clear |= t.several & (mismatch <= SINGLE) & (mismatch <= FADING * before)
+    clear |= t.several & (mismatch <= PROPORTIONAL_ALONE) & (mismatch <= FADING * before)
     # one triple says too little for an order that few schemes have
     own &= (p == np.round(p)) | (np.abs(t.local - p) <= SINGLE_WIDTH)
     clear = np.where(t.several, clear | errors_confirm(e, t, p), own | errors_vouch(e, p))
@@ -291,7 +284,9 @@ def _plausible(t: Trend, p: Floats, tol: float) -> Flags:
         near &= (candidate >= LEAST_CANDIDATE) & (several | alone | (candidate <= p + MOST_ABOVE))
         pure = np.abs(t.order - candidate) <= SINGLE_WIDTH
         found |= (
-            near & ~passing & (whole | np.where(several, np.abs(t.scatter) <= 2 * SINGLE, pure))
+            near
+            & ~passing
+            & (whole | np.where(several, np.abs(t.scatter) <= 2 * PROPORTIONAL_ALONE, pure))
         )
     return found
 
@@ -301,3 +296,50 @@ def _on_the_way(t: Trend, p: Floats, tol: float) -> Flags:
     way = np.abs(t.local - p) - tol
     approach = np.abs(t.local - t.change - p) - np.abs(t.local - p)
     return np.asarray(t.several & (3 * approach >= way))
+
+
+def _two_ratios(e: Evidence, t: Trend, p: Floats) -> Flags:
+    """Say where the last two ratios are those of h^p, and no lower power is seen to take over.
+
+    What is left beside h^p may then be a higher power, accidents of the levels, or less than a tenth of a lower power:
+    the order passes, and its interval reaches down to the lower power that may be there.
+    """
+    now, before = mismatches(t, p)
+    near = np.maximum(np.abs(t.local - p), np.abs(t.local - t.change - p)) <= e.tolerance
+    both = t.several & near & (now <= PROPORTIONAL_ALONE) & (before <= COINCIDENT)
+    # behind a jump two orders may be neighbours by accident
+    both &= ~np.signbit(t.scatter) & ~t.gap & ~t.alternating & ~(np.abs(t.earlier) > JUMP)
+    # nor are they the orders of one power where the differences have turned round between them
+    both &= ~t.turning
+    return np.asarray(both & ~_emerges(t, p) & (t.irregular | ~errors_leave(e, t, p)))
+
+
+def _below(t: Trend) -> Floats:
+    """Return the lower end of an interval that reaches to the lowest power that may be hiding, shape (...)."""
+    return np.minimum(t.low, lowest(t.order - t.width, FARTHEST))
+
+
+def _little_left(t: Trend, p: Floats) -> Flags:
+    """Say where what is left besides h^p is less than a tenth of a lower power would make."""
+    now, before = mismatches(t, p)
+    # what round-off may have made does not tell of a lower power that grows
+    return np.asarray(now <= most_left(p, now, before, t.several & (now > t.noise)))
+
+
+def _emerges(t: Trend, p: Floats) -> Flags:
+    """Say where a lower power is seen to grow: by the shape of the differences, or in the orders.
+
+    Three orders tell of it by their last two changes. Two orders have one, which says little where the differences
+    become proportional at the same time.
+    """
+    now, _ = mismatches(t, p)
+    spread, before = np.abs(t.scatter), t.scatter_before
+    by_shape = (spread > QUIET) & (spread > GROWS * before)
+    # what rises more steeply than any lower power is a floor that begins
+    by_shape &= ~(spread > steepest(t.local - t.change) * before)
+    last = t.local - p
+    away, then, earlier = np.abs(last), np.abs(last - t.change), np.abs(last - t.change - t.earlier)
+    calm = (before > READABLE) & (spread <= FADING * before)
+    two = np.isnan(t.earlier) & (now > HIDDEN) & ~calm
+    by_order = (away > GROWS * then) & ((then > GROWS * earlier) | two)
+    return np.asarray((by_shape | by_order) & (now > t.noise) & ~_little_left(t, p))

@@ -15,12 +15,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from vibsim.convergence.thresholds import ROUND_OFF_SAFETY, STEEPEST, ZERO_CROSSING
 
-NEAR_ZERO = 0.1
-"""A denominator below this part of its surroundings is taken for a zero crossing."""
-ABOVE_FLOOR = 10.0
-"""A denominator must exceed the round-off floor so many times for a ratio to mean something."""
+Floats = NDArray[np.float64]
 
 
 SAFE_SQUARES = 1e140
@@ -131,10 +128,6 @@ def rescaling(order: Floats | float, levels: Sequence[int]) -> Floats:
     return factor
 
 
-STEEPEST = 64.0
-"""Orders are sought between -STEEPEST and STEEPEST."""
-
-
 def order_of_ratio(ratio: Floats, levels: Sequence[int]) -> Floats:
     """Solve `target_ratio` for the order.
 
@@ -186,9 +179,9 @@ def local_scale(series: Floats) -> Floats:
 def masked_ratio(first: Floats, second: Floats, floor: Floats | float = 0.0) -> Floats:
     """Return the ratio of successive differences as a function of time.
 
-    Masked (NaN) at a zero crossing of either difference, that is where one is below `NEAR_ZERO` times its
-    `local_scale` or has another sign than its neighbour, and where the denominator is below `ABOVE_FLOOR` times the
-    round-off floor.
+    Masked (NaN) at a zero crossing of either difference, that is where one is below `ZERO_CROSSING` times its
+    `local_scale` or has another sign than its neighbour, and where the denominator is below `ROUND_OFF_SAFETY` times
+    the round-off floor.
 
     Parameters
     ----------
@@ -197,9 +190,9 @@ def masked_ratio(first: Floats, second: Floats, floor: Floats | float = 0.0) -> 
     floor
         Round-off floor of the finer difference, shape (..., 1) or a number.
     """
-    keep = np.abs(second) > ABOVE_FLOOR * np.asarray(floor)
+    keep = np.abs(second) > ROUND_OFF_SAFETY * np.asarray(floor)
     for series in (first, second):
-        keep &= np.abs(series) > NEAR_ZERO * local_scale(series)
+        keep &= np.abs(series) > ZERO_CROSSING * local_scale(series)
         crossing = np.sign(series[..., 1:]) * np.sign(series[..., :-1]) < 0
         keep[..., 1:] &= ~crossing
         keep[..., :-1] &= ~crossing

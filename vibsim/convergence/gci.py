@@ -1,5 +1,5 @@
 r"""The grid convergence index: the field's known error bar, beside the bound of
-`vibsim.convergence.scalar_extrapolation`.
+`vibsim.convergence.number_extrapolation`.
 
 Of the finest two levels, ``GCI = F |u_fine - u_coarse|/(r^p - 1)`` with the refinement ratio r (P. J. Roache,
 Perspective: a method for uniform reporting of grid refinement studies, J. Fluids Eng. 116, 1994). It belongs to the
@@ -23,7 +23,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.convergence.differences import gap_ratio, order_of_ratio, safe_ratio
-from vibsim.convergence.scalar_extrapolation import ORDINARY, triple_at
+from vibsim.convergence.extrapolation import error_left
+from vibsim.convergence.number_extrapolation import triple_at
+from vibsim.convergence.thresholds import (
+    GCI_AGREES,
+    GCI_CAUTIOUS,
+    GCI_EXPONENTS,
+    GCI_FITTED,
+    GCI_LEAST_ORDER,
+    GCI_NEAR_ZERO,
+    GCI_TRUSTED,
+    ORDINARY_ORDER,
+)
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -40,19 +51,6 @@ CLASSES = (
 """How the finest three levels above round-off follow each other; files hold a position here."""
 UNKNOWN, MONOTONE, OSCILLATING, DIVERGING, SWINGING, ROUND_OFF = range(len(CLASSES))
 
-TRUSTED, CAUTIOUS = 1.25, 3.0
-"""The factor F."""
-AGREES = 0.1
-"""Part of the promised order that the observed one may be off."""
-LEAST_ORDER = 0.5
-"""The least order that is used."""
-FITTED = 5
-"""So many of the finest levels are fitted at most."""
-EXPONENTS = 16
-"""So many exponents from `LEAST_ORDER` to the promised order are tried in a fit."""
-NEAR_ZERO = 0.05
-"""A number below this part of its scale is near zero."""
-
 
 def classify(values: Floats, levels: Sequence[int], floor: Floats) -> Codes:
     """Say how numbers converge, as positions in `CLASSES`.
@@ -63,7 +61,7 @@ def classify(values: Floats, levels: Sequence[int], floor: Floats) -> Codes:
     Parameters
     ----------
     values, levels, floor
-        As `vibsim.convergence.scalar_extrapolation.limit` takes them.
+        As `vibsim.convergence.number_extrapolation.limit` takes them.
     """
     found = np.full(values.shape[:-1], UNKNOWN, dtype=np.int8)
     if len(levels) < 3:
@@ -89,7 +87,7 @@ def index(values: Floats, levels: Sequence[int], order: Floats, kinds: Codes) ->
     Parameters
     ----------
     values, levels
-        As `vibsim.convergence.scalar_extrapolation.limit` takes them.
+        As `vibsim.convergence.number_extrapolation.limit` takes them.
     order
         Promised order, shape (...).
     kinds
@@ -103,12 +101,12 @@ def index(values: Floats, levels: Sequence[int], order: Floats, kinds: Codes) ->
     n = len(levels)
     if n == 1:
         return np.full(values.shape[:-1], np.nan)
-    promised = np.where(np.isfinite(order), order, ORDINARY)
+    promised = np.where(np.isfinite(order), order, ORDINARY_ORDER)
     with np.errstate(all="ignore"):
         change = np.abs(values[..., -1] - values[..., -2])
         gap = levels[-1] - levels[-2]
         if n == 2:
-            return np.asarray(CAUTIOUS * change / (gap_ratio(promised, gap) - 1.0))
+            return np.asarray(error_left(GCI_CAUTIOUS * change, gap_ratio(promised, gap)))
         last = -np.diff(values[..., -3:], axis=-1)
         seen = order_of_ratio(safe_ratio(last[..., 0], last[..., 1]), levels[-3:])
         regular = of_order(change, gap, seen, promised)
@@ -131,14 +129,14 @@ def of_order(change: Floats, gap: int, seen: Floats, promised: Floats) -> Floats
         Observed and promised order; NaN for one that is not known.
     """
     agrees = _agrees(seen, promised)
-    factor = np.where(agrees, TRUSTED, CAUTIOUS)
-    capped = np.clip(np.where(np.isfinite(seen), seen, promised), LEAST_ORDER, None)
+    factor = np.where(agrees, GCI_TRUSTED, GCI_CAUTIOUS)
+    capped = np.clip(np.where(np.isfinite(seen), seen, promised), GCI_LEAST_ORDER, None)
     p = np.where(agrees, promised, np.minimum(capped, promised))
-    return np.asarray(factor * change / (gap_ratio(p, gap) - 1.0))
+    return np.asarray(error_left(factor * change, gap_ratio(p, gap)))
 
 
 def _agrees(seen: Floats, promised: Floats) -> Flags:
-    return np.asarray(np.abs(seen - promised) <= AGREES * promised)
+    return np.asarray(np.abs(seen - promised) <= GCI_AGREES * promised)
 
 
 def relative(index: Floats, value: Floats, scale: Floats) -> Floats:
@@ -150,26 +148,26 @@ def relative(index: Floats, value: Floats, scale: Floats) -> Floats:
         Size that such a number has: of the solution, or of the number itself.
     """
     size = np.abs(value)
-    usable = (size > index) & (size > NEAR_ZERO * scale)
+    usable = (size > index) & (size > GCI_NEAR_ZERO * scale)
     return np.where(usable, safe_ratio(*np.broadcast_arrays(index, size)), np.nan)
 
 
 def _range(values: Floats) -> Floats:
-    recent = values[..., -FITTED:]
-    return np.asarray(CAUTIOUS * (np.max(recent, axis=-1) - np.min(recent, axis=-1)))
+    recent = values[..., -GCI_FITTED:]
+    return np.asarray(GCI_CAUTIOUS * (np.max(recent, axis=-1) - np.min(recent, axis=-1)))
 
 
 def _fitted(values: Floats, levels: Sequence[int], promised: Floats) -> Floats:
-    """Return the index of the best fit of ``u + c h^p``, p between `LEAST_ORDER` and the promised order."""
-    m = min(len(levels), FITTED)
+    """Return the index of the best fit of ``u + c h^p``, p between `GCI_LEAST_ORDER` and the promised order."""
+    m = min(len(levels), GCI_FITTED)
     u = values[..., -m:]
     h = np.exp2(-(np.array(levels[-m:], dtype=np.float64) - levels[-1]))
     mean = np.mean(u, axis=-1)
     least = np.full(mean.shape, np.inf)
     index = np.full(mean.shape, np.nan)
     typical = (np.max(u, axis=-1) - np.min(u, axis=-1)) / (m - 1)
-    for part in np.linspace(0.0, 1.0, EXPONENTS):
-        p = LEAST_ORDER + part * np.maximum(promised - LEAST_ORDER, 0.0)
+    for part in np.linspace(0.0, 1.0, GCI_EXPONENTS):
+        p = GCI_LEAST_ORDER + part * np.maximum(promised - GCI_LEAST_ORDER, 0.0)
         x = h ** p[..., None]
         away = x - np.mean(x, axis=-1)[..., None]
         slope = np.sum(away * (u - mean[..., None]), axis=-1) / np.sum(away * away, axis=-1)
@@ -181,8 +179,8 @@ def _fitted(values: Floats, levels: Sequence[int], promised: Floats) -> Floats:
         good = sigma < typical
         now = np.where(
             good,
-            TRUSTED * error + sigma + off,
-            CAUTIOUS * sigma / typical * (error + sigma + off),
+            GCI_TRUSTED * error + sigma + off,
+            GCI_CAUTIOUS * sigma / typical * (error + sigma + off),
         )
         better = sigma < least
         least, index = np.where(better, sigma, least), np.where(better, now, index)

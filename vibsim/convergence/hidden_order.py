@@ -17,16 +17,10 @@ from numpy.typing import NDArray
 
 from vibsim.convergence.asymptotic_range import Trend
 from vibsim.convergence.ladder_statistics import Evidence, floor_of_pairs, pick
+from vibsim.convergence.thresholds import EXCLUDED, HALF_SPACING, HIGHER_POWERS
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-EXCLUDED = 1e-6
-"""A part of the error that is no larger takes h^(p-1) twenty levels to decide: more than any ladder has."""
-APART = 0.25
-"""Orders further apart are different ones: half the distance of two of them."""
-POWERS = 4
-"""Higher powers that are taken away, at most."""
 
 
 def is_promise_hidden(e: Evidence, t: Trend) -> Flags:
@@ -36,8 +30,8 @@ def is_promise_hidden(e: Evidence, t: Trend) -> Flags:
         return np.zeros(shape, dtype=bool)
     with np.errstate(invalid="ignore"):
         shown = np.round(2.0 * t.order) / 2
-        maybe = (t.count > 0) & np.isfinite(shown) & (shown > e.promised + APART)
-        maybe &= e.special > e.promised + APART
+        maybe = (t.count > 0) & np.isfinite(shown) & (shown > e.promised + HALF_SPACING)
+        maybe &= e.special > e.promised + HALF_SPACING
     hidden = maybe.copy()
     last = t.last + 1
     groups = np.stack([last, shown, np.broadcast_to(e.promised, shape)], axis=-1)
@@ -56,7 +50,7 @@ def _most(e: Evidence, rows: Flags, last: int, p: float, r: float) -> Floats:
     steeper = np.expm1(p * np.log(2.0)) / np.expm1(r * np.log(2.0))
     least = np.full(size.shape, np.inf)
     for step in (1.0, 2.0):
-        for count in range(1, min(last, POWERS) + 1):
+        for count in range(1, min(last, HIGHER_POWERS) + 1):
             powers = np.array([r, *(p + step * k for k in range(count))])
             weights = _weights(e.levels, last, powers)
             first = last + 1 - len(weights)

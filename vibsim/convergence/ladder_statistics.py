@@ -13,27 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.convergence.differences import safe_ratio
+from vibsim.convergence.thresholds import (
+    ABOVE_ROUND_OFF,
+    BLOWN_UP,
+    EXACT_ACCURACY,
+    EXACT_DIFFERENCE,
+    MEASUREMENT_FACTOR,
+    ORDINARY_ORDER,
+    RESOLVED_DECAY,
+    VISIBLE_ERROR,
+)
 from vibsim.core.vocabulary import TOLERANCE
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-BLAME = 100.0
-"""Round-off may be blamed for a difference up to so many times its predicted floor, an order of magnitude."""
-TINY = 1e-10
-"""Differences of a scheme that is exact are no larger part of the solution."""
-VISIBLE = 1e4
-"""An ordinary error, (w dt)^p at the coarsest level, this many times above the blamed floor would have been seen."""
-MEASURED = 2.0
-"""A difference may be laid to the measurement of a quantity up to so many times what that is known to be off by."""
-BLOWN_UP = 10.0
-"""A solution so many times larger than the exact one has grown."""
-RESOLVED = 1.0
-"""A step no longer than so many times that in which damping takes a velocity away sees how it goes."""
-EXACT_ACCURACY = 1e-12
-"""An exact solution is trusted to this part of its size."""
-ORDINARY = 2.0
-"""Order of the error that would have been seen where an exact quantity is promised."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +139,7 @@ def floor_of_pairs(e: Evidence) -> Floats:
 
 def at_round_off(e: Evidence) -> Flags:
     """Say where all differences may be round-off."""
-    return np.asarray(np.all(e.difference <= BLAME * floor_of_pairs(e), axis=-1))
+    return np.asarray(np.all(e.difference <= ABOVE_ROUND_OFF * floor_of_pairs(e), axis=-1))
 
 
 def truly_exact(e: Evidence) -> Flags:
@@ -171,15 +164,15 @@ def _motion(e: Evidence) -> Floats:
 def _agrees(e: Evidence) -> Flags:
     """Say where the differences are round-off, and tiny beside the solution."""
     blur = _blur(e)
-    of_pairs = MEASURED * (blur[..., :-1] + blur[..., 1:])
-    tiny = np.all(e.difference <= TINY * e.size[..., None] + of_pairs, axis=-1)
+    of_pairs = MEASUREMENT_FACTOR * (blur[..., :-1] + blur[..., 1:])
+    tiny = np.all(e.difference <= EXACT_DIFFERENCE * e.size[..., None] + of_pairs, axis=-1)
     return np.asarray(at_round_off(e) & tiny)
 
 
 def _would_show(e: Evidence, moved: Floats) -> Flags:
     """Say where an ordinary error of a solution that moves by so much of its size would have been seen."""
     # what a short run has accumulated is smaller by (w T)^2
-    power = np.where(np.isinf(e.order), ORDINARY, e.order)
+    power = np.where(np.isinf(e.order), ORDINARY_ORDER, e.order)
     if e.promised is not None:
         # what a scheme of higher order leaves is smaller than an error of the order that is asked for
         power = np.where(np.isinf(e.promised), power, np.fmax(power, e.promised))
@@ -197,8 +190,8 @@ def _would_show(e: Evidence, moved: Floats) -> Flags:
     ordinary = share * rate**power
     # of what grew without bound nothing is said
     with np.errstate(invalid="ignore"):
-        visible = ordinary * e.size >= VISIBLE * _blur(e)[..., 0]
-    return np.asarray((ordinary >= VISIBLE * BLAME * e.relative_floor) & visible)
+        visible = ordinary * e.size >= VISIBLE_ERROR * _blur(e)[..., 0]
+    return np.asarray((ordinary >= VISIBLE_ERROR * ABOVE_ROUND_OFF * e.relative_floor) & visible)
 
 
 def _blur(e: Evidence) -> Floats:
@@ -210,12 +203,12 @@ def unresolved(e: Evidence) -> Flags:
     """Say where a velocity is gone within one step of the finest level, so that no level shows how."""
     if e.decay is None:
         return np.zeros(e.order.shape, dtype=bool)
-    return np.asarray(e.decay > RESOLVED)
+    return np.asarray(e.decay > RESOLVED_DECAY)
 
 
 def accuracy(e: Evidence) -> Floats:
     """Return how well the finest error is known, shape (...)."""
-    return np.asarray(BLAME * e.floor[..., -1] + EXACT_ACCURACY * e.size)
+    return np.asarray(ABOVE_ROUND_OFF * e.floor[..., -1] + EXACT_ACCURACY * e.size)
 
 
 def far_from_exact(e: Evidence) -> Flags:
@@ -226,5 +219,5 @@ def far_from_exact(e: Evidence) -> Flags:
 
 
 def pick(values: Floats, index: NDArray[np.int64]) -> Floats:
-    """Return one entry of the last axis for each ladder."""
-    return np.take_along_axis(values, index[..., None], axis=-1)[..., 0]
+    """Return one entry of the last axis for each ladder; the first one for a negative index."""
+    return np.take_along_axis(values, np.maximum(index, 0)[..., None], axis=-1)[..., 0]

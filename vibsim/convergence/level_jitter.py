@@ -13,19 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.convergence.roundoff_onset import QUIET
-from vibsim.convergence.settled_orders import COINCIDENT, GROWS
+from vibsim.convergence.thresholds import (
+    COINCIDENT,
+    GROWS,
+    JITTER_ORDERS,
+    OF_SWINGS,
+    QUIET,
+    SURE_TURNS,
+)
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
-
-FEWEST, MOST = 3, 6
-"""So many orders, the last ones, are looked at."""
-SURE = 2
-"""So many changes of direction are no power that takes over from another one, which makes one of them."""
-OF_SWINGS = 2.0
-"""Half the width of the interval of the mean over the largest distance from it."""
 
 
 @dataclass(frozen=True)
@@ -57,10 +56,11 @@ def accidents(
     tolerance
         How far from their mean the orders may be.
     """
+    fewest, most = JITTER_ORDERS
     shape = last.shape
     found, sure = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
     mean, width = np.full(shape, np.nan), np.full(shape, np.nan)
-    for count in range(FEWEST, min(MOST, orders.shape[-1]) + 1):
+    for count in range(fewest, min(most, orders.shape[-1]) + 1):
         index = np.maximum(last[..., None] - np.arange(count), 0)
         values, left = (np.take_along_axis(x, index, axis=-1) for x in (orders, scatter))
         change = np.diff(values, axis=-1)
@@ -68,10 +68,10 @@ def accidents(
         middle = np.mean(values, axis=-1)
         away = np.max(np.abs(values - middle[..., None]), axis=-1)
         swings = several & (last + 1 >= count) & (away <= tolerance)
-        swings &= turns >= (1 if count == FEWEST else SURE)
+        swings &= turns >= (1 if count == fewest else SURE_TURNS)
         swings &= np.all((left >= 0) & (left <= COINCIDENT), axis=-1) & ~_turns_away(left)
         found |= swings
-        sure = np.where(swings, turns >= SURE, sure)
+        sure = np.where(swings, turns >= SURE_TURNS, sure)
         mean = np.where(swings, middle, mean)
         width = np.where(swings, OF_SWINGS * away, width)
     return Uneven(found, sure, mean, width)

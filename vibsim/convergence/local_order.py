@@ -29,15 +29,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.convergence.differences import ABOVE_FLOOR, largest, order_of_ratio, safe_ratio
+from vibsim.convergence.differences import largest, order_of_ratio, safe_ratio
+from vibsim.convergence.thresholds import LEAST_WINDOW, OWN_END, ROUND_OFF_SAFETY
 
 Floats = NDArray[np.float64]
 Counts = NDArray[np.int64]
-
-FEWEST = 3
-"""Points of the shortest window."""
-ALONE = 0.5
-"""The last point counts for itself where its differences are at least this part of those before it."""
 
 
 def window_points(width: Floats, spacing: Floats, points: int) -> Counts:
@@ -53,8 +49,8 @@ def window_points(width: Floats, spacing: Floats, points: int) -> Counts:
         Number of points of the series.
     """
     half = np.rint(0.5 * width / spacing)
-    most = max((points - 1) // 2, FEWEST // 2)
-    return np.asarray(2 * np.clip(half, FEWEST // 2, most).astype(np.int64) + 1)
+    most = max((points - 1) // 2, LEAST_WINDOW // 2)
+    return np.asarray(2 * np.clip(half, LEAST_WINDOW // 2, most).astype(np.int64) + 1)
 
 
 def local_order(
@@ -87,11 +83,11 @@ def local_order(
         window, below what may be round-off, or one of them vanishes or is not finite; an end is infinite where the
         interval is unbounded.
     """
-    inner = slice(None, -1) if end_included and first.shape[-1] > FEWEST else slice(None)
+    inner = slice(None, -1) if end_included and first.shape[-1] > LEAST_WINDOW else slice(None)
     scale = _scale(first)
     scaled = first * scale, second * scale
     sums = _by_count([d[..., inner] for d in scaled], counts)
-    noise = tuple(ABOVE_FLOOR * floor[..., None] * scale for floor in floors)
+    noise = tuple(ROUND_OFF_SAFETY * floor[..., None] * scale for floor in floors)
     ratio, unsure = _compared(sums, noise)
     if inner.stop is not None:
         ratio, unsure = _with_end(ratio, unsure, scaled, sums, noise)
@@ -159,7 +155,7 @@ def _with_end(
     ends = [np.abs(series[..., -1:]) for series in pair]
     alone = np.ones(ends[0].shape, dtype=bool)
     for end, square in zip(ends, sums, strict=False):
-        alone &= end > ALONE * np.sqrt(square[..., -1:])
+        alone &= end > OWN_END * np.sqrt(square[..., -1:])
     signs = np.sign(pair[0][..., -1:]) * np.sign(pair[1][..., -1:])
     one_point = np.stack([ends[0] ** 2, ends[1] ** 2, signs * ends[0] * ends[1]])
     own = _compared(one_point, noise)

@@ -4,10 +4,10 @@ Noise is told from an error by its shape. The differences of an error are propor
 emerges turns them once and leaves them proportional again. Noise differs from level to level, so that its differences
 have nothing to do with each other, and it does not fall. Three floors are told apart by how much evidence they take:
 
-- *predicted*: up to `blame` times what the scheme predicts for its arithmetic. One triple that breaks the trend is
-  evidence enough;
-- *possible*: up to `LOUD` times eps N^2, more than double precision makes of N steps in any arithmetic. It is fitted:
-  the scatter must rise faster than any lower power can make it (`STEEP`), up to the finest level;
+- *predicted*: up to `ABOVE_ROUND_OFF` times what the scheme predicts for its arithmetic. One triple that breaks the
+  trend is evidence enough;
+- *possible*: up to `ROUND_OFF_SAFETY` times eps N^2, more than double precision makes of N steps in any arithmetic.
+  It is fitted: the scatter must rise faster than any lower power can make it (`STEEP`), up to the finest level;
 - *unexplained*: any size. The finest `PLATEAU` triples must show unrelated differences that do not fall, or the scatter
   must rise to unrelated differences more steeply than that of any lower power, twice in turn. A single bad level cannot
   look like that. Single numbers have no shape: of these, the finest differences must stop falling.
@@ -18,38 +18,27 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.convergence.thresholds import (
+    ABOVE_ROUND_OFF,
+    AUDIBLE,
+    HALF_SPACING,
+    HEARD,
+    HEARD_IN_ERROR,
+    INCOHERENT,
+    LOG2,
+    PLATEAU,
+    QUIET,
+    ROUND_OFF_SAFETY,
+    SHOWS,
+    SINGLE_NUMBER,
+    STAYS,
+    STEEP,
+    TRIPLES_BEFORE,
+    UNRELATED_FIRST,
+)
+
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-QUIET = 0.01
-"""Scatter or change of the order too small to read a trend from."""
-AUDIBLE = 0.003
-"""Scatter above which noise is looked for."""
-SHOWS = 3.0
-"""Noise changes an order by no more than so many times its scatter (over log 2)."""
-UNRELATED_FIRST = 0.1
-"""A first triple with more scatter has no trend before it that could vouch for it: suspect differences spoil it."""
-FLAT_FIRST = 0.25
-"""The same for a first triple with a lower order, half the least that an expansion has: noise does not fall with dt."""
-LOUD = 10.0
-"""Round-off may be so many times its predicted floor, an order of magnitude, and move the order accordingly."""
-STEEP = 1.1
-"""Scatter that rises by more than so many times 2^(p - 1/2) per level is no power h^(1/2) or higher under h^p."""
-INCOHERENT = 0.5
-"""Differences with more scatter, or opposite to each other, are not those of one error."""
-PLATEAU = 3
-"""So many triples, of five levels, show a floor that nothing explains."""
-VOUCHED = 2
-"""So many triples before it must be those of an error."""
-HEARD = 0.05
-"""A floor that is a larger part of a difference spoils its order: by 0.07 and more."""
-HEARD_IN_ERROR = 0.3
-"""The same of an error: what is left of the bounds within which it must agree with the differences."""
-STAYS = 0.5
-"""A floor does not fall below this part of itself."""
-SINGLE_NUMBER = 1e-9
-"""Series with less scatter are multiples of one another, such as a single number, and cannot show noise by it."""
-LOG2 = float(np.log(2.0))
 
 
 def noise_share(difference: Floats, floor: Floats) -> Floats:
@@ -73,7 +62,6 @@ def before_round_off(
     difference: Floats,
     noise: Floats,
     possible: Floats,
-    suspect: float,
     numbers: Flags | None = None,
 ) -> Flags:
     """Say of every triple whether it stands before the first one that round-off spoils.
@@ -86,21 +74,19 @@ def before_round_off(
         Norms of the differences, shape (..., m+1).
     noise, possible
         Predicted and possible floor over the finer difference (`noise_share`), shape (..., m).
-    suspect
-        From this share of predicted noise on a triple is suspect.
     numbers
         Where the series are single numbers, shape (...).
     """
     incoherent = np.signbit(scatter) | (np.abs(scatter) > INCOHERENT) | np.isnan(scatter)
     spoiled = _breaks_the_trend(orders, scatter, incoherent)
     # what rises out of the floor again on a finer level was no floor
-    predicted = _from_here_on(noise) >= suspect
+    predicted = _from_here_on(noise) >= 1.0 / ABOVE_ROUND_OFF
     spoiled &= predicted
     onset = _onset(orders, scatter, incoherent)
     share = possible / np.fmax(np.fmin(np.abs(scatter), 1.0), SINGLE_NUMBER)
-    spoiled |= onset & (_from_here_on(share) * LOUD >= 1.0)
+    spoiled |= onset & (_from_here_on(share) * ROUND_OFF_SAFETY >= 1.0)
     floor = _plateau(incoherent, difference) | _climbs(orders, scatter, incoherent)
-    spoiled[..., VOUCHED:] |= (onset & floor[..., None])[..., VOUCHED:]
+    spoiled[..., TRIPLES_BEFORE:] |= (onset & floor[..., None])[..., TRIPLES_BEFORE:]
     if numbers is not None:
         spoiled |= _below_a_flat_end(difference, orders) & numbers[..., None] & ~predicted
     return ~np.logical_or.accumulate(spoiled, axis=-1)
@@ -121,7 +107,7 @@ def _breaks_the_trend(orders: Floats, scatter: Floats, incoherent: Flags) -> Fla
     """
     size = np.abs(scatter)
     breaks = np.isnan(orders) | np.isnan(scatter) | np.signbit(scatter)
-    breaks[..., 0] |= (size[..., 0] > UNRELATED_FIRST) | (orders[..., 0] < FLAT_FIRST)
+    breaks[..., 0] |= (size[..., 0] > UNRELATED_FIRST) | (orders[..., 0] < HALF_SPACING)
     change = np.abs(np.diff(orders, axis=-1))
     for i in range(1, orders.shape[-1]):
         usual = np.maximum(QUIET, change[..., i - 2]) if i > 1 else 5 * QUIET
@@ -168,7 +154,7 @@ def _climbs(orders: Floats, scatter: Floats, incoherent: Flags) -> Flags:
 
     A floor does that, which a single bad level does not: its scatter is large at once.
     """
-    if orders.shape[-1] <= VOUCHED:
+    if orders.shape[-1] <= TRIPLES_BEFORE:
         return np.zeros(orders.shape[:-1], dtype=bool)
     size = np.abs(scatter)
     most = steepest(orders)
@@ -190,13 +176,13 @@ def _below_a_flat_end(difference: Floats, orders: Floats) -> Flags:
     noise = np.zeros(difference.shape)
     with np.errstate(divide="ignore", invalid="ignore"):
         size = np.log2(difference)
-        for first in range(pairs - PLATEAU, VOUCHED - 1, -1):
-            flat = size[..., first] - size[..., -1] < FLAT_FIRST * (pairs - 1 - first)
+        for first in range(pairs - PLATEAU, TRIPLES_BEFORE - 1, -1):
+            flat = size[..., first] - size[..., -1] < HALF_SPACING * (pairs - 1 - first)
             grown = difference[..., first : first + 1] * np.exp2(0.5 * (index - first))
             noise = np.where(flat[..., None], grown, noise)
         heard = np.minimum(HEARD, HEARD_IN_ERROR / (np.exp2(np.clip(orders, 1.0, 16.0)) - 1))
         spoiled = ~(noise[..., 1:] <= heard * difference[..., 1:])
-    vouched = np.sum(np.logical_and.accumulate(~spoiled, axis=-1), axis=-1) >= VOUCHED
+    vouched = np.sum(np.logical_and.accumulate(~spoiled, axis=-1), axis=-1) >= TRIPLES_BEFORE
     return np.asarray(spoiled & vouched[..., None])
 
 

@@ -14,64 +14,32 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.convergence.roundoff_onset import LOG2
+from vibsim.convergence.thresholds import (
+    ALIKE,
+    EMERGING,
+    FADING,
+    FARTHEST,
+    FASTEST,
+    GROWS,
+    HIDDEN,
+    LEAST_WIDTH,
+    LOG2,
+    MOST_SETTLED,
+    NEAREST,
+    OF_CHANGE,
+    OF_ERRORS,
+    OF_FADING,
+    OF_SCATTER,
+    OF_SETTLED,
+    OF_STEADY,
+    PARALLEL,
+    READABLE,
+    SINGLE_WIDTH,
+    SLOWEST,
+)
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-COINCIDENT = 0.2
-"""Largest scatter (see `differences.scatter`) of curves that count as proportional."""
-FADING = 0.75
-"""The scatter fades when it falls at least to this part of itself per level (1/2 and 1/4 are usual)."""
-QUICK, SLOW = 0.62, 0.05
-"""What fades no faster is a power h^(p+1/2), of which more than a tenth makes the mismatch 0.06."""
-GROWS = 1.3
-"""The scatter drifts when it grows by more per level; a power lower by 1/2 makes it grow by 2^0.5."""
-READABLE = 1e-5
-"""Less scatter, or less than `PARALLEL` of the change of the order, is that of series of one shape, and no trend."""
-PARALLEL = 0.05
-SLOWEST, FASTEST = 0.8, 0.1
-"""Factors per level between which changes of the order fade when they come from a power of the expansion."""
-ALIKE = 0.15
-"""Scatter and order tell of the same power where their factors differ by no more."""
-LEAST_WIDTH = 1e-6
-"""Half the width of an interval at least: the digits that reports show."""
-OF_CHANGE = 2.1
-"""Half the width of an interval over the last changes of the order: 95 % of ladders whose trend is not known."""
-OF_SETTLED = 7.5
-"""The same where scatter and three orders tell of one next power, which is then taken off: over the last change times
-what the correction leaves out, which is the distance of the two factors and the scatter itself."""
-MOST_SETTLED = 0.6
-"""Such an interval is no wider than this part of the last change."""
-OF_STEADY = 0.5
-"""The same over the larger of two changes, where three orders of series of one shape do."""
-OF_FADING = 1.3
-"""The same where the scatter alone tells that the next power fades."""
-OF_SCATTER = 3.0
-"""Half the width of the interval of a single order over its scatter / log 2: shapes at an angle of 18 degrees."""
-OF_ERRORS = 2.0
-"""Half the width of the interval of a single order over its distance from the order of the last true errors."""
-SINGLE_WIDTH = 2e-4
-"""Half the width of the interval of a single order at least."""
-JUMP = 0.3
-"""Change of the order from one triple to the next that a scatter of `HIDDEN` at most cannot come from."""
-SETTLED = 0.15
-"""Largest mismatch of a settled order: a second term of a tenth of the first makes 0.2 for neighbouring powers."""
-HIDDEN = 0.015
-"""A tenth of h^(p-1), or of h^(p-2), beside h^p makes at least this mismatch: 0.0167 for p = 2, 0.015 for p = 4.
-
-With more, a ladder of which no trend is known may be on the way to a lower order.
-"""
-EMERGING = 0.1
-"""A lower power that is seen to grow may be so large a part of h^p at the finest level."""
-NEAREST = 0.1
-"""An order so near a multiple of 1/2 may be that one: expansions have no other, and the distance is an error seen."""
-FARTHEST = 3.0
-"""A lower power is lower by no more."""
-PASSING = 0.05
-"""Orders that change by more and do not settle may be on the way from one power to another."""
-NEXT = 2.0
-"""The powers of an expansion are at most so far apart: an order that has not settled may become one so far away."""
 
 
 def settling(

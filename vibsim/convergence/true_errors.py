@@ -11,28 +11,23 @@ from numpy.typing import NDArray
 from vibsim.convergence.asymptotic_range import Trend, mismatches
 from vibsim.convergence.differences import safe_ratio
 from vibsim.convergence.ladder_statistics import Evidence, accuracy, error_orders, pick
-from vibsim.convergence.roundoff_onset import LOG2
-from vibsim.convergence.settled_orders import EMERGING, FARTHEST, GROWS, SETTLED
+from vibsim.convergence.thresholds import (
+    EMERGING,
+    ERRORS_FADE,
+    ERRORS_VOUCH,
+    EXCESS,
+    FARTHEST,
+    GROWS,
+    HALF_SPACING,
+    LEAVES,
+    LOG2,
+    SEEN_SHARE,
+    SETTLED_MISMATCH,
+    STAYED,
+)
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-EXCESS = 1.5
-"""An error so many times the one that the differences allow, or so many times smaller, contradicts them."""
-AGREEMENT = 0.25
-"""Orders of differences and of errors agree within half of what separates two orders."""
-LEAVES = 0.03
-"""Orders of true errors may be so far from p: a tenth of h^(p-1) beside h^p makes 0.07."""
-VOUCHED = 0.04
-"""Mismatch of errors that leaves no room for a tenth of a lower power, which makes 0.05."""
-VOUCHED_FADING = 0.6
-"""What the errors show besides h^p falls at least to this part of itself per level when it is a higher power."""
-SEEN = 0.3
-"""Of what a lower power in the errors must leave in the differences, this part would be seen."""
-STAYED = 0.5
-"""An error that depends on where events lie stays where the finest level has more than this part of the coarsest."""
-LEAST_ORDER = 0.25
-"""No stated order is taken for less when errors are predicted: half the least that an expansion has, 1/2."""
 
 
 def errors_leave(e: Evidence, t: Trend, p: Floats) -> Flags:
@@ -70,8 +65,8 @@ def _unseen(t: Trend, p: Floats, last: Floats) -> Flags:
 
     Of h^(1/2), the part x of the errors is ``x (2^(1/2) - 1)/(2^p - 1)`` of the differences.
     """
-    least = LOG2 * last * (np.sqrt(2.0) - 1.0) / np.expm1(np.maximum(p, LEAST_ORDER) * LOG2)
-    return np.asarray(t.several & (np.maximum(*mismatches(t, p)) < SEEN * least))
+    least = LOG2 * last * (np.sqrt(2.0) - 1.0) / np.expm1(np.maximum(p, HALF_SPACING) * LOG2)
+    return np.asarray(t.several & (np.maximum(*mismatches(t, p)) < SEEN_SHARE * least))
 
 
 def _little(t: Trend, p: Floats, last: Floats, before: Floats) -> Flags:
@@ -120,8 +115,8 @@ def errors_confirm(e: Evidence, t: Trend, p: Floats) -> Flags:
 
 def _no_room(e: Evidence, error: Floats, finer: Floats, coarser: Floats) -> Flags:
     """Say where mismatches of two pairs of errors are small, or fade, and the last error is no round-off."""
-    fades = (finer <= VOUCHED_FADING * coarser) & (finer <= SETTLED)
-    return np.asarray((error > EXCESS * accuracy(e)) & ((finer <= VOUCHED) | fades))
+    fades = (finer <= ERRORS_FADE * coarser) & (finer <= SETTLED_MISMATCH)
+    return np.asarray((error > EXCESS * accuracy(e)) & ((finer <= ERRORS_VOUCH) | fades))
 
 
 def contradicts(e: Evidence, t: Trend) -> tuple[Flags, Flags]:
@@ -137,7 +132,7 @@ def contradicts(e: Evidence, t: Trend) -> tuple[Flags, Flags]:
     gap = np.diff(np.array(e.levels))[finer - 1]
     difference, error = pick(e.difference, finer - 1), pick(e.error, finer)
     most, least = (
-        difference / np.expm1(np.maximum(order, LEAST_ORDER) * gap * np.log(2.0))
+        difference / np.expm1(np.maximum(order, HALF_SPACING) * gap * np.log(2.0))
         for order in (
             np.minimum(t.order, t.local) - t.width,
             np.maximum(t.order, t.local) + t.width,
@@ -158,7 +153,7 @@ def irregular(e: Evidence, t: Trend) -> Flags:
     if e.left_to_the_mesh is not None:
         found |= ~np.isnan(e.left_to_the_mesh)
     if e.corner is not None:
-        found |= e.corner <= t.order + AGREEMENT
+        found |= e.corner <= t.order + HALF_SPACING
     return found
 
 
@@ -188,11 +183,9 @@ def errors_agree(e: Evidence, t: Trend) -> Flags:
     agree = np.ones(e.order.shape, dtype=bool)
     if e.error is None:
         return agree
-    levels = np.array(e.levels, dtype=np.float64)
     for back in (0, 1):
-        coarse, fine = t.last + 1 - back, t.last + 2 - back
-        ratio = safe_ratio(pick(e.error, coarse), pick(e.error, fine))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            found = np.log2(ratio) / (levels[fine] - levels[coarse])
-        agree &= ~np.isfinite(found) | (np.abs(found - t.order) <= np.maximum(AGREEMENT, t.width))
+        found = pick(error_orders(e), t.last + 1 - back)
+        agree &= ~np.isfinite(found) | (
+            np.abs(found - t.order) <= np.maximum(HALF_SPACING, t.width)
+        )
     return agree

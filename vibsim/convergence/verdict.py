@@ -10,7 +10,7 @@ The rules, in the order in which they apply (the first that applies decides):
    ``too_few_levels``;
 2. round-off: `vibsim.convergence.roundoff_onset` says where it begins; finer triples are cut off. Nothing left:
    ``exact`` where the differences of an inexact scheme would have been seen, else ``round_off``. Where the promise is
-   that a quantity is exact, this alone decides: a difference above ``BLAME * floor`` is ``order_low``;
+   that a quantity is exact, this alone decides: a difference above ``ABOVE_ROUND_OFF * floor`` is ``order_low``;
 3. one triple left: the two difference series over time are the evidence, and must be proportional; beside them the true
    errors, where they are known;
 4. several left: the last two local orders or their limit, and what is left besides h^p, which must fade, or be too
@@ -35,13 +35,7 @@ from numpy.typing import NDArray
 from vibsim.convergence.asymptotic_range import trend
 from vibsim.convergence.classify import rules
 from vibsim.convergence.differences import order_of_ratio, safe_ratio
-from vibsim.convergence.ladder_statistics import (
-    BLAME,
-    Evidence,
-    at_round_off,
-    breakdown,
-    error_orders,
-)
+from vibsim.convergence.ladder_statistics import Evidence, at_round_off, breakdown, error_orders
 from vibsim.convergence.true_errors import errors_vouch
 from vibsim.core.vocabulary import REASON_NAMES, REASONS, STATUSES
 
@@ -107,7 +101,6 @@ def judge(evidence: Evidence) -> Judgement:
         e.scatter,
         e.difference,
         e.floor,
-        BLAME,
         e.tolerance,
         ceiling=e.ceiling,
         of_errors=of_errors,

@@ -26,10 +26,20 @@ from vibsim.comparison.extrapolate_members import (
     noise_of,
 )
 from vibsim.comparison.member_method import Method, Start
-from vibsim.convergence.romberg import Pair
+from vibsim.convergence.state_extrapolation import Pair
 from vibsim.core.errors import Fault, InputError, VibsimError
 from vibsim.experiment.schema.fields import MAX_LEVEL
 from vibsim.ladder.solving import climb
+from vibsim.ladder.thresholds import (
+    LEAST_STEPS,
+    LONGEST,
+    MOST_STEPS,
+    PATIENCE,
+    PILOT,
+    PLAIN_STEPS,
+    SEARCHED,
+    TIMES,
+)
 from vibsim.simulation import Members, members
 
 if TYPE_CHECKING:
@@ -37,23 +47,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-PILOT = 16
-"""Members that are run."""
-SEARCHED = 2**16
-"""Up to so many members their extreme values are looked for."""
-LEAST_STEPS = 16
-"""Steps of the coarsest level that is tried."""
-TIMES = 32
-"""At so many times at most the pilot looks."""
-LONGEST = 12
-"""Levels of a ladder at most; more of them only add round-off."""
-MOST_STEPS = 2**27
-"""Steps that the pilot may take, all its members and levels together."""
 NOT_SMOOTH = "the solutions of its levels do not approach each other as smooth ones would"
-PATIENCE = 2
-"""After so many levels that do not halve the bound no finer one will."""
-PLAIN_STEPS = 2**18
-"""Up to so many steps of a level the pilot takes less time in plain Python than a new kernel takes to be compiled."""
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from vibsim.comparison.best_solution import in_order, methods, record_of, start_
 from vibsim.comparison.extrapolate_members import Extrapolated, joined
 from vibsim.ladder.choosing import resolve
 from vibsim.ladder.solving import climb
+from vibsim.ladder.thresholds import POINTS_AT_A_TIME
 from vibsim.simulation import Members, members
 from vibsim.simulation.level import coordinates
 
@@ -17,9 +18,6 @@ if TYPE_CHECKING:
     import xarray
 
     from vibsim.experiment import Experiment
-
-PART = 2**18
-"""Points of one level that are held at a time."""
 
 
 def best(
@@ -53,7 +51,7 @@ def best(
     steps = tuple(experiment.steps(level) for level in experiment.levels)
     every = plan.sampling(experiment, experiment.levels[0])
     points = steps[0] // every
-    size = max(PART // (points + 1), 1)
+    size = max(POINTS_AT_A_TIME // (points + 1), 1)
     schemes = experiment.ladder
     parts = []
     for first in range(0, experiment.members, size):

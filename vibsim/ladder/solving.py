@@ -15,12 +15,11 @@ from vibsim.comparison.extrapolate_members import (
     noise_of,
 )
 from vibsim.comparison.member_method import Method, Start, rate_of
-from vibsim.convergence.romberg import FLOATS, KNOWN_DIGIT, Circumstances, Pair, best_entry
+from vibsim.convergence.state_extrapolation import FLOATS, Circumstances, Pair, best_entry
+from vibsim.convergence.thresholds import KNOWN_DIGIT
+from vibsim.ladder.thresholds import LEAST_LOOKS
 
 Floats = NDArray[np.float64]
-
-SEEN = 16
-"""The coarsest level is looked at so many times at least, where rounding errors are measured."""
 
 
 def solve(
@@ -93,7 +92,7 @@ def _levels(
 ) -> tuple[list[Pair], Floats | None]:
     """Return every level at `points` equal times and t = 0, and the measured noise, of shape (t, case)."""
     finer = 1
-    while points * finer < SEEN and steps[0] % (2 * points * finer) == 0:
+    while points * finer < LEAST_LOOKS and steps[0] % (2 * points * finer) == 0:
         finer *= 2
     every = [n // points for n in steps]
     every[0] //= finer

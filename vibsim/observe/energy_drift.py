@@ -4,16 +4,16 @@ What is fitted is M(t), the largest absolute deviation at every step so far. Let
 [T/2, T], [T/4, T/2] and [T/8, T/4]. Where ``M = a + b t^k``, whatever a and b, ``(m1 - m2)/(m2 - m3) = 2^k``: a means
 smooths the stairs in which a drift climbs under an oscillation, and the oscillation itself is a. So, in this order:
 
-- ``none``: M(T) is no more than `BLAME` times the predicted round-off of the energy;
+- ``none``: M(T) is no more than `ABOVE_ROUND_OFF` times the predicted round-off of the energy;
 - ``unclear``: fewer than `LEAST_PERIODS` periods, in which the window from T/8 on would not see the whole of an
   oscillation, or fewer than `LEAST_SAMPLES` samples;
-- ``exponential``: the energy itself has changed by more than a factor e^`LARGE` and the k of ``|ln(E/E(0))|`` is nearer
-  to 1 than that of M. A smaller change cannot be told from a linear one, and the linear one is meant then;
+- ``exponential``: the energy itself has changed by more than a factor e^`LARGE_CHANGE` and the k of ``|ln(E/E(0))|``
+  is nearer to 1 than that of M. A smaller change cannot be told from a linear one, and the linear one is meant then;
   An energy that falls below the smallest normal number is fitted above it alone, and is never bounded;
 - ``bounded``: m1 is above m2 by less than `STILL` of M(T), or it creeps only: k below `CREEP`, m1 above m2 by less
   than `STILL_CREEPS` (finer sampling of the same maximum); and so does the range of the deviation so far, which a drift
   widens from the start on, where M stands until the drift has overtaken an oscillation to the other side;
-- ``linear``, ``quadratic``: k, of M or of that range, within `NEAR` of 1 or 2;
+- ``linear``, ``quadratic``: k, of M or of that range, within `NEAR_POWER` of 1 or 2;
 - else ``unclear``.
 
 A drift so slow that a run shows less than `STILL` of it is called bounded: a longer run decides.
@@ -27,29 +27,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.convergence.differences import safe_ratio
-from vibsim.convergence.ladder_statistics import BLAME
+from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.vocabulary import DRIFTS
+from vibsim.observe.thresholds import (
+    CREEP,
+    LARGE_CHANGE,
+    LEAST_PER_PERIOD,
+    LEAST_PERIODS,
+    LEAST_SAMPLES,
+    NEAR_POWER,
+    SMALLEST_NORMAL,
+    STILL,
+    STILL_CREEPS,
+)
 
 Floats = NDArray[np.float64]
 
-LEAST_PERIODS = 4.0
-"""The energy error of a vibration repeats every half period, which T/8 is then."""
-LEAST_SAMPLES = 32
-"""Samples on [0, T], four of them on the shortest window."""
-LEAST_PER_PERIOD = 16.0
-"""Samples in a period that see its extrema to 2 %: the range of fewer says nothing."""
-STILL = 0.01
-"""Rise of M from one window to the next, as a part of itself, that is none."""
-STILL_CREEPS = 0.2
-"""Largest rise of a maximum that is found more exactly with time only."""
-CREEP = -0.5
-"""Largest k of such a rise."""
-NEAR = 0.25
-"""How far k may be from 1 or 2: a quarter of what separates them."""
-LARGE = 0.2
-"""ln(E/E(0)) beyond which exponential and linear growth differ in k by more than rounding: by about 0.1 at 0.2."""
-SMALLEST = float(np.finfo(np.float64).tiny)
-"""The smallest normal number: what is below has lost digits."""
 
 NONE, BOUNDED, LINEAR, QUADRATIC, EXPONENTIAL, UNCLEAR = range(len(DRIFTS))
 """Index into `vocabulary.DRIFTS`."""
@@ -108,9 +101,11 @@ def drift_of(
         rise, k = _rise(means)
         fall, k_log = _power(np.abs(change))
         last = change[..., -2]
-        gone = (np.abs(ratio * energy[..., None])[..., -2] < SMALLEST) & (np.abs(energy) > SMALLEST)
+        gone = (np.abs(ratio * energy[..., None])[..., -2] < SMALLEST_NORMAL) & (
+            np.abs(energy) > SMALLEST_NORMAL
+        )
     size = np.where(np.isfinite(end) & (end > 0), end, 1.0)
-    allowed = np.broadcast_to(BLAME * floor, end.shape)
+    allowed = np.broadcast_to(ABOVE_ROUND_OFF * floor, end.shape)
     still = _is_still(rise, k, size)
     if deviation is not None:
         # M stands still until a drift has overtaken an oscillation to the other side, and is of no power then
@@ -121,7 +116,7 @@ def drift_of(
         rise, k = _rise(means)
         still &= ~widens
     closer = ~(np.abs(k_log - 1.0) >= np.abs(k - 1.0))
-    exponential = (np.abs(last) > LARGE) & (np.abs(k_log - 1.0) <= NEAR) & closer
+    exponential = (np.abs(last) > LARGE_CHANGE) & (np.abs(k_log - 1.0) <= NEAR_POWER) & closer
     short = (periods < LEAST_PERIODS) | (samples < LEAST_SAMPLES)
     unknown = ~np.isfinite(end) | np.isnan(running[..., -2])
     rules = [
@@ -131,8 +126,8 @@ def drift_of(
         (exponential, EXPONENTIAL),
         (gone, UNCLEAR),
         (still, BOUNDED),
-        (np.abs(k - 1.0) <= NEAR, LINEAR),
-        (np.abs(k - 2.0) <= NEAR, QUADRATIC),
+        (np.abs(k - 1.0) <= NEAR_POWER, LINEAR),
+        (np.abs(k - 2.0) <= NEAR_POWER, QUADRATIC),
     ]
     kind = np.select([mask for mask, _ in rules], [code for _, code in rules], UNCLEAR)
     relative = safe_ratio(rise, np.abs(energy))
@@ -141,7 +136,7 @@ def drift_of(
     per_period, per_square = safe_ratio(relative, first), safe_ratio(relative, second)
     of_log = safe_ratio(np.sign(last) * fall, first)
     for at in zip(*np.nonzero((kind == UNCLEAR) & gone & ~unknown & ~short), strict=True):
-        per_sample, k[at] = _decay(change[at], np.abs(ratio[at] * energy[at]) >= SMALLEST)
+        per_sample, k[at] = _decay(change[at], np.abs(ratio[at] * energy[at]) >= SMALLEST_NORMAL)
         if per_sample < 0:
             kind[at], of_log[at] = EXPONENTIAL, per_sample * samples / periods[at[-1]]
     zero = np.zeros(end.shape)
@@ -161,7 +156,7 @@ def drift_of(
 
 def _is_named(k: Floats) -> NDArray[np.bool_]:
     """Say where k is that of a linear or a quadratic drift."""
-    return np.asarray((np.abs(k - 1.0) <= NEAR) | (np.abs(k - 2.0) <= NEAR))
+    return np.asarray((np.abs(k - 1.0) <= NEAR_POWER) | (np.abs(k - 2.0) <= NEAR_POWER))
 
 
 def _is_still(rise: Floats, k: Floats, size: Floats) -> NDArray[np.bool_]:
@@ -190,7 +185,7 @@ def _decay(change: Floats, is_normal: NDArray[np.bool_]) -> tuple[float, float]:
     fall, k = _power(np.abs(above))
     n = len(above) - 1
     rise, _ = _power(np.arange(n + 1.0))
-    return float(-fall / rise) if abs(k - 1.0) <= NEAR else np.nan, float(k)
+    return float(-fall / rise) if abs(k - 1.0) <= NEAR_POWER else np.nan, float(k)
 
 
 def _power(values: Floats) -> tuple[Floats, Floats]:

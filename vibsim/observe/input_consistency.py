@@ -10,14 +10,12 @@ from numpy.typing import NDArray
 
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record
+from vibsim.observe.thresholds import SAME_START
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
 Floats = NDArray[np.float64]
-
-SAME_START = 1e-9
-"""Levels start from the same values, to this part of the state's size: far above the rounding of an exact solution."""
 
 
 SAME_AT_EVERY_LEVEL = frozenset({"natural_frequency", "exact_period"})

@@ -28,6 +28,7 @@ from vibsim.observe.input_consistency import check_belonging
 from vibsim.observe.missed_pulses import Missed, missed_pulses
 from vibsim.observe.sensitivity import sensitivity
 from vibsim.observe.stiffness import decay_rate, stiffest
+from vibsim.observe.thresholds import FEW_RADIANS
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import Members, members
 
@@ -37,8 +38,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-FEW_RADIANS = 0.5
-"""Common times further apart, in units of 1/w, may miss the turns of a motion: the largest by more than an eighth."""
 CENTRED = "_d2t"
 """What follows the name of a velocity or an energy that is made with ``[D_2t u]``."""
 
@@ -49,7 +48,7 @@ def plain_name(name: str) -> str:
 
 
 @dataclass(frozen=True)
-class Part:
+class MemberBlock:
     """Some members of an experiment, or all; s, c and l stand for schemes, cases and levels."""
 
     experiment: Experiment
@@ -200,7 +199,7 @@ class Part:
             return np.asarray(np.maximum(computed, self.stored_floor * size[..., None]))
 
 
-def part_of(experiment: Experiment, records: Mapping[int, Record]) -> Part:
+def block_of(experiment: Experiment, records: Mapping[int, Record]) -> MemberBlock:
     """Bring the level Records of some members together.
 
     Raises
@@ -217,7 +216,7 @@ def part_of(experiment: Experiment, records: Mapping[int, Record]) -> Part:
     group = members(experiment, int(case[0]), int(case[-1]) + 1)
     t = grid.times(group.end)
     exact = _exact(experiment, t, group) if lean else _stored(experiment, grid, finest)
-    return Part(
+    return MemberBlock(
         experiment=experiment,
         records=records,
         grid=grid,

@@ -7,23 +7,19 @@ from numpy.typing import NDArray
 
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, solution_size
 from vibsim.convergence.differences import largest, safe_ratio
-from vibsim.convergence.ladder_statistics import BLAME
+from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.formula import derivative, plus, values
 from vibsim.models.base import tree
 from vibsim.observe.energy_drift import Drift, drift_of
-from vibsim.observe.member_block import CENTRED, Part, energy_at_start
+from vibsim.observe.member_block import CENTRED, MemberBlock, energy_at_start
+from vibsim.observe.thresholds import MOST_ROUNDED, STEPPED
 from vibsim.schemes import SCHEMES
 from vibsim.schemes.base import UNIT_ROUND_OFF, round_off
 
 Floats = NDArray[np.float64]
 
-STEPPED = 4.0
-"""How often ``N p + N^(1/2) p^2`` round-offs may be in the energy of a scheme that keeps it: 1.02 at most was seen."""
-MOST_ROUNDED = 1e-3
-"""Part of the energy above which a deviation is never called rounding, however large the step."""
 
-
-def drift_at(part: Part, level: int, name: str = "energy_deviation") -> Drift:
+def drift_at(block: MemberBlock, level: int, name: str = "energy_deviation") -> Drift:
     """Find how an energy deviation grows at a level; NaN rows of its series are ``unclear``.
 
     Parameters
@@ -31,31 +27,31 @@ def drift_at(part: Part, level: int, name: str = "energy_deviation") -> Drift:
     name
         ``energy_deviation`` or ``energy_deviation_d2t``.
     """
-    record, index = part.records[level], part.grid.levels.index(level)
+    record, index = block.records[level], block.grid.levels.index(level)
     initial = energy_at_start(record)
-    missing = np.full((*part.shape, len(record["t"])), np.nan)
+    missing = np.full((*block.shape, len(record["t"])), np.nan)
     deviation = np.asarray(record[name], dtype=float) if name in record else missing
     size = np.abs(initial) + solution_size([np.nan_to_num(deviation)])
     # an energy without bound has a floor without bound
     with np.errstate(over="ignore", invalid="ignore"):
-        grows = _conditioned(part, level, size)
+        grows = _conditioned(block, level, size)
         # a motion that magnifies a disturbance shifts it in time, which leaves the energy as it is
-        floor = part.floor_of(name, size * grows / part.magnified)[..., index]
-        floor = np.maximum(floor, _of_steps(part, level) * size * grows)
+        floor = block.floor_of(name, size * grows / block.magnified)[..., index]
+        floor = np.maximum(floor, _of_steps(block, level) * size * grows)
     # the tolerance of an adaptive scheme is an error that it makes, and no round-off
-    floor[part.adaptive] = SPACING_AT_ONE * size[part.adaptive]
+    floor[block.adaptive] = SPACING_AT_ONE * size[block.adaptive]
     w = np.asarray(record["natural_frequency"], dtype=float)
     return drift_of(
-        _running(part, level, name, deviation),
-        _ratio(part, level, name, deviation),
+        _running(block, level, name, deviation),
+        _ratio(block, level, name, deviation),
         initial,
         floor,
-        w * part.group.end / (2.0 * np.pi),
+        w * block.group.end / (2.0 * np.pi),
         deviation,
     )
 
 
-def _conditioned(part: Part, level: int, size: Floats) -> Floats:
+def _conditioned(block: MemberBlock, level: int, size: Floats) -> Floats:
     """Return the factor by which rounding of the states is felt by the energy, at least 1, shape (scheme, case).
 
     A conserved energy keeps every error dE that a rounded state dx makes: ``dE = sum of (dE/dx) dx``, with dx relative
@@ -67,11 +63,11 @@ def _conditioned(part: Part, level: int, size: Floats) -> Floats:
     size
         Size of the energy, shape (scheme, case).
     """
-    model, record = part.model, part.records[level]
+    model, record = block.model, block.records[level]
     if not model.conservative:
-        return np.broadcast_to(part.magnified, size.shape)
+        return np.broadcast_to(block.magnified, size.shape)
     states = {s.name: np.asarray(record[s.name], dtype=float) for s in model.states}
-    named = {row.name: part.group.parameters[row.key][:, None] for row in model.parameters}
+    named = {row.name: block.group.parameters[row.key][:, None] for row in model.parameters}
     energy = plus(tree(model, model.kinetic_energy), tree(model, model.potential_energy))
     square = np.zeros(next(iter(states.values())).shape)
     with np.errstate(all="ignore"):
@@ -82,24 +78,25 @@ def _conditioned(part: Part, level: int, size: Floats) -> Floats:
     return np.asarray(np.fmax(felt, 1.0))
 
 
-def _of_steps(part: Part, level: int) -> Floats:
-    """Return what rounding adds to the energy in proportion to the size of a step, over `BLAME`, (scheme, case).
+def _of_steps(block: MemberBlock, level: int) -> Floats:
+    """Return what rounding adds to the energy in proportion to the size of a step, shape (scheme, case).
 
+    It is relative to the energy, over `ABOVE_ROUND_OFF`.
     Rounded coefficients make every step, of the size p = w dt, larger or smaller by the same: N p. Steps larger than a
     radian are differences of numbers p^2 large, which are rounded otherwise each time: ``N^(1/2) p^2``. Centred
     differences have a prediction of their own for each way of writing them.
     """
-    kinds = [SCHEMES[scheme.kind] for scheme in part.experiment.schemes]
+    kinds = [SCHEMES[scheme.kind] for scheme in block.experiment.schemes]
     plain = np.array([kind.round_off is round_off for kind in kinds])
-    index = part.grid.levels.index(level)
-    p, steps = part.omega_dt[:, index], part.grid.steps[index]
+    index = block.grid.levels.index(level)
+    p, steps = block.omega_dt[:, index], block.grid.steps[index]
     size = STEPPED * UNIT_ROUND_OFF * (steps * p + steps**0.5 * p * p)
-    return np.where(plain[:, None], np.minimum(size, MOST_ROUNDED), 0.0) / BLAME
+    return np.where(plain[:, None], np.minimum(size, MOST_ROUNDED), 0.0) / ABOVE_ROUND_OFF
 
 
-def _running(part: Part, level: int, name: str, deviation: Floats) -> Floats:
+def _running(block: MemberBlock, level: int, name: str, deviation: Floats) -> Floats:
     """Return the largest deviation over every step so far; where storage is bounded, over the samples so far."""
-    record = part.records[level]
+    record = block.records[level]
     if f"{name}_running_max" in record:
         return np.asarray(record[f"{name}_running_max"], dtype=float)
     values = np.abs(deviation)
@@ -108,9 +105,9 @@ def _running(part: Part, level: int, name: str, deviation: Floats) -> Floats:
     return np.asarray(np.maximum.accumulate(values, axis=-1))
 
 
-def _ratio(part: Part, level: int, name: str, deviation: Floats) -> Floats:
+def _ratio(block: MemberBlock, level: int, name: str, deviation: Floats) -> Floats:
     """Return the energy over that at the start; from the energy itself, which has more digits where it decays."""
-    record, initial = part.records[level], energy_at_start(part.records[level])[..., None]
+    record, initial = block.records[level], energy_at_start(block.records[level])[..., None]
     energy = name.replace("_deviation", "")
     values = record[energy] if energy in record else initial + deviation
     ratio = safe_ratio(*np.broadcast_arrays(values, initial))

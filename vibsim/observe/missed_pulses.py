@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 from vibsim.core.record import Record, Variable, attributes
 from vibsim.formula import Pulses
 from vibsim.models import Model
+from vibsim.observe.thresholds import MOST_GAPS
 from vibsim.simulation import Members
 from vibsim.simulation.reference.missed_pulses import pulses_of_force, varies_in_time
 
 Floats = NDArray[np.float64]
 
-MOST_GAPS = 2**21
-"""Gaps between points that are looked at; of longer and larger runs wider ones, and then those around a pulse."""
 AROUND = np.arange(-2, 4)
 """Points around a pulse."""
 

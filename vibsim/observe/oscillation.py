@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from vibsim.convergence.differences import safe_ratio
 from vibsim.core.record import Record
 from vibsim.experiment.stored_series import FEWEST_EXTREMA
-from vibsim.observe.member_block import Part
+from vibsim.observe.member_block import MemberBlock
 from vibsim.observe.predicted_oscillation import is_simple, natural_frequency
 from vibsim.observe.recurrence import Motion, fitted
 from vibsim.schemes import SCHEMES
@@ -35,56 +35,56 @@ def amplitude_error(record: Record) -> Floats:
     return np.asarray(growth_factor(record) - 1.0)
 
 
-def growth_per_period(part: Part, level: int) -> Floats:
+def growth_per_period(block: MemberBlock, level: int) -> Floats:
     """Return the factor by which the amplitude grows in a period.
 
     The period is the natural one where the model is linear, so that it can be compared with theory even where the
     scheme's own period is far from it; else it is the measured one.
     """
-    record, index = part.records[level], part.grid.levels.index(level)
-    found = growth_over_run(part, record)
-    motion = _recurrence(part, level)
+    record, index = block.records[level], block.grid.levels.index(level)
+    found = growth_over_run(block, record)
+    motion = _recurrence(block, level)
     if motion is None:
         return found
     with np.errstate(over="ignore"):
-        own = np.exp(motion.log_growth * (2.0 * np.pi / part.omega_dt[:, index]))
+        own = np.exp(motion.log_growth * (2.0 * np.pi / block.omega_dt[:, index]))
     return np.where(np.isfinite(own), own, found)
 
 
-def growth_of_motion(part: Part, level: int) -> Floats:
+def growth_of_motion(block: MemberBlock, level: int) -> Floats:
     """Return the same where it is the growth of the whole motion; NaN of several coordinates.
 
     Two coordinates pass their energy to and fro: the peaks of the first one rise and fall without any growth.
     """
-    if len(part.model.positions) > 1:
-        return np.full(part.shape, np.nan)
-    return growth_per_period(part, level)
+    if len(block.model.positions) > 1:
+        return np.full(block.shape, np.nan)
+    return growth_per_period(block, level)
 
 
-def has_recurrence(part: Part, level: int) -> bool:
+def has_recurrence(block: MemberBlock, level: int) -> bool:
     """Tell whether the steps of a level satisfy a recurrence that can be seen: a linear model, and no step left out."""
-    return is_simple(part) and int(np.asarray(part.records[level].attrs["every"])) == 1
+    return is_simple(block) and int(np.asarray(block.records[level].attrs["every"])) == 1
 
 
-def _recurrence(part: Part, level: int) -> Motion | None:
+def _recurrence(block: MemberBlock, level: int) -> Motion | None:
     """Return the recurrence of every run, where there is one."""
-    if not has_recurrence(part, level):
+    if not has_recurrence(block, level):
         return None
-    return fitted(np.asarray(part.records[level][part.model.position], dtype=float))
+    return fitted(np.asarray(block.records[level][block.model.position], dtype=float))
 
 
-def growth_over_run(part: Part, record: Record) -> Floats:
+def growth_over_run(block: MemberBlock, record: Record) -> Floats:
     """Return the same from the first and the last peak of the whole run, the start among them; always there.
 
     Beyond a limit, where the sign changes at every step, the height of a peak may have either sign.
     """
     time = np.asarray(record["period"] * record["period_count"], dtype=float)
-    return _per_period(part, record, np.abs(growth_factor(record)), time)
+    return _per_period(block, record, np.abs(growth_factor(record)), time)
 
 
-def _per_period(part: Part, record: Record, factor: Floats, time: Floats) -> Floats:
+def _per_period(block: MemberBlock, record: Record, factor: Floats, time: Floats) -> Floats:
     period = np.asarray(record["period"], dtype=float)
-    natural = 2.0 * np.pi / natural_frequency(part) if is_simple(part) else period
+    natural = 2.0 * np.pi / natural_frequency(block) if is_simple(block) else period
     intervals = safe_ratio(*np.broadcast_arrays(time, natural))
     usable = (factor > 0) & (intervals > 0)
     log = np.log(np.where(usable, factor, 1.0)) / np.where(usable, intervals, 1.0)
@@ -92,14 +92,14 @@ def _per_period(part: Part, record: Record, factor: Floats, time: Floats) -> Flo
         return np.where(usable, np.exp(log), np.nan)
 
 
-def frequency(part: Part, level: int) -> Floats:
+def frequency(block: MemberBlock, level: int) -> Floats:
     """Return the angular frequency: 2 pi over the period."""
-    by_peaks = _frequency_by_peaks(part.records[level])
-    motion = _recurrence(part, level)
+    by_peaks = _frequency_by_peaks(block.records[level])
+    motion = _recurrence(block, level)
     if motion is None:
         return by_peaks
-    p = part.omega_dt[:, part.grid.levels.index(level)]
-    own = motion.angle * (natural_frequency(part) / p)
+    p = block.omega_dt[:, block.grid.levels.index(level)]
+    own = motion.angle * (natural_frequency(block) / p)
     return np.where(own > 0, own, by_peaks)
 
 
@@ -108,23 +108,23 @@ def _frequency_by_peaks(record: Record) -> Floats:
     return safe_ratio(np.full_like(period, 2 * np.pi), period)
 
 
-def error_of_frequency(part: Part, level: int) -> Floats:
+def error_of_frequency(block: MemberBlock, level: int) -> Floats:
     """Return the frequency over the exact one, less one."""
-    return np.asarray(frequency(part, level) * _exact_period(part, level) / (2 * np.pi) - 1.0)
+    return np.asarray(frequency(block, level) * _exact_period(block, level) / (2 * np.pi) - 1.0)
 
 
-def phase_error(part: Part, level: int) -> Floats:
+def phase_error(block: MemberBlock, level: int) -> Floats:
     """Return the exact period less the measured one: the time by which peaks come early, per period."""
-    found = frequency(part, level)
+    found = frequency(block, level)
     period = safe_ratio(np.full_like(found, 2 * np.pi), found)
-    return np.asarray(_exact_period(part, level) - period)
+    return np.asarray(_exact_period(block, level) - period)
 
 
-def _exact_period(part: Part, level: int) -> Floats:
+def _exact_period(block: MemberBlock, level: int) -> Floats:
     """Return the exact period, shape (case,); NaN where it is not known or infinite."""
-    record = part.records[level]
+    record = block.records[level]
     if "exact_period" not in record:
-        return np.full(part.shape[1], np.nan)
+        return np.full(block.shape[1], np.nan)
     found = np.asarray(record["exact_period"], dtype=float)
     return np.where(np.isfinite(found), found, np.nan)
 
@@ -152,37 +152,37 @@ def phase_error_slope(record: Record) -> Floats:
     return np.where(several & np.isfinite(found), found, missing)
 
 
-def energy_error_d2t(part: Part, record: Record) -> Floats:
+def energy_error_d2t(block: MemberBlock, record: Record) -> Floats:
     """Return max |E - E(0)| with the velocity ``[D_2t u]``, n = 1, ..., N-1.
 
     A scheme whose own velocity that is has its own, without the last point.
     """
-    found = np.full(part.shape, np.nan)
+    found = np.full(block.shape, np.nan)
     if "energy_deviation_d2t_max_abs" in record:
         found[...] = record["energy_deviation_d2t_max_abs"]
     own = record["energy_deviation_max_abs_interior"]
-    for i, scheme in enumerate(part.experiment.schemes):
+    for i, scheme in enumerate(block.experiment.schemes):
         if not scheme.adaptive and not scheme.own_velocity:
             found[i] = own[i]
     return found
 
 
-def force_evaluations(part: Part, level: int) -> Floats:
+def force_evaluations(block: MemberBlock, level: int) -> Floats:
     """Return the number of evaluations of the acceleration; of an implicit scheme one for each step and stage."""
-    counts = [SCHEMES[scheme.kind].force_evaluations for scheme in part.experiment.schemes]
-    return _own_or(part, level, "force_evaluations_total", np.array(counts, dtype=float))
+    counts = [SCHEMES[scheme.kind].force_evaluations for scheme in block.experiment.schemes]
+    return _own_or(block, level, "force_evaluations_total", np.array(counts, dtype=float))
 
 
-def steps_taken(part: Part, level: int) -> Floats:
+def steps_taken(block: MemberBlock, level: int) -> Floats:
     """Return the number of steps taken."""
-    return _own_or(part, level, "accepted_steps", np.ones(len(part.experiment.schemes)))
+    return _own_or(block, level, "accepted_steps", np.ones(len(block.experiment.schemes)))
 
 
-def _own_or(part: Part, level: int, name: str, per_step: Floats) -> Floats:
+def _own_or(block: MemberBlock, level: int, name: str, per_step: Floats) -> Floats:
     """Return what an adaptive scheme counted, or the number of steps times a number per step."""
-    record = part.records[level]
-    steps = part.grid.steps[part.grid.levels.index(level)]
-    found = np.array(np.broadcast_to((per_step * steps)[:, None], part.shape))
-    own = np.asarray(record[name], dtype=float) if name in record else np.full(part.shape, np.nan)
-    found[part.adaptive] = own[part.adaptive]
+    record = block.records[level]
+    steps = block.grid.steps[block.grid.levels.index(level)]
+    found = np.array(np.broadcast_to((per_step * steps)[:, None], block.shape))
+    own = np.asarray(record[name], dtype=float) if name in record else np.full(block.shape, np.nan)
+    found[block.adaptive] = own[block.adaptive]
     return found

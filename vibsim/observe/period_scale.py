@@ -7,31 +7,29 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.observe.member_block import Part
+from vibsim.observe.member_block import MemberBlock
+from vibsim.observe.thresholds import PIECES_OF_TIME
 
 Floats = NDArray[np.float64]
 
-PARTS = 8
-"""A motion without a period is looked at in so many parts of its whole time."""
 
-
-def swing(part: Part) -> Floats:
+def swing(block: MemberBlock) -> Floats:
     """Return the period of the motion of every member, in the unit of time, shape (case,).
 
     That of the exact solution where it has one, else that of small oscillations; of a motion with neither, an eighth
     of the time.
     """
-    end = np.broadcast_to(part.group.end, part.shape[1:])
-    exact = _of_case(part, "exact_period")
-    w = np.abs(_of_case(part, "natural_frequency"))
+    end = np.broadcast_to(block.group.end, block.shape[1:])
+    exact = _of_case(block, "exact_period")
+    w = np.abs(_of_case(block, "natural_frequency"))
     with np.errstate(divide="ignore"):
         small = np.where(w > 0, 2.0 * math.pi / w, np.nan)
     found = np.where(np.isfinite(exact) & (exact > 0), exact, small)
-    return np.asarray(np.where(np.isfinite(found), found, end / PARTS))
+    return np.asarray(np.where(np.isfinite(found), found, end / PIECES_OF_TIME))
 
 
-def _of_case(part: Part, name: str) -> Floats:
+def _of_case(block: MemberBlock, name: str) -> Floats:
     """Return a number of every member; NaN where the levels do not hold it."""
-    if name not in part.finest:
-        return np.full(part.shape[1:], np.nan)
-    return np.broadcast_to(np.asarray(part.finest[name], dtype=np.float64), part.shape[1:])
+    if name not in block.finest:
+        return np.full(block.shape[1:], np.nan)
+    return np.broadcast_to(np.asarray(block.finest[name], dtype=np.float64), block.shape[1:])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vibsim.apriori.formal_orders import formal_orders
 from vibsim.apriori.phase_amplitude_orders import is_promised
-from vibsim.convergence.ladder_statistics import BLAME, MEASURED
+from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, MEASUREMENT_FACTOR
 from vibsim.experiment.stored_series import asked
 from vibsim.formula import values
 from vibsim.models import tree
@@ -27,9 +27,10 @@ from vibsim.models.shared.phase_amplitude_names import (
     is_error_part,
     whole_of,
 )
-from vibsim.observe.member_block import Part
+from vibsim.observe.member_block import MemberBlock
 from vibsim.observe.period_scale import swing
 from vibsim.observe.quintic_interpolant import template
+from vibsim.observe.thresholds import MOST_UNASKED
 from vibsim.observe.waveform_fit import shift, strides
 
 if TYPE_CHECKING:
@@ -42,30 +43,28 @@ LONG_NAMES = {
     PHASE: "time by which {} is early",
     AMPLITUDE: "part by which the amplitude of {} is too large",
 }
-ALWAYS = 2**14
-"""Samples of all schemes, members and levels up to which the parts are looked at without being asked for."""
 
 Make = Callable[..., "Comparison"]
 
 
-def wanted(part: Part, names: tuple[str, ...]) -> tuple[str, ...]:
+def wanted(block: MemberBlock, names: tuple[str, ...]) -> tuple[str, ...]:
     """Return those of `names` that are parts, and of a small experiment the parts of every position.
 
     They are made of the states, and let a verdict on the position say which of the two is wrong.
     """
     named = [name for name in names if is_error_part(name)]
-    schemes, cases = part.shape
-    size = schemes * cases * len(part.grid.t) * len(part.grid.levels)
-    small = not part.lean and len(part.grid.levels) > 2 and size <= ALWAYS
-    small &= {*part.model.positions, *part.model.velocities} <= {*names}
-    more = part.model.positions if small and has_error_parts(part.model) else ()
+    schemes, cases = block.shape
+    size = schemes * cases * len(block.grid.t) * len(block.grid.levels)
+    small = not block.lean and len(block.grid.levels) > 2 and size <= MOST_UNASKED
+    small &= {*block.model.positions, *block.model.velocities} <= {*names}
+    more = block.model.positions if small and has_error_parts(block.model) else ()
     return tuple(
         dict.fromkeys([*named, *(name + end for name in more for end in (PHASE, AMPLITUDE))])
     )
 
 
 def parts_of_errors(
-    part: Part, found: Mapping[str, Comparison], names: tuple[str, ...], make: Make
+    block: MemberBlock, found: Mapping[str, Comparison], names: tuple[str, ...], make: Make
 ) -> dict[str, Comparison]:
     """Compare parts of errors between levels.
 
@@ -80,88 +79,89 @@ def parts_of_errors(
     """
     parts: dict[str, Comparison] = {}
     for position in dict.fromkeys(map(whole_of, names)):
-        told, floors, known = _told(part, found, position)
-        between = _blur(part, told)
+        told, floors, known = _told(block, found, position)
+        between = _blur(block, told)
         for k, end in enumerate((PHASE, AMPLITUDE)):
             name = position + end
             if name not in names:
                 continue
             scale = floors[k]
             parts[name] = make(
-                part=part,
+                block=block,
                 name=name,
                 long_name=LONG_NAMES[end].format(found[position].long_name),
                 units="s" if end == PHASE else "1",
                 values=[row[k] for row in told],
                 exact=_nothing(known, told[0][k].shape) if known.any() else None,
-                order=_order(part, name),
-                floor=part.floor_of(name, scale) + MEASURED / BLAME * between[k],
+                order=_order(block, name),
+                floor=block.floor_of(name, scale)
+                + MEASUREMENT_FACTOR / ABOVE_ROUND_OFF * between[k],
                 scale=scale,
                 blur=between[k],
             )
     return parts
 
 
-def _order(part: Part, name: str) -> Floats:
+def _order(block: MemberBlock, name: str) -> Floats:
     """Return the order by which a part is rescaled: the promised one where some check asks for the part.
 
     Where theory promises none it is that of the first check which expects one, else the position's. A claim that is
     known to be false, and a check that is to fail, expect none.
     """
-    if is_promised(part.experiment, name) and name in asked(part.experiment):
-        return formal_orders(part.experiment, name, part.columns)
-    order = formal_orders(part.experiment, whole_of(name), part.columns).copy()
-    for check in reversed(part.experiment.checks):
+    if is_promised(block.experiment, name) and name in asked(block.experiment):
+        return formal_orders(block.experiment, name, block.columns)
+    order = formal_orders(block.experiment, whole_of(name), block.columns).copy()
+    for check in reversed(block.experiment.checks):
         inner = check.measured
         if inner.kind != "converges" or inner.converges != name or inner.order == "scheme":
             continue
         if inner.expect.status != "PASS" or (check.kind == "claim" and not check.holds):
             continue
-        for s, scheme in enumerate(part.experiment.schemes):
+        for s, scheme in enumerate(block.experiment.schemes):
             if inner.schemes is None or scheme.name in inner.schemes:
                 order[s] = float(inner.order)
-    order[part.adaptive] = np.nan
+    order[block.adaptive] = np.nan
     return order
 
 
 def _told(
-    part: Part, found: Mapping[str, Comparison], position: str
+    block: MemberBlock, found: Mapping[str, Comparison], position: str
 ) -> tuple[list[tuple[Floats, Floats]], tuple[Floats, Floats], Flags]:
     """Return phase and amplitude at every level, the sizes their round-off is relative to, and if the truth is known.
 
     Shapes (scheme, case, t), (scheme, case) and (case,).
     """
-    place = part.model.positions.index(position)
-    states = [*part.model.positions, *part.model.velocities]
-    shape = (*part.shape, len(part.grid.t))
+    place = block.model.positions.index(position)
+    states = [*block.model.positions, *block.model.velocities]
+    shape = (*block.shape, len(block.grid.t))
     known = np.all([_is_known(found[name], shape) for name in states], axis=0)
     truth = {name: _truth(found[name], known, shape) for name in states}
-    speed = part.model.velocities[place]
-    push = _push(part, place, truth)
-    period = np.broadcast_to(swing(part), part.shape)
-    spacing = np.broadcast_to(part.grid.spacing, part.shape)
+    speed = block.model.velocities[place]
+    push = _push(block, place, truth)
+    period = np.broadcast_to(swing(block), block.shape)
+    spacing = np.broadcast_to(block.grid.spacing, block.shape)
     u, v, a = (_rows(x) for x in (truth[position], truth[speed], push))
     of = template(u, v, a, spacing.ravel())
     stride = strides(period.ravel(), spacing.ravel(), shape[-1])
     told = []
-    for level in range(len(part.grid.levels)):
+    for level in range(len(block.grid.levels)):
         moved, moving = (_rows(found[name].values[level]) for name in (position, speed))
         one = shift(moved, moving, of, period.ravel(), stride)
         told.append((one.time.reshape(shape), one.factor.reshape(shape)))
     _all_or_none(told)
-    rest, fastest = (_least(x, stride).reshape(part.shape) for x in (u, v))
+    rest, fastest = (_least(x, stride).reshape(block.shape) for x in (u, v))
     scale = found[position].scale
     return told, (scale / fastest, scale / rest), known
 
 
-def _blur(part: Part, told: list[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
+def _blur(block: MemberBlock, told: list[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
     """Return what phase and amplitude are off by between samples of the true motion, shape (scheme, case, level).
 
     The quintic between two samples is off by ``(s (h - s))^3/720`` times the sixth derivative, s behind the one of them
     (`vibsim.observe.quintic_interpolant`). That is known, and no order of magnitude as round-off is.
     """
-    w = (2.0 * np.pi / np.broadcast_to(swing(part), part.shape))[..., None]
-    h = np.broadcast_to(part.grid.spacing, part.shape)[..., None]
+    w = (2.0 * np.pi / np.broadcast_to(swing(block), block.shape))[..., None]
+    h = np.broadcast_to(block.grid.spacing, block.shape)[..., None]
     off = []
     for time, _ in told:
         behind = np.mod(np.where(np.isfinite(time), time, 0.0), h)
@@ -194,11 +194,11 @@ def _rows(values: Floats) -> Floats:
     return np.ascontiguousarray(values.reshape(-1, values.shape[-1]))
 
 
-def _push(part: Part, place: int, truth: Mapping[str, Floats]) -> Floats:
+def _push(block: MemberBlock, place: int, truth: Mapping[str, Floats]) -> Floats:
     """Return the acceleration of a coordinate along a motion, shape (scheme, case, t)."""
-    model = part.model
-    parameters = {row.name: part.group.parameters[row.key][:, None] for row in model.parameters}
-    numbers = {**parameters, **truth, "t": part.grid.times(part.group.end)}
+    model = block.model
+    parameters = {row.name: block.group.parameters[row.key][:, None] for row in model.parameters}
+    numbers = {**parameters, **truth, "t": block.grid.times(block.group.end)}
     shape = next(iter(truth.values())).shape
     return np.broadcast_to(values(tree(model, model.accelerations[place]), numbers), shape)
 

@@ -19,20 +19,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from vibsim.observe.thresholds import (
+    FADES,
+    LEAST_LEFT,
+    LEAST_STEPS,
+    RECURRENCE_ROUNDING,
+    RESIDUAL,
+    SINGULAR,
+)
 
-LEAST_STEPS = 8
-"""Fewer steps leave too little behind the start."""
-SINGULAR = 1e-24
-"""Of the part of the differences that is no multiple of the positions, squared: below, only one root is in the run."""
-ROUNDING = 2.0**-44
-"""Root mean square of what is left of the weighted steps when only rounding is: at most 2^-45 up to w dt = 30."""
-RESIDUAL = 1e-11
-"""The same for larger steps, whose rounding errors are some w^2 dt^2 large: above, the run is no such recurrence."""
-FADES = 4.0
-"""What is left of a parasitic root is so many times larger early in the window than late; rounding is the same."""
-LEAST_LEFT = 16
-"""Steps in each half of the window of which that can be told."""
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -83,7 +79,7 @@ def fitted(position: Floats) -> Motion:
 def _is_small(left: Floats) -> NDArray[np.bool_]:
     """Say where what is left is rounding, and no parasitic root that is on its way out."""
     whole = _mean_square(left)
-    found = whole < ROUNDING**2
+    found = whole < RECURRENCE_ROUNDING**2
     middle = left.shape[-1] // 2
     if middle >= LEAST_LEFT:
         stays = _mean_square(left[..., :middle]) < FADES**2 * _mean_square(left[..., middle:])

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from vibsim.convergence.differences import laid_out, largest
 from vibsim.models import Model
+from vibsim.observe.thresholds import DISTURBANCE, INSTANT, NEAR_REST, PLACES
 from vibsim.simulation import Members
 
 if TYPE_CHECKING:
@@ -30,16 +31,6 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 States = dict[str, Floats]
-
-DISTURBANCE = 1e-12
-"""Relative disturbance of a state: above the rounding of an exact solution, below what bends most responses."""
-PLACES = 8
-"""At so many times along the run a disturbance is tried."""
-INSTANT = 1e-6
-"""A time in units of 1/w over which the motion is straight."""
-NEAR_REST = 1e-3
-"""A start whose motion is so much slower than w times its size is next to an equilibrium: there C is so large that what
-is left of a difference between two of its values is the rounding of the disturbed solution."""
 
 
 def sensitivity(

@@ -19,12 +19,10 @@ from vibsim.core.record import Record
 from vibsim.formula import derivative, names_in, values
 from vibsim.models.base import Model, tree
 from vibsim.observe.common_grid import Grid, take
+from vibsim.observe.thresholds import A_WHILE
 from vibsim.simulation import Members
 
 Floats = NDArray[np.float64]
-
-A_WHILE = 0.1
-"""Part of the time for which the motion is at least a quarter as stiff as at 0, half the frequency, where 0 counts."""
 
 
 def applies(model: Model) -> bool:

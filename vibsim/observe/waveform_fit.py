@@ -27,25 +27,20 @@ from numpy.typing import NDArray
 
 from vibsim.convergence.differences import total
 from vibsim.observe.quintic_interpolant import Template
+from vibsim.observe.thresholds import (
+    BEYOND_THE_ENDS,
+    HALF_WINDOW,
+    LARGE_SHIFT,
+    LAST_ROUND_MOVES,
+    LEAST_PER_SHIFT,
+    ROUNDS,
+    SHORTEST_RUN,
+    WINDOW_POINTS,
+)
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-HALF = 8
-"""Points of a window on each side of its centre."""
-POINTS = 2 * HALF + 1
-FEWEST = 6
-"""Points in a period, at least, for a shift to be seen."""
-SHORTEST = 0.6
-"""Part of a period that a run must last."""
-ROUNDS = ((0.02, 4), (0.5, 6), (math.inf, 10))
-"""Rounds of Newton's method by the largest shift that is met, in radians: each doubles the number of right digits."""
-SETTLED = 1e-6
-"""Part of a radian, and of the amplitude, by which the last round may still have moved anything."""
-LARGE = ROUNDS[1][0]
-"""Shifts beyond this part of a radian are read from the phase plane first."""
-BEYOND = 0.5
-"""Part of a cell by which a shifted point may lie beyond the ends of the template."""
 PIECE = 2**18
 """Numbers of one kind that are worked on at a time."""
 
@@ -73,10 +68,14 @@ def strides(period: Floats, spacing: Floats, points: int) -> Indices:
         Number of samples.
     """
     samples = period / spacing
-    wanted = np.ceil(samples / (2 * HALF))
-    most = (points - 1) // (2 * HALF)
+    wanted = np.ceil(samples / (2 * HALF_WINDOW))
+    most = (points - 1) // (2 * HALF_WINDOW)
     found = np.clip(wanted, 1, max(most, 1))
-    usable = (samples >= FEWEST) & (most >= 1) & (found * 2 * HALF >= SHORTEST * samples)
+    usable = (
+        (samples >= LEAST_PER_SHIFT)
+        & (most >= 1)
+        & (found * 2 * HALF_WINDOW >= SHORTEST_RUN * samples)
+    )
     return np.where(usable, found, 0).astype(np.int64)
 
 
@@ -113,7 +112,7 @@ def shift(
 
 def _pieces(rows: Indices, points: int) -> Iterator[tuple[Indices, Indices]]:
     """Yield rows and samples that are worked on together."""
-    piece = max(PIECE // POINTS, 1)
+    piece = max(PIECE // WINDOW_POINTS, 1)
     step = max(piece // points, 1)
     for first in range(0, len(rows), step):
         for start in range(0, points, piece):
@@ -141,13 +140,13 @@ def _fitted(
     """Return shift and factor at the samples `at`, shape (2, r, len(at)); windows lie along the first dimension."""
     last = position.shape[-1] - 1
     low, high = _inside(guess, of.spacing)
-    high = np.maximum(high - 2 * HALF * stride, low)
-    first = np.clip(at - HALF * stride[:, None], low[:, None], high[:, None])
-    centre = first + HALF * stride[:, None]
-    places = first + stride[:, None] * np.arange(POINTS)[:, None, None]
+    high = np.maximum(high - 2 * HALF_WINDOW * stride, low)
+    first = np.clip(at - HALF_WINDOW * stride[:, None], low[:, None], high[:, None])
+    centre = first + HALF_WINDOW * stride[:, None]
+    places = first + stride[:, None] * np.arange(WINDOW_POINTS)[:, None, None]
     rows = np.arange(len(position))[:, None]
     u, still = position[rows, places], ~_turns(of.velocity[rows, places])
-    s = ((np.arange(POINTS) - HALF) / HALF)[:, None, None]
+    s = ((np.arange(WINDOW_POINTS) - HALF_WINDOW) / HALF_WINDOW)[:, None, None]
     radian, h = period[:, None] / (2 * math.pi), of.spacing[:, None]
     phi, slope = guess[rows, centre], np.zeros(centre.shape)
     rise, offset = (np.zeros(centre.shape) for _ in range(2))
@@ -157,7 +156,7 @@ def _fitted(
         where = places + (phi + slope * s) / h
         there, speed = of.at(where)
         beyond = np.maximum(-where, where - last)
-        weight = np.clip((BEYOND - beyond) / (0.5 * BEYOND), 0.0, 1.0)
+        weight = np.clip((BEYOND_THE_ENDS - beyond) / (0.5 * BEYOND_THE_ENDS), 0.0, 1.0)
         left = (u - offset) * np.exp(-alpha - rise * s) - there
         speed = speed * radian
         by = _solved([np.ones(u.shape), there, s * there, speed, s * speed], left, weight)
@@ -167,9 +166,9 @@ def _fitted(
         alpha, rise = alpha + np.log1p(gain), rise + by[2] / (1.0 + gain)
         phi, slope = phi + by[3] * radian, slope + by[4] * radian
         moved = np.maximum(np.abs(by[1]) + np.abs(by[2]), np.abs(by[3]) + np.abs(by[4]))
-    away = (at - centre) / (HALF * stride[:, None])
+    away = (at - centre) / (HALF_WINDOW * stride[:, None])
     found = np.stack([phi + slope * away, np.expm1(alpha + rise * away)])
-    return np.where(still | ~(moved < SETTLED), np.nan, found)
+    return np.where(still | ~(moved < LAST_ROUND_MOVES), np.nan, found)
 
 
 def _inside(guess: Floats, spacing: Floats) -> tuple[Indices, Indices]:
@@ -187,7 +186,7 @@ def _turns(velocity: Floats) -> NDArray[np.bool_]:
 
 def _spread(values: Floats) -> Floats:
     """Return the sum of squares around the mean over a window, shape (r, t)."""
-    rest = values - _sum(values) / POINTS
+    rest = values - _sum(values) / WINDOW_POINTS
     return _sum(rest * rest)
 
 
@@ -241,7 +240,7 @@ def _guess(
     largest = np.nan_to_num(np.max(np.abs(turned - target), axis=-1))
     monotone = np.min(np.diff(target, axis=-1), axis=-1) > 0
     times = of.times
-    for row in np.flatnonzero((largest > LARGE) & monotone).tolist():
+    for row in np.flatnonzero((largest > LARGE_SHIFT) & monotone).tolist():
         late = np.maximum(turned[row] - target[row, -1], 0.0) / w[row]
         found[row] = np.interp(turned[row], target[row], times[row]) + late - times[row]
     return found, largest

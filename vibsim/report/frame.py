@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.convergence.ladder_statistics import BLAME
+from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.report.data import Floats, Member, at, floor_norm, known, largest, pick, whole
@@ -84,7 +84,7 @@ def why_lost(
     floor = floor_norm(record, quantity, member, TYPICAL_NORM)
     if np.isnan(differences).any():
         return NO_VALUE
-    near = differences <= BLAME * largest(floor[levels])
+    near = differences <= ABOVE_ROUND_OFF * largest(floor[levels])
     return ROUND_OFF if near.all() else UNLIKE
 
 

@@ -28,7 +28,7 @@ def at_start(q: Comparison) -> dict[str, Variable]:
     if not q.name.endswith(PHASE) or not q.differences:
         return {}
     first = judgement(q, TYPICAL_NORM).first
-    levels = np.array(q.part.grid.levels[:-1])
+    levels = np.array(q.block.grid.levels[:-1])
     # of the coarsest pair that the order rests on: furthest from round-off
     pair = np.where(first < 0, len(levels) - 1, np.searchsorted(levels, first))
     share = np.stack([safe_ratio(np.abs(d[..., 0]), largest(d)) for d in q.differences], axis=-1)

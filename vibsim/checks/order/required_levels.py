@@ -6,8 +6,8 @@ as it was seen or as the powers of the scheme give it, say at which level the or
 confirms it. An order far above p is that of levels which have nothing to do with the solution, and tells nothing.
 
 **Round-off.** Differences fall like h^p from the finest clean one on, the predicted round-off of an arithmetic grows
-with the number of steps. An order can be read from three levels as long as the finer of their two differences is `LOUD`
-times the round-off of its levels.
+with the number of steps. An order can be read from three levels as long as the finer of their two differences is
+`ORDER_ABOVE_ROUND_OFF` times the round-off of its levels.
 """
 
 from __future__ import annotations
@@ -20,9 +20,13 @@ from numpy.typing import NDArray
 from vibsim.apriori.formal_orders import even_powers, relative_floors
 from vibsim.comparison.order_evidence import evidence
 from vibsim.comparison.quantity_comparison import Comparison
-from vibsim.convergence.classify import LEAST_CANDIDATE, MOST_ABOVE
-from vibsim.convergence.hidden_order import APART
-from vibsim.convergence.scalar_extrapolation import LOUD, ORDINARY
+from vibsim.convergence.thresholds import (
+    HALF_SPACING,
+    LEAST_CANDIDATE,
+    MOST_ABOVE,
+    ORDER_ABOVE_ROUND_OFF,
+    ORDINARY_ORDER,
+)
 from vibsim.convergence.verdict import Judgement
 from vibsim.core.vocabulary import REASON_NAMES
 
@@ -65,7 +69,7 @@ def more_levels(q: Comparison, judged: Judgement, order: Floats, tolerance: floa
     aim = _aim(q, orders[..., -1], np.broadcast_to(order, shape))
     away = np.abs(orders - aim[..., None])
     with np.errstate(all="ignore"):
-        promised = np.where(even_powers(q.part.experiment, q.name, q.part.columns), 0.25, 0.5)
+        promised = np.where(even_powers(q.block.experiment, q.name, q.block.columns), 0.25, 0.5)
         seen = away[..., -1] / away[..., -2] if orders.shape[-1] > 1 else promised
         # what was seen once may be an accident; no power falls faster than the next one
         factor = np.maximum(seen, promised)
@@ -73,7 +77,9 @@ def more_levels(q: Comparison, judged: Judgement, order: Floats, tolerance: floa
         # an error that falls faster than the powers do is none of them
         known = early & np.isfinite(steps) & (orders[..., -1] <= aim + MOST_ABOVE)
         # how small the promised power still is, behind a higher one, is not in the orders
-        known &= ~((orders[..., -1] > q.order + APART) & (q.special > q.order + APART))
+        known &= ~(
+            (orders[..., -1] > q.order + HALF_SPACING) & (q.special > q.order + HALF_SPACING)
+        )
     known &= (factor <= SLOWEST) & (steps <= MOST)
     needed[known] = np.maximum(steps[known], 1).astype(np.int8)
     return needed
@@ -119,7 +125,9 @@ def finest_readable(
     with np.errstate(all="ignore"):
         for level in range(FINEST - 1):
             fall = np.exp2(p * (at - level - 1))
-            clean = (size > 0.0) & (size * fall >= LOUD * (noise(level + 1) + noise(level + 2)))
+            clean = (size > 0.0) & (
+                size * fall >= ORDER_ABOVE_ROUND_OFF * (noise(level + 1) + noise(level + 2))
+            )
             found = np.where(lost & clean, level + 2, found).astype(np.int8)
     return found
 
@@ -129,11 +137,13 @@ def _clean_difference(q: Comparison, norm: str, p: Floats) -> tuple[Floats, Floa
 
     Where none is above it, the coarsest difference is taken, which is noise: what can be read is then too much.
     """
-    levels = q.part.grid.levels
-    e = evidence(q, norm, q.order, ORDINARY)
+    levels = q.block.grid.levels
+    e = evidence(q, norm, q.order, ORDINARY_ORDER)
     place = np.zeros(p.shape, dtype=np.int64)
     for i in range(len(levels) - 1):
-        clean = e.difference[..., i] >= LOUD * (e.floor[..., i] + e.floor[..., i + 1])
+        clean = e.difference[..., i] >= ORDER_ABOVE_ROUND_OFF * (
+            e.floor[..., i] + e.floor[..., i + 1]
+        )
         place = np.where(clean, i, place)
     size = np.take_along_axis(e.difference, place[..., None], axis=-1)[..., 0]
     gap = np.diff(np.array(levels))[place]
@@ -143,16 +153,16 @@ def _clean_difference(q: Comparison, norm: str, p: Floats) -> tuple[Floats, Floa
 
 def _noise(q: Comparison, norm: str, arithmetic: str | None) -> Callable[[int], Floats]:
     """Return what gives the predicted round-off of a level in a norm, shape (scheme, case)."""
-    part = q.part
-    e = evidence(q, norm, q.order, ORDINARY)
-    if part.stored_floor[-1] > 0.0:
+    block = q.block
+    e = evidence(q, norm, q.order, ORDINARY_ORDER)
+    if block.stored_floor[-1] > 0.0:
         # what storing leaves is the same at every level, in any arithmetic
         return lambda level: e.floor[..., -1]
-    base = e.floor[..., -1] / part.relative_floor[..., -1]
+    base = e.floor[..., -1] / block.relative_floor[..., -1]
 
     def at(level: int) -> Floats:
-        steps = (part.experiment.steps(level),)
-        floors = relative_floors(part.experiment, steps, part.columns, arithmetic)
+        steps = (block.experiment.steps(level),)
+        floors = relative_floors(block.experiment, steps, block.columns, arithmetic)
         return np.asarray(base * floors[..., 0])
 
     return at

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from vibsim.convergence.hidden_order import APART
+from vibsim.convergence.thresholds import HALF_SPACING
 from vibsim.schemes import Options
 
 ALIKE = 0.15
@@ -142,7 +142,7 @@ def shows_promise(s: Story) -> bool:
 
 def may_hide(s: Story) -> bool:
     """Tell whether the order that the scheme promises may be behind a higher one, as near a special case."""
-    return s.promised + APART < min(s.order, s.special)
+    return s.promised + HALF_SPACING < min(s.order, s.special)
 
 
 def due(s: Story) -> float:

@@ -13,7 +13,7 @@ from vibsim.checks.value import by_level
 from vibsim.checks.value.criteria import compare
 from vibsim.comparison import best_values, value_numbers
 from vibsim.comparison.quantity_comparison import Comparison
-from vibsim.observe.member_block import Part
+from vibsim.observe.member_block import MemberBlock
 
 if TYPE_CHECKING:
     from vibsim.experiment.schema.checks import ValueCheck
@@ -33,12 +33,14 @@ FIELDS = {
 }
 
 
-def measure(part: Part, compared: Mapping[str, Comparison], check: ValueCheck) -> Mapping[str, Any]:
+def measure(
+    block: MemberBlock, compared: Mapping[str, Comparison], check: ValueCheck
+) -> Mapping[str, Any]:
     """Return what a check measures."""
     at = check.at
-    place = value_numbers.Place(part, compared, check.quantity or "", at.level, at.t, at.step)
+    place = value_numbers.Place(block, compared, check.quantity or "", at.level, at.t, at.step)
     value, bound = (
-        np.broadcast_to(found, part.shape) for found in best_values.value(check.value, place)
+        np.broadcast_to(found, block.shape) for found in best_values.value(check.value, place)
     )
     return {"value": value, "error_bound": bound, **_along_levels(check, place, value)}
 
@@ -49,7 +51,7 @@ def _along_levels(
     """Return what finer levels do to the number, which of them has it as asked, and the number at every level."""
     levels = place.levels
     fulfilled = compare(check, found)[0]
-    is_needed = not (place.part.lean and np.all(fulfilled))
+    is_needed = not (place.block.lean and np.all(fulfilled))
     if is_needed and by_level.has_levels(check.value):
         numbers = by_level.by_level(check.value, place)
     else:

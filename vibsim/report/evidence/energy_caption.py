@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from vibsim.observe.energy_drift import LEAST_PERIODS, LEAST_SAMPLES, STILL
+from vibsim.observe.thresholds import LEAST_PERIODS, LEAST_SAMPLES, STILL
 from vibsim.report.evidence.energy_error import NAMES, POWERS, EnergyError
 from vibsim.report.evidence.frame import brief, short
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from vibsim.checks.growth import LIMIT_ROUNDING
 from vibsim.checks.numbers_in_words import factor_in_words
-from vibsim.convergence.ladder_statistics import BLOWN_UP
+from vibsim.convergence.thresholds import BLOWN_UP
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import HIGHEST
 from vibsim.report import style

@@ -1,6 +1,6 @@
 """The table of the most accurate values that the ladder holds, each with two error bars.
 
-One belongs to the extrapolated value (a calibrated bound, `vibsim.convergence.scalar_extrapolation`), the other to the
+One belongs to the extrapolated value (a calibrated bound, `vibsim.convergence.number_extrapolation`), the other to the
 value of the finest level (the grid convergence index, `vibsim.convergence.gci`).
 """
 

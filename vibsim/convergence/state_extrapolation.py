@@ -1,13 +1,6 @@
-r"""Extrapolation over all levels of a ladder: the tableau, and which of its entries to believe how far.
+r"""Extrapolation of a motion over all levels, at every time by itself: which entry to believe how far.
 
-A level with the step h has ``u_h = u + c_1 h^p + c_2 h^(p+q) + c_3 h^(p+2q) + ...``. Column 0 of the tableau holds the
-levels; an entry of column j combines j + 1 neighbouring levels so that the first j powers vanish,
-
-    T[i][j] = T[i][j-1] + f (T[i][j-1] - T[i-1][j-1]),
-
-with f from the steps of the levels alone (Aitken and Neville for p = q; C. Brezinski's E-algorithm otherwise). The
-levels need not be neighbours: f is worked out in whole fractions. Source: W. Romberg (1955); R. Bulirsch and J. Stoer
-(1966); E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, section II.9.
+The scheme and the error bar are those of `vibsim.convergence.extrapolation`, with the powers of the scheme.
 
 What is known of the error of an entry, besides round-off:
 
@@ -29,27 +22,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from vibsim.convergence.romberg_weights import Entry, Tableau
-
-SAFETY = 2.0
-"""Factor on the estimated error of truncation."""
-GAIN_SAFETY = 5.0
-"""Factor on what one more extrapolation leaves of an error, ..."""
-FIRST_GAIN_SAFETY = 100.0
-"""... and where three levels are all there is, so that no gain was seen before."""
-LARGEST_GAIN = 1e-3
-"""One more extrapolation is never believed to leave less of an error."""
-LEAST_FALL = 1.25
-"""A change that falls by less counts as one that falls by this factor: four times itself is then left."""
-ROUND_OFF_SAFETY = 10.0
-"""Factor on the round-off of the levels: one run's difference to another is one draw of it."""
-KNOWN_DIGIT = 0.1
-"""An error beyond this part of the solution's size is no longer small; then nothing is known of it."""
+from vibsim.convergence.extrapolation import Entry, error_left, next_row, triangular_scheme
+from vibsim.convergence.thresholds import (
+    FIRST_GAIN_SAFETY,
+    GAIN_SAFETY,
+    LARGEST_GAIN,
+    LEAST_FALL,
+    ROUND_OFF_SAFETY,
+    STATE_SAFETY,
+)
 
 LASTING = 2.0**-52
 """Relative error of what every level has in common: parameters, the step, the elementary functions."""
@@ -139,10 +126,39 @@ Pair = tuple[Any, Any]
 """Position and velocity."""
 
 
+@dataclass(frozen=True)
+class Tableau:
+    """What the steps of the levels say; one for every scheme with its options."""
+
+    entries: tuple[tuple[Entry, ...], ...]
+    """Row i holds the entries j = 1, ..., i."""
+    round_off: tuple[tuple[float, ...], ...]
+    """Of the same entries, relative to the solution."""
+    amplification: tuple[float, ...]
+    """Row i: times the change of its level and ``1/(w end)^p`` this is the response of the motion to a lasting relative
+    disturbance of its equation: the scheme itself disturbs it by ``(w h)^p / (2 (p+1)!)``, for central differences."""
+
+
+@lru_cache(maxsize=256)
+def tableau(steps: tuple[int, ...], p: int, q: int, round_off: tuple[float, ...]) -> Tableau:
+    """Return the tableau of a ladder; `round_off` is relative, of every level. See `triangular_scheme` for the rest."""
+    rows = triangular_scheme(steps, p, q)
+    noise = tuple(
+        tuple(entry.round_off(round_off[i - j : i + 1]) for j, entry in enumerate(row, start=1))
+        for i, row in enumerate(rows)
+    )
+    amplification = [0.0] + [
+        2.0 * math.factorial(p + 1) * (1.0 + row[0].factor) * float(n) ** p
+        for row, n in zip(rows[1:], steps[:-1], strict=True)
+    ]
+    return Tableau(rows, noise, tuple(amplification))
+
+
 class _Row(NamedTuple):
     """One row of the tableau; lists over the columns."""
 
-    values: list[Pair]
+    position: list[Any]
+    velocity: list[Any]
     changes: list[Any]
     """From the row before, so far."""
     bounds: list[Any]
@@ -159,7 +175,7 @@ def best_entry(
     levels
         Position and velocity of every level, from coarse to fine; NaN where a level has failed.
     """
-    row = _Row([levels[0]], [], [])
+    row = _Row([levels[0][0]], [levels[0][1]], [], [])
     found: list[tuple[int, Pair, Any]] = []
     response: Any = 0.0
     noise = lasting = response
@@ -168,16 +184,20 @@ def best_entry(
         for j in range(1, i):
             # at least as wrong as the finer row says
             bound = of.larger(row.bounds[j - 1], finer.changes[j])
-            floor = noise * table.entries[i - 1][j - 1].round_off + lasting
-            found.append(((i - 1) * len(levels) + j, row.values[j], bound + floor))
+            floor = noise * table.round_off[i - 1][j - 1] + lasting
+            found.append(
+                ((i - 1) * len(levels) + j, (row.position[j], row.velocity[j]), bound + floor)
+            )
         response = of.larger(table.amplification[i] * known.response * finer.changes[0], response)
         noise = of.larger(response / known.spread, known.noise) * ROUND_OFF_SAFETY
         lasting = LASTING * (known.size * (1.0 + known.phase) + response)
         row = finer
     last = len(levels) - 1
     for j in range(1, last + 1):
-        floor = noise * table.entries[last][j - 1].round_off + lasting
-        found.append((last * len(levels) + j, row.values[j], row.bounds[j - 1] + floor))
+        floor = noise * table.round_off[last][j - 1] + lasting
+        found.append(
+            (last * len(levels) + j, (row.position[j], row.velocity[j]), row.bounds[j - 1] + floor)
+        )
     return _least(found, levels[-1], last * len(levels), of)
 
 
@@ -200,28 +220,26 @@ def _next_row(
     entries: Sequence[Entry], level: Pair, row: _Row, known: Circumstances, of: Arithmetic
 ) -> _Row:
     """Return the row of a level from the row of the level before, without its round-off."""
-    values, changes, bounds = [level], list[Any](), list[Any]()
-    lefts: list[Any] = []
+    position, dx = next_row(entries, level[0], row.position)
+    velocity, dy = next_row(entries, level[1], row.velocity)
+    changes, bounds, lefts = list[Any](), list[Any](), list[Any]()
     trust: Any = 1.0
     for j, entry in enumerate(entries):
-        (x, y), (x_before, y_before) = values[j], row.values[j]
-        dx, dy = x - x_before, y - y_before
-        change = of.so_far(of.larger(abs(dx), abs(dy) / known.rate)) + _TINY
+        change = of.so_far(of.larger(abs(dx[j]), abs(dy[j]) / known.rate)) + _TINY
         changes.append(change)
-        values.append((x + entry.factor * dx, y + entry.factor * dy))
         left = change
         if entry.change_fall:
             fall = row.changes[j] / (change * entry.change_fall) + _TINY
             trust = of.smaller(of.smaller(fall, 1.0 / fall), trust)
             seen = fall == fall
         if j or entry.change_fall:
-            left = change / (of.larger(entry.fall * trust, LEAST_FALL) - 1.0)
+            left = error_left(change, of.larger(entry.fall * trust, LEAST_FALL))
         if j == 0 and entry.change_fall:
             left = of.choose(seen, left, change)
         if j > 1:
             gain = of.smaller(entry.coarser * lefts[-1] / lefts[-2], 1.0)
             left = of.larger(lefts[-1] * gain, left)
-        bound = of.choose(SAFETY * left > known.limit, math.inf, SAFETY * left)
+        bound = of.choose(STATE_SAFETY * left > known.limit, math.inf, STATE_SAFETY * left)
         if j:
             safety = GAIN_SAFETY if len(entries) > 2 or entry.change_fall else FIRST_GAIN_SAFETY
             gain = safety * entry.coarser * left / (lefts[-1] * trust)
@@ -229,4 +247,4 @@ def _next_row(
             bounds[-1] = of.larger(entry.factor * change, bounds[-1])
         lefts.append(left)
         bounds.append(bound / (trust * trust + _TINY))
-    return _Row(values, changes, bounds)
+    return _Row(position, velocity, changes, bounds)

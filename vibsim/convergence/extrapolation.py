@@ -1,0 +1,258 @@
+r"""Extrapolation over the levels of a ladder: one triangular scheme and one rule for error bars.
+
+A level with the step h has ``u_h = u + c_1 h^p + c_2 h^(p+q) + c_3 h^(p+2q) + ...``. Column 0 of the scheme holds the
+levels. An entry of column j combines j + 1 neighbouring levels so that the first j powers vanish,
+
+    T[i][j] = T[i][j-1] + f (T[i][j-1] - T[i-1][j-1]),         f = 1/(K - 1),
+
+where K is the factor by which the error of column j - 1 falls from row i - 1 to row i. Richardson extrapolation is
+column 1, Romberg's method all columns. The levels need not be neighbours: f is worked out in whole fractions.
+
+If the entries of a column change by c from one row to the next, and these changes fall by the factor K per row, then
+what is left in the finer entry is
+
+    c/(K - 1),         times a safety.
+
+Every error bar is that (`error_left`); they differ in what is known of K, and so in the safety:
+
+- *grid convergence index* (`vibsim.convergence.gci`): column 0, and the observed order, if it is the promised one;
+- *series* (`extrapolate_series`): columns 1 and 2. A curve over time has a shape, and K is that of its norms;
+- *numbers* (`vibsim.convergence.number_extrapolation`): all columns. A number has no shape, so that every power
+  must be seen;
+- *states* (`vibsim.convergence.state_extrapolation`): all columns, at every time by itself. The powers are those of the
+  scheme, the round-off is measured, and what was seen to fall otherwise is trusted less.
+
+Source: L. F. Richardson (1911); W. Romberg (1955); C. Brezinski's E-algorithm for unequal gaps; E. Hairer,
+S. P. Norsett and G. Wanner, Solving Ordinary Differential Equations I, section II.9; pendulum lecture, section 2.5.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.convergence.differences import largest as absolute
+from vibsim.convergence.differences import norm, safe_ratio
+from vibsim.convergence.thresholds import SERIES_SAFETY
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What the steps of the levels say about one entry ``T[i][j]``, j > 0."""
+
+    factor: float
+    """f of the recursion."""
+    fall: float
+    """Factor K by which the error of column j - 1 falls from row i - 1 to row i."""
+    change_fall: float
+    """Factor by which the changes of column j - 1 fall from row i - 1 to row i; 0 where row i - 1 has none."""
+    coarser: float
+    """What the coarsest of the levels costs: the ratio of steps to the next coarser level to the power q."""
+    weights: tuple[float, ...]
+    """Sizes of the weights of the levels i - j to i in the combination."""
+
+    def round_off(self, of_levels: Sequence[Any]) -> Any:
+        """Return the most that round-off of the levels i - j to i makes of the entry."""
+        return sum(w * r for w, r in zip(self.weights, of_levels, strict=True))
+
+
+Scheme = tuple[tuple[Entry, ...], ...]
+"""Row i holds the entries j = 1, ..., i, or as many as there are columns."""
+
+
+@lru_cache(maxsize=1024)
+def triangular_scheme(
+    steps: tuple[int, ...], p: float, q: int, columns: int | None = None
+) -> Scheme:
+    """Return the triangular scheme of a ladder.
+
+    Parameters
+    ----------
+    steps
+        Number of steps of every level, strictly increasing; only their ratios matter.
+    p, q
+        The error expands in the powers p, p + q, p + 2 q, ... of the time step, p > 0.
+    columns
+        So many powers are removed at most; as many as can be where None.
+    """
+    n = len(steps)
+    depth = n - 1 if columns is None else min(columns, n - 1)
+    h = [Fraction(steps[0], count) for count in steps]
+    left = [[_power(x, p + k * q) for k in range(depth)] for x in h]
+    weights = [[Fraction(int(k == i)) for k in range(n)] for i in range(n)]
+    rows: list[tuple[Entry, ...]] = [() for _ in steps]
+    for j in range(1, depth + 1):
+        size = [row[j - 1] for row in left]
+        factors = {i: size[i] / (size[i - 1] - size[i]) for i in range(j, n)}
+        combined = {i: _combined(weights, i, f) for i, f in factors.items()}
+        for i, f in factors.items():
+            changes = [size[k - 1] - size[k] for k in (i - 1, i) if k >= j]
+            rows[i] += (
+                Entry(
+                    factor=float(f),
+                    fall=float(1 + 1 / f),
+                    change_fall=float(changes[0] / changes[1]) if len(changes) == 2 else 0.0,
+                    coarser=float(Fraction(steps[i - j + 1], steps[i - j]) ** q),
+                    weights=tuple(abs(float(w)) for w in combined[i][i - j : i + 1]),
+                ),
+            )
+        left = [_combined(left, i, factors[i]) if i >= j else left[i] for i in range(n)]
+        weights = [combined.get(i, weights[i]) for i in range(n)]
+    return tuple(rows)
+
+
+def _power(h: Fraction, p: float) -> Fraction:
+    """Return h^p: exact for a whole p, correctly rounded for half a one."""
+    if float(p).is_integer():
+        return Fraction(h ** int(p))
+    if float(2 * p).is_integer():
+        return Fraction(math.sqrt(h ** int(2 * p)))
+    return Fraction(float(h) ** p)
+
+
+def _combined(rows: Sequence[Sequence[Fraction]], i: int, f: Fraction) -> list[Fraction]:
+    return [x + f * (x - y) for x, y in zip(rows[i], rows[i - 1], strict=True)]
+
+
+def next_row(
+    entries: Sequence[Entry], level: Any, before: Sequence[Any]
+) -> tuple[list[Any], list[Any]]:
+    """Return the row of a level, and what its entries differ by from those of the row before.
+
+    Parameters
+    ----------
+    entries
+        The row of the `Scheme`.
+    level
+        What the level has: a float or an array.
+    before
+        The row of the level before; empty for the first level.
+    """
+    row, changes = [level], []
+    for j, coarse in enumerate(before):
+        change = row[j] - coarse
+        changes.append(change)
+        if j < len(entries):
+            row.append(row[j] + entries[j].factor * change)
+    return row, changes
+
+
+def error_left(change: Any, fall: Any) -> Any:
+    """Return what is left in the finer of two entries that differ by `change`, where errors fall by `fall` per row."""
+    return change / (fall - 1.0)
+
+
+def steps_of(levels: Sequence[int]) -> tuple[int, ...]:
+    """Return numbers of steps in the ratios of the levels, which are halved steps."""
+    return tuple(1 << (level - levels[0]) for level in levels)
+
+
+def of_orders(
+    levels: Sequence[int], order: Floats, q: int, number: Callable[[Scheme], float]
+) -> Floats:
+    """Return a number of the scheme of every order, of the shape of `order`; NaN for an order that is not known."""
+    found = np.full(order.shape, np.nan)
+    for p in np.unique(order[np.isfinite(order) & (order > 0)]).tolist():
+        found[order == p] = number(triangular_scheme(steps_of(levels), p, q))
+    return found
+
+
+def extrapolate_series(
+    series: Sequence[Floats],
+    levels: Sequence[int],
+    order: Floats,
+    even: NDArray[np.bool_],
+    largest: bool = False,
+) -> tuple[Floats, Floats]:
+    """Extrapolate a ladder of solutions.
+
+    Parameters
+    ----------
+    series
+        The solution at every level, each of shape (scheme, case, t).
+    levels
+        Their levels, strictly increasing.
+    order
+        Formal order p, shape (scheme, case or 1).
+    even
+        Whether the next power is p + 2 rather than p + 1, shape (scheme, case or 1); from four levels on the data
+        decide.
+    largest
+        Whether the largest bound is enough.
+
+    Returns
+    -------
+    value
+        Extrapolated solution, shape (scheme, case, t): of the finest three levels, or of as many as there are.
+    bound
+        Bound of its error without round-off, which never falls with time; of shape (scheme, case, 1) where the largest
+        is enough. With three levels and more it is the change between the last two entries of column 1, as large as it
+        has been so far; what four levels show is left of that, times `SERIES_SAFETY`, where the change falls by no more
+        than the next power gives. It is honest for a solution of a lower order than p, too. With two levels it is the
+        estimated error of the finer one; with one level NaN.
+    """
+    so_far = _at_most if largest else _so_far
+    if len(series) == 1:
+        return series[0], so_far(np.full_like(series[0], np.nan))
+    series, levels = series[-4:], levels[-4:]
+    n = len(series)
+
+    def column(j: int, i: int, q: int) -> Floats:
+        return of_orders(levels, order, q, lambda scheme: scheme[i][j - 1].factor)
+
+    with np.errstate(over="ignore", invalid="ignore"):
+        first = [
+            fine + column(1, i, 1)[..., None] * (fine - coarse)
+            for i, (coarse, fine) in enumerate(pairwise(series), start=1)
+        ]
+        if n == 2:
+            return first[-1], so_far(first[-1] - series[-1])
+        change = first[-1] - first[-2]
+        every, second = column(2, n - 1, 1), column(2, n - 1, 2)
+        if n == 3:
+            return first[-1] + np.where(even, second, every)[..., None] * change, so_far(change)
+        before = first[-2] - first[-3]
+        seen = _seen_fall(before, change)
+        slow, quick = (of_orders(levels, order, q, lambda s: s[3][1].change_fall) for q in (1, 2))
+        is_even = np.nan_to_num(seen, nan=2.0) > np.sqrt(quick * slow)
+        value = first[-1] + np.where(is_even, second, every)[..., None] * change
+        most = np.where(even, quick, slow)
+        factor = np.clip(np.nan_to_num(seen, nan=2.0), 2.0, np.maximum(most, 2.0))
+        # a change that fell faster than any term falls is one that happens to vanish here: trust the one before it
+        expected = so_far(before) / np.maximum(slow, 2.0)[..., None]
+        vanishing = seen > most * SERIES_SAFETY
+        size = np.maximum(so_far(change), np.where(vanishing[..., None], expected, 0.0))
+        factor = np.where(vanishing, np.minimum(factor, np.maximum(slow, 2.0)), factor)
+        return value, np.asarray(error_left(SERIES_SAFETY * size, factor[..., None]))
+
+
+def _at_most(change: Floats) -> Floats:
+    """Return the largest absolute value, shape (scheme, case, 1)."""
+    return absolute(change)[..., None]
+
+
+def _so_far(change: Floats) -> Floats:
+    """Return the largest absolute value up to each time: a zero crossing of an estimate is no small error."""
+    return np.asarray(np.maximum.accumulate(np.abs(change), axis=-1))
+
+
+def _seen_fall(before: Floats, change: Floats) -> Floats:
+    """Return the factor by which the change fell, shape (scheme, case): the least of several norms.
+
+    One bad point, such as an end formula, falls more slowly than the rest and weighs differently in each norm.
+    """
+    one = np.ones(1)
+    falls = [
+        safe_ratio(norm(before, kind, one), norm(change, kind, one)) for kind in ("l2", "linf")
+    ]
+    return np.asarray(np.minimum(*falls))

@@ -1,0 +1,240 @@
+"""The limit of one number over a ladder: its most accurate value, and a bound of the error of that.
+
+The scheme and the error bar are those of `vibsim.convergence.extrapolation`. A single number has no curve whose shape
+would tell an accident from an order, so that nothing is believed but what was seen:
+
+- one more extrapolation is believed where the last changes of the column before it have the ratio of its power;
+- its error is as much as it has changed from row to row, times a safety; a part of that only where the changes fall as
+  the next power does;
+- a change that is smaller than the one before it promises may be passing through zero, and does not count as smaller;
+- an entry that a finer row contradicts is as wrong as the contradiction says;
+- where nothing is believed, the finest level stands as it is, with an error of `SPREAD` times what the last levels
+  differ by (L. Eca and M. Hoekstra, 2014). It is unknown where they do not approach each other, if only raggedly.
+
+Round-off is added with the weights of the combination. The entry with the least bound is taken. The factors are
+calibrated: ``docs/method.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.convergence.differences import order_of_ratio, safe_ratio
+from vibsim.convergence.extrapolation import (
+    Scheme,
+    error_left,
+    next_row,
+    steps_of,
+    triangular_scheme,
+)
+from vibsim.convergence.thresholds import (
+    COLUMNS,
+    DECLINE,
+    FALL_ABOVE_ROUND_OFF,
+    HIGHEST_ORDER,
+    LEAST_SHARE,
+    LEAST_SHARE_OF_THREE,
+    NEAR_HALF,
+    NUMBER_SAFETY,
+    NUMBER_SAFETY_ALONE,
+    ORDER_ABOVE_ROUND_OFF,
+    ORDINARY_ORDER,
+    OTHER_ORDER,
+    RAGGED,
+    RATIO_AGREES,
+    RATIO_ALONE_AGREES,
+    RATIO_BEFORE_AGREES,
+    RATIO_OF_THREE,
+    ROUND_OFF_SAFETY,
+    SAFETY_OF_THREE,
+    SPREAD,
+    SPREAD_OF_THREE,
+    SPREAD_OF_TWO,
+)
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The best values of some ladders; arrays of shape (...)."""
+
+    value: Floats
+    """The finest level where no extrapolation is believed."""
+    bound: Floats
+    """Bound of the error; NaN where nothing is known of it."""
+    first: Integers
+    """Place of the coarsest level that was used."""
+    last: Integers
+    """Place of the finest one."""
+
+
+def limit(
+    values: Floats, levels: Sequence[int], order: Floats, even: Flags, floor: Floats
+) -> Limit:
+    """Find the limits of numbers.
+
+    Parameters
+    ----------
+    values
+        The numbers at every level, shape (..., n); NaN where they do not exist.
+    levels
+        Their n levels, strictly increasing.
+    order
+        Promised order p, shape (...); where the levels show another one, that is taken.
+    even
+        Whether the next power is p + 2 rather than p + 1, shape (...).
+    floor
+        Predicted round-off at every level, in the unit of the numbers, shape (..., n).
+    """
+    n = len(levels)
+    finest = np.full(values.shape[:-1], n - 1)
+    with np.errstate(all="ignore"):
+        bound = _bound_of_finest(values, floor)
+        best = Limit(
+            values[..., -1].copy(),
+            np.where(np.isnan(bound), np.inf, bound),
+            finest,
+            finest.copy(),
+        )
+        if n > 2:
+            p = _leading(observed_order(values, levels, floor), order)
+            best = _extrapolated(values, levels, p, np.where(even, 2, 1), floor, best)
+    known = np.isfinite(best.bound) & np.isfinite(best.value)
+    return Limit(best.value, np.where(known, best.bound, np.nan), best.first, best.last)
+
+
+def observed_order(values: Floats, levels: Sequence[int], floor: Floats) -> Floats:
+    """Return the order of the finest triple whose differences are above round-off, shape (...); NaN without one."""
+    found = np.full(values.shape[:-1], np.nan)
+    for i in range(len(levels) - 2):
+        triple, clean = triple_at(values, floor, i)
+        found = np.where(clean, order_of_ratio(safe_ratio(*triple), levels[i : i + 3]), found)
+    return found
+
+
+def triple_at(values: Floats, floor: Floats, i: int) -> tuple[tuple[Floats, Floats], Flags]:
+    """Return the two differences of the triple that begins at place i, and whether they are above round-off."""
+    with np.errstate(invalid="ignore"):
+        first, second = (values[..., k] - values[..., k + 1] for k in (i, i + 1))
+        noise = ORDER_ABOVE_ROUND_OFF * (floor[..., i + 1] + floor[..., i + 2])
+        return (first, second), (np.abs(second) > noise) & (np.abs(first) > noise)
+
+
+def _leading(seen: Floats, promised: Floats) -> Floats:
+    """Return the order to extrapolate with: the promised one, or another one that the levels show."""
+    p = np.where(np.isfinite(promised), promised, ORDINARY_ORDER)
+    likely = np.clip(np.round(2.0 * seen) / 2, 0.5, HIGHEST_ORDER)
+    other = (np.abs(seen - p) > OTHER_ORDER) & (np.abs(seen - likely) <= NEAR_HALF)
+    return np.where(other, likely, p)
+
+
+def _bound_of_finest(values: Floats, floor: Floats) -> Floats:
+    """Return a bound of the error of the finest level without any order; NaN where the levels do not approach it."""
+    n = values.shape[-1]
+    if n == 1:
+        return np.full(values.shape[:-1], np.nan)
+    change = np.abs(np.diff(values, axis=-1))
+    noise = ROUND_OFF_SAFETY * floor[..., -1]
+    if n == 2:
+        return np.asarray(SPREAD_OF_TWO * change[..., 0] + noise)
+    recent = values[..., -3:]
+    spread = SPREAD_OF_THREE if n == 3 else SPREAD
+    bound = spread * (np.max(recent, axis=-1) - np.min(recent, axis=-1)) + noise
+    falls = np.all(np.diff(change[..., -3:], axis=-1) < 0, axis=-1)
+    rounding = np.max(change[..., -2:], axis=-1) <= FALL_ABOVE_ROUND_OFF * floor[..., -1]
+    found = np.where(falls | rounding, bound, np.nan)
+    if n < RAGGED:
+        return found
+    # an extremum over grid points falls raggedly, as the grid happens to lie
+    recent = values[..., -RAGGED:]
+    wide = SPREAD * (np.max(recent, axis=-1) - np.min(recent, axis=-1)) + noise
+    ragged = np.max(change[..., -2:], axis=-1) < DECLINE * np.max(change[..., :-2], axis=-1)
+    return np.where(ragged, np.fmin(found, wide), found)
+
+
+def _extrapolated(
+    values: Floats, levels: Sequence[int], p: Floats, q: Integers, floor: Floats, best: Limit
+) -> Limit:
+    """Extrapolate the numbers of each expansion together."""
+    expansions = np.stack([p, np.broadcast_to(q, p.shape)], axis=-1)
+    for order, step in np.unique(expansions[p > 0], axis=0).tolist():
+        own = np.all(expansions == (order, step), axis=-1)
+        scheme = triangular_scheme(steps_of(levels), order, int(step), COLUMNS + 1)
+        found = _Rows(values[own], scheme, floor[own])
+        rows = found.least(Limit(*(of[own] for of in vars(best).values())))
+        for of, new in zip(vars(best).values(), vars(rows).values(), strict=True):
+            of[own] = new
+    return best
+
+
+class _Rows:
+    """The triangular scheme of numbers of one expansion: rows over levels, lists over columns, arrays of shape (m,)."""
+
+    def __init__(self, values: Floats, scheme: Scheme, floor: Floats) -> None:
+        self.scheme, self.floor = scheme, floor
+        self.entries: list[list[Floats]] = []
+        self.changes: list[list[Floats]] = []
+        for i, entries in enumerate(scheme):
+            before = self.entries[-1] if i else []
+            row, changes = next_row(entries[:COLUMNS], values[..., i], before)
+            self.entries.append(row)
+            self.changes.append(changes)
+        few = len(scheme) == 3
+        self.agrees_alone = RATIO_OF_THREE if few else RATIO_ALONE_AGREES
+        self.safety_alone = SAFETY_OF_THREE if few else NUMBER_SAFETY_ALONE
+        self.least_part = LEAST_SHARE_OF_THREE if few else LEAST_SHARE
+
+    def _apart(self, j: int, i: int) -> Floats:
+        """Return how far the ratio of the changes of column j at rows i - 1 and i is from that of its power."""
+        wanted = self.scheme[i][j].change_fall
+        return np.abs(self.changes[i - 1][j] / (self.changes[i][j] * wanted) - 1.0)
+
+    def _agrees(self, j: int, i: int) -> Flags:
+        """Say where the changes of column j up to row i have the ratio of its power."""
+        if i < j + 2:
+            return np.zeros(self.floor.shape[:-1], dtype=bool)
+        alone = i == j + 2
+        agrees = self._apart(j, i) <= (self.agrees_alone if alone else RATIO_AGREES)
+        if not alone:
+            agrees &= self._apart(j, i - 1) <= RATIO_BEFORE_AGREES
+        return np.asarray(agrees)
+
+    def _error(self, j: int, i: int) -> Floats:
+        """Return a bound of the error of the entry at row i and column j, j > 0, without round-off."""
+        change, fall, alone = np.abs(self.changes[i][j]), self.scheme[i][j].fall, i == j + 1
+        if alone:
+            taken = np.abs(self.entries[i][j] - self.entries[i][j - 1])
+            change = np.maximum(change, self.least_part * taken)
+        else:
+            change = np.maximum(change, np.abs(self.changes[i - 1][j]) / fall)
+        error = (self.safety_alone if alone else NUMBER_SAFETY) * change
+        error = np.where(self._agrees(j, i), error_left(error, fall), error)
+        for finer in self.entries[i + 1 :]:
+            error = np.fmax(error, np.abs(self.entries[i][j] - finer[j]))
+        return error
+
+    def least(self, best: Limit) -> Limit:
+        """Return the entry with the least bound, or what there is already."""
+        for i in range(2, len(self.entries)):
+            believed = np.ones(self.floor.shape[:-1], dtype=bool)
+            for j in range(1, min(i - 1, COLUMNS) + 1):
+                believed = believed & self._agrees(j - 1, i)
+                noise = self.scheme[i][j - 1].round_off(
+                    [self.floor[..., k] for k in range(i - j, i + 1)]
+                )
+                bound = self._error(j, i) + ROUND_OFF_SAFETY * noise
+                take = believed & (bound < best.bound)
+                best = Limit(
+                    np.where(take, self.entries[i][j], best.value),
+                    np.where(take, bound, best.bound),
+                    np.where(take, i - j, best.first),
+                    np.where(take, i, best.last),
+                )
+        return best
