@@ -30,11 +30,12 @@ def storage(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
 
 @pytest.mark.parametrize("name", SWEEPS)
 def test_parts_and_threads_change_no_bit(name: str, storage: str) -> None:
+    """Parts of one member on threads, and parts that the members do not divide evenly one after the other."""
     experiment = SWEEPS[name]
     records = simulated(experiment)
     whole = analyse_records(experiment, records)
     assert whole.attrs["storage"] == storage
-    for size, threads in ((1, 1), (1, 3), (3, 2), (5, 1)):
+    for size, threads in ((1, 3), (5, 1)):
         assert_same_bytes(analysed(experiment, records, size, threads), whole)
 
 
@@ -44,7 +45,8 @@ def test_a_member_alone_has_the_numbers_and_verdicts_that_it_has_in_the_sweep(
 ) -> None:
     experiment = SWEEPS[name]
     whole = analyse_records(experiment, simulated(experiment))
-    for case in range(experiment.members):
+    # every third: of a grid of 7 by 4 that is every value of both
+    for case in range(0, experiment.members, 3 if experiment.members > 12 else 1):
         alone = experiment.alone(case)
         found = analyse_records(alone, simulated(alone))
         same = cut(whole, case, case + 1)

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import forked
 import pytest
 
 from vibsim.cli import main
@@ -26,10 +27,17 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def vibsim(
+def vibsim(*arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run a command, and see that it ends without a traceback."""
+    ended = forked.vibsim(*arguments)
+    assert "Traceback" not in ended.stdout + ended.stderr
+    return ended
+
+
+def started(
     *arguments: object, before: Callable[[], None] | None = None, **variables: str
 ) -> subprocess.CompletedProcess[str]:
-    """Run a command, and see that it ends without a traceback."""
+    """Run a command by an interpreter of its own: where its limits or its environment count."""
     ended = subprocess.run(
         [sys.executable, "-m", "vibsim", *map(str, arguments)],
         env={**os.environ, **variables},
@@ -76,7 +84,7 @@ def test_a_file_to_write_with_a_name_that_is_too_long(file: Path, tmp_path: Path
 
 @pytest.mark.parametrize("megabytes", [100, 150, 200, 300])
 def test_too_little_memory_is_told_with_what_is_needed(file: Path, megabytes: int) -> None:
-    ended = vibsim("check", file, before=limit(resource.RLIMIT_AS, megabytes * 10**6))
+    ended = started("check", file, before=limit(resource.RLIMIT_AS, megabytes * 10**6))
     assert ended.returncode == 1
     text = f"the limit is {megabytes} MB (ulimit -v), 600 MB are needed"
     assert ended.stderr == f"vibsim: not enough memory: {text}\n"
@@ -86,7 +94,7 @@ def test_too_little_memory_is_told_with_what_is_needed(file: Path, megabytes: in
 def test_a_limit_of_the_size_of_files_is_named(file: Path, tmp_path: Path, kilobytes: int) -> None:
     """The library says only `HDF error`, wherever in the file it comes to the limit."""
     file.write_text(TEXT.replace("7]", "10]"))
-    ended = vibsim(
+    ended = started(
         *("simulate", file, "--level", 10, "--results", tmp_path, "--out", tmp_path / "level.nc"),
         before=limit(resource.RLIMIT_FSIZE, kilobytes * 1024),
     )
@@ -144,7 +152,7 @@ def test_a_file_system_without_locks_is_refused(file: Path, tmp_path: Path, name
     import errno
 
     (tmp_path / "sitecustomize.py").write_text(NO_LOCKS.format(number=getattr(errno, name)))
-    ended = vibsim("run", file, "--results", tmp_path / "results", PYTHONPATH=str(tmp_path))
+    ended = started("run", file, "--results", tmp_path / "results", PYTHONPATH=str(tmp_path))
     assert ended.returncode == 1
     assert "file system has no file locks (flock)" in ended.stderr
     assert "--results" in ended.stderr

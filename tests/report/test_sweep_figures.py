@@ -329,8 +329,15 @@ def test_without_an_exact_solution_maps_show_the_estimate_and_its_error_bar(monk
     assert np.all(error.estimate[stated] <= error.high[stated])
 
 
-@pytest.mark.parametrize("levels", [[6], [6, 7]])
-@pytest.mark.parametrize("sweep", [ACROSS, SAMPLE, {"model.g": {"logspace": [1.0, 1e4, 9]}}])
+@pytest.mark.parametrize(
+    ("sweep", "levels"),
+    [
+        (ACROSS, [6]),
+        (ACROSS, [6, 7]),
+        (SAMPLE, [6]),
+        ({"model.g": {"logspace": [1.0, 1e4, 9]}}, [6, 7]),
+    ],
+)
 def test_few_levels_make_the_pages_of_a_sweep(tmp_path, sweep, levels):
     exp = samples.experiment(sweep=sweep, levels=levels)
     record = samples.record(exp)

@@ -33,7 +33,7 @@ def run(scheme, options, p, initial, steps):
 @pytest.mark.parametrize(("scheme", "options"), VARIANTS)
 def test_what_is_computed_is_the_exact_discrete_solution(scheme, options):
     p = steps_per_radian(scheme, options)
-    steps = 1500
+    steps = 500
     stepper = scheme.stepper(options)
     position, velocity, last = run(scheme, options, p, (1.1, -0.3), steps)
     u, v = discrete(stepper, 1.0, p, 1.1, -0.3, np.arange(steps + 1), steps)

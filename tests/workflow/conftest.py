@@ -5,14 +5,13 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pytest
+from forked import vibsim
 
 from vibsim.cli import main
 
@@ -28,13 +27,6 @@ schemes: [central]
 checks:
   - {id: order, converges: theta, order: scheme, tolerance: 0.5}
 """
-
-
-def vibsim(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "vibsim", *map(str, arguments)]
-    return subprocess.run(
-        command, capture_output=True, text=True, check=False, cwd=cwd, timeout=300
-    )
 
 
 def here(*arguments: object) -> subprocess.CompletedProcess[str]:
@@ -72,11 +64,6 @@ class Place:
         ended = self.run("--dry-run", "--json", files=files)
         assert ended.returncode == 0, ended.stderr
         return [short(entry["job"]) for entry in json.loads(ended.stdout)["jobs"]]
-
-    def outcome(self) -> dict[str, Any]:
-        ended = self.run("--json")
-        found: dict[str, Any] = json.loads(ended.stdout)
-        return found
 
     def change(self, old: str, new: str) -> None:
         text = self.file.read_text()

@@ -9,10 +9,14 @@ import sys
 import time
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
+from forked import vibsim
 
-from .conftest import TEXT, Place, vibsim
+from vibsim.cli.run import snakemake
+
+from .conftest import TEXT, Place
 
 
 def flip(path: Path) -> None:
@@ -25,15 +29,15 @@ def cut(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-100])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "harm"),
     [
-        ("level_07.nc", flip),
-        pytest.param("summary.json", cut, marks=pytest.mark.slow),
-        pytest.param("convergence.nc", flip, marks=pytest.mark.slow),
-        pytest.param("convergence.nc", cut, marks=pytest.mark.slow),
-        pytest.param("level_07.nc", cut, marks=pytest.mark.slow),
-        pytest.param("summary.json", flip, marks=pytest.mark.slow),
+        ("summary.json", cut),
+        ("convergence.nc", flip),
+        ("convergence.nc", cut),
+        ("level_07.nc", cut),
+        ("summary.json", flip),
     ],
 )
 def test_a_damaged_file_is_named_deleted_and_made_again(
@@ -231,43 +235,30 @@ def test_a_failing_level_does_not_cost_those_that_share_its_job(place: Place, tr
     assert (folder / "level_07.nc").is_file()
 
 
-EDITED = """
-import sys
-from pathlib import Path
-from vibsim.cli import main
-from vibsim.cli.run import snakemake as workflow
-
-file, results, old, new = sys.argv[1:]
-run, rounds = workflow.run, []
-
-def edit_first(*arguments):
-    rounds.append(None)
-    Path(file).write_text(Path(file).read_text().replace(old, new))
-    return run(*arguments)
-
-workflow.run = edit_first
-status = main(["run", file, "--results", results, "--cores", "2"])
-print("rounds", len(rounds))
-sys.exit(status)
-"""
-
-
 @pytest.mark.parametrize(
     ("old", "new", "is_refused"),
     [("theta: 1.0", "theta: 0.5", True), ("title: A tiny", "# a word\ntitle: A tiny", False)],
 )
 def test_a_file_that_is_edited_while_it_is_run_costs_one_round(
-    tmp_path: Path, old: str, new: str, is_refused: bool
+    place: Place,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    old: str,
+    new: str,
+    is_refused: bool,
 ) -> None:
-    file, results = tmp_path / "tiny.yaml", tmp_path / "results"
-    file.write_text(TEXT)
-    ended = subprocess.run(
-        [sys.executable, "-c", EDITED, file, results, old, new],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert "rounds 1\n" in ended.stdout
+    right, rounds = snakemake.run, tmp_path / "rounds"
+
+    def edit_first(*arguments: Any) -> snakemake.Outcome:
+        with rounds.open("a") as file:
+            file.write("x")
+        place.change(old, new)
+        return right(*arguments)
+
+    monkeypatch.setattr(snakemake, "run", edit_first)
+    (place.tiny / "report.html").unlink()
+    ended = place.run()
+    assert rounds.read_text() == "x"
     assert ended.returncode == int(is_refused)
-    told = f"{file}: was edited while it was run; run it again"
+    told = f"{place.file}: was edited while it was run; run it again"
     assert (told in ended.stderr) == is_refused
