@@ -1,59 +1,157 @@
 from __future__ import annotations
 
-import pytest
+import json
+import logging
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
 
-from vibsim.cli.run.progress import Progress, describe
-from vibsim.cli.run.snakemake import Job, _Reader
+import pytest
+from snakemake_interface_logger_plugins.common import LogEvent
+from snakemake_interface_logger_plugins.tests import MockOutputSettings
+
+from vibsim.cli.run.progress import Job, Progress
+from vibsim.cli.run.snakemake import Outcome, follow
+from vibsim.cli.run.snakemake_process import LogHandler, LogHandlerSettings
 from vibsim.cli.sizes import amount, duration, size
 
-TEXT = """\
-Building DAG of jobs...
-[Sat Nov 21 01:05:16 2026]
-localrule simulate:
-    output: a/x/level_07.nc
-    log: a/x/logs/level_07.log
-    jobid: 3
-    reason: Missing output files: a/x/level_07.nc
-    wildcards: experiment=a/x, level=07
-[Sat Nov 21 01:05:16 2026]
-Finished jobid: 2 (Rule: simulate)
-1 of 4 steps (25%) done
-[Sat Nov 21 01:05:16 2026]
-Error in rule analyse:
-    message: None
-    jobid: 1
-    input: a/x/level_07.nc
-    output: a/x/convergence.nc, a/x/summary.json
-    log: a/x/logs/analyse.log (check log file(s) for error details)
-    shell:
-        python -m vibsim
-rule all:
-    input: index.html
-rule index:
-    output: index.html, summary.csv
+EVENTS: list[tuple[str, LogEvent | None, dict[str, Any]]] = [
+    ("Building DAG of jobs...", None, {}),
+    ("Job stats: ...", LogEvent.RUN_INFO, {"stats": {"simulate_3": 1, "total": 4}}),
+    (
+        "Rule: simulate_3",
+        LogEvent.JOB_INFO,
+        {
+            "rule_name": "simulate_3",
+            "output": ["a/x/level_07.nc (update)"],
+            "log": ["a/x/logs/level_07.log"],
+            "reason": "Missing output files: a/x/level_07.nc",
+            "resources": object(),
+        },
+    ),
+    ("Finished jobid: 2", LogEvent.JOB_FINISHED, {"job_id": 2}),
+    ("", LogEvent.PROGRESS, {"done": 1, "total": 4}),
+    (
+        "Error in rule analyse",
+        LogEvent.JOB_ERROR,
+        {
+            "rule_name": "analyse",
+            "output": ["a/x/convergence.nc", "a/x/summary.json"],
+            "log": ["a/x/logs/analyse.log"],
+        },
+    ),
+    ("", LogEvent.JOB_INFO, {"rule_name": "all", "output": [], "log": [], "reason": ""}),
+    (
+        "",
+        LogEvent.JOB_INFO,
+        {"rule_name": "index", "output": ["index.html", "summary.csv"], "log": [], "reason": ""},
+    ),
+    ("WorkflowError:\nAt least one job", LogEvent.ERROR, {"exception": "WorkflowError"}),
+]
+
+
+def lines_of(events: list[tuple[str, LogEvent | None, dict[str, Any]]]) -> list[bytes]:
+    """Return what the plug-in writes of records as Snakemake makes them."""
+    reading, writing = os.pipe()
+    handler = LogHandler(MockOutputSettings(), LogHandlerSettings(pipe=writing))
+    for text, event, fields in events:
+        record = logging.LogRecord("snakemake", logging.INFO, "x.py", 1, text, (), None)
+        record.__dict__ |= fields | ({"event": event} if event else {})
+        handler.handle(record)
+    os.close(writing)
+    with os.fdopen(reading, "rb") as file:
+        return file.readlines()
+
+
+def test_jobs_failures_and_steps_are_read_from_the_events_of_snakemake() -> None:
+    lines = lines_of(EVENTS)
+    assert [json.loads(line)["event"] for line in lines] == [
+        str(event) for _, event, _ in EVENTS if event not in (None, LogEvent.JOB_FINISHED)
+    ]
+    found = follow(lines)
+    assert [str(job) for job in found.jobs] == ["simulate a/x level_07.nc", "index"]
+    assert found.jobs[0].outputs == ("a/x/level_07.nc",)
+    assert found.jobs[0].reason == "Missing output files: a/x/level_07.nc"
+    (failed,) = found.failed
+    assert str(failed) == "analyse a/x"
+    assert failed.log == "a/x/logs/analyse.log"
+    assert found.cause == "WorkflowError: At least one job"
+
+
+def test_an_event_that_a_kill_cut_short_is_left_out() -> None:
+    lines = lines_of(EVENTS)
+    assert len(follow([*lines[:2], lines[4][:-1]]).jobs) == 1
+
+
+@pytest.mark.parametrize(
+    ("exception", "message", "text", "cause"),
+    [
+        (
+            "",
+            "",
+            "Traceback ...\n  File\nImportError: nothing here\n\n",
+            "ImportError: nothing here",
+        ),
+        ("", "", "", ""),
+        (
+            "ValueError",
+            "ValueError in line 4:\nno good\n  File x",
+            "",
+            "ValueError in line 4: no good",
+        ),
+        ("OSError", "Traceback:\n  File x:\nOSError: full", "Building\n", "OSError: full"),
+        ("Error", "Traceback:\n  File x:\nsqlite3.Error: locked", "", "sqlite3.Error: locked"),
+    ],
+)
+def test_the_cause_is_the_exception_or_the_last_line(
+    exception: str, message: str, text: str, cause: str
+) -> None:
+    assert Outcome(1, exception=exception, message=message, text=text).cause == cause
+
+
+BROKEN = """
+import os, sys
+from pathlib import Path
+from vibsim.cli.run import lock, snakemake
+results, root = map(Path, sys.argv[1:])
+snakemake.checkout = lambda: root
+ended = snakemake.run([], results, lock.hold(results), ["--cores", "1"])
+print(ended.status, ended.cause)
+assert len(ended.text.splitlines()) > 1
 """
 
 
-def test_jobs_failures_and_steps_are_read_from_what_snakemake_writes() -> None:
-    seen: list[tuple[int, int, Job | None]] = []
-    reader = _Reader(lambda *told: seen.append(told))
-    for line in [*TEXT.splitlines(), ""]:
-        reader.take(line)
-    assert [describe(job) for job in reader.jobs] == ["simulate a/x level_07.nc", "index"]
-    assert reader.jobs[0].reason == "Missing output files: a/x/level_07.nc"
-    (failed,) = reader.failed
-    assert describe(failed) == "analyse a/x"
-    assert failed.log == "a/x/logs/analyse.log"
-    assert (1, 4, None) in seen
+@pytest.mark.parametrize(
+    ("snakefile", "profile", "cause"),
+    [
+        ('raise ValueError("no good")', "{}", 'Snakefile", line 2: no good'),
+        ("import missing_module", "{}", "line 2: No module named 'missing_module'"),
+        ("rule all:\n    input: 'none'", "{}", "Missing input files for rule all:"),
+        ("", "scheduler: none", "argument --scheduler: invalid choice: 'none'"),
+        ("", "[", 'config.yaml", line 1'),
+    ],
+    ids=["exception", "import", "input", "argument", "profile"],
+)
+def test_a_broken_workflow_is_told_in_a_line(
+    tmp_path: Path, snakefile: str, profile: str, cause: str
+) -> None:
+    root = tmp_path / "root"
+    (root / "workflow/profiles/default").mkdir(parents=True)
+    (root / "workflow/profiles/default/config.yaml").write_text(profile)
+    (root / "Snakefile").write_text(f"# a workflow\n{snakefile}\n")
+    command = [sys.executable, "-c", BROKEN, str(tmp_path / "results"), str(root)]
+    ended = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert ended.stdout.startswith(("1 ", "2 "))
+    assert cause in ended.stdout
 
 
 def test_a_job_with_several_files_is_told_by_its_first_and_last() -> None:
-    output = "a/x/level_06.nc (update), a/x/level_07.nc (update), a/x/level_09.nc (update)"
-    job = Job("simulate_3", output, "", "")
-    assert describe(job) == "simulate a/x level_06.nc to level_09.nc"
-    assert job.outputs == [f"a/x/level_0{n}.nc" for n in (6, 7, 9)]
-    shard = Job("simulate_4", "a/x/level_06/shard_0001.nc (update)", "", "")
-    assert describe(shard) == "simulate a/x level_06/shard_0001.nc"
+    outputs = ("a/x/level_06.nc", "a/x/level_07.nc", "a/x/level_09.nc")
+    assert str(Job("simulate_3", outputs, "", "")) == "simulate a/x level_06.nc to level_09.nc"
+    shard = Job("simulate_4", ("a/x/level_06/shard_0001.nc",), "", "")
+    assert str(shard) == "simulate a/x level_06/shard_0001.nc"
 
 
 @pytest.mark.parametrize(
@@ -83,10 +181,9 @@ def test_progress_counts_the_jobs_without_the_target_of_all(
 ) -> None:
     progress = Progress()
     progress.is_terminal = False
-    reader = _Reader(progress)
-    for line in ["total           4", *TEXT.splitlines(), ""]:
-        reader.take(line)
+    follow(lines_of(EVENTS), progress)
     assert capsys.readouterr().err.splitlines() == [
         "1 of 3: simulate a/x level_07.nc",
         "2 of 3: index",
     ]
+    assert progress.done == 1

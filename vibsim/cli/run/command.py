@@ -21,10 +21,10 @@ from vibsim.cli.jobs.common import chosen_results
 from vibsim.cli.jobs.simulate import is_made
 from vibsim.cli.run import changes, lock, outcome, snakemake, sources, supervise
 from vibsim.cli.run.leftovers import leftovers, remove
-from vibsim.cli.run.progress import Progress, describe
+from vibsim.cli.run.progress import Job, Progress
 from vibsim.core import private_cache
 from vibsim.core.errors import VibsimError
-from vibsim.plan import Plan, checkout
+from vibsim.plan import Plan
 
 _STAGES = 4
 """How often the workflow is started at most: once, and once for each kind of file found bad."""
@@ -40,7 +40,7 @@ def run(options: Namespace) -> int:
 
 
 def _run(options: Namespace) -> int:
-    root, results = checkout(), chosen_results(options)
+    results = chosen_results(options)
     # Everything is validated before anything is written but the cache of plans.
     plans = plans_of(options.experiments, cached=True)
     results_folder.check(results, [plan.key for plan in plans])
@@ -48,16 +48,16 @@ def _run(options: Namespace) -> int:
     arguments = ["--cores", str(options.cores or len(os.sched_getaffinity(0)))]
     arguments += ["--resources", f"mem_mb={resources.megabytes(plans)}"]
     if options.dry_run:
-        return _dry_run(plans, results, root, arguments, options)
+        return _dry_run(plans, results, arguments, options)
     _prepare(results)
     held = lock.hold(results)
     sources.claim(plans, results)
     progress = Progress()
     deleted.take(results)
     _clear(plans, results, options.verify)
-    jobs: list[snakemake.Job] = []
+    jobs: list[Job] = []
     for _ in range(_STAGES):
-        ended = snakemake.run(plans, results, root, held, arguments, progress)
+        ended = snakemake.run(plans, results, held, arguments, progress)
         if ended.jobs:
             _refuse_edited(plans, options)
         findings = outcome.collect(plans, results)
@@ -100,9 +100,7 @@ def _refuse_edited(plans: Sequence[Plan], options: Namespace) -> None:
         raise VibsimError("\n".join(f"{file}: {rule}" for file in files))
 
 
-def _dry_run(
-    plans: Sequence[Plan], results: Path, root: Path, arguments: list[str], options: Namespace
-) -> int:
+def _dry_run(plans: Sequence[Plan], results: Path, arguments: list[str], options: Namespace) -> int:
     """Show the jobs; a results folder that does not exist yet is not made for that."""
     with ExitStack() as stack:
         if not results.exists():
@@ -119,7 +117,7 @@ def _dry_run(
         if bad:
             paths = dict.fromkeys(error.path.relative_to(results).as_posix() for error in bad)
             arguments += ["--forcerun", *paths]
-        return _show_jobs(plans, results, root, held, arguments, options.json)
+        return _show_jobs(plans, results, held, arguments, options.json)
 
 
 def _prepare(results: Path) -> None:
@@ -130,25 +128,23 @@ def _prepare(results: Path) -> None:
 
 
 def _show_jobs(
-    plans: Sequence[Plan], results: Path, root: Path, held: int, arguments: list[str], as_json: bool
+    plans: Sequence[Plan], results: Path, held: int, arguments: list[str], as_json: bool
 ) -> int:
-    ended = snakemake.run(plans, results, root, held, arguments, lambda *_: None)
+    ended = snakemake.run(plans, results, held, arguments)
     _check(ended)
     jobs = list(_one_by_one(ended.jobs, plans, results))
     if as_json:
-        entries = [{"job": describe(job), "rule": job.rule, "reason": job.reason} for job in jobs]
+        entries = [{"job": str(job), "rule": job.rule, "reason": job.reason} for job in jobs]
         print(json.dumps({"jobs": entries}, indent=1))
         return 0
     for job in jobs:
-        print(f"{describe(job)}: {job.reason}")
+        print(f"{job}: {job.reason}")
     if not jobs:
         print("nothing to do")
     return 0
 
 
-def _one_by_one(
-    jobs: Sequence[snakemake.Job], plans: Sequence[Plan], results: Path
-) -> Iterator[snakemake.Job]:
+def _one_by_one(jobs: Sequence[Job], plans: Sequence[Plan], results: Path) -> Iterator[Job]:
     """Yield what a run would make, file by file: a job keeps those of its files that are up to date."""
     shards = {shard.path: shard for plan in plans for shard in plan.shards}
     for job in jobs:
@@ -157,7 +153,7 @@ def _one_by_one(
             continue
         for path in job.outputs:
             if not is_made(results / path, shards[path]):
-                yield replace(job, rule="simulate", output=path)
+                yield replace(job, rule="simulate", outputs=(path,))
 
 
 def _check(ended: snakemake.Outcome) -> None:
@@ -176,7 +172,7 @@ def _show(
     _check(ended)
     failures = [
         outcome.Failure(
-            describe(job),
+            str(job),
             str(results / job.log),
             # a job on a full disk cannot say so in its log
             outcome.tail(results / job.log) or resources.obstacle(results),

@@ -1,11 +1,42 @@
-"""Progress on the terminal: one line that is rewritten, or plain lines where the output is kept."""
+"""The jobs of a run, and how far it is: one line that is rewritten, or plain lines where the output is kept."""
 
 from __future__ import annotations
 
 import shutil
 import sys
+from dataclasses import dataclass
 
-from vibsim.cli.run.snakemake import Job
+
+@dataclass(frozen=True)
+class Job:
+    """A job that Snakemake started, or would start."""
+
+    rule: str
+    outputs: tuple[str, ...]
+    """The files that it makes, from the results folder."""
+    log: str
+    reason: str
+    """Why it is to run."""
+
+    @property
+    def simulates(self) -> bool:
+        """Whether it makes level files."""
+        return self.rule.startswith("simulate")
+
+    @property
+    def folder(self) -> str:
+        """Folder of the experiment, empty for the index."""
+        parts = self.outputs[0].split("/")
+        return "/".join(parts[:2]) if len(parts) > 2 else ""
+
+    def __str__(self) -> str:
+        """Say what it does: ``simulate pendulum_lab/convergence level_06.nc to level_09.nc``."""
+        if not self.folder:
+            return self.rule
+        if not self.simulates:
+            return f"{self.rule} {self.folder}"
+        names = [path.removeprefix(f"{self.folder}/") for path in self.outputs]
+        return f"simulate {self.folder} " + " to ".join(dict.fromkeys((names[0], names[-1])))
 
 
 class Progress:
@@ -18,39 +49,34 @@ class Progress:
         self.total = 0
         self.current = ""
 
-    def __call__(self, done: int, total: int, job: Job | None) -> None:
-        """Take what the workflow tells: steps done of all, or a job that has started."""
-        if job is not None:
-            self.current = describe(job)
-            self.started += 1
-            if not self.is_terminal:
-                count = f"{self.started} of {self.total}: " if self.total else ""
-                print(f"{count}{self.current}", file=sys.stderr, flush=True)
-        else:
-            # the target of all is no job
-            self.total = total - 1
-            self.done = min(done, self.total)
-            self.started = self.started if done else 0
-        if self.is_terminal:
-            count = f"{self.done} of {self.total}: " if self.total else ""
-            self._rewrite(f"{count}{self.current}")
+    def count(self, done: int, total: int) -> None:
+        """Take how many jobs are done of how many, both with the target of all, which is no job."""
+        self.total = total - 1
+        self.done = min(done, self.total)
+        if not done:
+            self.started = 0
+        self._show()
+
+    def start(self, job: Job) -> None:
+        """Take a job that has started."""
+        self.current = str(job)
+        self.started += 1
+        if not self.is_terminal:
+            count = f"{self.started} of {self.total}: " if self.total else ""
+            print(f"{count}{self.current}", file=sys.stderr, flush=True)
+        self._show()
 
     def clear(self) -> None:
         """Remove the line."""
         if self.is_terminal:
             self._rewrite("")
 
+    def _show(self) -> None:
+        if self.is_terminal:
+            count = f"{self.done} of {self.total}: " if self.total else ""
+            self._rewrite(f"{count}{self.current}")
+
     def _rewrite(self, text: str) -> None:
         width = shutil.get_terminal_size().columns - 1
         sys.stderr.write(f"\r\033[K{text[:width]}")
         sys.stderr.flush()
-
-
-def describe(job: Job) -> str:
-    """Say what a job does: ``simulate pendulum_lab/convergence level_06.nc to level_09.nc``."""
-    if not job.folder:
-        return job.rule
-    if not job.simulates:
-        return f"{job.rule} {job.folder}"
-    names = [path.removeprefix(f"{job.folder}/") for path in job.outputs]
-    return f"simulate {job.folder} " + " to ".join(dict.fromkeys((names[0], names[-1])))

@@ -1,22 +1,66 @@
-"""Snakemake as a child of a run: it ends with the run, and at once when it is told to.
+"""Snakemake as a child of a run: it tells the run what it does, ends with it, and at once when it is told to.
 
-Its own handler of SIGTERM takes a lock that the interrupted thread may hold, and then waits for ever; nothing is
-lost when it is killed instead, since every file appears whole.
+What it does goes through a pipe to the run, one JSON object a line (`LogHandler`, a logger plug-in of Snakemake). Its
+own handler of SIGTERM takes a lock that the interrupted thread may hold, and then waits for ever; nothing is lost when
+it is killed instead, since every file appears whole.
 """
 
-from __future__ import annotations
-
-import runpy
+import json
+import os
 import sys
+from dataclasses import dataclass, field
+from logging import LogRecord
+
+from snakemake_interface_logger_plugins.base import LogHandlerBase
+from snakemake_interface_logger_plugins.common import LogEvent
+from snakemake_interface_logger_plugins.registry import LoggerPluginRegistry
+from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 
 from vibsim.cli.run import supervise
+
+FIELDS = {
+    LogEvent.RUN_INFO: ("stats",),
+    LogEvent.PROGRESS: ("done", "total"),
+    LogEvent.JOB_INFO: ("rule_name", "output", "log", "reason"),
+    LogEvent.JOB_ERROR: ("rule_name", "output", "log"),
+    LogEvent.ERROR: ("exception", "msg"),
+}
+"""The events that a run follows, each with what it needs to know of it."""
+
+
+@dataclass
+class LogHandlerSettings(LogHandlerSettingsBase):
+    """The option ``--logger-vibsim-pipe`` of Snakemake."""
+
+    pipe: int = field(default=-1, metadata={"help": "descriptor that events are written to"})
+
+
+class LogHandler(LogHandlerBase):
+    """Writes events to the pipe; what people read goes to stderr as ever."""
+
+    writes_to_stream = False
+    writes_to_file = False
+    has_filter = True
+    has_formatter = True
+    needs_rulegraph = False
+    settings: LogHandlerSettings
+
+    def emit(self, record: LogRecord) -> None:
+        """Write the event of a record, if it has one that a run follows."""
+        event = getattr(record, "event", None)
+        if event in FIELDS:
+            content = {"event": event, **{name: getattr(record, name) for name in FIELDS[event]}}
+            os.write(self.settings.pipe, f"{json.dumps(content)}\n".encode())
 
 
 def main() -> None:
     """Run Snakemake for the process that the first argument names, with the others."""
     supervise.end_at_once()
     supervise.end_with(int(sys.argv.pop(1)))
-    runpy.run_module("snakemake", run_name="__main__", alter_sys=True)
+    from snakemake.cli import main as snakemake
+
+    LoggerPluginRegistry().register_plugin("snakemake_logger_plugin_vibsim", sys.modules[__name__])
+    snakemake()
 
 
 if __name__ == "__main__":
