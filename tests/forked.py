@@ -29,7 +29,10 @@ def vibsim(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedP
     """Run a command and return its exit status and what it wrote."""
     command = ["vibsim", *map(str, arguments)]
     with TemporaryFile() as out, TemporaryFile() as err:
-        child = os.fork()
+        with warnings.catch_warnings():
+            # from Python 3.12 on, of threads that this process has, and the new one has not
+            warnings.simplefilter("ignore", DeprecationWarning)
+            child = os.fork()
         if not child:
             _perform(command, out.fileno(), err.fileno(), cwd)
         status = _wait(child, command)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import fcntl
 import io
 import json
 import os
@@ -87,13 +88,20 @@ def short(job: str) -> str:
 
 
 @pytest.fixture(scope="session")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Place:
-    """Run the tiny experiment once."""
-    place = Place(tmp_path_factory.mktemp("finished"))
-    place.file.parent.mkdir(parents=True)
-    place.file.write_text(TEXT)
-    ended = place.run()
-    assert ended.returncode == 0, ended.stdout + ended.stderr
+def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Place:
+    """Run the tiny experiment once: the first process that asks does, others wait for it."""
+    base = tmp_path_factory.getbasetemp()
+    shared = base if worker_id == "master" else base.parent
+    place, done = Place(shared / "finished"), shared / "finished.done"
+    with (shared / "finished.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not done.exists():
+            shutil.rmtree(place.folder, ignore_errors=True)
+            place.file.parent.mkdir(parents=True)
+            place.file.write_text(TEXT)
+            ended = place.run()
+            assert ended.returncode == 0, ended.stdout + ended.stderr
+            done.touch()
     return place
 
 
