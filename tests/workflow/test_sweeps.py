@@ -160,7 +160,7 @@ def test_a_member_that_fails_costs_no_other(empty: Place) -> None:
     """A member that overflows is a result with a status; the others are as without it."""
     write(empty, "initial.omega: [0.1, 1.0e+200, 0.2]")
     ended = empty.run()
-    assert "did not come to its end" not in ended.stdout
+    assert "did not finish" not in ended.stdout
     record = store.read(empty.tiny / "level_06/shard_0000.nc")
     assert record["status"][0].tolist() == [0, 1, 0]
     write(empty, "initial.omega: [0.1, 0.2]")
