@@ -33,9 +33,9 @@ def file(tmp_path: Path) -> Path:
 Capture = pytest.CaptureFixture[str]
 
 
-def test_check_accepts_a_sound_file(file: Path, capsys: Capture) -> None:
+def test_check_accepts_a_valid_file(file: Path, capsys: Capture) -> None:
     assert main(["check", str(file)]) == 0
-    assert "sound" in capsys.readouterr().out
+    assert "valid (1 member, levels 5, 6, 7)" in capsys.readouterr().out
 
 
 def test_check_tells_all_faults_of_all_files_without_a_traceback(

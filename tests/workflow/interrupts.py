@@ -160,7 +160,7 @@ class Stress:
         if took >= LIMIT:
             self.faults.append(f"{name}: {took:.1f} s, status {status}: {err}")
         self.counts[f"status {status}"] += 1
-        told = "vibsim: interrupted; the same command goes on from here" in err
+        told = "vibsim: interrupted; run the same command again to continue" in err
         if status not in ((0, 129, 130, 143) if delay > EARLY else (0, 129, 130, 143, -1, -2, -15)):
             self.faults.append(f"{name}: status {status}: {out} {err}")
         if delay > EARLY and status > 2 and not told:

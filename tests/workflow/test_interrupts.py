@@ -24,7 +24,7 @@ time: {end: 20.0}
 levels: [6, 32]
 schemes: [central]
 """
-TOLD = "vibsim: interrupted; the same command goes on from here\n"
+TOLD = "vibsim: interrupted; run the same command again to continue\n"
 
 
 @pytest.fixture(autouse=True)

@@ -31,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         return supervised(lambda: _perform(sys.argv[1:]))
     except Exception as error:
-        return _told(error)
+        return _failed(error)
 
 
 def _perform(arguments: Sequence[str]) -> int:
@@ -44,11 +44,11 @@ def _perform(arguments: Sequence[str]) -> int:
         finally:
             sys.stdout.flush()
     except Exception as error:
-        return _told(error)
+        return _failed(error)
     return status
 
 
-def _told(error: Exception) -> int:
-    from vibsim.cli.failure import told
+def _failed(error: Exception) -> int:
+    from vibsim.cli.failure import report
 
-    return told(error)
+    return report(error)

@@ -20,7 +20,7 @@ _OF_MEMORY = (
 """How libraries tell in their own words that they were given no memory."""
 
 
-def told(error: Exception) -> int:
+def report(error: Exception) -> int:
     """Say on stderr what went wrong and return the exit status."""
     if isinstance(error, BrokenPipeError):
         # The reader of a pipe has gone (``vibsim list | head``); nobody is left to tell.
@@ -40,7 +40,7 @@ def sentence(error: Exception) -> str:
     if (isinstance(error, OSError) and error.errno) or netcdf.is_from_library(error):
         return reason(error)
     text = "".join(traceback.format_exception(error))
-    return f"internal error, {_place(error)}: {reason(error)}; please report it {kept(text)}"
+    return f"internal error, {_place(error)}: {reason(error)}; please report it {save_text(text)}"
 
 
 def reason(error: BaseException) -> str:
@@ -69,7 +69,7 @@ def _place(error: Exception) -> str:
     return f"{Path(last.filename).name}, line {last.lineno}"
 
 
-def kept(text: str) -> str:
+def save_text(text: str) -> str:
     """Write a long text to a file of its own, for whoever wants to know more, and say where it is."""
     try:
         descriptor, name = tempfile.mkstemp(prefix="vibsim-error-", suffix=".txt")

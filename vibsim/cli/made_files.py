@@ -101,13 +101,13 @@ def content(path: Path) -> str:
     """
     if path.suffix == ".nc":
         seal.check(path)
-        return seal.told(path)
+        return seal.stored_digest(path)
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _made(path: Path) -> Entry:
-    digest = seal.told(path) if path.suffix == ".nc" else content(path)
+    digest = seal.stored_digest(path) if path.suffix == ".nc" else content(path)
     return entry(path.lstat(), digest)
 
 

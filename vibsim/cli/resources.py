@@ -22,23 +22,19 @@ def check(plans: Sequence[Plan], results: Path) -> None:
     InputError
         With what is needed and what is there.
     """
-    if problem := lacking(plans, results):
-        raise InputError([Fault(str(results), 0, "", "", problem)])
-
-
-def lacking(plans: Sequence[Plan], results: Path) -> str:
-    """Say what the machine has too little of; empty where everything fits."""
-    needed, free = missing_bytes(plans, results), free_bytes(results)
+    needed, free, total = _missing_bytes(plans, results), free_bytes(results), _memory("MemTotal")
+    problems = [
+        f"{plan.key}: a job needs {size(plan.memory)} of memory, the machine has {size(total)}"
+        for plan in plans
+        if plan.memory > total
+    ]
     if needed > free:
-        return f"the files need {size(needed)} of disk, {size(free)} are free"
-    total = _memory("MemTotal")
-    for plan in plans:
-        if plan.memory > total:
-            return f"{plan.key}: a job needs {size(plan.memory)} of memory, the machine has {size(total)}"
-    return ""
+        problems = [f"the files need {size(needed)} of disk, {size(free)} are free"]
+    if problems:
+        raise InputError([Fault(str(results), 0, "", "", problems[0])])
 
 
-def missing_bytes(plans: Sequence[Plan], results: Path) -> int:
+def _missing_bytes(plans: Sequence[Plan], results: Path) -> int:
     """Return the estimated size of the files that are not there yet."""
     compared = (plan.analysis_bytes for plan in plans if not (results / plan.convergence).exists())
     return sum(compared) + sum(

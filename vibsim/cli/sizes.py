@@ -5,7 +5,11 @@ from __future__ import annotations
 
 def size(number: float) -> str:
     """Return bytes as text: ``1.2 GB``."""
-    return _scaled(number, 1000.0, ("B", "kB", "MB", "GB", "TB"))
+    for unit in ("B", "kB", "MB", "GB"):
+        if number < 999.5:
+            return f"{number:.3g} {unit}"
+        number /= 1000.0
+    return f"{number:.3g} TB"
 
 
 def amount(number: float) -> str:
@@ -19,11 +23,3 @@ def duration(seconds: float) -> str:
         if seconds < limit:
             return f"{seconds / factor:.1f} {unit}"
     return f"{seconds / 86400.0:.1f} d"
-
-
-def _scaled(number: float, base: float, units: tuple[str, ...]) -> str:
-    for unit in units[:-1]:
-        if number < 0.9995 * base:
-            return f"{number:.3g} {unit}"
-        number /= base
-    return f"{number:.3g} {units[-1]}"

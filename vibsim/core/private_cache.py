@@ -58,28 +58,23 @@ def kept(
     folder = opened(kind)
     if folder is None:
         return make()
-    found = _found(folder, name, load)
-    if found is None:
-        with folder.held(name):
-            # another one may have made it
-            found = _found(folder, name, load)
-            return _made(folder, name, make, dump) if found is None else found
-    return found
 
+    def found() -> Thing | None:
+        content = folder.read(name)
+        return None if content is None else load(content)
 
-def _found(folder: Folder, name: str, load: Callable[[bytes], Thing | None]) -> Thing | None:
-    content = folder.read(name)
-    return None if content is None else load(content)
-
-
-def _made(
-    folder: Folder, name: str, make: Callable[[], Thing], dump: Callable[[Thing], bytes | None]
-) -> Thing:
-    made = make()
-    content = dump(made)
-    if content is not None:
-        folder.write(name, content)
-    return made
+    thing = found()
+    if thing is not None:
+        return thing
+    with folder.held(name):
+        # another one may have made it
+        thing = found()
+        if thing is None:
+            thing = make()
+            content = dump(thing)
+            if content is not None:
+                folder.write(name, content)
+    return thing
 
 
 def place() -> Path:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vibsim.core import netcdf
 from vibsim.core.errors import DamagedFileError
 from vibsim.core.record import Attribute, Record, Variable
-from vibsim.store import identity, seal
+from vibsim.store import seal
 
 
 def read(path: Path, *, digest: str | None = None) -> Record:
@@ -63,7 +63,7 @@ def opened(path: Path, digest: str | None) -> Iterator[Any]:
             dataset.set_auto_maskandscale(False)
             dataset.set_auto_chartostring(False)
             form, job = (getattr(dataset, name, None) for name in ("vibsim_format", "digest"))
-            identity.check(path, form, str(job), digest)
+            seal.check_job(path, form, str(job), digest)
         yield dataset
     finally:
         dataset.close()

@@ -1,4 +1,6 @@
-"""The seal of a binary file: the SHA-256 of all its bytes, appended behind them.
+"""Whether a result file is whole, and whose it is.
+
+The seal of a binary file is the SHA-256 of all its bytes, appended behind them.
 
 HDF5 reads what its superblock says and ignores bytes behind it, so that a sealed file opens in
 every netCDF program. The library's own checksums (fletcher32) see damaged data but not damaged
@@ -9,9 +11,11 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
+from typing import Any
 
 from vibsim.core import regular_files
-from vibsim.core.errors import DamagedFileError
+from vibsim.core.errors import DamagedFileError, StaleFileError
+from vibsim.core.vocabulary import FORMAT
 
 _MARK = b"\nvibsim-sha256:"
 LENGTH = len(_MARK) + 64 + 1
@@ -35,7 +39,7 @@ def attach(path: Path) -> None:
         file.write(seal)
 
 
-def told(path: Path) -> str:
+def stored_digest(path: Path) -> str:
     """Return the digest in the seal of `path`, which is not compared.
 
     Raises
@@ -73,3 +77,28 @@ def check(path: Path) -> None:
     if found.startswith(_MARK):
         raise DamagedFileError(path, "its bytes are not those that were written")
     raise DamagedFileError(path, "it does not end with a seal: truncated, or not vibsim's")
+
+
+def check_job(path: Path, form: Any, digest: str, wanted: str | None) -> None:
+    """Compare what a whole file says of its format and its job with what is wanted.
+
+    Parameters
+    ----------
+    path
+        The file, for the message.
+    form
+        Its ``vibsim_format``, None where it has none.
+    digest
+        Digest of the job that made it.
+    wanted
+        Digest of the job whose result is wanted; None takes any.
+
+    Raises
+    ------
+    StaleFileError
+        When the file is of another format or another job's.
+    """
+    if form != FORMAT:
+        raise StaleFileError(path, f"it is not in vibsim format {FORMAT}")
+    if wanted is not None and digest != wanted:
+        raise StaleFileError(path, f"it belongs to job {digest[:12]}, wanted is {wanted[:12]}")

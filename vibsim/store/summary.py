@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from vibsim.core import regular_files
-from vibsim.core.errors import DamagedFileError
+from vibsim.core.errors import DamagedFileError, StaleFileError
 from vibsim.core.vocabulary import FORMAT, jsonable
-from vibsim.store import identity
+from vibsim.store import seal
 from vibsim.store.atomic import write_text
 
 
@@ -61,8 +61,10 @@ def read_json(path: Path, *, digest: str | None = None, name: str | None = None)
         raise DamagedFileError(path, "it is not JSON") from error
     if not isinstance(content, dict) or text != _sealed(content):
         raise DamagedFileError(path, "its bytes are not those that were written")
-    identity.check(path, content.get("vibsim_format"), str(content.get("digest")), digest)
-    identity.check_name(path, f"{content.get('collection')}/{content.get('experiment')}", name)
+    seal.check_job(path, content.get("vibsim_format"), str(content.get("digest")), digest)
+    found = f"{content.get('collection')}/{content.get('experiment')}"
+    if name is not None and found != name:
+        raise StaleFileError(path, f"it is {found}, wanted is {name}")
     return content
 
 

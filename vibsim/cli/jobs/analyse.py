@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 from vibsim.cli import made_files
 from vibsim.cli.jobs.common import check_digest, one_plan, provenance, titled
-from vibsim.cli.jobs.levels import check_levels, readers
+from vibsim.cli.jobs.levels import open_levels
 from vibsim.plan.digested_part import analysed
 
 if TYPE_CHECKING:
@@ -22,12 +21,10 @@ def analyse(options: Namespace) -> int:
     from vibsim import store
     from vibsim.analysis import analyse_parts, joined, kept, summarise, verdicts
 
-    check_levels(plan, options, results)
     experiment = plan.experiment
     folder = options.out or results / plan.key
     thin: list[Record] = []
-    with ExitStack() as stack:
-        levels = readers(plan, results, stack)
+    with open_levels(plan, options, results) as levels:
         parts = kept(experiment, analyse_parts(experiment, levels, threads=options.threads), thin)
         store.write_parts(
             folder / "convergence.nc",

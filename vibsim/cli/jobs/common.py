@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -67,27 +67,20 @@ def read_all(
 ) -> dict[str, Any]:
     """Read every file, and only then refuse: a run makes all that are bad again in one go."""
     found: dict[str, Any] = {}
-    errors: list[FileError] = []
+    problems: list[str] = []
     for path, read in readers.items():
         try:
             found[path] = read(results / path)
         except FileError as error:
-            errors.append(error)
-    if errors:
-        kept = _discard(errors, results) if options.discard else []
-        raise VibsimError("\n".join([*map(str, errors), *kept]))
+            problems.append(str(error))
+            if options.discard:
+                try:
+                    delete(error, results)
+                except VibsimError as obstacle:
+                    problems.append(str(obstacle))
+    if problems:
+        raise VibsimError("\n".join(problems))
     return found
-
-
-def _discard(errors: Sequence[FileError], results: Path) -> list[str]:
-    """Delete every bad file; return why some could not be."""
-    kept: list[str] = []
-    for bad in errors:
-        try:
-            delete(bad, results)
-        except VibsimError as error:
-            kept.append(str(error))
-    return kept
 
 
 def titled(record: Record, title: str) -> Record:

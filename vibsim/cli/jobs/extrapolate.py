@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Iterator
-from contextlib import ExitStack
 
 from vibsim.cli import made_files
 from vibsim.cli.jobs.common import check_digest, one_plan, provenance, refusal, titled
-from vibsim.cli.jobs.levels import check_levels, readers
-from vibsim.plan import Plan
+from vibsim.cli.jobs.levels import open_levels
 from vibsim.plan.digested_part import extrapolated
 
 PART_BYTES = 64 * 10**6
@@ -25,14 +22,17 @@ def extrapolate(options: Namespace) -> int:
     from vibsim import store
     from vibsim.comparison.best_solution import best_record
 
-    check_levels(plan, options, results)
-    with ExitStack() as stack:
-        levels = readers(plan, results, stack)
+    size = max(1, PART_BYTES * plan.cases // plan.bytes)
+    with open_levels(plan, options, results) as levels:
         parts = (
             best_record(
-                plan.experiment, {level: read(start, stop) for level, read in levels.items()}
+                plan.experiment,
+                {
+                    level: read(start, min(start + size, plan.cases))
+                    for level, read in levels.items()
+                },
             )
-            for start, stop in _ranges(plan)
+            for start in range(0, plan.cases, size)
         )
         store.write_parts(
             options.out or results / plan.best,
@@ -44,10 +44,3 @@ def extrapolate(options: Namespace) -> int:
     if options.out is None:
         made_files.add(results, plan.key, ["best.nc"])
     return 0
-
-
-def _ranges(plan: Plan) -> Iterator[tuple[int, int]]:
-    """Yield ranges of members whose levels fit into memory together."""
-    size = max(1, PART_BYTES * plan.cases // plan.bytes)
-    for start in range(0, plan.cases, size):
-        yield start, min(start + size, plan.cases)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,22 +16,25 @@ if TYPE_CHECKING:
     from vibsim.core.record import Record
 
 
-def check_levels(plan: Plan, options: Namespace, results: Path) -> None:
-    """Refuse where a level file is damaged or another job's."""
+@contextmanager
+def open_levels(
+    plan: Plan, options: Namespace, results: Path
+) -> Iterator[dict[int, Callable[[int, int], Record]]]:
+    """Open all level files; yield what reads a range of members of each level.
+
+    Raises
+    ------
+    VibsimError
+        Where files are damaged or another job's.
+    """
     from vibsim import store
 
     checks = {shard.path: partial(store.check, digest=shard.digest) for shard in plan.shards}
     read_all(options, results, checks)
-
-
-def readers(plan: Plan, results: Path, stack: ExitStack) -> dict[int, Callable[[int, int], Record]]:
-    """Return what reads a range of members of each level; the files were checked before."""
-    from vibsim import store
-
-    files = {
-        level.level: [(results / shard.path, shard.digest) for shard in level.shards]
-        for level in plan.levels
-    }
-    return {
-        level: stack.enter_context(store.open_level(found)).read for level, found in files.items()
-    }
+    with ExitStack() as stack:
+        yield {
+            level.level: stack.enter_context(
+                store.open_level([(results / shard.path, shard.digest) for shard in level.shards])
+            ).read
+            for level in plan.levels
+        }

@@ -1,8 +1,12 @@
-"""Which results are no longer as they were made: by size, time and inode, and where one of these differs by content."""
+"""What is in a results folder: files no longer as they were made, and files that nobody asks for any more.
+
+A file is as it was made where size, time and inode are; where one of these differs, the content is compared.
+"""
 
 from __future__ import annotations
 
 import os
+import re
 import stat
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
@@ -16,6 +20,9 @@ from vibsim.plan import Plan
 _OVER_ALL = ("index.html", "summary.csv")
 _SEALED = (".nc", ".json")
 """Files that say themselves whether they are whole."""
+_LEVEL = re.compile(r"level_\d{2,}")
+_FILE = re.compile(r"level_\d{2,}\.nc|best\.nc")
+_SHARD = re.compile(r"shard_\d{4,}\.nc")
 
 
 def changed(plans: Sequence[Plan], results: Path, *, every: bool) -> list[FileError]:
@@ -65,9 +72,9 @@ def _problem(folder: Path, name: str, entries: dict[str, Entry], every: bool) ->
         if not every and known and known.fits(status):
             return ""
         if not stat.S_ISREG(status.st_mode):
-            return "is no file"
+            return "is not a file"
         if not known and path.suffix not in _SEALED:
-            return "nothing on record says that it is as it was made"
+            return "has no entry in the record of what was made"
         digest = made_files.content(path)
     except FileNotFoundError:
         return ""
@@ -113,3 +120,30 @@ def _settled(results: Path, key: str, name: str, known: Entry, fresh: set[str]) 
         return known
     same = (status.st_size, status.st_ino) == (known.size, known.inode)
     return known._replace(time=status.st_mtime_ns) if same else known
+
+
+def leftovers(plans: Sequence[Plan], results: Path) -> list[Path]:
+    """Return the files under names that vibsim gives, and that these experiments have not; links are nobody's."""
+    wanted = {results / path for plan in plans for path in plan.files}
+    found = (path for plan in plans for path in _found(results / plan.key))
+    return [path for path in found if path not in wanted]
+
+
+def _found(folder: Path) -> Iterator[Path]:
+    for path in sorted(folder.iterdir()) if folder.is_dir() else ():
+        if path.is_symlink():
+            continue
+        if path.is_file() and _FILE.fullmatch(path.name):
+            yield path
+        elif path.is_dir() and _LEVEL.fullmatch(path.name):
+            shards = sorted(path.iterdir())
+            yield from (p for p in shards if _SHARD.fullmatch(p.name) and not p.is_symlink())
+
+
+def remove(path: Path) -> None:
+    """Remove a file, and the folder of its level when that is empty."""
+    path.unlink(missing_ok=True)
+    if _LEVEL.fullmatch(path.parent.name):
+        # It is not empty while there is anything else in it.
+        with suppress(OSError):
+            path.parent.rmdir()

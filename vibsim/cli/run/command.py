@@ -20,7 +20,6 @@ from vibsim.cli.jobs import deleted
 from vibsim.cli.jobs.common import chosen_results
 from vibsim.cli.jobs.simulate import is_made
 from vibsim.cli.run import changes, lock, outcome, snakemake, sources, supervise
-from vibsim.cli.run.leftovers import leftovers, remove
 from vibsim.cli.run.progress import Job, Progress
 from vibsim.core import private_cache
 from vibsim.core.errors import VibsimError
@@ -49,7 +48,6 @@ def _run(options: Namespace) -> int:
     arguments += ["--resources", f"mem_mb={resources.megabytes(plans)}"]
     if options.dry_run:
         return _dry_run(plans, results, arguments, options)
-    _prepare(results)
     held = lock.hold(results)
     sources.claim(plans, results)
     progress = Progress()
@@ -60,7 +58,7 @@ def _run(options: Namespace) -> int:
         ended = snakemake.run(plans, results, held, arguments, progress)
         if ended.jobs:
             _refuse_edited(plans, options)
-        findings = outcome.collect(plans, results)
+        findings = [outcome.collect(plan, results) for plan in plans]
         progress.clear()
         jobs.extend(ended.jobs)
         changes.settle(plans, results, (path for job in ended.jobs for path in job.outputs))
@@ -74,13 +72,9 @@ def _clear(plans: Sequence[Plan], results: Path, every: bool) -> None:
     for error in changes.changed(plans, results, every=every):
         deleted.delete(error, results)
     _tell_deleted(results)
-    for path in _leftovers(plans, results):
-        remove(path)
+    for path in changes.leftovers(plans, results):
+        changes.remove(path)
         print(f"vibsim: removed, no longer asked for: {path}", file=sys.stderr)
-
-
-def _leftovers(plans: Sequence[Plan], results: Path) -> list[Path]:
-    return [path for plan in plans for path in leftovers(plan, results)]
 
 
 def _tell_deleted(results: Path) -> bool:
@@ -105,42 +99,25 @@ def _dry_run(plans: Sequence[Plan], results: Path, arguments: list[str], options
     with ExitStack() as stack:
         if not results.exists():
             results = Path(stack.enter_context(TemporaryDirectory(prefix="vibsim-")))
-        _prepare(results)
         held = lock.hold(results)
-        sources.check(plans, results)
+        sources.claim(plans, results, dry_run=True)
         bad = changes.changed(plans, results, every=options.verify)
         for error in bad:
             print(f"vibsim: would be deleted and made again: {error}", file=sys.stderr)
-        for path in _leftovers(plans, results):
+        for path in changes.leftovers(plans, results):
             print(f"vibsim: would be removed, no longer asked for: {path}", file=sys.stderr)
         arguments = [*arguments, "--dry-run"]
         if bad:
             paths = dict.fromkeys(error.path.relative_to(results).as_posix() for error in bad)
             arguments += ["--forcerun", *paths]
-        return _show_jobs(plans, results, held, arguments, options.json)
-
-
-def _prepare(results: Path) -> None:
-    try:
-        (results / ".vibsim").mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise VibsimError(f"{results}: cannot be written ({error.strerror})") from error
-
-
-def _show_jobs(
-    plans: Sequence[Plan], results: Path, held: int, arguments: list[str], as_json: bool
-) -> int:
-    ended = snakemake.run(plans, results, held, arguments)
-    _check(ended)
-    jobs = list(_one_by_one(ended.jobs, plans, results))
-    if as_json:
+        ended = snakemake.run(plans, results, held, arguments)
+        _check(ended)
+        jobs = list(_one_by_one(ended.jobs, plans, results))
+    if options.json:
         entries = [{"job": str(job), "rule": job.rule, "reason": job.reason} for job in jobs]
         print(json.dumps({"jobs": entries}, indent=1))
-        return 0
-    for job in jobs:
-        print(f"{job}: {job.reason}")
-    if not jobs:
-        print("nothing to do")
+    else:
+        print(*[f"{job}: {job.reason}" for job in jobs] or ["nothing to do"], sep="\n")
     return 0
 
 
@@ -157,9 +134,9 @@ def _one_by_one(jobs: Sequence[Job], plans: Sequence[Plan], results: Path) -> It
 
 
 def _check(ended: snakemake.Outcome) -> None:
-    """Refuse to go on where Snakemake itself broke down, rather than one of its jobs."""
+    """Refuse to go on where Snakemake itself failed, rather than one of its jobs."""
     if ended.status and not ended.failed:
-        raise VibsimError(f"the workflow broke down: {ended.cause} {failure.kept(ended.text)}")
+        raise VibsimError(f"the workflow failed: {ended.cause} {failure.save_text(ended.text)}")
 
 
 def _show(
@@ -185,11 +162,10 @@ def _show(
     else:
         if not worked:
             print("nothing to do: all results are up to date\n")
-        for line in outcome.as_text(findings, failures, _columns()):
-            print(line)
+        print(*outcome.as_text(findings, failures, _columns()), sep="\n")
         if has_index:
             print(f"report: {results / 'index.html'}")
-    return 0 if outcome.passed(findings, failures) else 1
+    return 0 if outcome.status(findings, failures) == "PASS" else 1
 
 
 def _write_index(results: Path) -> bool:

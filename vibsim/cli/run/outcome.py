@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -41,15 +41,11 @@ class Finding:
         return str(self.summary["status"]) if self.summary else "FAIL"
 
 
-def collect(plans: Sequence[Plan], results: Path) -> list[Finding]:
-    """Read the summary of every plan; delete one that is damaged or outdated."""
-    return [_collect(plan, results) for plan in plans]
-
-
-def _collect(plan: Plan, results: Path) -> Finding:
+def collect(plan: Plan, results: Path) -> Finding:
+    """Read the summary of an experiment; delete one that is damaged or outdated."""
     path = results / plan.summary
     if not path.is_file():
-        return Finding(plan, None, "did not come to its end")
+        return Finding(plan, None, "did not finish: it has no summary")
     try:
         return Finding(plan, read_json(path, digest=plan.analysis, name=plan.key), "")
     except FileError as error:
@@ -66,22 +62,19 @@ def tail(path: Path) -> tuple[str, ...]:
     return tuple(line for line in lines if line.strip())[-_LOG_LINES:]
 
 
-def passed(findings: Sequence[Finding], failures: Sequence[Failure]) -> bool:
-    """Tell whether every check of every experiment passed and every job ended well."""
-    return not failures and all(finding.status == "PASS" for finding in findings)
+def status(findings: Sequence[Finding], failures: Sequence[Failure]) -> str:
+    """Return the status of the whole run: PASS where every check passed and every job ended well."""
+    return worst([finding.status for finding in findings] + ["FAIL"] * bool(failures))
 
 
 def as_json(findings: Sequence[Finding], failures: Sequence[Failure], results: Path) -> str:
     """Return the outcome as JSON text."""
     content = {
         "vibsim_format": FORMAT,
-        "status": worst([finding.status for finding in findings] + ["FAIL"] * bool(failures)),
+        "status": status(findings, failures),
         "results": str(results),
         "experiments": [_entry(finding) for finding in findings],
-        "failed_jobs": [
-            {"job": failure.job, "log": failure.log, "tail": list(failure.tail)}
-            for failure in failures
-        ],
+        "failed_jobs": [asdict(failure) for failure in failures],
     }
     return json.dumps(content, indent=1, ensure_ascii=False)
 
@@ -123,14 +116,9 @@ def as_text(
         yield f"\nfailed: {failure.job} (log: {failure.log})"
         yield from (f"  {line}" for line in failure.tail)
     checks = [check["status"] for f in findings if f.summary for check in f.summary["checks"]]
-    yield (
-        f"\n{_counted(findings)}, {checks.count('PASS')} of {len(checks)} checks passed: "
-        + worst([finding.status for finding in findings] + ["FAIL"] * bool(failures))
-    )
-
-
-def _counted(findings: Sequence[Finding]) -> str:
-    return "1 experiment" if len(findings) == 1 else f"{len(findings)} experiments"
+    counted = "1 experiment" if len(findings) == 1 else f"{len(findings)} experiments"
+    passed = f"{checks.count('PASS')} of {len(checks)} checks passed"
+    yield f"\n{counted}, {passed}: {status(findings, failures)}"
 
 
 def _checks(checks: Sequence[Mapping[str, Any]], columns: int) -> Iterator[str]:

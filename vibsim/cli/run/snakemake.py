@@ -164,7 +164,9 @@ def _status(process: subprocess.Popen[bytes]) -> int:
         raise supervise.Interrupted(number)
     if status < 0:
         name = signal.Signals(-status).name
-        raise VibsimError(f"the workflow was killed by {name}; the same command goes on from here")
+        raise VibsimError(
+            f"the workflow was killed by {name}; run the same command again to continue"
+        )
     return status
 
 

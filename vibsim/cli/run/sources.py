@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -22,36 +22,17 @@ Source = tuple[str, str]
 """The file by its real path, and by its path from the results folder; one member of a sweep with its number."""
 
 
-def check(plans: Sequence[Plan], results: Path) -> None:
-    """Refuse the results of other files.
+def claim(plans: Sequence[Plan], results: Path, *, dry_run: bool = False) -> None:
+    """Refuse the results of other files; put down whose the results are from now on, unless in a dry run.
 
     Raises
     ------
     InputError
         With both files of every name that is taken.
     """
-    if faults := list(_faults(plans, _own(plans, results), _load(results), results)):
-        raise InputError(faults)
-
-
-def claim(plans: Sequence[Plan], results: Path) -> None:
-    """Refuse as `check` does, and put down whose the results are from now on."""
-    check(plans, results)
     known = _load(results)
-    now = known | _own(plans, results)
-    if now != known:
-        # Results on a read-only medium keep what they have.
-        with suppress(OSError):
-            write_text(_path(results), json.dumps(now, indent=1) + "\n")
-
-
-def _own(plans: Sequence[Plan], results: Path) -> dict[str, Source]:
-    return {plan.key: _source(plan, results) for plan in plans if plan.collection == ADHOC}
-
-
-def _faults(
-    plans: Sequence[Plan], own: Mapping[str, Source], known: Mapping[str, Source], results: Path
-) -> Iterator[Fault]:
+    own = {plan.key: _source(plan, results) for plan in plans if plan.collection == ADHOC}
+    faults = []
     for plan in plans:
         first = known.get(plan.key)
         if plan.key not in own or first is None or set(first) & set(own[plan.key]):
@@ -59,7 +40,14 @@ def _faults(
         if Path(_file(first[0])).exists():
             rule = f"{results / plan.key} has the results of another file of this name, {first[0]}"
             hint = "rename one of the two files, or choose another folder with --results"
-            yield Fault(plan.file, 0, "", "", rule, hint)
+            faults.append(Fault(plan.file, 0, "", "", rule, hint))
+    if faults:
+        raise InputError(faults)
+    now = known | own
+    if now != known and not dry_run:
+        # Results on a read-only medium keep what they have.
+        with suppress(OSError):
+            write_text(_path(results), json.dumps(now, indent=1) + "\n")
 
 
 def _source(plan: Plan, results: Path) -> Source:

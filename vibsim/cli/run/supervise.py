@@ -65,7 +65,7 @@ def supervised(work: Work) -> int:
     os.close(writing)
     status, number = _watch(worker, ends)
     _wait_for_children()
-    return _told(status, number, orderly=os.read(reading, 1) != b"")
+    return _exit_status(status, number, orderly=os.read(reading, 1) != b"")
 
 
 def children_end_with_this() -> None:
@@ -201,16 +201,16 @@ def _wait_for_children() -> None:
                 time.sleep(0.01)
 
 
-def _told(status: int, asked: int, orderly: bool) -> int:
+def _exit_status(status: int, asked: int, orderly: bool) -> int:
     """Say how the worker ended, unless it has said so itself; return the exit status."""
     code = os.waitstatus_to_exitcode(status)
     if number := asked or ended_by(code):
-        _say("interrupted; the same command goes on from here")
+        _say("interrupted; run the same command again to continue")
         return 128 + number
     if not orderly:
         # killed by the system, or left by a library that was given no memory
         how = f"killed by {signal.Signals(-code).name}" if code < 0 else "ended by a library"
-        _say(f"{how}, perhaps for lack of memory; the same command goes on from here")
+        _say(f"{how}, perhaps for lack of memory; run the same command again to continue")
         return 1
     return code
 
