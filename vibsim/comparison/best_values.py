@@ -22,6 +22,7 @@ from vibsim.convergence import gci
 from vibsim.convergence.scalar_extrapolation import LOUD, Limit, limit, observed_order
 from vibsim.core.record import Variable, attributes
 from vibsim.experiment.value_names import HAVE_LIMITS
+from vibsim.models import Model
 from vibsim.observe import oscillation
 from vibsim.observe.member_block import Part
 
@@ -205,15 +206,14 @@ def _scale(name: str, place: value_numbers.Place, found: Floats) -> Floats:
     return np.ones(found.shape[:-1])
 
 
-def scalars(part: Part) -> tuple[Scalar, ...]:
+def scalars(model: Model, lean: bool = False) -> tuple[Scalar, ...]:
     """Name the numbers whose limits are kept; where storage is bounded, period and amplitude."""
-    model = part.model
     first = model.states[0]
     whole = [
         Scalar("period", "period", "", "s", "period"),
         Scalar("amplitude", "amplitude", "", first.unit, "amplitude"),
     ]
-    if part.lean:
+    if lean:
         return tuple(whole)
     whole += [
         Scalar("frequency", "frequency", "", "rad s-1", "angular frequency"),
@@ -227,18 +227,18 @@ def scalars(part: Part) -> tuple[Scalar, ...]:
     return tuple(whole)
 
 
-_WORDS = {"end": "at the end", "min": "least value", "max": "largest value"}
+WORDS = {"end": "at the end", "min": "least value", "max": "largest value"}
 
 
 def _of(name: str, unit: str, words: str, which: tuple[str, ...]) -> list[Scalar]:
-    return [Scalar(f"{name}_{w}", w, name, unit, f"{words}, {_WORDS[w]}") for w in which]
+    return [Scalar(f"{name}_{w}", w, name, unit, f"{words}, {WORDS[w]}") for w in which]
 
 
 def table(part: Part, compared: Mapping[str, Comparison]) -> Table:
     """Return the limits of all numbers, as variables of the convergence Record."""
     found: Table = {}
     kept = []
-    for row in scalars(part):
+    for row in scalars(part.model, part.lean):
         place = value_numbers.Place(part, compared, row.quantity, "best", None, None)
         if part.lean:
             found |= _of_limit(row, _ladder(row.value, place).limit())
@@ -290,6 +290,6 @@ def coordinate(part: Part) -> Table:
     """Return the coordinate of the numbers; empty where only their limits are kept."""
     if part.lean:
         return {}
-    names = np.array([row.variable for row in scalars(part)])
+    names = np.array([row.variable for row in scalars(part.model, part.lean)])
     words = "numbers of which the limit was sought"
     return {"scalar": Variable(("scalar",), names, attributes(words, "1"))}
