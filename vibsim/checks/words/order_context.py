@@ -95,7 +95,7 @@ class Story:
     shortest: float = math.nan
     """The step of the finest level."""
     parts: str = ""
-    """What phase and amplitude of the error say of it (`vibsim.checks.order.phase_amplitude_text`)."""
+    """What phase and amplitude of the error say of it (`vibsim.checks.words.phase_amplitude`)."""
     kind: str = ""
     """Kind of the scheme."""
     promised: float = math.nan
