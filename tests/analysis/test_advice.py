@@ -17,9 +17,9 @@ from level_records import experiment, level_records, standard_error
 from vibsim import Experiment, analyse, simulate
 from vibsim.analysis import analyse_records, verdicts
 from vibsim.checks.fields import name_of
-from vibsim.checks.order.advice import advise
-from vibsim.checks.order.sentences import tell
-from vibsim.checks.order.verdict_context import Corner, Story
+from vibsim.checks.words.order import tell
+from vibsim.checks.words.order_advice import advise
+from vibsim.checks.words.order_context import Corner, Story
 from vibsim.comparison.order_causes import CAUSES
 from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import DRIFTS, REASON_NAMES, REASONS, STATUSES
@@ -304,7 +304,8 @@ def test_a_number_that_needs_more_levels_than_there_are_says_so() -> None:
     (found,) = verdicts(exp, analyse_records(exp, level_records(exp)))
     assert (found.status, found.reason) == ("INCONCLUSIVE", "too_few_levels")
     assert (
-        found.text == "ratio of theta does not exist here: it rests on more levels than there are."
+        found.text
+        == "ratio of theta does not exist here, because it needs more levels than there are."
     )
     assert found.advice == "Add finer `levels:`, so that there are 3 of them."
 
@@ -338,7 +339,7 @@ def test_advice_on_a_number_is_right_when_it_is_followed(value: str) -> None:
     truth = _number({**of, "value": value, "at": {"level": 14}, "equals": 9.0}, [13, 14])
     check = {**of, "value": value, "equals": truth + 0.1, "atol": 1e-3}
     advice = judged({**RUN, "levels": [5, 6, 7], "checks": [check]}).advice
-    assert advice.startswith("Correct `equals:`")
+    assert advice.startswith("Change `equals:`")
     check = {**of, "value": value, "equals": truth, "atol": 1e-6}
     assert judged({**RUN, "levels": [5, 6, 7], "checks": [check]}).advice.startswith("Add finer")
     assert judged({**RUN, "levels": [5, 6, 13, 14], "checks": [check]}).status == "PASS"
@@ -347,7 +348,7 @@ def test_advice_on_a_number_is_right_when_it_is_followed(value: str) -> None:
 def test_advice_on_a_number_of_several_levels_looks_at_those_that_have_one() -> None:
     check = {"value": "observed_order", "quantity": "theta"}
     far = judged({**RUN, "levels": [6, 7, 8, 9, 10], "checks": [{**check, "above": 3.9}]})
-    assert far.advice.startswith("Correct `above:`")
+    assert far.advice.startswith("Change `above:`")
     near = judged({**RUN, "levels": [4, 5, 6, 7, 8], "checks": [{**check, "below": 2.001}]})
     assert near.advice.startswith("Add finer `levels:`")
 

@@ -173,7 +173,7 @@ def test_growth_that_contradicts_theory_fails_whatever_is_expected() -> None:
     assert [v.status for v in run.verdicts] == ["PASS", "FAIL"]
     assert [v.status for v in found.verdicts] == ["FAIL", "FAIL"]
     assert [v.reason for v in found.verdicts] == ["mismatch", "mismatch"]
-    assert "not what the theory is of" in found.verdicts[0].text
+    assert "not the scheme that the theory describes" in found.verdicts[0].text
 
 
 SAME = [

@@ -10,7 +10,7 @@ import pytest
 from level_records import experiment, level_records, standard_error
 
 from vibsim.analysis import Verdict, analyse_records, summarise, verdicts
-from vibsim.checks.value.advice import sees_several_levels
+from vibsim.checks.value.criteria import sees_several_levels
 from vibsim.comparison import value_numbers as values
 from vibsim.comparison.order_evidence import evidence
 from vibsim.comparison.quantity_comparison import comparisons
@@ -209,10 +209,10 @@ def test_a_number_that_does_not_exist_is_not_applicable() -> None:
 @pytest.mark.parametrize(
     ("check", "advice"),
     [
-        ({"value": "stability_limit", "equals": 9.0}, "Correct"),
-        ({"value": "force_evaluations", "equals": 9.0}, "Correct"),
-        ({"value": "max", "quantity": "theta", "equals": 9.0}, "Correct"),
-        ({"value": "max", "quantity": "theta", "equals": 9.0, "at": {"level": 4}}, "Correct"),
+        ({"value": "stability_limit", "equals": 9.0}, "Change"),
+        ({"value": "force_evaluations", "equals": 9.0}, "Change"),
+        ({"value": "max", "quantity": "theta", "equals": 9.0}, "Change"),
+        ({"value": "max", "quantity": "theta", "equals": 9.0, "at": {"level": 4}}, "Change"),
     ],
 )
 def test_finer_levels_are_advised_where_they_change_the_number(

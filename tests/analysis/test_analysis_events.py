@@ -73,8 +73,8 @@ WRONG = {"value": "event_count", "equals": 7}
 @pytest.mark.parametrize(
     ("scheme", "check", "advice"),
     [
-        ("rk4", WRONG, "Correct `equals:`"),
-        ("rk4", {**WRONG, "at": {"level": 6}}, "Correct `equals:`"),
+        ("rk4", WRONG, "Change `equals:`"),
+        ("rk4", {**WRONG, "at": {"level": 6}}, "Change `equals:`"),
         ({"kind": "rk4", "events": "mesh"}, WRONG, "Set `events: located` for scheme rk4, or"),
     ],
 )

@@ -277,5 +277,5 @@ def test_what_no_level_can_tell_is_said_of_what_is_kept_of_parts() -> None:
         list(kept(experiment, [whole], thin))
         (found,) = verdicts(experiment, thin[0])
         assert found.status == "PASS"
-        assert ("a wrong limit would not be noticed" in found.text) == is_said
+        assert ("convergence to a wrong answer would go unnoticed" in found.text) == is_said
         assert found.text == verdicts(experiment, whole)[0].text

@@ -101,7 +101,7 @@ def test_what_no_level_can_tell_is_said() -> None:
     }
     found = judged(data, {**data, "model": {"kind": "sliding_box", "alpha": 0.5, "mu": 0.101}})
     assert found.status == "PASS"
-    assert "a wrong limit would not be noticed" in found.text
+    assert "convergence to a wrong answer would go unnoticed" in found.text
     assert "noticed" not in judged(spring(1.7, (6, 7, 8, 9)), spring(1.7, (6, 7, 8, 9))).text
 
 

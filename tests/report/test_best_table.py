@@ -20,7 +20,7 @@ from vibsim.simulation import simulate_record
 
 def table(exp: object) -> tuple[Record, best.Table]:
     record = samples.record(exp)
-    found = best.table(record, choice.members(record, "theta"))
+    found = best.table(samples.plain().model.definition, record, choice.members(record, "theta"))
     assert found is not None
     return record, found
 
@@ -57,7 +57,7 @@ def test_what_is_unknown_is_said() -> None:
     record, _ = table(samples.plain())
     bound = record.variables["period_richardson_error"]
     bound.values[...] = np.nan
-    found = best.table(record, choice.members(record, "theta"))
+    found = best.table(samples.plain().model.definition, record, choice.members(record, "theta"))
     assert found is not None
     assert any("unknown" in row for row in found.text_rows())
     assert rows(found)["period [s]"]["bound"] == ""
@@ -66,7 +66,10 @@ def test_what_is_unknown_is_said() -> None:
 def test_one_level_has_no_table_and_a_sweep_names_its_members() -> None:
     exp = samples.plain(levels=[9])
     record = samples.record(exp)
-    assert best.table(record, choice.members(record, "theta")) is None
+    assert (
+        best.table(samples.plain().model.definition, record, choice.members(record, "theta"))
+        is None
+    )
     _, found = table(samples.swept(4))
     assert "member" in [column.header for column in found.columns]
 
@@ -79,7 +82,7 @@ def test_a_lean_record_has_period_and_amplitude() -> None:
         for level, row in levels.items()
     }
     record = analyse_records(exp, lean)
-    found = best.table(record, choice.members(record, "theta"))
+    found = best.table(samples.plain().model.definition, record, choice.members(record, "theta"))
     assert found is not None
     assert {row[0] for row in found.rows} == {"period [s]", "amplitude [rad]"}
     assert not {"GCI", "order"} & {column.header for column in found.columns}

@@ -16,7 +16,7 @@ import numpy as np
 
 from vibsim import plan
 from vibsim.analysis.compare_levels import analyse_records
-from vibsim.checks.order.phase_amplitude_text import is_told
+from vibsim.checks.order.phase_at_start import is_told
 from vibsim.checks.tolerance_check import is_bound
 from vibsim.checks.value.units import UNITS, units_in
 from vibsim.comparison.exact_availability import known_errors

@@ -12,7 +12,7 @@ from vibsim.analysis.check_variables import definition, measured
 from vibsim.analysis.motion_variables import motion
 from vibsim.apriori.force_discontinuities import corner_variables, switches_of
 from vibsim.checks.fields import flags
-from vibsim.checks.order.phase_amplitude_text import at_start
+from vibsim.checks.order.phase_at_start import at_start
 from vibsim.checks.tolerance_check import bounds
 from vibsim.comparison import best_values
 from vibsim.comparison.comparison_variables import SERIES, Table, in_precision, numbers, over_time

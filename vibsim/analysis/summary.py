@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from vibsim.analysis.check_verdicts import Verdict
 from vibsim.apriori.formal_orders import Columns, columns_of
 from vibsim.checks.results import Result
+from vibsim.checks.words.verdict import Wording
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import FORMAT, jsonable, worst
 
@@ -63,9 +64,11 @@ def summarise(
 def _check(
     experiment: Experiment, record: Record, verdict: Verdict, most: int | None
 ) -> dict[str, Any]:
+    check = next((check for check in experiment.checks if check.id == verdict.id), None)
+    wording = Wording(experiment, record, check)
     rows = [
-        {**_plain(row), "sentence": sentence, **_member(experiment, record, row.case)}
-        for row, sentence in verdict.results.told(most)
+        {**_plain(row), "sentence": wording.sentence(row), **_member(experiment, record, row.case)}
+        for row in verdict.results.worst(most)
     ]
     return {name: getattr(verdict, name) for name in verdict.__dataclass_fields__} | {
         "results": rows

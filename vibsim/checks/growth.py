@@ -19,7 +19,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.checks.order.verdict_context import ALIKE
 from vibsim.convergence.thresholds import BLOWN_UP
 from vibsim.observe import oscillation, predicted_oscillation
 from vibsim.observe.member_block import MemberBlock
@@ -29,6 +28,8 @@ Flags = NDArray[np.bool_]
 
 LIMIT_ROUNDING = 1e-9
 """w dt within this part of the limit is at the limit, as in `ladder_statistics.breakdown`."""
+ALIKE = 0.15
+"""Two levels fail at one time that fail within this part of it: the finer one sees it at most a step earlier."""
 NEAR = 0.1
 """How far the logarithm of a growth may be from the predicted one, as a part of it."""
 

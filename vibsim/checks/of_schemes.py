@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.checks.fields import Facts
-from vibsim.checks.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
+from vibsim.checks.fields import Field, facts
+from vibsim.checks.outcome import Outcome
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import REASON_NAMES
+from vibsim.core.vocabulary import REASON_NAMES, REASONS, STATUSES
 from vibsim.experiment.check_scheme_selection import schemes_of
 from vibsim.observe.member_block import MemberBlock
 
@@ -34,12 +34,7 @@ MATCH, MISMATCH, UNSTABLE, NON_FINITE, PRE_ASYMPTOTIC, NOT_APPLICABLE, ROUND_OFF
         "round_off",
     ),
 )
-BROKEN = "Start `levels:` at a finer level, or shorten `time: end`."
-"""Advice where the calculation met a number that is not finite."""
 MOTIONS = ("moves", "rests")
-NOTHING_MOVES = "Nothing moves here: {} stays what it was at the start, whatever the scheme does"
-MOVE = "Choose `initial:` values, or a force, with which something moves."
-"""Advice where nothing moves."""
 
 
 def level_of(block: MemberBlock, check: StableCheck | ConservesCheck | EqualCheck) -> int:
@@ -64,24 +59,14 @@ def by_reason(
     experiment: Experiment,
     record: Record,
     check: ConservesCheck | EqualCheck,
-    found: Facts,
+    id_: str,
+    fields: Mapping[str, Field],
     reason: NDArray[Any],
-    value: Floats,
-    expected: str,
-    tell: Callable[[int, int], str],
     away: Floats,
-    advise: Callable[[int, int], str],
 ) -> Outcome:
     """Return the outcome of a check that expects a PASS, from its reasons."""
-    statuses = {
-        MATCH: PASS,
-        NOT_APPLICABLE: INCONCLUSIVE,
-        PRE_ASYMPTOTIC: INCONCLUSIVE,
-        ROUND_OFF: INCONCLUSIVE,
-    }
-    status = np.full(reason.shape, FAIL, dtype=np.int8)
-    for code, which in statuses.items():
-        status[reason == code] = which
+    statuses = np.array([STATUSES.index(status) for status in REASONS.values()], dtype=np.int8)
+    status = statuses[reason]
     return outcome_of(
         experiment,
         record,
@@ -90,15 +75,7 @@ def by_reason(
         reason=reason.astype(np.int8),
         compared=status,
         away=away,
-        expected=expected,
-        expects_pass=True,
-        quantity=check.about,
-        tell=tell,
-        advise=lambda scheme, case: (
-            BROKEN if reason[scheme, case] == NON_FINITE else advise(scheme, case)
-        ),
-        value=value,
-        facts=found,
+        facts=facts(record, id_, fields),
     )
 
 
@@ -121,8 +98,3 @@ def outcome_of(
         case_index=cases,
         **more,
     )
-
-
-def place_of(record: Record, level: int) -> int:
-    """Return the position of a level in a record."""
-    return [int(known) for known in record["level"]].index(level)

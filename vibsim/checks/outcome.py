@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.checks.fields import Facts
 from vibsim.core.vocabulary import SEVERITY, STATUSES
+
+if TYPE_CHECKING:
+    from vibsim.experiment.schema.checks import ClaimCheck, Measurement
 
 Floats = NDArray[np.float64]
 
@@ -39,17 +41,8 @@ class Outcome:
     """Status after comparison with what was expected."""
     away: Floats
     """How far each number is from the expected one; larger is worse."""
-    expected: str
-    expects_pass: bool
-    quantity: str | None
-    tell: Callable[[int, int], str]
-    """Sentence on a scheme and a member."""
-    advise: Callable[[int, int], str]
-    """Advice on a scheme and a member."""
     facts: Facts
     """What was measured of every scheme and member."""
-    value: Floats | None = None
-    """The number that decides; None where an order does."""
 
     @property
     def total(self) -> int:
@@ -101,8 +94,31 @@ class Outcome:
         return {name: int(np.sum(self.chosen == i)) for i, name in enumerate(STATUSES)}
 
 
-def number_at(values: NDArray[Any] | None, scheme: int, case: int) -> float | None:
-    """Return one number, None where there is none or it is not finite."""
-    if values is None or not np.isfinite(values[scheme, case]):
-        return None
-    return float(values[scheme, case])
+def compared_reason(check: Measurement | None, status: str, measured: str, reason: str) -> str:
+    """Return the measured reason where a PASS was expected, else whether the outcome is the expected one.
+
+    Parameters
+    ----------
+    status, measured
+        Status compared with what was expected, and the measured one.
+    """
+    expects_pass = expects_a_pass(check)
+    if status == "PASS" and not expects_pass:
+        return "match"
+    if status == "FAIL" and (not expects_pass or measured == "PASS"):
+        return "mismatch"
+    return reason
+
+
+def expects_a_pass(check: Measurement | None) -> bool:
+    """Tell whether a check expects that what it measures passes; None stands for a tolerance."""
+    if check is not None and check.kind == "converges":
+        return check.expect.status == "PASS"
+    return check.stable if check is not None and check.kind == "stable" else True
+
+
+def truth(claim: ClaimCheck, status: str, reason: str) -> bool | None:
+    """Return whether a statement is true by status and reason of what measures it; None where it is not decided."""
+    # a number that broke down shows neither a statement nor its opposite
+    is_unmeasured = claim.that.kind != "converges" and reason == "non_finite"
+    return None if status == "INCONCLUSIVE" or is_unmeasured else status == "PASS"

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, overload
 
 from vibsim.checks.fields import facts_of
-from vibsim.checks.outcome import Outcome, number_at
-from vibsim.core.vocabulary import REASON_NAMES, STATUSES
+from vibsim.checks.outcome import Outcome
+from vibsim.core.vocabulary import REASON_NAMES, STATUSES, decisive_number
 
 
 @dataclass(frozen=True)
@@ -21,10 +21,13 @@ class Result:
     status: str
     """The measured one, whatever was expected."""
     reason: str
-    value: float | None
-    """The number that decides; None where an order does, or where it is not finite."""
     facts: Mapping[str, Any] = field(hash=False)
     """What was measured, by name, as plain data; None where there is none."""
+
+    @property
+    def value(self) -> float | None:
+        """The number that decides; None where an order does, or where it is not finite."""
+        return decisive_number(self.facts)
 
     @property
     def order(self) -> float | None:
@@ -75,17 +78,17 @@ class Results(Sequence[Result]):
         return hash(tuple(self))
 
     def __reduce__(self) -> tuple[type[Results], tuple[Outcome]]:
-        """Copy and pickle the arrays: what tells of a result in words belongs to the analysis, and stays there."""
-        return Results, (replace(self._outcome, tell=_no_words, advise=_no_words),)
+        """Copy and pickle what was measured, without the ranking."""
+        return Results, (replace(self._outcome),)
 
     def __repr__(self) -> str:
         return f"<{len(self)} results>"
 
-    def told(self, most: int | None) -> Iterator[tuple[Result, str]]:
-        """Yield the worst results, all of them where `most` is None, each with the sentence on it."""
+    def worst(self, most: int | None) -> Iterator[Result]:
+        """Yield the worst results, all of them where `most` is None, without sorting more."""
         outcome = self._outcome
         for number in outcome.ranking if most is None else outcome.worst(most):
-            yield self._one(int(number)), outcome.tell(*outcome.position(number))
+            yield self._one(int(number))
 
     def _one(self, number: int) -> Result:
         outcome, (scheme, case) = self._outcome, self._outcome.position(number)
@@ -94,11 +97,5 @@ class Results(Sequence[Result]):
             case=int(outcome.cases[case]),
             status=STATUSES[int(outcome.status[scheme, case])],
             reason=REASON_NAMES[int(outcome.reason[scheme, case])],
-            value=number_at(outcome.value, scheme, case),
             facts=facts_of(outcome.facts, scheme, case),
         )
-
-
-def _no_words(scheme: int, case: int) -> str:
-    """Say nothing of a scheme and a member: the sentences of a copy are those that its verdict has already."""
-    return ""

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.apriori.formal_orders import columns_of
-from vibsim.checks.numbers_in_words import number
 from vibsim.checks.outcome import PASS, Outcome
+from vibsim.checks.words.notation import PLAIN
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import STATUSES
 
@@ -166,7 +166,7 @@ def _place(
 
 def _interval(key: str, values: Column, low: float, high: float) -> str:
     if low == high:
-        return f"{key} equal to {number(low)}"
+        return f"{key} equal to {PLAIN.number(low)}"
     # rounded outward, so that what is said is true
     least, most = (_rounded(end, way) for end, way in ((low, ROUND_FLOOR), (high, ROUND_CEILING)))
     if high >= np.max(values):
@@ -181,4 +181,4 @@ def _rounded(value: float, way: str) -> str:
 
     What it has are its 15 decimal digits: those of 1.9 are no 1.8999999999999999.
     """
-    return number(float(Context(prec=6, rounding=way).create_decimal(f"{value:.15g}")))
+    return PLAIN.number(float(Context(prec=6, rounding=way).create_decimal(f"{value:.15g}")))

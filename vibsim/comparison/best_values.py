@@ -24,6 +24,7 @@ from vibsim.convergence.number_extrapolation import Limit, limit, observed_order
 from vibsim.convergence.thresholds import ORDER_ABOVE_ROUND_OFF
 from vibsim.core.record import Variable, attributes
 from vibsim.experiment.value_names import HAVE_LIMITS
+from vibsim.models import Model
 from vibsim.observe import oscillation
 from vibsim.observe.member_block import MemberBlock
 
@@ -201,15 +202,14 @@ def _scale(name: str, place: value_numbers.Place, found: Floats) -> Floats:
     return np.ones(found.shape[:-1])
 
 
-def scalars(block: MemberBlock) -> tuple[Scalar, ...]:
+def scalars(model: Model, lean: bool = False) -> tuple[Scalar, ...]:
     """Name the numbers whose limits are kept; where storage is bounded, period and amplitude."""
-    model = block.model
     first = model.states[0]
     whole = [
         Scalar("period", "period", "", "s", "period"),
         Scalar("amplitude", "amplitude", "", first.unit, "amplitude"),
     ]
-    if block.lean:
+    if lean:
         return tuple(whole)
     whole += [
         Scalar("frequency", "frequency", "", "rad s-1", "angular frequency"),
@@ -223,18 +223,18 @@ def scalars(block: MemberBlock) -> tuple[Scalar, ...]:
     return tuple(whole)
 
 
-_WORDS = {"end": "at the end", "min": "least value", "max": "largest value"}
+WORDS = {"end": "at the end", "min": "least value", "max": "largest value"}
 
 
 def _of(name: str, unit: str, words: str, which: tuple[str, ...]) -> list[Scalar]:
-    return [Scalar(f"{name}_{w}", w, name, unit, f"{words}, {_WORDS[w]}") for w in which]
+    return [Scalar(f"{name}_{w}", w, name, unit, f"{words}, {WORDS[w]}") for w in which]
 
 
 def table(block: MemberBlock, compared: Mapping[str, Comparison]) -> Table:
     """Return the limits of all numbers, as variables of the convergence Record."""
     found: Table = {}
     kept = []
-    for row in scalars(block):
+    for row in scalars(block.model, block.lean):
         place = value_numbers.Place(block, compared, row.quantity, "best", None, None)
         if block.lean:
             found |= _of_limit(row, _ladder(row.value, place).limit())
@@ -286,6 +286,6 @@ def coordinate(block: MemberBlock) -> Table:
     """Return the coordinate of the numbers; empty where only their limits are kept."""
     if block.lean:
         return {}
-    names = np.array([row.variable for row in scalars(block)])
+    names = np.array([row.variable for row in scalars(block.model, block.lean)])
     words = "numbers of which the limit was sought"
     return {"scalar": Variable(("scalar",), names, attributes(words, "1"))}

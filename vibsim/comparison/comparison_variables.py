@@ -27,6 +27,7 @@ Floats = NDArray[np.float64]
 Table = dict[str, Variable]
 Add = Callable[..., None]
 
+PROMISED_ORDER = "order that the scheme promises, infinite for what is exact"
 LEAST_ORDER = (
     "order that the scheme promises for the position, at least that of a part of its error"
 )
@@ -71,13 +72,13 @@ def numbers(q: Comparison) -> Table:
         words = "largest error bound of the extrapolation"
         add("richardson_error_max", ("scheme", "case"), q.largest_bound, words, q.units)
     add("floor", of_level, q.floor, "predicted round-off", q.units)
-    words = "order that the scheme promises, infinite for what is exact"
-    if is_error_part(q.name) and not is_promised(block.experiment, q.name):
-        words = LEAST_ORDER
+    is_due = not is_error_part(q.name) or is_promised(block.experiment, q.name)
+    words = PROMISED_ORDER if is_due else LEAST_ORDER
+    attrs = attributes(f"{q.long_name}: {words}", "1", promised=int(is_due))
+    formal = Variable(("scheme",), q.order[:, 0], attrs)
     if orders_vary(block.experiment, q.name):
-        add("formal_order", ("scheme", "case"), np.broadcast_to(q.order, block.shape), words, "1")
-    else:
-        add("formal_order", ("scheme",), q.order[:, 0], words, "1")
+        formal = Variable(("scheme", "case"), np.broadcast_to(q.order, block.shape), attrs)
+    table[f"{q.name}_formal_order"] = formal
     if levels > 1:
         words = _IN_NORM.format("difference")
         add(

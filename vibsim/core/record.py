@@ -68,6 +68,10 @@ class Record:
         values = np.ravel(np.asarray(attrs["flag_values"])).tolist()
         return dict(zip(values, str(attrs["flag_meanings"]).split(), strict=True))
 
+    def place(self, dim: str, value: int) -> int:
+        """Return the position of a value of a coordinate of whole numbers."""
+        return int(np.flatnonzero(np.asarray(self[dim]) == value)[0])
+
     def __contains__(self, name: str) -> bool:
         return name in self.variables or name in self.coords
 

@@ -52,6 +52,25 @@ TOLERANCE = 0.1
 BY_TOLERANCE = "tolerance"
 """Name and kind of the verdict that an experiment with a tolerance has beside those of its checks."""
 
+DECISIVE: Mapping[str, str] = MappingProxyType(
+    {
+        "converges": "order",
+        "value": "value",
+        "stable": "growth",
+        "conserves": "energy_error",
+        "equal": "distance",
+        BY_TOLERANCE: "error_bound",
+    }
+)
+"""Kind of a check to the fact that decides it; no check has that of one before it in this order."""
+
+
+def decisive_number(facts: Mapping[str, Any]) -> float | None:
+    """Return the number that decides a result with these facts; None where an order does, or it is not finite."""
+    found: float | None = next((facts[name] for name in DECISIVE.values() if name in facts), None)
+    return None if DECISIVE["converges"] in facts else found
+
+
 FORMAT = 2
 """Version of the file format, ``vibsim_format`` in every file."""
 

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.apriori.roundoff_floor import norm_of_floor
-from vibsim.comparison.comparison_variables import LEAST_ORDER
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.report.style import RAISE
@@ -186,8 +185,8 @@ def formal_orders(record: Record, quantity: str) -> Floats:
 
 def due(record: Record, quantity: str) -> str:
     """Say whose an order is: promised by theory, or expected by a check of a part of an error that has no promise."""
-    words = str(record.variable(f"{quantity}_formal_order").attrs.get("long_name", ""))
-    return "expected" if words.endswith(LEAST_ORDER) else "promised"
+    is_promised = record.variable(f"{quantity}_formal_order").attrs["promised"]
+    return "promised" if is_promised else "expected"
 
 
 def promised_text(record: Record, quantity: str, scheme: int) -> str:

@@ -7,19 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.apriori.formal_orders import columns_of, options_of
 from vibsim.checks.fields import facts, measured
 from vibsim.checks.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
-from vibsim.checks.value import criteria
-from vibsim.checks.value.advice import advise, lacks_levels, sees_several_levels
-from vibsim.checks.value.criteria import compare
+from vibsim.checks.value.criteria import compare, lacks_levels, sees_several_levels
 from vibsim.checks.value.measure import FIELDS
-from vibsim.checks.value.units import unit_of
 from vibsim.comparison.best_values import has_limit
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASON_NAMES
 from vibsim.experiment.check_scheme_selection import schemes_of
-from vibsim.schemes.base import is_on_the_mesh
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
@@ -46,8 +41,6 @@ UNBOUNDED = frozenset({"stability_limit"})
 """Numbers of which infinity is a value: above every other number."""
 FEW = 3
 """Fewer levels do not show how large an error is."""
-ROUND_OFF = 1e-13
-"""A number that is no larger is rounding."""
 
 
 def valued(experiment: Experiment, record: Record, check: ValueCheck, id_: str) -> Outcome:
@@ -62,16 +55,13 @@ def valued(experiment: Experiment, record: Record, check: ValueCheck, id_: str) 
     id_
         Id of the check in it.
     """
-    number, bound, needed, first = (
-        measured(record, id_, field)
-        for field in ("value", "error_bound", "levels_needed", "level_as_asked")
-    )
+    number, bound = (measured(record, id_, field) for field in ("value", "error_bound"))
     names = record.words("scheme")
     at = check.at
     schemes = list(schemes_of(experiment, check))
     every = np.asarray(record["case"])
     cases = np.flatnonzero(every == at.case) if at.case is not None else np.arange(len(every))
-    (holds, away), rule = compare(check, number), criteria.rule(check)
+    holds, away = compare(check, number)
     lost = _failed(record, check) & ~(
         np.isfinite(number) if check.value in SURVIVES_FAILURE else np.zeros_like(holds)
     )
@@ -85,16 +75,6 @@ def valued(experiment: Experiment, record: Record, check: ValueCheck, id_: str) 
     missing = "too_few_levels" if lacks_levels(experiment, check) else "not_applicable"
     codes = [REASON_NAMES.index(name) for name in ("non_finite", missing, "match", few)]
     reason = np.select(masks, codes, REASON_NAMES.index("mismatch"))
-    columns = columns_of(record)
-    what = criteria.what(check)
-    unit = f" {measure}" if (measure := unit_of(experiment, record, check)) else ""
-
-    def tell(scheme: int, case: int) -> str:
-        found = float(number[scheme, case])
-        word = REASON_NAMES[int(reason[scheme, case])]
-        error = _bound_in_words(check, float(bound[scheme, case]))
-        return _tell(what, word, found, rule, f"{unit}{error}")
-
     return Outcome(
         schemes=[names[i] for i in schemes],
         scheme_index=schemes,
@@ -104,20 +84,7 @@ def valued(experiment: Experiment, record: Record, check: ValueCheck, id_: str) 
         reason=reason,
         compared=status,
         away=away,
-        expected=rule,
-        expects_pass=True,
-        quantity=check.quantity,
-        tell=tell,
-        advise=lambda scheme, case: advise(
-            experiment,
-            check,
-            REASON_NAMES[int(reason[scheme, case])],
-            names[scheme] if is_on_the_mesh(options_of(experiment, columns, scheme, case)) else "",
-            int(needed[scheme, case]),
-            int(first[scheme, case]),
-        ),
         facts=facts(record, id_, FIELDS),
-        value=number,
     )
 
 
@@ -126,30 +93,6 @@ def _is_open(check: ValueCheck, away: Floats, bound: Floats) -> Flags:
     if not has_limit(check.value, check.at.level):
         return np.zeros(away.shape, dtype=bool)
     return ~(away > bound)
-
-
-def _bound_in_words(check: ValueCheck, bound: float) -> str:
-    if not has_limit(check.value, check.at.level):
-        return ""
-    if np.isnan(bound):
-        return ", with an error that is not known: the levels do not approach each other"
-    return f", with an error of at most {bound:.2g}"
-
-
-def _tell(what: str, reason: str, found: float, rule: str, error: str) -> str:
-    match reason:
-        case "non_finite":
-            return f"{what} means nothing here: the calculation met a number that is not finite."
-        case "not_applicable":
-            return f"{what} does not exist here, or was not stored."
-        case "too_few_levels" if np.isnan(found):
-            return f"{what} does not exist here: it rests on more levels than there are."
-        case "pre_asymptotic" | "too_few_levels":
-            return f"{what} is {found:.10g}{error}: it may be {rule}, or not."
-    verb = "is" if reason == "match" else "is not"
-    # of round-off two digits say all
-    digits = 2 if reason == "match" and abs(found) <= ROUND_OFF else 10
-    return f"{what} is {found:.{digits}g}{error}; it {verb} {rule}."
 
 
 def _failed(record: Record, check: ValueCheck) -> Flags:

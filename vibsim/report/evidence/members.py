@@ -9,6 +9,7 @@ import numpy as np
 
 from vibsim.checks.fields import name_of
 from vibsim.core.record import Record
+from vibsim.core.vocabulary import DECISIVE
 from vibsim.report import style
 from vibsim.report.data import Floats, Member, pick, swept, swept_label, unit
 from vibsim.report.evidence.frame import (
@@ -29,12 +30,6 @@ from vibsim.report.text import words
 if TYPE_CHECKING:
     from vibsim.experiment.schema.scheme_checks import ConservesCheck, EqualCheck, StableCheck
 
-NUMBERS = {
-    "stable": ("growth", "predicted_growth"),
-    "conserves": ("energy_error", ""),
-    "equal": ("distance", "allowed"),
-}
-"""Kind of a check to the field that decides, and the one that is drawn beside it."""
 MANY = 60
 """Up to so many members each has a dot; of more the range is drawn."""
 DECADE = 10.0
@@ -42,9 +37,11 @@ DECADE = 10.0
 WIDTH = 320.0
 ALONE = "a run of so many samples keeps no series over time, so that nothing is drawn: the number alone decides."
 BESIDE = {
-    "stable": "orange is what theory predicts, for small oscillations",
-    "equal": "orange is what is allowed",
+    "stable": ("predicted_growth", "orange is what theory predicts, for small oscillations"),
+    "equal": ("allowed", "orange is what is allowed"),
+    "conserves": ("", ""),
 }
+"""Kind of a check to the field that is drawn beside the one that decides, and the words on it."""
 
 
 def picture(
@@ -54,12 +51,12 @@ def picture(
     count = len(record["case"])
     if count == 1:
         return Picture("", f"{member.title}: {ALONE}")
-    number, other = NUMBERS[check.kind]
+    other, words_on_it = BESIDE[check.kind]
     values, beside = (
         np.asarray(pick(record, name_of(name, field), scheme=member.scheme), np.float64)
         if field
         else np.full(count, np.nan)
-        for field in (number, other)
+        for field in (DECISIVE[check.kind], other)
     )
     if not np.isfinite(logarithms(values)).any():
         return Picture("", f"{member.title}: no member has a number that could be drawn.")
@@ -69,7 +66,7 @@ def picture(
     around = up.change(ALIKE) if check.kind == "stable" else _decade(up.change(values))
     panel = _panel(x, up, values, beside, member.case, around)
     panel.frame(up.title, title, scale, up.ticks(*panel.y))
-    more = f"; {BESIDE[check.kind]}" if np.isfinite(up.change(beside)).any() else ""
+    more = f"; {words_on_it}" if np.isfinite(up.change(beside)).any() else ""
     return Picture(
         document([panel], up.title),
         f"{member.scheme_name}, all {words.number(count, 'integer')} members, of which no series are kept: filled is "

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vibsim.checks.growth import LIMIT_ROUNDING
-from vibsim.checks.numbers_in_words import factor_in_words
 from vibsim.convergence.thresholds import BLOWN_UP
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import HIGHEST
@@ -205,7 +204,7 @@ def _told(seen: float, told: float, is_near: bool) -> str:
     """Say what was measured and predicted, the latter perhaps of small oscillations only."""
     how = "predicted for small oscillations" if is_near else "predicted"
     numbers = [
-        f"{words.readable(factor_in_words(value)).replace(' - ', ' − ')} {word}"
+        f"{words.PAGE.factor(value).replace(' - ', ' − ')} {word}"
         for value, word in ((seen, "measured (dot)"), (told, f"{how} (bar)"))
         if math.isfinite(value)
     ]

@@ -15,6 +15,7 @@ from vibsim.checks.fields import name_of
 from vibsim.checks.value import criteria
 from vibsim.checks.value.by_level import own_levels
 from vibsim.checks.value.units import unit_of
+from vibsim.checks.words.value import what
 from vibsim.core.record import Record
 from vibsim.report import style
 from vibsim.report.data import Floats, Member, at, norm_unit, pick, pretty_unit, unit, whole
@@ -64,8 +65,7 @@ def picture(
 
 def _spoken(check: ValueCheck) -> str:
     """Return the name of a number as a title has it."""
-    letter = words.symbol(check.quantity) if check.quantity else None
-    told = criteria.what(check, letter, words.spoken(check.value))
+    told = what(check, words.PAGE)
     if check.value in criteria.SAMPLED or (check.at.t is None and check.at.step is None):
         return told
     return f"{told} up to {f't = {check.at.t:g}' if check.at.t is not None else f'step {check.at.step}'}"

@@ -7,9 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from shlex import quote
 from typing import TYPE_CHECKING, Any
 
+from vibsim.checks.results import Result
 from vibsim.checks.value.units import unit_of
+from vibsim.checks.words.verdict import Wording, expectation
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import BY_TOLERANCE
+from vibsim.core.vocabulary import decisive_number, worst
 from vibsim.experiment.collection import ADHOC, ENDINGS
 from vibsim.experiment.schema.checks import ClaimCheck
 from vibsim.plan.versions import DRAWING, versions
@@ -17,10 +19,10 @@ from vibsim.report import data
 from vibsim.report.evidence import figure
 from vibsim.report.tables import orders, published
 from vibsim.report.tables.table import Cell, Column, Table, Written
-from vibsim.report.text import assertions, briefs, reasons, setting, words
+from vibsim.report.text import assertions, reasons, setting, words
 
 if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
+    from vibsim.experiment import Check, Experiment
     from vibsim.experiment.schema.checks import Measurement
 
 
@@ -33,9 +35,10 @@ def context(
     """Return the words of a page by the names that its template uses."""
     checks = _carded(experiment, summary)
     asserted = {spec.id: spec for spec in experiment.checks}
-    plain = [check for check in checks if briefs.is_plain(asserted.get(check["id"]), check)]
-    plain = plain if len(checks) >= briefs.MANY else []
-    full = [check for check in checks if check not in plain]
+    made = {check["id"]: card(experiment, record, check) for check in summary["checks"]}
+    plain = [check["id"] for check in checks if _is_plain(asserted.get(check["id"]), check)]
+    plain = plain if len(checks) >= MANY else []
+    full = [check["id"] for check in checks if check["id"] not in plain]
     return {
         "collection": experiment.collection,
         "name": experiment.name,
@@ -43,12 +46,11 @@ def context(
         "source": experiment.source,
         "status": summary["status"],
         "sentence": words.overall(summary),
-        "unsettled": words.unsettled(summary),
-        "checks": [card(experiment, record, check) for check in full],
-        "plain": [
-            card(experiment, record, check) | briefs.row(asserted[check["id"]], check)
-            for check in plain
-        ],
+        "unsettled": [made[check["id"]] for check in summary["checks"] if check["status"] != "PASS"]
+        if len(summary["checks"]) > 1
+        else [],
+        "checks": [made[name] for name in full],
+        "plain": [made[name] | assertions.row(asserted[name]) for name in plain],
         "brief": len(checks) > BRIEF,
         "failures": orders.failures(summary, record),
         "unlisted": _unlisted(summary),
@@ -72,6 +74,8 @@ def _carded(experiment: Experiment, summary: Mapping[str, Any]) -> list[Mapping[
     ]
 
 
+MANY = 6
+"""From so many checks on, those that passed share a table; fewer have a card each."""
 SETTLED = ("asymptotic", "order_low", "order_high")
 """Reasons of a result whose order is known: any other has at most an estimate that may be an accident."""
 BRIEF = 3
@@ -95,6 +99,13 @@ def _python(experiment: Experiment) -> str:
     return PYTHON.format(file=named, alone=f".alone({case})" if case else "")
 
 
+def _is_plain(asserted: Check | None, check: Mapping[str, Any]) -> bool:
+    """Say whether a row tells all of a check: it passed, has no note and refutes no statement."""
+    if check["status"] != "PASS" or asserted is None or getattr(asserted, "note", None):
+        return False
+    return asserted.kind != "claim" or asserted.holds
+
+
 def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the page says of one check."""
     asserted = next((spec for spec in experiment.checks if spec.id == check["id"]), None)
@@ -111,31 +122,38 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         if measured and measured.kind == "value"
         else ""
     )
-    if asserted:
-        heading = assertions.heading(asserted)
-    elif check["kind"] == BY_TOLERANCE:
-        heading = assertions.of_tolerance(check["expected"])
-    else:
-        heading = words.told(check)
     return {
         "id": check["id"],
         "kind": check["kind"],
-        "heading": heading,
+        "heading": assertions.heading(asserted)
+        if asserted
+        else assertions.of_tolerance(check["expected"]),
         "background": assertions.background(asserted) if asserted else "",
         "note": (getattr(asserted, "note", None) or "") if asserted else "",
-        "text": words.told(check).removeprefix(heading).lstrip(". "),
         "status": check["status"],
         "reason": check["reason"] or "–",
         "meaning": _meaning(asserted, check, explained),
         "needs": explained.needs,
-        "advice": words.told(check, "advice"),
-        "expected": words.readable(words.expectation(check.get("expected"))),
+        "expected": expectation(experiment, asserted, words.PAGE),
         "factor": _factor(check),
         "results": _results(record, check, unit),
         "more": _more(check),
         "where": _where(check),
         "alone": _alone(check),
         "picture": figure.picture(experiment, record, asserted, check),
+        **_said(Wording(experiment, record, asserted, words.PAGE), check),
+    }
+
+
+def _said(wording: Wording, check: Mapping[str, Any]) -> dict[str, str]:
+    """Return what was measured in a sentence and in a few words, and what to change."""
+    first, counts = check["results"][0], check["counts"]
+    facts = (first[key] for key in ("scheme", "case", "status", "reason", "facts"))
+    result = Result(*facts)
+    return {
+        "text": wording.text(result, counts, check["where"]),
+        "measured": wording.measured(result, counts),
+        "advice": wording.advice(check["status"], result, counts),
     }
 
 
@@ -177,7 +195,7 @@ def _results(record: Record, check: Mapping[str, Any], unit: str) -> Table | Non
     measured = check.get("kind") == "converges" or any(
         words.fact(r, "order") is not None for r in results
     )
-    valued = any(words.decisive_number(r) is not None for r in results)
+    valued = any(_number(r) is not None for r in results)
     columns = [Column("scheme")]
     columns += [Column("case", form="integer"), Column("member")] if sweep else []
     columns += [Column("measured"), Column("reason")]
@@ -207,11 +225,15 @@ def _cells(
             words.levels(words.levels_of(result)),
         )
     if valued:
-        yield _value(words.decisive_number(result))
+        yield _value(_number(result))
 
 
 ROUND_OFF = 1e-12
 """Numbers no larger than this have two digits: more would be noise."""
+
+
+def _number(result: Mapping[str, Any]) -> float | None:
+    return decisive_number(result.get("facts") or {})
 
 
 def _value(value: float | None) -> Cell:
@@ -221,9 +243,9 @@ def _value(value: float | None) -> Cell:
 
 
 def _where(check: Mapping[str, Any]) -> list[str]:
-    """Return the sentences on where in a sweep results lie, but for one that the check's own text has."""
-    found: Mapping[str, Mapping[str, Any]] = check.get("where") or {}
-    return [f"{place['text']}." for place in found.values() if place["text"] not in check["text"]]
+    """Return the sentences on where in a sweep results lie, but for those that the check's own text has."""
+    decides = worst(status for status, count in check["counts"].items() if count)
+    return [f"{place['text']}." for status, place in check["where"].items() if status != decides]
 
 
 def _alone(check: Mapping[str, Any]) -> str:

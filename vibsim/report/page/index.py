@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from vibsim import store
 from vibsim.core.errors import FileError
-from vibsim.core.vocabulary import SEVERITY, worst
+from vibsim.core.vocabulary import SEVERITY, decisive_number, worst
 from vibsim.report.page.page import environment
 from vibsim.report.tables.table import Column, Table, to_csv
 from vibsim.report.text import words
@@ -110,7 +110,7 @@ def _why(checks: Sequence[Mapping[str, Any]]) -> str:
     first = max(checks, key=lambda check: SEVERITY[check["status"]])
     if first["status"] == "PASS":
         return ", ".join(dict.fromkeys(str(check["reason"]) for check in checks))
-    return f"{first['reason']}: {words.told(first)}"
+    return f"{first['reason']}: {first['text']}"
 
 
 def _counts(checks: Sequence[Mapping[str, Any]]) -> str:
@@ -150,7 +150,7 @@ def _lines(row: Row) -> Iterator[tuple[Any, ...]]:
         window = words.levels_of(decides)
         yield (
             *head, check["id"], check["kind"], check["text"], check.get("quantity"),
-            words.expectation(check.get("expected")), check["status"], check["reason"], decides.get("scheme"),
+            check.get("expected"), check["status"], check["reason"], decides.get("scheme"),
             decides.get("case"), words.fact(decides, "order"), low, high, words.levels(window) if window else None,
-            words.decisive_number(decides), check.get("advice"), row.broken,
+            decisive_number(decides.get("facts") or {}), check.get("advice"), row.broken,
         )  # fmt: skip

@@ -237,7 +237,7 @@ def _tables(
     beside += [energy.velocities(record), events.table(record)]
     # what damping or a force changes says nothing of a scheme
     conserved = experiment.model.definition.conservative
-    optional = [best.table(record, shown)]
+    optional = [best.table(experiment.model.definition, record, shown)]
     optional.append(orders.maxima(record, shown) if conserved else None)
     optional.append(orders.scalars(record, shown))
     optional.append(None if data.is_lean(record) else work.table(experiment, record))

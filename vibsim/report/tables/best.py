@@ -9,15 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+from vibsim.comparison.best_values import WORDS, Scalar, scalars
 from vibsim.core.record import Record
+from vibsim.models import Model
+from vibsim.report import style
 from vibsim.report.data import Member, at, exact_periods, exact_series, flags, swept, unit, whole
 from vibsim.report.style import power
-from vibsim.report.tables.orders import without
 from vibsim.report.tables.table import Cell, Column, Table, Written
 from vibsim.report.text import words
 
-LEAN = ("period", "amplitude")
-"""Numbers of which limits are kept where storage is bounded."""
 CLASSES = {
     "unknown": "–",
     "monotone": "monotone",
@@ -33,7 +33,7 @@ PER_NUMBER = ("finest level", "GCI", "GCI relative", "order", "levels", "converg
 """Columns that are kept with series only."""
 
 
-def table(record: Record, shown: Sequence[Member]) -> Table | None:
+def table(model: Model, record: Record, shown: Sequence[Member]) -> Table | None:
     """Return the limit of every number of the members; None where there is none, or one level only."""
     if len(whole(record, "level")) < 2 or "period_richardson" not in record:
         return None
@@ -44,15 +44,14 @@ def table(record: Record, shown: Sequence[Member]) -> Table | None:
         Column("best value", form="full"), Column("bound", form="small"), Column("true error", form="small"),
         Column("order", form="order"), Column("levels"), Column("convergence"),
     )  # fmt: skip
-    rows = list(_rows(record, shown, several))
+    rows = list(_rows(model, record, shown, several))
     if not rows:
         return None
     headers = [column.header for column in columns]
     error = headers.index("true error")
     missing = [] if any(math.isfinite(_float(row[error])) for row in rows) else ["true error"]
     missing += [] if "scalar" in record else PER_NUMBER
-    columns, rows = without(missing, columns, rows)
-    return Table("best_values", _caption(missing), columns, tuple(rows), heads=1)
+    return Table("best_values", _caption(missing), columns, tuple(rows), 1).without(missing)
 
 
 def _caption(missing: Sequence[str]) -> str:
@@ -73,9 +72,11 @@ def _float(cell: Cell) -> float:
     return float(cell) if isinstance(cell, int | float) else math.nan
 
 
-def _rows(record: Record, shown: Sequence[Member], several: bool) -> Iterator[tuple[Cell, ...]]:
-    names = record.words("scalar") if "scalar" in record else list(LEAN)
-    for k, name in enumerate(names):
+def _rows(
+    model: Model, record: Record, shown: Sequence[Member], several: bool
+) -> Iterator[tuple[Cell, ...]]:
+    for k, row in enumerate(scalars(model, "scalar" not in record)):
+        name = row.variable
         for member in shown:
             value = float(at(record, f"{name}_richardson", member))
             bound = float(at(record, f"{name}_richardson_error", member))
@@ -86,7 +87,7 @@ def _rows(record: Record, shown: Sequence[Member], several: bool) -> Iterator[tu
             who = [member.scheme_name, *([member.case_name] if several else [])]
             exact = _exact(record, name, member)
             yield (
-                _name(record, name),
+                _name(record, row),
                 *who,
                 *finest,
                 _rounded(value, known),
@@ -96,17 +97,10 @@ def _rows(record: Record, shown: Sequence[Member], several: bool) -> Iterator[tu
             )
 
 
-def _name(record: Record, name: str) -> str:
-    words_ = str(record.variable(f"{name}_richardson").attrs["long_name"]).rpartition(":")[0]
-    quantity, _, which = name.rpartition("_")
-    letter = words.SYMBOLS.get(quantity)
-    text = f"{letter} {words_.rpartition(', ')[2]}" if letter and which in ENDINGS else words_
-    measure = unit(record, f"{name}_richardson")
-    return f"{text} [{measure}]" if measure else text
-
-
-ENDINGS = ("end", "min", "max")
-"""What follows the name of a quantity in the name of a number of it."""
+def _name(record: Record, row: Scalar) -> str:
+    letter = words.SYMBOLS.get(row.quantity)
+    text = f"{letter} {WORDS[row.value]}" if letter else row.words
+    return style.label(text, unit(record, f"{row.variable}_richardson"))
 
 
 def _finest(record: Record, name: str, k: int, member: Member) -> tuple[Cell, ...]:
@@ -136,7 +130,7 @@ def _rounded(value: float, error: float) -> Written:
     if abs(value) >= 1e-3 or value == 0.0:
         return Written(value, f"{value:.{decimals}f}".replace("-", "−"))
     digits = max(decimals + size, 0)
-    return Written(value, words.readable(f"{value:.{digits}e}").replace("-", "−"))
+    return Written(value, words.PAGE.digits(f"{value:.{digits}e}").replace("-", "−"))
 
 
 def _approach(record: Record, k: int, member: Member) -> tuple[Cell, ...]:

@@ -7,12 +7,12 @@ whatever the scheme; for many schemes what they show is the error of that differ
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 
 from vibsim.core.record import Record
-from vibsim.report.data import Floats, flags, known, steps_of, swept, time_unit, whole
+from vibsim.report.data import Floats, Member, flags, known
+from vibsim.report.tables.by_level import by_level, cells, step_column
 from vibsim.report.tables.table import Cell, Column, Table, Written
 from vibsim.report.tables.theory import MEMBER, OF_LEVEL, everyone
 
@@ -23,14 +23,23 @@ def velocities(record: Record) -> Table | None:
     """Return the largest relative energy error with both velocities; None where no scheme has one of its own."""
     if CENTRED not in record or not np.isfinite(known(record, CENTRED, OF_LEVEL)).any():
         return None
-    named = "energy_drift_kind" in record
-    columns = (
-        Column("scheme"), *([Column("member")] if swept(record) else []), Column("level", form="integer"),
-        Column("dt", time_unit(record, "dt"), "step"),
-        Column("max |dE|/E(0), own velocity", form="small"), Column("max |dE|/E(0), [D₂ₜu]", form="small"),
-        Column("second over first", form="norm"),
-        *([Column("drift of the energy, own velocity")] if named else []),
-    )  # fmt: skip
+    own, centred = relative(record, OWN), relative(record, CENTRED)
+    # the velocity of a scheme without another one is the centred difference, but at the last step
+    is_same = np.asarray(np.isnan(centred).all(axis=-1))
+    second = np.where(is_same[..., None], relative(record, f"{OWN}_interior"), centred)
+    is_named = "energy_drift_kind" in record
+    kinds = flags(record, "energy_drift_kind") if is_named else np.full(own.shape, "")
+    rates = known(record, "energy_drift_rate", OF_LEVEL)
+
+    def quotient(member: Member, i: int) -> Cell:
+        at = member.scheme, member.case, i
+        is_noise = own[at] <= ROUND_OFF or kinds[at] == "none"
+        return None if is_same[at[:2]] or is_noise else _plain(float(second[at] / own[at]))
+
+    def drift(member: Member, i: int) -> Cell:
+        at = member.scheme, member.case, i
+        return _drift(kinds[at], float(rates[at]))
+
     caption = (
         "Energy error by the velocity that it is made with: the scheme's own, over every step; and [D₂ₜu], over every "
         "step but the first and the last, as in the tables of the text. Where the second is much larger, it shows the "
@@ -38,34 +47,20 @@ def velocities(record: Record) -> Table | None:
         "the second is smaller, the own velocity is the less accurate one, as that of Euler-Cromer, which is of first "
         "order only"
     )
-    rows = tuple(_rows(record, named))
-    return Table("energy_velocities", caption, columns, rows, 2 * int(bool(swept(record))))
+    filled = (
+        step_column(record),
+        (Column("max |dE|/E(0), own velocity", form="small"), cells(own)),
+        (Column("max |dE|/E(0), [D₂ₜu]", form="small"), cells(second)),
+        (Column("second over first", form="norm"), quotient),
+        (Column("drift of the energy, own velocity"), drift) if is_named else None,
+    )
+    return by_level(record, "energy_velocities", caption, everyone(record), filled)
 
 
 def relative(record: Record, name: str) -> Floats:
     """Return a number over the first energy of each member, shape (scheme, case, level); NaN where that vanishes."""
     values, first = known(record, name, OF_LEVEL), np.abs(known(record, "energy_initial", MEMBER))
     return np.asarray(values / np.where(first > 0.0, first, np.nan)[..., None])
-
-
-def _rows(record: Record, named: bool) -> Iterator[tuple[Cell, ...]]:
-    own, centred = relative(record, OWN), relative(record, CENTRED)
-    interior = relative(record, f"{OWN}_interior")
-    kinds = flags(record, "energy_drift_kind") if named else None
-    rates = known(record, "energy_drift_rate", OF_LEVEL)
-    for member in everyone(record):
-        dt = steps_of(record, member.case)
-        place = member.scheme, member.case
-        is_same = np.isnan(centred[place]).all()
-        for i, level in enumerate(whole(record, "level")):
-            who = [member.scheme_name, *([member.case_name] if swept(record) else [])]
-            a = float(own[(*place, i)])
-            # the velocity of such a scheme is the centred difference, but at the last step
-            b = float((interior if is_same else centred)[(*place, i)])
-            kind = [] if kinds is None else [_drift(kinds[(*place, i)], float(rates[(*place, i)]))]
-            is_noise = a <= ROUND_OFF or kind == ["none"]
-            quotient = None if is_same or is_noise else _plain(b / a)
-            yield (*who, level, float(dt[i]), a, b, quotient, *kind)
 
 
 ROUND_OFF = 1e-13

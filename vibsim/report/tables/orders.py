@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import TYPICAL_NORM
+from vibsim.core.vocabulary import TYPICAL_NORM, decisive_number
 from vibsim.report import frame
 from vibsim.report.data import (
+    Floats,
     Member,
     at,
     case_name,
@@ -20,12 +21,11 @@ from vibsim.report.data import (
     norm_unit,
     place_of,
     sound_pairs,
-    steps_of,
-    swept,
     time_unit,
     unit,
     whole,
 )
+from vibsim.report.tables.by_level import Fill, by_level, cells, step_column
 from vibsim.report.tables.table import Cell, Column, Table
 from vibsim.report.text import words
 
@@ -44,82 +44,44 @@ def checks(summary: Mapping[str, Any]) -> Table:
 
 def _check_rows(check: Mapping[str, Any]) -> Iterator[tuple[Cell, ...]]:
     head = (check["id"], check["kind"], check.get("quantity"), check["status"], check["reason"],
-            words.expectation(check.get("expected")))  # fmt: skip
+            check.get("expected"))  # fmt: skip
     for result in check.get("results") or [{}]:
         low, high = words.interval_of(result) or (None, None)
         window = words.levels_of(result)
         yield (
             *head, result.get("scheme"), result.get("case"), result.get("status"), result.get("reason"),
             words.fact(result, "order"), low, high, words.levels(window) if window else None,
-            _number(words.decisive_number(result)),
+            decisive_number(result.get("facts") or {}),
         )  # fmt: skip
-
-
-def _number(value: Any) -> Cell:
-    return value if value is None or isinstance(value, int | float | str) else str(value)
 
 
 def orders(
     record: Record, quantity: str, shown: Sequence[Member], norm: str = TYPICAL_NORM
 ) -> Table:
     """Return norms, ratios and orders of a quantity, one row per scheme, member and level."""
-    measure, sweep = norm_unit(record, quantity, norm), bool(swept(record))
-    columns = (
-        Column("scheme"), *([Column("member")] if sweep else []), Column("level", form="integer"),
-        Column("steps", form="integer"), Column("dt", time_unit(record, "dt"), "step"),
-        Column("difference", measure, "norm"), Column("ratio", form="order"), Column("order", form="order"),
-        Column("true error", measure, "norm"), Column("floor", measure, "norm"), Column("counts"),
-    )  # fmt: skip
-    rows = [row for member in shown for row in _order_rows(record, quantity, member, norm, sweep)]
-    letter = words.symbol(quantity)
-    pairs, triples = bool(whole(record, "pair")), bool(whole(record, "triple"))
-    missing = () if triples else ("ratio", "order", "counts") if pairs else COMPARED
-    caption = f"{letter}: {norm} norm of {letter}(level) − {letter}(next level)"
-    caption += "; ratio and order from three levels starting here" if triples else ""
-    columns, rows = without(missing, columns, rows)
-    return Table(
-        f"orders_{quantity}_{norm}",
-        caption if pairs else f"{letter}: {norm} norm of its error",
-        columns,
-        tuple(rows),
-        heads=2 if sweep else 0,
+    measure, n = norm_unit(record, quantity, norm), record.words("norm").index(norm)
+    letter, pairs = words.symbol(quantity), bool(whole(record, "pair"))
+    triples, count = bool(whole(record, "triple")), len(whole(record, "level"))
+    floors = {member: floor_norm(record, quantity, member, norm) for member in shown}
+    notes = {member: _notes(record, quantity, member) for member in shown}
+
+    def of(name: str) -> Fill:
+        found = {m: _padded(record, f"{quantity}_{name}", m, n, count) for m in shown}
+        return lambda member, i: found[member][i]
+
+    filled = (
+        (Column("steps", form="integer"), lambda member, i: int(record["steps"][i])),
+        step_column(record),
+        (Column("difference", measure, "norm"), of("difference_norm")) if pairs else None,
+        (Column("ratio", form="order"), of("ratio_norm")) if triples else None,
+        (Column("order", form="order"), of("observed_order")) if triples else None,
+        (Column("true error", measure, "norm"), of("error_norm")),
+        (Column("floor", measure, "norm"), lambda member, i: float(floors[member][i])),
+        (Column("counts"), lambda member, i: notes[member][i]) if triples else None,
     )
-
-
-COMPARED = ("difference", "ratio", "order", "counts")
-"""Columns that take several levels."""
-
-
-def without(
-    names: Sequence[str], columns: tuple[Column, ...], rows: Iterable[tuple[Cell, ...]]
-) -> tuple[tuple[Column, ...], list[tuple[Cell, ...]]]:
-    """Return columns and rows without the columns of these headers."""
-    kept = [i for i, column in enumerate(columns) if column.header not in names]
-    return tuple(columns[i] for i in kept), [tuple(row[i] for i in kept) for row in rows]
-
-
-def _order_rows(
-    record: Record, quantity: str, member: Member, norm: str, sweep: bool
-) -> Iterator[tuple[Cell, ...]]:
-    n = record.words("norm").index(norm)
-    levels, dt = whole(record, "level"), steps_of(record, member.case)
-    columns = [
-        _padded(record, f"{quantity}_{name}", member, n, len(levels))
-        for name in ("difference_norm", "ratio_norm", "observed_order", "error_norm")
-    ]
-    floor = floor_norm(record, quantity, member, norm)
-    note = _notes(record, quantity, member)
-    for i, level in enumerate(levels):
-        who: list[Cell] = [member.scheme_name, *([member.case_name] if sweep else [])]
-        yield (
-            *who,
-            level,
-            int(record["steps"][i]),
-            float(dt[i]),
-            *(column[i] for column in columns),
-            float(floor[i]),
-            note[i],
-        )
+    caption = f"{letter}: {norm} norm of {f'{letter}(level) − {letter}(next level)' if pairs else 'its error'}"
+    caption += "; ratio and order from three levels starting here" if triples else ""
+    return by_level(record, f"orders_{quantity}_{norm}", caption, shown, filled)
 
 
 def _padded(record: Record, name: str, member: Member, norm: int, count: int) -> list[float]:
@@ -168,39 +130,29 @@ def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
         )
         if name in record
     }
-    columns = [Column("scheme"), Column("level", form="integer")]
-    for text in known.values():
-        ratio = f"ratio, {text.split()[0]}" if text else "ratio"
-        columns += [
-            Column(f"max |dE| {text}".strip(), measure, "norm"),
-            Column(ratio, form="order"),
-        ]
-    rows: list[tuple[Cell, ...]] = []
-    for member in shown:
-        found = [at(record, name, member) for name in known]
-        whole_runs = at(record, "status", member) == 0
-        for i, level in enumerate(whole(record, "level")):
-            sound = whole_runs[i : i + 2].all()
-            cells = [
-                cell
-                for values in found
-                for cell in (float(values[i]), _ratio(values, i) if sound else math.nan)
-            ]
-            rows.append((member.title, level, *cells))
+    several = len(whole(record, "level")) > 1
+    filled: list[tuple[Column, Fill] | None] = []
+    for name, text in known.items():
+        header = f"ratio, {text.split()[0]}" if text else "ratio"
+        values = np.asarray(record[name], dtype=np.float64)
+        filled.append((Column(f"max |dE| {text}".strip(), measure, "norm"), cells(values)))
+        filled.append((Column(header, form="order"), _ratio(record, values)) if several else None)
     caption = (
         "Largest energy deviation over every step; the last point has an end formula of its own"
     )
-    several = len(whole(record, "level")) > 1
-    missing = [c.header for c in columns if c.header.startswith("ratio") and not several]
-    shown_columns, shown_rows = without(missing, tuple(columns), rows)
-    heads = int(bool(swept(record)))
-    return Table("energy_maxima", caption, shown_columns, tuple(shown_rows), heads)
+    return by_level(record, "energy_maxima", caption, shown, filled, titled=True)
 
 
-def _ratio(values: Any, i: int) -> float:
-    return (
-        float(values[i] / values[i + 1]) if i + 1 < len(values) and values[i + 1] != 0 else math.nan
-    )
+def _ratio(record: Record, values: Floats) -> Fill:
+    """Return what fills a column with the ratio of a level's value to that of the next one."""
+
+    def fill(member: Member, i: int) -> Cell:
+        found = values[member.scheme, member.case]
+        is_sound = (at(record, "status", member)[i : i + 2] == 0).all()
+        is_there = i + 1 < len(found) and found[i + 1] != 0
+        return float(found[i] / found[i + 1]) if is_sound and is_there else math.nan
+
+    return fill
 
 
 def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
@@ -208,22 +160,23 @@ def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
     if "period" not in record or not np.isfinite(np.asarray(record["period"], dtype=float)).any():
         return None
     time, angle = unit(record, "period"), unit(record, "amplitude")
-    columns = (
-        Column("scheme"), Column("level", form="integer"), Column("period", time, "full"),
-        Column("exact period", time, "full"), Column("relative error", form="norm"),
-        Column("amplitude", angle, "full"),
-    )  # fmt: skip
-    rows: list[tuple[Cell, ...]] = []
-    for member in shown:
-        period, amplitude = at(record, "period", member), at(record, "amplitude", member)
-        exact = float(exact_periods(record)[member.case])
-        for i, level in enumerate(whole(record, "level")):
-            error = float(period[i]) / exact - 1.0 if math.isfinite(exact) else math.nan
-            # the peak of a run that grows without bound may have either sign
-            size = abs(float(amplitude[i]))
-            rows.append((member.title, level, float(period[i]), exact, error, size))
+    period = np.asarray(record["period"], dtype=np.float64)
+    exact = exact_periods(record)
+
+    def error(member: Member, i: int) -> Cell:
+        known = float(exact[member.case])
+        measured = float(period[member.scheme, member.case, i])
+        return measured / known - 1.0 if math.isfinite(known) else math.nan
+
+    filled = (
+        (Column("period", time, "full"), cells(period)),
+        (Column("exact period", time, "full"), lambda member, i: float(exact[member.case])),
+        (Column("relative error", form="norm"), error),
+        # the peak of a run that grows without bound may have either sign
+        (Column("amplitude", angle, "full"), cells(np.abs(record["amplitude"]))),
+    )
     caption = "Period (interpolated) and amplitude"
-    return Table("scalars", caption, columns, tuple(rows), int(bool(swept(record))))
+    return by_level(record, "scalars", caption, shown, filled, titled=True)
 
 
 def failures(summary: Mapping[str, Any], record: Record) -> Table | None:
@@ -235,24 +188,12 @@ def failures(summary: Mapping[str, Any], record: Record) -> Table | None:
         Column("scheme"), Column("level", form="integer"), Column("case", form="integer"), Column("member"),
         Column("t", time_unit(record), "step"), Column("step", form="integer"), Column("error"),
     )  # fmt: skip
+    keys = ("scheme", "level", "case", "member", "t", "step", "error")
     rows = tuple(
-        (
-            f["scheme"],
-            f["level"],
-            f["case"],
-            _member(record, f["case"]),
-            f["t"],
-            f["step"],
-            f["error"],
-        )
-        for f in found
+        tuple({**row, "member": _member(record, row["case"])}[key] for key in keys) for row in found
     )
-    return Table(
-        "failures",
-        "Runs that broke down: the first moment at which the solution was not finite",
-        columns,
-        rows,
-    )
+    caption = "Runs that broke down: the first moment at which the solution was not finite"
+    return Table("failures", caption, columns, rows)
 
 
 def _member(record: Record, case: int) -> str:

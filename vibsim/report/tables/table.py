@@ -6,8 +6,8 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 from vibsim.report.style import LOWER, SUPERSCRIPTS
 from vibsim.report.text import words
@@ -59,6 +59,15 @@ class Table:
     def __post_init__(self) -> None:
         if any(len(row) != len(self.columns) for row in self.rows):
             raise ValueError(f"table {self.name}: a row does not have {len(self.columns)} cells")
+
+    def only(self, kept: Sequence[int]) -> Table:
+        """Return the table with the columns at these positions."""
+        rows = tuple(tuple(row[i] for i in kept) for row in self.rows)
+        return replace(self, columns=tuple(self.columns[i] for i in kept), rows=rows)
+
+    def without(self, headers: Collection[str]) -> Table:
+        """Return the table without the columns of these headers."""
+        return self.only([i for i, row in enumerate(self.columns) if row.header not in headers])
 
     def text_rows(self) -> Iterator[list[str]]:
         """Yield every row as it is read."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -175,15 +176,16 @@ def _predictions(
             Column(DIFFERENCE, measure, "brief"),
         ]
     rows = tuple(_prediction_rows(record, tuple(shown)))
+    table = Table(name, caption, tuple(columns), rows, 2 * bool(swept(record)))
     kept = [
         i
         for i, column in enumerate(columns)
         if column.header != DIFFERENCE or any(row[i] is not None for row in rows)
     ]
-    if len(kept) < len(columns):
-        caption += ". Where no difference is shown, the two agree to round-off"
-    told = tuple(tuple(row[i] for i in kept) for row in rows)
-    return Table(name, caption, tuple(columns[i] for i in kept), told, 2 * int(bool(swept(record))))
+    agree = ". Where no difference is shown, the two agree to round-off"
+    return (
+        table if len(kept) == len(columns) else replace(table.only(kept), caption=caption + agree)
+    )
 
 
 DIFFERENCE = "difference"

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vibsim.checks.value.criteria import SAMPLED, what
+from vibsim.checks.value.criteria import SAMPLED
+from vibsim.checks.words.value import what
 from vibsim.report.text import words
 
 if TYPE_CHECKING:
@@ -21,12 +22,28 @@ def heading(check: Check | Measurement) -> str:
     """Return the assertion of a check in one line."""
     if check.kind == "claim":
         return f"Claim: {check.claim}"
-    return words.sentence(_measured(check))
+    return words.PAGE.opening(_measured(check))
 
 
 def of_tolerance(bound: str) -> str:
     """Return in one line what an experiment with a tolerance asserts; `bound` is what its verdict expects."""
     return f"The error of the extrapolated solution is {bound}, in the unit of each state, at every stored time"
+
+
+def row(check: Check) -> dict[str, str]:
+    """Return the words of a check in the table of those that passed: what it is about, and what it asks for."""
+    if check.kind == "claim":
+        origin = f"Source: {check.source}" if check.source else ""
+        asked = f"true: {heading(check.that)}"
+        return {"subject": f"Claim: {check.claim}", "origin": origin, "asked": asked}
+    found = {"subject": words.PAGE.opening(subject(check)), "origin": "", "asked": ""}
+    if check.kind == "converges" and check.expect.status == "PASS":
+        found["asked"] = (
+            "as its scheme promises"
+            if check.order == "scheme"
+            else f"order {check.order:g} ± {check.tolerance:g}"
+        )
+    return found
 
 
 def background(check: Check) -> str:
@@ -68,8 +85,7 @@ def subject(check: Measurement) -> str:
         return f"{words.title(check.quantity)} by {check.first}{_where(check)}"
     if check.kind != "value":
         return _measured(check)
-    quantity = words.title(check.quantity) if check.quantity else None
-    told = what(check, quantity, words.spoken(check.value))
+    told = what(check, words.PAGE)
     keys = ("level", "scheme", "case") if check.value in SAMPLED else PLACES
     places = ((key, getattr(check.at, key)) for key in keys)
     where = ", ".join(f"{key} {value}" for key, value in places if value is not None)
@@ -80,14 +96,14 @@ def subject(check: Measurement) -> str:
 
 def _value(check: ValueCheck) -> str:
     tolerances = [
-        f"{key} {words.readable(f'{value:g}')}"
+        f"{key} {words.PAGE.number(value)}"
         for key, value in (("rtol", check.rtol), ("atol", check.atol))
         if value is not None
     ]
     bounds = {"equals": check.equals, "is below": check.below, "is above": check.above}
     rule = next(
         (
-            f"{verb} {words.readable(repr(value))}"
+            f"{verb} {words.PAGE.digits(repr(value))}"
             for verb, value in bounds.items()
             if value is not None
         ),
@@ -98,8 +114,8 @@ def _value(check: ValueCheck) -> str:
 
 
 STABLE = {
-    True: "no instability: the amplitude grows by nothing but an error that vanishes with dt",
-    False: "instability: the amplitude grows, and by more than an error that vanishes with dt",
+    True: "stability: the amplitude grows by no more than an error that vanishes with dt",
+    False: "instability: the amplitude grows by more than an error that vanishes with dt",
 }
 """What is said of a check for stability: Forward Euler, whose growth refinement cures, is not unstable."""
 
@@ -125,7 +141,7 @@ def _conserves(check: ConservesCheck) -> str:
 def _equal(check: EqualCheck) -> str:
     known = {"exact": "the exact solution", "discrete": "the exact solution of its own steps"}
     other = known.get(check.second, check.second)
-    within = "round-off" if check.atol is None else words.readable(f"{check.atol:g}")
+    within = "round-off" if check.atol is None else words.PAGE.number(check.atol)
     letter = words.title(check.quantity)
     return f"{letter} by {check.first} equals that of {other} to {within}{_where(check)}"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vibsim.checks.value.advice import COUNTED, depends_on_level
+from vibsim.checks.value.criteria import COUNTED, depends_on_level
 from vibsim.core.vocabulary import BY_TOLERANCE
 
 
@@ -18,18 +18,17 @@ class Reason:
 
 REASONS = {
     "asymptotic": Reason(
-        "The error shrinks from level to level with the order that is asked for: the rescaled differences fall on top "
-        "of each other, and more closely so on finer levels.",
-        "Three levels at least, curves that coincide, ratios that settle, and differences well above round-off: all "
-        "four are met on the levels named.",
+        "The error shrinks from level to level with the order that is asked for. The rescaled differences coincide, "
+        "more closely so on finer levels.",
+        "Three levels at least, curves that coincide, ratios that settle, and differences well above round-off. "
+        "The levels named meet all four.",
     ),
     "exact": Reason(
-        "The levels differ by round-off only: the scheme makes no truncation error here to measure.",
+        "The levels differ by round-off only. The scheme has no truncation error here.",
         "Nothing more, if exactness is expected here; otherwise a problem on which the scheme does make an error.",
     ),
     "match": Reason(
-        "The outcome is the expected one. Expected was something other than plain convergence, for instance a trap "
-        "that the check is meant to notice.",
+        "The outcome is the expected one, which is not plain convergence: the check is a trap, for instance.",
         "The measured verdict and the expected one agree; look at the measured reason to see what was noticed.",
     ),
     "order_low": Reason(
@@ -44,10 +43,10 @@ REASONS = {
     ),
     "mismatch": Reason(
         "The measured outcome is not the expected one.",
-        "Compare the expected value with the measured one: one of the two is wrong.",
+        "Compare the expected value with the measured one. One of the two is wrong.",
     ),
     "wrong_limit": Reason(
-        "The levels approach each other, but not the exact solution: the scheme converges to something else.",
+        "The levels approach each other, but not the exact solution. The scheme converges to a wrong answer.",
         "The differences alone cannot show this; the exact solution does. Check the equation that is being solved.",
     ),
     "unstable": Reason(
@@ -60,12 +59,11 @@ REASONS = {
         "A smaller step, or a look at the member, level and time listed under Failures.",
     ),
     "pre_asymptotic": Reason(
-        "The step is still too coarse: the ratios have not settled, so the order read from them is an accident.",
+        "The step is still too coarse. The ratios have not settled, so the order read from them is an accident.",
         "Finer levels, until the ratios settle and the rescaled curves coincide.",
     ),
     "round_off": Reason(
-        "The differences have reached the floor of the arithmetic: what is left is rounding noise, which says nothing "
-        "about the scheme.",
+        "The differences have reached round-off, and rounding noise says nothing about the scheme.",
         "Coarser levels, or an arithmetic with a lower floor (increment or compensated).",
     ),
     "oscillating": Reason(
@@ -78,7 +76,7 @@ REASONS = {
         "it into account.",
     ),
     "too_few_levels": Reason(
-        "An order cannot be judged from two levels: one difference has nothing to be compared with.",
+        "Two levels cannot show an order, because a single difference has nothing to compare with.",
         "Three levels at least; four or more let the trend of the ratios be seen.",
     ),
     "not_applicable": Reason(
@@ -91,19 +89,19 @@ _UNKNOWN = Reason("", "")
 _SAYS = "The measured number is what the check says."
 _NUMBER = Reason(
     _SAYS,
-    "A number that finer levels do not change, and that is not just inside its bound: the tables show both.",
+    "A number on which finer levels agree, and which is not close to its limit. The tables show both.",
 )
 _NUMBER_OF_ONE = Reason(
     _SAYS,
-    "More levels: on one alone nothing shows how much of the number is the step's.",
+    "More levels. One level alone does not show the error of the step.",
 )
 _NUMBER_OF_SCHEME = Reason(
     _SAYS,
-    "Nothing more: no level enters it. It comes from the equations of the scheme or the model, not from a run.",
+    "Nothing more. It follows from the equations of the scheme or the model, without a run.",
 )
 _NUMBER_COUNTED = Reason(
     _SAYS,
-    "Nothing more: it is counted, and exact.",
+    "Nothing more. It is a count, and exact.",
 )
 _BY_KIND = {
     "stable": Reason(
@@ -113,13 +111,13 @@ _BY_KIND = {
     ),
     "conserves": Reason(
         "The error of the energy changes with time as the check says.",
-        "A run of many periods: a slow drift below a larger oscillation shows late. The figure of the running maximum "
-        "has it at every time.",
+        "A run of many periods, because a slow drift below a larger oscillation shows late. The figure of the running "
+        "maximum shows it at every time.",
     ),
     "equal": Reason(
         "The two solutions are as near to each other as the check says.",
-        "A distance well below what is allowed, at every stored time; what is allowed without `atol` are the rounding "
-        "errors of both.",
+        "A distance well below what is allowed, at every stored time. Without `atol`, the rounding errors of both are "
+        "allowed.",
     ),
 }
 
@@ -127,12 +125,12 @@ _BY_KIND = {
 _OF_PROMISE = {
     "order_low": Reason(
         "The error does shrink, with the order that the scheme promises here, which is lower than the one asked for.",
-        "Nothing more: the ratios have settled where they should. Ask for the order of the scheme, or take a scheme of "
+        "Nothing more. The ratios have settled where they should. Ask for the order of the scheme, or take a scheme of "
         "a higher one.",
     ),
     "order_high": Reason(
         "The error shrinks faster than asked for, as the scheme promises here.",
-        "Nothing more: the ratios have settled where they should. Ask for the order of the scheme.",
+        "Nothing more. The ratios have settled where they should. Ask for the order of the scheme.",
     ),
 }
 """What an order means that is not the one of the check, but the one of the scheme."""

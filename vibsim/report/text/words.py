@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
+from vibsim.checks.words.notation import Notation
+from vibsim.experiment.value_names import VALUES
 from vibsim.models.shared.phase_amplitude_names import AMPLITUDE, PHASE, is_error_part, whole_of
 from vibsim.report.style import power
 
@@ -66,26 +68,29 @@ def name(quantity: str) -> str:
     return text if plain == quantity else f"{text} by the centred difference [D₂ₜu]"
 
 
-STATUS = {
-    "PASS": "Every check came out as it should.",
-    "INCONCLUSIVE": "No check failed, but at least one could not be decided: treat its number as unproven.",
-    "FAIL": "At least one check came out wrong.",
-}
-
-
 def overall(summary: Mapping[str, Any]) -> str:
     """Return the verdict on a whole experiment in one or two sentences."""
     checks: Sequence[Mapping[str, Any]] = summary["checks"]
-    total = len(checks)
-    passed = sum(check["status"] == "PASS" for check in checks)
     failures = broken(summary)
-    told = f"{passed} of {total} {'check' if total == 1 else 'checks'} passed."
-    parts = [STATUS.get(summary["status"], ""), told if total > 1 else ""]
-    if not total:
-        parts = ["There is no check, so nothing was decided."]
+    parts = [_counted([check["status"] for check in checks])]
     if failures:
         parts.append(f"{failures} {'run' if failures == 1 else 'runs'} broke down (see Failures).")
-    return " ".join(part for part in parts if part)
+    return " ".join(parts)
+
+
+def _counted(statuses: Sequence[str]) -> str:
+    """Say how many checks passed, failed and are undecided."""
+    total = len(statuses)
+    if not total:
+        return "There is no check, so nothing was decided."
+    failed, undecided, passed = map(statuses.count, ("FAIL", "INCONCLUSIVE", "PASS"))
+    if passed == total:
+        return "The check passed." if total == 1 else f"All {total} checks passed."
+    parts = [f"{failed} {'check' if failed == 1 else 'checks'} failed"] if failed else []
+    parts += [f"{undecided} {'is' if undecided == 1 else 'are'} undecided"] if undecided else []
+    parts += [f"{passed} passed"] if passed else []
+    start = "" if failed else "No check failed; "
+    return f"{start}{', '.join(parts)}."
 
 
 def broken(summary: Mapping[str, Any]) -> int:
@@ -93,69 +98,42 @@ def broken(summary: Mapping[str, Any]) -> int:
     return int(summary.get("failure_count") or len(summary.get("failures") or []))
 
 
-def told(check: Mapping[str, Any], field: str = "text") -> str:
-    """Return a text of a check with the letter of its quantity; a claim's own words and code stay as they are."""
-    text, quantity = str(check[field] or ""), check.get("quantity")
-    claim, mark, measured = text.rpartition(_MEASURED)
-    parts = measured.split("`")
-    if quantity:
-        letter = title(quantity)
-        parts[::2] = [re.sub(rf"\b{re.escape(quantity)}\b", letter, p) for p in parts[::2]]
-    parts[::2] = map(readable, parts[::2])
-    return claim + mark + sentence("`".join(parts))
+PROSE = {"phase", "amplitude"} | {name.partition("_")[0] for name in VALUES}
+"""With what the name of a value, or of a part of an error, begins."""
 
 
-_POWER = re.compile(r"(?<![\w.])(-?)(\d+(?:\.\d+)?)e([-+]?\d+)(?!\w)")
-_LONG = re.compile(r"(?<![\w.])\d+\.(?:0\b|\d{9,})(?![\w.]*\w)")
-_NAMED = re.compile(r"(?<!scheme )\b[a-z0-9]+(?:_[a-z0-9]+)+(?=(?: of | is | at ))")
+class _Page(Notation):
+    """The notation of a page: letters for quantities, words for values, powers of ten."""
+
+    def quantity(self, name: str) -> str:
+        """Write a quantity as a letter, or a part of an error in words."""
+        return title(name)
+
+    def value(self, name: str) -> str:
+        """Write the name of a number as words."""
+        return name.replace(CENTRED, " by [D₂ₜu]").replace("_", " ")
+
+    def opening(self, text: str) -> str:
+        """Begin a sentence that begins with a word, not a letter of mathematics, with a capital letter."""
+        return text[:1].upper() + text[1:] if text.partition(" ")[0] in PROSE else text
+
+    def digits(self, text: str) -> str:
+        """Write a number with no more digits than say something, and with a power of ten."""
+        mantissa, has_power, exponent = text.partition("e")
+        if len(mantissa) > MOST_DIGITS or (mantissa.endswith(".0") and not has_power):
+            mantissa = f"{float(mantissa):.10g}"
+        if not has_power:
+            return mantissa
+        ten = power(int(exponent))
+        if abs(float(mantissa)) != 1.0:
+            return f"{mantissa}·{ten}"
+        return f"-{ten}" if mantissa.startswith("-") else ten
 
 
-def sentence(text: str) -> str:
-    """Begin sentences that begin with the name of a value, or of a part of an error, with a capital letter."""
-    from vibsim.experiment.value_names import VALUES
-
-    names = {spoken(value).split()[0] for value in VALUES} | {"phase"}
-    first = "|".join(sorted(name for name in names if name.isalpha()))
-    return re.sub(rf"(^|[.] )({first})(?= )", lambda m: m[1] + m[2].capitalize(), text)
-
-
-def readable(text: str) -> str:
-    """Return a machine's sentence with no more digits than say something, powers of ten and names in words."""
-    text = re.sub(
-        r"\bstability_limit is 0;", "it grows at every step, so its stability_limit is 0;", text
-    )
-    text = _NAMED.sub(lambda found: spoken(found[0]), text)
-    text = _LONG.sub(lambda found: f"{float(found[0]):.10g}", text)
-    return _POWER.sub(_raised, text)
-
-
-def spoken(value: str) -> str:
-    """Write the name of a value as words; what is no such name stays as it is."""
-    from vibsim.experiment.value_names import VALUES
-
-    return value.replace("_d2t", " by [D₂ₜu]").replace("_", " ") if value in VALUES else value
-
-
-def _raised(found: re.Match[str]) -> str:
-    sign, mantissa, exponent = found.groups()
-    shown = mantissa if len(mantissa) <= MOST_DIGITS else f"{float(mantissa):.10g}"
-    ten = power(int(exponent))
-    return f"{sign}{ten}" if float(mantissa) == 1.0 else f"{sign}{shown}·{ten}"
-
+PAGE = _Page()
 
 MOST_DIGITS = 11
 """Characters of a mantissa that are read."""
-
-
-_MEASURED = " Measured: the statement "
-"""What separates a claim from what was measured of it."""
-
-
-def unsettled(summary: Mapping[str, Any]) -> list[str]:
-    """Return the texts of the checks that did not pass, with status and reason, while there are several checks."""
-    checks: Sequence[Mapping[str, Any]] = summary["checks"]
-    open_ones = [check for check in checks if check["status"] != "PASS"] if len(checks) > 1 else []
-    return [f"{check['status']} ({check['reason']}): {told(check)}" for check in open_ones]
 
 
 def number(value: Any, form: str = "norm") -> str:
@@ -256,19 +234,6 @@ def levels(window: Sequence[int] | None) -> str:
     return str(found[0]) if len(found) == 1 else f"{min(found)} to {max(found)}"
 
 
-def expectation(expected: Any) -> str:
-    """Write what a check expected: text as it stands, a mapping as ``key value`` pairs."""
-    if expected is None:
-        return "–"
-    if isinstance(expected, Mapping):
-        return ", ".join(
-            f"{key} {expectation(value)}" for key, value in expected.items() if value is not None
-        )
-    if isinstance(expected, bool):
-        return "true" if expected else "false"
-    return number(expected, "step") if isinstance(expected, float) else str(expected)
-
-
 def ratio(order: float | None) -> str:
     """Say by what factor the error falls when the step is halved."""
     if order is None or math.isnan(order):
@@ -276,19 +241,9 @@ def ratio(order: float | None) -> str:
     return f"Halving the step divides the error by about {2.0**order:.3g}."
 
 
-NUMBERS = ("value", "growth", "energy_error", "distance", "error_bound")
-"""Facts that decide a check of their kind."""
-
-
 def fact(result: Mapping[str, Any], name: str) -> Any:
     """Return a fact of a result in a summary; None where it has none."""
     return (result.get("facts") or {}).get(name)
-
-
-def decisive_number(result: Mapping[str, Any]) -> float | None:
-    """Return the number that decides a result, where no order does."""
-    found = result.get("facts") or {}
-    return next((found[name] for name in NUMBERS if name in found), None)
 
 
 def interval_of(result: Mapping[str, Any]) -> tuple[float, float] | None:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from vibsim.checks.numbers_in_words import number
-from vibsim.checks.order.verdict_context import (
+from vibsim.checks.words.order_context import (
     Corner,
     Story,
     ends_low,
@@ -45,7 +44,7 @@ def advise(s: Story) -> str:
             order = s.promised if lower else s.expected
             return (
                 f"{'Set `order: scheme`, and end' if lower else 'End'} the time interval (`time: end`) before t = "
-                f"{s.corner.time:.4g}, where order {number(order)} can be seen{_or_lower(s, s.corner)}."
+                f"{s.number(s.corner.time, 4)}, where order {s.number(order)} can be seen{_or_lower(s, s.corner)}."
             )
         case "order_low":
             return _on_low_order(s)
@@ -68,8 +67,8 @@ def advise(s: Story) -> str:
             )
         case "non_finite" if not math.isnan(s.singular):
             return (
-                f"End the time interval (`time: end`) before t = {s.singular:.4g}, or check the formulas of `model:`: "
-                "finer levels will not help where the motion escapes, or a formula has no finite value."
+                f"End the time interval (`time: end`) before t = {s.number(s.singular, 4)}, or check the formulas of "
+                "`model:`: finer levels will not help where the motion escapes, or a formula has no finite value."
             )
         case "non_finite":
             level = first_sound(s)
@@ -88,7 +87,7 @@ def advise(s: Story) -> str:
             return "Name schemes with a fixed step (`schemes:`), or ask for its error with a `value:` check."
         case "not_applicable" if s.cause == "still":
             return (
-                f"Choose `initial:` values, a force or a `time: end` with which {s.quantity} moves from one common "
+                f"Choose `initial:` values, a force or a `time: end` with which {s.what} moves from one common "
                 "time to the next."
             )
         case "not_applicable":
@@ -102,7 +101,7 @@ def _or_lower(s: Story, corner: Corner) -> str:
     if s.promised <= most:
         return ""
     at_most = " at most" if corner.power > 1.0 else ""
-    return f", or take a scheme (`schemes:`) of order {number(most)}{at_most}"
+    return f", or take a scheme (`schemes:`) of order {s.number(most)}{at_most}"
 
 
 def _on_pulse(s: Story) -> str:
@@ -111,7 +110,7 @@ def _on_pulse(s: Story) -> str:
     more = max(math.ceil(math.log2(s.shortest / width)), 0) + 1
     return (
         f"Use steps that are shorter than the pulse, from level {s.levels[-1] + more} on, write a wider pulse of the "
-        f"same impulse, or end the time interval (`time: end`) before t = {time:.6g}."
+        f"same impulse, or end the time interval (`time: end`) before t = {s.number(time, 6)}."
     )
 
 
@@ -135,7 +134,7 @@ def _on_low_order(s: Story) -> str:
         kick = f", or set `end_velocity: kick` for scheme {s.scheme}"
         return f"Measure with `norm: linf_interior`{kick if 'end_velocity' in s.options else ''}."
     if s.cause == "one_quantity":
-        return f"Look for a formula of lower order that {s.quantity} alone is made with{_or_expect(s)}."
+        return f"Look for a formula of lower order that {s.what} alone is made with{_or_expect(s)}."
     return f"Look for a term of lower order in scheme {s.scheme}{_or_expect(s)}."
 
 
@@ -157,7 +156,7 @@ def _on_high_order(s: Story) -> str:
                 "turning points alone."
             )
         case "theory" if math.isfinite(s.order):
-            return f"Set `order: {number(_likely(s))}`, which the theory of scheme {s.scheme} has here."
+            return f"Set `order: {s.number(_likely(s))}`, which the theory of scheme {s.scheme} has here."
         case "one_norm":
             return f"Measure in another `norm:`{_or_expect(s)}."
         case "one_quantity":
@@ -227,5 +226,5 @@ def _likely(s: Story) -> float:
 
 def _or_expect(s: Story) -> str:
     if math.isfinite(s.order) and _likely(s) > 0:
-        return f", or set `order: {number(_likely(s))}` if you expect it"
+        return f", or set `order: {s.number(_likely(s))}` if you expect it"
     return " (`schemes:`)"

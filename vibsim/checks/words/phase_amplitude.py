@@ -4,14 +4,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from vibsim.comparison.order_evidence import judgement
-from vibsim.comparison.quantity_comparison import Comparison
-from vibsim.convergence.differences import largest, safe_ratio
-from vibsim.core.record import Record, Variable, attributes
+from vibsim.checks.words.found import Found
 from vibsim.core.vocabulary import TYPICAL_NORM
-from vibsim.models import Model
 from vibsim.models.shared.phase_amplitude_names import AMPLITUDE, PHASE
 
 APART = 0.5
@@ -23,37 +17,12 @@ THERE = 0.5
 NAMES = {1.0: "first", 2.0: "second", 3.0: "third", 4.0: "fourth", 5.0: "fifth", 6.0: "sixth"}
 
 
-def at_start(q: Comparison) -> dict[str, Variable]:
-    """Return the part of a phase error that is there from the first step on; nothing of any other quantity."""
-    if not q.name.endswith(PHASE) or not q.differences:
-        return {}
-    first = judgement(q, TYPICAL_NORM).first
-    levels = np.array(q.block.grid.levels[:-1])
-    # of the coarsest pair that the order rests on: furthest from round-off
-    pair = np.where(first < 0, len(levels) - 1, np.searchsorted(levels, first))
-    share = np.stack([safe_ratio(np.abs(d[..., 0]), largest(d)) for d in q.differences], axis=-1)
-    chosen = np.take_along_axis(share, pair[..., None], axis=-1)[..., 0]
-    attrs = attributes(f"{q.long_name}: what is there from the start over the largest", "1")
-    return {f"{q.name}_at_start": Variable(("scheme", "case"), chosen, attrs)}
-
-
-def is_told(name: str) -> bool:
-    """Tell whether a variable of the convergence Record is one that `parts_in_words` reads."""
-    return name.endswith((f"{PHASE}_order", f"{AMPLITUDE}_order", f"{PHASE}_at_start"))
-
-
-def parts_in_words(model: Model, record: Record, quantity: str, scheme: int, case: int) -> str:
+def parts_in_words(f: Found, quantity: str) -> str:
     """Say of which order phase and amplitude are where they differ; empty where they do not, or it is not known.
 
-    Parameters
-    ----------
-    record
-        Convergence Record.
-    quantity
-        A state; of any other quantity nothing is said.
-    scheme, case
-        Places in the record.
+    Of a quantity that is no state nothing is said.
     """
+    model, record = f.experiment.model.definition, f.record
     known = dict(zip((*model.positions, *model.velocities), model.positions * 2, strict=True))
     position = known.get(quantity, "")
     # a large run keeps only the part that a check asks for
@@ -61,10 +30,12 @@ def parts_in_words(model: Model, record: Record, quantity: str, scheme: int, cas
         return ""
     norm = record.words("norm").index(TYPICAL_NORM)
     phase, amplitude = (
-        float(record[f"{position}{end}_order"][scheme, case, norm]) for end in (PHASE, AMPLITUDE)
+        float(record[f"{position}{end}_order"][f.scheme, f.case, norm])
+        for end in (PHASE, AMPLITUDE)
     )
-    share = float(record[f"{position}{PHASE}_at_start"][scheme, case])
-    return sentence(phase, amplitude, share, "" if quantity == position else f" of {position}")
+    share = float(record[f"{position}{PHASE}_at_start"][f.scheme, f.case])
+    whose = "" if quantity == position else f" of {f.notation.quantity(position)}"
+    return sentence(phase, amplitude, share, whose)
 
 
 def sentence(phase: float, amplitude: float, share: float, whose: str = "") -> str:
