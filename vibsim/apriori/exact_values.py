@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vibsim.core.array_types import Floats
 from vibsim.formula import values
 from vibsim.models import BUDGET, Model, tree
 from vibsim.models.base import Formula
 from vibsim.models.table import BEND, HEIGHT
 from vibsim.simulation.members import Members
-
-Floats = NDArray[np.float64]
 
 
 def formulas_of(model: Model) -> dict[str, Formula]:

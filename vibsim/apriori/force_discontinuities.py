@@ -16,18 +16,15 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.apriori.thresholds import FAR, HALVINGS, MOST_SMOOTH, NEAR, ON_A_POINT
+from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.record import Record, Variable, attributes
 from vibsim.formula import Name, Switch, names_in, to_formula
 from vibsim.models import Model
 from vibsim.models.events import Friction
 from vibsim.simulation import Members
 from vibsim.simulation.reference.one_sided_forces import TABLE, Sides, sides
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -37,7 +34,7 @@ class Corners:
     power: Floats
     """The highest power of dt that stays regular, k + 1; NaN where there is no corner."""
     time: Floats
-    switch: Ints
+    switch: Integers
     """Index into `switches_of`, -1 for none."""
 
 
@@ -112,7 +109,7 @@ def corners_of(model: Model, finest: Record, group: Members, dt: Floats) -> Corn
 
 def _of_scheme(
     held: Sides, states: Floats, t: Floats, numbers: Mapping[str, Floats], dt: Floats
-) -> tuple[Floats, Floats, Ints]:
+) -> tuple[Floats, Floats, Integers]:
     """Return power, time and switch of the first corner of every member, each of shape (case,)."""
     cases, samples = t.shape
     q, modes = _modes(held, states.reshape(len(states), -1), t.ravel())
@@ -133,7 +130,7 @@ def _of_scheme(
     return power, time, np.asarray(switch, dtype=np.int64)
 
 
-def is_on_a_point(t: Floats, dt: Floats) -> NDArray[np.bool_]:
+def is_on_a_point(t: Floats, dt: Floats) -> Flags:
     """Tell whether times are grid points of step dt."""
     place = t / dt
     return np.asarray(np.abs(place - np.round(place)) <= ON_A_POINT)
@@ -165,7 +162,7 @@ class _Followed:
     edge: Floats
     """The value that is passed between two samples, shape (switch, case, sample - 1)."""
 
-    def first(self, when: Floats) -> tuple[Floats, Floats, Ints]:
+    def first(self, when: Floats) -> tuple[Floats, Floats, Integers]:
         """Return power, time and switch of the first corner of every member, each of shape (case,).
 
         Parameters
@@ -211,7 +208,7 @@ def _modes(held: Sides, states: Floats, t: Floats) -> tuple[Floats, Floats]:
     return q, modes
 
 
-def _power(path: _Path, switch: Ints, edge: Floats, size: Floats) -> Floats:
+def _power(path: _Path, switch: Integers, edge: Floats, size: Floats) -> Floats:
     """Return the power of dt that a corner leaves, shape (n,); NaN where both formulas are the same."""
     s = _crossing(path, switch, edge)
     slope = _quantity(path, switch, np.ones(len(s))) - _quantity(path, switch, np.zeros(len(s)))
@@ -224,12 +221,12 @@ def _power(path: _Path, switch: Ints, edge: Floats, size: Floats) -> Floats:
     return np.where((gaps[0] > 0.0) & (k < MOST_SMOOTH), np.maximum(k, 0.0) + 1.0, np.nan)
 
 
-def _quantity(path: _Path, switch: Ints, s: Floats) -> Floats:
+def _quantity(path: _Path, switch: Integers, s: Floats) -> Floats:
     u, v, t = path.at(s)
     return path.held.quantities(path.modes[0], u, v, t)[switch, np.arange(len(s))]
 
 
-def _crossing(path: _Path, switch: Ints, edge: Floats) -> Floats:
+def _crossing(path: _Path, switch: Integers, edge: Floats) -> Floats:
     """Return after which part of the way a switch has the value `edge`, by bisection."""
     low, high = np.zeros(len(edge)), np.ones(len(edge))
     start = _quantity(path, switch, low) > edge

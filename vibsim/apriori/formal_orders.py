@@ -14,6 +14,7 @@ from vibsim import plan
 from vibsim.apriori.initial_motion import BEGINNINGS, beginning_varies, beginnings
 from vibsim.apriori.phase_amplitude_orders import is_promised, part_orders
 from vibsim.apriori.roundoff_floor import relative_floor
+from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.models import Model
 from vibsim.models.shared.phase_amplitude_names import whole_of
@@ -25,7 +26,6 @@ from vibsim.theory import stability_limit
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
-Floats = NDArray[np.float64]
 Columns = Mapping[str, NDArray[Any]]
 """Swept values by dotted key, each of shape (case,)."""
 
@@ -95,7 +95,7 @@ def orders_vary(experiment: Experiment, quantity: str) -> bool:
     return options_swept(experiment) or beginning_varies(experiment)
 
 
-def even_powers(experiment: Experiment, quantity: str, columns: Columns) -> NDArray[np.bool_]:
+def even_powers(experiment: Experiment, quantity: str, columns: Columns) -> Flags:
     """Tell whether the error of a quantity has every second power only, shape (scheme, case)."""
     model, of = experiment.model.definition, whole_of(quantity)
     even = _each(experiment, columns, lambda s, o: float(s.has_even_powers(of, model, o)))

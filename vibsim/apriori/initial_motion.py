@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.apriori.thresholds import BALANCED
+from vibsim.core.array_types import Floats, Integers
 from vibsim.formula import values
 from vibsim.models import Model, tree
 from vibsim.models.base import Numbers
@@ -19,7 +20,6 @@ from vibsim.simulation.members import numbers_of
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
-Floats = NDArray[np.float64]
 
 BEGINNINGS: tuple[Beginning, ...] = get_args(Beginning)
 
@@ -46,7 +46,7 @@ def _sweeps(experiment: Experiment, *sections: str) -> bool:
     return any(key.startswith(sections) for key in keys)
 
 
-def beginnings(experiment: Experiment, columns: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
+def beginnings(experiment: Experiment, columns: Mapping[str, NDArray[Any]]) -> Integers:
     """Return the index in `BEGINNINGS` for every member, shape (case,); of shape (1,) where it is one for all."""
     size = len(next(iter(columns.values()))) if beginning_varies(experiment) else 1
     if not beginning_matters(experiment):

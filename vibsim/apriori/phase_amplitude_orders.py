@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim import plan, theory
+from vibsim.core.array_types import Floats, Integers
 from vibsim.models.shared.free import FreeOscillation, free_oscillation, why_not_free
 from vibsim.models.shared.phase_amplitude_names import PHASE, is_error_part
 from vibsim.schemes import SCHEMES, Options
@@ -21,8 +21,6 @@ from vibsim.simulation.members import numbers_of
 if TYPE_CHECKING:
     from vibsim.apriori.formal_orders import Columns
     from vibsim.experiment import Experiment
-
-Floats = NDArray[np.float64]
 
 
 def is_promised(experiment: Experiment, quantity: str) -> bool:
@@ -58,7 +56,7 @@ def _of_scheme(
     kind: str,
     options: Options,
     motion: FreeOscillation,
-    where: NDArray[np.int64],
+    where: Integers,
 ) -> Floats:
     """Return the orders of both parts, shape (2, len(where)), worked out once for each damping."""
     stepper = SCHEMES[kind].stepper_for(experiment.model.definition, options)

@@ -9,14 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.apriori.thresholds import STORED
 from vibsim.convergence.differences import largest
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.schemes import Options, Scheme
-
-Floats = NDArray[np.float64]
 
 SPACING_AT_ONE = float(np.finfo(np.float64).eps)
 """Distance from 1 to the next number, 2^-52: twice the unit round-off.

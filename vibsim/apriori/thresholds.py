@@ -25,5 +25,4 @@ BALANCED = 1e-12
 # Storing
 
 STORED = 1.0 / 7.0
-"""Root mean square of the error that storing leaves of numbers from 1/2 to 1: half a spacing over root 12.
-[derived]"""
+"""Root mean square of the error that storing leaves of numbers from 1/2 to 1: half a spacing over root 12. [derived]"""

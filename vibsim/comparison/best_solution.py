@@ -17,6 +17,7 @@ from vibsim.comparison.extrapolate_members import (
 )
 from vibsim.comparison.member_method import Method, Start
 from vibsim.convergence.state_extrapolation import Pair
+from vibsim.core.array_types import Floats, Integers
 from vibsim.core.record import Attribute, Record, Variable, attributes
 from vibsim.observe.common_grid import Grid, common_grid, take
 from vibsim.observe.input_consistency import check_belonging
@@ -27,7 +28,6 @@ from vibsim.simulation.scaled import in_scales
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
-Floats = NDArray[np.float64]
 
 SERIES = ("scheme", "case", "t")
 REACHED = ("no", "yes")
@@ -81,9 +81,7 @@ def extrapolated(
     return rows
 
 
-def methods(
-    experiment: Experiment, scheme: int, group: Members
-) -> list[tuple[Method, NDArray[np.int64]]]:
+def methods(experiment: Experiment, scheme: int, group: Members) -> list[tuple[Method, Integers]]:
     """Return the methods of one scheme, which differ where options are swept, and the members that have each."""
     model, kind = experiment.model.definition, experiment.schemes[scheme].kind
     return [
@@ -92,7 +90,7 @@ def methods(
     ]
 
 
-def start_of(method: Method, group: Members, where: NDArray[np.int64]) -> Start:
+def start_of(method: Method, group: Members, where: Integers) -> Start:
     """Return the numbers of the members at the places `where` of `group`."""
     model = method.model
     end = group.end[where]
@@ -111,7 +109,7 @@ def _of_method(
     grid: Grid,
     levels: Sequence[tuple[Floats, ...]],
     scheme: int,
-    where: NDArray[np.int64],
+    where: Integers,
 ) -> Extrapolated:
     # in memory time comes first, and all members are taken without a copy
     some = slice(None) if len(where) == levels[0][0].shape[1] else where
@@ -124,7 +122,7 @@ def _of_method(
     return extrapolate_members(method, start, grid.steps, t, pairs, noise)
 
 
-def in_order(parts: Sequence[tuple[Extrapolated, NDArray[np.int64]]]) -> Extrapolated:
+def in_order(parts: Sequence[tuple[Extrapolated, Integers]]) -> Extrapolated:
     """Put members that were stepped with different options where they belong."""
     if len(parts) == 1:
         return parts[0][0]

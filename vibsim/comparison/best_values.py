@@ -22,13 +22,13 @@ from vibsim.comparison.thresholds import MISSED_EXTREMUM, OF_GRID, OF_PARABOLA
 from vibsim.convergence import gci
 from vibsim.convergence.number_extrapolation import Limit, limit, observed_order
 from vibsim.convergence.thresholds import ORDER_ABOVE_ROUND_OFF
+from vibsim.core.array_types import Codes, Flags, Floats
 from vibsim.core.record import Variable, attributes
 from vibsim.experiment.value_names import HAVE_LIMITS
 from vibsim.models import Model
 from vibsim.observe import oscillation
 from vibsim.observe.member_block import MemberBlock
 
-Floats = NDArray[np.float64]
 Table = dict[str, Variable]
 
 MEMBER = ("scheme", "case")
@@ -66,7 +66,7 @@ class Best:
     limit: Limit
     order: Floats
     """Observed order; NaN where there is none."""
-    kind: NDArray[np.int8]
+    kind: Codes
     """Position in `gci.CLASSES`."""
     index: Floats
     """Grid convergence index of the finest level."""
@@ -96,7 +96,7 @@ class _Ladder:
 
     values: Floats
     order: Floats
-    even: NDArray[np.bool_]
+    even: Flags
     floor: Floats
     missed: Floats
     """What the points of the finest grid may miss of an extremum, shape (scheme, case)."""
@@ -158,7 +158,7 @@ def _at_levels(name: str, place: value_numbers.Place) -> Floats:
     return np.stack(found, axis=-1)
 
 
-def _promised(name: str, place: value_numbers.Place) -> tuple[Floats, NDArray[np.bool_]]:
+def _promised(name: str, place: value_numbers.Place) -> tuple[Floats, Flags]:
     """Return the order that a number should have, and whether its powers are even, shape (scheme, case)."""
     block, experiment = place.block, place.block.experiment
     quantity = place.quantity or block.model.position

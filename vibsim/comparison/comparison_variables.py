@@ -16,14 +16,14 @@ from vibsim.convergence import differences
 from vibsim.convergence.gci import of_order
 from vibsim.convergence.local_order import local_order, window_points
 from vibsim.convergence.thresholds import ORDINARY_ORDER
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Variable, attributes
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.models import ENERGIES
 from vibsim.models.shared.phase_amplitude_names import is_error_part
 from vibsim.observe.member_block import CENTRED, by_level, plain_name
-from vibsim.observe.period_scale import swing
+from vibsim.observe.oscillation import period_scale
 
-Floats = NDArray[np.float64]
 Table = dict[str, Variable]
 Add = Callable[..., None]
 
@@ -202,7 +202,7 @@ def _ratios(q: Comparison, add: Add) -> None:
 def _local_orders(q: Comparison, add: Add) -> None:
     """Add the order of every triple as a function of time, with its interval, in single precision."""
     grid = q.block.grid
-    counts = window_points(ORDER_WINDOW * swing(q.block), grid.spacing, len(grid.t))
+    counts = window_points(ORDER_WINDOW * period_scale(q.block), grid.spacing, len(grid.t))
     floor = [q.floor[..., i] + q.floor[..., i + 1] for i in range(len(q.differences))]
     rows = [
         local_order(

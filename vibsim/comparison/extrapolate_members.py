@@ -20,10 +20,9 @@ from vibsim.comparison.member_method import Method, Start, rate_of
 from vibsim.comparison.thresholds import RECENT, RESOLVED_STEP
 from vibsim.convergence.state_extrapolation import Best, Circumstances, Pair, best_entry
 from vibsim.convergence.thresholds import KNOWN_DIGIT
+from vibsim.core.array_types import Floats
 from vibsim.engine import integrate
 from vibsim.schemes.base import Options
-
-Floats = NDArray[np.float64]
 
 PIECE = 2**14
 """Points extrapolated at a time, so that the tableau stays in cache."""

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.comparison.thresholds import LONG_RUN
 from vibsim.convergence.state_extrapolation import Tableau, tableau
+from vibsim.core.array_types import Floats, Integers
 from vibsim.models import Model
 from vibsim.schemes import Options, Scheme
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -104,7 +102,7 @@ class Start:
     frequency: Floats
     """Angular frequency of small oscillations, shape (case,)."""
 
-    def of(self, some: NDArray[np.int64] | slice) -> Start:
+    def of(self, some: Integers | slice) -> Start:
         """Return the numbers of some of the members."""
         return Start(*(values[some] for values in vars(self).values()))
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.comparison.order_evidence import evidence, judgement
 from vibsim.comparison.quantity_comparison import Comparison
@@ -22,13 +21,10 @@ from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.convergence.ladder_statistics import at_rest, floor_of_pairs, unresolved
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING
 from vibsim.convergence.verdict import Judgement
+from vibsim.core.array_types import Codes, Flags, Floats
 from vibsim.core.vocabulary import NORMS, REASON_NAMES
 from vibsim.observe import predicted_oscillation
 from vibsim.observe.member_block import MemberBlock
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Codes = NDArray[np.int8]
 
 CAUSES = (
     "none",

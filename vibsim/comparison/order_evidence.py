@@ -6,7 +6,6 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, norm_of_floor
 from vibsim.comparison.quantity_comparison import Comparison
@@ -14,6 +13,7 @@ from vibsim.comparison.thresholds import STRAIGHT
 from vibsim.convergence.differences import largest
 from vibsim.convergence.ladder_statistics import Evidence
 from vibsim.convergence.verdict import Judgement, judge
+from vibsim.core.array_types import Flags, Floats
 from vibsim.core.vocabulary import TOLERANCE
 from vibsim.models import ENERGIES
 from vibsim.models.shared.phase_amplitude_names import is_error_part
@@ -21,9 +21,6 @@ from vibsim.observe.member_block import plain_name
 
 if TYPE_CHECKING:
     from vibsim.experiment.schema.checks import ConvergesCheck
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 def judgement(q: Comparison, norm: str) -> Judgement:

@@ -8,7 +8,6 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.apriori.formal_orders import even_powers, formal_orders, special_orders
 from vibsim.apriori.roundoff_floor import solution_size
@@ -23,11 +22,9 @@ from vibsim.convergence import differences
 from vibsim.convergence.extrapolation import extrapolate_series
 from vibsim.convergence.thresholds import ROUND_OFF_SAFETY
 from vibsim.convergence.verdict import Judgement, local_orders
+from vibsim.core.array_types import Flags, Floats
 from vibsim.observe.member_block import MemberBlock, by_level, energy_at_start
 from vibsim.observe.phase_amplitude_error import parts_of_errors, wanted
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

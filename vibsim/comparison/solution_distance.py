@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim import theory
 from vibsim.apriori.exact_values import known_values
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
+from vibsim.core.array_types import Floats
 from vibsim.models import ENERGIES
 from vibsim.observe.member_block import CENTRED, MemberBlock, energy_at_start, plain_name
 from vibsim.observe.predicted_oscillation import is_simple, natural_frequency, steppers
@@ -26,8 +26,6 @@ from vibsim.schemes import SCHEMES
 
 if TYPE_CHECKING:
     from vibsim.experiment.schema.scheme_checks import EqualCheck
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

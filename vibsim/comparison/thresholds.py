@@ -29,8 +29,7 @@ ORDER_WINDOW = 0.5
 # Causes of an order
 
 VANISHING_RATE = 1e-3
-"""A rate of change that is no larger a part of its largest value, at every common time, vanishes there.
-[convention]"""
+"""A rate of change that is no larger a part of its largest value, at every common time, vanishes there. [convention]"""
 THEORY_ROUNDING = 1e-12
 """An error of the theory that is no larger is rounding. [convention]"""
 

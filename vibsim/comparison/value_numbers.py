@@ -10,17 +10,15 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.comparison.comparison_variables import estimates
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.comparison.solution_distance import discrete_error, exact_series
 from vibsim.convergence.differences import largest, safe_ratio
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.observe import oscillation, predicted_oscillation
 from vibsim.observe.member_block import MemberBlock, energy_at_start
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -15,15 +15,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.comparison.comparison_variables import Table
 from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Variable, attributes
 from vibsim.observe.member_block import MemberBlock, by_level
 from vibsim.schemes import SCHEMES
-
-Floats = NDArray[np.float64]
 
 OF_LEVEL = ("scheme", "case", "level")
 

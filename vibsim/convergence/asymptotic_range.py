@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.ladder_statistics import pick
 from vibsim.convergence.level_jitter import Uneven, accidents
@@ -44,10 +43,7 @@ from vibsim.convergence.thresholds import (
     SUSPECT,
     TRIPLES_AGREE,
 )
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Integers = NDArray[np.int64]
+from vibsim.core.array_types import Flags, Floats, Integers
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.asymptotic_range import Trend, mismatches
 from vibsim.convergence.hidden_order import is_promise_hidden
@@ -61,10 +60,8 @@ from vibsim.convergence.true_errors import (
     irregular,
     limit_is_missed,
 )
+from vibsim.core.array_types import Flags, Floats
 from vibsim.core.vocabulary import TOLERANCE
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Floats]:

@@ -13,12 +13,9 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.thresholds import ROUND_OFF_SAFETY, STEEPEST, ZERO_CROSSING
-
-Floats = NDArray[np.float64]
-
+from vibsim.core.array_types import Floats
 
 SAFE_SQUARES = 1e140
 """Numbers between this and its inverse have squares whose sums neither overflow nor vanish."""

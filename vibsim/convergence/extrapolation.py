@@ -37,13 +37,11 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.differences import largest as absolute
 from vibsim.convergence.differences import norm, safe_ratio
 from vibsim.convergence.thresholds import SERIES_SAFETY
-
-Floats = NDArray[np.float64]
+from vibsim.core.array_types import Flags, Floats
 
 
 @dataclass(frozen=True)
@@ -171,7 +169,7 @@ def extrapolate_series(
     series: Sequence[Floats],
     levels: Sequence[int],
     order: Floats,
-    even: NDArray[np.bool_],
+    even: Flags,
     largest: bool = False,
 ) -> tuple[Floats, Floats]:
     """Extrapolate a ladder of solutions.

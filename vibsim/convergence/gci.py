@@ -20,7 +20,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.differences import gap_ratio, order_of_ratio, safe_ratio
 from vibsim.convergence.extrapolation import error_left
@@ -35,10 +34,7 @@ from vibsim.convergence.thresholds import (
     GCI_TRUSTED,
     ORDINARY_ORDER,
 )
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Codes = NDArray[np.int8]
+from vibsim.core.array_types import Codes, Flags, Floats
 
 CLASSES = (
     "unknown",

@@ -13,14 +13,11 @@ p + 2, p + 4, ... as further powers, and what rounding makes of it.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.asymptotic_range import Trend
 from vibsim.convergence.ladder_statistics import Evidence, floor_of_pairs, pick
 from vibsim.convergence.thresholds import EXCLUDED, HALF_SPACING, HIGHER_POWERS
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from vibsim.core.array_types import Flags, Floats
 
 
 def is_promise_hidden(e: Evidence, t: Trend) -> Flags:

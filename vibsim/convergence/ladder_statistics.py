@@ -10,7 +10,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.differences import safe_ratio
 from vibsim.convergence.thresholds import (
@@ -23,10 +22,8 @@ from vibsim.convergence.thresholds import (
     RESOLVED_DECAY,
     VISIBLE_ERROR,
 )
+from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.vocabulary import TOLERANCE
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -218,6 +215,6 @@ def far_from_exact(e: Evidence) -> Flags:
     return np.asarray(np.nan_to_num(e.error[..., -1], nan=0.0) > accuracy(e))
 
 
-def pick(values: Floats, index: NDArray[np.int64]) -> Floats:
+def pick(values: Floats, index: Integers) -> Floats:
     """Return one entry of the last axis for each ladder; the first one for a negative index."""
     return np.take_along_axis(values, np.maximum(index, 0)[..., None], axis=-1)[..., 0]

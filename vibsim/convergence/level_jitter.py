@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.thresholds import (
     COINCIDENT,
@@ -21,10 +20,7 @@ from vibsim.convergence.thresholds import (
     QUIET,
     SURE_TURNS,
 )
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Integers = NDArray[np.int64]
+from vibsim.core.array_types import Flags, Floats, Integers
 
 
 @dataclass(frozen=True)

@@ -27,16 +27,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.differences import largest, order_of_ratio, safe_ratio
 from vibsim.convergence.thresholds import LEAST_WINDOW, OWN_END, ROUND_OFF_SAFETY
-
-Floats = NDArray[np.float64]
-Counts = NDArray[np.int64]
+from vibsim.core.array_types import Floats, Integers
 
 
-def window_points(width: Floats, spacing: Floats, points: int) -> Counts:
+def window_points(width: Floats, spacing: Floats, points: int) -> Integers:
     """Return how many points the window of each member has, an odd number, shape (case,).
 
     Parameters
@@ -58,7 +55,7 @@ def local_order(
     second: Floats,
     levels: Sequence[int],
     floors: tuple[Floats, Floats],
-    counts: Counts,
+    counts: Integers,
     end_included: bool = True,
 ) -> tuple[Floats, Floats, Floats]:
     """Return the order at every time, and the ends of its interval.
@@ -100,7 +97,7 @@ def _scale(series: Floats) -> Floats:
     return np.ldexp(1.0, -np.frexp(np.where(size > 0, size, 1.0))[1])
 
 
-def _by_count(pair: list[Floats], counts: Counts) -> Floats:
+def _by_count(pair: list[Floats], counts: Integers) -> Floats:
     """Return means of d_k^2, d_(k+1)^2 and d_k d_(k+1) over the window, shape (3, scheme, case, t)."""
     first, second = pair
     found = np.empty((3, *first.shape))

@@ -21,7 +21,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.differences import order_of_ratio, safe_ratio
 from vibsim.convergence.extrapolation import (
@@ -55,10 +54,7 @@ from vibsim.convergence.thresholds import (
     SPREAD_OF_THREE,
     SPREAD_OF_TWO,
 )
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Integers = NDArray[np.int64]
+from vibsim.core.array_types import Flags, Floats, Integers
 
 
 @dataclass(frozen=True)

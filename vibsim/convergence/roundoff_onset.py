@@ -16,7 +16,6 @@ have nothing to do with each other, and it does not fall. Three floors are told 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.thresholds import (
     ABOVE_ROUND_OFF,
@@ -36,9 +35,7 @@ from vibsim.convergence.thresholds import (
     TRIPLES_BEFORE,
     UNRELATED_FIRST,
 )
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from vibsim.core.array_types import Flags, Floats
 
 
 def noise_share(difference: Floats, floor: Floats) -> Floats:

@@ -12,7 +12,6 @@ the factor that makes the intervals of random ladders with known truth contain t
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.thresholds import (
     ALIKE,
@@ -37,9 +36,7 @@ from vibsim.convergence.thresholds import (
     SINGLE_WIDTH,
     SLOWEST,
 )
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from vibsim.core.array_types import Flags, Floats
 
 
 def settling(

@@ -86,8 +86,7 @@ COINCIDENT = 0.2
 PROPORTIONAL_ALONE = 0.05
 """The same where one triple is the only evidence. [calibrated]"""
 UNRELATED = 0.7
-"""Series with so much scatter have nothing to do with each other, and a change from there says nothing.
-[calibrated]"""
+"""Series with so much scatter have nothing to do with each other, and a change from there says nothing. [calibrated]"""
 JUMP = 0.3
 """Change of the order from one triple to the next that a scatter of `HIDDEN` at most cannot come from. [calibrated]"""
 TRIPLES_AGREE = 0.01
@@ -170,8 +169,7 @@ DEPARTED = 0.012
 REACH = 0.05
 """An order this near a multiple of 1/2 may be that multiple: a tenth of the distance between two of them. [derived]"""
 REACH_SETTLED = 0.1
-"""The same for a whole number that several triples support: a tenth of the distance between whole numbers.
-[derived]"""
+"""The same for a whole number that several triples support: a tenth of the distance between whole numbers. [derived]"""
 OF_SINGLE = 2.0
 """A single order may be so many times its scatter (over log 2) from the whole number that it stands for.
 [calibrated]"""
@@ -235,13 +233,11 @@ NUMBER_SAFETY, NUMBER_SAFETY_ALONE = 2.0, 4.0
 LEAST_SHARE = 0.01
 """The least part of what was taken away that is left, where one change supports the extrapolation. [calibrated]"""
 RATIO_OF_THREE, SAFETY_OF_THREE, LEAST_SHARE_OF_THREE = 0.05, 6.0, 0.03
-"""The same as `RATIO_ALONE_AGREES`, `NUMBER_SAFETY_ALONE` and `LEAST_SHARE` of three levels: their only ratio may be
-an
+"""The same as `RATIO_ALONE_AGREES`, `NUMBER_SAFETY_ALONE` and `LEAST_SHARE` of three levels: their only ratio may be an
 accident. [calibrated]"""
 SPREAD, SPREAD_OF_THREE, SPREAD_OF_TWO = 3.0, 3.5, 4.0
 """Factor on what the last three levels differ by (L. Eca and M. Hoekstra, 2014), three levels that are all there are,
-and
-two. [calibrated]"""
+and two. [calibrated]"""
 RAGGED, DECLINE = 5, 0.5
 """Of so many levels and more, changes may fall raggedly, where the last two are at most this part of those before.
 [calibrated]"""
@@ -250,8 +246,7 @@ ORDER_ABOVE_ROUND_OFF = 30.0
 FALL_ABOVE_ROUND_OFF = 200.0
 """Differences of numbers must fall where they exceed their predicted round-off by this factor. [calibrated]"""
 OTHER_ORDER, NEAR_HALF = 0.3, 0.15
-"""An order further than the first from the promised one is another one, where it is as near as the second to a
-multiple
+"""An order further than the first from the promised one is another one, where it is as near as the second to a multiple
 of 1/2. [calibrated]"""
 HIGHEST_ORDER = 12.0
 """No higher order is looked for. [convention]"""
@@ -262,8 +257,7 @@ STATE_SAFETY = 2.0
 """Factor on the estimated error of truncation. [pendulums]"""
 GAIN_SAFETY, FIRST_GAIN_SAFETY = 5.0, 100.0
 """Factor on what one more extrapolation leaves of an error, and where three levels are all there is, so that no gain
-was
-seen before. [pendulums]"""
+was seen before. [pendulums]"""
 LARGEST_GAIN = 1e-3
 """One more extrapolation is never believed to leave less of an error. [pendulums]"""
 LEAST_FALL = 1.25

@@ -6,7 +6,6 @@ They fall with the same power as the differences, and show a lower power before 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.asymptotic_range import Trend, mismatches
 from vibsim.convergence.differences import safe_ratio
@@ -25,9 +24,7 @@ from vibsim.convergence.thresholds import (
     SETTLED_MISMATCH,
     STAYED,
 )
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from vibsim.core.array_types import Flags, Floats
 
 
 def errors_leave(e: Evidence, t: Trend, p: Floats) -> Flags:

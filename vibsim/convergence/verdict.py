@@ -30,18 +30,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.asymptotic_range import trend
 from vibsim.convergence.classify import rules
 from vibsim.convergence.differences import order_of_ratio, safe_ratio
 from vibsim.convergence.ladder_statistics import Evidence, at_round_off, breakdown, error_orders
 from vibsim.convergence.true_errors import errors_vouch
+from vibsim.core.array_types import Codes, Flags, Floats, Integers
 from vibsim.core.vocabulary import REASON_NAMES, REASONS, STATUSES
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Codes = NDArray[np.int8]
 
 
 @dataclass(frozen=True)
@@ -58,11 +54,11 @@ class Judgement:
     """Lower end of its interval; NaN where nothing is decided."""
     high: Floats
     """Upper end of its interval."""
-    first: NDArray[np.int64]
+    first: Integers
     """Coarsest level that the order rests on; -1 where there is no order."""
-    last: NDArray[np.int64]
+    last: Integers
     """Finest level that the order rests on; -1 where there is no order."""
-    culprit: NDArray[np.int64]
+    culprit: Integers
     """The coarsest level that failed, or whose w dt is beyond the limit; -1 where there is none."""
     orders: Floats = field(repr=False)
     """Local order of every triple, shape (..., n-2)."""
@@ -139,13 +135,13 @@ def local_orders(difference: Floats, levels: tuple[int, ...]) -> Floats:
 
 def _decide(
     cases: list[tuple[Flags, str]],
-    culprit: NDArray[np.int64],
+    culprit: Integers,
     orders: Floats,
     order: Floats,
     low: Floats,
     high: Floats,
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
+    first: Integers,
+    last: Integers,
 ) -> Judgement:
     """Take the first rule that applies to each ladder; without one it is not yet asymptotic."""
     codes = [REASON_NAMES.index(reason) for _, reason in cases]

@@ -27,6 +27,7 @@ from vibsim.comparison.extrapolate_members import (
 )
 from vibsim.comparison.member_method import Method, Start
 from vibsim.convergence.state_extrapolation import Pair
+from vibsim.core.array_types import Floats, Integers
 from vibsim.core.errors import Fault, InputError, VibsimError
 from vibsim.experiment.schema.fields import MAX_LEVEL
 from vibsim.ladder.solving import climb
@@ -45,7 +46,6 @@ from vibsim.simulation import Members, members
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
-Floats = NDArray[np.float64]
 
 NOT_SMOOTH = "the solutions of its levels do not approach each other as smooth ones would"
 
@@ -57,7 +57,7 @@ class _Run:
     method: Method
     scheme: int
     start: Start
-    case: NDArray[np.int64]
+    case: Integers
     levels: list[Pair]
     noise: list[Floats | None]
     """Measured at each level, for the ladders that begin there."""
@@ -133,7 +133,7 @@ def _runs(experiment: Experiment) -> list[_Run]:
     ]
 
 
-def pilot(experiment: Experiment) -> NDArray[np.int64]:
+def pilot(experiment: Experiment) -> Integers:
     """Return the members to try: the corners of the sweep, the extreme values of each key, and a spread between."""
     count = experiment.members
     if count <= PILOT or experiment.sweep is None:
@@ -152,7 +152,7 @@ def pilot(experiment: Experiment) -> NDArray[np.int64]:
     return np.array(sorted(list(dict.fromkeys([*found[:PILOT], *spread]))[:PILOT]))
 
 
-def _gathered(experiment: Experiment, cases: NDArray[np.int64]) -> Members:
+def _gathered(experiment: Experiment, cases: Integers) -> Members:
     """Return the numbers of some members, wherever they stand in the sweep."""
     each = [members(experiment, case, case + 1) for case in cases.tolist()]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.comparison.extrapolate_members import (
     Extrapolated,
@@ -17,9 +16,8 @@ from vibsim.comparison.extrapolate_members import (
 from vibsim.comparison.member_method import Method, Start, rate_of
 from vibsim.convergence.state_extrapolation import FLOATS, Circumstances, Pair, best_entry
 from vibsim.convergence.thresholds import KNOWN_DIGIT
+from vibsim.core.array_types import Floats
 from vibsim.ladder.thresholds import LEAST_LOOKS
-
-Floats = NDArray[np.float64]
 
 
 def solve(

@@ -11,13 +11,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.differences import laid_out
+from vibsim.core.array_types import Floats
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -24,10 +24,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.differences import safe_ratio
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
+from vibsim.core.array_types import Codes, Flags, Floats
 from vibsim.core.vocabulary import DRIFTS
 from vibsim.observe.thresholds import (
     CREEP,
@@ -41,9 +41,6 @@ from vibsim.observe.thresholds import (
     STILL_CREEPS,
 )
 
-Floats = NDArray[np.float64]
-
-
 NONE, BOUNDED, LINEAR, QUADRATIC, EXPONENTIAL, UNCLEAR = range(len(DRIFTS))
 """Index into `vocabulary.DRIFTS`."""
 
@@ -52,7 +49,7 @@ NONE, BOUNDED, LINEAR, QUADRATIC, EXPONENTIAL, UNCLEAR = range(len(DRIFTS))
 class Drift:
     """How the energy error of members grows; arrays of shape (scheme, case)."""
 
-    kind: NDArray[np.int8]
+    kind: Codes
     """Index into `vocabulary.DRIFTS`."""
     rate: Floats
     """Of a linear or quadratic drift the relative energy error per period, or per period squared; of an exponential
@@ -154,12 +151,12 @@ def drift_of(
     )
 
 
-def _is_named(k: Floats) -> NDArray[np.bool_]:
+def _is_named(k: Floats) -> Flags:
     """Say where k is that of a linear or a quadratic drift."""
     return np.asarray((np.abs(k - 1.0) <= NEAR_POWER) | (np.abs(k - 2.0) <= NEAR_POWER))
 
 
-def _is_still(rise: Floats, k: Floats, size: Floats) -> NDArray[np.bool_]:
+def _is_still(rise: Floats, k: Floats, size: Floats) -> Flags:
     """Say where a largest value so far no longer grows, or creeps only."""
     creeps = (rise <= STILL_CREEPS * size) & (k <= CREEP)
     return np.asarray((rise <= STILL * size) | creeps)
@@ -174,7 +171,7 @@ def _range(deviation: Floats) -> Floats:
     return np.asarray(highest - lowest)
 
 
-def _decay(change: Floats, is_normal: NDArray[np.bool_]) -> tuple[float, float]:
+def _decay(change: Floats, is_normal: Flags) -> tuple[float, float]:
     """Return the rate of an exponential decay up to the last normal number, per sample, and k; NaN where it is none.
 
     Too few samples for a fit have their mean rate.

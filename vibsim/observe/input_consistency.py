@@ -6,16 +6,14 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vibsim.core.array_types import Floats
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record
 from vibsim.observe.thresholds import SAME_START
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
-
-Floats = NDArray[np.float64]
 
 
 SAME_AT_EVERY_LEVEL = frozenset({"natural_frequency", "exact_period"})

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.apriori.exact_values import known_values
 from vibsim.apriori.force_discontinuities import Corners, corners_of
@@ -20,6 +19,7 @@ from vibsim.apriori.formal_orders import (
 )
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, solution_size, stored_floor
 from vibsim.convergence.differences import laid_out, largest
+from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import HIGHEST, NORMS, TYPICAL_NORM
 from vibsim.models import BUDGET, ENERGIES, Model
@@ -35,8 +35,6 @@ from vibsim.simulation import Members, members
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 CENTRED = "_d2t"
 """What follows the name of a velocity or an energy that is made with ``[D_2t u]``."""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, solution_size
 from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
+from vibsim.core.array_types import Floats
 from vibsim.formula import derivative, plus, values
 from vibsim.models.base import tree
 from vibsim.observe.energy_drift import Drift, drift_of
@@ -15,8 +15,6 @@ from vibsim.observe.member_block import CENTRED, MemberBlock, energy_at_start
 from vibsim.observe.thresholds import MOST_ROUNDED, STEPPED
 from vibsim.schemes import SCHEMES
 from vibsim.schemes.base import UNIT_ROUND_OFF, round_off
-
-Floats = NDArray[np.float64]
 
 
 def drift_at(block: MemberBlock, level: int, name: str = "energy_deviation") -> Drift:

@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record, Variable, attributes
 from vibsim.formula import Pulses
 from vibsim.models import Model
 from vibsim.observe.thresholds import MOST_GAPS
 from vibsim.simulation import Members
 from vibsim.simulation.reference.missed_pulses import pulses_of_force, varies_in_time
-
-Floats = NDArray[np.float64]
 
 AROUND = np.arange(-2, 4)
 """Points around a pulse."""
@@ -27,7 +25,7 @@ class Missed:
     time: Floats
     """NaN where there is none, here and below."""
     width: Floats
-    jumps: NDArray[np.bool_]
+    jumps: Flags
     """Whether the force jumps there, or has corners."""
 
 

@@ -10,18 +10,19 @@ Source: vibration text (B), sections 3.5 and 4.1, exercise 2.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.differences import safe_ratio
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.experiment.stored_series import FEWEST_EXTREMA
 from vibsim.observe.member_block import MemberBlock
 from vibsim.observe.predicted_oscillation import is_simple, natural_frequency
 from vibsim.observe.recurrence import Motion, fitted
+from vibsim.observe.thresholds import PIECES_OF_TIME
 from vibsim.schemes import SCHEMES
-
-Floats = NDArray[np.float64]
 
 
 def growth_factor(record: Record) -> Floats:
@@ -186,3 +187,25 @@ def _own_or(block: MemberBlock, level: int, name: str, per_step: Floats) -> Floa
     own = np.asarray(record[name], dtype=float) if name in record else np.full(block.shape, np.nan)
     found[block.adaptive] = own[block.adaptive]
     return found
+
+
+def period_scale(block: MemberBlock) -> Floats:
+    """Return how long an oscillation of every member takes, as far as windows over time need to know it, shape (case,).
+
+    That of the exact solution where it has one, else that of small oscillations; of a motion with neither, an eighth
+    of the time.
+    """
+    end = np.broadcast_to(block.group.end, block.shape[1:])
+    exact = _of_case(block, "exact_period")
+    w = np.abs(_of_case(block, "natural_frequency"))
+    with np.errstate(divide="ignore"):
+        small = np.where(w > 0, 2.0 * math.pi / w, np.nan)
+    found = np.where(np.isfinite(exact) & (exact > 0), exact, small)
+    return np.asarray(np.where(np.isfinite(found), found, end / PIECES_OF_TIME))
+
+
+def _of_case(block: MemberBlock, name: str) -> Floats:
+    """Return a number of every member; NaN where the levels do not hold it."""
+    if name not in block.finest:
+        return np.full(block.shape[1:], np.nan)
+    return np.broadcast_to(np.asarray(block.finest[name], dtype=np.float64), block.shape[1:])

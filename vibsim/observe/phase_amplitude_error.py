@@ -12,11 +12,11 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.apriori.formal_orders import formal_orders
 from vibsim.apriori.phase_amplitude_orders import is_promised
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, MEASUREMENT_FACTOR
+from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.experiment.stored_series import asked
 from vibsim.formula import values
 from vibsim.models import tree
@@ -28,7 +28,7 @@ from vibsim.models.shared.phase_amplitude_names import (
     whole_of,
 )
 from vibsim.observe.member_block import MemberBlock
-from vibsim.observe.period_scale import swing
+from vibsim.observe.oscillation import period_scale
 from vibsim.observe.quintic_interpolant import template
 from vibsim.observe.thresholds import MOST_UNASKED
 from vibsim.observe.waveform_fit import shift, strides
@@ -36,8 +36,6 @@ from vibsim.observe.waveform_fit import shift, strides
 if TYPE_CHECKING:
     from vibsim.comparison.quantity_comparison import Comparison
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 LONG_NAMES = {
     PHASE: "time by which {} is early",
@@ -138,7 +136,7 @@ def _told(
     truth = {name: _truth(found[name], known, shape) for name in states}
     speed = block.model.velocities[place]
     push = _push(block, place, truth)
-    period = np.broadcast_to(swing(block), block.shape)
+    period = np.broadcast_to(period_scale(block), block.shape)
     spacing = np.broadcast_to(block.grid.spacing, block.shape)
     u, v, a = (_rows(x) for x in (truth[position], truth[speed], push))
     of = template(u, v, a, spacing.ravel())
@@ -160,7 +158,7 @@ def _blur(block: MemberBlock, told: list[tuple[Floats, Floats]]) -> tuple[Floats
     The quintic between two samples is off by ``(s (h - s))^3/720`` times the sixth derivative, s behind the one of them
     (`vibsim.observe.quintic_interpolant`). That is known, and no order of magnitude as round-off is.
     """
-    w = (2.0 * np.pi / np.broadcast_to(swing(block), block.shape))[..., None]
+    w = (2.0 * np.pi / np.broadcast_to(period_scale(block), block.shape))[..., None]
     h = np.broadcast_to(block.grid.spacing, block.shape)[..., None]
     off = []
     for time, _ in told:
@@ -211,7 +209,7 @@ def _all_or_none(told: list[tuple[Floats, Floats]]) -> None:
             values_[~every] = np.nan
 
 
-def _least(values: Floats, stride: NDArray[np.int64]) -> Floats:
+def _least(values: Floats, stride: Integers) -> Floats:
     """Return the smallest of the largest values within pieces as long as a window, shape (r,)."""
     found = np.full(len(values), np.nan)
     points = values.shape[-1]

@@ -10,14 +10,13 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim import plan, theory
 from vibsim.apriori.formal_orders import limit_of
+from vibsim.core.array_types import Floats, Integers
 from vibsim.observe.member_block import MemberBlock
 from vibsim.schemes import SCHEMES, Options, Stepper
 
-Floats = NDArray[np.float64]
 Function = Callable[[Stepper, Floats], Any]
 
 
@@ -26,7 +25,7 @@ def is_simple(block: MemberBlock) -> bool:
     return block.model.linear and block.model.conservative
 
 
-def steppers(block: MemberBlock, scheme: int) -> list[tuple[Options, NDArray[np.int64] | slice]]:
+def steppers(block: MemberBlock, scheme: int) -> list[tuple[Options, Integers | slice]]:
     """Return the options of one scheme, and the members that have them; empty for one that chooses its own steps."""
     if block.adaptive[scheme]:
         return []

@@ -17,8 +17,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vibsim.core.array_types import Flags, Floats
 from vibsim.observe.thresholds import (
     FADES,
     LEAST_LEFT,
@@ -27,8 +27,6 @@ from vibsim.observe.thresholds import (
     RESIDUAL,
     SINGULAR,
 )
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -76,7 +74,7 @@ def fitted(position: Floats) -> Motion:
     return Motion(np.where(sound, log_growth, np.nan), np.where(sound, angle, np.nan))
 
 
-def _is_small(left: Floats) -> NDArray[np.bool_]:
+def _is_small(left: Floats) -> Flags:
     """Say where what is left is rounding, and no parasitic root that is on its way out."""
     whole = _mean_square(left)
     found = whole < RECURRENCE_ROUNDING**2

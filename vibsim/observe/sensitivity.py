@@ -19,9 +19,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.differences import laid_out, largest
+from vibsim.core.array_types import Flags, Floats
 from vibsim.models import Model
 from vibsim.observe.thresholds import DISTURBANCE, INSTANT, NEAR_REST, PLACES
 from vibsim.simulation import Members
@@ -29,7 +29,6 @@ from vibsim.simulation import Members
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
-Floats = NDArray[np.float64]
 States = dict[str, Floats]
 
 
@@ -78,7 +77,7 @@ def _linear(
     initial: States,
     parameters: States,
     known: States | None,
-) -> tuple[Floats, NDArray[np.bool_]]:
+) -> tuple[Floats, Flags]:
     """Return the factor by the formulas at the head, and where a start is next to an equilibrium."""
     w = np.asarray(model.natural_frequency(parameters), dtype=np.float64)
     u, v = (

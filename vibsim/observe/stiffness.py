@@ -13,16 +13,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.formula import derivative, names_in, values
 from vibsim.models.base import Model, tree
 from vibsim.observe.common_grid import Grid, take
 from vibsim.observe.thresholds import A_WHILE
 from vibsim.simulation import Members
-
-Floats = NDArray[np.float64]
 
 
 def applies(model: Model) -> bool:

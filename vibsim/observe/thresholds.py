@@ -38,8 +38,8 @@ PLACES = 8
 INSTANT = 1e-6
 """A time in units of 1/w over which the motion is straight. [convention]"""
 NEAR_REST = 1e-3
-"""A start whose motion is so much slower than w times its size is next to an equilibrium: there C is so large that
-what is left of a difference between two of its values is the rounding of the disturbed solution. [convention]"""
+"""A start whose motion is so much slower than w times its size is next to an equilibrium: there C is so large that what
+is left of a difference between two of its values is the rounding of the disturbed solution. [convention]"""
 
 # Pulses
 

@@ -23,9 +23,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.differences import total
+from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.observe.quintic_interpolant import Template
 from vibsim.observe.thresholds import (
     BEYOND_THE_ENDS,
@@ -37,9 +37,6 @@ from vibsim.observe.thresholds import (
     SHORTEST_RUN,
     WINDOW_POINTS,
 )
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 PIECE = 2**18
 """Numbers of one kind that are worked on at a time."""
@@ -55,7 +52,7 @@ class Shift:
     """Of the amplitude, less one."""
 
 
-def strides(period: Floats, spacing: Floats, points: int) -> Indices:
+def strides(period: Floats, spacing: Floats, points: int) -> Integers:
     """Return the distance between the points of a window, shape (r,); 0 where the run or the samples are too few.
 
     Parameters
@@ -80,7 +77,7 @@ def strides(period: Floats, spacing: Floats, points: int) -> Indices:
 
 
 def shift(
-    position: Floats, velocity: Floats, of: Template, period: Floats, stride: Indices
+    position: Floats, velocity: Floats, of: Template, period: Floats, stride: Integers
 ) -> Shift:
     """Tell shift and factor of computed motions apart.
 
@@ -110,7 +107,7 @@ def shift(
     return Shift(found[0], found[1])
 
 
-def _pieces(rows: Indices, points: int) -> Iterator[tuple[Indices, Indices]]:
+def _pieces(rows: Integers, points: int) -> Iterator[tuple[Integers, Integers]]:
     """Yield rows and samples that are worked on together."""
     piece = max(PIECE // WINDOW_POINTS, 1)
     step = max(piece // points, 1)
@@ -119,7 +116,7 @@ def _pieces(rows: Indices, points: int) -> Iterator[tuple[Indices, Indices]]:
             yield rows[first : first + step], np.arange(start, min(start + piece, points))
 
 
-def _rows(of: Template, chosen: Indices) -> Template:
+def _rows(of: Template, chosen: Integers) -> Template:
     return Template(
         of.position[chosen],
         of.velocity[chosen],
@@ -133,8 +130,8 @@ def _fitted(
     guess: Floats,
     of: Template,
     period: Floats,
-    stride: Indices,
-    at: Indices,
+    stride: Integers,
+    at: Integers,
     rounds: int,
 ) -> Floats:
     """Return shift and factor at the samples `at`, shape (2, r, len(at)); windows lie along the first dimension."""
@@ -171,7 +168,7 @@ def _fitted(
     return np.where(still | ~(moved < LAST_ROUND_MOVES), np.nan, found)
 
 
-def _inside(guess: Floats, spacing: Floats) -> tuple[Indices, Indices]:
+def _inside(guess: Floats, spacing: Floats) -> tuple[Integers, Integers]:
     """Return the first and the last sample that a guessed shift leaves within the template, each of shape (r,)."""
     last = guess.shape[-1] - 1
     moved = np.arange(last + 1) + guess / spacing[:, None]
@@ -179,7 +176,7 @@ def _inside(guess: Floats, spacing: Floats) -> tuple[Indices, Indices]:
     return np.argmax(inside, axis=-1), last - np.argmax(inside[:, ::-1], axis=-1)
 
 
-def _turns(velocity: Floats) -> NDArray[np.bool_]:
+def _turns(velocity: Floats) -> Flags:
     """Say where the motion turns within a window: only then it oscillates."""
     return np.asarray((np.min(velocity, axis=0) < 0) & (np.max(velocity, axis=0) > 0))
 
