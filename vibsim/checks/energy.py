@@ -27,13 +27,13 @@ from vibsim.checks.of_schemes import (
 from vibsim.checks.outcome import Outcome
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import DRIFTS, REASON_NAMES
-from vibsim.experiment.schema.scheme_checks import Drift
+from vibsim.experiment.schema.checks import Drift
 from vibsim.observe.member_block import Part
 from vibsim.observe.member_energy_drift import drift_at
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.scheme_checks import ConservesCheck
+    from vibsim.experiment.schema.checks import ConservesCheck
 
 KNOWN_DRIFTS = get_args(Drift)
 """What `drift:` may be."""

@@ -29,12 +29,12 @@ from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.comparison.solution_distance import apart
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASON_NAMES
-from vibsim.experiment.schema.scheme_checks import SOLUTIONS
+from vibsim.experiment.schema.checks import SOLUTIONS
 from vibsim.observe.member_block import Part
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.scheme_checks import EqualCheck
+    from vibsim.experiment.schema.checks import EqualCheck
 
 Floats = NDArray[np.float64]
 

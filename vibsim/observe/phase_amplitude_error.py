@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from vibsim.apriori.formal_orders import formal_orders
 from vibsim.apriori.phase_amplitude_orders import is_promised
 from vibsim.convergence.ladder_statistics import BLAME, MEASURED
-from vibsim.experiment.stored_series import asked
+from vibsim.experiment.storage import asked
 from vibsim.formula import values
 from vibsim.models import tree
 from vibsim.models.shared.phase_amplitude_names import (

@@ -33,7 +33,7 @@ from vibsim.checks.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
 from vibsim.comparison.exact_availability import has_exact
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASON_NAMES, STATUSES
-from vibsim.experiment.check_scheme_selection import schemes_of
+from vibsim.experiment.data import schemes_of
 from vibsim.models.shared.phase_amplitude_names import is_error_part, whole_of
 from vibsim.observe.member_block import fastest
 from vibsim.schemes import SCHEMES, Options, Scheme

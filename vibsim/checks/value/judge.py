@@ -18,7 +18,7 @@ from vibsim.checks.value.units import unit_of
 from vibsim.comparison.best_values import has_limit
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASON_NAMES
-from vibsim.experiment.check_scheme_selection import schemes_of
+from vibsim.experiment.data import schemes_of
 from vibsim.schemes.base import is_on_the_mesh
 
 if TYPE_CHECKING:

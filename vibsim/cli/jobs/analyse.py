@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from vibsim.cli import made_files
 from vibsim.cli.jobs.common import check_digest, one_plan, provenance, titled
 from vibsim.cli.jobs.levels import check_levels, readers
-from vibsim.plan.digested_part import analysed
+from vibsim.plan.digests import analysed
 
 if TYPE_CHECKING:
     from vibsim.core.record import Record

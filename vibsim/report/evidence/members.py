@@ -27,7 +27,7 @@ from vibsim.report.evidence.svg_plot import Panel, document
 from vibsim.report.text import words
 
 if TYPE_CHECKING:
-    from vibsim.experiment.schema.scheme_checks import ConservesCheck, EqualCheck, StableCheck
+    from vibsim.experiment.schema.checks import ConservesCheck, EqualCheck, StableCheck
 
 NUMBERS = {
     "stable": ("growth", "predicted_growth"),
