@@ -14,7 +14,7 @@ from vibsim.core.errors import SimulationError
 from vibsim.core.record import Record
 from vibsim.engine import integrate
 from vibsim.experiment import Experiment
-from vibsim.experiment.level_counts import load_of
+from vibsim.experiment.cost import load_of
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
 from vibsim.schemes.adaptive import LEAST_RELATIVE, TOLERANCE, seconds

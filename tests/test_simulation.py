@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vibsim import Experiment, simulate
-from vibsim.experiment.stored_series import FEWEST_EXTREMA, MOST_EXTREMA, extrema_kept
+from vibsim.experiment.storage import FEWEST_EXTREMA, MOST_EXTREMA, extrema_kept
 from vibsim.simulation import simulate_record
 
 BASE = {

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from vibsim.analysis import summary_schema
-from vibsim.experiment.schema import json_schema
+from vibsim.experiment.schema import document
 
 SCHEMAS: Mapping[str, Callable[[], dict[str, Any]]] = {
-    "experiment": json_schema.schema,
+    "experiment": document.schema,
     "summary": summary_schema.schema,
 }
 FOLDER = Path(__file__).resolve().parent / "schemas"

@@ -9,7 +9,7 @@ from spring_runs import PERIODS, STEPS, judged, spring
 
 from vibsim.analysis import analyse_records
 from vibsim.core.record import Record, Variable
-from vibsim.experiment.stored_series import FEWEST_EXTREMA
+from vibsim.experiment.storage import FEWEST_EXTREMA
 from vibsim.schemes import FIXED_STEP
 
 SCHEMES = ["central", "rk2", "rk4", "crank_nicolson", "euler_cromer", "backward_euler"]

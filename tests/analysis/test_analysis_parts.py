@@ -16,7 +16,7 @@ from vibsim.comparison.value_numbers import KNOWN
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record, Variable
 from vibsim.experiment import VALUES
-from vibsim.experiment.stored_series import stored_series
+from vibsim.experiment.storage import stored_series
 from vibsim.experiment.value_names import Value
 from vibsim.models import MODELS
 
@@ -24,7 +24,7 @@ from vibsim.models import MODELS
 @pytest.fixture(params=["series", "lean"])
 def storage(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     if request.param == "lean":
-        monkeypatch.setattr("vibsim.experiment.stored_samples.LEAN", 0)
+        monkeypatch.setattr("vibsim.experiment.storage.LEAN", 0)
     return str(request.param)
 
 
@@ -65,7 +65,7 @@ def test_a_member_alone_has_the_numbers_and_verdicts_that_it_has_in_the_sweep(
 def test_bounded_storage_changes_no_number(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     experiment = SWEEPS[name]
     full = analyse_records(experiment, simulated(experiment))
-    monkeypatch.setattr("vibsim.experiment.stored_samples.LEAN", 0)
+    monkeypatch.setattr("vibsim.experiment.storage.LEAN", 0)
     lean = analyse_records(experiment, simulated(experiment))
     assert not any("t" in variable.dims for variable in lean.variables.values())
     assert lean.words("norm") == ["l1", "l2", "linf"]
@@ -119,7 +119,7 @@ def test_every_value_can_be_asked_for_where_storage_is_bounded(
 ) -> None:
     experiment = every_value()
     full = values_of(experiment, analyse_records(experiment, simulated(experiment)))
-    monkeypatch.setattr("vibsim.experiment.stored_samples.LEAN", 0)
+    monkeypatch.setattr("vibsim.experiment.storage.LEAN", 0)
     records = simulated(experiment)
     names = {n for n, v in records[7].variables.items() if "t" in v.dims}
     running = "energy_deviation_running_max"
@@ -134,7 +134,7 @@ def test_every_value_can_be_asked_for_where_storage_is_bounded(
 
 
 def test_what_bounded_storage_keeps_of_a_member(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vibsim.experiment.stored_samples.LEAN", 0)
+    monkeypatch.setattr("vibsim.experiment.storage.LEAN", 0)
     experiment = of({"initial.theta": [0.5, 1.0]}, checks=CHECKS[:1], schemes=["central"])
     record = analyse_records(experiment, simulated(experiment))
     everything = (*record.coords.values(), *record.variables.values())
@@ -158,7 +158,7 @@ def test_verdicts_need_only_what_is_kept_of_parts() -> None:
 def test_a_failure_has_its_step_where_storage_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     experiment = SWEEPS["ends"]
     full = analyse_records(experiment, simulated(experiment))
-    monkeypatch.setattr("vibsim.experiment.stored_samples.LEAN", 0)
+    monkeypatch.setattr("vibsim.experiment.storage.LEAN", 0)
     lean = analyse_records(experiment, simulated(experiment))
     assert "last_step" in full
     assert "last_step" not in lean

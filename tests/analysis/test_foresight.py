@@ -14,7 +14,7 @@ from vibsim.checks.words.costs import cost_in_words
 from vibsim.comparison.order_causes import CAUSES
 from vibsim.core.record import Record
 from vibsim.experiment import Experiment
-from vibsim.experiment.level_counts import load_of
+from vibsim.experiment.cost import load_of
 from vibsim.simulation import simulate_record
 
 PENDULUM = {"model": {"kind": "pendulum"}, "initial": {"theta": 1.0}, "time": {"end": 20.0}}

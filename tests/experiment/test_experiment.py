@@ -18,7 +18,7 @@ from pydantic import ValidationError
 from vibsim.core.errors import InputError
 from vibsim.experiment import Experiment, canonical, collection_of, restore
 from vibsim.experiment import collection as collections
-from vibsim.experiment.stored_samples import stride
+from vibsim.experiment.storage import stride
 from vibsim.models import MODELS
 from vibsim.plan import choose, sampling
 from vibsim.plan import load as load_plan

@@ -12,8 +12,7 @@ from experiment_files import GOOD, build, content, faults_of, file_faults, only_
 
 from vibsim.analysis import analyse_records
 from vibsim.core.errors import InputError
-from vibsim.experiment import VALUES, Experiment
-from vibsim.experiment import build as building
+from vibsim.experiment import VALUES, Experiment, reading
 from vibsim.experiment.rules import quantities as quantity_rules
 from vibsim.experiment.rules import schemes as scheme_rules
 from vibsim.models import MODELS, quantities
@@ -456,7 +455,7 @@ def test_an_extremum_that_is_accepted_is_measured(name: str, quantity: str) -> N
 
 def change_model(monkeypatch: pytest.MonkeyPatch, kind: str = "pendulum", **changes: Any) -> None:
     models = {**MODELS, kind: replace(MODELS[kind], variant=None, **changes)}
-    monkeypatch.setattr(building, "MODELS", models)
+    monkeypatch.setattr(reading, "MODELS", models)
 
 
 @pytest.mark.parametrize("name", [name for name, row in VALUES.items() if row.needs_exact])

@@ -13,8 +13,8 @@ import pytest
 from experiment_files import build, faults_of, only_fault
 
 from vibsim.experiment.cost import Load
-from vibsim.experiment.stored_series import FEWEST_EXTREMA, MOST_EXTREMA
-from vibsim.experiment.sweep.columns import line
+from vibsim.experiment.storage import FEWEST_EXTREMA, MOST_EXTREMA
+from vibsim.experiment.sweep_columns import line
 from vibsim.plan.build import build as build_plan
 
 ALL = Load(

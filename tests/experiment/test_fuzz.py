@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from vibsim import plan
 from vibsim.core.errors import InputError
 from vibsim.experiment import Experiment, canonical, restore
-from vibsim.experiment.build import Place, build
-from vibsim.experiment.faults import Report
+from vibsim.experiment.reading import build
 from vibsim.experiment.yaml.parse import parse
 
 QUIET = settings(
@@ -55,7 +54,7 @@ def members(experiment: Experiment) -> None:
 def read(data: bytes) -> None:
     def make() -> Experiment:
         source = parse(data, "fuzz.yaml")
-        return build(Experiment, source, Place("adhoc", "fuzz"), Report(source))
+        return build(Experiment, source, "adhoc", "fuzz")
 
     attempt(make)
 

@@ -15,9 +15,8 @@ from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
 from vibsim.experiment import Experiment, canonical, restore
-from vibsim.experiment.schema.json_schema import schema
-from vibsim.experiment.schema.printed_numbers import read_printed
-from vibsim.experiment.schema.published import row_id
+from vibsim.experiment.schema.document import schema
+from vibsim.experiment.schema.published import read_printed, row_id
 from vibsim.plan.build import build as build_plan
 
 TABLE: dict[str, Any] = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from vibsim.experiment.stored_samples import FEWEST, LARGE, LEAN, SMALL, is_lean, stride
+from vibsim.experiment.storage import FEWEST, LARGE, LEAN, SMALL, is_lean, stride
 
 
 @pytest.mark.parametrize("coarsest", [2, 16, 48, 64, 1000, 1024, 2**20])

@@ -12,7 +12,7 @@ from jsonschema import Draft202012Validator
 from test_experiment import EXAMPLE
 from test_experiment_faults import CASES
 
-from vibsim.experiment.schema.json_schema import schema
+from vibsim.experiment.schema.document import schema
 from vibsim.experiment.yaml.parse import parse
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES

@@ -10,7 +10,7 @@ from experiment_files import build, faults_of, only_fault
 from test_experiment_faults import change_model
 
 from vibsim.experiment import VALUES, Experiment, canonical, restore
-from vibsim.experiment.check_scheme_selection import schemes_of
+from vibsim.experiment.data import schemes_of
 from vibsim.experiment.rules import quantities as quantity_rules
 from vibsim.models import MODELS, centred, quantities
 from vibsim.schemes import FIXED_STEP, SCHEMES

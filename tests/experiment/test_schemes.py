@@ -13,10 +13,9 @@ import pytest
 from experiment_files import GOOD, build, faults_of, file_faults, only_fault
 
 from vibsim import plan
-from vibsim.experiment import Experiment, canonical, restore
-from vibsim.experiment import build as building
+from vibsim.experiment import Experiment, canonical, reading, restore
 from vibsim.experiment.rules import schemes as scheme_rules
-from vibsim.experiment.schema.options import tolerance_name
+from vibsim.experiment.schema.sweep import tolerance_name
 from vibsim.models import MODELS
 from vibsim.schemes import FIXED_STEP, SCHEMES, AnyOption, Flag, NumberOption, Option
 
@@ -199,7 +198,7 @@ def test_a_scheme_for_forces_without_velocity_names_those_that_can(
     model = replace(MODELS["pendulum"], variant=None, acceleration="-(g/L)*sin(theta) - 0.1*omega")
     monkeypatch.setattr(scheme_rules, "SCHEMES", schemes)
     build()
-    monkeypatch.setattr(building, "MODELS", {"pendulum": model})
+    monkeypatch.setattr(reading, "MODELS", {"pendulum": model})
     (fault,) = file_faults(tmp_path, GOOD)
     rule = "cannot treat pendulum, whose acceleration depends on omega otherwise than by linear or quadratic damping"
     assert fault.rule == rule

@@ -14,7 +14,7 @@ from experiment_files import build, calls_at_most, faults_of
 
 from vibsim.experiment import Experiment, canonical, restore
 from vibsim.experiment.rules.size_limits import MAX_MEMBERS
-from vibsim.experiment.schema.axes import Draw, Linspace, Logspace, Range
+from vibsim.experiment.schema.sweep import Draw, Linspace, Logspace, Range
 
 SAMPLE = {
     "method": "sobol",

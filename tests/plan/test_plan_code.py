@@ -11,7 +11,7 @@ import pytest
 
 import vibsim
 from vibsim.models import MODELS
-from vibsim.plan import build, code_digest, shards
+from vibsim.plan import build, code_digest
 from vibsim.schemes import SCHEMES
 
 PACKAGE = Path(vibsim.__file__).parent
@@ -35,7 +35,7 @@ def forget() -> None:
         code_digest.everything,
         code_digest._imports,
         code_digest._handed_on,
-        shards.code_of,
+        build.code_of,
         build._code,
     ):
         cached.cache_clear()
@@ -43,11 +43,11 @@ def forget() -> None:
 
 def digests() -> dict[str, str]:
     """Return the digests of the code; imports are not read anew, which a constant at the end does not change."""
-    for cached in (code_digest.everything, shards.code_of, build._code):
+    for cached in (code_digest.everything, build.code_of, build._code):
         cached.cache_clear()
     return {
-        "pendulum": shards.code_of("pendulum", ("central",)),
-        "linear": shards.code_of("linear_pendulum", ("central",)),
+        "pendulum": build.code_of("pendulum", ("central",)),
+        "linear": build.code_of("linear_pendulum", ("central",)),
         "analyse": build._code("analyse"),
         "extrapolate": build._code("extrapolate"),
         "report": build._code("report"),
@@ -75,7 +75,7 @@ AFTER = ALL - SIMULATIONS
         ("core/netcdf.py", ALL),
         ("__init__.py", ALL),
         ("core/private_cache.py", {*SIMULATIONS, "analyse", "extrapolate"}),
-        ("experiment/level_counts.py", {"analyse", "report"}),
+        ("experiment/cost.py", ALL),
         ("native/lowering.py", {*SIMULATIONS, "analyse", "extrapolate"}),
         ("elementary/exponential.py", ALL),
         ("formula/parser.py", ALL),
@@ -90,25 +90,27 @@ AFTER = ALL - SIMULATIONS
         ("theory/amplification.py", {"analyse", "report"}),
         ("experiment/experiment.py", ALL),
         ("experiment/data.py", ALL),
-        ("experiment/stored_series.py", ALL - {"extrapolate"}),
-        ("experiment/stored_samples.py", ALL),
-        ("experiment/sweep/columns.py", ALL),
-        ("experiment/schema/axes.py", ALL),
+        ("experiment/storage.py", ALL),
+        ("experiment/sweep_columns.py", ALL),
+        ("experiment/schema/sweep.py", ALL),
         ("experiment/schema/checks.py", ALL),
-        ("experiment/check_scheme_selection.py", {"analyse"}),
         ("experiment/tables/file.py", ALL),
         # An experiment file is read before a job has its plan, and what comes out is in the digest.
         *(
             (f"experiment/{name}.py", set())
-            for name in ("reading", "build", "schema/document", "faults", "units/convert")
+            for name in (
+                "reading",
+                "derived",
+                "validation",
+                "schema/document",
+                "faults",
+                "units/convert",
+            )
         ),
         ("plan/cases.py", ALL),
         ("plan/jobs.py", ALL),
-        ("plan/digested_part.py", ALL - {"report"}),
-        *(
-            (f"plan/{name}.py", set())
-            for name in ("build", "cache", "choose", "workflow_names", "shards")
-        ),
+        ("plan/digests.py", ALL - {"report"}),
+        *((f"plan/{name}.py", set()) for name in ("build", "cache", "choose", "workflow_names")),
         ("engine/member_loop.py", {*SIMULATIONS, "analyse", "extrapolate"}),
         ("simulation/level.py", SIMULATIONS),
         ("simulation/derived.py", SIMULATIONS),
@@ -146,12 +148,12 @@ def test_another_entry_under_the_same_name_changes_the_simulation(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The lists of all schemes and models count by the entries that they give."""
-    before = shards.code_of("pendulum", ("rk4",))
+    before = build.code_of("pendulum", ("rk4",))
     swapped = {**SCHEMES, "rk4": SCHEMES["rk2"]}
     monkeypatch.setattr("vibsim.schemes.SCHEMES", swapped)
-    shards.code_of.cache_clear()
-    assert shards.code_of("pendulum", ("rk4",)) != before
-    shards.code_of.cache_clear()
+    build.code_of.cache_clear()
+    assert build.code_of("pendulum", ("rk4",)) != before
+    build.code_of.cache_clear()
 
 
 def test_imports_are_followed_wherever_they_stand(package: Path) -> None:
@@ -169,7 +171,7 @@ def test_imports_are_followed_wherever_they_stand(package: Path) -> None:
         "vibsim.models",
         "vibsim.models.base",
         "vibsim.experiment",
-        "vibsim.experiment.check_scheme_selection",
+        "vibsim.experiment.data",
         "vibsim.store",
         "vibsim.store.atomic",
         "vibsim.variables",
@@ -282,5 +284,5 @@ def test_a_simulation_runs_only_what_its_digest_covers(tmp_path: Path) -> None:
         "levels: [5, 6, 7]\nschemes: [central]\n"
     )
     found = ran_by("simulate", file, "--level", 5, "--results", tmp_path / "results")
-    assert {"vibsim.experiment.stored_series", "vibsim.plan.cases", "vibsim.store.writing"} <= found
+    assert {"vibsim.experiment.storage", "vibsim.plan.cases", "vibsim.store.writing"} <= found
     assert found <= covered("simulate", "pendulum", ("central",))

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from vibsim.experiment import Experiment, cost
-from vibsim.experiment.level_counts import load_of
+from vibsim.experiment.cost import load_of
 from vibsim.plan import Choice, Plan, load
 
 Plans = Callable[..., Plan]

@@ -267,7 +267,7 @@ def test_what_is_not_stored_has_a_reason_for_no_picture():
 @pytest.fixture
 def lean(monkeypatch):
     """Let every experiment be so large that no series are kept."""
-    monkeypatch.setattr("vibsim.experiment.stored_samples.LEAN", 0)
+    monkeypatch.setattr("vibsim.experiment.storage.LEAN", 0)
 
 
 @pytest.mark.parametrize("kind", BEHAVIOUR)

@@ -61,7 +61,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         file.write_text(TEXT.replace("SAMPLES", samples))
         with pytest.MonkeyPatch.context() as patch:
             if storage == "lean":
-                patch.setattr("vibsim.experiment.stored_samples.LEAN", 0)
+                patch.setattr("vibsim.experiment.storage.LEAN", 0)
             common = [str(file), "--results", str(folder)]
             assert main(["simulate", *common, "--level", "3", "4", "5"]) == 0
             assert main(["analyse", *common]) == 0

@@ -55,8 +55,8 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
 
 CONSTANT = "CHANGED = True"
 CHANGES = {
-    "experiment/check_scheme_selection.py": ("def schemes_of(experiment, check): return ()", LATER),
-    "experiment/stored_series.py": ("def asked(experiment): return ()", EVERYTHING),
+    "experiment/data.py": ("def schemes_of(experiment, check): return ()", EVERYTHING),
+    "experiment/storage.py": ("def asked(experiment): return ()", EVERYTHING),
     "plan/cases.py": ("def option_groups(experiment, scheme, columns): return []", EVERYTHING),
     "cli/jobs/simulate.py": (CONSTANT, EVERYTHING),
     "cli/jobs/analyse.py": (CONSTANT, LATER),
@@ -83,7 +83,7 @@ CHANGES = {
     "experiment/faults.py": (CONSTANT, NOTHING),
     "ladder/choosing.py": (CONSTANT, NOTHING),
 }
-QUICK = {"experiment/check_scheme_selection.py", "plan/cases.py"}
+QUICK = {"store/summary.py", "plan/cases.py"}
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ from vibsim.convergence import differences
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record, Variable, attributes
 from vibsim.core.vocabulary import HIGHEST, REASON_NAMES, STATUSES, TYPICAL_NORM
-from vibsim.experiment.stored_series import RUNNING, asked, lean_series
+from vibsim.experiment.storage import RUNNING, asked, lean_series
 from vibsim.models import centred
 from vibsim.models.events import TREATMENTS
 from vibsim.models.shared.phase_amplitude_names import is_error_part

@@ -29,7 +29,7 @@ from vibsim.observe.member_energy_drift import drift_at
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.scheme_checks import ConservesCheck
+    from vibsim.experiment.schema.checks import ConservesCheck
 
 FIELDS = {
     "drift": Field("how the energy error grows", np.int8, DRIFTS),

@@ -27,7 +27,7 @@ from vibsim.observe.member_block import MemberBlock
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.scheme_checks import EqualCheck
+    from vibsim.experiment.schema.checks import EqualCheck
 
 Floats = NDArray[np.float64]
 

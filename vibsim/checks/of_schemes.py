@@ -13,12 +13,12 @@ from vibsim.checks.outcome import Outcome
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASON_NAMES, REASONS, STATUSES
-from vibsim.experiment.check_scheme_selection import schemes_of
+from vibsim.experiment.data import schemes_of
 from vibsim.observe.member_block import MemberBlock
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.scheme_checks import ConservesCheck, EqualCheck, StableCheck
+    from vibsim.experiment.schema.checks import ConservesCheck, EqualCheck, StableCheck
 
 Floats = NDArray[np.float64]
 

@@ -24,7 +24,7 @@ from vibsim.observe.member_block import MemberBlock
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.scheme_checks import StableCheck
+    from vibsim.experiment.schema.checks import StableCheck
 
 FIELDS = {
     "status": Field("status", np.int8, STATUSES),

@@ -25,7 +25,7 @@ from vibsim.observe.predicted_oscillation import is_simple, natural_frequency, s
 from vibsim.schemes import SCHEMES
 
 if TYPE_CHECKING:
-    from vibsim.experiment.schema.scheme_checks import EqualCheck
+    from vibsim.experiment.schema.checks import EqualCheck
 
 
 @dataclass(frozen=True)

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 from vibsim.core.lazy import loader
 
 if TYPE_CHECKING:
-    from vibsim.experiment.check_scheme_selection import schemes_of
     from vibsim.experiment.collection import collection_of
+    from vibsim.experiment.data import schemes_of
     from vibsim.experiment.experiment import Experiment, canonical, restore
     from vibsim.experiment.schema.checks import Check, ConvergesCheck, ValueCheck
     from vibsim.experiment.value_names import VALUES
 
 _HOMES = {
-    "check_scheme_selection": ("schemes_of",),
+    "data": ("schemes_of",),
     "collection": ("collection_of",),
     "experiment": ("Experiment", "canonical", "restore"),
     "schema.checks": ("Check", "ConvergesCheck", "ValueCheck"),

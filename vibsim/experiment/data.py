@@ -14,8 +14,7 @@ from pydantic import AfterValidator, Field, PrivateAttr, StrictBool
 
 from vibsim.core.errors import VibsimError
 from vibsim.experiment.collection import ADHOC
-from vibsim.experiment.schema.axes import Axis
-from vibsim.experiment.schema.checks import Check
+from vibsim.experiment.schema.checks import Check, ConservesCheck, EqualCheck, ValueCheck
 from vibsim.experiment.schema.fields import (
     DECLARED,
     Count,
@@ -28,7 +27,8 @@ from vibsim.experiment.schema.fields import (
     Text,
 )
 from vibsim.experiment.schema.published import PublishedTable
-from vibsim.models import MODELS, Model, natural_end, quantities
+from vibsim.experiment.schema.sweep import Axis
+from vibsim.models import MODELS, Model, centred, natural_end, quantities
 from vibsim.models.table import Table
 from vibsim.schemes import SCHEMES
 
@@ -62,7 +62,7 @@ class TableSpec(Section):
 
     @property
     def table(self) -> Table:
-        """The numbers, which `vibsim.experiment.tables.attach.attach` puts there."""
+        """The numbers, which `vibsim.experiment.tables.file.attach` puts there."""
         if self._table is None:
             raise VibsimError(f"the table {self.file} was not read")
         return self._table
@@ -277,3 +277,23 @@ class ExperimentSpec(Section):
 
 AnyExperiment = TypeVar("AnyExperiment", bound=ExperimentSpec)
 """The class of an experiment, which stays the same where one is made of another."""
+
+
+def schemes_of(experiment: ExperimentSpec, check: Check) -> tuple[int, ...]:
+    """Return the numbers of the schemes that a check, or that inside a claim, is about, increasing.
+
+    They are those that it names. Where it names none, they are those with equal steps; and where it is about what only
+    schemes with a velocity of their own have, those.
+    """
+    inner = check.measured
+    named: tuple[str, ...] | None
+    if isinstance(inner, ValueCheck):
+        named = None if inner.at.scheme is None else (inner.at.scheme,)
+    else:
+        named = inner.equal if isinstance(inner, EqualCheck) else inner.schemes
+    if named is not None:
+        return tuple(i for i, scheme in enumerate(experiment.schemes) if scheme.name in named)
+    quantity = inner.conserves if isinstance(inner, ConservesCheck) else inner.about
+    if quantity not in centred(experiment.model.definition):
+        return experiment.ladder
+    return tuple(i for i in experiment.ladder if experiment.schemes[i].own_velocity)

@@ -57,14 +57,14 @@ class Experiment(ExperimentSpec):
         return from_content(cls, data, name, collection)
 
     def alone(self, case: int) -> Self:
-        """Return the experiment of one member, without a sweep; see `vibsim.experiment.single_member`."""
-        from vibsim.experiment.single_member import alone
+        """Return the experiment of one member, without a sweep; see `vibsim.experiment.derived`."""
+        from vibsim.experiment.derived import alone
 
         return alone(self, case)
 
     def with_levels(self, levels: Sequence[int]) -> Self:
-        """Return the experiment with the `levels` chosen by its tolerance; see `vibsim.experiment.with_levels`."""
-        from vibsim.experiment.with_levels import with_levels
+        """Return the experiment with the `levels` chosen by its tolerance; see `vibsim.experiment.derived`."""
+        from vibsim.experiment.derived import with_levels
 
         return with_levels(self, levels)
 
@@ -101,7 +101,7 @@ def restore(content: Mapping[str, Any], file: Path | None = None) -> Experiment:
     experiment = Experiment.model_validate(data)
     experiment._file = file
     if experiment.model.tables:
-        from vibsim.experiment.tables.attach import attach
+        from vibsim.experiment.tables.file import attach
 
         attach(experiment)
     return experiment

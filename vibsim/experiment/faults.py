@@ -3,31 +3,20 @@
 from __future__ import annotations
 
 import re
-from typing import Any, cast
+from typing import Any
 
 from pydantic import ValidationError
 
 from vibsim.core.errors import Fault, InputError, nearest
-from vibsim.experiment.schema.checks import CLASSES, At, Expect, ValueCheck
-from vibsim.experiment.schema.document import (
-    MODEL_SECTIONS,
-    SCHEME_SECTIONS,
-    Document,
-    Every,
-    LevelRange,
-    TimeSection,
-)
-from vibsim.experiment.schema.fields import TABLE, Section
-from vibsim.experiment.schema.published import PublishedAt, PublishedRow, PublishedTable
-from vibsim.experiment.schema.sweep_section import Sample
 from vibsim.experiment.yaml.parse import MAX_FAULTS, Path_, Source, dotted
 from vibsim.models import MODELS
+from vibsim.schemes import SCHEMES
 
 MAX_VALUE = 60
+MISSING = "required key is missing"
 
 _RULES = {
-    "missing": "required key is missing",
-    "extra_forbidden": "unknown key",
+    "missing": MISSING,
     "greater_than": "must be greater than {gt:g}",
     "greater_than_equal": "must be at least {ge:g}",
     "less_than": "must be less than {lt:g}",
@@ -42,8 +31,6 @@ _RULES = {
     "model_type": "must be a mapping",
     "model_attributes_type": "must be a mapping",
     "bool_type": "must be true or false",
-    "union_tag_invalid": "unknown kind",
-    "union_tag_not_found": "must be a mapping with the key kind",
 }
 _FORMS = {
     "linspace": "must be [first, last, count]",
@@ -87,6 +74,13 @@ class Report:
             self.faults.add(Fault(self.source.file, 0, "", "", "has more faults than are listed"))
             self.raise_any()
 
+    def add_malformed(
+        self, path: Path_, rule: str, hint: str = "", value: object = None, at_key: bool = False
+    ) -> None:
+        """Note a fault of which nothing else follows: see `faulty`."""
+        self.add(path, rule, hint, value, at_key)
+        self.faulty.add(path)
+
     def line(self, path: Path_) -> int:
         """Return the line of the nearest key above `path` that the file has, 0 without one."""
         for length in range(len(path), 0, -1):
@@ -95,78 +89,71 @@ class Report:
                 return place.key_line
         return self.source.top.line if self.source.top else 0
 
-    def add_invalid(self, error: ValidationError) -> list[Path_]:
-        """Note every fault that pydantic found; return their places."""
-        paths = [self._add_row(row) for row in error.errors(include_url=False)]
+    def add_unknown_key(self, path: Path_, value: object, known: list[str]) -> None:
+        """Note a key that is none of those `known` in its mapping."""
+        if path[0] == "sweep" and path[-1] in _FORMS:
+            rule, hint = "a key of the sweep has one rule for its values", ""
+        else:
+            is_rule = any(name in _FORMS for name in known)
+            rule, hint = "unknown key", nearest(path[-1], list(_FORMS) if is_rule else known)
+        self.add_malformed(path, rule, hint, value, at_key=True)
+
+    def add_invalid(self, error: ValidationError, path: Path_) -> list[Path_]:
+        """Note every fault that pydantic found in the value at `path`; return their places."""
+        paths = [self._add_row(row, path) for row in error.errors(include_url=False)]
         self.faulty.update(paths)
         return paths
 
-    def _add_row(self, row: Any) -> Path_:
+    def _add_row(self, row: Any, above: Path_) -> Path_:
         kind: str = row["type"]
-        path = plain_path(row["loc"], keep_last=kind == "extra_forbidden")
+        # the names of union members stand in no file
+        named = (part for part in row["loc"] if not str(part).startswith("\0"))
+        path: Path_ = (*above, *named)
         context = row.get("ctx", {})
-        rule = _RULES.get(kind, "{msg}").format(**{**context, "msg": worded(row["msg"])})
+        message = row["msg"].replace("Input should", "must", 1)
+        rule = _RULES.get(kind, "{msg}").format(**{**context, "msg": message})
         value = None if kind == "missing" else row["input"]
         hint = context.get("hint", "")
-        match kind:
-            case "extra_forbidden":
-                hint = nearest(path[-1], known_keys(path[:-1], self.source.data))
-                if path[-1] in _FORMS:
-                    rule, hint = "a key of the sweep has one rule for its values", ""
-            case "values":
-                return self._add_values(path, rule, value)
-            case "literal_error":
-                hint = nearest(value, re.findall(r"'([^']*)'", context["expected"]))
-            case "union_tag_invalid" | "union_tag_not_found":
-                return self._add_kind(path, value)
+        if kind == "values":
+            self._add_values(path, rule, value)
+            return path
+        if kind.startswith("union_tag"):
+            self._add_kind(path, value)
+            return path
+        if kind == "literal_error":
+            hint = nearest(value, re.findall(r"'([^']*)'", context["expected"]))
         if kind in ("missing", "too_long", "tuple_type"):
             path, rule = _whole_list(path, rule)
         # a list with wrong items is too short only for pydantic, which counts the right ones
         if kind != "too_short" or not value:
-            self.add(path, rule, hint, value, at_key=kind == "extra_forbidden")
+            self.add(path, rule, hint, value)
         return path
 
-    def _add_values(self, path: Path_, rule: str, value: object) -> Path_:
+    def _add_values(self, path: Path_, rule: str, value: object) -> None:
         """Note that the values of a key of the sweep are no list and follow no rule."""
         names = [str(name) for name in value] if isinstance(value, dict) else []
         for name in names:
             self.add((*path, name), "unknown key", nearest(name, list(_FORMS)), at_key=True)
         if not names:
             self.add(path, rule, value=value)
-        return path
 
-    def _add_kind(self, path: Path_, value: object) -> Path_:
+    def _add_kind(self, path: Path_, value: object) -> None:
         """Note that a model or a scheme has no kind that exists."""
-        kinds = sorted(MODEL_SECTIONS if path[0] == "model" else SCHEME_SECTIONS)
+        kinds = sorted(MODELS if path[0] == "model" else SCHEMES)
+        place = (*path, "kind")
         if not isinstance(value, dict):
             hint = f"e.g. {{kind: {kinds[0]}}}"
             self.add(path, "must be a mapping with the key kind", hint, value)
         elif "kind" in value:
-            self.add(
-                (*path, "kind"),
-                f"unknown {path[0]}".rstrip("s"),
-                nearest(value["kind"], kinds),
-                value["kind"],
-            )
+            rule = f"unknown {path[0]}".rstrip("s")
+            self.add(place, rule, nearest(value["kind"], kinds), value["kind"])
         else:
-            self.add((*path, "kind"), _RULES["missing"], nearest("", kinds))
-        return path
+            self.add(place, MISSING, nearest("", kinds))
 
     def raise_any(self) -> None:
         """Raise `InputError` with every fault, if there is one."""
         if self.faults:
             raise InputError(self.faults)
-
-
-def plain_path(loc: tuple[str | int, ...], keep_last: bool) -> Path_:
-    """Return a place without the names of union members, which no file contains."""
-    last = len(loc) - 1 if keep_last else len(loc)
-    named = [
-        part
-        for index, part in enumerate(loc)
-        if index == last or not (isinstance(part, str) and part.startswith("\0"))
-    ]
-    return tuple(named)
 
 
 def _whole_list(path: Path_, rule: str) -> tuple[Path_, str]:
@@ -181,11 +168,6 @@ def _whole_list(path: Path_, rule: str) -> tuple[Path_, str]:
     return path, rule
 
 
-def worded(message: str) -> str:
-    """Return one of pydantic's messages in the imperative of the others."""
-    return message.replace("Input should", "must", 1)
-
-
 def shorten(text: str) -> str:
     """Return `text` on one line, cut to `MAX_VALUE` characters; control characters are spelled out."""
     shown = (
@@ -193,47 +175,3 @@ def shorten(text: str) -> str:
     )
     line = " ".join("".join(shown).split())
     return line if len(line) <= MAX_VALUE else line[: MAX_VALUE - 3] + "..."
-
-
-def known_keys(path: Path_, data: Any) -> list[str]:
-    """Name the keys that a mapping at `path` may have."""
-    value: Any = data
-    for part in path:
-        value = cast(Any, value)[part]
-    if path[:1] == ("sweep",) and path != ("sweep", "sample"):
-        return list(_FORMS)
-    if path[:1] == ("model",) and len(path) > 1:
-        formulas = MODELS[data["model"]["kind"]].formulas
-        row = next((row for row in formulas if row.name == path[1]), None)
-        return [*row.terms, *((TABLE, *row.table) if row.table else ())] if row else []
-    fields = _section(path, value).model_fields
-    return [field.alias or name for name, field in fields.items()]
-
-
-def _section(path: Path_, value: Any) -> type[Section]:
-    match path:
-        case ():
-            return Document
-        case ("model",):
-            return MODEL_SECTIONS[value["kind"]]
-        case ("time",):
-            return TimeSection
-        case ("levels",):
-            return LevelRange
-        case ("samples",):
-            return Every
-        case ("sweep", "sample"):
-            return Sample
-        case ("schemes", _):
-            return SCHEME_SECTIONS[value["kind"]]
-        case ("published", _):
-            return PublishedTable
-        case ("published", _, "rows", _):
-            return PublishedRow
-        case ("published", *_, "at"):
-            return PublishedAt
-        case (*_, "at"):
-            return At
-        case (*_, "expect"):
-            return Expect
-    return next((row for key, row in CLASSES.items() if key in value), ValueCheck)

@@ -1,25 +1,42 @@
-"""The ways into an experiment: a file, or its content as a dictionary."""
+"""From a file, or what one would hold, to an experiment: all sections are read before anything is refused."""
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from itertools import pairwise
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
-from vibsim.core.errors import Fault, InputError
-from vibsim.experiment.build import Place, build
+from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.experiment.collection import collection_of
-from vibsim.experiment.data import AnyExperiment
-from vibsim.experiment.faults import Report, shorten
-from vibsim.experiment.schema.document import Document
+from vibsim.experiment.data import AnyExperiment, ModelSpec, SchemeSpec, Sweep, TimeSpec
+from vibsim.experiment.faults import MISSING, Report, shorten
+from vibsim.experiment.rules import members, size_limits, timing
+from vibsim.experiment.rules import schemes as scheme_rules
+from vibsim.experiment.rules.check_places import Ladder
+from vibsim.experiment.rules.checks import check_published, finish_checks
+from vibsim.experiment.rules.model import Equation
+from vibsim.experiment.rules.model import equation as read_equation
+from vibsim.experiment.rules.sweep import SweepAxes, read_sweep
+from vibsim.experiment.schema.checks import ConvergesCheck
+from vibsim.experiment.schema.document import Document, Every, LevelRange
 from vibsim.experiment.schema.fields import IDENTIFIER
+from vibsim.experiment.schema.model_and_schemes import scheme_names
+from vibsim.experiment.schema.published import claims
+from vibsim.experiment.units.scaling import Numbers, characteristic
+from vibsim.experiment.validation import read_document
 from vibsim.experiment.yaml.parse import MAX_DEPTH, Source, read
+from vibsim.models import MODELS, Model, quantities
 
 MAX_NAME = 100
 MAX_REPEATS = 20
 """Snakemake takes a name that ends in so many repetitions for a rule that feeds itself."""
+SAME_START = 1e-12
+"""A state that is given and follows from the parameters agrees to this part of the largest one."""
 
 _PERIODIC = re.compile(rf"(.+)\1{{{MAX_REPEATS - 1}}}$")
 _NAME_RULE = "must consist of a to z, 0 to 9 and _"
@@ -30,31 +47,14 @@ def from_file(
 ) -> AnyExperiment:
     """Read the experiment file at `path`; see `vibsim.experiment.Experiment.from_yaml`."""
     source = read(path, list(Document.model_fields))
-    return _build(kind, source, Place(collection or collection_of(path, configs), path.stem, path))
+    return build(kind, source, collection or collection_of(path, configs), path.stem, path)
 
 
 def from_content(
     kind: type[AnyExperiment], data: Mapping[str, Any], name: str, collection: str
 ) -> AnyExperiment:
     """Build an experiment from `data`; see `vibsim.experiment.Experiment.from_dict`."""
-    return _build(kind, Source(name, _plain(data, name)), Place(collection, name))
-
-
-def _build(kind: type[AnyExperiment], source: Source, place: Place) -> AnyExperiment:
-    report = Report(source)
-    _check_names(place, report)
-    return build(kind, source, place, report)
-
-
-def _check_names(place: Place, report: Report) -> None:
-    for what, text in (("experiment", place.name), ("collection", place.collection)):
-        named = f"the name of the {what}, '{shorten(text)}',"
-        if not re.fullmatch(IDENTIFIER, text):
-            report.add((), f"{named} {_NAME_RULE}")
-        elif len(text) > MAX_NAME:
-            report.add((), f"{named} must not be longer than {MAX_NAME} characters")
-        elif _PERIODIC.search(text):
-            report.add((), f"{named} must not end with {MAX_REPEATS} times the same")
+    return build(kind, Source(name, _plain(data, name)), collection, name)
 
 
 def _plain(data: Any, name: str, depth: int = 0) -> Any:
@@ -73,3 +73,215 @@ def _plain(data: Any, name: str, depth: int = 0) -> Any:
     if isinstance(data, Integral):
         return int(data)
     return float(data) if isinstance(data, Real) else data
+
+
+def build(
+    kind: type[AnyExperiment], source: Source, collection: str, name: str, file: Path | None = None
+) -> AnyExperiment:
+    """Validate what `source` holds and fill in every default; `kind` is the class of what is built.
+
+    Raises
+    ------
+    InputError
+        With every fault of the file.
+    """
+    report = Report(source)
+    for what, text in (("experiment", name), ("collection", collection)):
+        _check_name(f"the name of the {what}, '{shorten(text)}',", text, report)
+    document = read_document(source, report)
+    swept = sorted(set(_keys(source.data.get("sweep"))))
+    of_kind = _model(source)
+    folder = file.parent if file else Path()
+    equation = read_equation(document.model, of_kind, swept, folder, report)
+    model, parameters = equation.model, equation.parameters
+    levels = _levels(document, source, report)
+    schemes = scheme_rules.finish_schemes(document.schemes, model, report)
+    time = timing.time_spec(document.time, model, parameters, report)
+    initial = _initial(document.initial, model or of_kind, parameters, report)
+    sweep = _sweep(document, source, model, schemes, report)
+    if time is not None and sweep.is_whole:
+        _check_members(equation, time, sweep, report)
+    numbers = Numbers(parameters, initial, time)
+    if document.scaled:
+        numbers = characteristic(numbers, model, swept, report)
+        time = numbers.time
+    samples = document.samples.every if isinstance(document.samples, Every) else document.samples
+    shape = size_limits.Shape(
+        base_steps=time.base_steps if time else None,
+        levels=levels,
+        schemes=max(len(schemes), len(document.schemes)),
+        members=sweep.members,
+        samples=samples,
+        variables=len(quantities(model)) if model else 0,
+        end=sweep.least_end(time) if time else None,
+        own_velocity=(model is None or model.events is None)
+        and any(scheme.own_velocity for scheme in schemes),
+    )
+    size_limits.check(shape, report)
+    _check_output(document, model, levels, report)
+    ladder = Ladder(
+        model=model,
+        shape=shape,
+        schemes=tuple(dict.fromkeys(scheme_names(source.data.get("schemes")))),
+        sound=tuple(schemes),
+        # a faulty sweep may change the end: then nothing is said about times
+        time=time if sweep.is_whole else None,
+        end=sweep.fixed_end(time) if time else None,
+        by_tolerance=source.data.get("tolerance") is not None,
+        is_whole=scheme_rules.are_known(document.schemes),
+    )
+    checks = document.checks
+    if not checks and not document.published and model is not None:
+        checks = [ConvergesCheck(converges=position) for position in model.positions]
+    given_ids = [check.id if check is not None else "" for check in document.checks]
+    checks = finish_checks(checks, ladder, report)
+    check_published(document.published, given_ids, ladder, report)
+    report.raise_any()
+    assert model is not None
+    assert time is not None
+    experiment = kind(
+        collection=collection,
+        name=name,
+        title=document.title,
+        source=document.source,
+        model=ModelSpec(
+            kind=model.kind,
+            parameters=dict(numbers.parameters),
+            formulas=equation.formulas,
+            tables=equation.tables,
+            terms=equation.terms,
+        ),
+        initial=dict(numbers.initial),
+        time=time,
+        levels=levels,
+        schemes=tuple(schemes),
+        sweep=Sweep(axes=sweep.axes) if sweep.axes else None,
+        samples=samples,
+        output=document.output,
+        tolerance=document.tolerance,
+        checks=(*checks, *claims(document.published, document.source)),
+        published=document.published,
+        units=document.units,
+        scaling=numbers.scaling,
+    )
+    experiment._file = file
+    size_limits.check_files(experiment, report)
+    report.raise_any()
+    return members.update_tables(experiment)
+
+
+def _check_name(what: str, text: str, report: Report) -> None:
+    if not re.fullmatch(IDENTIFIER, text):
+        report.add((), f"{what} {_NAME_RULE}")
+    elif len(text) > MAX_NAME:
+        report.add((), f"{what} must not be longer than {MAX_NAME} characters")
+    elif _PERIODIC.search(text):
+        report.add((), f"{what} must not end with {MAX_REPEATS} times the same")
+
+
+def _keys(section: Any) -> Iterator[str]:
+    """Yield every key of a section, those inside of it too."""
+    if isinstance(section, Mapping):
+        for key, value in section.items():
+            yield str(key)
+            yield from _keys(value)
+
+
+def _model(source: Source) -> Model | None:
+    """Return the model; a model section with a fault elsewhere still names it."""
+    section = source.data.get("model")
+    kind = section.get("kind") if isinstance(section, Mapping) else None
+    return MODELS.get(kind) if isinstance(kind, str) else None
+
+
+def _levels(document: Any, source: Source, report: Report) -> tuple[int, ...]:
+    """Return the levels; none where the section is missing or faulty, or a tolerance stands for it."""
+    given = [key for key in ("levels", "tolerance") if source.data.get(key) is not None]
+    if not given:
+        report.add(("levels",), MISSING, "or tolerance")
+    elif len(given) > 1:
+        report.add(("tolerance",), "must not be given together with levels", at_key=True)
+    section = document.levels
+    if isinstance(section, LevelRange):
+        if section.from_ > section.to:
+            report.add(("levels", "to"), f"must be at least 'from', which is {section.from_}")
+        return tuple(range(section.from_, section.to + 1))
+    levels: tuple[int, ...] = section or ()
+    is_sound = True
+    for i, (low, high) in enumerate(pairwise(levels), 1):
+        if low >= high:
+            word = "must not be repeated" if low == high else "must be in increasing order"
+            report.add(("levels", i), f"levels {word}", value=high)
+            is_sound = False
+    return levels if is_sound else ()
+
+
+def _initial(
+    given: Mapping[str, float],
+    model: Model | None,
+    parameters: Mapping[str, float],
+    report: Report,
+) -> dict[str, float]:
+    """Return the initial value of every state, 0 for those that are not given."""
+    if model is None:
+        return {}
+    states = [state.name for state in model.states]
+    for name in given:
+        if name not in states:
+            report.add(("initial", name), "unknown state", nearest(name, states), at_key=True)
+    found = {name: given.get(name, 0.0) for name in states}
+    for state in model.states:
+        if state.minimum is not None and found[state.name] < state.minimum:
+            rule = f"must be at least {state.minimum:g}"
+            report.add(("initial", state.name), rule, value=found[state.name])
+    start = model.start(parameters) if model.start and parameters else {}
+    size = max(map(abs, start.values()), default=0.0)
+    for name, value in start.items():
+        if name in given and not math.isclose(
+            found[name], value, rel_tol=SAME_START, abs_tol=SAME_START * size
+        ):
+            rule = f"must be {value:.15g}, where the motion starts, or be left out"
+            report.add(("initial", name), rule)
+        found[name] = float(value)
+    return found
+
+
+def _sweep(
+    document: Any, source: Source, model: Model | None, schemes: list[SchemeSpec], report: Report
+) -> SweepAxes:
+    """Return the sweep; not whole where something of it is malformed and was left out."""
+    is_whole = not any(path[:1] == ("sweep",) for path in report.faulty)
+    if document.sweep is None:
+        return SweepAxes(is_whole=is_whole)
+    lacks_scheme = not scheme_rules.are_known(document.schemes)
+    order = list(source.data["sweep"])
+    found = read_sweep(document, order, model, schemes, lacks_scheme, report)
+    if is_whole and found.is_whole and not found.axes:
+        report.add(("sweep",), "must not be empty")
+    return found if is_whole else replace(found, is_whole=False)
+
+
+def _check_members(equation: Equation, time: TimeSpec, sweep: SweepAxes, report: Report) -> None:
+    """Check what must hold for every member: tables are long enough, and what is differentiated has no jumps."""
+    if equation.model is None or not equation.parameters:
+        return
+    numbers = members.MemberNumbers(equation.model, equation.parameters, time, sweep.axes, 0)
+    for name in equation.tables:
+        members.check_length(numbers, name, report)
+    members.check_jumps(numbers, equation.formulas, report)
+
+
+def _check_output(
+    document: Any, model: Model | None, levels: tuple[int, ...], report: Report
+) -> None:
+    """Refuse to extrapolate over one level, or the whole motion of several coordinates."""
+    if document.output == "best" and len(levels) == 1:
+        rule = "the best solution is extrapolated over at least 2 levels, there is 1"
+        report.add(("output",), rule)
+    if model is None or model.coordinates == 1:
+        return
+    rule = f"extrapolates a motion of one coordinate, {model.kind} has {model.coordinates}"
+    if document.tolerance is not None:
+        report.add(("tolerance",), rule, "give levels", document.tolerance)
+    if document.output == "best":
+        report.add(("output",), rule, "choose from verdict", document.output)

@@ -94,12 +94,7 @@ _SERIES = (
         best=True,
         measure="quantity",
     ),
-    Value(
-        "max_abs_interior",
-        "the same without the last point",
-        "deviation",
-        measure="quantity",
-    ),
+    Value("max_abs_interior", "the same without the last point", "deviation", measure="quantity"),
     Value(
         "max_abs_ratio",
         "largest absolute value over every step, over that of the next finer level",
@@ -124,19 +119,8 @@ _SERIES = (
     Value("relative_running_max", "the same, over |E(0)|", "running", _ANYWHERE),
 )
 _OSCILLATION = (
-    Value(
-        "period",
-        "period, from interpolated peaks",
-        "none",
-        best=True,
-        measure="time",
-    ),
-    Value(
-        "period_grid",
-        "period, from peaks at grid points",
-        "none",
-        measure="time",
-    ),
+    Value("period", "period, from interpolated peaks", "none", best=True, measure="time"),
+    Value("period_grid", "period, from peaks at grid points", "none", measure="time"),
     Value(
         "exact_period",
         "period of the exact solution",
@@ -233,20 +217,8 @@ _EVENTS = (
         needs_events=True,
         measure="count",
     ),
-    Value(
-        "first_event_time",
-        "time of the first event",
-        "none",
-        needs_events=True,
-        measure="time",
-    ),
-    Value(
-        "last_event_time",
-        "time of the last event",
-        "none",
-        needs_events=True,
-        measure="time",
-    ),
+    Value("first_event_time", "time of the first event", "none", needs_events=True, measure="time"),
+    Value("last_event_time", "time of the last event", "none", needs_events=True, measure="time"),
     Value(
         "rest_time",
         "time from which the body was at rest to the end",
@@ -256,12 +228,7 @@ _EVENTS = (
     ),
 )
 _COST = (
-    Value(
-        "accepted_steps",
-        "number of steps taken",
-        "none",
-        measure="count",
-    ),
+    Value("accepted_steps", "number of steps taken", "none", measure="count"),
     Value(
         "force_evaluations",
         "number of evaluations of the acceleration; of an implicit scheme those of one iteration per step",

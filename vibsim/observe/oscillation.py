@@ -17,7 +17,7 @@ import numpy as np
 from vibsim.convergence.differences import safe_ratio
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.experiment.stored_series import FEWEST_EXTREMA
+from vibsim.experiment.storage import FEWEST_EXTREMA
 from vibsim.observe.member_block import MemberBlock
 from vibsim.observe.predicted_oscillation import is_simple, natural_frequency
 from vibsim.observe.recurrence import Motion, fitted

@@ -17,7 +17,7 @@ from vibsim.apriori.formal_orders import formal_orders
 from vibsim.apriori.phase_amplitude_orders import is_promised
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, MEASUREMENT_FACTOR
 from vibsim.core.array_types import Flags, Floats, Integers
-from vibsim.experiment.stored_series import asked
+from vibsim.experiment.storage import asked
 from vibsim.formula import values
 from vibsim.models import tree
 from vibsim.models.shared.phase_amplitude_names import (

@@ -5,7 +5,7 @@ plans of all experiments each time it starts.
 """
 
 from vibsim.plan.cache import load, load_all
-from vibsim.plan.cases import columns, count, option_groups, sampling
+from vibsim.plan.cases import columns, option_groups, sampling
 from vibsim.plan.choose import Choice, checkout, choose, experiments
 from vibsim.plan.jobs import Batch, LevelJob, Plan, ShardJob
 from vibsim.plan.workflow_names import Names
@@ -20,7 +20,6 @@ __all__ = [
     "checkout",
     "choose",
     "columns",
-    "count",
     "experiments",
     "load",
     "load_all",

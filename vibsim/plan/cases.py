@@ -13,11 +13,6 @@ if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
 
-def count(experiment: Experiment) -> int:
-    """Return the number of members: 1 without a sweep."""
-    return experiment.members
-
-
 def columns(experiment: Experiment, start: int, stop: int) -> dict[str, NDArray[Any]]:
     """Return the swept values of the members from `start` up to, not including, `stop`.
 
@@ -36,7 +31,7 @@ def columns(experiment: Experiment, start: int, stop: int) -> dict[str, NDArray[
     """
     if experiment.sweep is None:
         return {}
-    from vibsim.experiment.sweep.columns import columns as values_of
+    from vibsim.experiment.sweep_columns import columns as values_of
 
     return values_of(experiment.sweep.axes, start, stop)
 
@@ -47,7 +42,7 @@ def sampling(experiment: Experiment, level: int) -> int:
     The first and the last time are always among them, and so are all times of the coarsest level
     unless the file asks for every n-th step of each level.
     """
-    from vibsim.experiment.stored_samples import stride
+    from vibsim.experiment.storage import stride
 
     coarsest = experiment.steps(experiment.levels[0])
     trajectories = len(experiment.schemes) * experiment.members
@@ -77,7 +72,7 @@ def option_groups(
     """
     import numpy as np
 
-    from vibsim.experiment.schema.options import as_option
+    from vibsim.experiment.schema.sweep import as_option
 
     base = experiment.scheme_options(scheme)
     size = len(next(iter(columns.values()))) if columns else 1

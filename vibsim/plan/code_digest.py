@@ -6,7 +6,7 @@ package counts with its ``__init__``, with what this uses itself, and with the m
 
 Two things are no part of it, because what comes out of them is in every digest itself: the making of plans
 (`_PLANNING`), whose outcome a job compares with the digest that it was given, before it starts; and the lists of all
-models and schemes (`_LISTS`), of which a job uses its own entries (`vibsim.plan.shards.code_of`). What only describes
+models and schemes (`_LISTS`), of which a job uses its own entries (`vibsim.plan.build.code_of`). What only describes
 types runs nothing.
 """
 
@@ -27,13 +27,11 @@ _PLANNING = (
     "vibsim.cli",
     "vibsim.cli.arguments",
     "vibsim.cli.chosen_plans",
-    "vibsim.plan.batches",
     "vibsim.plan.build",
     "vibsim.plan.cache",
     "vibsim.plan.choose",
     "vibsim.plan.workflow_names",
-    "vibsim.experiment.single_member",
-    "vibsim.experiment.with_levels",
+    "vibsim.experiment.derived",
     "vibsim.experiment.reading",
 )
 """From what a user writes to a plan; no job runs any of it once it has its plan (a test traces that)."""

@@ -13,8 +13,8 @@ from typing import Any
 from vibsim.plan import code_digest
 from vibsim.plan.cache import Resolver, load_all
 from vibsim.plan.choose import choose
+from vibsim.plan.digests import digest_of
 from vibsim.plan.jobs import Batch, Plan
-from vibsim.plan.shards import digest_of
 
 _LARGE = 32 * 10**6
 """Bytes of level files from which an analysis has work for more threads than one."""

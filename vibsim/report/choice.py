@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import SEVERITY, TOLERANCE, TYPICAL_NORM
-from vibsim.experiment.stored_series import asked
+from vibsim.experiment.storage import asked
 from vibsim.report.data import Member, case_name, due, flags, formal_orders, pick, swept
 from vibsim.schemes import SCHEMES
 

@@ -196,7 +196,7 @@ def promised_text(record: Record, quantity: str, scheme: int) -> str:
 
 
 def is_lean(record: Record) -> bool:
-    """Say whether no series over time are stored (see `vibsim.experiment.stored_samples`)."""
+    """Say whether no series over time are stored (see `vibsim.experiment.storage`)."""
     return record.attrs.get("storage") == "lean"
 
 

@@ -2,8 +2,8 @@
 
 The record holds what a level file holds: the states, the energies, their exact values where they are known, and what
 was gathered over every step. Shapes are (scheme, case, t), (case, t), (scheme, case) or (case,). Where storage
-is bounded (`vibsim.experiment.stored_samples.is_lean`), of the series only those of
-`vibsim.experiment.stored_series.lean_series`.
+is bounded (`vibsim.experiment.storage.is_lean`), of the series only those of
+`vibsim.experiment.storage.lean_series`.
 """
 
 from vibsim.simulation.level import simulate, simulate_record

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vibsim import plan
 from vibsim.core.record import Attribute, Record, Variable, attributes
 from vibsim.core.vocabulary import HIGHEST
-from vibsim.experiment.stored_series import (
+from vibsim.experiment.storage import (
     RUNNING,
     asks_for_peaks,
     extrema_kept,
@@ -89,7 +89,7 @@ def simulate_record(
     if level not in experiment.levels:
         raise ValueError(f"level {level} is none of {list(experiment.levels)}")
     model = experiment.model.definition
-    group = members(experiment, start, plan.count(experiment) if stop is None else stop)
+    group = members(experiment, start, experiment.members if stop is None else stop)
     steps, every = experiment.steps(level), plan.sampling(experiment, level)
     is_lean, wanted = is_bounded(experiment), stored_series(experiment)
     kept = extrema_kept(steps, len(experiment.schemes) * experiment.members)

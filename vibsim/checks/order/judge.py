@@ -13,7 +13,7 @@ from vibsim.checks.order.measure import FIELDS
 from vibsim.checks.outcome import FAIL, INCONCLUSIVE, PASS, Outcome
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASON_NAMES, STATUSES
-from vibsim.experiment.check_scheme_selection import schemes_of
+from vibsim.experiment.data import schemes_of
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment

@@ -14,7 +14,7 @@ from vibsim.checks.value.measure import FIELDS
 from vibsim.comparison.best_values import has_limit
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASON_NAMES
-from vibsim.experiment.check_scheme_selection import schemes_of
+from vibsim.experiment.data import schemes_of
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment

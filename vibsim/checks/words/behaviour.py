@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, get_args
 from vibsim.apriori.formal_orders import columns_of, stability_limits
 from vibsim.checks.words.found import Found
 from vibsim.checks.words.notation import growth_in_words, vanishing_in_words
-from vibsim.experiment.schema.scheme_checks import SOLUTIONS, Drift
+from vibsim.experiment.schema.checks import SOLUTIONS, Drift
 
 if TYPE_CHECKING:
-    from vibsim.experiment.schema.scheme_checks import ConservesCheck, EqualCheck
+    from vibsim.experiment.schema.checks import ConservesCheck, EqualCheck
 
 KNOWN_DRIFTS = get_args(Drift)
 """What `drift:` may be."""

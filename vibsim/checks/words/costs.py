@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from vibsim.experiment.level_counts import load_of
+from vibsim.experiment.cost import load_of
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment

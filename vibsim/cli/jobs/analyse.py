@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from vibsim.cli import made_files
 from vibsim.cli.jobs.common import check_digest, one_plan, provenance, titled
 from vibsim.cli.jobs.levels import open_levels
-from vibsim.plan.digested_part import analysed
+from vibsim.plan.digests import analysed
 
 if TYPE_CHECKING:
     from vibsim.core.record import Record

@@ -7,7 +7,7 @@ from argparse import Namespace
 from vibsim.cli import made_files
 from vibsim.cli.jobs.common import check_digest, one_plan, provenance, refusal, titled
 from vibsim.cli.jobs.levels import open_levels
-from vibsim.plan.digested_part import extrapolated
+from vibsim.plan.digests import extrapolated
 
 PART_BYTES = 64 * 10**6
 """Bytes of all levels together that an extrapolation reads at a time."""

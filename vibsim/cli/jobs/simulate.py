@@ -15,7 +15,7 @@ from vibsim.cli.failure import sentence
 from vibsim.cli.jobs.common import check_digest, one_plan, provenance, refusal, titled
 from vibsim.core.errors import FileError, VibsimError
 from vibsim.plan import Plan, ShardJob
-from vibsim.plan.batches import batch_digest
+from vibsim.plan.digests import batch_digest
 
 
 def simulate(options: Namespace) -> int:
@@ -87,7 +87,7 @@ def _make(plan: Plan, level: int, job: ShardJob, path: Path, threads: int) -> No
         With the level and the members.
     """
     from vibsim import store
-    from vibsim.plan.digested_part import simulated, values_digest
+    from vibsim.plan.digests import simulated, values_digest
     from vibsim.simulation import simulate_record
 
     # Should the process be killed, its log ends with what it was at.

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
+from functools import cached_property
 
 from vibsim.core.errors import nearest
 from vibsim.experiment.data import SchemeSpec, TimeSpec
@@ -23,32 +23,32 @@ class Ladder:
 
     model: Model | None
     schemes: tuple[str, ...]
+    """The names of the schemes as written, right or wrong."""
     shape: Shape
     time: TimeSpec | None
     end: float | None
     """The last time of every member, None where it varies; then `t` is a fraction."""
     by_tolerance: bool = False
     """Whether the levels are still to be chosen, so that none of them can be named."""
-    adaptive: tuple[str, ...] = ()
-    """Of the schemes, those that choose their own steps."""
-    own: tuple[str, ...] = ()
-    """Of the schemes, those with another velocity than the centred difference."""
+    sound: tuple[SchemeSpec, ...] = ()
+    """The schemes without a fault."""
     is_whole: bool = True
     """Whether every scheme is known; where one is not, it may be of any kind."""
+
+    @cached_property
+    def adaptive(self) -> tuple[str, ...]:
+        """Names of the schemes that choose their own steps."""
+        return tuple(scheme.name for scheme in self.sound if scheme.adaptive)
+
+    @cached_property
+    def own(self) -> tuple[str, ...]:
+        """Names of the schemes with another velocity than the centred difference."""
+        return tuple(scheme.name for scheme in self.sound if scheme.own_velocity)
 
     @property
     def own_velocity(self) -> bool:
         """Whether some scheme has, or may have, another velocity than the centred difference."""
         return bool(self.own) or not self.is_whole
-
-
-def kinds_of(schemes: Sequence[SchemeSpec]) -> dict[str, Any]:
-    """Return what a `Ladder` holds of the schemes."""
-    return {
-        "schemes": tuple(scheme.name for scheme in schemes),
-        "adaptive": tuple(scheme.name for scheme in schemes if scheme.adaptive),
-        "own": tuple(scheme.name for scheme in schemes if scheme.own_velocity),
-    }
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,8 @@ class Scope:
         In a row of a printed table some keys stand under ``at``, which checks do not have there.
         """
         inner = self.path[0] == "published" and keys[0] in ("t", "step", "case")
-        return replace(self, path=(*self.path, *(("at",) if inner else ()), *keys))
+        path = (*self.path, *(("at",) if inner else ()), *keys)
+        return Scope(path, self.ladder, self.report)
 
     @property
     def is_faulty(self) -> bool:

@@ -11,9 +11,9 @@ import numpy as np
 
 from vibsim.experiment.data import TableSpec
 from vibsim.experiment.faults import Report
-from vibsim.experiment.rules.tables import table_of
+from vibsim.experiment.rules.members import table_of
 from vibsim.experiment.schema.fields import DECLARED, TABLE, Section
-from vibsim.experiment.schema.model_section import name_fault
+from vibsim.experiment.schema.model_and_schemes import name_fault
 from vibsim.experiment.tables.file import ENDINGS
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import (

@@ -8,9 +8,9 @@ from typing import Any
 from vibsim.core.errors import nearest
 from vibsim.experiment.data import SchemeSpec
 from vibsim.experiment.faults import Report
-from vibsim.experiment.schema.options import tolerance_name
-from vibsim.experiment.schema.scheme_checks import SOLUTIONS
-from vibsim.experiment.schema.scheme_section import TOLERANCE
+from vibsim.experiment.schema.checks import SOLUTIONS
+from vibsim.experiment.schema.model_and_schemes import TOLERANCE
+from vibsim.experiment.schema.sweep import tolerance_name
 from vibsim.models import MODELS, Model
 from vibsim.schemes import FIXED_STEP, SCHEMES
 from vibsim.schemes.base import EVENTS, VECTOR

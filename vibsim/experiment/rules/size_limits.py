@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vibsim.experiment.cost import Load
+from vibsim.experiment.cost import Load, load_of
 from vibsim.experiment.data import ExperimentSpec
 from vibsim.experiment.faults import Report
-from vibsim.experiment.level_counts import load_of
-from vibsim.experiment.stored_samples import is_lean, stride
-from vibsim.experiment.stored_series import extrema_kept
+from vibsim.experiment.storage import extrema_kept, is_lean, stride
 
 MAX_MEMBERS = 10**7
 MAX_MEMBER_STEPS = 2**40

@@ -15,9 +15,14 @@ WHOLE = 1e-12
 
 
 def time_spec(
-    section: TimeSection, model: Model | None, parameters: Mapping[str, float], report: Report
+    section: TimeSection | None,
+    model: Model | None,
+    parameters: Mapping[str, float],
+    report: Report,
 ) -> TimeSpec | None:
     """Return the end and the steps at level 0; None where they cannot be told."""
+    if section is None:
+        return None
     given = [name for name in TimeSection.model_fields if getattr(section, name) is not None]
     if "end" in given:
         return _by_end(section, given, report)

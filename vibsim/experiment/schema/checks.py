@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
     BeforeValidator,
@@ -15,15 +15,16 @@ from pydantic import (
     StrictBool,
     Tag,
     WithJsonSchema,
-    model_validator,
 )
 from pydantic_core import PydanticCustomError
 
 from vibsim.core.vocabulary import REASONS, TOLERANCE, TYPICAL_NORM, Norm, Status
 from vibsim.experiment.schema.fields import (
     MAX_LEVEL,
+    STAND_IN,
     GivenId,
     Index,
+    Level,
     NonNegative,
     Number,
     Positive,
@@ -33,17 +34,111 @@ from vibsim.experiment.schema.fields import (
     tag,
     whole,
 )
-from vibsim.experiment.schema.scheme_checks import (
-    ConservesCheck,
-    EqualCheck,
-    MeasuringCheck,
-    StableCheck,
-)
 from vibsim.experiment.value_names import VALUES
+
+Drift = Literal["none", "bounded", "linear", "quadratic"]
+SOLUTIONS = ("exact", "discrete")
+"""What a scheme may be compared with beside another scheme; no scheme has such a name."""
+
+_Names = Annotated[tuple[Text, ...], Field(min_length=1)]
+
+
+class MeasuringCheck(Section):
+    """What every check that measures something has."""
+
+    id: GivenId = ""
+    """Name of the check, unique in the file; `check_1` and so on when left out."""
+
+    @property
+    def measured(self) -> Self:
+        """The check that is measured: this one."""
+        return self
+
+    @property
+    def about(self) -> str | None:
+        """The quantity that must be known over time."""
+        return None
+
+    @property
+    def member(self) -> int | None:
+        """The member of the sweep that the check speaks of; None for every one."""
+        found: int | None = getattr(self, "case", None)
+        return found
+
+
+class StableCheck(MeasuringCheck):
+    """The amplitude does not grow without bound, or it does."""
+
+    kind: ClassVar[Literal["stable"]] = "stable"
+    stand_ins = MappingProxyType({"stable": True})
+    stable: StrictBool
+    """Whether the schemes must be stable."""
+    schemes: _Names | None = None
+    """Names of the schemes; every scheme when left out."""
+    level: Level | None = None
+    """A level; the finest one when left out."""
+    case: Index | None = None
+    """Index of a member of the sweep, from 0; every one when left out."""
+
+
+class ConservesCheck(MeasuringCheck):
+    """The error of the energy has a kind of growth with time."""
+
+    kind: ClassVar[Literal["conserves"]] = "conserves"
+    stand_ins = MappingProxyType({"conserves": "energy"})
+    conserves: Literal["energy", "energy_d2t"]
+    """`energy` by the scheme's own velocity, or `energy_d2t` by the centred difference of the position."""
+    drift: Drift = "none"
+    """How the largest error so far grows: not at all (round-off), bounded, like t, or like t^2."""
+    schemes: _Names | None = None
+    """Names of the schemes; every scheme when left out."""
+    level: Level | None = None
+    """A level; the finest one when left out."""
+    case: Index | None = None
+    """Index of a member of the sweep, from 0; every one when left out."""
+
+    @property
+    def about(self) -> str | None:
+        """The quantity that must be known over time."""
+        return self.conserves.replace("energy", "energy_deviation")
+
+
+class EqualCheck(MeasuringCheck):
+    """The solution of a scheme is that of another one, or a known one, at every stored time."""
+
+    kind: ClassVar[Literal["equal"]] = "equal"
+    stand_ins = MappingProxyType({"equal": (STAND_IN, STAND_IN)})
+    equal: tuple[Text, Text]
+    """A scheme, and what it must equal: another scheme, `exact`, or `discrete`, the exact solution of its own steps."""
+    quantity: Text
+    """The quantity that is compared."""
+    atol: NonNegative | None = None
+    """How far apart they may be; derived from the number of steps and the machine precision when left out."""
+    level: Level | None = None
+    """A level; the finest one when left out."""
+    case: Index | None = None
+    """Index of a member of the sweep, from 0; every one when left out."""
+
+    @property
+    def about(self) -> str | None:
+        """The quantity that must be known over time."""
+        return self.quantity
+
+    @property
+    def first(self) -> str:
+        """The scheme that is compared."""
+        return self.equal[0]
+
+    @property
+    def second(self) -> str:
+        """What it must equal: a scheme, or one of `SOLUTIONS`."""
+        return self.equal[1]
 
 
 class Expect(Section):
     """The verdict that a check should get."""
+
+    stand_ins = MappingProxyType({})
 
     status: Status = "PASS"
     """The expected status."""
@@ -90,6 +185,7 @@ class At(Section):
     """Where a value is taken; left out means every scheme, every case, the finest level."""
 
     model_config = ConfigDict(json_schema_extra=_describe_best)
+    stand_ins = MappingProxyType({})
 
     t: Number | None = None
     """A stored sample time; where the end differs between members, the fraction 0 to 1 of it."""
@@ -102,23 +198,24 @@ class At(Section):
     case: Index | None = None
     """Index of a member of the sweep, from 0."""
 
-    @model_validator(mode="before")
     @classmethod
-    def _best(cls, data: Any) -> Any:
-        if not isinstance(data, dict) or "best" not in data:
-            return data
-        rest = {key: value for key, value in data.items() if key != "best"}
-        if data["best"] is not True:
-            raise PydanticCustomError("best", "best must be true, or left out")
-        if rest.setdefault("level", "best") != "best":
-            raise PydanticCustomError("best", "must have a level or best, not both")
-        return rest
+    def normal(cls, written: Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
+        """Return what is written with ``level: best`` for ``best: true``."""
+        if "best" not in written:
+            return written, ""
+        rest = {key: value for key, value in written.items() if key not in ("best", "level")}
+        if written["best"] is not True:
+            return rest, "best must be true, or left out"
+        if written.get("level", "best") != "best":
+            return rest, "must have a level or best, not both"
+        return {**rest, "level": "best"}, ""
 
 
 class ConvergesCheck(MeasuringCheck):
     """A quantity converges with an order, and the verdict can be trusted."""
 
     kind: ClassVar[Literal["converges"]] = "converges"
+    stand_ins = MappingProxyType({"converges": STAND_IN})
     converges: Text
     """The quantity: a state, energy, energy_deviation, kinetic_energy, potential_energy, or the part of an error
     `<position>_phase_error` or `<position>_amplitude_error`."""
@@ -149,6 +246,7 @@ class ValueCheck(MeasuringCheck):
     """A number of the outcome equals, is below or is above a given one."""
 
     kind: ClassVar[Literal["value"]] = "value"
+    stand_ins = MappingProxyType({"value": STAND_IN})
     value: Annotated[str, Field(json_schema_extra={"enum": sorted(VALUES)})]
     """Name of the number, see `vibsim list checks`."""
     quantity: Text | None = None
@@ -179,6 +277,11 @@ class ValueCheck(MeasuringCheck):
         return atol + rtol * abs(self.equals)
 
     @property
+    def member(self) -> int | None:
+        """The member of the sweep that the check speaks of; None for every one."""
+        return self.at.case
+
+    @property
     def about(self) -> str | None:
         """The quantity that must be known over time."""
         return self.quantity
@@ -192,7 +295,7 @@ def _which(value: Any) -> str | None:
     return next((tag(key) for key in CLASSES if key in keys), None)
 
 
-def _keys(*more: str) -> str:
+def _leading_keys(*more: str) -> str:
     """Say in words which key a check must have."""
     *others, last = (*MEASURED, *more)
     return f"must be a mapping with the key {', '.join(others)} or {last}"
@@ -210,7 +313,7 @@ Measured = Annotated[
     | Annotated[StableCheck, Tag(tag("stable"))]
     | Annotated[ConservesCheck, Tag(tag("conserves"))]
     | Annotated[EqualCheck, Tag(tag("equal"))],
-    Discriminator(_which, custom_error_type="check", custom_error_message=_keys()),
+    Discriminator(_which, custom_error_type="check", custom_error_message=_leading_keys()),
 ]
 
 
@@ -218,6 +321,7 @@ class ClaimCheck(Section):
     """A statement of a source, true or false, and the measurement that decides it."""
 
     kind: ClassVar[Literal["claim"]] = "claim"
+    stand_ins = MappingProxyType({"claim": STAND_IN})
     id: GivenId = ""
     """Name of the check, unique in the file; `check_1` and so on when left out."""
     claim: Text
@@ -247,5 +351,5 @@ Check = Annotated[
     | Annotated[ConservesCheck, Tag(tag("conserves"))]
     | Annotated[EqualCheck, Tag(tag("equal"))]
     | Annotated[ClaimCheck, Tag(tag("claim"))],
-    Discriminator(_which, custom_error_type="check", custom_error_message=_keys("claim")),
+    Discriminator(_which, custom_error_type="check", custom_error_message=_leading_keys("claim")),
 ]

@@ -1,8 +1,9 @@
-"""The experiment file as it is written: one class per section, built from the registries."""
+"""The experiment file as it is written, one class per section, and its JSON Schema for editors."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Annotated, Any, Literal, Union
 
 from pydantic import (
@@ -13,9 +14,11 @@ from pydantic import (
     Tag,
     WithJsonSchema,
 )
+from pydantic.json_schema import GenerateJsonSchema
 
 from vibsim.experiment.schema.checks import Check
 from vibsim.experiment.schema.fields import (
+    BY_SHAPE,
     MAX_ENTRIES,
     MAX_LEVEL,
     Count,
@@ -29,10 +32,9 @@ from vibsim.experiment.schema.fields import (
     short,
     tag,
 )
-from vibsim.experiment.schema.model_section import model_section
+from vibsim.experiment.schema.model_and_schemes import model_section, scheme_section
 from vibsim.experiment.schema.published import PublishedTable
-from vibsim.experiment.schema.scheme_section import scheme_section
-from vibsim.experiment.schema.sweep_section import SweepSection
+from vibsim.experiment.schema.sweep import SweepSection
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
 
@@ -119,19 +121,15 @@ class Every(Section):
     """n; it must divide the number of steps of the coarsest level, whose stored times are those of the comparison."""
 
 
-def _shape(value: Any) -> str:
-    return tag("mapping") if isinstance(value, Mapping | Section) else tag("other")
-
-
 Levels = Annotated[
     Annotated[LevelRange, Tag(tag("mapping"))]
     | Annotated[tuple[Level, ...], Field(min_length=1), short(MAX_LEVEL + 1), Tag(tag("other"))],
-    Discriminator(_shape),
+    BY_SHAPE,
 ]
 Samples = Annotated[
     Annotated[Every, Tag(tag("mapping"))]
     | Annotated[Literal["auto", "common", "all"], Tag(tag("other"))],
-    Discriminator(_shape),
+    BY_SHAPE,
 ]
 
 
@@ -162,6 +160,7 @@ class Document(Section):
     model_config = ConfigDict(
         json_schema_extra={"oneOf": [{"required": ["levels"]}, {"required": ["tolerance"]}]}
     )
+    stand_ins = MappingProxyType({"title": None, "model": None, "time": None, "schemes": ()})
 
     title: Text
     """What the experiment shows, in a line."""
@@ -193,3 +192,16 @@ class Document(Section):
     """What must come out; when left out, that the position converges as the scheme promises."""
     published: Annotated[tuple[PublishedTable, ...], short(MAX_ENTRIES)] = ()
     """Tables that a source printed: every row is a claim, shown beside our number."""
+
+
+class _Generator(GenerateJsonSchema):
+    """Leaves out the titles that pydantic makes from the names of keys."""
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        return False
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of an experiment file."""
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
+    return head | Document.model_json_schema(schema_generator=_Generator)

@@ -7,14 +7,16 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from numbers import Integral, Real
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import (
     AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
+    Discriminator,
     Field,
     GetJsonSchemaHandler,
 )
@@ -26,6 +28,8 @@ from vibsim.formula import ExpressionError, constant
 IDENTIFIER = r"^[a-z0-9_]+$"
 _CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 MAX_LEVEL = 40
+STAND_IN = "?"
+"""Takes the place of text that is faulty and cannot be left out; nothing is said about it a second time."""
 MAX_FORMULAS = 1000
 """Values of one list that are not plain numbers."""
 MAX_ENTRIES = 1000
@@ -45,8 +49,23 @@ class Section(BaseModel):
     """A part of an experiment: frozen, and without unknown keys."""
 
     model_config = ConfigDict(
-        extra="forbid", frozen=True, use_attribute_docstrings=True, allow_inf_nan=False
+        extra="forbid",
+        frozen=True,
+        use_attribute_docstrings=True,
+        allow_inf_nan=False,
+        defer_build=True,
     )
+
+    stand_ins: ClassVar[Mapping[str, Any] | None] = None
+    """What takes the place of required values that are faulty, where what else is there is looked at nevertheless; None
+    where nothing is said about a part with a fault."""
+    other_values: ClassVar[Any] = None
+    """What describes the values of keys without a name of their own; None where there are no such keys."""
+
+    @classmethod
+    def normal(cls, written: Mapping[str, Any]) -> tuple[Mapping[str, Any], str]:
+        """Return what is written with every abbreviation written out, and the rule that it breaks, if it does."""
+        return written, ""
 
 
 class MadeSection(Section):
@@ -80,6 +99,14 @@ class FrozenDict(dict[str, Any]):
 def tag(name: str) -> str:
     """Mark the name of a union's member, so that it can be told from a key in the place of a fault."""
     return f"\0{name}"
+
+
+def _shape(value: Any) -> str:
+    return tag("mapping") if isinstance(value, Mapping | Section) else tag("other")
+
+
+BY_SHAPE = Discriminator(_shape)
+"""Chooses the member of a union that is tagged ``mapping``, or that tagged ``other``."""
 
 
 def number(value: Any) -> float:

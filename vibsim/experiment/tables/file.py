@@ -14,9 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.core import netcdf
-from vibsim.core.errors import nearest
+from vibsim.core.errors import Fault, InputError, nearest
+from vibsim.experiment.data import ExperimentSpec, TableSpec
+from vibsim.experiment.schema.fields import TABLE
 from vibsim.experiment.tables import csv_text
 from vibsim.experiment.yaml.file_content import MOST_BYTES, content_of
+from vibsim.models import MODELS, FormulaField
 from vibsim.models.table import FEWEST, Table
 
 Floats = NDArray[np.float64]
@@ -234,3 +237,35 @@ def _check_spacing(columns: Columns, name: str) -> None:
     raise TableError(
         "table", f"{columns.at(i + 1)}: {rule}", f"the others are {spacing:.10g} apart"
     )
+
+
+def attach(experiment: ExperimentSpec) -> None:
+    """Read the tables of an experiment that was kept without their numbers.
+
+    Raises
+    ------
+    InputError
+        Where one cannot be read, or has other numbers than it had.
+    """
+    folder = experiment.file.parent if experiment.file else Path()
+    for name, spec in experiment.model.tables.items():
+        keys = next(row.table for row in _fields(experiment) if row.name == name)
+        try:
+            table, content = read(folder / spec.file, keys or ("", ""), (spec.place, spec.value))
+        except TableError as error:
+            raise _changed(experiment, name, spec, error.rule, error.hint) from None
+        if table.digest != spec.numbers:
+            rule = "has other numbers than when the experiment was read"
+            raise _changed(experiment, name, spec, rule, "run the experiment again")
+        spec.hold(table, content)
+
+
+def _fields(experiment: ExperimentSpec) -> tuple[FormulaField, ...]:
+    return MODELS[experiment.model.kind].formulas
+
+
+def _changed(
+    experiment: ExperimentSpec, name: str, spec: TableSpec, rule: str, hint: str
+) -> InputError:
+    file = str(experiment.file or experiment.name)
+    return InputError([Fault(file, 0, f"model.{name}.{TABLE}", spec.file, rule, hint)])

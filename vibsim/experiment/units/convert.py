@@ -1,4 +1,4 @@
-"""Numbers with units in the content of a file: replaced by numbers in the units of the model before all checks.
+"""Numbers with units in the content of a file: replaced by numbers in the units of the model before any check.
 
 What follows sees plain numbers alone. Units may stand where a model or the time has a unit: in ``model``, ``initial``,
 ``time`` and the values of ``sweep`` over those. A file without units does not load the registry.
@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import keyword
 import math
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from typing import Any
 
 from vibsim.experiment.faults import Report
-from vibsim.experiment.schema.axes import RULES
 from vibsim.experiment.schema.fields import DECLARED, FORMULA_NOTE, MAX_FORMULAS, TABLE
 from vibsim.experiment.schema.unit_text import NAME, UnitError, factors, split
 from vibsim.experiment.yaml.parse import Path_
@@ -32,27 +30,74 @@ _NO_NUMBERS = ("model.kind", "time.base_steps")
 _TIME = {"end": "s", "base_dt": "s", "periods": "1", "steps_per_period": "1"}
 _STAND_IN = 1.0
 """Takes the place of what is refused, until it is taken out; nothing objects to it."""
-Place = tuple[Any, Any, Path_, str]
-"""A holder of text, the key or position in it, the place in the file, and the unit that is wanted."""
 
 
-@dataclass
-class Conversion:
-    """The content of a file on its way to plain numbers."""
+class Units:
+    """The units of a file, with which its values become plain numbers."""
 
-    report: Report
-    own: dict[str, Any] = field(default_factory=dict)
-    """Units that the file defines."""
-    broken: set[str] = field(default_factory=set)
-    """Names of units whose definition is refused; nothing is said about what is measured in them."""
-    refused: list[Path_] = field(default_factory=list)
+    def __init__(self, data: Mapping[str, Any], report: Report) -> None:
+        self.report = report
+        self.own: dict[str, Any] = {}
+        """Units that the file defines."""
+        self.broken: set[str] = set()
+        """Names of units whose definition is refused; nothing is said about what is measured in them."""
+        section = data.get("model")
+        kind = section.get("kind") if isinstance(section, dict) else None
+        self.wanted = _wanted(MODELS.get(kind) if isinstance(kind, str) else None)
+        if isinstance(data.get("units"), dict):
+            self._define_all(data["units"])
 
-    def refuse(self, path: Path_, error: UnitError, text: object) -> None:
+    @property
+    def defined(self) -> dict[str, str]:
+        """The units that the file defines, in SI base units."""
+        return {name: f"{float(unit.factor):.10g} {unit.text}" for name, unit in self.own.items()}
+
+    def plain(self, path: Path_, written: Any) -> tuple[Any, set[str | int]]:
+        """Return what is written at `path` with numbers in place of those with units.
+
+        Also return the keys or positions in it where something is refused, with a fault; 1 stands in for that. Where it
+        is itself refused, `path` becomes one of the faulty places.
+        """
+        refused: set[str | int] = set()
+        if path[0] not in ("model", "initial", "time", "sweep"):
+            return written, refused
+        entries: Iterable[tuple[str | int, Any]] = ()
+        if isinstance(written, str):
+            is_number = len(path) > 1 and (path[0] != "sweep" or isinstance(path[-1], int))
+            return (self._plain_number(path, written) if is_number else written), refused
+        if isinstance(written, dict):
+            entries = written.items()
+        elif isinstance(written, list) and path[0] == "sweep":
+            # the last one is a count
+            entries = enumerate(written[: 2 if path[-1] in ("linspace", "logspace") else None])
+        others = [(key, value) for key, value in entries if not isinstance(value, float | int)]
+        # with more of them the list is refused
+        if not others or len(others) > MAX_FORMULAS:
+            return written, refused
+        found = written.copy()
+        for key, value in others:
+            found[key], inner = self.plain((*path, key), value)
+            if inner or (*path, key) in self.report.faulty:
+                refused.add(key)
+        return found, refused
+
+    def _plain_number(self, path: Path_, text: str) -> Any:
+        keys = path if path[0] != "sweep" else [key for key in path if "." in str(key)][:1]
+        wanted = self.wanted(".".join(map(str, keys)))
+        if wanted is None:
+            return text
+        try:
+            number = self.number(text, wanted)
+        except UnitError as error:
+            self._refuse(path, error, text)
+            return _STAND_IN
+        return text if number is None else number
+
+    def _refuse(self, path: Path_, error: UnitError, text: object) -> None:
         """Note a fault; nothing more is said about its place."""
         if error.rule:
             self.report.add(path, error.rule, error.hint, text)
         self.report.faulty.add(path)
-        self.refused.append(path)
 
     def number(self, text: str, wanted: str) -> float | None:
         """Return a number with a unit in the `wanted` one; None where it has no unit."""
@@ -68,7 +113,7 @@ class Conversion:
             raise UnitError("")
         return converted(_constant(formula), unit, wanted, self.own)
 
-    def define(self, name: str, value: Any) -> None:
+    def _define(self, name: str, value: Any) -> None:
         """Add a unit of the file.
 
         Raises
@@ -87,60 +132,17 @@ class Conversion:
             raise UnitError("a unit must be greater than 0")
         self.own[name] = Unit(Fraction(repr(factor)), unit.powers)
 
-
-def plain_numbers(data: Mapping[str, Any], report: Report) -> tuple[dict[str, Any], list[Path_]]:
-    """Return `data` without units, and the places whose values are refused; 1 stands in for those.
-
-    The units that the file defines are left as text, in SI base units.
-    """
-    conversion = Conversion(report)
-    found = _copied(data)
-    _define_all(found, conversion)
-    for holder, key, path, wanted in list(_places(found)):
-        value = holder[key]
-        try:
-            number = conversion.number(value, wanted)
-        except UnitError as error:
-            conversion.refuse(path, error, value)
-            number = _STAND_IN
-        if number is not None:
-            holder[key] = number
-    return found, conversion.refused
-
-
-def _copied(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a copy whose numbers with units can be replaced; a list without text is the same list."""
-
-    def copy(value: Any) -> Any:
-        if isinstance(value, float | int | str):
-            return value
-        if isinstance(value, Mapping):
-            return {key: copy(part) for key, part in value.items()}
-        if isinstance(value, list) and not all(isinstance(part, float | int) for part in value):
-            return [copy(part) for part in value]
-        return value
-
-    sections = ("units", "model", "initial", "time", "sweep")
-    return {key: copy(value) if key in sections else value for key, value in data.items()}
-
-
-def _define_all(data: dict[str, Any], conversion: Conversion) -> None:
-    units = data.get("units")
-    if not isinstance(units, dict):
-        return
-    if len(units) > MAX_OWN:
-        rule = f"must not have more than {MAX_OWN} units, has {len(units)}"
-        conversion.refuse(("units",), UnitError(rule), "")
-        return
-    for name, value in units.items():
-        try:
-            conversion.define(str(name), value)
-        except UnitError as error:
-            conversion.refuse(("units", str(name)), error, value)
-            conversion.broken.add(str(name))
-    data["units"] = {
-        name: f"{float(unit.factor):.10g} {unit.text}" for name, unit in conversion.own.items()
-    }
+    def _define_all(self, units: dict[str, Any]) -> None:
+        if len(units) > MAX_OWN:
+            rule = f"must not have more than {MAX_OWN} units, has {len(units)}"
+            self._refuse(("units",), UnitError(rule), "")
+            return
+        for name, value in units.items():
+            try:
+                self._define(name, value)
+            except UnitError as error:
+                self._refuse(("units", name), error, value)
+                self.broken.add(name)
 
 
 def _check_name(name: str) -> None:
@@ -177,29 +179,6 @@ def _constant(value: Any) -> float:
     return number
 
 
-def _places(data: Mapping[str, Any]) -> Iterator[Place]:
-    """Yield every place of a value that may have a unit."""
-    section = data.get("model")
-    kind = section.get("kind") if isinstance(section, dict) else None
-    model = MODELS.get(kind) if isinstance(kind, str) else None
-    wanted = _wanted(model)
-    for name in ("model", "initial", "time"):
-        yield from _values(data.get(name), (name,), name, wanted)
-    sweep = data.get("sweep")
-    if not isinstance(sweep, dict):
-        return
-    for key, written in sweep.items():
-        if key == "zip" and isinstance(written, dict):
-            for inner, values in written.items():
-                yield from _swept(values, ("sweep", key, inner), wanted(inner))
-        elif key == "sample" and isinstance(written, dict):
-            over = written.get("over")
-            for inner, values in over.items() if isinstance(over, dict) else ():
-                yield from _listed(values, ("sweep", key, "over", inner), wanted(inner))
-        else:
-            yield from _swept(written, ("sweep", key), wanted(key))
-
-
 def _wanted(model: Model | None) -> Callable[[str], str | None]:
     """Return what tells the unit of a dotted key; None where the value is no number."""
     units = {f"time.{name}": unit for name, unit in _TIME.items()}
@@ -220,37 +199,3 @@ def _wanted(model: Model | None) -> Callable[[str], str | None]:
         return units.get(key, ANY if is_declared else UNKNOWN)
 
     return wanted
-
-
-def _values(
-    section: Any, path: Path_, key: str, wanted: Callable[[str], str | None]
-) -> Iterator[Place]:
-    """Yield the values of a section, and those of the mappings in it."""
-    for name, value in section.items() if isinstance(section, dict) else ():
-        if isinstance(value, dict):
-            yield from _values(value, (*path, name), f"{key}.{name}", wanted)
-        elif isinstance(value, str):
-            unit = wanted(f"{key}.{name}")
-            if unit is not None:
-                yield section, name, (*path, name), unit
-
-
-def _swept(written: Any, path: Path_, unit: str | None) -> Iterator[Place]:
-    """Yield the values of one key of a sweep, however they are given."""
-    if isinstance(written, dict):
-        for rule in RULES:
-            values = written.get(rule)
-            # the last one is a count
-            last = 2 if rule in ("linspace", "logspace") else None
-            yield from _listed(values, (*path, rule), unit, last)
-    else:
-        yield from _listed(written, path, unit)
-
-
-def _listed(values: Any, path: Path_, unit: str | None, last: int | None = None) -> Iterator[Place]:
-    if unit is None or not isinstance(values, list):
-        return
-    texts = [i for i, value in enumerate(values[:last]) if isinstance(value, str)]
-    # with more of them the list is refused
-    if len(texts) <= MAX_FORMULAS:
-        yield from ((values, i, (*path, i), unit) for i in texts)

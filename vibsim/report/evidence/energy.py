@@ -30,7 +30,7 @@ from vibsim.report.evidence.svg_plot import BAND, INK, Panel, document
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.scheme_checks import ConservesCheck
+    from vibsim.experiment.schema.checks import ConservesCheck
 
 WINDOWS = ((0.125, 0.25), (0.25, 0.5), (0.5, 1.0))
 """In parts of the end, those of m3, m2 and m1."""

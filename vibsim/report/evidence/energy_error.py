@@ -15,7 +15,7 @@ from vibsim.report.evidence.frame import measured
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.scheme_checks import ConservesCheck
+    from vibsim.experiment.schema.checks import ConservesCheck
 
 NAMES = ("m₃", "m₂", "m₁")
 """Of the three means, the earliest first."""

@@ -27,7 +27,7 @@ from vibsim.report.text import words
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.scheme_checks import EqualCheck
+    from vibsim.experiment.schema.checks import EqualCheck
 
 OTHERS = {"exact": "the exact solution", "discrete": "the exact solution of its own steps"}
 WIDTH = 320.0

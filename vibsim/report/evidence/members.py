@@ -28,7 +28,7 @@ from vibsim.report.evidence.svg_plot import Panel, document
 from vibsim.report.text import words
 
 if TYPE_CHECKING:
-    from vibsim.experiment.schema.scheme_checks import ConservesCheck, EqualCheck, StableCheck
+    from vibsim.experiment.schema.checks import ConservesCheck, EqualCheck, StableCheck
 
 MANY = 60
 """Up to so many members each has a dot; of more the range is drawn."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import SEVERITY
-from vibsim.experiment.stored_series import asked
+from vibsim.experiment.storage import asked
 from vibsim.report import choice, data, frame, sweep_layout
 from vibsim.report.data import Member
 from vibsim.report.figures import (

@@ -10,8 +10,7 @@ from vibsim.report.text import words
 
 if TYPE_CHECKING:
     from vibsim.experiment import Check, ConvergesCheck, ValueCheck
-    from vibsim.experiment.schema.checks import Measurement
-    from vibsim.experiment.schema.scheme_checks import ConservesCheck, EqualCheck, StableCheck
+    from vibsim.experiment.schema.checks import ConservesCheck, EqualCheck, Measurement, StableCheck
 
 
 PLACES = ("t", "step", "level", "scheme", "case")

@@ -15,7 +15,7 @@ from vibsim.report.text import words
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
     from vibsim.experiment.data import Scaling, SchemeSpec, TableSpec
-    from vibsim.experiment.schema.axes import Axis
+    from vibsim.experiment.schema.sweep import Axis
 
 
 def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
@@ -143,7 +143,7 @@ def _plain(value: Any) -> str:
 
 def _axis(axis: Axis) -> str:
     """Write an axis of the sweep: its keys with their values, or the points scattered over them."""
-    from vibsim.experiment.schema.axes import Draw
+    from vibsim.experiment.schema.sweep import Draw
 
     if isinstance(axis.values, Draw):
         box = ", ".join(

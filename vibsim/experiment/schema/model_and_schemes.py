@@ -1,10 +1,15 @@
-"""The section ``model`` as it is written: numbers, and formulas where the model takes some."""
+"""The section ``model`` and the entries of ``schemes`` as written: classes made from the registries.
+
+A scheme that chooses its own steps may have a list of tolerances; it stands for as many schemes, each named after its
+tolerance.
+"""
 
 from __future__ import annotations
 
 import keyword
+import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -12,6 +17,7 @@ from pydantic import (
     BeforeValidator,
     Discriminator,
     Field,
+    StrictBool,
     StringConstraints,
     Tag,
     WithJsonSchema,
@@ -19,10 +25,99 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from vibsim.experiment.schema.fields import FORMULA, TABLE, MadeSection, Number, Section, Text, tag
-from vibsim.experiment.schema.scheme_section import class_name
+from vibsim.experiment.schema.fields import (
+    BY_SHAPE,
+    FORMULA,
+    TABLE,
+    Line,
+    MadeSection,
+    Number,
+    Section,
+    Text,
+    number,
+    short,
+    tag,
+)
+from vibsim.experiment.schema.sweep import tolerance_name
 from vibsim.formula import FUNCTIONS
 from vibsim.models import FormulaField, Model
+from vibsim.schemes import AnyOption, Flag, NumberOption, Option, Scheme
+from vibsim.schemes.base import EVENTS
+
+TOLERANCE = "tolerance"
+"""The option that a scheme with steps of its own choice may have several values of."""
+MAX_TOLERANCES = 100
+
+
+def class_name(kind: str) -> str:
+    """Return the name of the class that describes a `kind`."""
+    return kind.title().replace("_", "")
+
+
+def scheme_section(scheme: Scheme) -> type[Section]:
+    """Return the class of an entry that is a mapping."""
+    label = "Name of the scheme in this experiment, if not its kind."
+    fields: dict[str, Any] = {
+        "kind": (Literal[scheme.kind], Field(description=scheme.title)),
+        "label": (Line | None, Field(default=None, description=label)),
+    }
+    for option in scheme.options:
+        row = Field(default=option.default, description=option.description)
+        fields[option.name] = (_type(option, scheme), row)
+    if not scheme.adaptive:
+        words = f"{EVENTS.description}; on models with events only, {EVENTS.default} when left out"
+        fields[EVENTS.name] = (
+            Literal[EVENTS.choices] | None,
+            Field(default=None, description=words),
+        )
+    doc = f"{scheme.title} ({scheme.source})."
+    return create_model(
+        f"{class_name(scheme.kind)}Scheme", __base__=MadeSection, __doc__=doc, **fields
+    )
+
+
+def _type(option: AnyOption, scheme: Scheme) -> Any:
+    if isinstance(option, Option):
+        return Literal[option.choices]
+    if isinstance(option, Flag):
+        return StrictBool
+    ends = {"ge": option.least, "le": option.most}
+    bounds: dict[str, Any] = {name: end for name, end in ends.items() if math.isfinite(end)}
+    value: Any = Annotated[float, Field(**bounds), FORMULA]
+    if not has_tolerances(scheme, option):
+        return value
+    several = Annotated[tuple[value, ...], Field(min_length=1), short(MAX_TOLERANCES)]
+    return Annotated[
+        Annotated[value, Tag(tag("one"))] | Annotated[several, Tag(tag("several"))],
+        Discriminator(_one_or_several),
+    ]
+
+
+def _one_or_several(value: Any) -> str:
+    return tag("several") if isinstance(value, list | tuple) else tag("one")
+
+
+def has_tolerances(scheme: Scheme, option: AnyOption) -> bool:
+    """Tell whether an option of a scheme may be a list of tolerances."""
+    return scheme.adaptive and option.name == TOLERANCE and isinstance(option, NumberOption)
+
+
+def scheme_names(data: Any) -> Iterator[str]:
+    """Yield the names that a list of schemes gives as written, right or wrong."""
+    for item in data if isinstance(data, list) else ():
+        name = item if not isinstance(item, Mapping) else item.get("label") or item.get("kind")
+        if not isinstance(name, str):
+            continue
+        several = item.get(TOLERANCE) if isinstance(item, Mapping) else None
+        if not isinstance(several, list):
+            yield name
+            continue
+        for value in several[:MAX_TOLERANCES]:
+            try:
+                yield tolerance_name(name, number(value))
+            except PydanticCustomError:
+                continue
+
 
 MAX_DECLARED = 50
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -72,29 +167,24 @@ def name_fault(name: str, taken: Mapping[str, str]) -> str:
     return f"'{name}' is {taken[name]}" if name in taken else ""
 
 
-def _shape(value: Any) -> str:
-    return tag("term") if isinstance(value, Mapping | Section) else tag("formula")
-
-
 def _formula_type(model: Model, field: FormulaField) -> Any:
     if field.table is not None:
-        return _formula_or(_table_section(model, field, field.table))
-    if not field.terms:
+        section = _table_section(model, field, field.table)
+    elif field.terms:
+        fields: dict[str, Any] = {
+            word: (
+                Annotated[float, FORMULA] | None,
+                Field(default=None, description=f"b of {text}"),
+            )
+            for word, text in field.terms.items()
+        }
+        name = f"{class_name(model.kind)}{class_name(field.name)}"
+        section = create_model(name, __base__=MadeSection, **fields)
+    else:
         return FormulaText
-    fields: dict[str, Any] = {
-        word: (Annotated[float, FORMULA] | None, Field(default=None, description=f"b of {text}"))
-        for word, text in field.terms.items()
-    }
-    section = create_model(
-        f"{class_name(model.kind)}{class_name(field.name)}", __base__=MadeSection, **fields
-    )
-    return _formula_or(section)
-
-
-def _formula_or(section: Any) -> Any:
     return Annotated[
-        Annotated[FormulaText, Tag(tag("formula"))] | Annotated[section, Tag(tag("term"))],
-        Discriminator(_shape),
+        Annotated[FormulaText, Tag(tag("other"))] | Annotated[section, Tag(tag("mapping"))],
+        BY_SHAPE,
     ]
 
 

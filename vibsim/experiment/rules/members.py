@@ -1,4 +1,8 @@
-"""Tables of an experiment: read where the section names them, and held to what every member asks of them."""
+"""What must hold for every member: its tables are long enough, and what its equation differentiates does not jump.
+
+A derivative of what jumps would leave out an impulse without a word. A voltage that is switched on is the most common
+case: V' vanishes before and behind it, and the current would stay 0.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +16,12 @@ from numpy.typing import NDArray
 
 from vibsim.experiment.data import AnyExperiment, ModelSpec, TableSpec, TimeSpec
 from vibsim.experiment.faults import Report
-from vibsim.experiment.schema.axes import Axis
 from vibsim.experiment.schema.fields import TABLE, FrozenDict, Section
-from vibsim.experiment.sweep.columns import columns
+from vibsim.experiment.schema.sweep import Axis
+from vibsim.experiment.sweep_columns import columns
 from vibsim.experiment.tables.file import TableError, read
-from vibsim.formula import values
+from vibsim.formula import Expression, derivative, parse, put, size, values
+from vibsim.formula.jumps import first_jump
 from vibsim.models import FormulaField, Model, natural_end, tree
 from vibsim.models.table import Table
 
@@ -181,3 +186,52 @@ def _with_met(model: ModelSpec, met: bool) -> ModelSpec:
     """Return a model whose tables say whether their points are met."""
     tables = {name: spec.model_copy(update={"is_met": met}) for name, spec in model.tables.items()}
     return model.model_copy(update={"tables": FrozenDict(tables)})
+
+
+MEMBERS = 64
+"""Members of a sweep that are looked at, evenly spread: a jump is hardly ever there for single ones."""
+WORK = 2**14
+"""Operations of all these members together: of a long formula, fewer members are looked at."""
+WORDS = {1: "derivative", 2: "second derivative"}
+HINTS = {
+    "voltage": "write a steep ramp, V0*(1 + tanh((t - t1)/0.001))/2 say, or begin behind the jump, "
+    "with di_dt larger by it over L",
+    "road": "round it off, or give it as a table, whose spacing does that",
+}
+OTHERS = "write a solution whose value and slope have no jumps"
+
+
+def check_jumps(members: MemberNumbers, formulas: Mapping[str, str], report: Report) -> None:
+    """Refuse formulas that jump, or whose slope does, where the equation has their derivatives."""
+    for row in members.model.formulas:
+        if row.derivatives and row.name in formulas:
+            _check_jumps(row, formulas[row.name], members, report)
+
+
+def _check_jumps(row: FormulaField, text: str, members: MemberNumbers, report: Report) -> None:
+    (name,) = row.names
+    known = [own.name for own in members.model.parameters]
+    formula, along = parse(text, (name, *known)), parse(row.along, ("t", *known))
+    for order in range(row.derivatives):
+        at = _jump(put(formula, name, along), members, along)
+        if at is not None:
+            what = "jumps" if order == 0 else "its slope jumps"
+            rule = (
+                f"{what} near {name} = {at:.6g}, and the equation has its {WORDS[row.derivatives]}"
+            )
+            report.add(("model", row.name), rule, HINTS.get(row.name, OTHERS), text)
+            return
+        formula = derivative(formula, name)
+
+
+def _jump(formula: Expression, members: MemberNumbers, along: Expression) -> float | None:
+    """Return the place of a jump of some member; None where none is found."""
+    most = max(1, min(MEMBERS, WORK // size(formula, WORK)))
+    for parameters, end in members.some(most):
+        numbers = {row.name: parameters[row.key] for row in members.model.parameters}
+        at = first_jump(formula, numbers, end)
+        if at is not None:
+            # halving ends beside 0, not at it
+            at = at if at > 1e-9 * end else 0.0
+            return float(values(along, {**numbers, "t": at}))
+    return None

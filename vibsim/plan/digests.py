@@ -1,10 +1,10 @@
-"""The part of an experiment that a job uses: what its digest covers, and what its file tells of."""
+"""Digests: of an experiment the part that a job uses, which its file tells of too; of a job its files."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from vibsim.plan.cases import columns
@@ -54,3 +54,14 @@ def extrapolated(content: Mapping[str, Any]) -> dict[str, Any]:
 def analysed(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return the part of an experiment in normal form that an analysis depends on and tells of."""
     return {key: value for key, value in content.items() if key not in _NOT_ANALYSED}
+
+
+def digest_of(content: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of `content` as JSON with sorted keys."""
+    text = json.dumps(content, sort_keys=True, allow_nan=False, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def batch_digest(files: Sequence[str]) -> str:
+    """Return the digest of a job from those of its files: that of the file where there is one."""
+    return files[0] if len(files) == 1 else digest_of({"job": "simulate", "files": list(files)})

@@ -1,1 +1,0 @@
-"""Parameter sweeps: keys, values, points, and the numbers of any range of members."""
