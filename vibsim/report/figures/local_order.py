@@ -51,8 +51,8 @@ def draw(
     triples, norm = whole(record, "triple"), record.words("norm").index(TYPICAL_NORM)
     promised = promises(experiment, record, quantity)
     for order, tolerance in promised:
-        ax.axhspan(order - tolerance, order + tolerance, color="#ececec", zorder=0)
-        ax.axhline(order, color="black", linestyle=(0, (4, 3)), linewidth=1.0, zorder=1)
+        ax.axhspan(order - tolerance, order + tolerance, **style.ALLOWED)
+        ax.axhline(order, **style.REFERENCE)
     sound: list[Floats] = []
     stated = False
     seen = [sound_triples(record, quantity, Member(s, case, x)) for s, x in enumerate(schemes)]
@@ -63,14 +63,8 @@ def draw(
             continue
         local = at(record, name, member, norm=norm)
         sound.append(local[good] if any(good) else local)
-        ax.plot(
-            triples,
-            local,
-            **style.look(s),
-            markersize=5,
-            linewidth=1.1,
-        )
-        stated |= _draw_stated(ax, record, quantity, member, norm)
+        ax.plot(triples, local, **style.look(s), markersize=5, linewidth=1.1)
+        stated |= draw_stated(ax, record, quantity, member, norm, style.look(s)["color"])
     ax.set_ylim(*_order_limits(sound, [order for order, _ in promised]))
     if len(schemes) == 1 and len(triples) <= 8:
         for level, order in zip(triples, local, strict=True):
@@ -128,13 +122,14 @@ def draw_each(
     return settled
 
 
-def _draw_stated(ax: Axes, record: Record, quantity: str, member: Member, norm: int) -> bool:
+def draw_stated(
+    ax: Axes, record: Record, quantity: str, member: Member, norm: int, colour: str
+) -> bool:
     """Draw the stated order as a bar over the levels of its window, with its interval; say whether there is one."""
     stated = stated_order(record, quantity, member, norm)
     if stated is None:
         return False
     order, low, high, first, last = stated
-    colour = style.look(member.scheme)["color"]
     ax.fill_between(
         [first, last], [low, low], [high, high], color=colour, alpha=0.18, linewidth=0, zorder=0.5
     )

@@ -5,14 +5,13 @@ Source: pendulum lecture, section 2.5.
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
-from vibsim.report import frame, style
+from vibsim.report import style
 from vibsim.report.choice import promises
 from vibsim.report.data import (
     Floats,
@@ -28,6 +27,7 @@ from vibsim.report.data import (
     whole,
 )
 from vibsim.report.figures import local_order
+from vibsim.report.figures.panels import legend_above, rows_of
 from vibsim.report.style import Picture
 from vibsim.report.text import words
 
@@ -36,9 +36,6 @@ if TYPE_CHECKING:
 
     from vibsim.experiment import Experiment
 
-FONT = 8
-"""Size of the legend [point]."""
-SLOPE: dict[str, Any] = {"color": "black", "linestyle": (0, (4, 3)), "linewidth": 1.0}
 SLOPES: tuple[Any, ...] = ((0, (4, 3)), (0, (1.2, 1.6)), (0, (7, 2, 1.2, 2)), (0, (10, 2)))
 """Dashes of several promised slopes."""
 WILD = 1e4
@@ -50,31 +47,12 @@ def against_step(experiment: Experiment, record: Record, quantity: str, case: in
     schemes = record.words("scheme")
     many = style.crowded(record)
     panel = max(2.2, 0.17 * len(schemes)) if many else 2.2
-    orders = dict.fromkeys(order for order, _ in promises(experiment, record, quantity))
-    told = [*schemes, "level difference", "true error", "predicted round-off"]
-    told += [f"slope {order:g} ({due(record, quantity)})" for order in orders]
-    columns = frame.columns(told, FONT, 0.9 * style.WIDTH)
-    rows = math.ceil(len(told) / columns)
-    height = panel + 0.95 + 0.2 * rows
-    figure = style.canvas(height)
-    low, tall = 0.5 / height, panel / height
-    left, right = (
-        figure.add_axes((0.088, low, 0.365, tall)),
-        figure.add_axes((0.68 if many else 0.555, low, 0.3 if many else 0.425, tall)),
-    )
+    second = (6.1, 2.7) if many else (5.0, 3.8)
+    figure, (left, right) = rows_of(2, [(0.8, 3.3), second], panel, 0.6, 0.5)
     kinds = _draw_norms(left, experiment, record, quantity, case, schemes)
     draw = local_order.draw_each if many else local_order.draw
     is_settled = draw(right, experiment, record, quantity, case, schemes)
-    handles, texts = left.get_legend_handles_labels()
-    figure.legend(
-        handles,
-        texts,
-        loc="lower left",
-        bbox_to_anchor=(0.075, (panel + 0.82) / height),
-        ncols=columns,
-        fontsize=FONT,
-        borderaxespad=0.0,
-    )
+    legend_above(figure, left)
     member = case_name(record, case)
     suffix = f", {member}" if member else ""
     letter = words.symbol(quantity)
@@ -113,7 +91,7 @@ def _caption(
         )
     if is_settled and not many:
         parts.append("The bar is the stated order with its interval, over the levels it rests on.")
-    return " ".join(part for part in parts if part)
+    return style.sentences(*parts)
 
 
 def _draw_norms(
@@ -222,7 +200,7 @@ def _reference(
         ax.plot(
             reach,
             start * (reach / dt[0]) ** order,
-            **SLOPE | ({"linestyle": dashes} if dashes else {}),
+            **style.REFERENCE | ({"linestyle": dashes} if dashes else {}),
             label=label,
         )
     if is_drawn and dashes:

@@ -22,7 +22,14 @@ from vibsim.report.data import (
     unit,
     whole,
 )
-from vibsim.report.figures.panels import decades, explosive, figure_of, panels, stop_at_breakdown
+from vibsim.report.figures.panels import (
+    decades,
+    explosive,
+    figure_of,
+    note,
+    panels,
+    stop_at_breakdown,
+)
 from vibsim.report.style import Picture
 from vibsim.report.text import words
 
@@ -103,13 +110,12 @@ def _draw_solution(ax: Axes, t: Floats, record: Record, quantity: str, member: M
     size = largest(exact) if np.isfinite(exact).all() else 0.0
     if 0.0 < size < max(largest(y) for y, _, _ in drawn) / CUT:
         ax.set_ylim(-CUT * size, CUT * size)
-        note = f"cut off at {CUT:g} times the exact solution"
-        ax.text(0.99, 0.11, note, transform=ax.transAxes, ha="right", fontsize=8.5)
+        note(ax, f"cut off at {CUT:g} times the exact solution", 0.11)
     elif explosive(ranged):
         for line in ax.lines:
             line.set_ydata(style.no_zeros(np.asarray(line.get_ydata(), dtype=np.float64)))
         style.log_axis(ax, "y", *decades(ranged))
-        ax.text(0.99, 0.11, "size, without the sign", transform=ax.transAxes, ha="right")
+        note(ax, "size, without the sign", 0.11)
     else:
         ax.set_ylim(*style.limits(*ranged))
     style.beside(ax)

@@ -77,15 +77,9 @@ def _draw_orders(
 ) -> None:
     promised = promises(experiment, record, quantity)
     for order, tolerance in promised:
-        ax.axhspan(order - tolerance, order + tolerance, color="#ececec", zorder=0)
-        ax.axhline(
-            order,
-            color="black",
-            linestyle=(0, (4, 3)),
-            linewidth=1.0,
-            zorder=1,
-            label=f"{due(record, quantity)}, {order:g} ± {tolerance:g}",
-        )
+        ax.axhspan(order - tolerance, order + tolerance, **style.ALLOWED)
+        text = f"{due(record, quantity)}, {order:g} ± {tolerance:g}"
+        ax.axhline(order, **style.REFERENCE, label=text)
     value, low, high = finest_level.orders(record, quantity)
     for s, scheme in enumerate(record.words("scheme")):
         look = style.look(s) | {"linestyle": "-", "markersize": 4, "linewidth": 0.8}
@@ -163,7 +157,7 @@ def mark_members(ax: Axes, along: Along, values: Floats) -> bool:
             x, y = along.key.values[members], values[s, members]
             grown = np.where(y > high, y, np.where(np.isfinite(y), high, np.nan))
             each = x.size <= MARKED
-            leaves |= frame.mark_leaving(ax, x, grown, style.look(s)["color"], each=each)
+            leaves |= frame.mark_leaving(ax, x, grown, color=style.look(s)["color"], each=each)
     return leaves
 
 

@@ -22,6 +22,7 @@ from vibsim.report.data import (
     power,
     sound_levels,
     sound_pairs,
+    sound_triples,
     time_unit,
     times,
     unit,
@@ -44,7 +45,6 @@ if TYPE_CHECKING:
 
 CURVES = 6
 """Most curves in one panel; more cannot be told apart."""
-TARGET: dict[str, Any] = {"color": "black", "linestyle": (0, (4, 3)), "linewidth": 1.0}
 
 
 EXACT = (
@@ -74,7 +74,7 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
     if ratios:
         _draw_ratios(axes[-2 if orders else -1], t, record, quantity, member, order)
     if orders:
-        good = _good(record, quantity, member)
+        good = sound_triples(record, quantity, member)
         order_panels.draw_orders(axes[-1], t, record, quantity, member, good, _few(good))
     axes[-1].set_xlabel(style.label("t", time_unit(record)))
     first = whole(record, "pair")[0]
@@ -99,7 +99,7 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
     return Picture(
         name=f"differences_{quantity}_{member.stem}",
         title=f"Do the levels agree? {words.title(quantity)}, {member.title}",
-        caption=" ".join(part for part in parts if part),
+        caption=style.sentences(*parts),
         alt=f"Rescaled level differences of {words.name(quantity)} against time for {member.title}"
         + (", with the ratio of successive differences" if ratios else "")
         + (" and the order over time" if orders else ""),
@@ -195,17 +195,11 @@ def _few(sound: list[bool]) -> list[int]:
     return [*kept, *lost]
 
 
-def _good(record: Record, quantity: str, member: Member) -> list[bool]:
-    """Say of every triple whether both of its differences stand above round-off."""
-    above = sound_pairs(record, quantity, member)
-    return [all(above[i : i + 2]) for i in range(len(whole(record, "triple")))]
-
-
 def _draw_ratios(
     ax: Axes, t: Floats, record: Record, quantity: str, member: Member, order: float
 ) -> None:
     levels, count = whole(record, "level"), len(whole(record, "triple"))
-    good = _good(record, quantity, member)
+    good = sound_triples(record, quantity, member)
     chosen = _few(good)
     drawn: list[Floats] = []
     lost = [_lost(record, quantity, member, [i, i + 1, i + 2]) for i in range(count)]
@@ -224,18 +218,11 @@ def _draw_ratios(
             **look,
         )
     if not drawn:
-        ax.text(
-            0.5,
-            0.7,
-            _why_no_ratio(good, lost),
-            transform=ax.transAxes,
-            ha="center",
-            color=style.GREY,
-        )
+        style.remark(ax, _why_no_ratio(good, lost))
     triples = [(levels[i], levels[i + 1], levels[i + 2]) for i in chosen]
     targets = sorted({float(target_ratio(order, triple)) for triple in triples})
     for k, target in enumerate(targets):
-        ax.axhline(target, zorder=1, label="" if k else due(record, quantity), **TARGET)
+        ax.axhline(target, **style.REFERENCE, label="" if k else due(record, quantity))
     ax.set_ylim(*_ratio_limits(drawn, targets))
     ax.set_ylabel("ratio")
     ax.set_title("Ratio of successive differences", fontweight="normal", fontsize=9)
