@@ -307,12 +307,56 @@ def log_limits(*series: Floats, margin: float = 0.08) -> tuple[float, float]:
     return 10.0 ** max(low, math.log10(LEAST)), 10.0 ** min(high, math.log10(MOST))
 
 
+def fit_log_axis(
+    ax: Axes,
+    which: str,
+    *series: Floats,
+    below: float = 0.0,
+    least: float = 0.0,
+    room: float = 3.0,
+    most: int = 7,
+) -> bool:
+    """Make an axis logarithmic over the positive finite values of some series; return whether there are any.
+
+    Parameters
+    ----------
+    below
+        Part of the values of each series that may lie below the axis.
+    least
+        Values below this part of the largest one leave the axis.
+    room
+        Factor between the outermost values and the ends of the axis.
+    most
+        Labelled ticks.
+    """
+    parts = [part[np.isfinite(part) & (part > 0.0)] for part in series]
+    parts = [part for part in parts if part.size]
+    if parts:
+        high = min(max(float(part.max()) for part in parts), LARGEST)
+        low = max(min(float(np.quantile(p, below)) for p in parts), least * high, TINIEST)
+        log_axis(ax, which, low / room, high * room, most)
+    return bool(parts)
+
+
+def spaced(count: int, most: int) -> list[int]:
+    """Choose at most `most` of `count` positions: the first, the last, and even ones between."""
+    return sorted({round(x) for x in np.linspace(0, count - 1, min(most, count))})
+
+
+BESIDE: dict[str, Any] = {
+    "loc": "upper left",
+    "bbox_to_anchor": (1.01, 1.03),
+    "borderaxespad": 0.0,
+}
+"""The place of a legend at the right of its axes."""
+
+
 def beside(ax: Axes, **options: Any) -> None:
     """Put the legend to the right of the axes, where it hides nothing."""
     if not ax.get_legend_handles_labels()[0]:
         ax.text(0.5, 0.5, "no finite value", transform=ax.transAxes, ha="center", color=GREY)
         return
-    ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.03), borderaxespad=0.0, **options)
+    ax.legend(**BESIDE, **options)
 
 
 def remark(ax: Axes, text: str) -> None:

@@ -168,8 +168,7 @@ def _tell_alike(ax: Axes, lines: list[Any], labels: list[str]) -> None:
             lines[i].set_label(text)
     if texts and lines[0].get_label()[:1] == "_":
         handles, words = zip(*texts, strict=True)
-        place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.03)}
-        ax.legend(list(handles), list(words), borderaxespad=0.0, fontsize=7.5, **place)
+        ax.legend(list(handles), list(words), **style.BESIDE, fontsize=7.5)
 
 
 def heights(time: Floats, peak: Floats, trough_time: Floats, trough: Floats) -> Floats:

@@ -11,21 +11,9 @@ import numpy as np
 
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
-from vibsim.report import style
+from vibsim.report import data, style
 from vibsim.report.choice import promises
-from vibsim.report.data import (
-    Floats,
-    Member,
-    at,
-    case_name,
-    due,
-    floor_norm,
-    formal_orders,
-    norm_unit,
-    steps_of,
-    time_unit,
-    whole,
-)
+from vibsim.report.data import Floats, Member
 from vibsim.report.figures import local_order
 from vibsim.report.figures.panels import legend_above, rows_of
 from vibsim.report.style import Picture
@@ -53,13 +41,13 @@ def against_step(experiment: Experiment, record: Record, quantity: str, case: in
     draw = local_order.draw_each if many else local_order.draw
     is_settled = draw(right, experiment, record, quantity, case, schemes)
     legend_above(figure, left)
-    member = case_name(record, case)
+    member = data.case_name(record, case)
     suffix = f", {member}" if member else ""
     letter = words.symbol(quantity)
     return Picture(
         name=f"order_{quantity}_{case}",
         title=f"How fast does the error shrink? {letter}{suffix}",
-        caption=_caption(kinds, is_settled, many, due(record, quantity)),
+        caption=_caption(kinds, is_settled, many, data.due(record, quantity)),
         alt=f"Norm of the level differences of {words.name(quantity)} against the step, and local order against level",
         figure=figure,
     )
@@ -98,19 +86,21 @@ def _draw_norms(
     ax: Axes, experiment: Experiment, record: Record, quantity: str, case: int, schemes: list[str]
 ) -> frozenset[str]:
     """Draw the norms; return what is seen: ``difference``, ``true``, ``slope``, ``floor``."""
-    dt, norm = steps_of(record, case), record.words("norm").index(TYPICAL_NORM)
-    measure = norm_unit(record, quantity, TYPICAL_NORM)
+    dt, norm = data.steps_of(record, case), record.words("norm").index(TYPICAL_NORM)
+    measure = data.norm_unit(record, quantity, TYPICAL_NORM)
     seen: list[Floats] = []
     floors: list[Floats] = []
-    promised = formal_orders(record, quantity)[:, case]
+    promised = data.formal_orders(record, quantity)[:, case]
     for s, scheme in enumerate(schemes):
         if np.isnan(promised[s]):
             # a scheme that chooses its own steps has no error against dt
             continue
         member = Member(s, case, scheme)
         look = style.look(s)
-        difference = style.no_zeros(at(record, f"{quantity}_difference_norm", member, norm=norm))
-        true = style.no_zeros(at(record, f"{quantity}_error_norm", member, norm=norm))
+        difference = style.no_zeros(
+            data.at(record, f"{quantity}_difference_norm", member, norm=norm)
+        )
+        true = style.no_zeros(data.at(record, f"{quantity}_error_norm", member, norm=norm))
         ax.plot(
             dt[: difference.size],
             difference,
@@ -127,7 +117,7 @@ def _draw_norms(
                 markersize=7,
                 markerfacecolor="none",
             )
-        floors.append(style.no_zeros(floor_norm(record, quantity, member, TYPICAL_NORM)))
+        floors.append(style.no_zeros(data.floor_norm(record, quantity, member, TYPICAL_NORM)))
         ax.plot(dt, floors[-1], color=look["color"], linestyle=":", linewidth=1.0)
         seen += [difference, true]
     if not any(np.isfinite(part).any() for part in seen):
@@ -143,7 +133,7 @@ def _draw_norms(
             dt,
             seen,
             order,
-            f"slope {order:g} ({due(record, quantity)})",
+            f"slope {order:g} ({data.due(record, quantity)})",
             SLOPES[k % len(SLOPES)] if len(orders) > 1 else "",
         )
         for k, order in enumerate(orders)
@@ -157,9 +147,9 @@ def _draw_norms(
     }
     found = frozenset(kind for kind, is_seen in kinds.items() if is_seen)
     _explain(ax, found)
-    ax.set_xlabel(style.label("dt", time_unit(record, "dt")))
+    ax.set_xlabel(style.label("dt", data.time_unit(record, "dt")))
     ax.set_ylabel(style.label(f"{TYPICAL_NORM} norm, {words.symbol(quantity)}", measure))
-    _level_axis(ax, dt, whole(record, "level"))
+    _level_axis(ax, dt, data.whole(record, "level"))
     return found
 
 

@@ -76,7 +76,7 @@ def _panels(record: Record, shown: list[Member]) -> list[tuple[str, list[Member]
             (case_name(record, case), [m for m in shown if m.case == case], finest)
             for case in cases
         ]
-    chosen = sorted({round(x) for x in np.linspace(0, finest, min(ACROSS, len(levels)))})
+    chosen = style.spaced(len(levels), ACROSS)
     return [(f"level {levels[i]}", shown, i) for i in chosen]
 
 

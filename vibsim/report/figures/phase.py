@@ -52,7 +52,7 @@ def plane(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     if not math.isfinite(w) or w <= 0.0 or period < SAMPLED * float(t[1] - t[0]):
         return None
     levels = whole(record, "level")
-    chosen = sorted({round(x) for x in np.linspace(0, len(levels) - 1, min(MOST, len(levels)))})
+    chosen = style.spaced(len(levels), MOST)
     columns = [(0.62 + 2.75 * i, 2.35) for i in range(ACROSS)]
     figure, axes = rows_of(len(chosen), columns, 2.35, 0.5, 0.45)
     size = _draw_exact(axes, record, model, case, w, t <= 1.02 * period)

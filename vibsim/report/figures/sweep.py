@@ -125,16 +125,10 @@ def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> tuple
                 dots = look | {"linestyle": "none", "markersize": 4, "markerfacecolor": "white"}
                 line(ax, x, dotted, label=text, **dots)
     leaves = False
-    for values in (
-        np.concatenate([true.ravel(), estimated.ravel()]),
-        np.concatenate([found.true.ravel(), found.estimate.ravel()]),
-    ):
-        # where nothing is bounded all of it makes the range
-        positive = values[np.isfinite(values) & (values > 0)]
-        if positive.size:
-            most = min(float(positive.max()), style.LARGEST)
-            least = max(float(np.quantile(positive, 0.005)), most * 1e-16, style.TINIEST)
-            style.log_axis(ax, "y", least / 3, most * 3)
+    # where nothing is bounded all of it makes the range
+    for values in ((true, estimated), (found.true, found.estimate)):
+        joined = np.concatenate(values, axis=None)
+        if style.fit_log_axis(ax, "y", joined, below=0.005, least=1e-16):
             leaves = mark_members(ax, along, found.best)
             break
     ax.set_ylabel(

@@ -79,8 +79,4 @@ def _ranges(axes: list[Axes], found: list[Line]) -> None:
         high = min(float(errors.max()), 1e3 * float(np.quantile(errors, 0.75)))
         style.log_axis(axes[0], "y", float(errors.min()) / 3.0, 3.0 * high)
     for k, ax in enumerate(axes):
-        work = np.concatenate([line.work[k] for line in found])
-        work = work[np.isfinite(work) & (work > 0.0)]
-        if work.size:
-            style.log_axis(ax, "x", float(work.min()) / 1.5, float(work.max()) * 1.5)
-            style.log_ticks(ax.xaxis, float(work.min()) / 1.5, float(work.max()) * 1.5, 5)
+        style.fit_log_axis(ax, "x", *(line.work[k] for line in found), room=1.5, most=5)
