@@ -7,6 +7,7 @@ from typing import Any
 
 from vibsim import experiment as spec
 from vibsim.analysis import analyse_records, summarise, verdicts
+from vibsim.report.figures import drawing
 from vibsim.simulation import simulate_record
 
 CENTRAL = ["central"]
@@ -36,6 +37,10 @@ def summary(exp: Any, rec: Any, **changes: Any) -> dict[str, Any]:
 
 def plan(exp: Any) -> Any:
     return SimpleNamespace(experiment=exp)
+
+
+def svg(picture: Any) -> str:
+    return drawing.svg(picture.figure, picture.name)
 
 
 def plain(**changes: Any) -> Any:

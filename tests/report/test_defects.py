@@ -11,7 +11,7 @@ import samples
 from vibsim import report
 from vibsim.report import choice, data, style, sweep_layout
 from vibsim.report.data import Member
-from vibsim.report.figures import drawing, maps, order, solution, time
+from vibsim.report.figures import maps, order, solution, time
 from vibsim.report.page import cards
 from vibsim.report.tables import orders as contents
 
@@ -86,7 +86,7 @@ def test_an_empty_panel_says_why_and_a_caption_names_only_what_is_drawn(changes,
     exp = samples.experiment(**changes)
     with style.applied():
         picture = order.against_step(exp, samples.record(exp), "theta", 0)
-        text = drawing.svg(picture)
+        text = samples.svg(picture)
     assert all(note in text for note in notes)
     assert not [word for word in absent if word in picture.caption]
 
@@ -96,7 +96,7 @@ def test_a_caption_names_the_dotted_line_where_it_is_drawn():
     exp = samples.experiment(schemes=[scheme], levels=[10, 12, 14, 16], samples="common")
     with style.applied():
         picture = order.against_step(exp, samples.record(exp), "theta", 0)
-        text = drawing.svg(picture)
+        text = samples.svg(picture)
     assert ("dotted" in picture.caption) == ("predicted round-off" in text)
     assert "dotted" in picture.caption
 

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 import samples
+from drawn import BLUE, bars, borders, curves, dots, texts
 
 from vibsim.experiment.schema.checks import MEASURED
 from vibsim.report.evidence import figure
 from vibsim.report.evidence.frame import short
-from vibsim.report.evidence.svg_plot import LEFT, TOP
-from vibsim.report.style import LOWER
 from vibsim.simulation import simulate_record
 
-WIDTH, HEIGHT = 320.0, 96.0
 SPRING = {
     "model": {"kind": "spring", "w": "2*pi"},
     "initial": {"u": 1.0},
@@ -50,26 +47,6 @@ def run(*checks, **changes):
     return experiment, record, found
 
 
-def bars(svg):
-    """Return the ends and heights of the wide bars [pixel]."""
-    pattern = r'points="([\d.]+),([\d.]+) ([\d.]+),\2" fill="none" stroke="#D55E00"'
-    return [tuple(map(float, row)) for row in re.findall(pattern, svg)]
-
-
-def dots(svg, fill="#0072B2"):
-    """Return the places of dots [pixel]."""
-    pattern = rf'<circle cx="([\d.]+)" cy="([\d.]+)" r="3.4" fill="{fill}"'
-    return [tuple(map(float, row)) for row in re.findall(pattern, svg)]
-
-
-def exponent_at(svg, height):
-    """Return the power of ten at a height, by the ticks of a logarithmic scale."""
-    found = re.findall(r'y="([\d.]+)" text-anchor="end"[^>]*>10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)<', svg)
-    rows = [(float(y) - 4.0, int(text.translate(LOWER))) for y, text in found]
-    slope, start = np.polyfit(*zip(*rows, strict=True), 1)
-    return slope * height + start
-
-
 def test_the_kinds_are_all_there():
     assert set(KINDS) == set(MEASURED)
 
@@ -93,11 +70,8 @@ def test_the_member_that_decides_is_drawn(kind):
 def test_the_means_of_a_linear_drift_climb_by_two():
     check = {"conserves": "energy", "drift": "linear", "level": 1}
     experiment, _, (found,) = run(check)
-    marks = bars(found.svg)
-    ends = [
-        (LEFT + WIDTH * a, LEFT + WIDTH * b)
-        for a, b in ((1 / 8, 1 / 4), (1 / 4, 1 / 2), (1 / 2, 1))
-    ]
+    marks = bars(found)
+    ends = [(10.0 * a, 10.0 * b) for a, b in ((1 / 8, 1 / 4), (1 / 4, 1 / 2), (1 / 2, 1))]
     assert np.array([(a, b) for a, _, b in marks]) == pytest.approx(np.array(ends))
     third, second, first = (y for _, y, _ in marks)
     assert (first - second) / (second - third) == pytest.approx(2.0, rel=0.05)
@@ -119,19 +93,21 @@ def test_a_quadratic_drift_climbs_by_four():
         time=limit,
         levels=[0],
     )
-    third, second, first = (y for _, y, _ in bars(found.svg))
+    third, second, first = (y for _, y, _ in bars(found))
     assert (first - second) / (second - third) == pytest.approx(4.0, rel=0.1)
     assert "a drift like t² has 4" in found.caption
 
 
 def test_a_drift_that_is_round_off_lies_below_its_border():
     _, record, (found,) = run({"conserves": "energy", "drift": "none"}, schemes=["crank_nicolson"])
-    (border,) = map(float, re.findall(r'd="M[\d.]+ ([\d.]+)H[\d.]+"[^>]*dasharray', found.svg))
+    (border,) = borders(found)
     allowed = record["check_check_1_round_off"][0, 0] / record["energy_initial"][0, 0]
-    assert exponent_at(found.svg, border) == pytest.approx(np.log10(allowed), abs=0.05)
-    (curve,) = re.findall(r'points="([^"]+)" fill="none" stroke="#0072B2"', found.svg)
-    assert min(float(pair.split(",")[1]) for pair in curve.split()) > border
-    assert bars(found.svg) == []
+    assert border == allowed
+    (curve,) = curves(found, BLUE)
+    assert np.nanmax(curve.get_ydata()) < border
+    low, high = found.figure.axes[0].get_ylim()
+    assert low < np.nanmax(curve.get_ydata()) < border < high
+    assert bars(found) == []
     assert "within the round-off of this run" in found.caption
 
 
@@ -139,8 +115,10 @@ def test_a_bounded_error_stays_at_the_dashed_line():
     _, _, (found,) = run(
         {"conserves": "energy", "drift": "bounded"}, schemes=["central"], levels=[1, 2]
     )
-    heights = [y for _, y, _ in bars(found.svg)]
-    assert max(heights) - min(heights) < 1.0
+    heights = [y for _, y, _ in bars(found)]
+    low, high = found.figure.axes[0].get_ylim()
+    # less than anyone sees: a hundredth of the frame
+    assert max(heights) - min(heights) < 0.01 * (high - low)
     assert "no growth" in found.caption
 
 
@@ -149,7 +127,7 @@ def test_an_exponential_drift_is_a_line_on_a_logarithmic_scale():
         {"conserves": "energy", "drift": "bounded"}, schemes=["forward_euler"], levels=[0, 1]
     )
     assert "by the factor" in found.caption
-    assert re.search(r">10[⁰¹²³⁴⁵⁶⁷⁸⁹]+<", found.svg)
+    assert found.figure.axes[0].get_yscale() == "log"
 
 
 def test_a_run_too_short_for_a_drift_says_so():
@@ -166,12 +144,12 @@ def test_the_difference_is_marked_where_it_is_largest():
     distance = np.abs(level["u"][0, 0] - level["u_exact"][0])
     assert np.nanmax(record["check_check_1_distance_over_time"]) == distance.max()
     assert distance.max() == record["check_check_1_distance"][0, 0]
-    ((x, y),) = dots(found.svg)
-    place = LEFT + WIDTH * np.argmax(distance) / (distance.size - 1)
-    assert x == pytest.approx(place, abs=WIDTH / 240 / 2)
-    assert exponent_at(found.svg, y) == pytest.approx(np.log10(distance.max()), abs=0.05)
-    (border,) = map(float, re.findall(r'd="M[\d.]+ ([\d.]+)H[\d.]+"[^>]*dasharray', found.svg))
-    assert exponent_at(found.svg, border) == pytest.approx(-8.0, abs=0.05)
+    ((x, y),) = dots(found, BLUE)
+    place = 10.0 * np.argmax(distance) / (distance.size - 1)
+    assert x == pytest.approx(place, abs=10.0 / 240 / 2)
+    assert y == distance.max()
+    assert borders(found) == [1e-8]
+    assert found.figure.axes[0].get_yscale() == "log"
     assert "times the 1·10⁻⁸ that is allowed" in found.caption
 
 
@@ -183,7 +161,7 @@ def test_a_long_run_keeps_its_largest_difference():
         np.nanmax(record["check_check_1_distance_over_time"])
         == record["check_check_1_distance"][0, 0]
     )
-    assert len(dots(found.svg)) == 1
+    assert len(dots(found)) == 1
 
 
 def test_two_that_are_the_same_have_words_and_no_picture():
@@ -199,16 +177,16 @@ def test_w_dt_is_marked_beside_the_limit():
     checks = [{"stable": False, "level": 0}, {"stable": True}]
     _, _, (unstable, stable) = run(*checks, schemes=["central"], time=time)
     for found, beyond, judged in ((unstable, True, 0), (stable, False, 3)):
-        steps, size, growth = dots(found.svg)
-        limit, border, _ = (
-            float(y) for y in re.findall(r'd="M[\d.]+ ([\d.]+)H[\d.]+"[^>]*dasharray', found.svg)
-        )
-        assert (steps[1] < limit) == beyond
-        assert (size[1] < border) == beyond
-        assert steps[0] == pytest.approx(LEFT + 150.0 * (judged + 0.5) / 4, abs=0.1)
-        assert len(dots(found.svg, "white")) == 9
+        (steps,), (size,), (growth,) = (dots(found, BLUE, i) for i in range(3))
+        limit, border, _ = borders(found)
+        assert limit == 2.0
+        assert (steps[1] > limit) == beyond
+        assert (size[1] > border) == beyond
+        assert steps[0] == judged
+        assert len(dots(found, "white")) == 9
         # measured and predicted are one
-        assert bars(found.svg)[judged][1] == pytest.approx(growth[1], abs=0.2)
+        low, high = found.figure.axes[2].get_ylim()
+        assert bars(found)[judged][1] == pytest.approx(growth[1], abs=0.002 * (high - low))
     assert "is beyond the limit 2;" in unstable.caption
     assert "is below the limit 2;" in stable.caption
 
@@ -218,7 +196,7 @@ def test_growth_that_refinement_removes_is_told():
     assert "grows at every step" in found.caption
     assert "falls to less than half from level 0 to 1" in found.caption
     # without a limit there are two panels
-    assert found.svg.count("<g ") == 2
+    assert len(found.figure.axes) == 2
 
 
 def test_at_the_limit_the_size_decides():
@@ -237,7 +215,7 @@ def test_a_prediction_for_a_nonlinear_model_is_that_of_small_oscillations():
     pendulum = {"model": {"kind": "pendulum"}, "initial": {"theta": 1.0}, "time": {"end": 40.0}}
     _, _, (found,) = run({"stable": True}, schemes=["central"], levels=[6, 7], **pendulum)
     assert "predicted for small oscillations" in found.caption
-    assert len(bars(found.svg)) == 1
+    assert len(bars(found)) == 1
 
 
 def test_a_run_that_breaks_down_is_drawn_up_to_there():
@@ -279,22 +257,23 @@ def test_without_series_the_members_are_drawn(lean, kind, count):
     fields = ("window_means", "distance_over_time", "value_by_level")
     assert not any(name.endswith(fields) for name in record.variables)
     assert "size_over_exact" not in record
-    assert len(dots(found.svg)) == 1
-    assert len(dots(found.svg, "white")) == (count if count == 5 else 0)
+    assert len(dots(found, BLUE)) == 1
+    assert len(dots(found, "white")) == (count if count == 5 else 0)
     assert f"all {count} members, of which no series are kept" in found.caption
 
 
 def test_members_on_a_grid_are_numbered(lean):
     sweep = {"initial.u": [0.5, 1.0], "model.w": [1.0, 2.0]}
     _, _, (found,) = run({"stable": True}, sweep=sweep, samples="auto")
-    assert "number of the member" in found.svg
+    assert "number of the member" in texts(found)
 
 
 def test_members_that_are_spread_over_decades_have_a_logarithmic_axis(lean):
     sweep = {"initial.u": {"logspace": [1e-3, 1e3, 7]}}
     _, _, (found,) = run(KINDS["equal"], sweep=sweep, samples="auto")
-    white = [x for x, _ in dots(found.svg, "white")]
-    assert np.diff(white) == pytest.approx(np.diff(white)[0], abs=0.15)
+    white = [x for x, _ in dots(found, "white")]
+    assert found.figure.axes[0].get_xscale() == "log"
+    assert np.diff(np.log(white)) == pytest.approx(np.diff(np.log(white))[0], abs=1e-9)
 
 
 @pytest.mark.parametrize("kind", BEHAVIOUR)
@@ -307,6 +286,8 @@ def test_a_single_run_without_series_says_why_there_is_no_picture(lean, kind):
 def test_the_frame_holds_every_mark():
     for kind in BEHAVIOUR:
         _, _, (found,) = run(KINDS[kind])
-        for x, y in dots(found.svg):
-            assert LEFT <= x <= LEFT + WIDTH
-            assert TOP <= y <= TOP + HEIGHT
+        for i, ax in enumerate(found.figure.axes):
+            (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+            for x, y in dots(found, axes=i):
+                assert left <= x <= right
+                assert low <= y <= high

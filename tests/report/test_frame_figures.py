@@ -12,8 +12,20 @@ from matplotlib.text import Text
 
 from vibsim.report import frame, style, sweep_layout
 from vibsim.report.data import Member
-from vibsim.report.figures import energy, extrema, gallery, order, period, sweep, theory, time, work
+from vibsim.report.figures import (
+    drawing,
+    energy,
+    extrema,
+    gallery,
+    order,
+    period,
+    sweep,
+    theory,
+    time,
+    work,
+)
 from vibsim.report.figures.panels import Curve
+from vibsim.report.tables.work import lines
 
 TEXT = ["forward_euler", "backward_euler", "crank_nicolson", "euler_cromer", "central"]
 MANY = [
@@ -77,7 +89,7 @@ def words_of(figure):
 
 
 def drawn_outside(figure):
-    """Return the words that a saved figure draws beyond its border."""
+    """Return the words that a figure draws beyond what is saved of it."""
     seen = []
     plain = Text.draw
 
@@ -88,7 +100,7 @@ def drawn_outside(figure):
 
     with patch.object(Text, "draw", draw):
         figure.canvas.draw()
-    box = figure.bbox
+    box = drawing.box(figure).transformed(figure.dpi_scale_trans)
     return [
         text
         for text, at in seen
@@ -199,9 +211,9 @@ def test_a_mark_stands_where_a_curve_leaves():
     ax = figure.add_axes((0.1, 0.1, 0.8, 0.8))
     ax.set(xlim=(0.0, 4.0), ylim=(0.0, 1.0))
     x = np.arange(5.0)
-    assert frame.mark_leaving(ax, x, np.array([0.5, 0.5, 1.5, 3.0, np.nan]), "black")
+    assert frame.mark_leaving(ax, x, np.array([0.5, 0.5, 1.5, 3.0, np.nan]), color="black")
     assert [line.get_xdata().tolist() for line in ax.lines] == [[1.5]]
-    assert not frame.mark_leaving(ax, x, np.full(5, 0.5), "black")
+    assert not frame.mark_leaving(ax, x, np.full(5, 0.5), color="black")
 
 
 def test_the_legend_of_work_and_precision_has_a_name_for_every_symbol():
@@ -210,7 +222,10 @@ def test_the_legend_of_work_and_precision_has_a_name_for_every_symbol():
     with style.applied():
         figure = work.precision(exp, record, 0).figure
         figure.draw_without_rendering()
-    for text in figure.legends[0].get_texts():
+    (legend,) = figure.legends
+    names = {line.name for line in lines(exp, record, 0)}
+    assert {text.get_text() for text in legend.get_texts()} >= names
+    for text in legend.get_texts():
         box = text.get_window_extent()
         assert figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1, text.get_text()
 

@@ -17,10 +17,10 @@ from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import REASONS
 from vibsim.report import choice, style, sweep_layout
 from vibsim.report.data import Member
-from vibsim.report.figures import drawing, time
 from vibsim.report.figures import maps as figures_map
 from vibsim.report.figures import order as figures_order
 from vibsim.report.figures import sweep as figures_sweep
+from vibsim.report.figures import time
 from vibsim.report.page import cards
 from vibsim.report.text import reasons
 
@@ -322,7 +322,7 @@ def test_every_promised_order_has_its_reference_and_its_tolerance():
     record = promising(samples.record(exp), 2, 1)
     assert choice.promises(exp, record, "theta") == [(1.0, 0.1), (2.0, 0.3)]
     with style.applied():
-        text = drawing.svg(figures_order.against_step(exp, record, "theta", 0))
+        text = samples.svg(figures_order.against_step(exp, record, "theta", 0))
     assert "slope 1 (promised)" in text
     assert "slope 2 (promised)" in text
 
@@ -332,8 +332,18 @@ def test_one_promise_of_several_schemes_is_drawn_once():
     record = samples.record(exp)
     assert choice.promises(exp, record, "theta") == [(2.0, 0.1)]
     with style.applied():
-        text = drawing.svg(figures_order.against_step(exp, record, "theta", 0))
+        text = samples.svg(figures_order.against_step(exp, record, "theta", 0))
     assert text.count("slope 2 (promised)") == 1
+
+
+PANELS = [
+    "Verdict",
+    "Order against the promised one",
+    "Error bar of the order",
+    "Levels that the order rests on",
+    "Error on level 10",
+    "Can the estimate be trusted?",
+]
 
 
 def test_a_sweep_shows_every_promise_and_the_map_is_relative_to_it():
@@ -343,13 +353,14 @@ def test_a_sweep_shows_every_promise_and_the_map_is_relative_to_it():
     with style.applied():
         keys = sweep_layout.keys(record)
         along, grid = sweep_layout.along_of(keys), sweep_layout.grid_of(keys)
-        text = drawing.svg(figures_sweep.orders(exp, record, along, "theta"))
+        text = samples.svg(figures_sweep.orders(exp, record, along, "theta"))
         maps = [figures_map.verdicts(exp, record, grid, "theta", s) for s in (0, 1)]
     assert "promised, 1 ± 0.1" in text
     assert "promised, 2 ± 0.3" in text
     for picture, label in zip(maps, ("order of θ − 2", "order of θ − 1"), strict=True):
-        panel, bar = picture.figure.axes[1:3]
-        assert bar.get_xlabel() == label
+        panel, bars = picture.figure.axes[1], picture.figure.axes[len(PANELS) :]
+        assert [panel.get_title(loc="left") for panel in picture.figure.axes[:6]] == PANELS
+        assert bars[0].get_xlabel() == label
         assert np.abs(panel.collections[0].get_array()).max() < 0.2
 
 

@@ -85,7 +85,7 @@ def documents():
     record = samples.record(exp)
     with style.applied():
         return [
-            drawing.svg(time.overlay(record, "theta", Member(0, 0, "central"))) for _ in range(2)
+            samples.svg(time.overlay(record, "theta", Member(0, 0, "central"))) for _ in range(2)
         ]
 
 
@@ -123,6 +123,6 @@ def test_a_name_with_markup_stays_text_in_a_figure():
     with style.applied():
         from vibsim.report.figures import order
 
-        text = drawing.svg(order.against_step(exp, record, "theta", 0))
+        text = samples.svg(order.against_step(exp, record, "theta", 0))
     assert "<script" not in text
     ElementTree.fromstring(text)

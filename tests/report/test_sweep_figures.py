@@ -17,7 +17,7 @@ from vibsim.core.vocabulary import REASONS
 from vibsim.models import MODELS
 from vibsim.report import finest_level, style, sweep_layout
 from vibsim.report.figures import cloud as figures_cloud
-from vibsim.report.figures import drawing, gallery, map_panels, maps, separatrix, spread
+from vibsim.report.figures import gallery, map_panels, maps, separatrix, spread
 from vibsim.report.figures import order as figures_order
 from vibsim.report.figures import sweep as figures_sweep
 from vibsim.report.sweep_layout import Key
@@ -153,7 +153,7 @@ def test_maps_show_verdict_order_error_and_the_separatrix(across):
     with style.applied():
         picture = maps.verdicts(exp, record, grid, "theta", 0)
         motion = maps.motion(exp, record, grid, 0)
-        text = drawing.svg(picture) + drawing.svg(motion)
+        text = samples.svg(picture) + samples.svg(motion)
     titles = [ax.get_title(loc="left") for ax in (*picture.figure.axes, *motion.figure.axes)]
     for title in (
         "Verdict", "Order against the promised one", "Error bar of the order", "Levels that the order rests on",
@@ -281,7 +281,7 @@ def test_words_that_are_swept_are_written_on_their_axis():
     ]
     grid = sweep_layout.grid_of(sweep_layout.keys(record))
     with style.applied():
-        text = drawing.svg(maps.verdicts(exp, record, grid, "theta", 0))
+        text = samples.svg(maps.verdicts(exp, record, grid, "theta", 0))
         figures_sweep.orders(exp, record, along, "theta")
     assert "first_order" in text
     assert "order of θ − 2" in text

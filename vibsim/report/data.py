@@ -195,6 +195,12 @@ def promised_text(record: Record, quantity: str, scheme: int) -> str:
     return f"{found[0]:g}".replace("inf", "∞") if found.size == 1 else due(record, quantity)
 
 
+def of_several(record: Record, scheme: int) -> str:
+    """Return the name of a scheme behind a comma, for a title; empty where there is one scheme."""
+    names = record.words("scheme")
+    return f", {names[scheme]}" if len(names) > 1 else ""
+
+
 def is_lean(record: Record) -> bool:
     """Say whether no series over time are stored (see `vibsim.experiment.storage`)."""
     return record.attrs.get("storage") == "lean"

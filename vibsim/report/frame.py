@@ -1,4 +1,4 @@
-"""What belongs within the frame of a figure, what leaves it, and that no word does."""
+"""What belongs within the frame of a figure, and what leaves it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from vibsim.report.data import Floats, Member, at, floor_norm, known, largest, p
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 WILD = 1e6
 """What exceeds the size of the motion by this factor grows without bound, and gives no frame its range."""
@@ -26,8 +25,6 @@ UNLIKE = "no longer proportional"
 NO_VALUE = "no value"
 ALIKE = 0.004
 """Curves that differ by less than this part of the frame's height look the same."""
-MARGIN = 0.05
-"""Between words and the border of a figure [inch]."""
 LEAVING = "Triangles at an edge: values beyond the frame."
 """For captions."""
 
@@ -88,7 +85,7 @@ def why_lost(
     return ROUND_OFF if near.all() else UNLIKE
 
 
-def mark_leaving(ax: Axes, x: Floats, y: Floats, colour: Any, *, each: bool = False) -> bool:
+def mark_leaving(ax: Axes, x: Floats, y: Floats, *, each: bool = False, **look: Any) -> bool:
     """Mark at the edges where values leave the frame (or, of points, each that is beyond); say whether any does."""
     low, high = ax.get_ylim()
     found = False
@@ -107,8 +104,8 @@ def mark_leaving(ax: Axes, x: Floats, y: Floats, colour: Any, *, each: bool = Fa
             linestyle="none",
             marker=marker,
             markersize=5,
-            color=colour,
             zorder=6,
+            **look,
         )
     return found
 
@@ -142,55 +139,3 @@ def same_as(curves: list[Floats], height: float) -> list[int | None]:
                 break
         found.append(match)
     return found
-
-
-def columns(texts: list[str], size: float, room: float, handle: float = 3.4) -> int:
-    """Return how many columns a legend may have within `room` [inch], by the widths of its words in that size."""
-    from matplotlib.font_manager import FontProperties
-    from matplotlib.textpath import TextPath
-
-    font = FontProperties(family="DejaVu Sans")
-    em = size / 72.0
-    widths = [
-        TextPath((0, 0), text.replace("\N{ZERO WIDTH SPACE}", ""), size=size, prop=font)
-        .get_extents()
-        .width
-        / 72.0
-        for text in texts
-    ]
-    for count in range(len(texts), 1, -1):
-        # entries run down the columns, the first of which are longer by one
-        parts = np.array_split(np.array(widths), count)
-        total = sum(float(part.max()) + (handle + 0.8) * em for part in parts)
-        if total + 2.0 * em * (count - 1) + 0.8 * em <= room:
-            return count
-    return 1
-
-
-def hold_words(figure: Figure) -> None:
-    """Widen a figure where words would leave it: axes keep their size, and what hangs on them its place."""
-    box = figure.get_tightbbox()
-    width, height = (float(x) for x in figure.get_size_inches())
-    left, bottom = (max(0.0, MARGIN - x) if x < 0.0 else 0.0 for x in (box.x0, box.y0))
-    right = box.x1 - width + MARGIN if box.x1 > width else 0.0
-    top = box.y1 - height + MARGIN if box.y1 > height else 0.0
-    if left + right + bottom + top == 0.0:
-        return
-    wide, tall = width + left + right, height + bottom + top
-
-    def moved(x: float, y: float) -> tuple[float, float]:
-        return (x * width + left) / wide, (y * height + bottom) / tall
-
-    places = [(ax, ax.get_position(original=True)) for ax in figure.axes]
-    anchors = [
-        (legend, legend.get_bbox_to_anchor().transformed(figure.transFigure.inverted()))
-        for legend in figure.legends
-    ]
-    figure.set_size_inches(wide, tall)
-    for ax, place in places:
-        (x0, y0), (x1, y1) = moved(place.x0, place.y0), moved(place.x1, place.y1)
-        ax.set_position((x0, y0, x1 - x0, y1 - y0))
-    for legend, anchor in anchors:
-        legend.set_bbox_to_anchor(moved(anchor.x0, anchor.y0), transform=figure.transFigure)
-    for text in figure.texts:
-        text.set_position(moved(*text.get_position()))

@@ -55,6 +55,15 @@ REASON_COLOURS = {
     "non_finite": "#000000",
 }
 """Greens, yellows and reds by status, dark to light within each: the reason of a verdict on a map."""
+REFERENCE: dict[str, Any] = {
+    "color": "black",
+    "linestyle": (0, (4, 3)),
+    "linewidth": 1.0,
+    "zorder": 1,
+}
+"""Of what is promised or exact."""
+ALLOWED: dict[str, Any] = {"color": "#ececec", "zorder": 0}
+"""Of a band of what a tolerance allows."""
 MISSING = "#d4d4d4"
 """Colour of what has no value."""
 WIDTH = 9.0
@@ -75,6 +84,8 @@ _RC: dict[Any, Any] = {
     "axes.titlelocation": "left",
     "axes.titlesize": 9.5,
     "axes.titleweight": "bold",
+    # a place of its own spares a search for one, a third of the time that an axis takes
+    "axes.titley": 1.0,
     "font.family": ["DejaVu Sans"],
     "font.size": 9.0,
     "grid.color": "#e6e6e6",
@@ -194,6 +205,16 @@ def power(exponent: int) -> str:
     return "10" + str(exponent).translate(RAISE)
 
 
+def sentences(*parts: str) -> str:
+    """Join the sentences of a caption that are there."""
+    return " ".join(part for part in parts if part)
+
+
+def positive(values: Floats) -> Floats:
+    """Return values with NaN for what is not finite and positive."""
+    return np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
+
+
 def scale(*series: Floats) -> int:
     """Return the exponent of ten that an axis should carry; 0 where plain numbers read well."""
     values = [np.abs(part[np.isfinite(part)]) for part in series]
@@ -215,27 +236,38 @@ LEAST, MOST = 1e-290, 1e290
 """What lies beyond is drawn at the edge: no axis has room for more decades of a float."""
 
 
-def log_axis(ax: Axes, which: str, low: float, high: float) -> None:
-    """Make an axis logarithmic from `low` to `high`, with at most about eight labelled ticks in Unicode."""
+def log_axis(ax: Axes, which: str, low: float, high: float, most: int = 7) -> None:
+    """Make an axis logarithmic from `low` to `high`, with about `most` labelled ticks in Unicode."""
     low, high = _within(low, high)
     # the limits first: a margin around values near the end of the floats would overflow
     getattr(ax, f"set_{which}lim")(low, high)
     getattr(ax, f"set_{which}scale")("log")
     getattr(ax, f"set_{which}lim")(low, high)
-    log_ticks(getattr(ax, f"{which}axis"), low, high)
+    log_ticks(getattr(ax, f"{which}axis"), low, high, most)
+
+
+DECADES = (1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300)
+"""Between ticks of a logarithmic axis."""
 
 
 def log_ticks(axis: Any, low: float, high: float, most: int = 7) -> None:
-    """Put ticks from `low` to `high` on a logarithmic axis (or colour bar): powers of ten, or 1, 2, 5 of each."""
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+    """Put ticks from `low` to `high` on a logarithmic axis (or colour bar).
+
+    They are powers of ten; up to 2 or 3 decades 1, 2 and 5 of each; where these would be fewer than two round numbers.
+    """
+    from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 
     low, high = _within(low, high)
     bottom, top = math.floor(math.log10(low)), math.ceil(math.log10(high))
-    step = max(1, math.ceil((top - bottom) / most))
-    ticks = [10.0**e for e in range(bottom, top + 1, step)]
-    if math.log10(high / low) < 2.2 * most / 7:
+    wide = math.log10(high) - math.log10(low)
+    step = next(k for k in DECADES if most * k >= wide)
+    ticks = [10.0**e for e in range(bottom, top + 1) if e % step == 0]
+    if wide < 2.2 * max(most, 5) / 7:
         ticks = [m * 10.0**e for e in range(bottom, top + 1) for m in (1, 2, 5)]
-    axis.set_major_locator(FixedLocator([x for x in ticks if low <= x <= high]))
+    shown = [x for x in ticks if low <= x <= high]
+    if len(shown) < 2:
+        shown = list(MaxNLocator(3, steps=[1, 2, 5, 10]).tick_values(low, high))
+    axis.set_major_locator(FixedLocator(shown))
     axis.set_minor_locator(NullLocator())
     plain = low >= 0.005 and high <= 2000
     axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}" if plain else log_tick(x)))
@@ -267,12 +299,64 @@ def limits(*series: Floats, margin: float = 0.08) -> tuple[float, float]:
     return low - room, high + room
 
 
+def log_limits(*series: Floats, margin: float = 0.08) -> tuple[float, float]:
+    """Return limits of a logarithmic axis that hold every finite positive value."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        low, high = limits(*(np.log10(part[part > 0.0]) for part in series), margin=margin)
+    # what a power of ten would overflow at lies beyond every axis
+    return 10.0 ** max(low, math.log10(LEAST)), 10.0 ** min(high, math.log10(MOST))
+
+
+def fit_log_axis(
+    ax: Axes,
+    which: str,
+    *series: Floats,
+    below: float = 0.0,
+    least: float = 0.0,
+    room: float = 3.0,
+    most: int = 7,
+) -> bool:
+    """Make an axis logarithmic over the positive finite values of some series; return whether there are any.
+
+    Parameters
+    ----------
+    below
+        Part of the values of each series that may lie below the axis.
+    least
+        Values below this part of the largest one leave the axis.
+    room
+        Factor between the outermost values and the ends of the axis.
+    most
+        Labelled ticks.
+    """
+    parts = [part[np.isfinite(part) & (part > 0.0)] for part in series]
+    parts = [part for part in parts if part.size]
+    if parts:
+        high = min(max(float(part.max()) for part in parts), LARGEST)
+        low = max(min(float(np.quantile(p, below)) for p in parts), least * high, TINIEST)
+        log_axis(ax, which, low / room, high * room, most)
+    return bool(parts)
+
+
+def spaced(count: int, most: int) -> list[int]:
+    """Choose at most `most` of `count` positions: the first, the last, and even ones between."""
+    return sorted({round(x) for x in np.linspace(0, count - 1, min(most, count))})
+
+
+BESIDE: dict[str, Any] = {
+    "loc": "upper left",
+    "bbox_to_anchor": (1.01, 1.03),
+    "borderaxespad": 0.0,
+}
+"""The place of a legend at the right of its axes."""
+
+
 def beside(ax: Axes, **options: Any) -> None:
     """Put the legend to the right of the axes, where it hides nothing."""
     if not ax.get_legend_handles_labels()[0]:
         ax.text(0.5, 0.5, "no finite value", transform=ax.transAxes, ha="center", color=GREY)
         return
-    ax.legend(loc="upper left", bbox_to_anchor=(1.01, 1.03), borderaxespad=0.0, **options)
+    ax.legend(**BESIDE, **options)
 
 
 def remark(ax: Axes, text: str) -> None:

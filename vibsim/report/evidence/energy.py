@@ -6,7 +6,6 @@ a drift ``a + b t^k`` has ``(m1 - m2)/(m2 - m3) = 2^k``.
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,116 +13,71 @@ import numpy as np
 from vibsim.core.record import Record
 from vibsim.report import style
 from vibsim.report.data import Floats, Member, at, time_unit, unit
+from vibsim.report.evidence import frame
 from vibsim.report.evidence.energy_caption import dashed, told
 from vibsim.report.evidence.energy_error import NAMES, POWERS, EnergyError, energy_error
-from vibsim.report.evidence.frame import (
-    COLOUR,
-    SECOND,
-    Picture,
-    log_ticks,
-    logarithms,
-    measured,
-    over_time,
-    ticks,
-)
-from vibsim.report.evidence.svg_plot import BAND, INK, Panel, document
+from vibsim.report.evidence.frame import Picture, measured
 
 if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
+    from matplotlib.axes import Axes
+
     from vibsim.experiment.schema.checks import ConservesCheck
 
 WINDOWS = ((0.125, 0.25), (0.25, 0.5), (0.5, 1.0))
 """In parts of the end, those of m3, m2 and m1."""
 LEAST = 1e-4
 """Part of the time before which a logarithmic scale need not show the error."""
-WIDTH = 320.0
 
 
-def picture(
-    experiment: Experiment, record: Record, check: ConservesCheck, name: str, member: Member
-) -> Picture | None:
+def picture(record: Record, check: ConservesCheck, name: str, member: Member) -> Picture | None:
     """Draw how the largest energy error so far grows, beside the drift that a check asks for."""
     series = f"{check.about}_running_max"
     if series not in record:
-        return Picture("", f"{member.title}: the largest energy error so far is not stored.")
+        return Picture(f"{member.title}: the largest energy error so far is not stored.")
     level = int(measured(record, name, "level", member.scheme, member.case))
     first = abs(float(at(record, "energy_initial", member)))
-    found = energy_error(experiment, record, check, name, member, first or 1.0, level)
-    if not (np.isfinite(found.running) & (found.running > 0.0)).any():
-        return _nothing(found, member)
+    found = energy_error(record, check, name, member, first or 1.0, level)
+    if not frame.usable(found.running).size:
+        nothing = f"{member.title}: the energy error is 0 at every step; there is nothing to draw."
+        return Picture(nothing) if np.any(found.running == 0.0) else None
     label = "largest energy error so far" + (" / E(0)" if first else "")
     by = " by [D₂ₜu]" if check.conserves.endswith("_d2t") else ""
     title = style.label(label + by, "" if first else unit(record, "energy_deviation_max_abs"))
-    panel = _panel(found)
-    scale = log_ticks(*panel.y) if found.is_log else ticks(*panel.y)
-    seconds = style.label("t", time_unit(record))
-    panel.frame(title, seconds, ticks(*panel.x, 5), scale)
+    figure = style.canvas(1.0)
+    _draw(frame.panel(figure, title, style.label("t", time_unit(record)), frame.WIDE), found)
     caption = f"{member.title}, level {level}: {told(found)} {dashed(found)}".strip()
-    return Picture(document([panel], title), caption)
+    return Picture(caption, title, figure)
 
 
-def _nothing(found: EnergyError, member: Member) -> Picture | None:
-    """Say that there is no error to draw, where that was found."""
-    if not np.any(found.running == 0.0):
-        return None
-    return Picture(
-        "", f"{member.title}: the energy error is 0 at every step; there is nothing to draw."
-    )
-
-
-def _panel(found: EnergyError) -> Panel:
-    """Return the panel with windows, error, means and the drift asked for."""
+def _draw(ax: Axes, found: EnergyError) -> None:
+    """Draw windows, error, means and the drift asked for."""
     t, end = found.t, float(found.t[-1])
-    curve, means = _scaled(found, found.running), _scaled(found, found.means)
-    panel = over_time(t, *_limits(found, curve, means))
-    panel.width = WIDTH
+    ax.set_xlim(float(t[0]), end)
+    border = np.array([found.round_off if found.has_border else np.nan])
+    if found.is_log:
+        late = found.running[t > LEAST * end]
+        lowest = 0.1 * np.max(frame.usable(found.running))
+        frame.scale(ax, late, found.means, border, np.array([lowest]), is_log=True)
+    else:
+        frame.scale(ax, found.running, found.means, np.zeros(1), margin=0.22)
+        ax.set_ylim(bottom=0.0)
     if found.has_bars:
         for first, last in WINDOWS[::2]:
-            panel.band(*panel.y, first * end, last * end, BAND, 0.6)
-    if found.has_border:
-        _border(panel, found)
-    panel.curve(*style.thin(t, curve, int(WIDTH) // 2), COLOUR, 1.6)
-    later = np.linspace(WINDOWS[0][0] * end, end, 60)
-    expected = _scaled(found, _expected(found, later))
-    inside = np.where((expected >= panel.y[0]) & (expected <= panel.y[1]), expected, np.nan)
-    panel.curve(later, inside, INK, 1.0, dashed=True)
-    if found.has_bars:
-        _bars(panel, means, end)
-    return panel
-
-
-def _border(panel: Panel, found: EnergyError) -> None:
-    """Draw the most that is taken for round-off, and fill what is below if that is where the error is."""
-    if found.round_off > 0.0:
-        border = math.log10(found.round_off)
+            ax.axvspan(first * end, last * end, color=frame.BAND, alpha=0.6, linewidth=0, zorder=0)
+    if found.has_border and found.round_off > 0.0:
+        # the most that is taken for round-off; below is where the error is
         if found.is_round_off:
-            panel.band(panel.y[0], border, *panel.x, BAND)
-        panel.level(border)
-
-
-def _bars(panel: Panel, means: Floats, end: float) -> None:
-    """Draw the means over their windows, with their names."""
-    for (first, last), mean, text in zip(WINDOWS, means, NAMES, strict=True):
-        if panel.inside(mean):
-            panel.curve(np.array([first, last]) * end, np.array([mean, mean]), SECOND, 2.4)
-            panel.word(
-                panel.across(first * end) + 2, panel.up(mean) - 4, text, "start", INK, halo=True
+            frame.allowed(ax, 0.0, found.round_off)
+        ax.axhline(found.round_off, **frame.DASHED)
+    ax.plot(*style.thin(t, found.running, 160), color=frame.COLOUR, linewidth=1.2)
+    later = np.linspace(WINDOWS[0][0] * end, end, 60)
+    ax.plot(later, _expected(found, later), **frame.DASHED)
+    if found.has_bars:
+        for (first, last), mean, text in zip(WINDOWS, found.means, NAMES, strict=True):
+            ax.plot([first * end, last * end], [mean, mean], color=frame.SECOND, linewidth=1.8)
+            ax.annotate(
+                text, (first * end, mean), (2, 3), textcoords="offset points", fontsize=frame.SIZE
             )
-
-
-def _scaled(found: EnergyError, values: Floats) -> Floats:
-    """Return values as the vertical scale has them: their powers of ten where it is logarithmic."""
-    return logarithms(values) if found.is_log else values
-
-
-def _limits(found: EnergyError, curve: Floats, means: Floats) -> tuple[float, float]:
-    if not found.is_log:
-        high = style.limits(curve, means, np.zeros(1), margin=0.22)[1]
-        return 0.0, high
-    border = np.array([found.round_off if found.has_border else np.nan])
-    late = curve[found.t > LEAST * found.t[-1]]
-    low, high = style.limits(late, means, _scaled(found, border), margin=0.15)
-    return low, max(high, low + 1.0)
 
 
 def _expected(found: EnergyError, t: Floats) -> Floats:

@@ -14,7 +14,6 @@ from vibsim.report.data import Floats, Member, at, pick, times, whole
 from vibsim.report.evidence.frame import measured
 
 if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
     from vibsim.experiment.schema.checks import ConservesCheck
 
 NAMES = ("m₃", "m₂", "m₁")
@@ -75,7 +74,6 @@ class EnergyError:
 
 
 def energy_error(
-    experiment: Experiment,
     record: Record,
     check: ConservesCheck,
     name: str,

@@ -9,85 +9,59 @@ import numpy as np
 
 from vibsim.checks.fields import name_of
 from vibsim.core.record import Record
-from vibsim.report import style
-from vibsim.report.data import Floats, Member, ends_of, pick, time_unit, unit
-from vibsim.report.evidence.frame import (
-    COLOUR,
-    Picture,
-    brief,
-    log_ticks,
-    logarithms,
-    measured,
-    over_time,
-    short,
-    ticks,
-)
-from vibsim.report.evidence.svg_plot import BAND, Panel, document
+from vibsim.report import data, style
+from vibsim.report.data import Member
+from vibsim.report.evidence import frame
+from vibsim.report.evidence.frame import Picture, brief, measured, short
 from vibsim.report.text import words
 
 if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
     from vibsim.experiment.schema.checks import EqualCheck
 
 OTHERS = {"exact": "the exact solution", "discrete": "the exact solution of its own steps"}
-WIDTH = 320.0
 DIPS = 10.0
 """Percentage of the places whose difference is so small, near a zero, that the scale need not show it."""
 
 
-def picture(
-    experiment: Experiment, record: Record, check: EqualCheck, name: str, member: Member
-) -> Picture | None:
+def picture(record: Record, check: EqualCheck, name: str, member: Member) -> Picture | None:
     """Draw the size of the difference of two solutions over time, on a logarithmic scale."""
     field = name_of(name, "distance_over_time")
-    distance = np.asarray(pick(record, field, case=member.case), dtype=np.float64)
-    allowed = measured(record, name, "allowed", member.scheme, member.case)
-    level = int(measured(record, name, "level", member.scheme, member.case))
+    distance = np.asarray(data.pick(record, field, case=member.case), dtype=np.float64)
+    bound, level, most = (
+        measured(record, name, field, member.scheme, member.case)
+        for field in ("allowed", "level", "distance")
+    )
     second = OTHERS.get(check.second, check.second)
-    who = f"{member.title}, level {level}: its {words.symbol(check.quantity)}"
+    who = f"{member.title}, level {level:.0f}: its {words.symbol(check.quantity)}"
     if not np.isfinite(distance).any():
         return None
-    if not (np.isfinite(distance) & (distance > 0.0)).any():
-        return Picture("", f"{who} and that of {second} are the same bit by bit at every time.")
-    t = np.linspace(0.0, _end(record, member), distance.size)
-    panel, nearest = _panel(t, distance, allowed)
+    seen = frame.usable(distance)
+    if not seen.size:
+        return Picture(f"{who} and that of {second} are the same bit by bit at every time.")
     title = style.label(
-        f"difference of {words.symbol(check.quantity)}", unit(record, f"{check.quantity}_finest")
+        f"difference of {words.symbol(check.quantity)}",
+        data.unit(record, f"{check.quantity}_finest"),
     )
-    seconds = style.label("t", time_unit(record))
-    panel.frame(title, seconds, ticks(*panel.x, 5), log_ticks(*panel.y))
-    most = (
-        f"It is largest at t = {short(float(t[nearest]))}, {short(float(distance[nearest]))} (dot)"
-    )
-    # a number that is not finite is the largest of all
-    if math.isnan(measured(record, name, "distance", member.scheme, member.case)):
-        told = "; then the run breaks down"
-    else:
-        told = _allowed(float(distance[nearest]), allowed)
-    return Picture(document([panel], title), f"{who} less that of {second}. {most}{told}.")
-
-
-def _end(record: Record, member: Member) -> float:
-    ends = ends_of(record)
-    return float(ends[member.case if ends.size > 1 else 0])
-
-
-def _panel(t: Floats, distance: Floats, allowed: float) -> tuple[Panel, int]:
-    """Return the panel, and the place where the difference is largest."""
-    logs = logarithms(distance)
-    border = math.log10(allowed) if 0.0 < allowed < math.inf else math.nan
-    usual = logs[logs >= np.nanpercentile(logs, DIPS)]
-    low, high = style.limits(usual, np.array([border]), margin=0.12)
-    panel = over_time(t, min(low, high - 1.0), high)
-    panel.width = WIDTH
-    if math.isfinite(border):
-        panel.band(panel.y[0], border, *panel.x, BAND)
-        panel.level(border)
+    figure = style.canvas(1.0)
+    ax = frame.panel(figure, title, style.label("t", data.time_unit(record)), frame.WIDE)
+    ends = data.ends_of(record)
+    t = np.linspace(0.0, ends[member.case if ends.size > 1 else 0], distance.size)
+    ax.set_xlim(t[0], t[-1])
+    usual = seen[seen >= np.percentile(seen, DIPS)]
+    frame.scale(ax, usual, np.array([bound, 0.1 * usual.max()]), is_log=True, margin=0.12)
+    if 0.0 < bound < math.inf:
+        frame.allowed(ax, 0.0, bound)
+        ax.axhline(bound, **frame.DASHED)
     # 0 lies below every frame
-    panel.curve(t, np.where(distance == 0.0, panel.y[0], logs), COLOUR, 1.2)
-    nearest = int(np.nanargmax(logs))
-    panel.points([t[nearest]], logs[[nearest]], [True], COLOUR)
-    return panel, nearest
+    lowest = ax.get_ylim()[0]
+    ax.plot(t, np.where(distance == 0.0, lowest, distance), color=frame.COLOUR, linewidth=0.9)
+    nearest = int(np.nanargmax(np.where(np.isfinite(distance), distance, np.nan)))
+    largest = float(distance[nearest])
+    frame.points(ax, [t[nearest]], distance[[nearest]], [True])
+    # a number that is not finite is the largest of all
+    told = "; then the run breaks down" if math.isnan(most) else _allowed(largest, bound)
+    where = f"It is largest at t = {short(float(t[nearest]))}, {short(largest)} (dot)"
+    return Picture(f"{who} less that of {second}. {where}{told}.", title, figure)
 
 
 def _allowed(distance: float, allowed: float) -> str:

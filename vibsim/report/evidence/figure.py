@@ -7,9 +7,11 @@ stability show the number that decides of all members instead.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from vibsim.core.record import Record
+from vibsim.report import style
 from vibsim.report.data import Member, case_name, is_lean, place_of
 from vibsim.report.evidence import energy, equal, members, order, stable, value
 from vibsim.report.evidence.frame import Picture
@@ -26,17 +28,25 @@ def picture(
     member = _member(record, results[0]) if results else None
     if asserted is None or member is None:
         return None
+    with style.applied():
+        found = _draw(experiment, record, asserted, member)
+    return found and replace(found, name=f"evidence_{asserted.id}")
+
+
+def _draw(
+    experiment: Experiment, record: Record, asserted: Check, member: Member
+) -> Picture | None:
     measured = asserted.measured
     if measured.kind == "converges":
-        return order.picture(experiment, record, measured, member)
+        return order.picture(record, measured, member)
     if measured.kind == "value":
         return value.picture(experiment, record, measured, asserted.id, member)
     if is_lean(record):
         return members.picture(record, measured, asserted.id, member)
     if measured.kind == "conserves":
-        return energy.picture(experiment, record, measured, asserted.id, member)
+        return energy.picture(record, measured, asserted.id, member)
     if measured.kind == "equal":
-        return equal.picture(experiment, record, measured, asserted.id, member)
+        return equal.picture(record, measured, asserted.id, member)
     return stable.picture(experiment, record, asserted.id, member)
 
 

@@ -1,29 +1,38 @@
-"""What the pictures of all kinds of checks have in common: what they are, and their ticks."""
+"""What the pictures of all kinds of checks have in common: panels of one size, dots that count or not, round ticks."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vibsim.checks.fields import name_of
 from vibsim.core.record import Record
-from vibsim.report import style
+from vibsim.report import frame, style
 from vibsim.report.data import Floats, pick
-from vibsim.report.evidence.svg_plot import Panel
+from vibsim.report.figures import drawing
 from vibsim.report.text import words
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+INK, SOFT, BAND = "#1b1b1b", "#555555", "#e4e4e4"
+COLOUR, SECOND = style.COLOURS[0], style.COLOURS[1]
+LEFT, RIGHT, ABOVE, BELOW, HEIGHT = 0.6, 0.35, 0.2, 0.38, 1.0
+"""Room around a panel, and its height [inch]."""
+WIDE = 3.3
+"""Width of a panel over time [inch]."""
+SIZE = 8.0
+"""Of letters [point]."""
 MOST_LEVELS = 12
 """With more of them every second one is named."""
-COLOUR, SECOND = style.COLOURS[0], style.COLOURS[1]
-DECADES = 2.2
-"""Up to so many decades a logarithmic scale has 1, 2 and 5 of each."""
-DECADE_STEPS = (1, 2, 3, 5, 10, 20, 50, 100, 200)
-"""Decades between ticks where there are more."""
-FEW_DECADES = 0.7
-"""Up to so many it has round numbers as a linear one."""
+FEWEST = 2
+"""Round numbers on a scale: one alone does not tell how large a curve is."""
+DASHED: dict[str, Any] = {"color": INK, "linewidth": 0.8, "linestyle": (0, (4, 3))}
 
 ALIKE = np.array([1.0 - 1e-11, 1.0 + 1e-11])
 """Growth factors between these differ by rounding only: a scale need not tell them apart."""
@@ -32,25 +41,114 @@ NEAR_ONE = 0.02
 FACTOR = 3.0
 """Growth factors beyond this, or one over it, have a logarithmic scale."""
 
-Ticks = list[tuple[float, str]]
-
 
 @dataclass(frozen=True)
 class Picture:
     """A drawing and the words below it."""
 
-    svg: str
-    """Empty where there is nothing to draw; the words say why."""
     caption: str
+    alt: str = ""
+    """What is drawn, for a reader who cannot see it."""
+    figure: Figure | None = None
+    """None where there is nothing to draw; the caption says why."""
+    name: str = "evidence"
+    """Unique on its page."""
+
+    @cached_property
+    def svg(self) -> str:
+        """The SVG element of its figure, in the size it was drawn in; empty without a figure."""
+        if self.figure is None:
+            return ""
+        with style.applied():
+            return drawing.inline(drawing.svg(self.figure, self.name), self.alt, is_scaled=False)
+
+
+def panel(figure: Figure, title: str, x_name: str, width: float = 2.5) -> Axes:
+    """Return a new panel to the right of those that a figure has, all of one `width` [inch]."""
+    figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    room, high = LEFT + width + RIGHT, ABOVE + HEIGHT + BELOW
+    wide = room * len(figure.axes)
+    figure.set_size_inches(wide, high)
+    for i, ax in enumerate(figure.axes):
+        left, bottom = (i * room + LEFT) / wide, BELOW / high
+        ax.set_position((left, bottom, width / wide, HEIGHT / high))
+    ax.set_title(title, fontsize=SIZE, fontweight="normal")
+    ax.set_xlabel(x_name, fontsize=SIZE, color=SOFT)
+    # a place of their own costs less than one that matplotlib finds
+    ax.xaxis.set_label_coords(0.5, -0.24)
+    ax.tick_params(labelsize=SIZE, color=SOFT, labelcolor=SOFT)
+    ax.grid(visible=False)
+    round_ticks(ax.xaxis, 5)
+    return ax
+
+
+def round_ticks(axis: Any, most: int = 4) -> None:
+    """Put about `most` round numbers on a linear axis; `FEWEST` at least."""
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+    axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 5, 10], min_n_ticks=FEWEST))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: words.number(value, "step")))
+
+
+def scale(ax: Axes, *shown: Floats, is_log: bool = False, margin: float = 0.15) -> None:
+    """Give the vertical axis a range that holds what is shown, and ticks; on a logarithmic one what is positive."""
+    if is_log:
+        style.log_axis(ax, "y", *style.log_limits(*shown, margin=margin), most=5)
+        return
+    ax.set_ylim(*style.limits(*shown, margin=margin))
+    round_ticks(ax.yaxis)
+
+
+def allowed(ax: Axes, low: float, high: float) -> None:
+    """Fill what lies between two values, which may be infinite, as far as the frame reaches."""
+    bottom, top = ax.get_ylim()
+    ax.axhspan(max(low, bottom), min(high, top), color=BAND, linewidth=0.0, zorder=0)
+
+
+def points(ax: Axes, x: Sequence[float], y: Floats, counts: Sequence[bool]) -> None:
+    """Draw dots, hollow ones that do not count; those beyond the frame are triangles on its edge."""
+    low, high = ax.get_ylim()
+    for is_full in (False, True):
+        of_kind = np.array(counts) == is_full
+        place, value = np.asarray(x, dtype=np.float64)[of_kind], y[of_kind]
+        inside = (value >= low) & (value <= high)
+        look: dict[str, Any] = {"color": COLOUR, "markerfacecolor": COLOUR if is_full else "white"}
+        if inside.any():
+            ax.plot(
+                place[inside], value[inside], "o", **look, markersize=5.0, clip_on=False, zorder=4
+            )
+        frame.mark_leaving(ax, place, value, each=True, **look)
+
+
+def level_axis(ax: Axes, levels: Sequence[int], most: int = MOST_LEVELS, extra: str = "") -> None:
+    """Name the levels, every second or third one where there are many, and what stands behind the last of them."""
+    named = {float(level): str(level) for level in levels[:: 1 + len(levels) // (most + 1)]}
+    named |= {levels[-1] + 1.0: extra} if extra else {}
+    ax.set_xlim(levels[0] - 0.5, levels[-1] + (1.5 if extra else 0.5))
+    ax.set_xticks(list(named), list(named.values()))
 
 
 @dataclass(frozen=True)
-class Scale:
-    """A vertical scale: how numbers are changed for it, and its ticks."""
+class GrowthScale:
+    """The vertical scale of growth factors."""
 
     title: str
-    change: Callable[[Floats], Floats]
-    ticks: Callable[[float, float], Ticks]
+    less: float = 0.0
+    """What is taken from each factor."""
+    is_log: bool = False
+
+
+def growth_scale(factors: Floats) -> GrowthScale:
+    """Return the scale on which positive finite growth factors can be told from each other and from 1."""
+    if np.all(np.abs(factors - 1.0) <= NEAR_ONE):
+        return GrowthScale("growth per period, less 1", less=1.0)
+    is_wide = factors.max() > FACTOR or factors.min() < 1.0 / FACTOR
+    return GrowthScale("growth per period", is_log=bool(is_wide))
+
+
+def usable(values: Floats) -> Floats:
+    """Return the values that are positive and finite."""
+    return values[(values > 0.0) & np.isfinite(values)]
 
 
 def measured(record: Record, check: str, name: str, scheme: int, case: int) -> float:
@@ -66,76 +164,3 @@ def short(value: float) -> str:
 def brief(value: float) -> str:
     """Write a number with two significant digits."""
     return words.number(value, "brief")
-
-
-FEWEST = 2
-"""Round numbers on a scale: one alone does not tell how large a curve is."""
-
-
-def ticks(low: float, high: float, most: int = 4) -> Ticks:
-    """Return about `most` round numbers in a range, as a scale has them; `FEWEST` at least."""
-    raw = (high - low) / most
-    ten = 10.0 ** math.floor(math.log10(raw))
-    steps = [m * ten for m in (10.0, 5.0, 2.0, 1.0, 0.5)]
-    wide = min(step for step in steps if step >= raw)
-    for step in steps[steps.index(wide) :]:
-        first, last = math.ceil(low / step), math.floor(high / step)
-        if last - first + 1 >= FEWEST:
-            break
-    return [(k * step, words.number(k * step, "step")) for k in range(first, last + 1)]
-
-
-def log_ticks(low: float, high: float) -> Ticks:
-    """Return at most about six ticks of a logarithmic scale.
-
-    Parameters
-    ----------
-    low, high
-        Its ends, as powers of ten.
-    """
-    if high - low <= FEW_DECADES:
-        found = ticks(10.0**low, 10.0**high, 3)
-        return [(math.log10(value), text) for value, text in found if value > 0.0]
-    powers = range(math.floor(low), math.ceil(high) + 1)
-    if high - low <= DECADES:
-        values = [m * 10.0**k for k in powers for m in (1.0, 2.0, 5.0)]
-        return [(math.log10(value), words.number(value, "step")) for value in values]
-    step = next(k for k in DECADE_STEPS if 5 * k >= high - low)
-    return [(float(k), style.power(k)) for k in powers if k % step == 0]
-
-
-def level_ticks(levels: list[int], most: int = MOST_LEVELS) -> Ticks:
-    """Name the levels, every second or third one where there are many."""
-    every = 1 + len(levels) // (most + 1)
-    return [(float(level), str(level)) for level in levels[::every]]
-
-
-def of_levels(levels: list[int], low: float, high: float, width: float = 240.0) -> Panel:
-    """Return an empty panel whose horizontal scale is the level."""
-    return Panel((levels[0] - 0.5, levels[-1] + 0.5), (low, high), width)
-
-
-def over_time(t: Floats, low: float, high: float) -> Panel:
-    """Return an empty panel whose horizontal scale is the time."""
-    return Panel((float(t[0]), float(t[-1])), (low, high))
-
-
-def growth_scale(factors: Floats) -> Scale:
-    """Return the scale on which growth factors can be told from each other and from 1.
-
-    Parameters
-    ----------
-    factors
-        Those to be shown: positive and finite, one at least.
-    """
-    if np.all(np.abs(factors - 1.0) <= NEAR_ONE):
-        return Scale("growth per period, less 1", lambda x: x - 1.0, lambda a, b: ticks(a, b, 3))
-    if factors.max() > FACTOR or factors.min() < 1.0 / FACTOR:
-        return Scale("growth per period", logarithms, log_ticks)
-    return Scale("growth per period", lambda x: x, ticks)
-
-
-def logarithms(values: Floats) -> Floats:
-    """Return the powers of ten of values; NaN of those that are not positive or not finite."""
-    usable = (values > 0.0) & np.isfinite(values)
-    return np.log10(np.where(usable, values, np.nan))

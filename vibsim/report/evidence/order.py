@@ -8,114 +8,81 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vibsim.core.record import Record
-from vibsim.report import style
-from vibsim.report.data import (
-    Floats,
-    Member,
-    at,
-    formal_order,
-    is_lean,
-    power,
-    sound_triples,
-    stated_order,
-    time_unit,
-    times,
-    unit,
-    whole,
-)
-from vibsim.report.evidence.frame import COLOUR, Picture, level_ticks, of_levels, over_time, ticks
-from vibsim.report.evidence.svg_plot import BAND, Panel, document
+from vibsim.report import data, style
+from vibsim.report.data import Member, at
+from vibsim.report.evidence import frame
+from vibsim.report.evidence.frame import Picture
+from vibsim.report.figures import local_order
 from vibsim.report.figures.time import differences as curves_of_differences
 from vibsim.report.text import words
 
 if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
+    from matplotlib.figure import Figure
+
     from vibsim.experiment.schema.checks import ConvergesCheck
 
 
-def picture(
-    experiment: Experiment, record: Record, check: ConvergesCheck, member: Member
-) -> Picture | None:
+def picture(record: Record, check: ConvergesCheck, member: Member) -> Picture | None:
     """Draw the rescaled differences over time, where series are kept, and the order by level."""
     quantity = check.converges
-    if f"{quantity}_observed_order" not in record:
-        return None
     norm = record.words("norm").index(check.norm)
-    orders = at(record, f"{quantity}_observed_order", member, norm=norm)
-    if not np.isfinite(orders).any():
+    name = f"{quantity}_observed_order"
+    if name not in record or not np.isfinite(at(record, name, member, norm=norm)).any():
         return None
-    expected = formal_order(record, member, quantity) if check.order == "scheme" else check.order
-    by_level = _orders(record, quantity, member, orders, (float(expected), check.tolerance))
-    _draw_stated(by_level, record, quantity, member, norm)
+    alt = f"Evidence on the order of {words.name(quantity)}"
     told = (
         "the order that three levels give, by the coarsest of them; filled where it counts. Grey: what the check asks "
         "for. Bar: the stated order with its interval."
     )
-    if is_lean(record):
-        return Picture(document([by_level], _label(quantity)), f"{member.title}: {told}")
-    curves = _differences(record, quantity, member)
-    order = power(record, member, quantity)
+    figure = style.canvas(1.0)
+    if data.is_lean(record):
+        _draw_orders(figure, record, check, member, norm)
+        return Picture(f"{member.title}: {told}", alt, figure)
+    _draw_differences(figure, record, quantity, member)
+    _draw_orders(figure, record, check, member, norm)
+    order = data.power(record, member, quantity)
     how = f"rescaled to coincide where the error has order {order:g}" if order else "as they are"
     left = (
         f"Left: differences between levels of {member.title}, {how}; the finest pair is the "
         "thinnest line."
     )
-    return Picture(document([curves, by_level], _label(quantity)), f"{left} Right: {told}")
+    return Picture(f"{left} Right: {told}", alt, figure)
 
 
-def _label(quantity: str) -> str:
-    return f"Evidence on the order of {words.name(quantity)}"
-
-
-def _differences(record: Record, quantity: str, member: Member) -> Panel:
-    """Return a panel with the rescaled differences over time."""
-    t, curves = times(record, member.case), curves_of_differences(record, quantity, member)
+def _draw_differences(figure: Figure, record: Record, quantity: str, member: Member) -> None:
+    """Draw the rescaled differences over time."""
+    t, curves = data.times(record, member.case), curves_of_differences(record, quantity, member)
     shown = [curve for curve in curves if curve.is_whole and curve.sound] or curves
-    low, high = style.limits(*(curve.values for curve in shown), margin=0.05)
-    panel = over_time(t, low, high)
-    panel.level(0.0, dashed=False, colour=BAND)
+    measure = data.unit(record, f"{quantity}_rescaled")
+    title = style.label(f"rescaled differences of {words.symbol(quantity)}", measure)
+    ax = frame.panel(figure, title, style.label("t", data.time_unit(record)))
+    ax.set_xlim(float(t[0]), float(t[-1]))
+    frame.scale(ax, *(curve.values for curve in shown), margin=0.05)
+    ax.axhline(0.0, color=frame.BAND, linewidth=0.8, zorder=0)
     for i, curve in enumerate(shown):
-        width = 3.6 - 2.6 * i / max(1, len(shown) - 1)
-        x, y = style.thin(t, curve.values, int(panel.width) // 2)
-        panel.curve(x, y, style.COLOURS[i], width)
-    size = f" [{measure}]" if (measure := unit(record, f"{quantity}_rescaled")) else ""
-    seconds = f" [{time}]" if (time := time_unit(record)) else ""
-    panel.frame(
-        f"rescaled differences of {words.symbol(quantity)}{size}",
-        f"t{seconds}",
-        ticks(float(t[0]), float(t[-1])),
-        ticks(low, high),
-    )
-    return panel
+        width = 2.7 - 2.0 * i / max(1, len(shown) - 1)
+        ax.plot(*style.thin(t, curve.values, 120), color=style.COLOURS[i], linewidth=width)
 
 
-def _orders(
-    record: Record, quantity: str, member: Member, orders: Floats, asked: tuple[float, float]
-) -> Panel:
-    """Return a panel with the order of every triple of levels, and the one that is asked for."""
-    triples = whole(record, "triple")
+def _draw_orders(
+    figure: Figure, record: Record, check: ConvergesCheck, member: Member, norm: int
+) -> None:
+    """Draw the order of every triple of levels, the one that is asked for, and the stated one."""
+    quantity = check.converges
+    orders = at(record, f"{quantity}_observed_order", member, norm=norm)
+    formal = data.formal_order(record, member, quantity)
+    expected = float(formal if check.order == "scheme" else check.order)
+    triples, levels = data.whole(record, "triple"), data.whole(record, "level")
     first, last = (int(at(record, f"{quantity}_window_{end}", member)) for end in ("first", "last"))
-    levels = whole(record, "level")
-    expected, tolerance = asked
-    good = np.array(sound_triples(record, quantity, member))
+    good = np.array(data.sound_triples(record, quantity, member))
     near = orders[good & np.isfinite(orders)] if good.any() else orders
-    known = [expected - 0.5, expected + 0.5] if math.isfinite(expected) else []
-    low, high = style.limits(np.clip(near, -1.0, 9.0), np.array(known), margin=0.15)
-    panel = of_levels(levels, low, high)
+    around = expected + np.array([-0.5, 0.5])
+    ax = frame.panel(figure, f"order of {words.symbol(quantity)}", "level")
+    frame.level_axis(ax, levels)
+    frame.scale(ax, np.clip(near, -1.0, 9.0), around)
     if math.isfinite(expected):
-        panel.band(expected - tolerance, expected + tolerance, *panel.x, BAND)
-        panel.level(expected)
+        frame.allowed(ax, expected - check.tolerance, expected + check.tolerance)
+        ax.axhline(expected, **frame.DASHED)
     counts = [first <= triple and levels[i + 2] <= last for i, triple in enumerate(triples)]
-    panel.points(triples, orders, counts, COLOUR)
-    step = max(1, round((high - low) / 4))
-    whole_orders = range(math.ceil(low), math.floor(high) + 1, step)
-    scale = [(float(k), words.number(k, "integer")) for k in whole_orders]
-    panel.frame(f"order of {words.symbol(quantity)}", "level", level_ticks(levels), scale)
-    return panel
-
-
-def _draw_stated(panel: Panel, record: Record, quantity: str, member: Member, norm: int) -> None:
-    """Draw the stated order with its interval over the levels of its window, where there is one."""
-    stated = stated_order(record, quantity, member, norm)
-    if stated is not None:
-        panel.band(*stated[1:], COLOUR, 0.25)
+    frame.points(ax, triples, orders, counts)
+    local_order.draw_stated(ax, record, quantity, member, norm, frame.COLOUR)

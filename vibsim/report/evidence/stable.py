@@ -19,27 +19,18 @@ from vibsim.core.vocabulary import HIGHEST
 from vibsim.report import style
 from vibsim.report.choice import position
 from vibsim.report.data import Floats, Member, at, known, whole
-from vibsim.report.evidence.frame import (
-    ALIKE,
-    COLOUR,
-    SECOND,
-    Picture,
-    Ticks,
-    growth_scale,
-    level_ticks,
-    log_ticks,
-    logarithms,
-    measured,
-    of_levels,
-    short,
-)
-from vibsim.report.evidence.svg_plot import BAND, Panel, document
+from vibsim.report.evidence import frame
+from vibsim.report.evidence.frame import ALIKE, SECOND, Picture, measured, short, usable
 from vibsim.report.text import words
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from vibsim.experiment import Experiment
 
-WIDTH = 150.0
+WIDTH = 1.56
+"""Of a panel [inch]."""
 MOST_LEVELS = 8
 NEAR_LIMIT = 0.02
 """A step so near to the limit, as a part of it, is told with its distance."""
@@ -47,7 +38,6 @@ NO_LIMIT = {
     0.0: "The scheme grows at every step, so that w dt has no limit to be compared with. ",
     math.inf: "The scheme has no limit of w dt. ",
 }
-OCTAVE = math.log10(2.0)
 SIDES = {1: ("Here",), 2: ("Left", "Right"), 3: ("Left", "Middle", "Right")}
 
 
@@ -57,60 +47,61 @@ class _Levels:
 
     every: list[int]
     judged: int
-
-    @property
-    def counts(self) -> list[bool]:
-        """Which of them is judged."""
-        return [level == self.judged for level in self.every]
+    figure: Figure
 
     @property
     def index(self) -> int:
         """Position of the one that is judged."""
         return self.every.index(self.judged)
 
-    def panel(self, title: str, low: float, high: float, scale: Ticks) -> Panel:
-        """Return a panel with its frame."""
-        panel = of_levels(self.every, low, high, WIDTH)
-        panel.frame(title, "level", level_ticks(self.every, MOST_LEVELS), scale)
-        return panel
+    def panel(self, title: str) -> Axes:
+        """Return a new panel over the levels."""
+        ax = frame.panel(self.figure, title, "level", WIDTH)
+        frame.level_axis(ax, self.every, MOST_LEVELS)
+        return ax
+
+    def points(self, ax: Axes, values: Floats) -> None:
+        """Draw a number of every level."""
+        frame.points(ax, self.every, values, [level == self.judged for level in self.every])
 
 
 def picture(experiment: Experiment, record: Record, name: str, member: Member) -> Picture | None:
     """Draw what decides whether a run is stable, on every level."""
     level = int(measured(record, name, "level", member.scheme, member.case))
-    levels = _Levels(whole(record, "level"), level)
+    levels = _Levels(whole(record, "level"), level, style.canvas(1.0))
     letter = words.symbol(position(experiment))
     found = [
         _steps(record, levels, member),
         _sizes(record, levels, member, letter),
         _growths(record, levels, member, name),
     ]
-    drawn = [one for one in found if one is not None]
-    if not drawn:
+    told = [text for text in found if text is not None]
+    if not told:
         return None
-    told = " ".join(
-        f"{side}: {text}" for side, (_, text) in zip(SIDES[len(drawn)], drawn, strict=True)
-    )
+    sides = " ".join(f"{s}: {text}" for s, text in zip(SIDES[len(told)], told, strict=True))
     _, limit = _step_and_limit(record, levels, member)
     head = f"{member.title}, level by level; filled is level {level}, which is judged."
-    caption = f"{head} {NO_LIMIT.get(limit, '')}{told}"
-    return Picture(document([panel for panel, _ in drawn], f"Stability of {member.title}"), caption)
+    caption = f"{head} {NO_LIMIT.get(limit, '')}{sides}"
+    return Picture(caption, f"Stability of {member.title}", levels.figure)
 
 
-def _steps(record: Record, levels: _Levels, member: Member) -> tuple[Panel, str] | None:
+def _steps(record: Record, levels: _Levels, member: Member) -> str | None:
     """Draw w dt beside the limit; None for a scheme without one, or one that grows at every step."""
     p = at(record, _step_name(record), member)
     limit = float(at(record, "stability_limit", member))
-    if not 0.0 < limit < math.inf or not np.isfinite(logarithms(p)).any():
+    if not 0.0 < limit < math.inf or not usable(p).size:
         return None
-    logs, border = logarithms(p), math.log10(limit)
-    around = np.array([border - OCTAVE, border + OCTAVE])
-    low, high = style.limits(logs, around, margin=0.08)
-    panel = levels.panel("w dt, and its limit (dashed)", low, high, log_ticks(low, high))
-    panel.band(low, border, *panel.x, BAND)
-    panel.level(border)
-    panel.points(levels.every, logs, levels.counts, COLOUR)
-    return panel, f"{_place(float(p[levels.index]), limit)}; grey is stable."
+    ax = levels.panel("w dt, and its limit (dashed)")
+    frame.scale(ax, p, limit * np.array([0.5, 2.0]), is_log=True, margin=0.08)
+    _draw_limit(ax, limit)
+    levels.points(ax, p)
+    return f"{_place(float(p[levels.index]), limit)}; grey is stable."
+
+
+def _draw_limit(ax: Axes, limit: float) -> None:
+    """Draw the limit that a number must stay below."""
+    frame.allowed(ax, 0.0, limit)
+    ax.axhline(limit, **frame.DASHED)
 
 
 def _place(p: float, limit: float) -> str:
@@ -123,21 +114,17 @@ def _place(p: float, limit: float) -> str:
     return f"{text} {'beyond' if p > limit else 'below'} {border}{by}"
 
 
-def _sizes(
-    record: Record, levels: _Levels, member: Member, letter: str
-) -> tuple[Panel, str] | None:
+def _sizes(record: Record, levels: _Levels, member: Member, letter: str) -> str | None:
     """Draw how large the solution gets, over the exact one."""
     size = known(record, "size_over_exact", ("level",), scheme=member.scheme, case=member.case)
-    if not np.isfinite(logarithms(size)).any():
+    if not usable(size).size:
         return None
-    logs, border = logarithms(size), math.log10(BLOWN_UP)
-    low, high = style.limits(logs, np.array([0.0, border]), margin=0.12)
-    panel = levels.panel(f"largest |{letter}| / exact", low, high, log_ticks(low, high))
-    panel.band(low, border, *panel.x, BAND)
-    panel.level(border)
-    panel.points(levels.every, logs, levels.counts, COLOUR)
+    ax = levels.panel(f"largest |{letter}| / exact")
+    frame.scale(ax, size, np.array([1.0, BLOWN_UP]), is_log=True, margin=0.12)
+    _draw_limit(ax, BLOWN_UP)
+    levels.points(ax, size)
     p, limit = _step_and_limit(record, levels, member)
-    return panel, _size_told(levels, size, abs(p / (limit or math.inf) - 1.0) <= LIMIT_ROUNDING)
+    return _size_told(levels, size, abs(p / (limit or math.inf) - 1.0) <= LIMIT_ROUNDING)
 
 
 def _step_and_limit(record: Record, levels: _Levels, member: Member) -> tuple[float, float]:
@@ -174,9 +161,7 @@ def _size_told(levels: _Levels, size: Floats, at_limit: bool) -> str:
     return f"{text}, beyond {border}, and no finer level halves that."
 
 
-def _growths(
-    record: Record, levels: _Levels, member: Member, name: str
-) -> tuple[Panel, str] | None:
+def _growths(record: Record, levels: _Levels, member: Member, name: str) -> str | None:
     """Draw the growth factor per period, measured and predicted."""
     seen = np.array(at(record, "measured_growth", member))
     told = np.array(at(record, "theory_growth", member))
@@ -184,20 +169,17 @@ def _growths(
     for values, field in ((seen, "growth"), (told, "predicted_growth")):
         if not math.isfinite(values[levels.index]):
             values[levels.index] = measured(record, name, field, member.scheme, member.case)
-    both = np.concatenate([seen, told])
-    both = both[np.isfinite(both) & (both > 0.0)]
+    both = usable(np.concatenate([seen, told]))
     if not both.size:
         return None
-    scale = growth_scale(both)
-    none = scale.change(np.ones(1))
-    low, high = style.limits(scale.change(both), scale.change(ALIKE), margin=0.15)
-    panel = levels.panel(scale.title, low, high, scale.ticks(low, high))
-    panel.level(float(none[0]))
-    for level, value in zip(levels.every, scale.change(told), strict=True):
-        if math.isfinite(value):
-            panel.curve(np.array([level - 0.35, level + 0.35]), np.full(2, value), SECOND, 2.4)
-    panel.points(levels.every, scale.change(seen), levels.counts, COLOUR)
-    return panel, _told(float(seen[levels.index]), float(told[levels.index]), is_near)
+    scale = frame.growth_scale(both)
+    ax = levels.panel(scale.title)
+    frame.scale(ax, both - scale.less, ALIKE - scale.less, is_log=scale.is_log)
+    ax.axhline(1.0 - scale.less, **frame.DASHED)
+    ends = np.array(levels.every) + np.array([[-0.35], [0.35]])
+    ax.plot(ends, np.stack([told - scale.less] * 2), color=SECOND, linewidth=1.8, zorder=3)
+    levels.points(ax, seen - scale.less)
+    return _told(float(seen[levels.index]), float(told[levels.index]), is_near)
 
 
 def _told(seen: float, told: float, is_near: bool) -> str:

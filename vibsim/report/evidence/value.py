@@ -19,28 +19,19 @@ from vibsim.checks.words.value import what
 from vibsim.core.record import Record
 from vibsim.report import style
 from vibsim.report.data import Floats, Member, at, norm_unit, pick, pretty_unit, unit, whole
-from vibsim.report.evidence.frame import (
-    COLOUR,
-    Picture,
-    Ticks,
-    level_ticks,
-    log_ticks,
-    logarithms,
-    measured,
-    of_levels,
-    ticks,
-)
-from vibsim.report.evidence.svg_plot import BAND, Panel, document
+from vibsim.report.evidence import frame
+from vibsim.report.evidence.frame import COLOUR, Picture, measured
+from vibsim.report.figures.panels import figure_of
 from vibsim.report.text import words
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from vibsim.experiment import Experiment
     from vibsim.experiment.schema.checks import ValueCheck
 
 WIDE = 30.0
 """Positive numbers of which the largest is more than so many times the least have a logarithmic scale."""
-NOWHERE = -400.0
-"""The logarithm that stands for a distance of 0: below every frame."""
 OF_LEVEL = ("scheme", "case", "level")
 
 
@@ -106,33 +97,30 @@ class ByLevel:
     """Of the error of the extrapolated number; NaN where there is none."""
 
     @property
-    def places(self) -> list[float]:
-        """Where the numbers stand: at their levels, the extrapolated one behind the last."""
-        return [*map(float, self.levels), self.levels[-1] + 1.0][: len(self.values)]
+    def bar(self) -> Floats:
+        """The ends of the error bar of the extrapolated number; NaN where there is none."""
+        return np.asarray(self.values[-1] + np.array([-self.bound, self.bound]))
 
-    def panel(self, low: float, high: float) -> Panel:
-        """Return an empty panel for values in a range."""
-        extra = [self.levels[-1] + 1] if len(self.values) > len(self.levels) else []
-        return of_levels([*self.levels, *extra], low, high)
+    def panel(self, title: str, values: Floats, around: Floats, *, is_log: bool) -> Axes:
+        """Return a new panel with some values by level in a range that holds those `around` them."""
+        ax = frame.panel(style.canvas(1.0), title, "level")
+        is_best = values.size > len(self.levels)
+        frame.level_axis(ax, self.levels, extra="best" if is_best else "")
+        frame.scale(ax, values, around, is_log=is_log)
+        places = [*self.levels, self.levels[-1] + 1][: values.size]
+        frame.points(ax, places, values, self.counts)
+        return ax
 
-    def draw(self, panel: Panel, shown: Floats, ends: tuple[float, float]) -> None:
-        """Draw the numbers as they are `shown`, and the error bar of the extrapolated one from end to end."""
-        if all(map(math.isfinite, ends)):
-            low, high = (min(max(end, panel.y[0]), panel.y[1]) for end in ends)
-            panel.curve(np.full(2, self.places[-1]), np.array([low, high]), COLOUR, 1.6)
-        panel.points(self.places, shown, self.counts, COLOUR)
-
-    def finish(self, panel: Panel, title: str, scale: Ticks, told: str) -> Picture:
-        """Return the picture of a panel."""
-        across = level_ticks(self.levels)
-        if len(self.values) > len(self.levels):
-            across = [*across, (self.places[-1], "best")]
-        panel.frame(title, "level", across, scale)
+    def finish(self, ax: Axes, ends: Floats, told: str) -> Picture:
+        """Return the picture of a panel, with an error bar between two `ends` where they are known."""
+        bar = ""
+        if np.isfinite(ends).all():
+            ax.plot(np.full(2, self.levels[-1] + 1.0), ends, color=COLOUR, linewidth=1.2)
+            bar = "; the bar is the bound of its error"
         one = len(self.levels) == 1 and len(self.values) == 1
         head = f"{self.scheme}, level {self.levels[0]}" if one else f"{self.scheme}, level by level"
-        bar = "; the bar is the bound of its error" if math.isfinite(self.bound) else ""
         caption = f"{head}: filled the one that is asked for{bar}; grey is {told}."
-        return Picture(document([panel], title), caption)
+        return Picture(caption, ax.get_title(loc="left"), figure_of(ax))
 
 
 def _row(
@@ -152,62 +140,40 @@ def _row(
 
 def _beside_border(row: ByLevel, check: ValueCheck) -> Picture | None:
     """Draw a number by level beside the one that it must be below or above."""
-    below = check.below is not None
-    border = check.below if check.below is not None else check.above
+    border = check.above if check.below is None else check.below
     if border is None:
         return None
-    is_log = _is_wide(np.append(row.values, border))
-    ends = row.values[-1] + np.array([-row.bound, row.bound])
-    values = row.values
-    if is_log:
-        values, ends = logarithms(values), np.where(ends > 0.0, logarithms(ends), NOWHERE)
-    border = math.log10(border) if is_log else border
-    low, high = style.limits(values, ends[ends > NOWHERE], np.array([border]), margin=0.15)
-    panel = row.panel(low, high)
-    panel.band(*((low, border) if below else (border, high)), *panel.x, BAND)
-    panel.level(border)
-    row.draw(panel, values, (float(ends[0]), float(ends[1])))
-    scale = log_ticks(low, high) if is_log else ticks(low, high)
-    return row.finish(panel, row.name, scale, "where it should lie")
-
-
-def _is_wide(values: Floats) -> bool:
-    """Say whether numbers need a logarithmic scale."""
-    known = values[np.isfinite(values)]
-    return bool(known.size and known.min() > 0.0 and known.max() > WIDE * known.min())
+    known = np.append(row.values[np.isfinite(row.values)], border)
+    is_log = bool(known.min() > 0.0 and known.max() > WIDE * known.min())
+    ax = row.panel(row.name, row.values, np.append(row.bar, border), is_log=is_log)
+    frame.allowed(ax, *((border, math.inf) if check.below is None else (-math.inf, border)))
+    ax.axhline(border, **frame.DASHED)
+    return row.finish(ax, row.bar, "where it should lie")
 
 
 def _distance(row: ByLevel, wanted: float, allowed: float) -> Picture | None:
     """Draw how far a number is from what it should be, on a logarithmic scale; None where nothing is allowed."""
     away = np.abs(row.values - wanted)
-    known = away[np.isfinite(away) & (away > 0.0)]
+    known = frame.usable(away)
     if not known.size or allowed <= 0.0:
         return None
-    with np.errstate(divide="ignore"):
-        logs = np.where(away > 0.0, np.log10(away), NOWHERE)
-        ends = np.log10(np.maximum(away[-1] + np.array([-row.bound, row.bound]), 0.0))
-    border = math.log10(allowed)
-    around = np.array([border, ends[1] if math.isfinite(ends[1]) else border])
-    low, high = style.limits(np.log10(known), around, margin=0.15)
-    panel = row.panel(min(low, high - 1.0), high)
-    panel.band(panel.y[0], border, *panel.x, BAND)
-    panel.level(border)
-    row.draw(panel, logs, (max(float(ends[0]), NOWHERE), float(ends[1])))
+    ends = np.maximum(away[-1] + np.array([-row.bound, row.bound]), 0.0)
+    around = np.append(ends[1:], [allowed, 0.1 * known.max()])
     title = f"distance of {row.name} from {words.number(wanted, 'step')}"
+    ax = row.panel(title, away, around, is_log=True)
+    frame.allowed(ax, 0.0, allowed)
+    ax.axhline(allowed, **frame.DASHED)
     told = "what the tolerance allows"
     if np.any(away == 0.0):
         told += "; a triangle at the lower edge has no distance at all"
-    return row.finish(panel, title, log_ticks(*panel.y), told)
+    return row.finish(ax, ends, told)
 
 
 def _within(row: ByLevel, wanted: float, allowed: float) -> Picture:
     """Draw a number by level beside the one that it should equal."""
     around = wanted + np.array([-allowed, allowed])
-    low, high = style.limits(row.values, around, margin=0.15)
-    panel = row.panel(low, high)
-    panel.band(wanted - allowed, wanted + allowed, *panel.x, BAND)
-    panel.level(wanted)
-    ends = row.values[-1] + np.array([-row.bound, row.bound])
-    row.draw(panel, row.values, (float(ends[0]), float(ends[1])))
+    ax = row.panel(row.name, row.values, around, is_log=False)
+    frame.allowed(ax, *around)
+    ax.axhline(wanted, **frame.DASHED)
     told = f"what the tolerance allows around {words.number(wanted, 'step')} (dashed)"
-    return row.finish(panel, row.name, ticks(low, high), told)
+    return row.finish(ax, row.bar, told)

@@ -15,14 +15,14 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import SEVERITY, TYPICAL_NORM
 from vibsim.report import finest_level, style
 from vibsim.report.choice import tolerance
-from vibsim.report.data import Floats, due, flags, norm_unit, promised_text, whole
+from vibsim.report.data import Floats, due, flags, norm_unit, of_several, promised_text, whole
+from vibsim.report.figures.panels import rows_of
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Key, bins, place_in
 from vibsim.report.text import words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from vibsim.experiment import Experiment
 
@@ -38,8 +38,8 @@ MESH = 160, 60
 """Cells that members are counted in, along and up."""
 SHOWN = 6
 """Most keys in one figure; the members' table has all."""
-ROW, ABOVE, FOOT = 1.45, 0.34, 0.5
-"""Height of a panel, room above the first one, room for the label below each [inch]."""
+ROW, FOOT = 1.45, 0.5
+"""Height of a panel, room for the label below [inch]."""
 COLUMNS = ((0.68, 2.5), (3.78, 2.3), (6.5, 2.3))
 """Left and width of the three columns [inch]."""
 
@@ -50,35 +50,34 @@ def projections(
     """Draw order, error and shares of the verdicts of one scheme against every swept key."""
     name, letter = record.words("scheme")[scheme], words.symbol(quantity)
     shown = keys[:SHOWN]
-    height = ABOVE + len(shown) * (ROW + FOOT)
-    figure = style.canvas(height)
+    figure, axes = rows_of(3 * len(shown), COLUMNS, ROW, 0.0, FOOT)
     status = flags(record, f"{quantity}_status")[scheme]
     masks = {word: status == word for word in SEVERITY}
     away = finest_level.deviation(record, quantity)[scheme]
     promised = promised_text(record, quantity, scheme)
     error = finest_level.error(record, quantity)
-    size = _log10(error.best[scheme])
+    size = np.log10(style.positive(error.best[scheme]))
     allowed = tolerance(experiment, quantity, name)
     for i, key in enumerate(shown):
-        axes = [_axes(figure, i, *column) for column in COLUMNS]
-        axes[0].axhspan(-allowed, allowed, color="#ececec", zorder=0)
-        _draw_members(axes[0], key, away, masks, (-BEYOND, BEYOND))
-        axes[0].set_ylabel(f"order of {letter} − {promised}", fontsize=8.5)
-        _draw_members(axes[1], key, size, masks, None)
-        _label_decades(axes[1])
-        _draw_shares(axes[2], key, masks)
-        for ax in axes:
+        order, error_size, share = row = axes[3 * i : 3 * i + 3]
+        order.axhspan(-allowed, allowed, **style.ALLOWED)
+        _draw_members(order, key, away, masks, (-BEYOND, BEYOND))
+        order.set_ylabel(f"order of {letter} − {promised}", fontsize=8.5)
+        _draw_members(error_size, key, size, masks, None)
+        _label_decades(error_size)
+        _draw_shares(share, key, masks)
+        for ax in row:
             _frame(ax, key)
     kind = "true" if error.is_known else "estimated"
     measure = norm_unit(record, quantity, TYPICAL_NORM)
     titles = ("Order", style.label(f"{kind} error".capitalize(), measure), "Share")
-    for ax, title in zip(figure.axes, titles, strict=False):
+    for ax, title in zip(axes, titles, strict=False):
         ax.set_title(title, fontsize=9)
-    figure.axes[2].legend(
+    axes[2].legend(
         loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=3, fontsize=7, handlelength=0.9,
         columnspacing=0.8, borderaxespad=0.1,
     )  # fmt: skip
-    several = f", {name}" if len(record["scheme"]) > 1 else ""
+    several = of_several(record, scheme)
     return Picture(
         name=f"projections_{quantity}_{scheme}",
         title=f"Where do members fail? {letter}{several}",
@@ -91,7 +90,7 @@ def projections(
 
 
 def _caption(away: Floats, left_out: int, level: int, due: str) -> str:
-    parts = [
+    return style.sentences(
         "Each row shows all members against one swept key, whatever the others are: left the stated order less the "
         f"{due} one, with its tolerance in grey; then the error on level {level}; right what share of the members "
         "near a value comes to which verdict. A key whose shares do not vary does not matter.",
@@ -102,14 +101,7 @@ def _caption(away: Floats, left_out: int, level: int, due: str) -> str:
         if np.any(~(np.abs(away) < BEYOND))
         else "",
         f"{left_out} more keys are not shown; the table of members has them." if left_out else "",
-    ]
-    return " ".join(part for part in parts if part)
-
-
-def _axes(figure: Figure, row: int, left: float, width: float) -> Axes:
-    height = figure.get_figheight()
-    bottom = height - ABOVE - row * (ROW + FOOT) - ROW
-    return figure.add_axes((left / style.WIDTH, bottom / height, width / style.WIDTH, ROW / height))
+    )
 
 
 def _frame(ax: Axes, key: Key) -> None:
@@ -120,11 +112,6 @@ def _frame(ax: Axes, key: Key) -> None:
         ax.set_xticks(key.distinct, key.words)
     ax.set_xlabel(key.label, fontsize=8.5, labelpad=2)
     ax.tick_params(labelsize=7.5)
-
-
-def _log10(values: Floats) -> Floats:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(np.isfinite(values) & (values > 0.0), np.log10(values), np.nan)
 
 
 def _label_decades(ax: Axes) -> None:

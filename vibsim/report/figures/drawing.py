@@ -4,58 +4,100 @@ from __future__ import annotations
 
 import io
 import re
+from typing import TYPE_CHECKING
 
-from vibsim.report.style import Picture
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from matplotlib.transforms import Bbox
 
 FORMATS = ("svg", "png", "pdf")
 """Formats of figures."""
 FAMILY = "'DejaVu Sans', Verdana, Arial, Helvetica, sans-serif"
+MARGIN = 0.05
+"""Between words and the border of a figure [inch]."""
 _PLACES = re.compile(r' (?:d|x|y)="[^"]*"')
 _DIGITS = re.compile(r"(\.\d\d)\d+")
 
 
-def svg(picture: Picture) -> str:
-    """Return the SVG document of a picture: no date, and the same bytes every time."""
+def box(figure: Figure) -> Bbox:
+    """Return what is saved of a figure [inch]: all of it, and the words that leave it."""
+    from matplotlib.transforms import Bbox
+
+    whole, drawn = figure.bbox_inches, figure.get_tightbbox().padded(MARGIN)
+    return Bbox.union([whole, drawn])
+
+
+def svg(figure: Figure, name: str) -> str:
+    """Return the SVG document of a figure: no date, and the same bytes every time.
+
+    Parameters
+    ----------
+    name
+        Unique on the page: the ids of the document begin with it.
+    """
     import matplotlib
 
     stream = io.StringIO()
     nothing = {"Date": None, "Creator": None, "Format": None, "Type": None}
-    with matplotlib.rc_context({"svg.hashsalt": picture.name}):
-        picture.figure.savefig(stream, format="svg", metadata=nothing)
-    return _tidy(stream.getvalue(), picture.name)
+    with matplotlib.rc_context({"svg.hashsalt": name}):
+        figure.savefig(stream, format="svg", metadata=nothing, bbox_inches=box(figure))
+    return _tidy(stream.getvalue(), name)
 
 
 def _tidy(text: str, name: str) -> str:
-    """Make ids unique among the figures of one page, drop unused ones, and let the reader's fonts serve."""
+    """Make ids unique among the figures of one page, drop what says nothing, and let the reader's fonts serve."""
     used = set(re.findall(r'(?:url\(#|href="#)([^)"]+)', text))
     text = re.sub(r' id="([^"]*)"', lambda m: f' id="{name}-{m[1]}"' if m[1] in used else "", text)
     text = re.sub(r'(url\(#|href="#)', rf"\g<1>{name}-", text)
     # hundredths of a point are more than anyone sees
     text = _PLACES.sub(lambda match: _DIGITS.sub(r"\1", match[0]), text)
     text = re.sub(
-        r"<!--.*?-->\s*|<metadata>.*?</metadata>\s*|<!DOCTYPE.*?>\s*", "", text, flags=re.DOTALL
+        r"<!--.*?-->\s*|<metadata>.*?</metadata>\s*|<!DOCTYPE.*?>\s*| transform=\"rotate\(-0 [^\"]*\"",
+        "",
+        text,
+        flags=re.DOTALL,
     )
-    return text.replace("'DejaVu Sans'", FAMILY)
+    text = re.sub(
+        r"; font-family: [^;\"]*", "", text.replace("<svg ", f'<svg font-family="{FAMILY}" ', 1)
+    )
+    text = re.sub(r"<g ?/>", "", text)
+    bare: list[bool] = []
+
+    def without_bare_groups(match: re.Match[str]) -> str:
+        if match[0] != "</g>":
+            bare.append(match[0] == "<g>")
+            return "" if bare[-1] else match[0]
+        return "" if bare.pop() else match[0]
+
+    return re.sub(r"\s*\n\s*", "\n", re.sub(r"<g(?: [^>]*[^/])?>|</g>", without_bare_groups, text))
 
 
-def inline(document: str, alt: str) -> str:
-    """Return the ``<svg>`` element of an SVG document for use within HTML, with `alt` as its accessible name."""
+def inline(document: str, alt: str, *, is_scaled: bool = True) -> str:
+    """Return the ``<svg>`` element of an SVG document for use within HTML.
+
+    Parameters
+    ----------
+    alt
+        Its accessible name.
+    is_scaled
+        Whether it takes the width that the page has, not its own.
+    """
     from markupsafe import escape
 
     element = document[document.index("<svg") :]
     element = re.sub(r' xmlns(:xlink)?="[^"]*"', "", element).replace("xlink:href", "href")
-    element = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", element, count=1)
-    element = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", element, count=1)
+    if is_scaled:
+        element = re.sub(r'(<svg[^>]*?) width="[^"]*" height="[^"]*"', r"\1", element, count=1)
     # a style sheet within the page would hold for all of it; the page has the same rule for its figures
     element = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>\s*", "", element, flags=re.DOTALL)
     return element.replace("<svg", f'<svg role="img" aria-label="{escape(alt)}"', 1)
 
 
-def binary(picture: Picture, form: str) -> bytes:
-    """Return a picture as PNG or PDF, free of dates."""
+def binary(figure: Figure, form: str) -> bytes:
+    """Return a figure as PNG or PDF, free of dates."""
     stream = io.BytesIO()
     metadata = {"pdf": {"CreationDate": None, "Creator": None, "Producer": None}}.get(
         form, {"Software": None}
     )
-    picture.figure.savefig(stream, format=form, metadata=metadata)
+    figure.savefig(stream, format=form, metadata=metadata, bbox_inches=box(figure))
     return stream.getvalue()

@@ -58,7 +58,7 @@ def running(record: Record, case: int) -> Picture | None:
         style.log_axis(ax, "y", *_limits([part[s] for part in both for s in group], most))
         for s in group:
             own = both[0][s] if np.isfinite(both[0][s]).any() else both[1][s]
-            leaves |= frame.mark_leaving(ax, t, own, style.look(s)["color"])
+            leaves |= frame.mark_leaving(ax, t, own, color=style.look(s)["color"])
         ax.plot([], [], color=style.GREY, label="own velocity")
         ax.plot([], [], color=style.GREY, linestyle=DASHED, label="[D₂ₜu]")
         style.beside(ax, fontsize=8, handlelength=2.4)

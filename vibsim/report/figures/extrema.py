@@ -15,7 +15,7 @@ from vibsim.core.record import Record
 from vibsim.report import frame, style
 from vibsim.report.choice import position
 from vibsim.report.data import Floats, Member, at, exact_periods, pick, time_unit, unit, whole
-from vibsim.report.figures.panels import figure_of, panels
+from vibsim.report.figures.panels import figure_of, note, panels
 from vibsim.report.style import Picture
 
 if TYPE_CHECKING:
@@ -29,7 +29,6 @@ MARKED = 40
 """Most numbers of one curve that get a marker each."""
 MOSTLY = 0.5
 """Where fewer than this part of the curves stay so small for two peaks or more, the scale is logarithmic."""
-EXACT: dict[str, Any] = {"color": "black", "linestyle": (0, (4, 3)), "linewidth": 1.0, "zorder": 1}
 WILD = 10.0
 """Amplitudes and periods beyond so many times the exact one are cut off, and the panel says so."""
 
@@ -56,7 +55,7 @@ def local(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     size = _amplitude(experiment, record, case)
     for ax, value in ((axes[0], exact), (axes[1], size), (axes[2], 0.0)):
         if math.isfinite(value):
-            ax.axhline(value, label="exact" if ax is axes[0] else "", **EXACT)
+            ax.axhline(value, label="exact" if ax is axes[0] else "", **style.REFERENCE)
     leaves = _ranges(axes, drawn, exact, size)
     for ax in axes:
         # amplitudes that hardly differ need long numbers
@@ -169,8 +168,7 @@ def _tell_alike(ax: Axes, lines: list[Any], labels: list[str]) -> None:
             lines[i].set_label(text)
     if texts and lines[0].get_label()[:1] == "_":
         handles, words = zip(*texts, strict=True)
-        place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.03)}
-        ax.legend(list(handles), list(words), borderaxespad=0.0, fontsize=7.5, **place)
+        ax.legend(list(handles), list(words), **style.BESIDE, fontsize=7.5)
 
 
 def heights(time: Floats, peak: Floats, trough_time: Floats, trough: Floats) -> Floats:
@@ -241,14 +239,13 @@ def _ranges(axes: list[Axes], drawn: list[list[Any]], exact: float, size: float)
             _grow(ax, lines, abs(value))
         else:
             ax.set_ylim(*style.limits(kept))
-            note = f"cut off beyond {WILD:g} times the exact one"
-            ax.text(0.99, 0.9, note, transform=ax.transAxes, ha="right", fontsize=8.5)
+            note(ax, f"cut off beyond {WILD:g} times the exact one")
         found = [
             frame.mark_leaving(
                 ax,
                 np.asarray(line.get_xdata(), dtype=np.float64),
                 np.asarray(line.get_ydata(), dtype=np.float64),
-                line.get_color(),
+                color=line.get_color(),
             )
             for line in lines
         ]
@@ -270,5 +267,4 @@ def _grow(ax: Axes, lines: list[Any], size: float) -> None:
     values = np.concatenate([np.asarray(line.get_ydata()) for line in lines] + [np.array([size])])
     shown = values[(values <= frame.WILD * size) & (values >= size / frame.WILD)]
     style.log_axis(ax, "y", float(shown.min()) / 2.0, 2.0 * float(shown.max()))
-    note = "size, logarithmic"
-    ax.text(0.99, 0.9, note, transform=ax.transAxes, ha="right", fontsize=8.5)
+    note(ax, "size, logarithmic")

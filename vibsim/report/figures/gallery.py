@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import SEVERITY
 from vibsim.experiment.storage import asked
-from vibsim.report import choice, data, frame, sweep_layout
+from vibsim.report import choice, data, sweep_layout
 from vibsim.report.data import Member
 from vibsim.report.figures import (
     cloud,
@@ -59,8 +59,6 @@ def pictures(experiment: Experiment, record: Record, shown: list[Member]) -> lis
         ]
     drawn += beside + alone
     drawn += [solution.solution(record, choice.position(experiment), member) for member in series]
-    for picture in drawn:
-        frame.hold_words(picture.figure)
     return drawn
 
 

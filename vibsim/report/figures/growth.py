@@ -12,20 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.core.record import Record
-from vibsim.report import style
+from vibsim.report import data, style
 from vibsim.report.choice import position
-from vibsim.report.data import (
-    Floats,
-    Member,
-    at,
-    exact_series,
-    known,
-    largest,
-    time_unit,
-    times,
-    unit,
-    whole,
-)
+from vibsim.report.data import Floats, Member
 from vibsim.report.figures.panels import figure_of, panels
 from vibsim.report.figures.phase import of_level
 from vibsim.report.style import Picture
@@ -58,34 +47,30 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
     if not runs:
         return None
     quantity = position(experiment)
-    letter, measure = words.symbol(quantity), unit(record, f"{quantity}_finest")
+    letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_finest")
     axes = panels([2.2, 2.6])
     sizes, reference = [], 0.0
     for k, (member, level) in enumerate(runs):
-        t = times(record, member.case)
+        t = data.times(record, member.case)
         values = of_level(record, quantity, member, level)
         look = style.look(k)
-        exact = exact_series(record, quantity, member)
-        reference = max(reference, largest(exact))
+        exact = data.exact_series(record, quantity, member)
+        reference = max(reference, data.largest(exact))
         within = (
-            np.abs(values) <= BEYOND * largest(exact)
-            if largest(exact) > 0.0
+            np.abs(values) <= BEYOND * data.largest(exact)
+            if data.largest(exact) > 0.0
             else np.isfinite(values)
         )
-        if k == 0 or _stays(values, largest(exact)):
+        if k == 0 or _stays(values, data.largest(exact)):
             x, y = style.thin(t, np.where(within, values, np.nan))
             axes[0].plot(x, y, color=look["color"], linewidth=1.2)
         size = style.no_zeros(values)
         # the margin of an axis would overflow beyond
         size = np.where(size < HIGHEST, size, np.nan)
-        axes[1].plot(
-            *style.thin(t, size),
-            color=look["color"],
-            linewidth=0.9,
-            label=_label(record, member, level),
-        )
+        text = _label(record, member, level)
+        axes[1].plot(*style.thin(t, size), color=look["color"], linewidth=0.9, label=text)
         sizes.append(size[np.isfinite(size)])
-        _envelope(axes[1], record, member, level, largest(exact), look["color"])
+        _envelope(axes[1], record, member, level, data.largest(exact), look["color"])
         if k == 0 and np.isfinite(exact).any():
             axes[0].plot(*style.thin(t, exact), color="black", linestyle=(0, (1, 2)), zorder=5)
     if reference > 0.0:
@@ -99,18 +84,10 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
         f"The slowest beside the exact solution (dotted), up to {WHOLE:g} times its size"
     )
     axes[1].set_title("Size of the solution, and the predicted growth (dashed)")
-    axes[1].set_xlabel(style.label("t", time_unit(record)))
+    axes[1].set_xlabel(style.label("t", data.time_unit(record)))
     # one legend for both panels
     handles, texts = axes[1].get_legend_handles_labels()
-    axes[0].legend(
-        handles,
-        texts,
-        loc="upper left",
-        bbox_to_anchor=(1.01, 1.03),
-        borderaxespad=0.0,
-        fontsize=8,
-        handlelength=1.4,
-    )
+    axes[0].legend(handles, texts, **style.BESIDE, fontsize=8, handlelength=1.4)
     return Picture(
         name="growing",
         title="Unstable runs: growth predicted and measured",
@@ -126,26 +103,27 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
 def _runs(record: Record) -> list[tuple[Member, int]]:
     """Choose the unstable runs, from the slowest growth to the fastest."""
     growth, limit = (
-        known(record, "theory_growth", OF_LEVEL),
-        known(record, "stability_limit", MEMBER),
+        data.known(record, "theory_growth", OF_LEVEL),
+        data.known(record, "stability_limit", MEMBER),
     )
     product = omega_dt(record)
     found: list[tuple[float, Member, int]] = []
     for member in everyone(record):
-        for i in range(len(whole(record, "level"))):
+        for i in range(len(data.whole(record, "level"))):
             factor = float(growth[member.scheme, member.case, i])
             most = float(limit[member.scheme, member.case])
             beyond = 0.0 < most <= product[member.case, i] * (1.0 + 1e-9)
             if beyond and not math.isnan(factor) and factor > 1.0 + NOTABLE:
                 found.append((factor, member, i))
     found.sort(key=lambda run: run[0])
-    places = sorted({round(x) for x in np.linspace(0, len(found) - 1, min(MOST, len(found)))})
+    places = style.spaced(len(found), MOST)
     return [found[i][1:] for i in places]
 
 
 def _label(record: Record, member: Member, level: int) -> str:
     told, seen = (
-        at(record, f"{who}_growth", member, level=level).item() for who in ("theory", "measured")
+        data.at(record, f"{who}_growth", member, level=level).item()
+        for who in ("theory", "measured")
     )
     product = float(omega_dt(record)[member.case, level])
     numbers = f"\n× {words.number(seen)}, theory {words.number(told)}"
@@ -161,9 +139,9 @@ def _envelope(
     ax: Any, record: Record, member: Member, level: int, size: float, colour: Any
 ) -> None:
     """Draw the predicted growth of an amplitude that begins with that of the exact solution."""
-    t = times(record, member.case)
-    growth = at(record, "theory_growth", member, level=level).item()
-    w = float(np.ravel(known(record, "natural_frequency", ("case",), case=member.case))[0])
+    t = data.times(record, member.case)
+    growth = data.at(record, "theory_growth", member, level=level).item()
+    w = float(np.ravel(data.known(record, "natural_frequency", ("case",), case=member.case))[0])
     if not (math.isfinite(growth) and math.isfinite(w) and size > 0.0):
         return
     exponent = (t - t[0]) * w / (2.0 * np.pi) * math.log10(growth) + math.log10(size)

@@ -11,18 +11,9 @@ import numpy as np
 
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
-from vibsim.report import style
+from vibsim.report import data, style
 from vibsim.report.choice import promises
-from vibsim.report.data import (
-    Floats,
-    Member,
-    at,
-    formal_orders,
-    pick,
-    sound_triples,
-    stated_order,
-    whole,
-)
+from vibsim.report.data import Floats, Member
 from vibsim.report.text import words
 
 if TYPE_CHECKING:
@@ -38,8 +29,8 @@ def draw(
     from matplotlib.ticker import MaxNLocator
 
     name = f"{quantity}_observed_order"
-    if name not in record or not np.isfinite(pick(record, name, case=case)).any():
-        few = len(whole(record, "level")) < 3
+    if name not in record or not np.isfinite(data.pick(record, name, case=case)).any():
+        few = len(data.whole(record, "level")) < 3
         ax.set(xticks=[], yticks=[])
         style.remark(
             ax,
@@ -48,29 +39,23 @@ def draw(
             else "no order:\nno ratio of differences exists",
         )
         return None
-    triples, norm = whole(record, "triple"), record.words("norm").index(TYPICAL_NORM)
+    triples, norm = data.whole(record, "triple"), record.words("norm").index(TYPICAL_NORM)
     promised = promises(experiment, record, quantity)
     for order, tolerance in promised:
-        ax.axhspan(order - tolerance, order + tolerance, color="#ececec", zorder=0)
-        ax.axhline(order, color="black", linestyle=(0, (4, 3)), linewidth=1.0, zorder=1)
+        ax.axhspan(order - tolerance, order + tolerance, **style.ALLOWED)
+        ax.axhline(order, **style.REFERENCE)
     sound: list[Floats] = []
     stated = False
-    seen = [sound_triples(record, quantity, Member(s, case, x)) for s, x in enumerate(schemes)]
+    seen = [data.sound_triples(record, quantity, Member(s, case, x)) for s, x in enumerate(schemes)]
     for s, scheme in enumerate(schemes):
         member, good = Member(s, case, scheme), seen[s]
         if any(map(any, seen)) and not any(good):
             # beside orders, those of noise would be taken for some
             continue
-        local = at(record, name, member, norm=norm)
+        local = data.at(record, name, member, norm=norm)
         sound.append(local[good] if any(good) else local)
-        ax.plot(
-            triples,
-            local,
-            **style.look(s),
-            markersize=5,
-            linewidth=1.1,
-        )
-        stated |= _draw_stated(ax, record, quantity, member, norm)
+        ax.plot(triples, local, **style.look(s), markersize=5, linewidth=1.1)
+        stated |= draw_stated(ax, record, quantity, member, norm, style.look(s)["color"])
     ax.set_ylim(*_order_limits(sound, [order for order, _ in promised]))
     if len(schemes) == 1 and len(triples) <= 8:
         for level, order in zip(triples, local, strict=True):
@@ -84,7 +69,7 @@ def draw(
                     fontsize=8,
                     annotation_clip=True,
                 )
-    levels = whole(record, "level")
+    levels = data.whole(record, "level")
     ax.set_xlim(levels[0] - 0.5, levels[-1] + 0.5)
     ax.xaxis.set_major_locator(MaxNLocator(nbins=10, integer=True))
     ax.set_xlabel("level (coarsest of three)")
@@ -97,22 +82,22 @@ def draw_each(
 ) -> bool | None:
     """Draw the stated order of every scheme in a row of its own; return as `draw` does."""
     name = f"{quantity}_observed_order"
-    if name not in record or not np.isfinite(pick(record, name, case=case)).any():
+    if name not in record or not np.isfinite(data.pick(record, name, case=case)).any():
         return draw(ax, experiment, record, quantity, case, schemes)
     norm = record.words("norm").index(TYPICAL_NORM)
     seen: list[float] = []
     settled = False
-    chosen = np.flatnonzero(~np.isnan(formal_orders(record, quantity)[:, case])).tolist()
+    chosen = np.flatnonzero(~np.isnan(data.formal_orders(record, quantity)[:, case])).tolist()
     for row, s in enumerate(chosen):
         scheme = schemes[s]
         member, colour = Member(s, case, scheme), style.look(s)["color"]
-        promised = float(formal_orders(record, quantity)[s, case])
+        promised = float(data.formal_orders(record, quantity)[s, case])
         order, low, high = (
-            float(at(record, f"{quantity}_order{end}", member, norm=norm))
+            float(data.at(record, f"{quantity}_order{end}", member, norm=norm))
             for end in ("", "_low", "_high")
         )
         settled |= bool(np.isfinite(order))
-        last = float(at(record, name, member, norm=norm)[-1])
+        last = float(data.at(record, name, member, norm=norm)[-1])
         face = colour if np.isfinite(order) else "white"
         value = order if np.isfinite(order) else last
         ax.plot([low, high], [row, row], color=colour, linewidth=3.0, alpha=0.35)
@@ -128,13 +113,14 @@ def draw_each(
     return settled
 
 
-def _draw_stated(ax: Axes, record: Record, quantity: str, member: Member, norm: int) -> bool:
+def draw_stated(
+    ax: Axes, record: Record, quantity: str, member: Member, norm: int, colour: str
+) -> bool:
     """Draw the stated order as a bar over the levels of its window, with its interval; say whether there is one."""
-    stated = stated_order(record, quantity, member, norm)
+    stated = data.stated_order(record, quantity, member, norm)
     if stated is None:
         return False
     order, low, high, first, last = stated
-    colour = style.look(member.scheme)["color"]
     ax.fill_between(
         [first, last], [low, low], [high, high], color=colour, alpha=0.18, linewidth=0, zorder=0.5
     )

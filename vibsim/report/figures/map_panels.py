@@ -9,6 +9,7 @@ import numpy as np
 
 from vibsim.report import style
 from vibsim.report.data import Floats
+from vibsim.report.figures.panels import rows_of
 from vibsim.report.sweep_layout import Grid
 
 if TYPE_CHECKING:
@@ -54,27 +55,19 @@ class Panel:
 
 def draw(grid: Grid, panels: list[Panel], ridge: tuple[Floats, Floats]) -> Figure:
     """Return a figure with the panels in rows of three, all over the same two parameters."""
-    rows = -(-len(panels) // COLUMNS)
-    height = rows * (ABOVE + TALL + BELOW)
-    figure = style.canvas(height)
-    for i, panel in enumerate(panels):
-        row, column = divmod(i, COLUMNS)
-        left = LEFT + column * (WIDE + GAP)
-        bottom = height - row * (ABOVE + TALL + BELOW) - ABOVE - TALL
-        ax = _axes(figure, left, bottom, WIDE, TALL)
+    columns = [(LEFT + i * (WIDE + GAP), WIDE) for i in range(COLUMNS)]
+    figure, axes = rows_of(len(panels), columns, TALL, ABOVE, BELOW)
+    for i, (ax, panel) in enumerate(zip(axes, panels, strict=True)):
         image = _cells(ax, grid, panel)
-        _frame(ax, grid, panel.title, first=column == 0)
+        _frame(ax, grid, panel.title, first=i % COLUMNS == 0)
         _mark(ax, ridge)
         if panel.kind == "code":
             _legend(ax, panel)
         elif image is not None:
-            _scale(_axes(figure, left, bottom - 0.62, WIDE, 0.11), image, panel)
+            box, high = ax.get_position(), figure.get_figheight()
+            bar = figure.add_axes((box.x0, box.y0 - 0.62 / high, box.width, 0.11 / high))
+            _scale(bar, image, panel)
     return figure
-
-
-def _axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
-    size = style.WIDTH, figure.get_figheight()
-    return figure.add_axes((left / size[0], bottom / size[1], width / size[0], height / size[1]))
 
 
 def _cells(ax: Axes, grid: Grid, panel: Panel) -> Any:

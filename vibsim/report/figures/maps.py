@@ -11,7 +11,16 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASONS, SEVERITY, TYPICAL_NORM
 from vibsim.report import finest_level, style
 from vibsim.report.choice import position, tolerance
-from vibsim.report.data import Floats, due, exact_periods, norm_unit, pick, promised_text, whole
+from vibsim.report.data import (
+    Floats,
+    due,
+    exact_periods,
+    norm_unit,
+    of_several,
+    pick,
+    promised_text,
+    whole,
+)
 from vibsim.report.figures import map_panels, separatrix
 from vibsim.report.figures.map_panels import Panel
 from vibsim.report.style import Picture
@@ -45,12 +54,21 @@ def verdicts(
         )
         panels.append(_window(record, grid, quantity, scheme))
     panels += _errors(record, grid, quantity, scheme)
-    several = f", {name}" if len(record["scheme"]) > 1 else ""
+    several = of_several(record, scheme)
     marked = separatrix.separatrix(experiment, grid)
+    kinds = {panel.kind for panel in panels}
     return Picture(
         name=f"map_{quantity}_{scheme}",
         title=f"Where does it converge, how fast, how well? {letter}{several}",
-        caption=_caption(panels, grid, marked, allowed, due(record, quantity)),
+        caption=style.sentences(
+            f"Pale colours are orders within ± {allowed:g} of the {due(record, quantity)} one, where the scale jumps."
+            if "distance" in kinds
+            else "",
+            "Where estimated over true error is pale, two levels alone tell the error."
+            if "factor" in kinds
+            else "",
+            _notes(panels, grid, marked),
+        ),
         alt=f"Maps over two swept parameters: verdict on {words.name(quantity)}, its order and its error{several}",
         figure=map_panels.draw(grid, panels, marked),
     )
@@ -73,8 +91,7 @@ def motion(experiment: Experiment, record: Record, grid: Grid, scheme: int) -> P
             )
     if not panels:
         return None
-    name = record.words("scheme")[scheme]
-    several = f", {name}" if len(record["scheme"]) > 1 else ""
+    several = of_several(record, scheme)
     marked = separatrix.separatrix(experiment, grid)
     parts = [
         f"Numbers of level {whole(record, 'level')[-1]}. The error bars come from the two finest levels alone: "
@@ -84,7 +101,7 @@ def motion(experiment: Experiment, record: Record, grid: Grid, scheme: int) -> P
     return Picture(
         name=f"map_period_{scheme}",
         title=f"Period and amplitude{several}",
-        caption=" ".join(filter(None, parts)),
+        caption=style.sentences(*parts),
         alt=f"Maps of the period, the exact period, the error of the period and the amplitude{several}",
         figure=map_panels.draw(grid, panels, marked),
     )
@@ -107,13 +124,13 @@ def numbers(experiment: Experiment, record: Record, grid: Grid, scheme: int) -> 
                 panels.append(Panel(check.id, grid.worst(values, np.abs(values)), text))
     if not panels:
         return None
-    several = f", {name}" if len(record["scheme"]) > 1 else ""
+    several = of_several(record, scheme)
     marked = separatrix.separatrix(experiment, grid)
     return Picture(
         name=f"map_checks_{scheme}",
         title=f"The numbers that the checks are about{several}",
-        caption=" ".join(
-            filter(None, ["Each panel has the name of its check.", _notes(panels, grid, marked)])
+        caption=style.sentences(
+            "Each panel has the name of its check.", _notes(panels, grid, marked)
         ),
         alt=f"Maps of the numbers that checks ask for{several}",
         figure=map_panels.draw(grid, panels, marked),
@@ -202,12 +219,14 @@ def _errors(record: Record, grid: Grid, quantity: str, scheme: int) -> list[Pane
     kind = "true" if found.is_known else "estimated"
     letter, level = words.symbol(quantity), whole(record, "level")[-1]
     text = style.label(f"{kind} error of {letter} ({TYPICAL_NORM})", measure)
-    panels = [Panel(f"Error on level {level}", grid.worst(_positive(found.best[scheme])), text)]
+    panels = [
+        Panel(f"Error on level {level}", grid.worst(style.positive(found.best[scheme])), text)
+    ]
     if not np.isfinite(found.estimate[scheme]).any():
         return panels
     with np.errstate(invalid="ignore", divide="ignore"):
         if found.is_known:
-            ratio = _positive(found.estimate[scheme] / found.true[scheme])
+            ratio = style.positive(found.estimate[scheme] / found.true[scheme])
             worst = grid.worst(ratio, np.abs(np.log(ratio)))
             return [
                 *panels,
@@ -216,37 +235,13 @@ def _errors(record: Record, grid: Grid, quantity: str, scheme: int) -> list[Pane
         width = (found.high - found.low)[scheme] / found.estimate[scheme]
     return [
         *panels,
-        Panel("Error bar of the error", grid.worst(_positive(width)), "relative width"),
+        Panel("Error bar of the error", grid.worst(style.positive(width)), "relative width"),
     ]
-
-
-def _positive(values: Floats) -> Floats:
-    return np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
-
-
-def _caption(
-    panels: list[Panel],
-    grid: Grid,
-    marked: tuple[Floats, Floats],
-    allowed: float,
-    due: str = "promised",
-) -> str:
-    kinds = {panel.kind for panel in panels}
-    parts = [
-        f"Pale colours are orders within ± {allowed:g} of the {due} one, where the scale jumps."
-        if "distance" in kinds
-        else "",
-        "Where estimated over true error is pale, two levels alone tell the error."
-        if "factor" in kinds
-        else "",
-        _notes(panels, grid, marked),
-    ]
-    return " ".join(part for part in parts if part)
 
 
 def _notes(panels: list[Panel], grid: Grid, marked: tuple[Floats, Floats]) -> str:
     """Explain what is grey, dotted or gathered in blocks; nothing that is not there."""
-    parts = [
+    return style.sentences(
         "Grey hatched cells have no such number."
         if any(panel.has_gaps for panel in panels)
         else "",
@@ -254,5 +249,4 @@ def _notes(panels: list[Panel], grid: Grid, marked: tuple[Floats, Floats]) -> st
         if marked[0].size
         else "",
         grid.note,
-    ]
-    return " ".join(part for part in parts if part)
+    )

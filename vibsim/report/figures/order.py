@@ -5,29 +5,17 @@ Source: pendulum lecture, section 2.5.
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
-from vibsim.report import frame, style
+from vibsim.report import data, style
 from vibsim.report.choice import promises
-from vibsim.report.data import (
-    Floats,
-    Member,
-    at,
-    case_name,
-    due,
-    floor_norm,
-    formal_orders,
-    norm_unit,
-    steps_of,
-    time_unit,
-    whole,
-)
+from vibsim.report.data import Floats, Member
 from vibsim.report.figures import local_order
+from vibsim.report.figures.panels import legend_above, rows_of
 from vibsim.report.style import Picture
 from vibsim.report.text import words
 
@@ -36,9 +24,6 @@ if TYPE_CHECKING:
 
     from vibsim.experiment import Experiment
 
-FONT = 8
-"""Size of the legend [point]."""
-SLOPE: dict[str, Any] = {"color": "black", "linestyle": (0, (4, 3)), "linewidth": 1.0}
 SLOPES: tuple[Any, ...] = ((0, (4, 3)), (0, (1.2, 1.6)), (0, (7, 2, 1.2, 2)), (0, (10, 2)))
 """Dashes of several promised slopes."""
 WILD = 1e4
@@ -50,38 +35,19 @@ def against_step(experiment: Experiment, record: Record, quantity: str, case: in
     schemes = record.words("scheme")
     many = style.crowded(record)
     panel = max(2.2, 0.17 * len(schemes)) if many else 2.2
-    orders = dict.fromkeys(order for order, _ in promises(experiment, record, quantity))
-    told = [*schemes, "level difference", "true error", "predicted round-off"]
-    told += [f"slope {order:g} ({due(record, quantity)})" for order in orders]
-    columns = frame.columns(told, FONT, 0.9 * style.WIDTH)
-    rows = math.ceil(len(told) / columns)
-    height = panel + 0.95 + 0.2 * rows
-    figure = style.canvas(height)
-    low, tall = 0.5 / height, panel / height
-    left, right = (
-        figure.add_axes((0.088, low, 0.365, tall)),
-        figure.add_axes((0.68 if many else 0.555, low, 0.3 if many else 0.425, tall)),
-    )
+    second = (6.1, 2.7) if many else (5.0, 3.8)
+    figure, (left, right) = rows_of(2, [(0.8, 3.3), second], panel, 0.6, 0.5)
     kinds = _draw_norms(left, experiment, record, quantity, case, schemes)
     draw = local_order.draw_each if many else local_order.draw
     is_settled = draw(right, experiment, record, quantity, case, schemes)
-    handles, texts = left.get_legend_handles_labels()
-    figure.legend(
-        handles,
-        texts,
-        loc="lower left",
-        bbox_to_anchor=(0.075, (panel + 0.82) / height),
-        ncols=columns,
-        fontsize=FONT,
-        borderaxespad=0.0,
-    )
-    member = case_name(record, case)
+    legend_above(figure, left)
+    member = data.case_name(record, case)
     suffix = f", {member}" if member else ""
     letter = words.symbol(quantity)
     return Picture(
         name=f"order_{quantity}_{case}",
         title=f"How fast does the error shrink? {letter}{suffix}",
-        caption=_caption(kinds, is_settled, many, due(record, quantity)),
+        caption=_caption(kinds, is_settled, many, data.due(record, quantity)),
         alt=f"Norm of the level differences of {words.name(quantity)} against the step, and local order against level",
         figure=figure,
     )
@@ -113,26 +79,28 @@ def _caption(
         )
     if is_settled and not many:
         parts.append("The bar is the stated order with its interval, over the levels it rests on.")
-    return " ".join(part for part in parts if part)
+    return style.sentences(*parts)
 
 
 def _draw_norms(
     ax: Axes, experiment: Experiment, record: Record, quantity: str, case: int, schemes: list[str]
 ) -> frozenset[str]:
     """Draw the norms; return what is seen: ``difference``, ``true``, ``slope``, ``floor``."""
-    dt, norm = steps_of(record, case), record.words("norm").index(TYPICAL_NORM)
-    measure = norm_unit(record, quantity, TYPICAL_NORM)
+    dt, norm = data.steps_of(record, case), record.words("norm").index(TYPICAL_NORM)
+    measure = data.norm_unit(record, quantity, TYPICAL_NORM)
     seen: list[Floats] = []
     floors: list[Floats] = []
-    promised = formal_orders(record, quantity)[:, case]
+    promised = data.formal_orders(record, quantity)[:, case]
     for s, scheme in enumerate(schemes):
         if np.isnan(promised[s]):
             # a scheme that chooses its own steps has no error against dt
             continue
         member = Member(s, case, scheme)
         look = style.look(s)
-        difference = style.no_zeros(at(record, f"{quantity}_difference_norm", member, norm=norm))
-        true = style.no_zeros(at(record, f"{quantity}_error_norm", member, norm=norm))
+        difference = style.no_zeros(
+            data.at(record, f"{quantity}_difference_norm", member, norm=norm)
+        )
+        true = style.no_zeros(data.at(record, f"{quantity}_error_norm", member, norm=norm))
         ax.plot(
             dt[: difference.size],
             difference,
@@ -149,7 +117,7 @@ def _draw_norms(
                 markersize=7,
                 markerfacecolor="none",
             )
-        floors.append(style.no_zeros(floor_norm(record, quantity, member, TYPICAL_NORM)))
+        floors.append(style.no_zeros(data.floor_norm(record, quantity, member, TYPICAL_NORM)))
         ax.plot(dt, floors[-1], color=look["color"], linestyle=":", linewidth=1.0)
         seen += [difference, true]
     if not any(np.isfinite(part).any() for part in seen):
@@ -165,7 +133,7 @@ def _draw_norms(
             dt,
             seen,
             order,
-            f"slope {order:g} ({due(record, quantity)})",
+            f"slope {order:g} ({data.due(record, quantity)})",
             SLOPES[k % len(SLOPES)] if len(orders) > 1 else "",
         )
         for k, order in enumerate(orders)
@@ -179,9 +147,9 @@ def _draw_norms(
     }
     found = frozenset(kind for kind, is_seen in kinds.items() if is_seen)
     _explain(ax, found)
-    ax.set_xlabel(style.label("dt", time_unit(record, "dt")))
+    ax.set_xlabel(style.label("dt", data.time_unit(record, "dt")))
     ax.set_ylabel(style.label(f"{TYPICAL_NORM} norm, {words.symbol(quantity)}", measure))
-    _level_axis(ax, dt, whole(record, "level"))
+    _level_axis(ax, dt, data.whole(record, "level"))
     return found
 
 
@@ -222,7 +190,7 @@ def _reference(
         ax.plot(
             reach,
             start * (reach / dt[0]) ** order,
-            **SLOPE | ({"linestyle": dashes} if dashes else {}),
+            **style.REFERENCE | ({"linestyle": dashes} if dashes else {}),
             label=label,
         )
     if is_drawn and dashes:

@@ -86,8 +86,7 @@ def draw_orders(
         _draw_one(ax, t, (order, low, high), sure, look, text)
         drawn += [order[sure] if sure.any() else order, order[-1:]]
     if math.isfinite(promised):
-        line: dict[str, Any] = {"linestyle": (0, (4, 3)), "linewidth": 1.0, "zorder": 1}
-        ax.axhline(promised, color="black", label=due(record, quantity), **line)
+        ax.axhline(promised, **style.REFERENCE, label=due(record, quantity))
     ax.set_ylim(*_limits(drawn, promised))
     ax.set_ylabel("order")
     ax.set_title("Order over time, in windows of half a period", fontweight="normal", fontsize=9)
@@ -116,15 +115,8 @@ def _draw_one(
     unsure = np.isfinite(order) & ~sure
     if unsure.any():
         every = max(1, int(np.count_nonzero(unsure)) // 60)
-        ax.plot(
-            t[unsure][::every],
-            order[unsure][::every],
-            color=THIN,
-            linestyle="none",
-            marker=".",
-            markersize=2.6,
-            zorder=1.5,
-        )
+        x, y = t[unsure][::every], order[unsure][::every]
+        ax.plot(x, y, ".", color=THIN, markersize=2.6, zorder=1.5)
 
 
 def _limits(drawn: list[Floats], promised: float) -> tuple[float, float]:

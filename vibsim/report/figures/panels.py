@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -62,6 +63,11 @@ def figure_of(axes: Axes) -> Figure:
     return figure
 
 
+def note(ax: Axes, text: str, height: float = 0.9) -> None:
+    """Say within a panel, at its right, how it shows what it shows."""
+    ax.text(0.99, height, text, transform=ax.transAxes, ha="right", fontsize=8.5)
+
+
 def panels(heights: list[float]) -> list[Axes]:
     """Return axes below each other with one common axis of abscissae; room for a legend at the right."""
     total = sum(heights) + 0.28 * len(heights) + 0.42
@@ -79,6 +85,56 @@ def panels(heights: list[float]) -> list[Axes]:
     return axes
 
 
+def rows_of(
+    count: int, columns: Sequence[tuple[float, float]], tall: float, above: float, below: float
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure and its panels, row by row.
+
+    Parameters
+    ----------
+    count
+        Number of panels.
+    columns
+        Left and width of each column [inch].
+    tall, above, below
+        Height of a panel, and the room above and below each [inch].
+    """
+    rows = -(-count // len(columns))
+    height = rows * (above + tall + below)
+    figure = style.canvas(height)
+    axes = []
+    for i in range(count):
+        row, column = divmod(i, len(columns))
+        left, width = columns[column]
+        bottom = height - row * (above + tall + below) - above - tall
+        axes.append(axes_at(figure, left, bottom, width, tall))
+    return figure, axes
+
+
+def axes_at(figure: Figure, left: float, bottom: float, width: float, tall: float) -> Axes:
+    """Return new axes of a figure at a place [inch]."""
+    high = figure.get_figheight()
+    return figure.add_axes((left / style.WIDTH, bottom / high, width / style.WIDTH, tall / high))
+
+
+LEGEND_COLUMNS = 7
+"""Most columns of a legend above panels."""
+
+
+def legend_above(figure: Figure, ax: Axes) -> None:
+    """Write the legend of a panel above all of them, in as many columns as there is room for."""
+    handles, texts = ax.get_legend_handles_labels()
+    # below the upper edge there is room for one row; more stand above it
+    place: dict[str, Any] = {"bbox_to_anchor": (0.07, 1.0 - 0.24 / figure.get_figheight())}
+    for count in range(min(len(texts), LEGEND_COLUMNS), 0, -1):
+        legend = figure.legend(
+            handles, texts, loc="lower left", borderaxespad=0.0, ncols=count, fontsize=8, **place
+        )
+        if count == 1 or legend.get_window_extent().width <= 0.92 * figure.bbox.width:
+            return
+        legend.remove()
+
+
 def draw_curves(ax: Axes, t: Floats, curves: list[Curve], text: str, measure: str) -> None:
     """Draw curves that may coincide: from wide and solid below to narrow and dashed above, markers in turn.
 
@@ -91,11 +147,11 @@ def draw_curves(ax: Axes, t: Floats, curves: list[Curve], text: str, measure: st
     for i, curve in enumerate(curves):
         values = style.no_zeros(curve.values) if wild else curve.values / 10.0**exponent
         x, y = style.thin(t, values)
-        note = f"\n({curve.fate})" if curve.fate else ""
+        fate = f"\n({curve.fate})" if curve.fate else ""
         look = _look(i, len(curves), x.size)
         if not curve.sound and any(c.sound for c in curves):
             look = {"color": "#a0a0a0", "linewidth": 0.6, "zorder": 1.5}
-        ax.plot(x, y, label=curve.label + note, **look)
+        ax.plot(x, y, label=curve.label + fate, **look)
     stop_at_breakdown(ax, t, [curve.values for curve in curves])
     if wild:
         style.log_axis(ax, "y", *decades(shown))
@@ -115,8 +171,7 @@ def stop_at_breakdown(ax: Axes, t: Floats, series: list[Floats]) -> None:
     last = t.size - 1 if last >= t.size - 2 else last
     ax.set_xlim(float(t[0]), float(t[last]))
     if last < t.size - 1:
-        note = f"ends with the breakdown, of {t[-1]:g} in all"
-        ax.text(0.99, 0.03, note, transform=ax.transAxes, ha="right", fontsize=8.5)
+        note(ax, f"ends with the breakdown, of {t[-1]:g} in all", 0.03)
 
 
 def explosive(series: list[Floats]) -> bool:

@@ -5,14 +5,15 @@ Source: vibration text, exercise 22 (the motion of the mass at (x, y), with equa
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vibsim.core.record import Record
 from vibsim.report import style
 from vibsim.report.data import Floats, Member, case_name, pick, swept, unit, whole
-from vibsim.report.figures.phase import ACROSS, legend_above, of_level
+from vibsim.report.figures.panels import legend_above, rows_of
+from vibsim.report.figures.phase import ACROSS, of_level
 from vibsim.report.style import Picture
 from vibsim.report.text import words
 
@@ -45,7 +46,10 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
     frame = _frame([points for panel in curves for _, points in panel])
     if frame is None:
         return None
-    figure, axes = _axes(len(panels), frame)
+    (left, right), (low, high) = frame
+    wide = style.WIDTH - 1.0
+    tall = min(wide * (high - low) / (right - left), TALLEST)
+    figure, axes = rows_of(len(panels), [(0.75, wide)], tall, 0.4, 0.3)
     for ax, (title, _, _), panel in zip(axes, panels, curves, strict=True):
         _draw(ax, panel)
         ax.set_title(title)
@@ -72,7 +76,7 @@ def _panels(record: Record, shown: list[Member]) -> list[tuple[str, list[Member]
             (case_name(record, case), [m for m in shown if m.case == case], finest)
             for case in cases
         ]
-    chosen = sorted({round(x) for x in np.linspace(0, finest, min(ACROSS, len(levels)))})
+    chosen = style.spaced(len(levels), ACROSS)
     return [(f"level {levels[i]}", shown, i) for i in chosen]
 
 
@@ -102,8 +106,7 @@ def _draw(ax: Axes, curves: list[tuple[str, Points]]) -> None:
         ax.plot(x[last], y[last], color=look["color"], marker=look["marker"], markersize=5,
                 linestyle="-", linewidth=width, label=style.entry(name))  # fmt: skip
     for x, y in (points for name, points in curves if not name):
-        dashed: dict[str, Any] = {"color": "black", "linestyle": (0, (4, 3)), "linewidth": 0.8}
-        ax.plot(x, y, **dashed, zorder=5, label="reference")
+        ax.plot(x, y, **style.REFERENCE | {"zorder": 5, "linewidth": 0.8}, label="reference")
 
 
 def _frame(seen: list[Points]) -> tuple[tuple[float, float], tuple[float, float]] | None:
@@ -122,21 +125,3 @@ def _frame(seen: list[Points]) -> tuple[tuple[float, float], tuple[float, float]
         room = max(min(reach, CUT * half[axis]), FLATTEST * max(half))
         limits.append((middle[axis] - 1.08 * room, middle[axis] + 1.08 * room))
     return (limits[0], limits[1]) if max(half) > 0.0 else None
-
-
-def _axes(
-    count: int, frame: tuple[tuple[float, float], tuple[float, float]]
-) -> tuple[Any, list[Axes]]:
-    """Return a figure with panels below each other, as high as the frame is beside its width, and a legend's room."""
-    (left, right), (low, high) = frame
-    wide = style.WIDTH - 1.0
-    side = min(wide * (high - low) / (right - left), TALLEST)
-    gap, above = 0.42, 0.45
-    total = count * (side + gap) + above + 0.2
-    figure = style.canvas(total)
-    axes = []
-    for i in range(count):
-        bottom = total - above - (i + 1) * (side + gap) + gap - 0.1
-        box = (0.75 / style.WIDTH, bottom / total, wide / style.WIDTH, side / total)
-        axes.append(figure.add_axes(box))
-    return figure, axes

@@ -10,7 +10,7 @@ import numpy as np
 from vibsim.core.record import Record
 from vibsim.report import finest_level, frame, style
 from vibsim.report.choice import position
-from vibsim.report.data import Floats, exact_periods, largest, whole
+from vibsim.report.data import Floats, exact_periods, whole
 from vibsim.report.figures.panels import explosive, figure_of, panels
 from vibsim.report.figures.sweep import MARKED, finish, interval, line, mark_members
 from vibsim.report.finest_level import Measured
@@ -83,7 +83,7 @@ def amplitude(experiment: Experiment, record: Record, along: Along) -> Picture |
     if _spans(found, held):
         # a motion that a scheme damps away would fill the frame with its decades
         least = np.nanmin(np.append(size, np.nanmax(held.value))) / frame.WILD
-        _log_limits(axes[0], np.maximum(held.value, least))
+        style.fit_log_axis(axes[0], "y", np.maximum(held.value, least), room=2.0)
     else:
         axes[0].set_ylim(*_room(held, None))
     leaves = mark_members(axes[0], along, found.value)
@@ -121,7 +121,7 @@ def _draw_error_bars(ax: Axes, record: Record, along: Along, found: Measured, he
             line(ax, along.key.values[members], error, **look | {"markersize": 4}, label=text)
     shown = held if np.isfinite(held).any() else found.error
     # of a motion that is damped away the error falls for ever
-    _log_limits(ax, np.where(shown > DEEP * largest(shown), shown, np.nan))
+    style.fit_log_axis(ax, "y", shown, least=DEEP, room=2.0)
     ax.set_ylabel(style.label("estimated error", found.unit))
     ax.set_title(f"Error bar of the {found.name}")
 
@@ -178,18 +178,11 @@ def _draw_errors(ax: Axes, record: Record, along: Along, found: Measured) -> Non
                     "linewidth": 1.2,
                 }
                 line(ax, x, style.no_zeros(error[i][s, members]), label=label, **look)
-    _log_limits(ax, np.stack(list(error.values())))
+    style.fit_log_axis(ax, "y", *error.values(), room=2.0)
     ax.set_ylabel("|period / exact − 1|")
     ax.set_title("Relative error of the period")
     if not style.crowded(record):
         style.beside(ax, fontsize=8)
-
-
-def _log_limits(ax: Axes, values: Floats) -> None:
-    positive = values[np.isfinite(values) & (values > 0)]
-    if positive.size:
-        low = max(float(positive.min()), style.TINIEST)
-        style.log_axis(ax, "y", low / 2, min(float(positive.max()), style.LARGEST) * 2)
 
 
 def _text(*parts: str) -> str:

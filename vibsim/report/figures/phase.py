@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.core.record import Record
-from vibsim.report import frame, style
+from vibsim.report import style
 from vibsim.report.data import Floats, Member, at, exact_periods, known, pick, times, unit, whole
+from vibsim.report.figures.panels import legend_above, rows_of
 from vibsim.report.style import Picture
 from vibsim.report.text import words
 
@@ -31,8 +32,6 @@ CUT = 2.5
 """What leaves the exact orbit by more than this factor is cut off."""
 PERIODS = 3.0
 """Of a longer motion the first period and the last so many are drawn."""
-FONT = 8
-"""Size of the legend [point]."""
 SAMPLED = 8
 """Fewer samples than this in a period do not draw an orbit."""
 
@@ -53,8 +52,9 @@ def plane(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     if not math.isfinite(w) or w <= 0.0 or period < SAMPLED * float(t[1] - t[0]):
         return None
     levels = whole(record, "level")
-    chosen = sorted({round(x) for x in np.linspace(0, len(levels) - 1, min(MOST, len(levels)))})
-    figure, axes = _axes(len(chosen))
+    chosen = style.spaced(len(levels), MOST)
+    columns = [(0.62 + 2.75 * i, 2.35) for i in range(ACROSS)]
+    figure, axes = rows_of(len(chosen), columns, 2.35, 0.5, 0.45)
     size = _draw_exact(axes, record, model, case, w, t <= 1.02 * period)
     early, late = t <= t[0] + period, t >= t[-1] - PERIODS * period
     is_long = bool(t[-1] > (PERIODS + 1.0) * period)
@@ -105,29 +105,6 @@ def _period(record: Record, case: int, w: float) -> float:
     return exact if math.isfinite(exact) else 2.0 * math.pi / w if w > 0.0 else math.nan
 
 
-def legend_above(figure: Any, ax: Axes) -> None:
-    """Write the legend of a panel above all of them."""
-    handles, texts = ax.get_legend_handles_labels()
-    columns = frame.columns(texts, FONT, 0.92 * style.WIDTH)
-    # below its upper edge there is room for one row; more stand above it
-    figure.legend(handles, texts, loc="lower left", borderaxespad=0.0, ncols=columns, fontsize=FONT,
-                  bbox_to_anchor=(0.06, 1.0 - 0.24 / float(figure.get_figheight())))  # fmt: skip
-
-
-def _axes(count: int) -> tuple[Any, list[Axes]]:
-    """Return a figure with square panels in rows, and room for a legend above them."""
-    rows, side, gap = -(-count // ACROSS), 2.35, 0.78
-    total = rows * (side + gap) + 0.45
-    figure = style.canvas(total)
-    axes = []
-    for i in range(count):
-        row, column = divmod(i, ACROSS)
-        bottom = total - 0.45 - (row + 1) * (side + gap) + gap - 0.17
-        box = (0.62 + column * (side + 0.4)) / style.WIDTH, bottom / total
-        axes.append(figure.add_axes((*box, side / style.WIDTH, side / total)))
-    return figure, axes
-
-
 def of_level(record: Record, name: str, member: Member, level: int) -> Floats:
     """Return a state on a level: the finest one and the differences between it and that level."""
     values = at(record, f"{name}_finest", member)
@@ -149,9 +126,7 @@ def _draw_exact(
         radius = float(np.hypot(u[0], v[0] / w))
         u, v = radius * np.cos(angle), radius * w * np.sin(angle)
     for ax in axes:
-        ax.plot(
-            u, v / w, color="black", linestyle=(0, (4, 3)), linewidth=1.0, zorder=5, label="exact"
-        )
+        ax.plot(u, v / w, **style.REFERENCE | {"zorder": 5}, label="exact")
     return float(np.max(np.hypot(u, v / w)))
 
 

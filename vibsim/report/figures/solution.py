@@ -10,19 +10,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.core.record import Record
-from vibsim.report import style
-from vibsim.report.data import (
-    Floats,
-    Member,
-    at,
-    exact_series,
-    largest,
-    time_unit,
-    times,
-    unit,
-    whole,
+from vibsim.report import data, style
+from vibsim.report.data import Floats, Member
+from vibsim.report.figures.panels import (
+    decades,
+    explosive,
+    figure_of,
+    note,
+    panels,
+    stop_at_breakdown,
 )
-from vibsim.report.figures.panels import decades, explosive, figure_of, panels, stop_at_breakdown
 from vibsim.report.style import Picture
 from vibsim.report.text import words
 
@@ -37,8 +34,8 @@ TINY = 1e-18
 
 def solution(record: Record, quantity: str, member: Member) -> Picture:
     """Draw the solution, and below it, on a logarithmic scale, its estimated and its true error."""
-    t, letter = times(record, member.case), words.symbol(quantity)
-    measure = unit(record, f"{quantity}_finest")
+    t, letter = data.times(record, member.case), words.symbol(quantity)
+    measure = data.unit(record, f"{quantity}_finest")
     axes = panels([2.3, 2.5])
     exact = _draw_solution(axes[0], t, record, quantity, member)
     axes[0].set_ylabel(style.label(letter, measure))
@@ -47,7 +44,7 @@ def solution(record: Record, quantity: str, member: Member) -> Picture:
     _draw_errors(axes[1], t, record, quantity, member)
     axes[1].set_ylabel(style.label(f"|error of {letter}|", measure))
     axes[1].set_title("Estimated beside true error" if exact else "Estimated error")
-    axes[1].set_xlabel(style.label("t", time_unit(record)))
+    axes[1].set_xlabel(style.label("t", data.time_unit(record)))
     caption = (
         f"Top: the finest level, and the value extrapolated from the two finest ones with its error bar{thickness}. "
         "Bottom: the error that the difference of two levels predicts"
@@ -68,12 +65,12 @@ def solution(record: Record, quantity: str, member: Member) -> Picture:
 
 def _draw_band(ax: Axes, t: Floats, record: Record, quantity: str, member: Member) -> str:
     """Draw the error bar of the extrapolated solution as a band, and say how thick it is."""
-    centre = at(record, f"{quantity}_richardson", member)
-    bound = at(record, f"{quantity}_richardson_error", member)
+    centre = data.at(record, f"{quantity}_richardson", member)
+    bound = data.at(record, f"{quantity}_richardson_error", member)
     if not np.isfinite(bound).all():
         return ""
     thickest = float(np.max(bound))
-    size = f"at most {words.number(thickest)} {unit(record, f'{quantity}_finest')}".strip()
+    size = f"at most {words.number(thickest)} {data.unit(record, f'{quantity}_finest')}".strip()
     low, high = ax.get_ylim()
     if thickest < 0.005 * (high - low):
         return f" ({size}: thinner than the line)"
@@ -84,32 +81,31 @@ def _draw_band(ax: Axes, t: Floats, record: Record, quantity: str, member: Membe
 
 
 def _draw_solution(ax: Axes, t: Floats, record: Record, quantity: str, member: Member) -> bool:
-    finest = whole(record, "level")[-1]
-    exact = exact_series(record, quantity, member)
+    finest = data.whole(record, "level")[-1]
+    exact = data.exact_series(record, quantity, member)
     pale: dict[str, Any] = {"color": "#56B4E9", "linewidth": 4.5, "alpha": 0.7}
     solid: dict[str, Any] = {"color": "#0072B2", "linewidth": 1.4}
     dotted: dict[str, Any] = {"color": "black", "linewidth": 1.4, "linestyle": (0, (1, 3))}
     rows = [
-        (at(record, f"{quantity}_richardson", member), "extrapolated (Richardson)", pale),
-        (at(record, f"{quantity}_finest", member), f"level {finest}", solid),
+        (data.at(record, f"{quantity}_richardson", member), "extrapolated (Richardson)", pale),
+        (data.at(record, f"{quantity}_finest", member), f"level {finest}", solid),
         (exact, "exact", dotted),
     ]
     drawn = [(y, text, look) for y, text, look in rows if np.isfinite(y).any()]
     for y, text, look in drawn:
         ax.plot(*style.thin(t, y), label=text, **look)
-    stop_at_breakdown(ax, t, [at(record, f"{quantity}_finest", member)])
+    stop_at_breakdown(ax, t, [data.at(record, f"{quantity}_finest", member)])
     # a run that blew up would hide the others
     ranged = [y for y, _, _ in drawn if np.isfinite(y).all()] or [y for y, _, _ in drawn]
-    size = largest(exact) if np.isfinite(exact).all() else 0.0
-    if 0.0 < size < max(largest(y) for y, _, _ in drawn) / CUT:
+    size = data.largest(exact) if np.isfinite(exact).all() else 0.0
+    if 0.0 < size < max(data.largest(y) for y, _, _ in drawn) / CUT:
         ax.set_ylim(-CUT * size, CUT * size)
-        note = f"cut off at {CUT:g} times the exact solution"
-        ax.text(0.99, 0.11, note, transform=ax.transAxes, ha="right", fontsize=8.5)
+        note(ax, f"cut off at {CUT:g} times the exact solution", 0.11)
     elif explosive(ranged):
         for line in ax.lines:
             line.set_ydata(style.no_zeros(np.asarray(line.get_ydata(), dtype=np.float64)))
         style.log_axis(ax, "y", *decades(ranged))
-        ax.text(0.99, 0.11, "size, without the sign", transform=ax.transAxes, ha="right")
+        note(ax, "size, without the sign", 0.11)
     else:
         ax.set_ylim(*style.limits(*ranged))
     style.beside(ax)
@@ -117,9 +113,9 @@ def _draw_solution(ax: Axes, t: Floats, record: Record, quantity: str, member: M
 
 
 def _draw_errors(ax: Axes, t: Floats, record: Record, quantity: str, member: Member) -> None:
-    pairs = whole(record, "pair")
+    pairs = data.whole(record, "pair")
     estimates = [
-        at(record, f"{quantity}_error_estimate", member, pair=i) for i in range(len(pairs))
+        data.at(record, f"{quantity}_error_estimate", member, pair=i) for i in range(len(pairs))
     ]
     # a run that blew up has no error worth a scale of its own, unless all did
     chosen = [i for i, estimate in enumerate(estimates) if np.isfinite(estimate).all()] or list(
@@ -128,29 +124,31 @@ def _draw_errors(ax: Axes, t: Floats, record: Record, quantity: str, member: Mem
     drawn: list[Floats] = []
     for k, i in enumerate(dict.fromkeys([chosen[0], chosen[-1]]) if chosen else []):
         drawn += _draw_pair(ax, t, record, quantity, member, i, style.COLOURS[k])
-    bound = at(record, f"{quantity}_richardson_error", member)
+    bound = data.at(record, f"{quantity}_richardson_error", member)
     if np.isfinite(bound).all():
         drawn.append(style.no_zeros(bound))
         ax.plot(*style.thin(t, drawn[-1]), color=style.COLOURS[2], label="bound, extrapolated")
-        true = exact_series(record, quantity, member)
-        true = true - at(record, f"{quantity}_richardson", member)
+        true = data.exact_series(record, quantity, member)
+        true = true - data.at(record, f"{quantity}_richardson", member)
         drawn += _dots(ax, t, style.no_zeros(true), style.COLOURS[2], "true, extrapolated")
-    _log_limits(ax, drawn)
+    # dips at zero crossings may leave the range below
+    if not style.fit_log_axis(ax, "y", *drawn, below=0.03, least=TINY):
+        style.remark(ax, "no error to draw: it is zero, or not known")
     style.beside(ax)
 
 
 def _draw_pair(
     ax: Axes, t: Floats, record: Record, quantity: str, member: Member, i: int, colour: str
 ) -> list[Floats]:
-    pair = whole(record, "pair")[i]
-    estimate = style.no_zeros(at(record, f"{quantity}_error_estimate", member, pair=i))
+    pair = data.whole(record, "pair")[i]
+    estimate = style.no_zeros(data.at(record, f"{quantity}_error_estimate", member, pair=i))
     ax.plot(
         *style.thin(t, estimate),
         color=colour,
         linestyle="-" if colour == style.COLOURS[0] else style.DASHES[1],
         label=f"estimate, level {pair}",
     )
-    true = style.no_zeros(at(record, f"{quantity}_error", member, pair=i))
+    true = style.no_zeros(data.at(record, f"{quantity}_error", member, pair=i))
     return [estimate, *_dots(ax, t, true, colour, f"true, level {pair}")]
 
 
@@ -171,15 +169,3 @@ def _dots(ax: Axes, t: Floats, values: Floats, colour: str, text: str) -> list[F
         label=text,
     )
     return [values]
-
-
-def _log_limits(ax: Axes, drawn: list[Floats]) -> None:
-    """Choose a logarithmic range from the bulk of the values: dips at zero crossings may leave it below."""
-    parts = [values[np.isfinite(values) & (values > 0)] for values in drawn]
-    parts = [part for part in parts if part.size]
-    if not parts:
-        style.remark(ax, "no error to draw: it is zero, or not known")
-        return
-    high = min(max(float(part.max()) for part in parts), style.LARGEST)
-    low = min(float(np.quantile(part, 0.03)) for part in parts)
-    style.log_axis(ax, "y", max(low / 3, TINY * high), 3 * high)

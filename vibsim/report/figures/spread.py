@@ -12,7 +12,8 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import SEVERITY, TYPICAL_NORM
 from vibsim.report import finest_level, style
 from vibsim.report.choice import position, tolerance
-from vibsim.report.data import Floats, flags, norm_unit, promised_text, whole
+from vibsim.report.data import Floats, flags, norm_unit, of_several, promised_text, whole
+from vibsim.report.figures.panels import rows_of
 from vibsim.report.style import Picture
 from vibsim.report.text import words
 
@@ -46,25 +47,17 @@ def histograms(experiment: Experiment, record: Record, quantity: str) -> Picture
     if len(record["case"]) < FEWEST:
         return None
     schemes = record.words("scheme")[:SHOWN]
-    height = len(schemes) * (ABOVE + ROW + FOOT)
-    figure = style.canvas(height)
+    first = _spreads(experiment, record, quantity, 0)
+    columns = [(0.68 + 2.83 * i, 2.45) for i in range(len(first))]
+    figure, axes = rows_of(len(schemes) * len(columns), columns, ROW, ABOVE, FOOT)
     status = flags(record, f"{quantity}_status")
     missing = 0
-    for s, scheme in enumerate(schemes):
-        spreads = _spreads(experiment, record, quantity, s, scheme if len(schemes) > 1 else "")
-        bottom = height - s * (ABOVE + ROW + FOOT) - ABOVE - ROW
-        for i, spread in enumerate(spreads):
-            box = (
-                (0.68 + 2.83 * i) / style.WIDTH,
-                bottom / height,
-                2.45 / style.WIDTH,
-                ROW / height,
-            )
-            ax = figure.add_axes(box)
+    for s in range(len(schemes)):
+        row = axes[s * len(columns) : (s + 1) * len(columns)]
+        row[0].set_ylabel("members")
+        for ax, spread in zip(row, _spreads(experiment, record, quantity, s), strict=False):
             missing += _draw(ax, spread, status[s])
-            if i == 0:
-                ax.set_ylabel("members")
-    _explain(figure.axes[0], status)
+    _explain(axes[0], status)
     return Picture(
         name=f"spread_{quantity}",
         title=f"How the members are spread: {words.symbol(quantity)}",
@@ -92,11 +85,10 @@ SHOWN = 6
 """Most schemes that have a row."""
 
 
-def _spreads(
-    experiment: Experiment, record: Record, quantity: str, s: int, scheme: str
-) -> list[Spread]:
+def _spreads(experiment: Experiment, record: Record, quantity: str, s: int) -> list[Spread]:
+    """Return the histograms of a scheme; each has as many."""
     letter, level = words.symbol(quantity), whole(record, "level")[-1]
-    several = f", {scheme}" if scheme else ""
+    several = of_several(record, s)
     found = finest_level.error(record, quantity)
     kind = "true" if found.is_known else "estimated"
     measure = norm_unit(record, quantity, TYPICAL_NORM)
@@ -107,9 +99,9 @@ def _spreads(
         Spread(f"Order of {letter}{several}", away, f"stated order − {promised}", False, (-allowed, allowed)),
         Spread(f"Error of {letter}, level {level}", found.best[s], style.label(f"{kind} error", measure), True),
     ]  # fmt: skip
-    relative = finest_level.period_error(record, -1)[s]
+    relative = finest_level.period_error(record, -1)
     if quantity == position(experiment) and np.isfinite(relative).any():
-        spreads.append(Spread("Error of the period", relative, "|period / exact − 1|", True))
+        spreads.append(Spread("Error of the period", relative[s], "|period / exact − 1|", True))
     return spreads
 
 
@@ -131,7 +123,7 @@ def _draw(ax: Axes, spread: Spread, status: NDArray[Any]) -> int:
     else:
         borders = np.linspace(*style.limits(values[usable], np.array(spread.band or ())), BARS + 1)
     if spread.band:
-        ax.axvspan(*spread.band, color="#ececec", zorder=0)
+        ax.axvspan(*spread.band, **style.ALLOWED)
     base = np.zeros(BARS)
     for word in reversed(tuple(SEVERITY)):
         count = np.histogram(values[usable & (status == word)], borders)[0]

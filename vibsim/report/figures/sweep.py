@@ -77,15 +77,9 @@ def _draw_orders(
 ) -> None:
     promised = promises(experiment, record, quantity)
     for order, tolerance in promised:
-        ax.axhspan(order - tolerance, order + tolerance, color="#ececec", zorder=0)
-        ax.axhline(
-            order,
-            color="black",
-            linestyle=(0, (4, 3)),
-            linewidth=1.0,
-            zorder=1,
-            label=f"{due(record, quantity)}, {order:g} ± {tolerance:g}",
-        )
+        ax.axhspan(order - tolerance, order + tolerance, **style.ALLOWED)
+        text = f"{due(record, quantity)}, {order:g} ± {tolerance:g}"
+        ax.axhline(order, **style.REFERENCE, label=text)
     value, low, high = finest_level.orders(record, quantity)
     for s, scheme in enumerate(record.words("scheme")):
         look = style.look(s) | {"linestyle": "-", "markersize": 4, "linewidth": 0.8}
@@ -131,16 +125,10 @@ def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> tuple
                 dots = look | {"linestyle": "none", "markersize": 4, "markerfacecolor": "white"}
                 line(ax, x, dotted, label=text, **dots)
     leaves = False
-    for values in (
-        np.concatenate([true.ravel(), estimated.ravel()]),
-        np.concatenate([found.true.ravel(), found.estimate.ravel()]),
-    ):
-        # where nothing is bounded all of it makes the range
-        positive = values[np.isfinite(values) & (values > 0)]
-        if positive.size:
-            most = min(float(positive.max()), style.LARGEST)
-            least = max(float(np.quantile(positive, 0.005)), most * 1e-16, style.TINIEST)
-            style.log_axis(ax, "y", least / 3, most * 3)
+    # where nothing is bounded all of it makes the range
+    for values in ((true, estimated), (found.true, found.estimate)):
+        joined = np.concatenate(values, axis=None)
+        if style.fit_log_axis(ax, "y", joined, below=0.005, least=1e-16):
             leaves = mark_members(ax, along, found.best)
             break
     ax.set_ylabel(
@@ -163,7 +151,7 @@ def mark_members(ax: Axes, along: Along, values: Floats) -> bool:
             x, y = along.key.values[members], values[s, members]
             grown = np.where(y > high, y, np.where(np.isfinite(y), high, np.nan))
             each = x.size <= MARKED
-            leaves |= frame.mark_leaving(ax, x, grown, style.look(s)["color"], each=each)
+            leaves |= frame.mark_leaving(ax, x, grown, color=style.look(s)["color"], each=each)
     return leaves
 
 

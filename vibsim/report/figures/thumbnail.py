@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from vibsim.report import style
 from vibsim.report.data import Floats
+from vibsim.report.figures import drawing
 from vibsim.report.figures.panels import Curve
 
 SIZE = (136, 64)
@@ -14,20 +13,17 @@ SIZE = (136, 64)
 
 def draw(t: Floats, curves: list[Curve]) -> str:
     """Return an SVG document with every sound curve as one line."""
-    width, height = SIZE
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(SIZE[0] / 96.0, SIZE[1] / 96.0))
+    ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     whole = [curve for curve in curves if curve.is_whole] or curves
     sound = [curve for curve in whole if curve.sound] or whole
-    low, high = style.limits(*(curve.values for curve in sound), margin=0.1)
-    lines = []
     for i, curve in enumerate(sound):
-        x, y = style.thin(t, curve.values, width // 2)
-        keep = np.isfinite(y)
-        across = (x[keep] - t[0]) / ((t[-1] - t[0]) or 1.0) * width
-        up = height * (1 - (y[keep] - low) / (high - low))
-        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(across, up, strict=True))
-        stroke = 3.2 - 2.2 * i / max(1, len(sound) - 1)
-        lines.append(
-            f'<polyline fill="none" stroke="{style.look(i)["color"]}" stroke-width="{stroke:.1f}" points="{points}"/>'
-        )
-    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}">'
-    return "\n".join([head, *lines, "</svg>\n"])
+        width = 2.4 - 1.6 * i / max(1, len(sound) - 1)
+        x, y = style.thin(t, curve.values, SIZE[0] // 2)
+        ax.plot(x, y, color=style.look(i)["color"], linewidth=width)
+    ax.set_xlim(float(t[0]), float(t[-1]) if t[-1] > t[0] else float(t[0]) + 1.0)
+    ax.set_ylim(*style.limits(*(curve.values for curve in sound), margin=0.1))
+    ax.set_axis_off()
+    return drawing.svg(figure, "thumbnail")

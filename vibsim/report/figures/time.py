@@ -12,21 +12,8 @@ import numpy as np
 
 from vibsim.convergence.differences import gap_ratio, rescaling, target_ratio
 from vibsim.core.record import Record
-from vibsim.report import frame, style
-from vibsim.report.data import (
-    Floats,
-    Member,
-    at,
-    due,
-    formal_order,
-    power,
-    sound_levels,
-    sound_pairs,
-    time_unit,
-    times,
-    unit,
-    whole,
-)
+from vibsim.report import data, frame, style
+from vibsim.report.data import Floats, Member
 from vibsim.report.figures import order_panels
 from vibsim.report.figures.panels import (
     Curve,
@@ -44,7 +31,6 @@ if TYPE_CHECKING:
 
 CURVES = 6
 """Most curves in one panel; more cannot be told apart."""
-TARGET: dict[str, Any] = {"color": "black", "linestyle": (0, (4, 3)), "linewidth": 1.0}
 
 
 EXACT = (
@@ -54,11 +40,11 @@ EXACT = (
 
 def overlay(record: Record, quantity: str, member: Member) -> Picture:
     """Draw the rescaled level differences of a quantity, their spread, and the ratio over time."""
-    t, order = times(record, member.case), power(record, member, quantity)
-    is_exact = math.isinf(formal_order(record, member, quantity))
-    letter, measure = words.symbol(quantity), unit(record, f"{quantity}_difference")
+    t, order = data.times(record, member.case), data.power(record, member, quantity)
+    is_exact = math.isinf(data.formal_order(record, member, quantity))
+    letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_difference")
     curves = differences(record, quantity, member)
-    spread, ratios = comparable(curves), len(whole(record, "triple")) > 0
+    spread, ratios = comparable(curves), len(data.whole(record, "triple")) > 0
     orders = ratios and order_panels.has_order(record, quantity, member)
     heights = [
         2.4,
@@ -74,14 +60,14 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
     if ratios:
         _draw_ratios(axes[-2 if orders else -1], t, record, quantity, member, order)
     if orders:
-        good = _good(record, quantity, member)
+        good = data.sound_triples(record, quantity, member)
         order_panels.draw_orders(axes[-1], t, record, quantity, member, good, _few(good))
-    axes[-1].set_xlabel(style.label("t", time_unit(record)))
-    first = whole(record, "pair")[0]
+    axes[-1].set_xlabel(style.label("t", data.time_unit(record)))
+    first = data.whole(record, "pair")[0]
     low = words.lowered(first)
     law = f"dt{words.raised(order)}" if order != 1.0 else "dt"
     shrinks = (
-        f"{_multiplied(order, whole(record, 'level'))}; if the error shrinks as {law}, the curves "
+        f"{_multiplied(order, data.whole(record, 'level'))}; if the error shrinks as {law}, the curves "
         "fall on one another."
     )
     parts = [
@@ -99,7 +85,7 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
     return Picture(
         name=f"differences_{quantity}_{member.stem}",
         title=f"Do the levels agree? {words.title(quantity)}, {member.title}",
-        caption=" ".join(part for part in parts if part),
+        caption=style.sentences(*parts),
         alt=f"Rescaled level differences of {words.name(quantity)} against time for {member.title}"
         + (", with the ratio of successive differences" if ratios else "")
         + (" and the order over time" if orders else ""),
@@ -109,25 +95,25 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
 
 def energy(record: Record, member: Member) -> Picture:
     """Draw the energy deviation of every level times ``(2**p)**k``: convergence to conservation."""
-    order = power(record, member, "energy_deviation")
-    is_exact = math.isinf(formal_order(record, member, "energy_deviation"))
-    measure, levels = unit(record, "energy_deviation_scaled"), whole(record, "level")
-    above = sound_levels(record, "energy_deviation", member)
+    order = data.power(record, member, "energy_deviation")
+    is_exact = math.isinf(data.formal_order(record, member, "energy_deviation"))
+    measure, levels = data.unit(record, "energy_deviation_scaled"), data.whole(record, "level")
+    above = data.sound_levels(record, "energy_deviation", member)
     curves = []
     for i, level in enumerate(levels):
-        values = at(record, "energy_deviation_scaled", member, level=i)
+        values = data.at(record, "energy_deviation_scaled", member, level=i)
         factor = words.factor(float(gap_ratio(order, level - levels[0])), 2.0**order)
         text = f"{factor}dE{words.lowered(level)}"
         curves.append(Curve(text, values, above[i], _lost(record, "energy_deviation", member, [i])))
     curves = [curves[i] for i in _few([curve.sound for curve in curves])]
     spread = comparable(curves)
     axes = panels([2.4, 1.3] if spread else [2.4])
-    t = times(record, member.case)
+    t = data.times(record, member.case)
     draw_curves(axes[0], t, curves, "rescaled dE", measure)
     axes[0].set_title("Energy deviation dE = E(t) − E(0), rescaled")
     if spread:
         draw_spread(axes[1], t, curves, measure)
-    axes[-1].set_xlabel(style.label("t", time_unit(record)))
+    axes[-1].set_xlabel(style.label("t", data.time_unit(record)))
     caption = (
         f"dE{words.lowered(levels[0])} is dE on level {levels[0]}, and so on. The exact energy is constant, so dE "
         "itself is an error. "
@@ -152,13 +138,13 @@ def energy(record: Record, member: Member) -> Picture:
 
 def differences(record: Record, quantity: str, member: Member) -> list[Curve]:
     """Return the level differences, rescaled so that an error ``C dt**p`` makes them coincide; at most `CURVES`."""
-    order, levels = power(record, member, quantity), whole(record, "level")
-    above, letter = sound_pairs(record, quantity, member), words.symbol(quantity)
+    order, levels = data.power(record, member, quantity), data.whole(record, "level")
+    above, letter = data.sound_pairs(record, quantity, member), words.symbol(quantity)
     curves = []
     for i in _few(above):
         gap = f"{letter}{words.lowered(levels[i])} − {letter}{words.lowered(levels[i + 1])}"
         factor = words.factor(float(rescaling(order, levels[: i + 2])), 2.0**order)
-        values = at(record, f"{quantity}_rescaled", member, pair=i)
+        values = data.at(record, f"{quantity}_rescaled", member, pair=i)
         lost = _lost(record, quantity, member, [i, i + 1])
         curves.append(Curve(f"{factor}({gap})" if factor else gap, values, above[i], lost))
     return curves
@@ -166,10 +152,10 @@ def differences(record: Record, quantity: str, member: Member) -> list[Curve]:
 
 def _lost(record: Record, quantity: str, member: Member, levels: list[int]) -> str:
     """Say why values of these positions of levels would mean nothing (see `frame.why_lost`)."""
-    pairs = [i for i in levels if i < len(whole(record, "pair"))]
-    found = [at(record, f"{quantity}_difference", member, pair=i) for i in pairs[:1]]
+    pairs = [i for i in levels if i < len(data.whole(record, "pair"))]
+    found = [data.at(record, f"{quantity}_difference", member, pair=i) for i in pairs[:1]]
     if f"{quantity}_scaled" in record and len(levels) == 1:
-        found = [at(record, f"{quantity}_scaled", member, level=levels[0])]
+        found = [data.at(record, f"{quantity}_scaled", member, level=levels[0])]
     return frame.why_lost(record, quantity, member, levels, np.concatenate([*found, np.zeros(1)]))
 
 
@@ -195,22 +181,19 @@ def _few(sound: list[bool]) -> list[int]:
     return [*kept, *lost]
 
 
-def _good(record: Record, quantity: str, member: Member) -> list[bool]:
-    """Say of every triple whether both of its differences stand above round-off."""
-    above = sound_pairs(record, quantity, member)
-    return [all(above[i : i + 2]) for i in range(len(whole(record, "triple")))]
-
-
 def _draw_ratios(
     ax: Axes, t: Floats, record: Record, quantity: str, member: Member, order: float
 ) -> None:
-    levels, count = whole(record, "level"), len(whole(record, "triple"))
-    good = _good(record, quantity, member)
+    levels, count = data.whole(record, "level"), len(data.whole(record, "triple"))
+    good = data.sound_triples(record, quantity, member)
     chosen = _few(good)
     drawn: list[Floats] = []
     lost = [_lost(record, quantity, member, [i, i + 1, i + 2]) for i in range(count)]
     for k, i in enumerate(chosen):
-        sound, values = good[i] or not any(good), at(record, f"{quantity}_ratio", member, triple=i)
+        sound, values = (
+            good[i] or not any(good),
+            data.at(record, f"{quantity}_ratio", member, triple=i),
+        )
         if not np.isfinite(values).any():
             continue
         look: dict[str, Any] = {"color": "#b0b0b0", "linewidth": 0.6, "zorder": 1.5}
@@ -224,18 +207,11 @@ def _draw_ratios(
             **look,
         )
     if not drawn:
-        ax.text(
-            0.5,
-            0.7,
-            _why_no_ratio(good, lost),
-            transform=ax.transAxes,
-            ha="center",
-            color=style.GREY,
-        )
+        style.remark(ax, _why_no_ratio(good, lost))
     triples = [(levels[i], levels[i + 1], levels[i + 2]) for i in chosen]
     targets = sorted({float(target_ratio(order, triple)) for triple in triples})
     for k, target in enumerate(targets):
-        ax.axhline(target, zorder=1, label="" if k else due(record, quantity), **TARGET)
+        ax.axhline(target, **style.REFERENCE, label="" if k else data.due(record, quantity))
     ax.set_ylim(*_ratio_limits(drawn, targets))
     ax.set_ylabel("ratio")
     ax.set_title("Ratio of successive differences", fontweight="normal", fontsize=9)

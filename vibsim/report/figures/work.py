@@ -6,16 +6,15 @@ error against work); vibration text, exercise 4.
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vibsim.core.record import Record
-from vibsim.report import frame, style
+from vibsim.report import style
 from vibsim.report.choice import position
 from vibsim.report.data import case_name, known, unit
-from vibsim.report.figures.panels import figure_of
+from vibsim.report.figures.panels import legend_above, rows_of
 from vibsim.report.style import Picture
 from vibsim.report.tables.work import Line, lines
 from vibsim.report.text import words
@@ -25,26 +24,15 @@ if TYPE_CHECKING:
 
     from vibsim.experiment import Experiment
 
-BOTTOM, HEIGHT = 0.55, 3.1
-"""Of the panels [inch]."""
-FONT = 8
-"""Size of the legend [point]."""
-
 
 def precision(experiment: Experiment, record: Record, case: int) -> Picture | None:
     """Draw the error against steps, evaluations and time; None for fewer than two lines with several points."""
     found = lines(experiment, record, case)
     if sum(line.error.size > 1 for line in found) < 2:
         return None
-    names = [line.name for line in found] + ["error of the reference"]
-    columns = frame.columns(names, FONT, 0.92 * style.WIDTH)
-    top = 0.35 + 0.19 * math.ceil(len(names) / columns)
-    total = BOTTOM + HEIGHT + top
-    figure = style.canvas(total)
-    axes: list[Any] = []
-    for i in range(3):
-        box = (0.075 + 0.315 * i, BOTTOM / total, 0.285, HEIGHT / total)
-        axes.append(figure.add_axes(box, sharey=axes[0] if axes else None))
+    figure, axes = rows_of(3, [(0.675 + 2.835 * i, 2.565) for i in range(3)], 3.1, 0.4, 0.55)
+    for ax in axes[1:]:
+        ax.sharey(axes[0])
     floor = float(known(record, "work_reference_error", ("case",))[case])
     for k, ax in enumerate(axes):
         for i, line in enumerate(found):
@@ -60,15 +48,7 @@ def precision(experiment: Experiment, record: Record, case: int) -> Picture | No
         ax.set_xlabel(text)
     for ax in axes[1:]:
         ax.tick_params(labelleft=False)
-    handles, texts = axes[0].get_legend_handles_labels()
-    figure.legend(
-        handles,
-        texts,
-        loc="upper left",
-        bbox_to_anchor=(0.065, 1.0),
-        ncols=columns,
-        fontsize=FONT,
-    )
+    legend_above(figure, axes[0])
     name = case_name(record, case)
     adaptive = (
         " Hollow: adaptive methods over their tolerances."
@@ -87,7 +67,7 @@ def precision(experiment: Experiment, record: Record, case: int) -> Picture | No
         f"round-off.{adaptive}{below} Of an implicit scheme the evaluations of one iteration per step are counted. The "
         "time is that of the cost model: one compiled member alone, and SciPy's own pace for adaptive methods.",
         alt="Largest error against steps, force evaluations and estimated time, all axes logarithmic",
-        figure=figure_of(axes[0]),
+        figure=figure,
     )
 
 
@@ -99,8 +79,4 @@ def _ranges(axes: list[Axes], found: list[Line]) -> None:
         high = min(float(errors.max()), 1e3 * float(np.quantile(errors, 0.75)))
         style.log_axis(axes[0], "y", float(errors.min()) / 3.0, 3.0 * high)
     for k, ax in enumerate(axes):
-        work = np.concatenate([line.work[k] for line in found])
-        work = work[np.isfinite(work) & (work > 0.0)]
-        if work.size:
-            style.log_axis(ax, "x", float(work.min()) / 1.5, float(work.max()) * 1.5)
-            style.log_ticks(ax.xaxis, float(work.min()) / 1.5, float(work.max()) * 1.5, 5)
+        style.fit_log_axis(ax, "x", *(line.work[k] for line in found), room=1.5, most=5)

@@ -86,7 +86,7 @@ def write(
     position = choice.position(experiment)
     with style.applied():
         pictures = gallery.pictures(experiment, convergence, shown)
-        drawn = [(picture, drawing.svg(picture)) for picture in pictures]
+        drawn = [(picture, drawing.svg(picture.figure, picture.name)) for picture in pictures]
         figures = dict(_figure_files(drawn, formats))
     figures["thumbnail.svg"] = _stamp(experiment, convergence, shown[0]).encode()
     listed, folded = _tables(experiment, convergence, summary)
@@ -166,7 +166,7 @@ def _figure_files(
 ) -> Iterable[tuple[str, bytes]]:
     for picture, text in drawn:
         for form in dict.fromkeys(["svg", *formats]):
-            content = text.encode() if form == "svg" else drawing.binary(picture, form)
+            content = text.encode() if form == "svg" else drawing.binary(picture.figure, form)
             yield f"{picture.name}.{form}", content
 
 
