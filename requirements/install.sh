@@ -98,6 +98,8 @@ if ! is_ready run; then
     install_pinned run
     # `compat` is a plain path; the default finder would add 9 ms to the start of every job.
     install --no-build-isolation --config-settings editable_mode=compat --editable .
+    # Where the environment keeps Python from writing compiled modules, every job would compile all of vibsim again: 0.15 s.
+    $environment/bin/python -m compileall -q vibsim
     mark_ready run
 fi
 # Adding changes nothing of what is there: interrupted here, the environment still serves a run.
