@@ -1,4 +1,4 @@
-"""``vibsim plan``: what a run would cost, without running it."""
+"""``vibsim plan``: what a run would cost, without running it. Files are counted as they are before compression."""
 
 from __future__ import annotations
 
@@ -60,11 +60,11 @@ def _lines(item: Plan) -> Iterator[str]:
         numbers = map(str, (level.level, level.steps, level.every, len(level.shards)))
         costs = amount(level.member_steps), size(level.bytes), size(level.memory)
         yield _row((*numbers, *costs, duration(level.seconds)))
-    yield f"    analysis: {size(item.analysis_bytes)} of disk, {size(item.analysis_memory)} of memory"
+    yield f"    analysis: at most {size(item.analysis_bytes)} of disk, {size(item.analysis_memory)} of memory"
     simulate = "1 simulate job" if len(item.batches) == 1 else f"{len(item.batches)} simulate jobs"
     yield (
-        f"    all: {simulate}, {amount(_steps(item))} member-steps, {size(item.bytes)} of disk, "
-        f"at most {size(item.memory)} of memory in a job, {duration(item.seconds)} of one core"
+        f"    all: {simulate}, {amount(_steps(item))} member-steps, at most {size(item.bytes)} of disk, "
+        f"{size(item.memory)} of memory in a job, {duration(item.seconds)} of one core"
     )
 
 
@@ -76,6 +76,6 @@ def _sum(plans: Sequence[Plan], results: Path) -> str:
     steps, files = sum(map(_steps, plans)), sum(item.bytes for item in plans)
     seconds = sum(item.seconds for item in plans)
     return (
-        f"{len(plans)} experiments: {amount(steps)} member-steps, {size(files)} of disk "
+        f"{len(plans)} experiments: {amount(steps)} member-steps, at most {size(files)} of disk "
         f"({size(resources.free_bytes(results))} free), {duration(seconds)} of one core"
     )
