@@ -53,7 +53,7 @@ def test_best_is_what_the_workflow_makes(name: str, monkeypatch: pytest.MonkeyPa
     of = experiment(levels=[6, 7, 9, 10], **sweep)
     records = {level: simulate_record(of, level) for level in of.levels}
     record = best_record(of, records)
-    monkeypatch.setattr(product, "PART", 150)
+    monkeypatch.setattr(product, "POINTS_AT_A_TIME", 150)
     for dataset in (ladder.best(of), ladder.best(of, threads=2)):
         assert set(dataset.data_vars) == set(record.variables)
         for key in (*record.variables, *record.coords):

@@ -161,7 +161,7 @@ def test_a_large_sweep_keeps_period_and_amplitude_only() -> None:
         for level, row in records.items()
     }
     block = block_of(experiment, lean)
-    assert [row.variable for row in scalars(block)] == ["period", "amplitude"]
+    assert [row.variable for row in scalars(block.model, block.lean)] == ["period", "amplitude"]
     thin = analyse_records(experiment, lean)
     kept = {name for name in thin.variables if "gci" in name or name.startswith("scalar_")}
     assert kept == set()
