@@ -101,6 +101,12 @@ def test_an_event_that_a_kill_cut_short_is_left_out() -> None:
             "",
             "ValueError in line 4: no good",
         ),
+        (
+            "ProtectedOutputException",
+            "ProtectedOutputException in line 2:\nWrite-protected output files:\nindex.html\n",
+            "",
+            "ProtectedOutputException in line 2: Write-protected output files: index.html",
+        ),
         ("OSError", "Traceback:\n  File x:\nOSError: full", "Building\n", "OSError: full"),
         ("Error", "Traceback:\n  File x:\nsqlite3.Error: locked", "", "sqlite3.Error: locked"),
     ],

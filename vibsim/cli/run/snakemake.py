@@ -49,9 +49,13 @@ class Outcome:
         """The exception with what it says in a line; where none was logged, the last line that was written."""
         lines = [line.strip() for line in (self.message or self.text).splitlines() if line.strip()]
         heads = [n for n, line in enumerate(lines) if line.startswith(self.exception or "\0")]
-        head, *more = lines[heads[-1] if heads else -1 :] or [""]
-        # such as `InputError in file "Snakefile", line 4:`, with the reason on the next line
-        return f"{head} {more[0]}" if more and head.endswith(":") else head
+        cause, *more = lines[heads[-1] if heads else -1 :] or [""]
+        # such as `InputError in file "Snakefile", line 4:`, with the reason on the next line, or the files behind it
+        for line in more:
+            if not cause.endswith(":"):
+                break
+            cause = f"{cause} {line}"
+        return cause
 
 
 def run(
