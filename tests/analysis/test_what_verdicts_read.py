@@ -28,6 +28,11 @@ EXPERIMENTS: dict[str, dict[str, Any]] = {
         "initial": {"u": 1.0},
     },
     "orders that rise": {**SPRING, "levels": [3, 4, 5], "schemes": ["central", "rk4"]},
+    "a claim about an order": {
+        **SPRING,
+        "levels": [3, 4, 5],
+        "checks": [{"claim": "It is of order 4.", "that": {"converges": "u", "order": 4}}],
+    },
     "round-off": {**SPRING, "levels": [12, 13, 14, 15], "schemes": ["pefrl"]},
     "an order too low": {
         **SPRING,

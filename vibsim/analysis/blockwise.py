@@ -22,7 +22,6 @@ from vibsim.checks.value.units import UNITS, units_in
 from vibsim.comparison.exact_availability import known_errors
 from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import HIGHEST
-from vibsim.experiment.schema.checks import ConvergesCheck
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
@@ -102,11 +101,9 @@ _OF_VERDICTS = (
 
 def verdict_variables(experiment: Experiment, record: Record) -> list[str]:
     """Name the variables of a convergence Record from which `verdicts` and `summarise` make what they say."""
-    orders = {
-        f"{check.converges}_observed_order"
-        for check in experiment.checks
-        if isinstance(check, ConvergesCheck)
-    }
+    # a claim reads what the check that decides it reads
+    measured = [check.measured for check in experiment.checks]
+    orders = {f"{one.converges}_observed_order" for one in measured if one.kind == "converges"}
     return [
         name
         for name in record.variables

@@ -13,10 +13,8 @@ from dataclasses import replace
 from functools import cache
 from typing import Any
 
-import numpy as np
-
 from vibsim.formula import parse
-from vibsim.models.base import Floats, Model, Numbers, Output, Parameter
+from vibsim.models.base import Model, Output, Parameter
 from vibsim.models.shared.linear_scales import linear_scales
 from vibsim.models.shared.mechanical import Forces, mechanical
 from vibsim.models.shared.scales import Scales
@@ -28,15 +26,6 @@ PARAMETERS = (
     Parameter("unbalance", 1.0, "kg m", "unbalanced mass times its distance from the axis"),
     Parameter("speed", 0.5, "rad s-1", "angular speed of the drum", minimum=0.0),
 )
-
-
-def steady_amplitude(parameters: Numbers) -> Floats:
-    """Return the amplitude of the steady motion [m]; infinite at resonance without damping."""
-    p = parameters
-    square = np.square(p["speed"])
-    with np.errstate(divide="ignore"):
-        size = np.hypot(p["k"] - p["m"] * square, p["b"] * p["speed"])
-        return np.asarray(np.abs(p["unbalance"]) * square / size)
 
 
 @cache
