@@ -154,7 +154,7 @@ def _theory(experiment: Experiment, s: int, grid: Floats) -> tuple[Floats, Float
         return None
     stepper = scheme.stepper(experiment.scheme_options(s))
     with np.errstate(all="ignore"):
-        growth = np.expm1(theory.log_growth(stepper, grid) * (2.0 * np.pi / grid))
+        growth = np.expm1(theory.roots(stepper, grid).log_growth * (2.0 * np.pi / grid))
         phase = theory.phase_error_per_period(stepper, grid)
     return np.asarray(growth), np.asarray(phase)
 
