@@ -38,7 +38,7 @@ def stability_limit(scheme: Scheme, options: Options) -> float:
     return _limit(scheme.stepper(options))
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=1024)
 def _limit(stepper: Stepper) -> float:
     grid = np.concatenate([GRID, _FAR])
     growing = np.flatnonzero(_grows(stepper, grid))
