@@ -223,6 +223,11 @@ class ExperimentSpec(Section):
         return self.sweep.count if self.sweep else 1
 
     @property
+    def trajectories(self) -> int:
+        """Number of schemes times number of members."""
+        return len(self.schemes) * self.members
+
+    @property
     def end_varies(self) -> bool:
         """Whether the end time differs between members, so that ``t`` is the fraction 0 to 1 of it."""
         axes = self.sweep.axes if self.sweep else ()
@@ -250,13 +255,6 @@ class ExperimentSpec(Section):
     def quantities(self) -> tuple[str, ...]:
         """Names of every quantity that is kept as a series where storage is not bounded."""
         return quantities(self.model.definition, self.own_velocity)
-
-    def scheme_options(self, scheme: int) -> Mapping[str, str | float | bool]:
-        """Return the options of scheme number `scheme`, apart from those that are swept.
-
-        `vibsim.plan.option_groups` gives the options of each member.
-        """
-        return self.schemes[scheme].options
 
     def natural_end(self, parameters: Mapping[str, Any]) -> Any:
         """Return the end time of a member with these `parameters` (numbers or arrays), unless swept."""

@@ -10,7 +10,6 @@ from vibsim.core.errors import Fault, InputError
 from vibsim.experiment.data import AnyExperiment, ExperimentSpec, SchemeSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules import size_limits
-from vibsim.experiment.rules.check_places import Ladder
 from vibsim.experiment.rules.checks import check_published, finish_checks
 from vibsim.experiment.rules.members import update_tables
 from vibsim.experiment.rules.sweep import SweepAxes
@@ -18,9 +17,8 @@ from vibsim.experiment.schema.checks import At, Check, ClaimCheck, ConvergesChec
 from vibsim.experiment.schema.fields import MAX_LEVEL, FrozenDict
 from vibsim.experiment.schema.published import PublishedAt, PublishedTable, claims
 from vibsim.experiment.schema.sweep import as_option
-from vibsim.experiment.sweep_columns import columns
+from vibsim.experiment.sweep_columns import columns_of
 from vibsim.experiment.yaml.parse import Source
-from vibsim.models import quantities
 
 AnyAt = TypeVar("AnyAt", At, PublishedAt)
 
@@ -43,7 +41,7 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
         rule = f"a case must be from 0 to {members - 1}"
         raise InputError([Fault(name, 0, "", str(case), rule, there)])
     axes = experiment.sweep.axes if experiment.sweep else ()
-    swept = {key: column[0].item() for key, column in columns(axes, case, case + 1).items()}
+    swept = {key: column[0].item() for key, column in columns_of(axes, case, case + 1).items()}
     parameters = _filled(swept, "model", experiment.model.parameters)
     # a term that is 0 for this member alone stays, and with it every bit
     model = experiment.model.model_copy(update={"parameters": parameters})
@@ -139,25 +137,19 @@ def with_levels(experiment: AnyExperiment, levels: Sequence[int]) -> AnyExperime
     rises = all(low < high for low, high in pairwise(levels))
     if not levels or not rises or not 0 <= levels[0] <= levels[-1] <= MAX_LEVEL:
         raise ValueError(f"{list(levels)} are not levels from 0 to {MAX_LEVEL} in increasing order")
-    model, time = experiment.model.definition, experiment.time
-    sweep_axes = SweepAxes(experiment.sweep.axes if experiment.sweep else ())
-    shape = size_limits.Shape(
-        base_steps=time.base_steps,
+    setting = size_limits.Setting(
+        model=experiment.model.definition,
+        time=experiment.time,
         levels=tuple(levels),
-        schemes=len(experiment.schemes),
-        members=experiment.members,
+        schemes=experiment.schemes,
+        names=tuple(scheme.name for scheme in experiment.schemes),
+        sweep=SweepAxes(experiment.sweep.axes if experiment.sweep else ()),
         samples=experiment.samples,
-        variables=len(quantities(model)),
-        end=sweep_axes.least_end(time),
-        own_velocity=experiment.own_velocity,
     )
     report = Report(Source(str(experiment.file or experiment.name), {}))
-    size_limits.check(shape, report)
-    names = tuple(scheme.name for scheme in experiment.schemes)
-    end = sweep_axes.fixed_end(time)
-    ladder = Ladder(model, names, shape, time, end, sound=experiment.schemes)
-    finish_checks((_as_written(check) for check in experiment.written), ladder, report)
-    check_published(experiment.published, (), ladder, report)
+    size_limits.check(setting, report)
+    finish_checks([_as_written(check) for check in experiment.written], setting, report)
+    check_published(experiment.published, (), setting, report)
     report.raise_any()
     found = experiment.model_copy(update={"levels": tuple(levels)})
     size_limits.check_files(found, report)

@@ -17,20 +17,19 @@ from vibsim.experiment.data import AnyExperiment, ModelSpec, SchemeSpec, Sweep, 
 from vibsim.experiment.faults import MISSING, Report, shorten
 from vibsim.experiment.rules import members, size_limits, timing
 from vibsim.experiment.rules import schemes as scheme_rules
-from vibsim.experiment.rules.check_places import Ladder
 from vibsim.experiment.rules.checks import check_published, finish_checks
 from vibsim.experiment.rules.model import Equation
 from vibsim.experiment.rules.model import equation as read_equation
+from vibsim.experiment.rules.scaling import Numbers, characteristic
 from vibsim.experiment.rules.sweep import SweepAxes, read_sweep
 from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.experiment.schema.document import Document, Every, LevelRange
 from vibsim.experiment.schema.fields import IDENTIFIER
 from vibsim.experiment.schema.model_and_schemes import scheme_names
 from vibsim.experiment.schema.published import claims
-from vibsim.experiment.units.scaling import Numbers, characteristic
 from vibsim.experiment.validation import read_document
 from vibsim.experiment.yaml.parse import MAX_DEPTH, Source, read
-from vibsim.models import MODELS, Model, quantities
+from vibsim.models import MODELS, Model
 
 MAX_NAME = 100
 MAX_REPEATS = 20
@@ -105,37 +104,25 @@ def build(
     if document.scaled:
         numbers = characteristic(numbers, model, swept, report)
         time = numbers.time
-    samples = document.samples.every if isinstance(document.samples, Every) else document.samples
-    shape = size_limits.Shape(
-        base_steps=time.base_steps if time else None,
-        levels=levels,
-        schemes=max(len(schemes), len(document.schemes)),
-        members=sweep.members,
-        samples=samples,
-        variables=len(quantities(model)) if model else 0,
-        end=sweep.least_end(time) if time else None,
-        own_velocity=(model is None or model.events is None)
-        and any(scheme.own_velocity for scheme in schemes),
-    )
-    size_limits.check(shape, report)
-    _check_output(document, model, levels, report)
-    ladder = Ladder(
+    setting = size_limits.Setting(
         model=model,
-        shape=shape,
-        schemes=tuple(dict.fromkeys(scheme_names(source.data.get("schemes")))),
-        sound=tuple(schemes),
-        # a faulty sweep may change the end: then nothing is said about times
-        time=time if sweep.is_whole else None,
-        end=sweep.fixed_end(time) if time else None,
+        time=time,
+        levels=levels,
+        schemes=tuple(schemes),
+        names=tuple(dict.fromkeys(scheme_names(source.data.get("schemes")))),
+        sweep=sweep,
+        samples=document.samples.every if isinstance(document.samples, Every) else document.samples,
         by_tolerance=source.data.get("tolerance") is not None,
-        is_whole=scheme_rules.are_known(document.schemes),
+        knows_schemes=scheme_rules.are_known(document.schemes),
     )
+    size_limits.check(setting, report)
+    _check_output(document, model, levels, report)
     checks = document.checks
     if not checks and not document.published and model is not None:
         checks = [ConvergesCheck(converges=position) for position in model.positions]
     given_ids = [check.id if check is not None else "" for check in document.checks]
-    checks = finish_checks(checks, ladder, report)
-    check_published(document.published, given_ids, ladder, report)
+    checks = finish_checks(checks, setting, report)
+    check_published(document.published, given_ids, setting, report)
     report.raise_any()
     assert model is not None
     assert time is not None
@@ -154,9 +141,9 @@ def build(
         initial=dict(numbers.initial),
         time=time,
         levels=levels,
-        schemes=tuple(schemes),
+        schemes=setting.schemes,
         sweep=Sweep(axes=sweep.axes) if sweep.axes else None,
-        samples=samples,
+        samples=setting.samples,
         output=document.output,
         tolerance=document.tolerance,
         checks=(*checks, *claims(document.published, document.source)),

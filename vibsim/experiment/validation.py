@@ -16,7 +16,7 @@ from pydantic import Discriminator, Tag, TypeAdapter, ValidationError
 from vibsim.experiment.faults import MISSING, Report
 from vibsim.experiment.schema.document import Document
 from vibsim.experiment.schema.fields import STAND_IN, Section
-from vibsim.experiment.units.convert import Units
+from vibsim.experiment.units import Units
 from vibsim.experiment.yaml.parse import Path_, Source
 
 _FAULTY: Any = object()

@@ -15,9 +15,8 @@ from typing import Any
 
 from vibsim.experiment import Experiment, canonical
 from vibsim.experiment.cost import JOB_SECONDS, analysis_disk, analysis_memory, load_of
-from vibsim.experiment.storage import is_bounded, stored_series
+from vibsim.experiment.storage import is_bounded, sampling, stored_series
 from vibsim.plan import code_digest
-from vibsim.plan.cases import sampling
 from vibsim.plan.digests import (
     analysed,
     batch_digest,
@@ -187,7 +186,7 @@ def build(experiment: Experiment) -> Plan:
         cases=experiment.members,
         schemes=tuple(scheme.name for scheme in experiment.schemes),
         levels=levels,
-        batches=batches(levels, len(experiment.schemes) * experiment.members),
+        batches=batches(levels, experiment.trajectories),
         analysis=analysis,
         analysis_memory=analysis_memory(loads, experiment.members),
         analysis_bytes=analysis_disk(loads, experiment.members, is_bounded(experiment)),

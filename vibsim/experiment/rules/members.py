@@ -18,7 +18,7 @@ from vibsim.experiment.data import AnyExperiment, ModelSpec, TableSpec, TimeSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.schema.fields import TABLE, FrozenDict, Section
 from vibsim.experiment.schema.sweep import Axis
-from vibsim.experiment.sweep_columns import columns
+from vibsim.experiment.sweep_columns import columns_of
 from vibsim.experiment.tables.file import TableError, read
 from vibsim.formula import Expression, derivative, parse, put, size, values
 from vibsim.formula.jumps import first_jump
@@ -101,7 +101,7 @@ class MemberNumbers:
 
     def _part(self, start: int, stop: int) -> tuple[dict[str, Any], Floats]:
         """Return what differs in members start..stop-1, and their ends."""
-        found = {k: v for k, v in columns(self._axes(), start, stop).items() if _matters(k)}
+        found = {k: v for k, v in columns_of(self._axes(), start, stop).items() if _matters(k)}
         end = found.get("time.end", np.full(stop - start, self.time.end))
         if self.time.periods is not None:
             own = natural_end(self.model, self.time.periods, self._parameters(found))
