@@ -91,7 +91,6 @@ def columns_of(axes: Sequence[Axis], start: int, stop: int) -> dict[str, Column]
 
 
 def _block(axis: Axis, start: int, stop: int) -> list[Column]:
-    """Return values number start..stop-1 along an axis, for every key."""
     if isinstance(axis.values, Draw):
         return _scatter(axis.values, start, stop)
     return [_part(values, start, stop) for values in axis.values]
@@ -160,7 +159,6 @@ def _random(seed: int, keys: int, start: int, stop: int) -> Floats:
 
 
 def _sobol(seed: int, keys: int, start: int, stop: int) -> Floats:
-    """Return points of the scrambled Sobol sequence, shape (stop - start, keys)."""
     from scipy.stats import qmc
 
     engine: Any = qmc.Sobol(keys, scramble=True, rng=seed)

@@ -160,7 +160,6 @@ def _check_name(name: str) -> None:
 
 
 def _constant(value: Any) -> float:
-    """Return the number before a unit."""
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise UnitError("must be a number with a unit, such as 4.9 m")
     try:

@@ -68,7 +68,7 @@ def check_scheme_and_case(at: At, scope: Scope) -> None:
 
 def check_case(case: int | None, scope: Scope) -> None:
     """Check that there is a member."""
-    members = scope.setting.sweep.members
+    members = scope.setting.members
     if case is not None and members is not None and case >= members:
         there = "there is 1 case" if members == 1 else f"there are {members} cases"
         scope.refuse(f"must be at most {members - 1}", there)
@@ -115,7 +115,7 @@ def check_place(at: At, row: Value, scope: Scope) -> None:
     if setting.by_tolerance and at.step is not None and "step" in row.at:
         scope.at("step").refuse(f"a step {_NOT_YET}", "t can")
     is_stored = level is not None and "t" in row.at
-    if is_stored and level is not None and setting.time is not None and setting.sweep.is_whole:
+    if is_stored and level is not None and setting.time is not None and setting.knows_sweep:
         _check_step(at.step, level, scope.at("step"))
     if at.t is not None and (is_stored or setting.by_tolerance):
         _check_time(at.t, level, scope.at("t"))
@@ -158,7 +158,7 @@ def _check_step(step: int | None, level: int, scope: Scope) -> None:
 def _check_time(t: float, level: int | None, scope: Scope) -> None:
     """Check that a time is in the interval, and where its level is known one of the equal parts that are stored."""
     setting = scope.setting
-    if setting.time is None or not setting.sweep.is_whole:
+    if setting.time is None or not setting.knows_sweep:
         return
     fixed = setting.sweep.fixed_end(setting.time)
     end = 1.0 if fixed is None else fixed

@@ -165,7 +165,6 @@ def _converges(check: ConvergesCheck, scope: Scope) -> None:
 
 
 def _known_error_part(name: str, scope: Scope) -> None:
-    """Check that a part of a position's error (phase or amplitude) exists."""
     model = scope.setting.model
     if model is None or name in error_parts(model):
         return
@@ -286,12 +285,10 @@ def _is_quantity(name: str, choices: tuple[str, ...], scope: Scope, what: str = 
 
 
 def _plain(name: str) -> str:
-    """Return the quantity of which `name` is the one by the centred difference."""
     return name.removesuffix("_d2t")
 
 
 def _has_quantity(name: str, schemes: Iterable[tuple[str, Scope]]) -> None:
-    """Check that schemes, each named in a scope, have a quantity."""
     for scheme, scope in schemes:
         setting = scope.setting
         if setting.model is None or name not in centred(setting.model) or not setting.own_velocity:
@@ -302,7 +299,6 @@ def _has_quantity(name: str, schemes: Iterable[tuple[str, Scope]]) -> None:
 
 
 def _known_value(name: str, scope: Scope) -> Value | None:
-    """Return the value of a name; None, and a fault, where there is none."""
     row = VALUES.get(name)
     if row is None:
         scope.refuse("unknown value", nearest(name, list(VALUES)), name)
@@ -329,7 +325,6 @@ def _check_value(row: Value, quantity: str | None, best: bool, scope: Scope) -> 
 
 
 def _is_comparable(row: Value, quantity: str | None, scope: Scope) -> None:
-    """Check that the model knows exactly what a value is compared with."""
     model = scope.setting.model
     if model is None:
         return

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from vibsim.experiment.cost import Load, load_of
-from vibsim.experiment.data import ExperimentSpec, SchemeSpec, TimeSpec
+from vibsim.experiment.data import ExperimentSpec, SchemeSpec, Sweep, TimeSpec
 from vibsim.experiment.faults import Report
-from vibsim.experiment.rules.sweep import SweepAxes
 from vibsim.experiment.storage import extrema_kept, is_lean, stride
 from vibsim.models import Model, quantities
 
@@ -43,8 +42,11 @@ class Setting:
     """Those without a fault."""
     names: tuple[str, ...]
     """The names of the schemes as written, right or wrong."""
-    sweep: SweepAxes
+    sweep: Sweep
+    """Its axes without a fault."""
     samples: int | str
+    knows_sweep: bool = True
+    """Whether the whole sweep is known."""
     by_tolerance: bool = False
     """Whether the levels are still to be chosen, so that none of them can be named."""
     knows_schemes: bool = True
@@ -57,7 +59,12 @@ class Setting:
     @property
     def trajectories(self) -> int:
         """Number of schemes times number of members, as far as they are known."""
-        return self.scheme_count * (self.sweep.members or 1)
+        return self.scheme_count * (self.members or 1)
+
+    @property
+    def members(self) -> int | None:
+        """Number of members, 1 without a sweep; None where it cannot be told."""
+        return self.sweep.count if self.knows_sweep else None
 
     @property
     def scheme_count(self) -> int:
@@ -106,7 +113,7 @@ class Setting:
 
 def check(setting: Setting, report: Report) -> None:
     """Note every limit that counts exceed."""
-    members = setting.sweep.members or 1
+    members = setting.members or 1
     if members > MAX_MEMBERS:
         rule = f"must not have more than {MAX_MEMBERS} members, has {members}"
         report.add(("sweep",), rule, at_key=True)
