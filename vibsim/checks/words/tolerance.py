@@ -36,7 +36,7 @@ def advise(f: Found) -> str:
     levels, model = experiment.levels, experiment.model.definition
     state = model.states[largest_bound(experiment, f.record)[1][f.scheme, f.case]].name
     swept = experiment.sweep.keys if experiment.sweep else ()
-    fixed = experiment.scheme_options(f.scheme).items()
+    fixed = experiment.schemes[f.scheme].options.items()
     options = {key: word for key, word in fixed if f"schemes.{name}.{key}" not in swept}
     ways = [
         "take such members into an experiment of their own, whose pilot tries them",

@@ -126,7 +126,7 @@ def _row(
     yield from (getattr(row.at, key) for key in at)
     yield row.printed
     yield Written(ours, words.like(ours, row.printed))
-    yield ours - row.number
+    yield ours - row.meaning.number
     yield _agrees(check, row)
     yield from _beside(record, name, row, len(table.beside))
     if noted:
