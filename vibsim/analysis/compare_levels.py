@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis.check_variables import definition, measured
 from vibsim.analysis.motion_variables import motion
 from vibsim.apriori.force_discontinuities import corner_variables, switches_of
 from vibsim.checks.fields import flags
-from vibsim.checks.order.phase_at_start import at_start
-from vibsim.checks.tolerance_check import bounds
+from vibsim.checks.kinds import check_variables, definition
+from vibsim.checks.order import phase_at_start
+from vibsim.checks.tolerance import bounds
 from vibsim.comparison import best_values
 from vibsim.comparison.comparison_variables import SERIES, Table, in_precision, numbers, over_time
 from vibsim.comparison.order_evidence import judgement
@@ -91,12 +91,12 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
     asked_for = asked(experiment)
     for q in found.values():
         if is_error_part(q.name) and q.name not in asked_for:
-            table |= _verdict(q) | at_start(q)
+            table |= _verdict(q) | phase_at_start(q)
             continue
-        table |= numbers(q) | _verdict(q) | at_start(q)
+        table |= numbers(q) | _verdict(q) | phase_at_start(q)
         if not block.lean:
             table |= over_time(q)
-    table |= _scalars(block) | measured(block, found) | motion(block, found)
+    table |= _scalars(block) | check_variables(block, found) | motion(block, found)
     if switches_of(block.model):
         table |= corner_variables(block.corners)
     if varies_in_time(block.model):

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from vibsim.analysis.check_verdicts import Verdict
 from vibsim.apriori.formal_orders import Columns, columns_of
-from vibsim.checks.results import Result
-from vibsim.checks.words.verdict import Wording
+from vibsim.checks.outcome import Result
+from vibsim.checks.verdict_text import Wording
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import FORMAT, jsonable, worst
 

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.analysis.check_variables import FIELDS
-from vibsim.checks.fields import MEMBERS, Field
-from vibsim.checks.order.judge import EXPECTED
-from vibsim.checks.tolerance_check import BOUND
+from vibsim.checks.fields import MEMBERS, Field, stated
+from vibsim.checks.kinds import KINDS
+from vibsim.checks.order import EXPECTED
+from vibsim.checks.tolerance import BOUND
 from vibsim.core.vocabulary import BY_TOLERANCE, FORMAT, REASON_NAMES, STATUSES
 
 TEXT = {"type": "string"}
@@ -50,17 +50,13 @@ def _fact(field: Field) -> dict[str, Any]:
 
 def _facts(kind: str, fields: Mapping[str, Field]) -> dict[str, Any]:
     """Return the schema of the facts of a kind of check."""
-    stated = {
-        name: _fact(field)
-        for name, field in fields.items()
-        if not field.of_figure and name not in ("status", "reason")
-    }
-    return _object(stated, title=f"facts of a check `{kind}`")
+    found = {name: _fact(field) for name, field in stated(fields).items()}
+    return _object(found, title=f"facts of a check `{kind}`")
 
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12) of a summary."""
-    kinds = {kind: dict(fields) for kind, fields in FIELDS.items()}
+    kinds = {kind: dict(row.fields) for kind, row in KINDS.items()}
     kinds["converges"]["expected"] = EXPECTED
     facts = [_facts(kind, fields) for kind, fields in kinds.items()]
     reached = {"error_bound": _fact(BOUND), "state": TEXT}
@@ -77,7 +73,7 @@ def schema() -> dict[str, Any]:
     }
     check = {
         "id": TEXT,
-        "kind": {"enum": [*FIELDS, "claim", BY_TOLERANCE]},
+        "kind": {"enum": [*KINDS, "claim", BY_TOLERANCE]},
         "text": TEXT,
         "quantity": {"type": ["string", "null"]},
         "expected": TEXT,
