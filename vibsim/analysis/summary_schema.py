@@ -41,24 +41,19 @@ def _fact(field: Field) -> dict[str, Any]:
     if field.words:
         return {"enum": list(field.words), "description": field.meaning}
     kind = "integer" if np.issubdtype(field.type, np.integer) else "number"
-    kind = "boolean" if np.issubdtype(field.type, np.bool_) else kind
-    if len(field.dims) > len(MEMBERS):
-        items: dict[str, Any] = {"type": ["array", "null"], "items": {"type": kind}}
-        return items | {"description": field.meaning}
-    return {"type": [kind, "null"], "description": field.meaning}
-
-
-def _facts(kind: str, fields: Mapping[str, Field]) -> dict[str, Any]:
-    """Return the schema of the facts of a kind of check."""
-    found = {name: _fact(field) for name, field in stated(fields).items()}
-    return _object(found, title=f"facts of a check `{kind}`")
+    several = {"type": ["array", "null"], "items": {"type": kind}}
+    one = {"type": [kind, "null"]}
+    return (several if len(field.dims) > len(MEMBERS) else one) | {"description": field.meaning}
 
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12) of a summary."""
-    kinds = {kind: dict(row.fields) for kind, row in KINDS.items()}
-    kinds["converges"]["expected"] = EXPECTED
-    facts = [_facts(kind, fields) for kind, fields in kinds.items()]
+    facts = []
+    for kind, row in KINDS.items():
+        of_kind = {name: _fact(field) for name, field in stated(row.fields).items()}
+        if kind == "converges":
+            of_kind["expected"] = _fact(EXPECTED)
+        facts.append(_object(of_kind, title=f"facts of a check `{kind}`"))
     reached = {"error_bound": _fact(BOUND), "state": TEXT}
     facts.append(_object(reached, title=f"facts of the check `{BY_TOLERANCE}`"))
     member = {"values": {"type": "object"}, "command": TEXT}
