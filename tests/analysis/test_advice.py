@@ -17,8 +17,8 @@ from level_records import experiment, level_records, standard_error
 from vibsim import Experiment, analyse, simulate
 from vibsim.analysis import analyse_records, verdicts
 from vibsim.checks.fields import name_of
-from vibsim.checks.order_context import Corner, OrderContext
-from vibsim.checks.order_text import in_words
+from vibsim.checks.order_context import Corner
+from vibsim.checks.order_text import OrderText, in_words
 from vibsim.checks.sentences import PLAIN
 from vibsim.comparison.order_causes import CAUSES
 from vibsim.core.record import Record, Variable
@@ -170,7 +170,7 @@ def test_an_expectation_that_is_not_met_ends_with_advice(expect: dict[str, str])
             assert_specific(found.advice)
 
 
-def story(**changes: Any) -> OrderContext:
+def story(**changes: Any) -> OrderText:
     plain: dict[str, Any] = {
         "quantity": "theta",
         "reason": "order_low",
@@ -212,16 +212,16 @@ def story(**changes: Any) -> OrderContext:
         "notation": PLAIN,
         "cost": lambda levels: f"{len(levels)} levels",
     }
-    made = object.__new__(OrderContext)
+    made = object.__new__(OrderText)
     vars(made).update({**plain, **changes})
     return made
 
 
-def tell(context: OrderContext) -> str:
+def tell(context: OrderText) -> str:
     return in_words(context).sentence
 
 
-def advise(context: OrderContext) -> str:
+def advise(context: OrderText) -> str:
     return in_words(context).advice
 
 

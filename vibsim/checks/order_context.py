@@ -24,7 +24,6 @@ from vibsim.checks.phase_amplitude_text import parts_in_words
 from vibsim.checks.sentences import Found, cost_in_words
 from vibsim.checks.stable import ALIKE
 from vibsim.comparison.exact_availability import has_exact
-from vibsim.convergence.thresholds import HALF_SPACING
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.models.shared.phase_amplitude_names import is_error_part, whole_of
@@ -183,32 +182,12 @@ class OrderContext:
         return (self.promises_less or self.promises_more) and not excluded
 
     @property
-    def may_hide(self) -> bool:
-        """Whether the order that the scheme promises may be behind a higher one, as near a special case."""
-        return self.promised + HALF_SPACING < min(self.order, self.special)
-
-    @property
-    def due(self) -> float:
-        """The order that levels approach: the one that the scheme has, where the last order is nearer to that."""
-        known = [order for order in self.orders if math.isfinite(order)]
-        if not known or not math.isfinite(self.promised):
-            return self.expected
-        return min(self.expected, self.promised, key=lambda order: abs(known[-1] - order))
-
-    @property
     def singular(self) -> float:
         """Time at which the two finest levels failed alike, so that finer ones will, too; NaN where they did not."""
         if len(self.failures) < 2:
             return math.nan
         before, last = self.failures[-2:]
         return last if abs(before - last) <= ALIKE * before else math.nan
-
-    @property
-    def first_sound(self) -> int:
-        """The coarsest level from which on none met a number that is not finite, as far as they tell."""
-        times = zip(self.levels, self.failures, strict=False)
-        failed = [level for level, t in times if not math.isnan(t)]
-        return max([self.culprit, self.levels[0], *failed]) + 1
 
     @property
     def is_beyond_limit(self) -> bool:

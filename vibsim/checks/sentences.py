@@ -74,15 +74,18 @@ PLAIN = Notation()
 
 
 class Template(string.Formatter):
-    """Fills templates: numbers in a notation, with as many digits as the field says, such as ``{s.time:4}``."""
+    """Fills templates with attributes of an object: ``{name}``, or ``{name:4}`` with so many digits of a number."""
 
-    def __init__(self, notation: Notation) -> None:
-        self.notation = notation
+    def __init__(self, source: object, notation: Notation) -> None:
+        self.source, self.notation = source, notation
 
-    def format_field(self, value: Any, format_spec: str) -> str:
-        """Write one field of a template; what is a function is called."""
-        if callable(value):
-            value = value()
+    def get_value(self, key: int | str, args: object, kwargs: object) -> Any:
+        """Return an attribute; what is a method is called."""
+        value = getattr(self.source, str(key))
+        return value() if callable(value) else value
+
+    def format_field(self, value: Any, format_spec: str) -> Any:
+        """Write numbers in the notation."""
         if isinstance(value, float):
             return self.notation.number(value, int(format_spec or 6))
         return format(value, format_spec)
