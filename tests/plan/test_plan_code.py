@@ -113,7 +113,7 @@ AFTER = ALL - SIMULATIONS
         ("engine/member_loop.py", ALL),
         ("simulation/level.py", SIMULATIONS),
         ("simulation/derived.py", SIMULATIONS),
-        ("checks/order/judge.py", {"analyse", "report"}),
+        ("checks/order.py", {"analyse", "report"}),
         ("comparison/best_solution.py", {"analyse", "extrapolate", "report"}),
         ("ladder/choosing.py", set()),
         ("store/writing.py", {*SIMULATIONS, "analyse", "extrapolate"}),

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 
-from vibsim.checks.words.found import Found
+from vibsim.checks.sentences import Found
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.models.shared.phase_amplitude_names import AMPLITUDE, PHASE
 
 APART = 0.5
 """Orders that differ by less are the same."""
-NEAR = 0.25
+NEAR = 0.125
 """How near to a whole or half order a stated one must be to be told."""
-THERE = 0.5
+FROM_THE_START = 0.5
 """A shift is there from the start where that of the first step is at least this part of the largest."""
 NAMES = {1.0: "first", 2.0: "second", 3.0: "third", 4.0: "fourth", 5.0: "fifth", 6.0: "sixth"}
 
@@ -22,7 +22,7 @@ def parts_in_words(f: Found, quantity: str) -> str:
 
     Of a quantity that is no state nothing is said.
     """
-    model, record = f.experiment.model.definition, f.record
+    model, record, place = f.experiment.model.definition, f.record, (f.scheme, f.case)
     known = dict(zip((*model.positions, *model.velocities), model.positions * 2, strict=True))
     position = known.get(quantity, "")
     # a large run keeps only the part that a check asks for
@@ -30,10 +30,9 @@ def parts_in_words(f: Found, quantity: str) -> str:
         return ""
     norm = record.words("norm").index(TYPICAL_NORM)
     phase, amplitude = (
-        float(record[f"{position}{end}_order"][f.scheme, f.case, norm])
-        for end in (PHASE, AMPLITUDE)
+        float(record[f"{position}{end}_order"][*place, norm]) for end in (PHASE, AMPLITUDE)
     )
-    share = float(record[f"{position}{PHASE}_at_start"][f.scheme, f.case])
+    share = float(record[f"{position}{PHASE}_at_start"][place])
     whose = "" if quantity == position else f" of {f.notation.quantity(position)}"
     return sentence(phase, amplitude, share, whose)
 
@@ -52,22 +51,18 @@ def sentence(phase: float, amplitude: float, share: float, whose: str = "") -> s
     """
     if not math.isfinite(phase + amplitude) or abs(phase - amplitude) < APART:
         return ""
-    if not (_is_near(phase) and _is_near(amplitude)):
+    halves = [round(2 * order) / 2 for order in (phase, amplitude)]
+    if any(
+        abs(order - half) > NEAR or order <= 2 * NEAR
+        for order, half in zip((phase, amplitude), halves, strict=True)
+    ):
         return ""
-    both = f" The phase{whose} is of {_order(phase)}, the amplitude of {_order(amplitude)}"
+    of_phase, of_amplitude = (
+        f"{NAMES[half]} order" if half in NAMES else f"order {half:g}" for half in halves
+    )
+    both = f" The phase{whose} is of {of_phase}, the amplitude of {of_amplitude}"
     if amplitude < phase:
         return f"{both}: it is the amplitude that is wrong."
-    if share >= THERE:
-        return f"{both}: the error is a shift in time from the first step on, so the start is of {_order(phase)}."
-    return (
-        f"{both}: the error is a shift in time that grows, so the frequency is of {_order(phase)}."
-    )
-
-
-def _is_near(order: float) -> bool:
-    return abs(order - round(2 * order) / 2) <= NEAR / 2 and order > NEAR
-
-
-def _order(order: float) -> str:
-    whole = round(2 * order) / 2
-    return f"{NAMES[whole]} order" if whole in NAMES else f"order {whole:g}"
+    if share >= FROM_THE_START:
+        return f"{both}: the error is a shift in time from the first step on, so the start is of {of_phase}."
+    return f"{both}: the error is a shift in time that grows, so the frequency is of {of_phase}."

@@ -11,12 +11,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from vibsim.apriori.formal_orders import columns_of
-from vibsim.checks.outcome import compared_reason, truth
-from vibsim.checks.results import Result
-from vibsim.checks.words import behaviour, order, order_advice, tolerance, value
-from vibsim.checks.words.found import Found
-from vibsim.checks.words.notation import PLAIN, Notation
-from vibsim.checks.words.order_context import story
+from vibsim.checks import equal, tolerance, value
+from vibsim.checks.kinds import KINDS
+from vibsim.checks.outcome import Result, compared_reason, truth
+from vibsim.checks.sentences import PLAIN, Description, Found, Notation
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import BY_TOLERANCE, worst
 
@@ -30,7 +28,7 @@ CORRECT = "Correct what the check expects (`expect:`), or find out why it turned
 def expectation(experiment: Experiment, check: Check | None, notation: Notation = PLAIN) -> str:
     """Say what a check expects; None stands for the tolerance of the experiment."""
     if check is None:
-        return tolerance.rule(experiment.tolerance or 0.0, notation)
+        return tolerance.rule(experiment, notation)
     match check.kind:
         case "claim":
             return "true" if check.holds else "false"
@@ -43,7 +41,7 @@ def expectation(experiment: Experiment, check: Check | None, notation: Notation 
             return "stable" if check.stable else "unstable"
         case "conserves":
             return check.drift
-    return f"equal to {behaviour.OTHERS.get(check.second, f'scheme {check.second}')}"
+    return f"equal to {equal.other_solution(check)}"
 
 
 @dataclass(frozen=True)
@@ -61,59 +59,30 @@ class Wording:
     def _measured(self) -> Measurement | None:
         return None if self.check is None else self.check.measured
 
-    def _found(self, result: Result) -> Found:
-        record = self.record
-        return Found(
+    def _describe(self, result: Result) -> Description:
+        record, check = self.record, self._measured
+        found = Found(
             self.experiment,
             record,
-            self._measured,
+            check,
             BY_TOLERANCE if self.check is None else self.check.id,
             record.words("scheme").index(result.scheme),
             record.place("case", result.case),
             result.reason,
             self.notation,
         )
+        return (
+            tolerance.describe(found) if check is None else KINDS[check.kind].describe(found, check)
+        )
 
     def sentence(self, result: Result) -> str:
         """Say what was measured of one result."""
-        found, check = self._found(result), self._measured
-        if check is None:
-            return tolerance.tell(found, self.experiment.tolerance or 0.0)
-        match check.kind:
-            case "converges":
-                return order.tell(story(found, check))
-            case "value":
-                return value.tell(found, check)
-            case "stable":
-                return behaviour.tell_stable(found)
-            case "conserves":
-                return behaviour.tell_conserves(found, check)
-        return behaviour.tell_equal(found, check)
-
-    def _advise(self, result: Result) -> str:
-        found, check = self._found(result), self._measured
-        if check is None:
-            return tolerance.advise(found)
-        match check.kind:
-            case "converges":
-                return order_advice.advise(story(found, check))
-            case "value":
-                return value.advise(found, check)
-            case "stable":
-                return behaviour.advise_stable(found)
-            case "conserves":
-                return behaviour.advise_conserves(found, check)
-        return behaviour.advise_equal(found, check)
+        return self._describe(result).sentence
 
     def measured(self, result: Result, counts: Mapping[str, int]) -> str:
         """Say in a few words what was measured where it decides, for a table of checks that passed."""
-        found, check = self._found(result), self._measured
-        if check is not None and check.kind == "equal":
-            told = behaviour.distance_in_words(found)
-        elif check is not None and check.kind == "value":
-            told = value.measured(found, check)
-        else:
-            told = self.sentence(result).removesuffix(".")
+        description = self._describe(result)
+        told = description.brief or description.sentence.removesuffix(".")
         total = sum(counts.values())
         return told if total == 1 else f"{told} ({self._place(result)}, the hardest of {total})"
 
@@ -139,40 +108,36 @@ class Wording:
             elif reason == "mismatch":
                 told += f" The check expects {expected}."
         if total > 1:
-            many = f"{status} in {counts[status]} of {total} results"
-            head = where[status]["text"] if status in where else many
+            head = f"{status} in {counts[status]} of {total} results"
             if status == "PASS":
                 head = f"All {total} results passed"
+            elif status in where:
+                head = where[status]["text"]
             told = f"{head}. The hardest ({self._place(result)}): {told}"
         if self.check is None or self.check.kind != "claim":
             return told
         holds = truth(self.check, status, result.reason)
-        if holds is None:
-            return f"Measured: the statement cannot be decided. {told}"
-        return f"Measured: the statement is {'true' if holds else 'false'}. {told}"
+        decided = "cannot be decided" if holds is None else f"is {'true' if holds else 'false'}"
+        return f"Measured: the statement {decided}. {told}"
 
     def _place(self, result: Result) -> str:
         """Name the scheme, and of a sweep the member with its swept values."""
-        columns, number = columns_of(self.record), self.notation.number
-        if not columns:
-            return f"scheme {result.scheme}"
-        place = self.record.place("case", result.case)
-        found = ((key, values[place]) for key, values in columns.items())
-        swept = (
-            f"{key} = {number(value) if isinstance(value, float) else value}"
-            for key, value in found
-        )
-        return ", ".join((f"scheme {result.scheme}", f"case {result.case}", *swept))
+        columns, parts = columns_of(self.record), [f"scheme {result.scheme}"]
+        if columns:
+            parts.append(f"case {result.case}")
+        for key, values in columns.items():
+            one = values[self.record.place("case", result.case)]
+            parts.append(f"{key} = {self.notation.number(one) if isinstance(one, float) else one}")
+        return ", ".join(parts)
 
     def advice(self, status: str, result: Result, counts: Mapping[str, int]) -> str:
         """Say what to change in the YAML; empty for a check whose status is PASS."""
         if status == "PASS":
             return ""
-        inner = _status(counts)
-        advice = "" if inner == "PASS" else self._advise(result) or CORRECT
-        if advice or self.check is None or self.check.kind != "claim":
-            return advice
-        return f"Set `holds: {'true' if inner == 'PASS' else 'false'}` if the measurement is right."
+        if _status(counts) != "PASS":
+            return self._describe(result).advice or CORRECT
+        is_claim = self.check is not None and self.check.kind == "claim"
+        return "Set `holds: true` if the measurement is right." if is_claim else ""
 
 
 def _status(counts: Mapping[str, int]) -> str:
