@@ -24,8 +24,8 @@ from vibsim.checks.of_schemes import (
 from vibsim.checks.outcome import Outcome
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import DRIFTS
+from vibsim.observe.energy_drift import drift_at
 from vibsim.observe.member_block import MemberBlock
-from vibsim.observe.member_energy_drift import drift_at
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
