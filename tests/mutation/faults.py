@@ -361,8 +361,8 @@ FAULTS = (
         "exact solution at other times",
         "exact",
         "simulation/level.py",
-        "t = _numbers(steps, every) * (group.end / steps)[:, None]",
-        "t = _numbers(steps, every) * (group.end / (steps + 1))[:, None]",
+        "number * (group.end / steps)[:, None],",
+        "number * (group.end / (steps + 1))[:, None],",
     ),
     # analysis
     Fault(
