@@ -353,7 +353,7 @@ FAULTS = (
     Fault(
         "exact solution without its frequency",
         "exact",
-        "models/shared/harmonic.py",
+        "models/shared/linear_motion.py",
         "u_0 * cos + v_0 / w * sin",
         "u_0 * cos + v_0 * sin",
     ),

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from vibsim.core.array_types import Floats
 from vibsim.experiment.data import TableSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.members import table_of
@@ -33,7 +34,6 @@ from vibsim.formula import (
 )
 from vibsim.formula.integral import has_rule
 from vibsim.models import FormulaField, Model, tree
-from vibsim.models.base import Floats
 from vibsim.models.oscillator import COULOMB
 
 NONE = "none"
