@@ -33,7 +33,7 @@ from vibsim.observe.missed_pulses import missed_variables
 from vibsim.observe.stiffness import applies as motion_decides
 from vibsim.observe.stiffness import is_damped
 from vibsim.schemes import SCHEMES
-from vibsim.simulation.reference.missed_pulses import varies_in_time
+from vibsim.simulation.reference.one_sided_forces import varies_in_time
 from vibsim.simulation.scaled import in_scales
 
 if TYPE_CHECKING:
