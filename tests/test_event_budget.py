@@ -27,22 +27,32 @@ def largest(content: dict[str, Any], quantity: str) -> list[Any]:
     return found
 
 
-@pytest.mark.parametrize("alpha", [0.0, 1.3])
-def test_the_budget_of_friction_vanishes_at_the_order_of_the_scheme(alpha: float) -> None:
+@pytest.mark.parametrize(
+    ("alpha", "schemes"),
+    [
+        *((0.0, ON_BOX[0::3]), (1.3, ON_BOX[1::3])),
+        *(pytest.param(alpha, ON_BOX, marks=pytest.mark.slow) for alpha in (0.0, 1.3)),
+    ],
+)
+def test_the_budget_of_friction_vanishes_at_the_order_of_the_scheme(
+    alpha: float, schemes: list[str]
+) -> None:
     content = {
         "model": {"kind": "sliding_box", "mu": 0.04, "m": 1.7, "k": 2.3, "alpha": alpha},
         "initial": {"u": 1.1, "v": -0.4},
         "time": {"end": 9.0},
-        "schemes": ON_BOX,
+        "schemes": schemes,
     }
     coarse, _, fine = largest(content, "energy_budget")
     # a power of four terms, two halvings: the ratio is 4^order but for the next terms
-    assert_order_of_budget(coarse, fine, 1e-13, 0.25)
+    assert_order_of_budget(schemes, coarse, fine, 1e-13, 0.25)
 
 
-def assert_order_of_budget(coarse: Any, fine: Any, exact: float, missing: float) -> None:
+def assert_order_of_budget(
+    schemes: list[str], coarse: Any, fine: Any, exact: float, missing: float
+) -> None:
     """Check two halvings of every scheme; what is below `exact` is rounding."""
-    for kind, first, last in zip(ON_BOX, coarse, fine, strict=True):
+    for kind, first, last in zip(schemes, coarse, fine, strict=True):
         order = SCHEMES[kind].formal_order("energy_budget", BOX, SCHEMES[kind].defaults())
         assert last < exact or np.log2(first / last) / 2.0 > order - missing, kind
 
@@ -120,7 +130,12 @@ def test_both_compiled_and_plain_sum_the_same() -> None:
         np.testing.assert_array_equal(one, other)
 
 
-def test_the_budget_of_a_driven_body_that_sticks_now_and_then() -> None:
+@pytest.mark.parametrize(
+    "schemes",
+    [ON_BOX[2::3], pytest.param(ON_BOX, marks=pytest.mark.slow)],
+    ids=lambda schemes: str(len(schemes)),
+)
+def test_the_budget_of_a_driven_body_that_sticks_now_and_then(schemes: list[str]) -> None:
     content = {
         "model": {
             "kind": "oscillator",
@@ -131,11 +146,11 @@ def test_the_budget_of_a_driven_body_that_sticks_now_and_then() -> None:
         },
         "initial": {"u": 0.7},
         "time": {"end": 18.0},
-        "schemes": ON_BOX,
+        "schemes": schemes,
     }
     coarse, _, fine = largest(content, "energy_budget")
     assert np.all(largest(content, "event_count")[0] >= 4)
-    assert_order_of_budget(coarse, fine, 1e-12, 0.35)
+    assert_order_of_budget(schemes, coarse, fine, 1e-12, 0.35)
 
 
 def test_the_work_of_a_force_beside_friction_against_a_fine_sum() -> None:

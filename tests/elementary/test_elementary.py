@@ -149,12 +149,12 @@ def worst(name, n):
 
 @pytest.mark.parametrize("name", EXACT)
 def test_error_is_below_the_bound(name):
-    assert worst(name, 5_000) < (BOUNDS.get(name, 1.0),)
+    assert worst(name, 1_000) < (BOUNDS.get(name, 1.0),)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", EXACT)
-def test_error_is_below_the_bound_at_twenty_times_as_many(name):
+def test_error_is_below_the_bound_at_a_hundred_times_as_many(name):
     assert worst(name, 100_000) < (BOUNDS.get(name, 1.0),)
 
 
@@ -175,7 +175,7 @@ def test_special_values(name):
 @pytest.mark.parametrize("name", [*ODD, *EVEN])
 def test_symmetry_to_the_last_bit(name):
     full = ELEMENTARY[name].full
-    (column,) = arguments(name, 2000)
+    (column,) = arguments(name, 500)
     for x in column.tolist():
         expected = -full(x) if name in ODD else full(x)
         # the sign of a zero is no sign

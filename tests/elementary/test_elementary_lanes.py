@@ -61,7 +61,7 @@ def same(a, b):
     return (a.view(np.int64) == b.view(np.int64)) | (np.isnan(a) & np.isnan(b))
 
 
-@pytest.mark.parametrize("count", [4_000, pytest.param(20_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [1_000, pytest.param(20_000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", ELEMENTARY)
 def test_fast_and_full_plain_and_compiled(name, count):
     columns = arguments(name, count)

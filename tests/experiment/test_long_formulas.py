@@ -42,19 +42,26 @@ def faults_of(model: dict[str, Any], **more: Any) -> tuple[Fault, ...]:
     return ()
 
 
+SLOW = {"marks": pytest.mark.slow}
+
+
 @pytest.mark.parametrize(
     ("kind", "key", "text", "is_sound"),
     [
         ("oscillator", "spring", total("sin({k}*u)", 94), True),
-        ("oscillator", "spring", "u + 1e-9*" + product("sin(0.01*{k}*u)", 94), False),
+        pytest.param(
+            "oscillator", "spring", "u + 1e-9*" + product("sin(0.01*{k}*u)", 94), False, **SLOW
+        ),
         ("oscillator", "spring", nested("sin", 94, "u"), False),
-        ("oscillator", "spring", total("tanh({k}*u)", 90), False),
+        pytest.param("oscillator", "spring", total("tanh({k}*u)", 90), False, **SLOW),
         ("oscillator", "spring", "**".join(["u"] * 90), False),
-        ("oscillator", "spring", "/".join(["(1 + u**2)"] * 90), False),
-        ("oscillator", "damping", "v*" + product("cosh(0.01*{k}*v)", 90), False),
+        pytest.param("oscillator", "spring", "/".join(["(1 + u**2)"] * 90), False, **SLOW),
+        pytest.param(
+            "oscillator", "damping", "v*" + product("cosh(0.01*{k}*v)", 90), False, **SLOW
+        ),
         ("oscillator", "exact", product("sin({k}*t)", 60), False),
         ("vehicle", "road", nested("sin", 90, "x"), False),
-        ("vehicle", "road", product("abs(sin({k}*x))", 89), False),
+        pytest.param("vehicle", "road", product("abs(sin({k}*x))", 89), False, **SLOW),
         ("circuit", "voltage", product("abs(sin({k}*t))", 89), False),
     ],
 )

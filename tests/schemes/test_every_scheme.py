@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 import scheme_runs as runs_of
+from thinned import thinned
 
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.schemes import FIXED_STEP, SCHEMES, NumberOption
@@ -19,14 +20,17 @@ def case(scheme, *rest, options=None):
     return pytest.param(*values, id="-".join([name, *(part.kind for part in rest)]))
 
 
-SMOOTH = [case(*pair) for pair in runs_of.pairs(runs_of.BASIC)]
-VARIED = [
-    case(scheme, model, options=options)
-    for scheme, model in runs_of.pairs(runs_of.ALL_MODELS)
-    for options in runs_of.variants(scheme)
-    # a trap: the promise of the centred scheme is that of a sound start (`test_central`)
-    if options.get("start") != "first_order"
-]
+SMOOTH = thinned([case(*pair) for pair in runs_of.pairs(runs_of.BASIC)], 3)
+VARIED = thinned(
+    [
+        case(scheme, model, options=options)
+        for scheme, model in runs_of.pairs(runs_of.ALL_MODELS)
+        for options in runs_of.variants(scheme)
+        # a trap: the promise of the centred scheme is that of a sound start (`test_central`)
+        if options.get("start") != "first_order"
+    ],
+    3,
+)
 PAIRED = [
     case(scheme, next(itertools.compress(models, (runs_of.suits(scheme, m) for m in models))))
     for i, scheme in enumerate(FIXED_STEP.values())

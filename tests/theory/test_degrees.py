@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import sympy
 from scheme_variants import VARIANTS
+from thinned import thinned
 
 from vibsim.engine import integrate
 from vibsim.models import MODELS
@@ -156,13 +157,14 @@ def marks(which):
 
 def cases(*, corrected):
     """List schemes and models; `corrected`: also the correction of the frequency, on the spring that it is made for."""
-    return [
+    found = [
         pytest.param(*variant.values, name, id=f"{variant.id}-{name}", marks=marks(variant.id))
         for variant in VARIANTS
         for name in FORMULAS
         if variant.values[0].treats(model(name))
         if not variant.values[1].get("frequency_correction") or (corrected and name == "none")
     ]
+    return thinned(found, 3)
 
 
 def written_out(name, degree):

@@ -87,12 +87,10 @@ CHANGES = {
     "experiment/faults.py": (CONSTANT, NOTHING),
     "ladder/choosing.py": (CONSTANT, NOTHING),
 }
-QUICK = {"store/summary.py", "experiment/sweep_columns.py"}
 
 
-@pytest.mark.parametrize(
-    "part", [p if p in QUICK else pytest.param(p, marks=pytest.mark.slow) for p in CHANGES]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("part", CHANGES)
 def test_a_changed_behaviour_is_seen(checkout: Checkout, part: str) -> None:
     text, expected = CHANGES[part]
     file = checkout.folder / "vibsim" / part

@@ -237,7 +237,10 @@ def test_a_failing_level_does_not_cost_those_that_share_its_job(place: Place, tr
 
 @pytest.mark.parametrize(
     ("old", "new", "is_refused"),
-    [("theta: 1.0", "theta: 0.5", True), ("title: A tiny", "# a word\ntitle: A tiny", False)],
+    [
+        ("theta: 1.0", "theta: 0.5", True),
+        pytest.param("title: A", "# a word\ntitle: A", False, marks=pytest.mark.slow),
+    ],
 )
 def test_a_file_that_is_edited_while_it_is_run_costs_one_round(
     place: Place,
