@@ -213,11 +213,6 @@ class Scheme:
         """Return every option with its default."""
         return {option.name: option.default for option in self.options}
 
-    def depends_on_beginning(self, options: Options) -> bool:
-        """Tell whether its orders depend on how a motion begins."""
-        orders = self.orders(options)
-        return orders.from_rest is not None or orders.from_balance is not None
-
     @property
     def words(self) -> tuple[Option, ...]:
         """The options that are a choice of words."""
