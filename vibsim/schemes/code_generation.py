@@ -13,12 +13,13 @@ import hashlib
 import inspect
 import linecache
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from types import FunctionType
 from typing import Any
 
 from vibsim.formula import constant
-from vibsim.schemes.base import HANDED, Function, Stepper, position_and_velocity
+from vibsim.schemes.base import HANDED, Stepper
 
 
 def written(
@@ -81,11 +82,6 @@ def exact_names(function: Callable[..., Any]) -> Mapping[str, str]:
     return _FORMULAS.get(function, {}) if isinstance(function, FunctionType) else {}
 
 
-def with_acceleration(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
-    """Return ``(u, v, a)``."""
-    return u(t), v(t), a(t)
-
-
 def self_starting(
     step: Callable[..., Any], *, implicit: bool = False, carries_acceleration: bool = False
 ) -> Stepper:
@@ -106,5 +102,7 @@ def self_starting(
         "    return following\n",
         functions={step.__name__: step},
     )
-    carried = with_acceleration if carries_acceleration else position_and_velocity
-    return Stepper(start, step, implicit=implicit, carried=carried)
+    stepper = Stepper(start, step, implicit=implicit)
+    if not carries_acceleration:
+        return stepper
+    return replace(stepper, carried=lambda u, v, a, t, dt: (u(t), v(t), a(t)))

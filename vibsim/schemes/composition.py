@@ -29,7 +29,7 @@ from functools import cache
 from typing import Any
 
 from vibsim.models.base import Model
-from vibsim.schemes.base import Acceleration, Function, Option, Options, Scheme, Stepper
+from vibsim.schemes.base import Acceleration, Option, Options, Scheme, Stepper
 from vibsim.schemes.code_generation import self_starting, written
 from vibsim.schemes.orders import depends_on_velocity, same_orders
 
@@ -177,16 +177,6 @@ def start_position_first(
     return u_1, ahead + dt * acceleration(u_1, ahead, dt, p)
 
 
-def with_slope_behind(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
-    """Return u and ``(u^n - u^(n-1))/dt``: what the velocity of `EULER_CROMER` is."""
-    return u(t), (u(t) - u(t - dt)) / dt
-
-
-def with_slope_ahead(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
-    """Return u and ``(u^(n+1) - u^n)/dt``: what the velocity of `EULER_CROMER_U_FIRST` is."""
-    return u(t), (u(t + dt) - u(t)) / dt
-
-
 _STARTS = ("first_order", "centred")
 
 _PLAIN = same_orders(
@@ -261,7 +251,8 @@ EULER_CROMER = _euler_cromer(
     "vibration text, section 7.1, equations (53)-(54), and section 8.8",
     alternating(KICK, "1", "1"),
     start_velocity_first,
-    with_slope_behind,
+    # the velocity is (u^n - u^(n-1))/dt
+    lambda u, v, a, t, dt: (u(t), (u(t) - u(t - dt)) / dt),
     velocity_forces=True,
 )
 EULER_CROMER_U_FIRST = _euler_cromer(
@@ -270,7 +261,8 @@ EULER_CROMER_U_FIRST = _euler_cromer(
     "vibration text, section 7.1, equations (51)-(52)",
     alternating(DRIFT, "1", "1"),
     start_position_first,
-    with_slope_ahead,
+    # the velocity is (u^(n+1) - u^n)/dt
+    lambda u, v, a, t, dt: (u(t), (u(t + dt) - u(t)) / dt),
     velocity_forces=False,
 )
 

@@ -49,16 +49,8 @@ def alone(function: F) -> F:
 
 @alone
 def solved(
-    x: float,
-    u: float,
-    d_u: float,
-    v: float,
-    d_v: float,
-    t: float,
-    p: Any,
-    acceleration: Acceleration,
-    slopes: Slopes,
-) -> float:
+    x: float, u: float, d_u: float, v: float, d_v: float, t: float, p: Any, acceleration: Acceleration, slopes: Slopes
+) -> float:  # fmt: skip
     """Return the x with ``x = acceleration(u + d_u x, v + d_v x, t, p)``, from a first guess x; NaN for none.
 
     It runs on exact numbers too, for which a change is either 0 or too large.
@@ -86,16 +78,8 @@ def solved(
 
 @alone
 def bisected(
-    x: float,
-    u: float,
-    d_u: float,
-    v: float,
-    d_v: float,
-    t: float,
-    p: Any,
-    acceleration: Acceleration,
-    slopes: Slopes,
-) -> float:
+    x: float, u: float, d_u: float, v: float, d_v: float, t: float, p: Any, acceleration: Acceleration, slopes: Slopes
+) -> float:  # fmt: skip
     """Return what `solved` does, by Newton's method and bisection in turns, or NaN."""
     below = above = math.nan
     change, scale, width = math.inf, 0.0, 0.0
@@ -131,17 +115,8 @@ def bisected(
 
 @alone
 def solved_together(
-    x: float,
-    y: float,
-    u: Two,
-    d_u: Four,
-    v: Two,
-    d_v: Four,
-    t: Two,
-    p: Any,
-    acceleration: Acceleration,
-    slopes: Slopes,
-) -> Two:
+    x: float, y: float, u: Two, d_u: Four, v: Two, d_v: Four, t: Two, p: Any, acceleration: Acceleration, slopes: Slopes
+) -> Two:  # fmt: skip
     """Return x and y with ``x = a(U_1, V_1, t_1)`` and ``y = a(U_2, V_2, t_2)``, from first guesses; NaN for none.
 
     ``U_i = u_i + d_u_i1 x + d_u_i2 y`` and V_i likewise; `d_u` and `d_v` are matrices row by row.

@@ -32,18 +32,15 @@ def solver(coordinates: int, stages: int) -> Callable[..., Any]:
     Positions, velocities and accelerations are tuples, as long as there are coordinates; `slopes` returns the
     derivatives of every acceleration by every position, row by row, and then those by every velocity.
     """
-    several = stages > 1
-    guesses = ("x", "y") if several else ("x",)
-    name = f"solved_{'together_' if several else ''}{coordinates}"
+    guesses = ("x", "y")[:stages]
+    unknowns = list(product(range(stages), range(coordinates)))
+    name = f"solved_{'together_' if stages > 1 else ''}{coordinates}"
     found = [f"({', '.join(f'x_{i}_{c}' for c in range(coordinates))})" for i in range(stages)]
     done = ", ".join(found)
     lines = [
         "@alone",
         f"def {name}({', '.join(guesses)}, u, d_u, v, d_v, t, p, acceleration, slopes):",
-        *(
-            f"    x_{i}_{c} = {guesses[i]}[{c}]"
-            for i, c in product(range(stages), range(coordinates))
-        ),
+        *(f"    x_{i}_{c} = {guesses[i]}[{c}]" for i, c in unknowns),
         "    before = 0.0",
         f"    for k in range({MOST_TOGETHER}):",
         *(f"        {line}" for line in _iteration(coordinates, stages)),
@@ -54,7 +51,7 @@ def solver(coordinates: int, stages: int) -> Callable[..., Any]:
         "        if k and not change > STALLED * scale + LEAST and not rate < 0.5:",
         f"            return {done}",
         "        before = change",
-        *(f"    x_{i}_{c} = math.nan" for i, c in product(range(stages), range(coordinates))),
+        *(f"    x_{i}_{c} = math.nan" for i, c in unknowns),
         f"    return {done}",
     ]
     return written("\n".join(lines) + "\n", _NUMBERS, {"alone": alone, "math": math})
@@ -62,61 +59,48 @@ def solver(coordinates: int, stages: int) -> Callable[..., Any]:
 
 def _iteration(coordinates: int, stages: int) -> Iterator[str]:
     """Yield the lines of one iteration, which change the unknowns and set `change` and `scale`."""
+    several = range(coordinates)
+    unknowns = list(enumerate(product(range(stages), several)))
+
+    def of_stage(name: str, *index: int) -> str:
+        """Name an entry of a vector or matrix over stages; of one stage it is the number itself."""
+        place = sum(i * stages ** (len(index) - k) for k, i in enumerate(index, 1))
+        return f"{name}[{place}]" if stages > 1 else name
+
+    def slope(i: int, row: int, column: int, by: int) -> str:
+        """Name the derivative of an acceleration at stage i by a position (0) or a velocity (1)."""
+        return f"slopes_{i}[{by * coordinates**2 + row * coordinates + column}]"
+
     terms = []
     for i in range(stages):
-        yield from _stage(i, coordinates, stages)
-        for c in range(coordinates):
+        for name, known, weights in (("place", "u", "d_u"), ("speed", "v", "d_v")):
+            entries = []
+            for c in several:
+                reach = (f"{of_stage(weights, i, j)} * x_{j}_{c}" for j in range(stages))
+                entries.append(f"{of_stage(known, i)}[{c}] + ({' + '.join(reach)})")
+            yield f"{name}_{i} = ({', '.join(entries)})"
+        for name in ("acceleration", "slopes"):
+            found = "force" if name == "acceleration" else name
+            yield f"{found}_{i} = {name}(place_{i}, speed_{i}, {of_stage('t', i)}, p)"
+        for c in several:
             terms.append(f"abs(force_{i}[{c}])")
-            for e in range(coordinates):
-                by_u, by_v = _slopes(i, c, e, coordinates)
-                terms += [f"abs({by_u} * place_{i}[{e}])", f"abs({by_v} * speed_{i}[{e}])"]
-    unknowns = [f"{i}_{c}" for i, c in product(range(stages), range(coordinates))]
-    for row, (i, c) in enumerate(product(range(stages), range(coordinates))):
+            for e in several:
+                terms.append(f"abs({slope(i, c, e, 0)} * place_{i}[{e}])")
+                terms.append(f"abs({slope(i, c, e, 1)} * speed_{i}[{e}])")
+    for row, (i, c) in unknowns:
         yield f"r_{row} = x_{i}_{c} - force_{i}[{c}]"
-        for column, (j, e) in enumerate(product(range(stages), range(coordinates))):
-            by_u, by_v = _slopes(i, c, e, coordinates)
-            entry = (
-                f"({by_u} * {_entry('d_u', i, j, stages)} + {by_v} * {_entry('d_v', i, j, stages)})"
-            )
-            yield f"m_{row}_{column} = {'1.0 - ' if row == column else '-'}{entry}"
+        for column, (j, e) in unknowns:
+            by_u = f"{slope(i, c, e, 0)} * {of_stage('d_u', i, j)}"
+            by_v = f"{slope(i, c, e, 1)} * {of_stage('d_v', i, j)}"
+            yield f"m_{row}_{column} = {'1.0 - ' if row == column else '-'}({by_u} + {by_v})"
     yield from elimination(len(unknowns))
-    yield from (f"x_{name} = x_{name} - r_{row}" for row, name in enumerate(unknowns))
+    yield from (f"x_{i}_{c} = x_{i}_{c} - r_{row}" for row, (i, c) in unknowns)
     yield "change = abs(r_0)"
-    yield from (
-        f"change = abs(r_{row}) if abs(r_{row}) > change else change"
-        for row in range(1, len(unknowns))
-    )
+    for row, _ in unknowns[1:]:
+        yield f"change = abs(r_{row}) if abs(r_{row}) > change else change"
     # a change that is no number is one in the sum as well
-    yield (
-        "change = change + ((" + " + ".join(f"r_{row}" for row in range(len(unknowns))) + ") * 0.0)"
-    )
+    yield f"change = change + (({' + '.join(f'r_{row}' for row, _ in unknowns)}) * 0.0)"
     yield f"scale = {' + '.join(terms)}"
-
-
-def _stage(i: int, coordinates: int, stages: int) -> Iterator[str]:
-    """Yield the lines that evaluate the force and its slopes at stage i."""
-    for name, known, weights in (("place", "u", "d_u"), ("speed", "v", "d_v")):
-        entries = []
-        for c in range(coordinates):
-            own = f"{known}[{i}][{c}]" if stages > 1 else f"{known}[{c}]"
-            reach = " + ".join(
-                f"{_entry(weights, i, j, stages)} * x_{j}_{c}" for j in range(stages)
-            )
-            entries.append(f"{own} + ({reach})")
-        yield f"{name}_{i} = ({', '.join(entries)})"
-    time = f"t[{i}]" if stages > 1 else "t"
-    yield f"force_{i} = acceleration(place_{i}, speed_{i}, {time}, p)"
-    yield f"slopes_{i} = slopes(place_{i}, speed_{i}, {time}, p)"
-
-
-def _entry(name: str, i: int, j: int, stages: int) -> str:
-    return f"{name}[{i * stages + j}]" if stages > 1 else name
-
-
-def _slopes(i: int, row: int, column: int, coordinates: int) -> tuple[str, str]:
-    """Name the derivatives of an acceleration at stage i by a position and by a velocity."""
-    place = row * coordinates + column
-    return f"slopes_{i}[{place}]", f"slopes_{i}[{coordinates**2 + place}]"
 
 
 def elimination(size: int) -> Iterator[str]:

@@ -17,11 +17,11 @@ from vibsim.apriori.formal_orders import (
     columns_of,
     formal_orders,
     has_corners,
+    is_promised,
     options_of,
     special_orders,
     stability_limits,
 )
-from vibsim.apriori.phase_amplitude_orders import is_promised
 from vibsim.checks.growth import ALIKE
 from vibsim.checks.order.judge import expected_order
 from vibsim.checks.words.costs import cost_in_words
