@@ -353,7 +353,7 @@ FAULTS = (
     Fault(
         "exact solution without its frequency",
         "exact",
-        "models/shared/harmonic.py",
+        "models/shared/linear_motion.py",
         "u_0 * cos + v_0 / w * sin",
         "u_0 * cos + v_0 * sin",
     ),
@@ -361,8 +361,8 @@ FAULTS = (
         "exact solution at other times",
         "exact",
         "simulation/level.py",
-        "t = _numbers(steps, every) * (group.end / steps)[:, None]",
-        "t = _numbers(steps, every) * (group.end / (steps + 1))[:, None]",
+        "number * (group.end / steps)[:, None],",
+        "number * (group.end / (steps + 1))[:, None],",
     ),
     # analysis
     Fault(

@@ -57,7 +57,10 @@ CONSTANT = "CHANGED = True"
 CHANGES = {
     "experiment/data.py": ("def schemes_of(experiment, check): return ()", EVERYTHING),
     "experiment/storage.py": ("def asked(experiment): return ()", EVERYTHING),
-    "plan/cases.py": ("def option_groups(experiment, scheme, columns): return []", EVERYTHING),
+    "experiment/sweep_columns.py": (
+        "def option_groups(experiment, scheme, columns): return []",
+        EVERYTHING,
+    ),
     "cli/jobs/simulate.py": (CONSTANT, EVERYTHING),
     "cli/jobs/analyse.py": (CONSTANT, LATER),
     "cli/jobs/extrapolate.py": (CONSTANT, {"extrapolate", "index"}),
@@ -66,8 +69,8 @@ CHANGES = {
     "report/page/index.py": (CONSTANT, {"report", "index"}),
     "store/writing.py": ("CONVENTIONS = 'CF-1.8'", EVERYTHING),
     "store/summary.py": (CONSTANT, LATER),
-    "checks/order/judge.py": (CONSTANT, LATER),
-    "checks/words/order_advice.py": (CONSTANT, LATER),
+    "checks/order.py": (CONSTANT, LATER),
+    "checks/order_text.py": (CONSTANT, LATER),
     "comparison/best_solution.py": (CONSTANT, {*LATER, "extrapolate"}),
     "theory/roots.py": (CONSTANT, LATER),
     "simulation/members.py": (CONSTANT, EVERYTHING),
@@ -84,7 +87,7 @@ CHANGES = {
     "experiment/faults.py": (CONSTANT, NOTHING),
     "ladder/choosing.py": (CONSTANT, NOTHING),
 }
-QUICK = {"store/summary.py", "plan/cases.py"}
+QUICK = {"store/summary.py", "experiment/sweep_columns.py"}
 
 
 @pytest.mark.parametrize(
