@@ -213,12 +213,7 @@ def relative_floors(
 ) -> Floats:
     """Return the predicted round-off relative to the solution, shape (scheme, case, level).
 
-    Parameters
-    ----------
-    steps
-        Number of steps of every level.
-    arithmetic
-        Of schemes that have several; the one that they have where None.
+    `steps` are those of every level, `arithmetic` that of schemes which have several, their own one where None.
     """
 
     def floor(scheme: Scheme, options: Options) -> list[float]:

@@ -27,15 +27,8 @@ def written(
 ) -> FunctionType:
     """Return the function that `text` defines; the same one for the same text.
 
-    Parameters
-    ----------
-    text
-        One ``def``, in ``+ - * /`` and comparisons.
-    formulas
-        Names of numbers that the text uses, and their formulas. Two functions of one scheme that share a name share
-        its formula.
-    functions
-        Names of functions that the text calls, or of `math`.
+    The text is one ``def``, in ``+ - * /`` and comparisons. `formulas` are those of the numbers that it uses by name
+    (two functions of one scheme that share a name share its formula), `functions` what it calls, or `math`.
     """
     return _written(text, tuple((formulas or {}).items()), tuple(sorted((functions or {}).items())))
 
@@ -87,11 +80,7 @@ def self_starting(
 ) -> Stepper:
     """Return the arithmetic of a one-step method, whose velocity is its own, from its step (`Stepper.step`).
 
-    Parameters
-    ----------
-    carries_acceleration
-        Whether the state is (u, v, a) rather than (u, v), as a step begins with the acceleration that the last one
-        ended with.
+    Where it carries the acceleration, with which the last step ended and a step begins, the state is (u, v, a).
     """
     asked = [name for name in HANDED if name in inspect.signature(step).parameters]
     rest = ", ".join(["dt", "p", *asked])

@@ -12,7 +12,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import StrEnum
 from fractions import Fraction
 from functools import cache
 from math import perm
@@ -102,13 +102,13 @@ def _names(model: Model, degree: int) -> tuple[str, ...]:
     return ("t", *of_solution, *own, _symbol(model, _FREQUENCY, 0))
 
 
-class Forces(IntEnum):
-    """Which forces of a model act beside the one that makes the polynomial a solution."""
+class Forces(StrEnum):
+    """Which forces of a model act beside the one for the polynomial, and what is at fault for a residual with them."""
 
-    NONE = 0
-    AT_REST = 1
+    NONE = "differences"
+    AT_REST = "force"
     """Those on a body at rest: all but damping."""
-    ALL = 2
+    ALL = "damping"
 
 
 @dataclass(frozen=True, eq=False)
