@@ -19,12 +19,7 @@ def known_values(
 ) -> Floats | None:
     """Return the exact values of a quantity other than a state, shape (case, t); None where nothing is known.
 
-    Parameters
-    ----------
-    states
-        The exact states at times `t`, shape (case, t); empty where they are not known.
-    group
-        The members.
+    `states` are the exact ones at times `t`, shape (case, t), empty where they are not known; `group` the members.
     """
     if name == BUDGET[2] or (name == "energy_deviation" and model.conservative):
         return np.zeros(t.shape)

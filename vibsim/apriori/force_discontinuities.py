@@ -75,14 +75,8 @@ def words_of(model: Model, index: int) -> str:
 def corners_of(model: Model, finest: Record, group: Members, dt: Floats) -> Corners:
     """Find the first corner that lies within a step, or jump of the force in time that lies at a grid point.
 
-    Parameters
-    ----------
-    finest
-        Record of the finest level.
-    group
-        Its members.
-    dt
-        Step of the coarsest level, of which every other one is a part, shape (case,).
+    In the Record of the finest level with its members; dt is the step of the coarsest one, of which every other one is
+    a part, shape (case,).
     """
     states = np.stack([np.asarray(finest[state.name], dtype=float) for state in model.states])
     _, schemes, cases, samples = states.shape

@@ -12,19 +12,18 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vibsim import plan
-from vibsim.apriori.phase_amplitude_orders import is_promised, part_orders
+from vibsim import plan, theory
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.record import Record
 from vibsim.formula import values
 from vibsim.models import Model, tree
-from vibsim.models.shared.phase_amplitude_names import whole_of
+from vibsim.models.shared.free import free_oscillation, why_not_free
+from vibsim.models.shared.phase_amplitude_names import PHASE, is_error_part, whole_of
 from vibsim.schemes import SCHEMES, Options, Scheme
 from vibsim.schemes.base import ORDER_AT_CORNERS, is_on_the_mesh
 from vibsim.schemes.orders import Beginning, depends_on_velocity, is_autonomous
 from vibsim.simulation.members import numbers_of
-from vibsim.theory import stability_limit
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
@@ -124,6 +123,37 @@ def formal_orders(experiment: Experiment, quantity: str, columns: Columns) -> Fl
     return np.choose(begins, [promised(b) for b in BEGINNINGS])
 
 
+def is_promised(experiment: Experiment, quantity: str) -> bool:
+    """Tell whether theory knows the order of a quantity as that of a part of an error."""
+    return is_error_part(quantity) and not why_not_free(experiment.model.definition)
+
+
+def part_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floats:
+    """Return the order of a part for which `is_promised` holds, shape (scheme, 1 or case).
+
+    It is infinite where the part is exact, and NaN where nothing oscillates or a scheme chooses its own steps.
+    """
+    model = experiment.model.definition
+    size = len(next(iter(columns.values()))) if columns else 1
+    parameters, initial = numbers_of(experiment, columns, size)
+    motion = free_oscillation(model, initial, parameters)
+    found = np.full((len(experiment.schemes), len(motion.frequency)), np.nan)
+    for s, spec in enumerate(experiment.schemes):
+        if SCHEMES[spec.kind].adaptive:
+            continue
+        for options, cases in plan.option_groups(experiment, s, columns):
+            stepper = SCHEMES[spec.kind].stepper_for(model, options)
+            damping = motion.damping[cases]
+            # worked out once for each damping
+            for value in np.unique(damping[np.isfinite(damping)]).tolist():
+                own = cases[damping == value]
+                both = theory.part_orders(
+                    stepper, value, motion.position[own], motion.velocity[own]
+                )
+                found[s, own] = both[0 if quantity.endswith(PHASE) else 1]
+    return found
+
+
 def special_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floats:
     """Return the highest order that every scheme has in a special case, shape (scheme, 1 or case).
 
@@ -183,12 +213,7 @@ def relative_floors(
 ) -> Floats:
     """Return the predicted round-off relative to the solution, shape (scheme, case, level).
 
-    Parameters
-    ----------
-    steps
-        Number of steps of every level.
-    arithmetic
-        Of schemes that have several; the one that they have where None.
+    `steps` are those of every level, `arithmetic` that of schemes which have several, their own one where None.
     """
 
     def floor(scheme: Scheme, options: Options) -> list[float]:
@@ -211,7 +236,7 @@ def stability_limits(experiment: Experiment, columns: Columns) -> Floats:
 
 def limit_of(scheme: Scheme, options: Options) -> float:
     """Return the largest stable w dt of a scheme, infinite for none, 0 where every step grows; NaN where it adapts."""
-    return math.nan if scheme.adaptive else stability_limit(scheme, options)
+    return math.nan if scheme.adaptive else theory.stability_limit(scheme, options)
 
 
 def _each(

@@ -30,13 +30,7 @@ def stored_floor(
 
     Data of other programs may be kept in single precision: no difference of two such levels is known to more than its
     seven digits.
-
-    Parameters
-    ----------
-    records
-        Level Records by level.
-    names
-        The states.
+    `names` are the states.
     """
     floors = []
     for level in levels:
@@ -49,10 +43,7 @@ def stored_floor(
 def solution_size(series: list[Floats]) -> Floats:
     """Return the size of a solution, shape (scheme, case): its largest value at the finest level that has one.
 
-    Parameters
-    ----------
-    series
-        The solution at every level from coarse to fine, each of shape (scheme, case, t).
+    The solution at every level from coarse to fine has the shape (scheme, case, t).
     """
     size = largest(series[-1])
     if np.all(np.isfinite(size)):
@@ -68,16 +59,8 @@ def solution_size(series: list[Floats]) -> Floats:
 def norm_of_floor(floor: Floats, kind: str, points: int, spacing: Floats) -> Floats:
     """Return the norm over time of noise as large as `floor` at every point; the shape of `floor`.
 
-    Parameters
-    ----------
-    floor
-        Size of the noise at one point, shape (..., case).
-    kind
-        One of `vocabulary.NORMS`.
-    points
-        Number of points of the grid.
-    spacing
-        Distance between them, shape (case,) or (1,).
+    The floor has the shape (..., case), the kind is one of `vocabulary.NORMS`; the points of the grid have a spacing of
+    shape (case,) or (1,).
     """
     weight = {"l1": spacing * points, "l2": np.sqrt(spacing * points)}.get(kind, np.ones(1))
     return np.asarray(floor * weight)

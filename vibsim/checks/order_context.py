@@ -14,11 +14,11 @@ from vibsim.apriori.formal_orders import (
     columns_of,
     formal_orders,
     has_corners,
+    is_promised,
     options_of,
     special_orders,
     stability_limits,
 )
-from vibsim.apriori.phase_amplitude_orders import is_promised
 from vibsim.checks.order import expected_order
 from vibsim.checks.phase_amplitude_text import parts_in_words
 from vibsim.checks.sentences import Found, cost_in_words

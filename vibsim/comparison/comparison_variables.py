@@ -8,8 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.apriori.formal_orders import orders_vary
-from vibsim.apriori.phase_amplitude_orders import is_promised
+from vibsim.apriori.formal_orders import is_promised, orders_vary
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.comparison.thresholds import ORDER_WINDOW
 from vibsim.convergence import differences

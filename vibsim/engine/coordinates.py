@@ -23,7 +23,6 @@ from vibsim.engine import gather
 from vibsim.engine.text import Module, collect, definition, enter
 from vibsim.schemes import newton
 from vibsim.schemes.base import HANDED, Stepper, no_backward
-from vibsim.schemes.newton_system import solver
 
 Kind = Literal["number", "vector", "zero"] | tuple["Kind", ...]
 
@@ -296,7 +295,7 @@ class _Writer:
             self.module.define(f"{NORM}(vector)", f"return sqrt({squares})")
             name = NORM
         elif function in _SOLVERS:
-            text = solver(self.count, _SOLVERS[function][0])
+            text = newton.solver(self.count, _SOLVERS[function][0])
             collect(self.module, text, text.__name__, {})
             name = text.__name__
         return ast.Call(ast.Name(name, ast.Load()), given, [])

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vibsim.apriori.formal_orders import formal_orders
-from vibsim.apriori.phase_amplitude_orders import is_promised
+from vibsim.apriori.formal_orders import formal_orders, is_promised
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, MEASUREMENT_FACTOR
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.experiment.storage import asked

@@ -82,15 +82,6 @@ def no_backward(state: CarriedState, dt: float) -> float:
     return math.nan * dt
 
 
-Function = Callable[[Any], Any]
-"""Of time."""
-
-
-def position_and_velocity(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
-    """Return ``(u, v)``."""
-    return u(t), v(t)
-
-
 @dataclass(frozen=True)
 class Stepper:
     """The arithmetic of a scheme: functions on the carried state of one member, and how it starts and ends.
@@ -119,7 +110,7 @@ class Stepper:
     """Factors of the acceleration and of the initial velocity that enters the start, from ``w dt``; None for 1."""
     events: str = ""
     """How it treats events, one of `EVENTS`; empty for a smooth model."""
-    carried: Callable[..., CarriedState] = position_and_velocity
+    carried: Callable[..., CarriedState] = lambda u, v, a, t, dt: (u(t), v(t))
     """``carried(u, v, a, t, dt)``: the state at time t of a motion with that position, velocity and acceleration,
     functions of time."""
     tabulated: bool = False
@@ -135,16 +126,11 @@ HANDED = ("acceleration", "slopes", "damping_rate")
 """Functions of the model that a function of a scheme is handed, by these names."""
 
 
-def no_damping(u: float, v: float, t: float, p: Any) -> float:
-    """Return 0."""
-    return 0.0
-
-
 def handed(
     function: Callable[..., Any],
     acceleration: Acceleration,
     slopes: Slopes,
-    damping_rate: Acceleration = no_damping,
+    damping_rate: Acceleration = lambda u, v, t, p: 0.0,
 ) -> Callable[..., Any]:
     """Return `function`, a `Stepper`'s start or step, with those functions of the model that it asks for."""
     known = {"acceleration": acceleration, "slopes": slopes, "damping_rate": damping_rate}
@@ -212,11 +198,6 @@ class Scheme:
     def defaults(self) -> dict[str, OptionValue]:
         """Return every option with its default."""
         return {option.name: option.default for option in self.options}
-
-    def depends_on_beginning(self, options: Options) -> bool:
-        """Tell whether its orders depend on how a motion begins."""
-        orders = self.orders(options)
-        return orders.from_rest is not None or orders.from_balance is not None
 
     @property
     def words(self) -> tuple[Option, ...]:

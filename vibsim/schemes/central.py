@@ -44,7 +44,6 @@ from vibsim.schemes.base import (
     VECTOR,
     Acceleration,
     Flag,
-    Function,
     Option,
     Options,
     Scheme,
@@ -62,11 +61,6 @@ def start_three_term(
     return u + dt * v + kick, u
 
 
-def with_point_behind(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
-    """Return u^n and u^(n-1)."""
-    return u(t), u(t - dt)
-
-
 def backward_three_term(state: tuple[float, float], dt: float) -> float:
     """Return ``(u^n - u^(n-1))/dt``: B, section 2.1."""
     u, behind = state
@@ -80,11 +74,6 @@ def start_increment(
     kick = 0.0 if variant else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
     d = dt * v + kick
     return u + d, d
-
-
-def with_increment(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
-    """Return u^n and the increment u^n - u^(n-1)."""
-    return u(t), u(t) - u(t - dt)
 
 
 def backward_increment(state: tuple[float, float], dt: float) -> float:
@@ -105,13 +94,6 @@ def start_compensated(
     part = ahead - u
     u_rest = (u - (ahead - part)) + (d - part)
     return ahead, d, u_rest, d_rest
-
-
-def with_rests(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
-    """Return u^n, the increment, and no rounding errors."""
-    increment = u(t) - u(t - dt)
-    nothing = increment - increment
-    return u(t), increment, nothing, nothing
 
 
 @dataclass(frozen=True)
@@ -188,10 +170,27 @@ class Arithmetic:
 
 
 ARITHMETICS = {
-    "compensated": Arithmetic(start_compensated, _COMPENSATED, backward_increment, with_rests, 0.0),
-    "increment": Arithmetic(start_increment, _INCREMENT, backward_increment, with_increment, 0.5),
+    "compensated": Arithmetic(
+        start_compensated,
+        _COMPENSATED,
+        backward_increment,
+        # no rounding errors
+        lambda u, v, a, t, dt: (u(t), u(t) - u(t - dt), u(t) - u(t), u(t) - u(t)),
+        0.0,
+    ),
+    "increment": Arithmetic(
+        start_increment,
+        _INCREMENT,
+        backward_increment,
+        lambda u, v, a, t, dt: (u(t), u(t) - u(t - dt)),
+        0.5,
+    ),
     "three_term": Arithmetic(
-        start_three_term, _THREE_TERM, backward_three_term, with_point_behind, 1.5
+        start_three_term,
+        _THREE_TERM,
+        backward_three_term,
+        lambda u, v, a, t, dt: (u(t), u(t - dt)),
+        1.5,
     ),
 }
 
@@ -329,11 +328,6 @@ CENTRAL = Scheme(
 )
 
 
-def even_without_damping(quantity: str, model: Model, options: Options) -> bool:
-    """Tell whether the error of `quantity` has even powers of dt only: see `even_powers`."""
-    return not depends_on_velocity(model) and even_powers(quantity, model, options)
-
-
 CENTRAL_QUADRATIC_ROOT = replace(
     CENTRAL,
     kind="central_quadratic_root",
@@ -351,7 +345,9 @@ CENTRAL_BACKWARD_DAMPING = replace(
     stepper=partial(stepper, treatment=BACKWARD),
     # the damping is taken half a step too early
     orders=lambda options: same_orders(2, velocity_dependent=same_orders(1)),
-    even_powers=even_without_damping,
+    even_powers=lambda quantity, model, options: (
+        not depends_on_velocity(model) and even_powers(quantity, model, options)
+    ),
     velocity_forces=True,
     damped=(),
 )

@@ -13,12 +13,13 @@ import hashlib
 import inspect
 import linecache
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from types import FunctionType
 from typing import Any
 
 from vibsim.formula import constant
-from vibsim.schemes.base import HANDED, Function, Stepper, position_and_velocity
+from vibsim.schemes.base import HANDED, Stepper
 
 
 def written(
@@ -26,15 +27,8 @@ def written(
 ) -> FunctionType:
     """Return the function that `text` defines; the same one for the same text.
 
-    Parameters
-    ----------
-    text
-        One ``def``, in ``+ - * /`` and comparisons.
-    formulas
-        Names of numbers that the text uses, and their formulas. Two functions of one scheme that share a name share
-        its formula.
-    functions
-        Names of functions that the text calls, or of `math`.
+    The text is one ``def``, in ``+ - * /`` and comparisons. `formulas` are those of the numbers that it uses by name
+    (two functions of one scheme that share a name share its formula), `functions` what it calls, or `math`.
     """
     return _written(text, tuple((formulas or {}).items()), tuple(sorted((functions or {}).items())))
 
@@ -81,21 +75,12 @@ def exact_names(function: Callable[..., Any]) -> Mapping[str, str]:
     return _FORMULAS.get(function, {}) if isinstance(function, FunctionType) else {}
 
 
-def with_acceleration(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
-    """Return ``(u, v, a)``."""
-    return u(t), v(t), a(t)
-
-
 def self_starting(
     step: Callable[..., Any], *, implicit: bool = False, carries_acceleration: bool = False
 ) -> Stepper:
     """Return the arithmetic of a one-step method, whose velocity is its own, from its step (`Stepper.step`).
 
-    Parameters
-    ----------
-    carries_acceleration
-        Whether the state is (u, v, a) rather than (u, v), as a step begins with the acceleration that the last one
-        ended with.
+    Where it carries the acceleration, with which the last step ended and a step begins, the state is (u, v, a).
     """
     asked = [name for name in HANDED if name in inspect.signature(step).parameters]
     rest = ", ".join(["dt", "p", *asked])
@@ -106,5 +91,7 @@ def self_starting(
         "    return following\n",
         functions={step.__name__: step},
     )
-    carried = with_acceleration if carries_acceleration else position_and_velocity
-    return Stepper(start, step, implicit=implicit, carried=carried)
+    stepper = Stepper(start, step, implicit=implicit)
+    if not carries_acceleration:
+        return stepper
+    return replace(stepper, carried=lambda u, v, a, t, dt: (u(t), v(t), a(t)))

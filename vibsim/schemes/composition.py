@@ -29,7 +29,7 @@ from functools import cache
 from typing import Any
 
 from vibsim.models.base import Model
-from vibsim.schemes.base import Acceleration, Function, Option, Options, Scheme, Stepper
+from vibsim.schemes.base import Acceleration, Option, Options, Scheme, Stepper
 from vibsim.schemes.code_generation import self_starting, written
 from vibsim.schemes.orders import depends_on_velocity, same_orders
 
@@ -63,9 +63,7 @@ def substep_function(substeps: Substeps) -> Callable[..., Any]:
             continue
         if not acceleration:
             acceleration = f"a_{i}"
-            whole = (
-                " + ".join(f"({part})" for part in passed) if len(passed) > 1 else "".join(passed)
-            )
+            whole = passed[0] if len(passed) == 1 else " + ".join(f"({part})" for part in passed)
             time = f"t + {times_dt(whole)}" if passed else "t"
             lines.append(f"{acceleration} = acceleration({position}, {velocity}, {time}, p)")
         lines.append(f"v_{i} = {velocity} + {times_dt(coefficient)} * {acceleration}")
@@ -74,6 +72,12 @@ def substep_function(substeps: Substeps) -> Callable[..., Any]:
     lines.append(f"return ({', '.join(following)}), v")
     body = "\n    ".join(lines)
     return written(f"def step_composed(state, t, dt, p, acceleration):\n    {body}\n", formulas)
+
+
+def alternating(first: str, *coefficients: str) -> Substeps:
+    """Return substeps of alternating kinds with these coefficients."""
+    kinds = (first, DRIFT if first == KICK else KICK)
+    return tuple((kinds[i % 2], coefficient) for i, coefficient in enumerate(coefficients))
 
 
 def carries_acceleration(substeps: Substeps) -> bool:
@@ -117,7 +121,7 @@ VELOCITY_VERLET = _composed(
     "velocity_verlet",
     "Velocity Verlet (kick, drift, kick)",
     "Hairer, Lubich and Wanner, Geometric Numerical Integration, section I.1.4",
-    ((KICK, "1/2"), (DRIFT, "1"), (KICK, "1/2")),
+    alternating(KICK, "1/2", "1", "1/2"),
     2,
     # in exact arithmetic v^n = (u^(n+1) - u^(n-1))/(2 dt)
     own_velocity=False,
@@ -126,47 +130,31 @@ POSITION_VERLET = _composed(
     "position_verlet",
     "Position Verlet (drift, kick, drift)",
     "Hairer, Lubich and Wanner, Geometric Numerical Integration, section I.1.4",
-    ((DRIFT, "1/2"), (KICK, "1"), (DRIFT, "1/2")),
+    alternating(DRIFT, "1/2", "1", "1/2"),
     2,
 )
 
 _OUTER = "1/(2 - 2**(1/3))"
 """Weight of the first and the last of the three Verlet steps that Yoshida composes."""
 _INNER = "-2**(1/3)/(2 - 2**(1/3))"
+_ENDS, _MIDDLE = f"({_OUTER})/2", f"({_OUTER} + {_INNER})/2"
 
 YOSHIDA4 = _composed(
     "yoshida4",
     "Yoshida's symplectic method (order 4)",
     "Yoshida 1990; Hairer, Lubich and Wanner, Geometric Numerical Integration, section II.4",
-    (
-        (DRIFT, f"({_OUTER})/2"),
-        (KICK, _OUTER),
-        (DRIFT, f"({_OUTER} + {_INNER})/2"),
-        (KICK, _INNER),
-        (DRIFT, f"({_OUTER} + {_INNER})/2"),
-        (KICK, _OUTER),
-        (DRIFT, f"({_OUTER})/2"),
-    ),
+    alternating(DRIFT, _ENDS, _OUTER, _MIDDLE, _INNER, _MIDDLE, _OUTER, _ENDS),
     4,
 )
 
 _XI, _LAMBDA, _CHI = "0.1786178958448091", "(-0.2123418310626054)", "(-0.06626458266981849)"
+_KICK, _DRIFT = f"(1 - 2*{_LAMBDA})/2", f"1 - 2*({_CHI} + {_XI})"
 
 PEFRL = _composed(
     "pefrl",
     "Position-extended Forest-Ruth-like method (PEFRL, order 4)",
     "Omelyan, Mryglod and Folk 2002",
-    (
-        (DRIFT, _XI),
-        (KICK, f"(1 - 2*{_LAMBDA})/2"),
-        (DRIFT, _CHI),
-        (KICK, _LAMBDA),
-        (DRIFT, f"1 - 2*({_CHI} + {_XI})"),
-        (KICK, _LAMBDA),
-        (DRIFT, _CHI),
-        (KICK, f"(1 - 2*{_LAMBDA})/2"),
-        (DRIFT, _XI),
-    ),
+    alternating(DRIFT, _XI, _KICK, _CHI, _LAMBDA, _DRIFT, _LAMBDA, _CHI, _KICK, _XI),
     4,
 )
 
@@ -187,16 +175,6 @@ def start_position_first(
     ahead = v + 0.5 * dt * acceleration(u, v, 0.0, p) if variant else v
     u_1 = u + dt * ahead
     return u_1, ahead + dt * acceleration(u_1, ahead, dt, p)
-
-
-def with_slope_behind(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
-    """Return u and ``(u^n - u^(n-1))/dt``: what the velocity of `EULER_CROMER` is."""
-    return u(t), (u(t) - u(t - dt)) / dt
-
-
-def with_slope_ahead(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
-    """Return u and ``(u^(n+1) - u^n)/dt``: what the velocity of `EULER_CROMER_U_FIRST` is."""
-    return u(t), (u(t + dt) - u(t)) / dt
 
 
 _STARTS = ("first_order", "centred")
@@ -271,26 +249,23 @@ EULER_CROMER = _euler_cromer(
     "euler_cromer",
     "Euler-Cromer, velocity first (symplectic Euler)",
     "vibration text, section 7.1, equations (53)-(54), and section 8.8",
-    ((KICK, "1"), (DRIFT, "1")),
+    alternating(KICK, "1", "1"),
     start_velocity_first,
-    with_slope_behind,
+    # the velocity is (u^n - u^(n-1))/dt
+    lambda u, v, a, t, dt: (u(t), (u(t) - u(t - dt)) / dt),
     velocity_forces=True,
 )
 EULER_CROMER_U_FIRST = _euler_cromer(
     "euler_cromer_u_first",
     "Euler-Cromer, position first (symplectic Euler)",
     "vibration text, section 7.1, equations (51)-(52)",
-    ((DRIFT, "1"), (KICK, "1")),
+    alternating(DRIFT, "1", "1"),
     start_position_first,
-    with_slope_ahead,
+    # the velocity is (u^(n+1) - u^n)/dt
+    lambda u, v, a, t, dt: (u(t), (u(t + dt) - u(t)) / dt),
     velocity_forces=False,
 )
 
 COMPOSITIONS = (
-    EULER_CROMER,
-    EULER_CROMER_U_FIRST,
-    VELOCITY_VERLET,
-    POSITION_VERLET,
-    YOSHIDA4,
-    PEFRL,
-)
+    EULER_CROMER, EULER_CROMER_U_FIRST, VELOCITY_VERLET, POSITION_VERLET, YOSHIDA4, PEFRL
+)  # fmt: skip

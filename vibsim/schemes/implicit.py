@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from vibsim.schemes.base import Acceleration, Function, Scheme, Slopes, Stepper
+from vibsim.schemes.base import Acceleration, Scheme, Slopes, Stepper
 from vibsim.schemes.code_generation import self_starting, written
 from vibsim.schemes.newton import solved, solved_together
 from vibsim.schemes.orders import same_orders
@@ -65,11 +65,6 @@ def start_bdf2(
     """Return the state at step 1, by one step of Crank-Nicolson."""
     (ahead, speed), _ = step_crank_nicolson((u, v), 0.0, dt, p, acceleration, slopes)
     return ahead, speed, u, v
-
-
-def with_points_behind(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
-    """Return u and v at t, and one step before."""
-    return u(t), v(t), u(t - dt), v(t - dt)
 
 
 def step_bdf2(
@@ -122,7 +117,12 @@ _GAUSS = written(_GAUSS_STEP, _GAUSS_FORMULAS, {"solved_together": solved_togeth
 _STEPPERS = {
     "backward_euler": self_starting(step_backward_euler, implicit=True),
     "crank_nicolson": self_starting(step_crank_nicolson, implicit=True),
-    "bdf2": Stepper(start_bdf2, step_bdf2, implicit=True, carried=with_points_behind),
+    "bdf2": Stepper(
+        start_bdf2,
+        step_bdf2,
+        implicit=True,
+        carried=lambda u, v, a, t, dt: (u(t), v(t), u(t - dt), v(t - dt)),
+    ),
     "gauss4": self_starting(_GAUSS, implicit=True),
 }
 

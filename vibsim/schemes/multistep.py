@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from vibsim.schemes.base import Acceleration, Function, Scheme, Stepper
+from vibsim.schemes.base import Acceleration, Scheme, Stepper
 from vibsim.schemes.code_generation import weighted, written
 from vibsim.schemes.orders import Orders, same_orders
 from vibsim.schemes.runge_kutta import HEUN, RK3
@@ -70,16 +70,6 @@ def start_three(
     return u_1, v_1, v, a_0, v_before, a_before
 
 
-def with_slopes_behind(points: int) -> Callable[..., Any]:
-    """Return what gives u and v at t, then v and a at so many points behind, the latest first."""
-
-    def carried(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
-        behind = [t - (j + 1.0) * dt for j in range(points)]
-        return u(t), v(t), *(slope(time) for time in behind for slope in (v, a))
-
-    return carried
-
-
 def _scheme(
     kind: str,
     title: str,
@@ -88,7 +78,11 @@ def _scheme(
     start_in_words: str,
     orders: Orders,
 ) -> Scheme:
-    carried = with_slopes_behind(len(weights) - 1)
+    def carried(u: Any, v: Any, a: Any, t: Any, dt: Any) -> Any:
+        """Return u and v at t, then v and a at the points behind, the latest first."""
+        behind = [t - float(j) * dt for j in range(1, len(weights))]
+        return u(t), v(t), *(slope(time) for time in behind for slope in (v, a))
+
     return Scheme(
         kind=kind,
         title=title,

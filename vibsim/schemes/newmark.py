@@ -30,7 +30,7 @@ import math
 from functools import cache
 
 from vibsim.schemes.base import NumberOption, Options, Scheme, Stepper
-from vibsim.schemes.code_generation import with_acceleration, written
+from vibsim.schemes.code_generation import self_starting, written
 from vibsim.schemes.newton import solved
 from vibsim.schemes.orders import Orders, same_orders
 
@@ -53,13 +53,6 @@ _AVERAGED = {
     "guess": "now",
 }
 
-_START = """\
-def start_newmark(variant, u, v, dt, p, acceleration, slopes):
-    a = acceleration(u, v, 0.0, p)
-    following, velocity = step_newmark((u, v, a), 0.0, dt, p, acceleration, slopes)
-    return following
-"""
-
 
 @cache
 def _stepper(beta: str, gamma: str, alpha_m: str = "0", alpha_f: str = "0") -> Stepper:
@@ -79,8 +72,7 @@ def _stepper(beta: str, gamma: str, alpha_m: str = "0", alpha_f: str = "0") -> S
         formulas |= {"OLD_FORCE": f"({alpha_f})/{new}", "OLD": f"({alpha_m})/{new}"}
     text = _STEP.format(**(_AVERAGED if is_averaged else _ALONE))
     step = written(text, formulas, {"solved": solved})
-    start = written(_START, functions={"step_newmark": step})
-    return Stepper(start, step, implicit=True, carried=with_acceleration)
+    return self_starting(step, implicit=True, carries_acceleration=True)
 
 
 def _newmark(options: Options) -> Stepper:

@@ -1,4 +1,4 @@
-r"""Newton's method for the one equation that a step of an implicit scheme leaves.
+r"""Newton's method for the equation that a step of an implicit scheme leaves, or the equations of several coordinates.
 
 Every scheme of `vibsim.schemes.implicit` and `vibsim.schemes.newmark` reduces to one unknown: the acceleration x at
 the next point, with ``x = a(u + d_u x, v + d_v x, t)`` and known u, d_u, v, d_v. Newton's method takes the model's own
@@ -11,14 +11,24 @@ takes two iterations, of which the second one finds the first one exact. Where N
 law), bisection takes turns with it between two places where the residual has different signs. Where no solution is
 found the result is NaN, so that the member ends there as failed: never a value that does not solve the equation. Of
 several solutions, which large steps may have, it is the one that Newton's method reaches from the present acceleration.
+
+Of several coordinates the unknowns are the accelerations of all of them at one or two stages (`solver`),
+``x_i = a(U_i, V_i, t_i)`` with ``U_i = u_i + sum_j d_u_ij x_j`` and V_i likewise. The matrix of Newton's method,
+``1 - (d_u_ij da/du + d_v_ij da/dv)``, differs from the unit matrix by O(dt^2), or O(dt) where the force depends on the
+velocity: it is eliminated without a search for pivots. A pivot that vanishes ends the member, as does an iteration
+without an end. There is no bisection.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
+from functools import cache
+from itertools import product
 from typing import Any, TypeVar
 
 from vibsim.schemes.base import Acceleration, Slopes
+from vibsim.schemes.code_generation import written
 
 F = TypeVar("F")
 Two = tuple[float, float]
@@ -49,16 +59,8 @@ def alone(function: F) -> F:
 
 @alone
 def solved(
-    x: float,
-    u: float,
-    d_u: float,
-    v: float,
-    d_v: float,
-    t: float,
-    p: Any,
-    acceleration: Acceleration,
-    slopes: Slopes,
-) -> float:
+    x: float, u: float, d_u: float, v: float, d_v: float, t: float, p: Any, acceleration: Acceleration, slopes: Slopes
+) -> float:  # fmt: skip
     """Return the x with ``x = acceleration(u + d_u x, v + d_v x, t, p)``, from a first guess x; NaN for none.
 
     It runs on exact numbers too, for which a change is either 0 or too large.
@@ -86,16 +88,8 @@ def solved(
 
 @alone
 def bisected(
-    x: float,
-    u: float,
-    d_u: float,
-    v: float,
-    d_v: float,
-    t: float,
-    p: Any,
-    acceleration: Acceleration,
-    slopes: Slopes,
-) -> float:
+    x: float, u: float, d_u: float, v: float, d_v: float, t: float, p: Any, acceleration: Acceleration, slopes: Slopes
+) -> float:  # fmt: skip
     """Return what `solved` does, by Newton's method and bisection in turns, or NaN."""
     below = above = math.nan
     change, scale, width = math.inf, 0.0, 0.0
@@ -131,17 +125,8 @@ def bisected(
 
 @alone
 def solved_together(
-    x: float,
-    y: float,
-    u: Two,
-    d_u: Four,
-    v: Two,
-    d_v: Four,
-    t: Two,
-    p: Any,
-    acceleration: Acceleration,
-    slopes: Slopes,
-) -> Two:
+    x: float, y: float, u: Two, d_u: Four, v: Two, d_v: Four, t: Two, p: Any, acceleration: Acceleration, slopes: Slopes
+) -> Two:  # fmt: skip
     """Return x and y with ``x = a(U_1, V_1, t_1)`` and ``y = a(U_2, V_2, t_2)``, from first guesses; NaN for none.
 
     ``U_i = u_i + d_u_i1 x + d_u_i2 y`` and V_i likewise; `d_u` and `d_v` are matrices row by row.
@@ -172,3 +157,97 @@ def solved_together(
             return x, y
         before = change
     return math.nan, math.nan
+
+
+@cache
+def solver(coordinates: int, stages: int) -> Callable[..., Any]:
+    """Return what `solved` (one stage) or `solved_together` (two) is for several coordinates.
+
+    Positions, velocities and accelerations are tuples, as long as there are coordinates; `slopes` returns the
+    derivatives of every acceleration by every position, row by row, and then those by every velocity.
+    """
+    guesses = ("x", "y")[:stages]
+    unknowns = list(product(range(stages), range(coordinates)))
+    name = f"solved_{'together_' if stages > 1 else ''}{coordinates}"
+    found = [f"({', '.join(f'x_{i}_{c}' for c in range(coordinates))})" for i in range(stages)]
+    done = ", ".join(found)
+    lines = [
+        "@alone",
+        f"def {name}({', '.join(guesses)}, u, d_u, v, d_v, t, p, acceleration, slopes):",
+        *(f"    x_{i}_{c} = {guesses[i]}[{c}]" for i, c in unknowns),
+        "    before = 0.0",
+        f"    for k in range({MOST_TOGETHER}):",
+        *(f"        {line}" for line in _iteration(coordinates, stages)),
+        "        rate = change / before if k else 1.0",
+        "        # `not >`, so that NaN ends it as well",
+        "        if not change * rate > TOLERANCE * scale + LEAST:",
+        f"            return {done}",
+        "        if k and not change > STALLED * scale + LEAST and not rate < 0.5:",
+        f"            return {done}",
+        "        before = change",
+        *(f"    x_{i}_{c} = math.nan" for i, c in unknowns),
+        f"    return {done}",
+    ]
+    numbers = {"LEAST": LEAST, "STALLED": STALLED, "TOLERANCE": TOLERANCE}
+    formulas = {name: repr(value) for name, value in numbers.items()}
+    return written("\n".join(lines) + "\n", formulas, {"alone": alone, "math": math})
+
+
+def _iteration(coordinates: int, stages: int) -> Iterator[str]:
+    """Yield the lines of one iteration, which change the unknowns and set `change` and `scale`."""
+    several = range(coordinates)
+    unknowns = list(enumerate(product(range(stages), several)))
+
+    def of_stage(name: str, *index: int) -> str:
+        """Name an entry of a vector or matrix over stages; of one stage it is the number itself."""
+        place = sum(i * stages ** (len(index) - k) for k, i in enumerate(index, 1))
+        return f"{name}[{place}]" if stages > 1 else name
+
+    def slope(i: int, row: int, column: int, by: int) -> str:
+        """Name the derivative of an acceleration at stage i by a position (0) or a velocity (1)."""
+        return f"slopes_{i}[{by * coordinates**2 + row * coordinates + column}]"
+
+    terms = []
+    for i in range(stages):
+        for name, known, weights in (("place", "u", "d_u"), ("speed", "v", "d_v")):
+            entries = []
+            for c in several:
+                reach = (f"{of_stage(weights, i, j)} * x_{j}_{c}" for j in range(stages))
+                entries.append(f"{of_stage(known, i)}[{c}] + ({' + '.join(reach)})")
+            yield f"{name}_{i} = ({', '.join(entries)})"
+        for name in ("acceleration", "slopes"):
+            found = "force" if name == "acceleration" else name
+            yield f"{found}_{i} = {name}(place_{i}, speed_{i}, {of_stage('t', i)}, p)"
+        for c in several:
+            terms.append(f"abs(force_{i}[{c}])")
+            for e in several:
+                terms.append(f"abs({slope(i, c, e, 0)} * place_{i}[{e}])")
+                terms.append(f"abs({slope(i, c, e, 1)} * speed_{i}[{e}])")
+    for row, (i, c) in unknowns:
+        yield f"r_{row} = x_{i}_{c} - force_{i}[{c}]"
+        for column, (j, e) in unknowns:
+            by_u = f"{slope(i, c, e, 0)} * {of_stage('d_u', i, j)}"
+            by_v = f"{slope(i, c, e, 1)} * {of_stage('d_v', i, j)}"
+            yield f"m_{row}_{column} = {'1.0 - ' if row == column else '-'}({by_u} + {by_v})"
+    yield from elimination(len(unknowns))
+    yield from (f"x_{i}_{c} = x_{i}_{c} - r_{row}" for row, (i, c) in unknowns)
+    yield "change = abs(r_0)"
+    for row, _ in unknowns[1:]:
+        yield f"change = abs(r_{row}) if abs(r_{row}) > change else change"
+    # a change that is no number is one in the sum as well
+    yield f"change = change + (({' + '.join(f'r_{row}' for row, _ in unknowns)}) * 0.0)"
+    yield f"scale = {' + '.join(terms)}"
+
+
+def elimination(size: int) -> Iterator[str]:
+    """Yield the lines that solve ``m x = r`` for ``m_0_0, m_0_1, ...``; the solution stands in ``r_0, ...`` then."""
+    for k in range(size):
+        for row in range(k + 1, size):
+            yield f"factor = m_{row}_{k} / m_{k}_{k}"
+            yield from (
+                f"m_{row}_{j} = m_{row}_{j} - factor * m_{k}_{j}" for j in range(k + 1, size)
+            )
+            yield f"r_{row} = r_{row} - factor * r_{k}"
+    for row in reversed(range(size)):
+        rest = "".join(f" - m_{row}_{j} * r_{j}" for j in range(row + 1, size))
+        yield f"r_{row} = (r_{row}{rest}) / m_{row}_{row}"

@@ -75,22 +75,11 @@ class Orders:
         """The highest order of position, velocity or energy in any case: of models, damping and beginnings."""
         own = (self.position, self.velocity, self.energy, self.energy_linear)
         others = (self.velocity_dependent, self.from_rest, self.from_balance)
-        return max(
-            *own,
-            self.position_linear or 0.0,
-            *(case.highest for case in others if case is not None),
-        )
+        cases = (case.highest for case in others if case is not None)
+        return max(*own, self.position_linear or 0.0, *cases)
 
     def of(self, quantity: str, model: Model, beginning: Beginning = "any") -> float:
-        """Return the order of a quantity of a model.
-
-        Parameters
-        ----------
-        quantity
-            A state, an energy (`vibsim.models.ENERGIES`), or either with ``_d2t`` behind it.
-        beginning
-            How the motion begins.
-        """
+        """Return the order of a state or an energy (`vibsim.models.ENERGIES`), or of either with ``_d2t`` behind it."""
         special = {"rest": self.from_rest, "balance": self.from_balance}.get(beginning)
         if special is not None:
             return special.of(quantity, model)

@@ -15,9 +15,9 @@ from vibsim.theory.roots import (
     dominant,
     phase_error_per_period,
     roots,
+    stability_limit,
 )
 from vibsim.theory.rounding import rounding_bound
-from vibsim.theory.stability import stability_limit
 
 __all__ = [
     "Amplification",

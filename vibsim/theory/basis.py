@@ -68,18 +68,8 @@ def unit_steps(
 ) -> UnitSteps:
     """Return what a step and the start make of unit vectors.
 
-    Parameters
-    ----------
-    p
-        ``w dt``, in the kind of number that is wanted.
-    zero
-        Nothing, of that kind and shape.
-    square
-        ``p^2``, where it is more than the product.
-    damping
-        g, of that kind; None for none.
-    with_start
-        Whether the start is wanted too.
+    p, ``w dt``, is of the kind of number that is wanted, `zero` nothing of that kind and shape, `square` ``p^2`` where
+    it is more than the product, `damping` g, None for none.
     """
     one = zero + 1.0
     force, push = stepper.scaling(p) if stepper.scaling else (one, one)
@@ -159,13 +149,7 @@ def decimal(formula: str) -> Decimal:
 def exact(
     formula: str, number: Callable[[Fraction], Any], power: Callable[[Any, Fraction], Any]
 ) -> Any:
-    """Return the value of a coefficient in numbers of any kind, as `value_of`.
-
-    Raises
-    ------
-    ValueError
-        Where the formula has more in it than ``+ - * / **`` and ``sqrt``.
-    """
+    """Return the value of a coefficient in numbers of any kind, as `value_of`; ValueError where it has more in it."""
     try:
         return value_of(parse(formula, ()), number, power, {})
     except ValueError:
@@ -187,19 +171,9 @@ def value_of(
 ) -> Any:
     """Return the value of a formula in numbers of any kind.
 
-    Parameters
-    ----------
-    number
-        Makes such a number of a fraction. A decimal of the formula stands for itself, not for the nearest float.
-    power
-        Raises one to a power, which is a constant of the formula.
-    names
-        Numbers for the names of the formula.
-
-    Raises
-    ------
-    ValueError
-        Where the formula has more in it than ``+ - * / **``, ``sqrt`` and ``abs``.
+    `number` makes such a number of a fraction (a decimal of the formula stands for itself, not for the nearest float),
+    `power` raises one to a power, which is a constant of the formula, `names` are numbers for the names of the formula.
+    ValueError where it has more in it than ``+ - * / **``, ``sqrt`` and ``abs``.
     """
 
     def value(node: Expression) -> Any:

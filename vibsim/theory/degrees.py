@@ -42,8 +42,7 @@ STEPS = 4
 ROUNDED = 1e-13
 """Size of a term that is none: some schemes state their coefficients to 16 decimals."""
 OF = ("position", "velocity", "state")
-CAUSES = ("differences", "force", "damping")
-"""Of `Forces`, in their order."""
+State = tuple[Laurent, ...]
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,7 @@ class Miss:
     step: Residual | None
     """Of every further step."""
     cause: str
-    """Of the residual of a step: one of `CAUSES`; empty where it is exact."""
+    """Of the residual of a step: a value of `Forces`; empty where it is exact."""
 
 
 def applies(model: Model) -> bool:
@@ -85,15 +84,7 @@ def _refuse(model: Model) -> None:
 def reproduces(stepper: Stepper, model: Model, degree: int) -> bool:
     """Tell whether a scheme reproduces polynomials of a degree, as solutions of a model with a force for them.
 
-    Parameters
-    ----------
-    stepper
-        The arithmetic of the scheme on that model (`vibsim.schemes.Scheme.stepper_for`).
-
-    Raises
-    ------
-    ValueError
-        Where the formulas of the model are no rational ones (`applies`).
+    The stepper is that of `vibsim.schemes.Scheme.stepper_for`. ValueError where the model has no rational formulas.
     """
     _refuse(model)
     course = with_numbers(stepper, model, degree, KNOWN)
@@ -121,34 +112,33 @@ def miss(stepper: Stepper, model: Model, degree: int) -> Miss:
     if step is None:
         return Miss(degree, first, step, "")
     acting = (forces for forces in Forces if _is_off(_step(replace(course, forces=forces))))
-    cause = next((CAUSES[forces] for forces in acting), "")
+    cause = next((forces.value for forces in acting), "")
     return Miss(degree, first, step, cause)
 
 
-Off = Callable[[Course], tuple[Laurent, ...]]
-
-
-def _first(course: Course) -> tuple[Laurent, ...]:
+def _first(course: Course) -> State:
     """Return what the state at step 1 is off by."""
     return _less(course.start(), course.state(course.dt))
 
 
-def _step(course: Course) -> tuple[Laurent, ...]:
+def _step(course: Course) -> State:
     """Return what a step from the polynomial at time t is off by."""
     t = course.names["t"]
     return _less(course.step(course.state(t), t), course.state(t + course.dt))
 
 
-def _less(state: tuple[Any, ...], exact: tuple[Any, ...]) -> tuple[Laurent, ...]:
+def _less(state: State, exact: State) -> State:
     return tuple(a - b for a, b in zip(state, exact, strict=True))
 
 
-def _is_off(state: tuple[Laurent, ...]) -> bool:
+def _is_off(state: State) -> bool:
     return any(x.leading is not None for x in state)
 
 
-def _residual(course: Course, off: Off) -> Residual | None:
+def _residual(course: Course, off: Callable[[Course], State]) -> Residual | None:
     """Return the first term of the first number of a state that is off; its power from a point, the rest in symbols."""
+    from sympy import factor
+
     for index, number in enumerate(off(course)):
         # terms that are no rounding of a scheme's coefficients
         powers = (
@@ -160,14 +150,9 @@ def _residual(course: Course, off: Off) -> Residual | None:
         if power is not None:
             known = power + 1 + (KNOWN - number.end)
             symbolic = with_symbols(course.stepper, course.model, course.degree, known)
-            return Residual(OF[min(index, 2)], power, _readable(off(symbolic)[index].at(power)))
+            coefficient = factor(off(symbolic)[index].at(power).as_expr())
+            return Residual(OF[min(index, 2)], power, coefficient)
     return None
-
-
-def _readable(element: Any) -> Any:
-    from sympy import factor
-
-    return factor(element.as_expr())
 
 
 def fitted_force(stepper: Stepper, model: Model, degree: int) -> Any:
@@ -175,15 +160,7 @@ def fitted_force(stepper: Stepper, model: Model, degree: int) -> Any:
 
     Of centred differences with quadratic damping by the geometric mean and degree 2 it is ``-b c_2^2 dt^2/m``: the
     force F^n is reduced by ``b c_2^2 dt^2`` for n >= 1, and F^0 stays (`errata`, 8.5).
-
-    Returns
-    -------
-    An expression of SymPy in dt and the symbols of `Residual`.
-
-    Raises
-    ------
-    ValueError
-        Where no such force does it.
+    An expression of SymPy in dt and the symbols of `Residual`; ValueError where no such force does it.
     """
     from sympy import Symbol
 

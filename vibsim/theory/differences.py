@@ -1,9 +1,7 @@
 r"""The finite difference operators of the vibration text on a mesh of equal steps.
 
-- ``[D_t D_t u]^n = (u^(n+1) - 2 u^n + u^(n-1))/dt^2`` (B, equation (4)),
-- ``[D_2t u]^n = (u^(n+1) - u^(n-1))/(2 dt)``,
-- ``[D_t^+ u]^n = (u^(n+1) - u^n)/dt`` and ``[D_t^- u]^n = (u^n - u^(n-1))/dt``,
-- the mean ``(u^n + u^(n+1))/2``.
+``[D_t D_t u]^n = (u^(n+1) - 2 u^n + u^(n-1))/dt^2`` (B, equation (4)), ``[D_2t u]^n = (u^(n+1) - u^(n-1))/(2 dt)``,
+``[D_t^+ u]^n = (u^(n+1) - u^n)/dt``, ``[D_t^- u]^n = (u^n - u^(n-1))/dt``, and the mean ``(u^n + u^(n+1))/2``.
 
 Every array has the time along its last axis. A result has values only where the operator has all its points: of n
 values, n - 2 from the centred ones, n - 1 from the others. So ``D_t^+ D_t^- u`` and ``D_t^- D_t^+ u`` are plain
@@ -35,14 +33,11 @@ def centred_difference(u: ArrayLike, dt: Any) -> Floats:
 
 
 def forward_difference(u: ArrayLike, dt: Any) -> Floats:
-    """Return ``[D_t^+ u]^n`` at the points 0, ..., n - 2."""
-    values = np.asarray(u, dtype=float)
-    return np.asarray((values[..., 1:] - values[..., :-1]) / dt)
+    """Return ``[D_t^+ u]^n`` at the points 0, ..., n - 2; the same numbers, one point later, are ``[D_t^- u]^n``."""
+    return np.asarray(np.diff(np.asarray(u, dtype=float)) / dt)
 
 
-def backward_difference(u: ArrayLike, dt: Any) -> Floats:
-    """Return ``[D_t^- u]^n`` at the points 1, ..., n - 1: the numbers of `forward_difference`, one point later."""
-    return forward_difference(u, dt)
+backward_difference = forward_difference
 
 
 def mean(u: ArrayLike) -> Floats:

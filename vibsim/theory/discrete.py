@@ -46,20 +46,10 @@ def discrete(
 ) -> tuple[Floats, Floats]:
     """Return position and velocity at step n of the exact discrete solution, every number rounded once.
 
-    Parameters
-    ----------
-    w, dt, u_0, v_0
-        Frequency, step and initial values; numbers, or arrays of shape (case,).
-    n
-        Whole numbers from 0; a number, or an array of shape (k,).
-    steps
-        Number of steps of the run, at whose end the velocity is that of `Stepper.end`; None: no run ends.
-
-    Returns
-    -------
-    u, v
-        Shape (case, k) without the axes of what was given as a number. The velocity is the scheme's own, at n = 0 the
-        initial one. What is too large for a float is infinite.
+    Frequency, step and initial values are numbers, or arrays of shape (case,); n, from 0, is a whole number or an array
+    of shape (k,); a run ends at `steps`, with the velocity of `Stepper.end`, or never (None). The shape is (case, k)
+    without the axes of what was given as a number. The velocity is the scheme's own, at n = 0 the initial one. What is
+    too large for a float is infinite.
     """
     members = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (w, dt, u_0, v_0)))
     flat = np.atleast_1d(np.asarray(n, dtype=np.int64))

@@ -130,13 +130,7 @@ class Laurent(Arithmetic):
         return self * Laurent(self.field, -power, inverse)
 
     def __pow__(self, exponent: int | Fraction) -> Laurent:
-        """Return a power, whole or of a series that begins with 1, by Miller's recurrence.
-
-        Raises
-        ------
-        ValueError
-            Where the power is not whole, and the series begins with something else.
-        """
+        """Return a whole power, or any one of a series that begins with 1 (else ValueError), by Miller's recurrence."""
         if exponent >= 0 and exponent == int(exponent):
             return math.prod([self] * int(exponent), start=self.lift(1.0))
         domain = self.field.domain
@@ -175,10 +169,7 @@ class Laurent(Arithmetic):
 def coefficients(stepper: Stepper) -> tuple[Any, Mapping[str, Any]]:
     """Return the least domain with all coefficients of a scheme, and the element of it that each formula is.
 
-    Raises
-    ------
-    ValueError
-        Where a coefficient is not algebraic.
+    ValueError where a coefficient is not algebraic.
     """
     from sympy import QQ, Pow, Rational
 

@@ -117,15 +117,7 @@ class Mode:
 
 @lru_cache(maxsize=1024)
 def principal_mode(stepper: Stepper, damping: float) -> Mode:
-    """Return the principal mode of a scheme.
-
-    Parameters
-    ----------
-    stepper
-        The arithmetic of the scheme on a model with or without linear damping (`Scheme.stepper_for`).
-    damping
-        ``g = c/w``, the damping rate over the frequency; below 2, so that the motion oscillates.
-    """
+    """Return the principal mode of the arithmetic of a scheme on a linear model (`Scheme.stepper_for`), g below 2."""
     step = principal(stepper, damping, KNOWN)
     square, decay = step.square, step.determinant**-HALF
     cosine = step.trace * HALF * decay
@@ -171,14 +163,8 @@ def part_orders(
 ) -> tuple[Floats, Floats]:
     """Return the orders of phase and amplitude; infinite where a part is exact, NaN where nothing oscillates.
 
-    Parameters
-    ----------
-    stepper
-        The arithmetic of the scheme on a linear model without forces in time (`Scheme.stepper_for`).
-    damping
-        The damping rate over the frequency, ``c/w``.
-    u, v
-        Initial position, measured from rest, and initial velocity over w, in the same unit; of any one shape.
+    The stepper is that on a linear model without forces in time (`Scheme.stepper_for`), the damping ``c/w``; u and v
+    are the initial position, measured from rest, and the initial velocity over w, in the same unit, of any one shape.
     """
     start = np.stack(np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (u, v))))
     with np.errstate(all="ignore"):

@@ -12,7 +12,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import StrEnum
 from fractions import Fraction
 from functools import cache
 from math import perm
@@ -32,6 +32,7 @@ from vibsim.formula import (
     over,
     plus,
     times,
+    walk,
 )
 from vibsim.models.base import Model, tree
 from vibsim.schemes.base import Stepper, handed
@@ -71,17 +72,17 @@ def restoring(model: Model) -> Expression:
 
 def is_rational(node: Expression) -> bool:
     """Tell whether a formula has ``+ - * /``, whole powers and absolute values only."""
-    match node:
-        case Number() | Name():
-            return True
-        case Negate(operand) | Call("abs", (operand,)):
-            return is_rational(operand)
-        case Binary("**", base, exponent):
-            power = literal(exponent)
-            return power is not None and power >= 0.0 and power.is_integer() and is_rational(base)
-        case Binary(_, left, right):
-            return is_rational(left) and is_rational(right)
-    return False
+
+    def is_known(part: Expression) -> bool:
+        match part:
+            case Binary("**", _, exponent):
+                power = literal(exponent)
+                return power is not None and power >= 0.0 and power.is_integer()
+            case Number() | Name() | Negate() | Binary("+" | "-" | "*" | "/") | Call("abs"):
+                return True
+        return False
+
+    return all(is_known(part) for part in walk(node))
 
 
 @cache
@@ -101,13 +102,13 @@ def _names(model: Model, degree: int) -> tuple[str, ...]:
     return ("t", *of_solution, *own, _symbol(model, _FREQUENCY, 0))
 
 
-class Forces(IntEnum):
-    """Which forces of a model act beside the one that makes the polynomial a solution."""
+class Forces(StrEnum):
+    """Which forces of a model act beside the one for the polynomial, and what is at fault for a residual with them."""
 
-    NONE = 0
-    AT_REST = 1
+    NONE = "differences"
+    AT_REST = "force"
     """Those on a body at rest: all but damping."""
-    ALL = 2
+    ALL = "damping"
 
 
 @dataclass(frozen=True, eq=False)

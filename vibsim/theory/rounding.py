@@ -87,14 +87,7 @@ def rounding_bound(
 ) -> tuple[Floats, Floats]:
     """Return bounds of ``|computed - discrete|`` for position and velocity over a run of `steps` steps.
 
-    Parameters
-    ----------
-    w, dt, u_0, v_0
-        As `vibsim.theory.discrete.discrete` takes them.
-
-    Returns
-    -------
-    Shape (case,), or numbers where all were numbers; infinite where the solution overflows.
+    Of shape (case,), or numbers where all were numbers (as of `discrete`); infinite where the solution overflows.
     """
     members = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (w, dt, u_0, v_0)))
     shape = members[0].shape

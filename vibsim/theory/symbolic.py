@@ -71,11 +71,7 @@ def solution(stepper: Stepper) -> Any:
     """Return ``u^n`` for ``u(0) = I``, ``u'(0) = V``, of a scheme that has two roots and no parasitic one.
 
     ``u^n = r^n (u^0 cos(n th) + (u^1/r - u^0 cos th) sin(n th)/sin th)``, r the growth per step and th = w~ dt.
-
-    Raises
-    ------
-    ValueError
-        Where the scheme has parasitic roots, or a start that is no step.
+    ValueError where the scheme has parasitic roots, or a start that is no step.
     """
     from sympy import acos, cos, sin, sqrt
 
@@ -93,23 +89,6 @@ def solution(stepper: Stepper) -> Any:
     return r**n * (
         begin * cos(n * angle) + (one / r - begin * cos(angle)) * sin(n * angle) / sin(angle)
     )
-
-
-def error_fraction() -> Any:
-    """Return ``E = [D_t D_t u]^n/u''(t_n)`` of ``u = exp(i w t)``, worked out from the difference (B, exercise 7)."""
-    from sympy import I, exp, simplify, sin
-
-    p = symbol("p")
-    fraction = (exp(I * p) - 2 + exp(-I * p)) / -(p**2)
-    wanted = (2 / p) ** 2 * sin(p / 2) ** 2
-    if simplify((fraction - wanted).rewrite(exp)) != 0:
-        raise ArithmeticError(f"{fraction} is not {wanted}")
-    return wanted
-
-
-def taylor(expression: Any, degree: int) -> Any:
-    """Return the Taylor polynomial in p of an expression, up to a degree."""
-    return expression.series(symbol("p"), 0, degree + 1).removeO()
 
 
 @lru_cache(maxsize=64)
