@@ -20,8 +20,7 @@ from vibsim.experiment.schema.fields import TABLE, FrozenDict, Section
 from vibsim.experiment.schema.sweep import Axis
 from vibsim.experiment.sweep_columns import columns
 from vibsim.experiment.tables.file import TableError, read
-from vibsim.formula import Expression, derivative, parse, put, size, values
-from vibsim.formula.jumps import first_jump
+from vibsim.formula import Expression, derivative, first_jump, parse, put, size, values
 from vibsim.models import FormulaField, Model, natural_end, tree
 from vibsim.models.table import Table
 

@@ -1,7 +1,7 @@
 """The forces of a model on one side of each of their corners, for the reference
 (`vibsim.simulation.reference.piecewise_collocation`).
 
-Formulas are evaluated by numpy with the modes of their switches held (`vibsim.formula.switches`). The points of a
+Formulas are evaluated by numpy with the modes of their switches held (`vibsim.formula.jumps`). The points of a
 table are one more switch, whose mode is the number of the point before the present place.
 """
 
