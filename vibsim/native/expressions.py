@@ -171,15 +171,12 @@ class Expressions:
             pair = [words_of(self.turned(self.value(part), kind)) for part in (body, orelse)]
             words = [self.builder.select(bit, a, b) for a, b in zip(*pair, strict=True)]
             return value_of(kind, iter(words))
-        then, otherwise, end = self.blocks("then", "otherwise", "chosen")
-        self.builder.cbranch(bit, then, otherwise)
         ways: list[tuple[list[ir.Value], ir.Block]] = []
-        for block, part in ((then, body), (otherwise, orelse)):
-            self.builder.position_at_end(block)
-            found = words_of(self.turned(self.value(part), kind))
-            ways.append((found, self.builder.block))
-            self.builder.branch(end)
-        self.builder.position_at_end(end)
+        with self.builder.if_else(bit) as branches:
+            for branch, part in zip(branches, (body, orelse), strict=True):
+                with branch:
+                    found = words_of(self.turned(self.value(part), kind))
+                    ways.append((found, self.builder.block))
         columns = zip(*[found for found, _ in ways], strict=True)
         blocks = [block for _, block in ways]
         words = [self._merged(list(zip(column, blocks, strict=True))) for column in columns]
