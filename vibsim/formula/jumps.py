@@ -83,35 +83,6 @@ class Pulses:
         )
 
 
-@dataclass(frozen=True)
-class _Gaps:
-    """Gaps between successive times, flat over members; arrays of shape (gap,)."""
-
-    formula: Expression
-    numbers: Mapping[str, Floats]
-    case: Integers
-    begin: Floats
-    end: Floats
-    low: Floats
-    """The least value that is no pulse."""
-    high: Floats
-
-    def of(self, which: Integers) -> Mapping[str, Floats]:
-        """Return the numbers of some gaps."""
-        return {name: x[which] for name, x in self.numbers.items()}
-
-    def excess(self, which: Integers, t: Floats) -> Floats:
-        """Return how far values at times in some gaps are from being none of a pulse; 0 or less where they are none."""
-        value = np.broadcast_to(values(self.formula, {**self.of(which), "t": t}), t.shape)
-        return np.maximum(self.low[which] - value, value - self.high[which])
-
-    def largest_excess(self, which: Integers, begin: Floats, end: Floats) -> Floats:
-        """Return how large that may be between two times."""
-        low, high = bounds(self.formula, {**self.of(which), "t": (begin, end)})
-        found = np.maximum(self.low[which] - low, high - self.high[which])
-        return np.broadcast_to(found, begin.shape)
-
-
 def hidden_pulses(formula: Expression, numbers: Mapping[str, Floats], t: Floats) -> Pulses:
     """Find a pulse of every member between the times at which it is looked at.
 
@@ -128,58 +99,61 @@ def hidden_pulses(formula: Expression, numbers: Mapping[str, Floats], t: Floats)
     time, width = np.full(cases, np.nan), np.full(cases, np.nan)
     if "t" not in names_in(formula) or count < 1:
         return Pulses(time, width)
+    # gaps between successive times, flat over members
+    flat = {name: np.broadcast_to(x, (cases, count)).ravel() for name, x in numbers.items()}
+    case = np.repeat(np.arange(cases), count)
+    begin, end = t[:, :-1].ravel(), t[:, 1:].ravel()
+
+    def excess(row: Integers, at: Floats) -> Floats:
+        """Return how far values at times in some gaps are from being none of a pulse; 0 or less where they are none."""
+        own = {name: x[row] for name, x in flat.items()}
+        value = np.broadcast_to(values(formula, {**own, "t": at}), at.shape)
+        return np.maximum(low[row] - value, value - high[row])
+
+    def width_of(row: Integers, at: Floats) -> float:
+        """Return the time over which the pulse around a time has half its height or more, to a factor of 2."""
+        reach = float(end[row][0] - begin[row][0]) * 0.5 ** np.arange(HALVINGS)
+        rows, least = np.broadcast_to(row, reach.shape), HALF * excess(row, at)[0]
+        sides = (excess(rows, at + side * reach) >= least for side in (-1.0, 1.0))
+        return sum(float(reach[np.argmax(high)]) if high.any() else 0.0 for high in sides)
+
     with np.errstate(all="ignore"):
-        gaps = _gaps(formula, numbers, t)
-        row = np.flatnonzero(np.isfinite(gaps.low + gaps.high + gaps.end))
-        a, b = gaps.begin[row], gaps.end[row]
+        low, high = _limits(formula, numbers, t)
+        row = np.flatnonzero(np.isfinite(low + high + end))
+        a, b = begin[row], end[row]
         for _ in range(HALVINGS):
-            excess = gaps.largest_excess(row, a, b)
-            left = np.flatnonzero((excess > 0.0) & np.isnan(time[gaps.case[row]]))
+            own = {name: x[row] for name, x in flat.items()}
+            least, most = bounds(formula, {**own, "t": (a, b)})
+            largest = np.broadcast_to(np.maximum(low[row] - least, most - high[row]), a.shape)
+            left = np.flatnonzero((largest > 0.0) & np.isnan(time[case[row]]))
             if len(left) > MOST:
-                left = left[np.argsort(-excess[left], kind="stable")[:MOST]]
+                left = left[np.argsort(-largest[left], kind="stable")[:MOST]]
             row, a, b = row[left], a[left], b[left]
             if not len(row):
                 break
             middle = 0.5 * (a + b)
-            hits = np.flatnonzero(gaps.excess(row, middle) > 0.0)
+            hits = np.flatnonzero(excess(row, middle) > 0.0)
             # of several the first one in time stays
             for i in hits[np.argsort(-middle[hits], kind="stable")]:
-                time[gaps.case[row[i]]] = middle[i]
-                width[gaps.case[row[i]]] = _width(gaps, row[i : i + 1], middle[i : i + 1])
+                time[case[row[i]]] = middle[i]
+                width[case[row[i]]] = width_of(row[i : i + 1], middle[i : i + 1])
             row, a, b = np.tile(row, 2), np.append(a, middle), np.append(middle, b)
     return Pulses(time, width)
 
 
-def _gaps(formula: Expression, numbers: Mapping[str, Floats], t: Floats) -> _Gaps:
-    """Return the gaps with what the formula is around each."""
+def _limits(formula: Expression, numbers: Mapping[str, Floats], t: Floats) -> tuple[Floats, Floats]:
+    """Return the least and the largest value in every gap that are no pulse, flat over members."""
     count = t.shape[1] - 1
     around = np.arange(count)[:, None] + np.array([-1, 0, 1, 2])
     places = np.take(t, np.clip(around, 0, count), axis=1)
-    own = {name: np.broadcast_to(x, (len(t), count)) for name, x in numbers.items()}
-    with_places = {name: x[..., None] for name, x in own.items()}
-    seen = np.broadcast_to(values(formula, {**with_places, "t": places}), places.shape)
+    own = {name: np.broadcast_to(x, (len(t), count))[..., None] for name, x in numbers.items()}
+    seen = np.broadcast_to(values(formula, {**own, "t": places}), places.shape)
     # behind the last time of a member nothing is known
     seen = np.where(np.isfinite(places), seen, seen[..., 1:2])
     low, high = np.min(seen, axis=-1), np.max(seen, axis=-1)
     size = np.nanmax(np.abs(np.where(np.isfinite(seen), seen, np.nan)), axis=(1, 2), initial=0.0)
     room = BEYOND * (high - low) + LEAST * size[:, None]
-    case = np.broadcast_to(np.arange(len(t))[:, None], low.shape)
-    flat = {name: x.ravel() for name, x in own.items()}
-    limits = (low - room).ravel(), (high + room).ravel()
-    return _Gaps(formula, flat, case.ravel(), t[:, :-1].ravel(), t[:, 1:].ravel(), *limits)
-
-
-def _width(gaps: _Gaps, which: Integers, t: Floats) -> float:
-    """Return the time over which the pulse around a time has half its height or more, to a factor of 2."""
-    height = gaps.excess(which, t)[0]
-    length = float(gaps.end[which][0] - gaps.begin[which][0])
-    reach = length * 0.5 ** np.arange(HALVINGS)
-    found = 0.0
-    for side in (-1.0, 1.0):
-        rows = np.broadcast_to(which, reach.shape)
-        high = gaps.excess(rows, t + side * reach) >= HALF * height
-        found += float(reach[np.argmax(high)]) if high.any() else 0.0
-    return found
+    return (low - room).ravel(), (high + room).ravel()
 
 
 def first_jump(formula: Expression, numbers: Mapping[str, float], end: float) -> float | None:
