@@ -116,7 +116,10 @@ class Expressions:
             case ast.Tuple(elts=parts):
                 return tuple([self.value(part) for part in parts])
             case ast.BinOp(left=left, op=op, right=right):
-                return self._binary(node, op, self.value(left), self.value(right))
+                one, other = self.value(left), self.value(right)
+                kind = operations.kind_of_binary(node, op, kind_of(one), kind_of(other))
+                numbers = cast(Number, one), cast(Number, other)
+                return Number(kind, operations.binary(self.builder, op, kind, *numbers))
             case ast.UnaryOp(op=ast.Not(), operand=operand):
                 return Number(TRUTH, self.builder.not_(self.truth(operand)))
             case ast.UnaryOp(operand=operand):
@@ -140,13 +143,6 @@ class Expressions:
             case ast.Call(func=func, args=arguments):
                 return self._call(node, func, [self.value(value) for value in arguments])
         raise refusal(node, "this cannot be compiled")
-
-    def _binary(self, node: ast.expr, op: ast.operator, left: Value, right: Value) -> Value:
-        if isinstance(left, tuple) and isinstance(right, tuple):
-            return left + right
-        kind = cast(str, operations.kind_of_binary(node, op, kind_of(left), kind_of(right)))
-        numbers = cast(Number, left), cast(Number, right)
-        return Number(kind, operations.binary(self.builder, op, kind, *numbers))
 
     def _bool(self, node: ast.BoolOp) -> Value:
         """Work out ``and`` or ``or``: what stands behind is worked out only where it decides."""

@@ -88,8 +88,6 @@ class _Statements(Expressions):
         super().__init__(call, inference, function)
         self.ends: list[ir.Block] = []
         """Where ``break`` goes, innermost last."""
-        self.repeats: list[ir.Block] = []
-        """Where ``continue`` goes."""
 
     def write(self) -> None:
         """Write the whole function."""
@@ -123,8 +121,6 @@ class _Statements(Expressions):
                 self._while(test, body)
             case ast.Break():
                 self.builder.branch(self.ends[-1])
-            case ast.Continue():
-                self.builder.branch(self.repeats[-1])
             case ast.Expr(value=value):
                 self.value(value)
             case ast.Pass():
@@ -227,9 +223,7 @@ class _Statements(Expressions):
 
     def _loop(self, body: Sequence[ast.stmt], repeat: ir.Block, end: ir.Block) -> None:
         self.ends.append(end)
-        self.repeats.append(repeat)
         self._block(body)
         if not self.builder.block.is_terminated:
             self.builder.branch(repeat)
         self.ends.pop()
-        self.repeats.pop()
