@@ -13,8 +13,17 @@ import pytest
 
 from vibsim.elementary import ELEMENTARY, primitives
 from vibsim.engine import text as kernel_text
-from vibsim.formula import FUNCTIONS, Call, evaluate, integral, parse, to_statements, values, walk
-from vibsim.formula.integral import has_rule
+from vibsim.formula import (
+    FUNCTIONS,
+    Call,
+    evaluate,
+    has_rule,
+    integral,
+    parse,
+    to_statements,
+    values,
+    walk,
+)
 from vibsim.native.linking import link
 from vibsim.native.machine import machine_code
 

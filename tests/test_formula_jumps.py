@@ -6,8 +6,7 @@ import math
 
 import pytest
 
-from vibsim.formula import parse
-from vibsim.formula.jumps import first_jump
+from vibsim.formula import first_jump, parse
 
 END = 4.0
 

@@ -23,12 +23,12 @@ from vibsim.formula import (
     Negate,
     Number,
     evaluate,
+    has_rule,
     integral,
     parse,
     to_formula,
     values,
 )
-from vibsim.formula.integral import has_rule
 
 NAMES = ("u", "k", "e", "pi", "t_0")
 _LEAVES = st.one_of(

@@ -85,7 +85,7 @@ f[0, 0] = math.sqrt(abs(x))
 f[0, 1] = math.copysign(x, y)
 """,
     "whole numbers": """
-w[0] = i + 3 * j - (i & 12) + (j | 3) - (i ^ j)
+w[0] = i + 3 * j - (i & 12) + (j | 3)
 w[1] = i >> 3
 w[2] = (i & 7) << 4
 """,
@@ -157,11 +157,9 @@ for k in range(5):
     k = 100
 w[0] = s + k
 """,
-    "break and continue": """
+    "break": """
 s = 0
 for k in range(10):
-    if k == 3:
-        continue
     if k > 6:
         break
     s += k
@@ -180,7 +178,7 @@ a, (b, c) = (x, (y, i))
 a, b = (b, a)
 f[0, 0] = a
 f[0, 1] = b
-t = (a, b) + (c,)
+t = (a, b, c)
 f[0, 2] = t[2]
 f[0, 3] = t[-2]
 """,
@@ -228,7 +226,7 @@ else:
 w[0] = int(x > y)
 f[0, 0] = float(i)
 f[0, 1] = float(x > y)
-f[0, 2] = bool(i) + bool(x)
+f[0, 2] = (not i) + (not x)
 """,
 }
 

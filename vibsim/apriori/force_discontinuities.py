@@ -5,7 +5,7 @@ jump lies: another place at each level. So no order above k + 1 is regular, wher
 for a jump of the force, 2 for ``abs(u)``, 3 for quadratic damping ``abs(v) v`` where the velocity vanishes. At a grid
 point only a jump of the force matters: of its two values a step that begins there and one that ends there take the
 same. Switches
-(`vibsim.formula.switches`) are followed along the samples of the finest level; k is read off the difference of the
+(`vibsim.formula.jumps`) are followed along the samples of the finest level; k is read off the difference of the
 two formulas on either side.
 """
 

@@ -31,12 +31,20 @@ from vibsim.elementary.exact import (
     sqrt,
     where,
 )
-from vibsim.elementary.exponential import exp, expm1
+from vibsim.elementary.exponential import (
+    cbrt,
+    exp,
+    expm1,
+    hypot,
+    log,
+    log1p,
+    log2,
+    log10,
+    power,
+    power_fast,
+)
 from vibsim.elementary.hyperbolic import acosh, asinh, atanh, cosh, sinh, tanh
 from vibsim.elementary.inverse import acos, asin, atan, atan2, atan2_fast
-from vibsim.elementary.logarithm import log, log1p, log2, log10
-from vibsim.elementary.power import power, power_fast
-from vibsim.elementary.root import cbrt, hypot
 
 __all__ = ["ELEMENTARY", "Elementary"]
 

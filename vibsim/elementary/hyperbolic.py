@@ -24,8 +24,7 @@ from vibsim.elementary.doubled import (
     two_product,
     two_sum,
 )
-from vibsim.elementary.exponential import exp_parts, scaled
-from vibsim.elementary.logarithm import halves, log_from, log_of_sum
+from vibsim.elementary.exponential import exp_parts, halves, log_from, log_of_sum, scaled
 from vibsim.elementary.primitives import two_to
 
 _H3, _H5, _H7, _H9, _H11, _H13, _H15 = (

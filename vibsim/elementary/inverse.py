@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import math
 
+from vibsim.elementary.circular import HALF_PI, HALF_PI_REST
 from vibsim.elementary.doubled import fast_two_sum, root_parts, two_product, two_sum
-from vibsim.elementary.reduction import HALF_PI, HALF_PI_REST
 
 _PI = 2.0 * HALF_PI
 _PI_REST = 2.0 * HALF_PI_REST

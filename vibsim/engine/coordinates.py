@@ -57,10 +57,7 @@ def collect_system(
     returns
         What it has to return, so that a number may stand for a vector of equal components.
 
-    Raises
-    ------
-    SimulationError
-        Where its text has no meaning for vectors.
+    Raises `SimulationError` where its text has no meaning for vectors.
     """
     tree = definition(function, name)
     arguments = [row.arg for row in tree.args.args if row.arg not in HANDED]
@@ -76,10 +73,7 @@ def collect_system(
 def put_scheme(module: Module, stepper: Stepper, count: int) -> None:
     """Write start, step and velocities of a scheme for `count` coordinates, and what is gathered of each.
 
-    Raises
-    ------
-    SimulationError
-        Where a function of the scheme has no meaning for vectors.
+    Raises `SimulationError` where a function of the scheme has no meaning for vectors.
     """
     state: Kind = NUMBER
     if stepper.whole:

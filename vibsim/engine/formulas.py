@@ -12,6 +12,7 @@ from vibsim.core.errors import SimulationError
 from vibsim.elementary import ELEMENTARY
 from vibsim.engine.text import Module, collect
 from vibsim.formula import Binary, Call, Compare, Expression, Name, Number
+from vibsim.formula.algebra import filled
 from vibsim.models import Model
 from vibsim.models.base import Formula, parameter_names, tree
 from vibsim.models.events import Friction, Impact
@@ -94,22 +95,13 @@ def put_formulas(
             "_dissipation": put(model.dissipation or "0.0"),
             "_driving": put(model.driving or "0.0"),
         }
-    is_rare = is_rare or _calls(formulas) > MOST_INLINE
+    trees = (formula for results in formulas.values() for formula in results.values())
+    nodes = (node for formula in trees for node in expression.walk(formula))
+    is_rare = is_rare or sum(isinstance(node, Call) for node in nodes) > MOST_INLINE
     is_scaled = stepper.scaling is not None
     scaled = ("acceleration", "slopes") if is_scaled else ()
     put_functions(module, model, suffix, formulas, is_rare=is_rare, scaled=scaled)
     put_parameters(module, model, 2 if is_scaled else 0, tabulated=stepper.tabulated)
-
-
-def _calls(formulas: Mapping[str, Mapping[str, Expression]]) -> int:
-    """Return how many calls of functions some formulas have."""
-    nodes = (
-        node
-        for part in formulas.values()
-        for each in part.values()
-        for node in expression.walk(each)
-    )
-    return sum(isinstance(node, Call) for node in nodes)
 
 
 def put_energy_with(module: Module, model: Model) -> None:
@@ -241,14 +233,16 @@ def _with_functions(module: Module, formula: Expression, suffix: str, is_rare: b
 
     def bind(node: Expression) -> Expression:
         match node:
-            case Binary("**", base, exponent) if not _is_whole(exponent):
-                return bind(Call("power", (base, exponent)))
-            case Compare(_, left, right) if suffix:
-                # a comparison would hide the NaN of a fast function out of its range
-                return Binary("+", node, _nothing(Binary("+", _nothing(left), _nothing(right))))
+            case Binary("**", base, exponent):
+                value = expression.literal(exponent)
+                is_whole = value is not None and value.is_integer()
+                return node if is_whole else bind(Call("power", (base, exponent)))
+            case Compare(_, x, y) if suffix:
+                # what is 0, or NaN where x or y is: a comparison would hide that of a fast function out of its range
+                return filled("node + ((x - x + (y - y)) - (x - x + (y - y)))", node=node, x=x, y=y)
             case Compare():
                 # as a number: a truth value knows no -0, which the fast text would give
-                return Binary("*", Number(1.0), node)
+                return filled("1*node", node=node)
             case Call(function, arguments):
                 if function not in ELEMENTARY:
                     raise SimulationError(
@@ -262,13 +256,3 @@ def _with_functions(module: Module, formula: Expression, suffix: str, is_rare: b
                 return node
 
     return expression.rebuilt(formula, bind)
-
-
-def _is_whole(exponent: Expression) -> bool:
-    value = expression.literal(exponent)
-    return value is not None and value.is_integer()
-
-
-def _nothing(node: Expression) -> Expression:
-    """Return an expression that is 0, or NaN where `node` is not finite."""
-    return Binary("-", node, node)

@@ -26,10 +26,7 @@ def load(text: str, kinds: str) -> Kernel:
     kinds
         Kinds of its arguments (`vibsim.native.linking.link`).
 
-    Raises
-    ------
-    SimulationError
-        Where the text cannot be compiled.
+    Raises `SimulationError` where the text cannot be compiled.
     """
     # what only plans, analyses or draws needs no LLVM
     from vibsim.native.linking import identity, link

@@ -41,16 +41,21 @@ def stages(step: Callable[..., Any]) -> tuple[Stage, ...]:
     if len(parts) < 2:
         return ()
     arguments = [argument.arg for argument in tree.args.args]
-    unpacking = [line for line in parts[0] if _is_unpacking(line, arguments[0])]
+    unpacking = [line for line in parts[0] if _value_name(line) == arguments[0]]
     given = {*arguments, *_names(unpacking, ast.Store)}
+    head = f"def step({', '.join((*arguments[:4], 'kept', *arguments[4:]))}):\n    pass"
     found = []
     before: tuple[str, ...] = ()
     for i, part in enumerate(parts):
         later = _names((line for lines in parts[i + 1 :] for line in lines), ast.Load)
         known = {*before, *_names(part, ast.Store)} - given
         after = tuple(sorted(known & later))
-        body = [*(unpacking if i else ()), *_taken(before), *part, *_returned(after)]
-        found.append(Stage(_function(tree, body), before, after))
+        [function] = ast.parse(head).body
+        assert isinstance(function, ast.FunctionDef)
+        taken = ast.parse(f"({', '.join(before)},) = kept").body if before else []
+        returned = ast.parse(f"return ({', '.join(after)},)").body if after else []
+        function.body = [*(unpacking if i else ()), *taken, *part, *returned]
+        found.append(Stage(function, before, after))
         before = after
     return tuple(found)
 
@@ -65,28 +70,26 @@ def _parts(body: Sequence[ast.stmt]) -> list[list[ast.stmt]]:
     *lines, end = body
     straight = isinstance(end, ast.Return) and all(isinstance(line, ast.Assign) for line in lines)
     stored = [node.id for node in _nodes(lines) if isinstance(node.ctx, ast.Store)]
-    evaluations = [line for line in lines if _is_evaluation(line)]
+    evaluations = [line for line in lines if _value_name(line) == f"{FORCE}()"]
     mentions = [node for node in _nodes(body) if node.id == FORCE]
     if not straight or len(set(stored)) < len(stored) or len(mentions) > len(evaluations):
         return [list(body)]
     parts: list[list[ast.stmt]] = [[]]
     for line in body:
         parts[-1].append(line)
-        if _is_evaluation(line) and line is not evaluations[-1]:
+        if line in evaluations[:-1]:
             parts.append([])
     return parts
 
 
-def _is_evaluation(line: ast.stmt) -> bool:
-    value = line.value if isinstance(line, ast.Assign) else None
-    return (
-        isinstance(value, ast.Call) and isinstance(value.func, ast.Name) and value.func.id == FORCE
-    )
-
-
-def _is_unpacking(line: ast.stmt, state: str) -> bool:
-    value = line.value if isinstance(line, ast.Assign) else None
-    return isinstance(value, ast.Name) and value.id == state
+def _value_name(line: ast.stmt) -> str:
+    """Return the name whose value a line assigns, with parentheses where it is called; else nothing."""
+    match line:
+        case ast.Assign(value=ast.Name(id=name)):
+            return name
+        case ast.Assign(value=ast.Call(func=ast.Name(id=name))):
+            return f"{name}()"
+    return ""
 
 
 def _nodes(lines: Iterable[ast.stmt]) -> list[ast.Name]:
@@ -95,24 +98,3 @@ def _nodes(lines: Iterable[ast.stmt]) -> list[ast.Name]:
 
 def _names(lines: Iterable[ast.stmt], context: type[ast.expr_context]) -> set[str]:
     return {node.id for node in _nodes(lines) if isinstance(node.ctx, context)}
-
-
-def _taken(names: Sequence[str]) -> list[ast.stmt]:
-    return ast.parse(f"({', '.join(names)},) = kept").body if names else []
-
-
-def _returned(names: Sequence[str]) -> list[ast.stmt]:
-    return ast.parse(f"return ({', '.join(names)},)").body if names else []
-
-
-def _function(step: ast.FunctionDef, body: list[ast.stmt]) -> ast.FunctionDef:
-    """Return a function with the arguments of a step and `kept` behind the four that every one has."""
-    arguments = ast.arguments(
-        posonlyargs=[],
-        args=[*step.args.args[:4], ast.arg("kept"), *step.args.args[4:]],
-        kwonlyargs=[],
-        kw_defaults=[],
-        defaults=[],
-    )
-    tree = ast.FunctionDef(step.name, arguments, body, [], lineno=1)
-    return ast.fix_missing_locations(tree)

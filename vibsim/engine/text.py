@@ -39,10 +39,7 @@ class Module:
     def put(self, name: str, text: str) -> None:
         """Add a part.
 
-        Raises
-        ------
-        SimulationError
-            Where the name stands for something else already.
+        Raises `SimulationError` where the name stands for something else already.
         """
         if self.parts.setdefault(name, text) != text:
             raise SimulationError(f"{name} means two things in one kernel")
@@ -70,10 +67,7 @@ def collect(
     is_called
         Whether it is compiled for itself (`vibsim.engine.kernel_stubs.called`).
 
-    Raises
-    ------
-    SimulationError
-        Where it uses something that cannot enter a kernel.
+    Raises `SimulationError` where it uses something that cannot enter a kernel.
     """
     enter(module, function, definition(function, name), name, renamed, is_called=is_called)
 
@@ -81,10 +75,7 @@ def collect(
 def definition(function: Callable[..., Any], name: str) -> ast.FunctionDef:
     """Return the parsed text of a function that is to stand under `name`.
 
-    Raises
-    ------
-    SimulationError
-        Where it is no plain function, so that it cannot enter a kernel.
+    Raises `SimulationError` where it is no plain function, so that it cannot enter a kernel.
     """
     if not isinstance(function, types.FunctionType):
         raise SimulationError(f"{name} is no plain Python function, so it cannot enter a kernel")
@@ -111,7 +102,21 @@ def enter(
     mark = _mark(module, function, tree, is_called)
     names = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id not in local]
     for other in sorted({node.id for node in names} & function.__globals__.keys()):
-        _collect_used(module, name, other, function.__globals__[other], renamed)
+        value, new = function.__globals__[other], renamed.get(other, other)
+        if other in module.given:
+            continue
+        if other in module.settings:
+            module.put(other, f"{other} = {module.settings[other]!r}")
+        elif isinstance(value, types.FunctionType):
+            # what is there already was bound by whoever makes the kernel
+            if new not in module.parts:
+                collect(module, value, new, renamed)
+        elif _is_constant(value):
+            module.put(other, f"{other} = {value!r}")
+        elif value is not math:
+            raise SimulationError(
+                f"{name} uses {other}, which is no number, tuple of numbers or plain function"
+            )
     for node in names:
         node.id = renamed.get(node.id, node.id)
     module.put(name, f"@{mark}\n{ast.unparse(tree)}")
@@ -131,25 +136,6 @@ def _mark(
     has_loop = any(isinstance(node, ast.For | ast.While) for node in ast.walk(tree))
     is_elementary = function.__module__.startswith("vibsim.elementary")
     return "called" if is_marked or (has_loop and is_elementary) else "compiled"
-
-
-def _collect_used(
-    module: Module, user: str, name: str, value: object, renamed: Mapping[str, str]
-) -> None:
-    """Write what a function uses under `name`, unless it is there, or bound by whoever makes the kernel."""
-    if name in module.given:
-        return
-    if name in module.settings:
-        module.put(name, f"{name} = {module.settings[name]!r}")
-    elif isinstance(value, types.FunctionType):
-        if renamed.get(name, name) not in module.parts:
-            collect(module, value, renamed.get(name, name), renamed)
-    elif _is_constant(value):
-        module.put(name, f"{name} = {value!r}")
-    elif value is not math:
-        raise SimulationError(
-            f"{user} uses {name}, which is no number, tuple of numbers or plain function"
-        )
 
 
 def _is_constant(value: object) -> bool:

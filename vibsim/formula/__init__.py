@@ -8,12 +8,10 @@ evaluated as Python.
 
 from vibsim.formula.algebra import is_multiple, is_zero, minus, over, plus, tidied, times
 from vibsim.formula.arrays import bounds, values
-from vibsim.formula.derivative import derivative
-from vibsim.formula.integral import integral
-from vibsim.formula.jumps import Pulses, hidden_pulses
+from vibsim.formula.calculus import derivative, has_rule, integral
+from vibsim.formula.jumps import Pulses, Switch, first_jump, held, hidden_pulses
 from vibsim.formula.parser import MAX_CHARACTERS, MAX_DEPTH, ExpressionError, parse
 from vibsim.formula.render import constant, evaluate, to_formula, to_statements
-from vibsim.formula.switches import Switch, held
 from vibsim.formula.tree import (
     CONSTANTS,
     FUNCTIONS,
@@ -37,7 +35,7 @@ from vibsim.formula.tree import (
 __all__ = [
     "CONSTANTS", "FUNCTIONS", "MAX_CHARACTERS", "MAX_DEPTH", "ONE", "ZERO", "Binary", "Call",
     "Compare", "Expression", "ExpressionError", "Name", "Negate", "Number", "Pulses", "Switch",
-    "bounds", "constant", "derivative", "evaluate", "held", "hidden_pulses", "integral",
+    "bounds", "constant", "derivative", "evaluate", "first_jump", "has_rule", "held", "hidden_pulses", "integral",
     "is_multiple", "is_zero", "literal", "minus", "names_in", "over", "parse", "plus", "put",
     "rebuilt", "size", "tidied", "times", "to_formula", "to_statements", "values", "walk",
 ]  # fmt: skip

@@ -69,10 +69,7 @@ def filled(text: str, **formulas: Expression) -> Expression:
 def tidied(node: Expression) -> Expression:
     """Return a formula without sums with 0, products with 0 and 1, and operations on numbers alone.
 
-    Raises
-    ------
-    ExpressionError
-        Where numbers alone have no value: 1/0.
+    Raises `ExpressionError` where numbers alone have no value: 1/0.
     """
     operations = {"+": plus, "-": minus, "*": times, "/": over}
 

@@ -1,4 +1,4 @@
-"""Where a formula jumps, and pulses that lie between the times at which it is looked at, so that no step knows of them.
+"""Where a formula has corners, jumps, and pulses between the times at which it is looked at, which no step knows of.
 
 A pulse is told from what steps see: between two times the formula leaves, by far, all values that it has at these and
 at those beside them. Bounds of the formula over intervals of time (`vibsim.formula.arrays`) say where that may
@@ -9,19 +9,38 @@ time [a, b] the difference D of ``f(b) - f(a)`` and the integral of f' vanishes 
 short enough. At a jump it stays what it is, however short the piece becomes. So pieces with a D are halved, on the side
 where more of it lies, until it has gone or nothing is left to halve. Where a pulse lies between the ends of a piece,
 the piece ends within it: its jumps would cancel.
+
+As *switches*: a function with a corner or a jump looks at a quantity: ``abs(x)`` at x, ``min(x, y)`` at x - y,
+``floor(x)`` at x, ``mod(x, y)`` at x/y. What it does with it follows from the *mode* of the quantity: the whole number
+below it where it is floored, and elsewhere 0 above 0 and -1 below it. With the modes held, the formula goes on as it
+was beyond the place where a mode changes: it is smooth there, if the functions in it are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from vibsim.core.array_types import Floats, Integers
+from vibsim.formula.algebra import filled, is_zero
 from vibsim.formula.arrays import bounds, values
-from vibsim.formula.derivative import derivative
-from vibsim.formula.tree import Call, Compare, Expression, names_in, walk
+from vibsim.formula.calculus import derivative
+from vibsim.formula.tree import (
+    STEPS,
+    Binary,
+    Call,
+    Compare,
+    Expression,
+    Name,
+    Negate,
+    Number,
+    children,
+    names_in,
+    rebuilt,
+    walk,
+)
 
 HALVINGS = 48
 MOST = 2**14
@@ -64,35 +83,6 @@ class Pulses:
         )
 
 
-@dataclass(frozen=True)
-class _Gaps:
-    """Gaps between successive times, flat over members; arrays of shape (gap,)."""
-
-    formula: Expression
-    numbers: Mapping[str, Floats]
-    case: Integers
-    begin: Floats
-    end: Floats
-    low: Floats
-    """The least value that is no pulse."""
-    high: Floats
-
-    def of(self, which: Integers) -> Mapping[str, Floats]:
-        """Return the numbers of some gaps."""
-        return {name: x[which] for name, x in self.numbers.items()}
-
-    def excess(self, which: Integers, t: Floats) -> Floats:
-        """Return how far values at times in some gaps are from being none of a pulse; 0 or less where they are none."""
-        value = np.broadcast_to(values(self.formula, {**self.of(which), "t": t}), t.shape)
-        return np.maximum(self.low[which] - value, value - self.high[which])
-
-    def largest_excess(self, which: Integers, begin: Floats, end: Floats) -> Floats:
-        """Return how large that may be between two times."""
-        low, high = bounds(self.formula, {**self.of(which), "t": (begin, end)})
-        found = np.maximum(self.low[which] - low, high - self.high[which])
-        return np.broadcast_to(found, begin.shape)
-
-
 def hidden_pulses(formula: Expression, numbers: Mapping[str, Floats], t: Floats) -> Pulses:
     """Find a pulse of every member between the times at which it is looked at.
 
@@ -109,58 +99,61 @@ def hidden_pulses(formula: Expression, numbers: Mapping[str, Floats], t: Floats)
     time, width = np.full(cases, np.nan), np.full(cases, np.nan)
     if "t" not in names_in(formula) or count < 1:
         return Pulses(time, width)
+    # gaps between successive times, flat over members
+    flat = {name: np.broadcast_to(x, (cases, count)).ravel() for name, x in numbers.items()}
+    case = np.repeat(np.arange(cases), count)
+    begin, end = t[:, :-1].ravel(), t[:, 1:].ravel()
+
+    def excess(row: Integers, at: Floats) -> Floats:
+        """Return how far values at times in some gaps are from being none of a pulse; 0 or less where they are none."""
+        own = {name: x[row] for name, x in flat.items()}
+        value = np.broadcast_to(values(formula, {**own, "t": at}), at.shape)
+        return np.maximum(low[row] - value, value - high[row])
+
+    def width_of(row: Integers, at: Floats) -> float:
+        """Return the time over which the pulse around a time has half its height or more, to a factor of 2."""
+        reach = float(end[row][0] - begin[row][0]) * 0.5 ** np.arange(HALVINGS)
+        rows, least = np.broadcast_to(row, reach.shape), HALF * excess(row, at)[0]
+        sides = (excess(rows, at + side * reach) >= least for side in (-1.0, 1.0))
+        return sum(float(reach[np.argmax(high)]) if high.any() else 0.0 for high in sides)
+
     with np.errstate(all="ignore"):
-        gaps = _gaps(formula, numbers, t)
-        row = np.flatnonzero(np.isfinite(gaps.low + gaps.high + gaps.end))
-        a, b = gaps.begin[row], gaps.end[row]
+        low, high = _limits(formula, numbers, t)
+        row = np.flatnonzero(np.isfinite(low + high + end))
+        a, b = begin[row], end[row]
         for _ in range(HALVINGS):
-            excess = gaps.largest_excess(row, a, b)
-            left = np.flatnonzero((excess > 0.0) & np.isnan(time[gaps.case[row]]))
+            own = {name: x[row] for name, x in flat.items()}
+            least, most = bounds(formula, {**own, "t": (a, b)})
+            largest = np.broadcast_to(np.maximum(low[row] - least, most - high[row]), a.shape)
+            left = np.flatnonzero((largest > 0.0) & np.isnan(time[case[row]]))
             if len(left) > MOST:
-                left = left[np.argsort(-excess[left], kind="stable")[:MOST]]
+                left = left[np.argsort(-largest[left], kind="stable")[:MOST]]
             row, a, b = row[left], a[left], b[left]
             if not len(row):
                 break
             middle = 0.5 * (a + b)
-            hits = np.flatnonzero(gaps.excess(row, middle) > 0.0)
+            hits = np.flatnonzero(excess(row, middle) > 0.0)
             # of several the first one in time stays
             for i in hits[np.argsort(-middle[hits], kind="stable")]:
-                time[gaps.case[row[i]]] = middle[i]
-                width[gaps.case[row[i]]] = _width(gaps, row[i : i + 1], middle[i : i + 1])
+                time[case[row[i]]] = middle[i]
+                width[case[row[i]]] = width_of(row[i : i + 1], middle[i : i + 1])
             row, a, b = np.tile(row, 2), np.append(a, middle), np.append(middle, b)
     return Pulses(time, width)
 
 
-def _gaps(formula: Expression, numbers: Mapping[str, Floats], t: Floats) -> _Gaps:
-    """Return the gaps with what the formula is around each."""
+def _limits(formula: Expression, numbers: Mapping[str, Floats], t: Floats) -> tuple[Floats, Floats]:
+    """Return the least and the largest value in every gap that are no pulse, flat over members."""
     count = t.shape[1] - 1
     around = np.arange(count)[:, None] + np.array([-1, 0, 1, 2])
     places = np.take(t, np.clip(around, 0, count), axis=1)
-    own = {name: np.broadcast_to(x, (len(t), count)) for name, x in numbers.items()}
-    with_places = {name: x[..., None] for name, x in own.items()}
-    seen = np.broadcast_to(values(formula, {**with_places, "t": places}), places.shape)
+    own = {name: np.broadcast_to(x, (len(t), count))[..., None] for name, x in numbers.items()}
+    seen = np.broadcast_to(values(formula, {**own, "t": places}), places.shape)
     # behind the last time of a member nothing is known
     seen = np.where(np.isfinite(places), seen, seen[..., 1:2])
     low, high = np.min(seen, axis=-1), np.max(seen, axis=-1)
     size = np.nanmax(np.abs(np.where(np.isfinite(seen), seen, np.nan)), axis=(1, 2), initial=0.0)
     room = BEYOND * (high - low) + LEAST * size[:, None]
-    case = np.broadcast_to(np.arange(len(t))[:, None], low.shape)
-    flat = {name: x.ravel() for name, x in own.items()}
-    limits = (low - room).ravel(), (high + room).ravel()
-    return _Gaps(formula, flat, case.ravel(), t[:, :-1].ravel(), t[:, 1:].ravel(), *limits)
-
-
-def _width(gaps: _Gaps, which: Integers, t: Floats) -> float:
-    """Return the time over which the pulse around a time has half its height or more, to a factor of 2."""
-    height = gaps.excess(which, t)[0]
-    length = float(gaps.end[which][0] - gaps.begin[which][0])
-    reach = length * 0.5 ** np.arange(HALVINGS)
-    found = 0.0
-    for side in (-1.0, 1.0):
-        rows = np.broadcast_to(which, reach.shape)
-        high = gaps.excess(rows, t + side * reach) >= HALF * height
-        found += float(reach[np.argmax(high)]) if high.any() else 0.0
-    return found
+    return (low - room).ravel(), (high + room).ravel()
 
 
 def first_jump(formula: Expression, numbers: Mapping[str, float], end: float) -> float | None:
@@ -216,3 +209,93 @@ def _with_pulses(formula: Expression, numbers: Mapping[str, float], edges: Float
         around = found.time[0] + found.width[0] * np.array([-1.0, 0.0, 1.0])
         edges = np.unique(np.append(edges, np.clip(around, edges[0], edges[-1])))
     return edges
+
+
+@dataclass(frozen=True)
+class Switch:
+    """A quantity at whose changes of mode a formula has a corner or a jump."""
+
+    quantity: Expression
+    """In the names of the formula and the modes of switches before this one."""
+    whole: bool
+    """Whether the mode changes at every whole number, not only at 0."""
+    mode: str
+    """Name of its mode; no user can write it."""
+
+
+def held(
+    formulas: Iterable[Expression], moving: Collection[str]
+) -> tuple[tuple[Expression, ...], tuple[Switch, ...]]:
+    """Return formulas with the modes of their switches in place of corners and jumps, and the switches.
+
+    Parameters
+    ----------
+    moving
+        Names whose values change along a motion; what is made of others alone has no switch.
+    """
+    found: dict[tuple[Expression, bool], Switch] = {}
+
+    def mode(quantity: Expression, whole: bool = False) -> Name:
+        key = quantity, whole
+        if key not in found:
+            found[key] = Switch(quantity, whole, f"_mode_{len(found)}")
+        return Name(found[key].mode)
+
+    def sides(left: Expression, right: Expression) -> tuple[Expression, Expression]:
+        """Return what is 1 where `left` is larger than `right`, else 0, and the other way round."""
+        if is_zero(left) and not is_zero(right):
+            smaller, larger = sides(right, left)
+            return larger, smaller
+        side = mode(left if is_zero(right) else Binary("-", left, right))
+        return filled("side + 1", side=side), Negate(side)
+
+    def change(node: Expression) -> Expression:
+        """Return a node, whose operands are held already, without its corner or jump."""
+        match node:
+            case Compare("==" | "!=" as symbol, left, right) if moves("-", left, right):
+                # true, or false, at single moments only
+                return Number(float(symbol == "!="))
+            case Compare(symbol, left, right) if moves("-", left, right):
+                larger, smaller = sides(left, right)
+                return larger if symbol in (">", ">=") else smaller
+            case Call("min" | "max" as function, (x, y)) if moves("-", x, y):
+                larger, smaller = sides(x, y)
+                return Call("where", (larger, x, y) if function == "max" else (smaller, x, y))
+            case Call("mod", (x, y)) if moves("/", x, y):
+                return filled("x - mode*y", x=x, y=y, mode=mode(Binary("/", x, y), whole=True))
+            case Call(function, (x,)) if function in _HELD and varies(x, moving):
+                is_rounded = function in ("floor", "ceil", "round")
+                quantity = filled("x + 0.5", x=x) if function == "round" else x
+                return filled(_HELD[function], x=x, mode=mode(quantity, is_rounded))
+        return node
+
+    def moves(symbol: str, left: Expression, right: Expression) -> bool:
+        return varies(Binary(symbol, left, right), moving)
+
+    made = tuple(rebuilt(formula, change) for formula in formulas)
+    return made, tuple(found.values())
+
+
+_HELD = {
+    "abs": "(2*mode + 1)*x",
+    "sign": "2*mode + 1",
+    "heaviside": "mode + 1",
+    "floor": "mode",
+    "ceil": "mode + 1",
+    "round": "mode",
+}
+"""Functions of one argument x, with the mode of what they look at."""
+
+
+def varies(node: Expression, moving: Collection[str]) -> bool:
+    """Tell whether the value changes along a motion otherwise than by jumps."""
+    match node:
+        case Name(name):
+            return name in moving
+        case Compare():
+            return False
+        case Call(function, _) if function in STEPS:
+            return False
+        case Call("where", (_, yes, no)):
+            return varies(yes, moving) or varies(no, moving)
+    return any(varies(child, moving) for child in children(node))

@@ -8,6 +8,7 @@ import re
 import warnings
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import partial
 
 from vibsim.core.errors import VibsimError, nearest
 from vibsim.formula.tree import (
@@ -21,6 +22,7 @@ from vibsim.formula.tree import (
     Negate,
     Number,
     literal,
+    paired,
     walk,
 )
 
@@ -143,11 +145,15 @@ class _Reader:
                 return self.convert(node.operand, depth + 1)
             case ast.UnaryOp(op=ast.Not()):
                 return Binary("-", Number(1.0), self.condition(node.operand, depth + 1))
-            case ast.BoolOp():
-                return self.joined(node, depth)
+            case ast.BoolOp(op=op, values=values):
+                below = depth + (len(values) - 1).bit_length()
+                parts = [self.condition(value, below) for value in values]
+                if isinstance(op, ast.And):
+                    return paired(parts, partial(Binary, "*"))
+                return paired(parts, lambda left, right: Call("max", (left, right)))
             case ast.IfExp():
-                parts = (node.test, node.body, node.orelse)
-                return Call("where", tuple(self.convert(part, depth + 1) for part in parts))
+                ways = (node.test, node.body, node.orelse)
+                return Call("where", tuple(self.convert(part, depth + 1) for part in ways))
             case ast.BinOp() if type(node.op) in _BINARY:
                 return self.binary(node, depth)
             case ast.Compare():
@@ -200,13 +206,7 @@ class _Reader:
                 hint = "join two comparisons with and"
                 raise self.fault(written, "a comparison within a chain of comparisons", hint)
         signs = [_COMPARE[type(operator)] for operator in node.ops]
-        return _paired(list(map(Compare, signs, sides[:-1], sides[1:])), is_product=True)
-
-    def joined(self, node: ast.BoolOp, depth: int) -> Expression:
-        """Read ``and`` as a product, ``or`` as the largest."""
-        below = depth + (len(node.values) - 1).bit_length()
-        values = [self.condition(value, below) for value in node.values]
-        return _paired(values, is_product=isinstance(node.op, ast.And))
+        return paired(list(map(Compare, signs, sides[:-1], sides[1:])), partial(Binary, "*"))
 
     def condition(self, node: ast.expr, depth: int) -> Expression:
         """Read what is 1 or 0."""
@@ -232,15 +232,6 @@ class _Reader:
         if len(node.args) != wanted:
             raise self.fault(node, f"{function} takes {wanted} argument(s), has {len(node.args)}")
         return Call(function, tuple(self.convert(argument, depth + 1) for argument in node.args))
-
-
-def _paired(terms: list[Expression], *, is_product: bool) -> Expression:
-    """Return terms joined in pairs by ``*`` or ``max``, so that the tree stays flat."""
-    while len(terms) > 1:
-        odd = terms[len(terms) - len(terms) % 2 :]
-        pairs = zip(terms[::2], terms[1::2], strict=False)
-        terms = [Binary("*", *pair) if is_product else Call("max", pair) for pair in pairs] + odd
-    return terms[0]
 
 
 def shorten(text: str, length: int = 60) -> str:

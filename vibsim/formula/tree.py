@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
@@ -135,3 +135,11 @@ def size(node: Expression, most: int) -> int:
 def names_in(expression: Expression) -> tuple[str, ...]:
     """Return the names that `expression` uses, each once, in the order of their first use."""
     return tuple(dict.fromkeys(node.name for node in walk(expression) if isinstance(node, Name)))
+
+
+def paired(terms: Sequence[Expression], join: Callable[..., Expression]) -> Expression:
+    """Return terms joined in pairs, so that the tree stays flat."""
+    while len(terms) > 1:
+        pairs = [join(*pair) for pair in zip(terms[::2], terms[1::2], strict=False)]
+        terms = [*pairs, *terms[len(terms) - len(terms) % 2 :]]
+    return terms[0]

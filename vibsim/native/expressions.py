@@ -116,7 +116,10 @@ class Expressions:
             case ast.Tuple(elts=parts):
                 return tuple([self.value(part) for part in parts])
             case ast.BinOp(left=left, op=op, right=right):
-                return self._binary(node, op, self.value(left), self.value(right))
+                one, other = self.value(left), self.value(right)
+                kind = operations.kind_of_binary(node, op, kind_of(one), kind_of(other))
+                numbers = cast(Number, one), cast(Number, other)
+                return Number(kind, operations.binary(self.builder, op, kind, *numbers))
             case ast.UnaryOp(op=ast.Not(), operand=operand):
                 return Number(TRUTH, self.builder.not_(self.truth(operand)))
             case ast.UnaryOp(operand=operand):
@@ -141,13 +144,6 @@ class Expressions:
                 return self._call(node, func, [self.value(value) for value in arguments])
         raise refusal(node, "this cannot be compiled")
 
-    def _binary(self, node: ast.expr, op: ast.operator, left: Value, right: Value) -> Value:
-        if isinstance(left, tuple) and isinstance(right, tuple):
-            return left + right
-        kind = cast(str, operations.kind_of_binary(node, op, kind_of(left), kind_of(right)))
-        numbers = cast(Number, left), cast(Number, right)
-        return Number(kind, operations.binary(self.builder, op, kind, *numbers))
-
     def _bool(self, node: ast.BoolOp) -> Value:
         """Work out ``and`` or ``or``: what stands behind is worked out only where it decides."""
         [end] = self.blocks("decided")
@@ -171,15 +167,12 @@ class Expressions:
             pair = [words_of(self.turned(self.value(part), kind)) for part in (body, orelse)]
             words = [self.builder.select(bit, a, b) for a, b in zip(*pair, strict=True)]
             return value_of(kind, iter(words))
-        then, otherwise, end = self.blocks("then", "otherwise", "chosen")
-        self.builder.cbranch(bit, then, otherwise)
         ways: list[tuple[list[ir.Value], ir.Block]] = []
-        for block, part in ((then, body), (otherwise, orelse)):
-            self.builder.position_at_end(block)
-            found = words_of(self.turned(self.value(part), kind))
-            ways.append((found, self.builder.block))
-            self.builder.branch(end)
-        self.builder.position_at_end(end)
+        with self.builder.if_else(bit) as branches:
+            for branch, part in zip(branches, (body, orelse), strict=True):
+                with branch:
+                    found = words_of(self.turned(self.value(part), kind))
+                    ways.append((found, self.builder.block))
         columns = zip(*[found for found, _ in ways], strict=True)
         blocks = [block for _, block in ways]
         words = [self._merged(list(zip(column, blocks, strict=True))) for column in columns]

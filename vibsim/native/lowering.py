@@ -88,8 +88,6 @@ class _Statements(Expressions):
         super().__init__(call, inference, function)
         self.ends: list[ir.Block] = []
         """Where ``break`` goes, innermost last."""
-        self.repeats: list[ir.Block] = []
-        """Where ``continue`` goes."""
 
     def write(self) -> None:
         """Write the whole function."""
@@ -123,8 +121,6 @@ class _Statements(Expressions):
                 self._while(test, body)
             case ast.Break():
                 self.builder.branch(self.ends[-1])
-            case ast.Continue():
-                self.builder.branch(self.repeats[-1])
             case ast.Expr(value=value):
                 self.value(value)
             case ast.Pass():
@@ -172,17 +168,12 @@ class _Statements(Expressions):
         if known is not None:
             self._block(known[0])
             return
-        bit = self.truth(node.test)
-        then, otherwise, end = self.blocks("then", "otherwise", "end")
-        self.builder.cbranch(bit, then, otherwise)
         goes_on = False
-        for block, body in ((then, node.body), (otherwise, node.orelse)):
-            self.builder.position_at_end(block)
-            self._block(body)
-            if not self.builder.block.is_terminated:
-                self.builder.branch(end)
-                goes_on = True
-        self.builder.position_at_end(end)
+        with self.builder.if_else(self.truth(node.test)) as parts:
+            for part, body in zip(parts, (node.body, node.orelse), strict=True):
+                with part:
+                    self._block(body)
+                    goes_on |= not self.builder.block.is_terminated
         if not goes_on:
             self.builder.unreachable()
 
@@ -206,20 +197,20 @@ class _Statements(Expressions):
         self.builder.position_at_end(end)
 
     def _range(self, node: ast.For) -> tuple[ir.Value, ir.Value, int]:
-        bounds: list[ast.expr] = []
         match node.iter:
-            case ast.Call(func=ast.Name(id="range"), args=[_] | [_, _] | [_, _, _] as bounds):
-                pass
+            case ast.Call(func=ast.Name(id="range"), args=[stop]):
+                bounds: list[ast.expr] = [ast.Constant(0), stop, ast.Constant(1)]
+            case ast.Call(func=ast.Name(id="range"), args=[_, _] | [_, _, _] as given):
+                bounds = [*given, ast.Constant(1)][:3]
             case _:
                 raise refusal(node.iter, "a loop goes over a range")
-        step = self.source.constant(bounds[2], self.inference.local) if len(bounds) > 2 else 1
+        step = self.source.constant(bounds[2], self.inference.local)
         if not isinstance(step, int) or step == 0:
             raise refusal(node.iter, "the step of a range is a whole number other than 0")
-        ends = bounds[:2] if len(bounds) > 1 else [ast.Constant(0), *bounds]
-        first, stop = (self.number(bound) for bound in ends)
-        if first.kind != WHOLE or stop.kind != WHOLE:
+        first, last = self.number(bounds[0]), self.number(bounds[1])
+        if first.kind != WHOLE or last.kind != WHOLE:
             raise refusal(node.iter, "a range is between whole numbers")
-        return first.word, stop.word, step
+        return first.word, last.word, step
 
     def _while(self, test: ast.expr, statements: Sequence[ast.stmt]) -> None:
         head, body, end = self.blocks("head", "body", "end")
@@ -232,9 +223,7 @@ class _Statements(Expressions):
 
     def _loop(self, body: Sequence[ast.stmt], repeat: ir.Block, end: ir.Block) -> None:
         self.ends.append(end)
-        self.repeats.append(repeat)
         self._block(body)
         if not self.builder.block.is_terminated:
             self.builder.branch(repeat)
         self.ends.pop()
-        self.repeats.pop()

@@ -17,14 +17,12 @@ from vibsim.native.source import refusal
 
 _FLOATS = {ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul"}
 _WHOLES = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.LShift: "shl", ast.RShift: "ashr"}
-_BITS = {ast.BitAnd: "and_", ast.BitOr: "or_", ast.BitXor: "xor"}
+_BITS = {ast.BitAnd: "and_", ast.BitOr: "or_"}
 _ORDERS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 
 
-def kind_of_binary(node: ast.expr, op: ast.operator, left: Kind, right: Kind) -> Kind:
+def kind_of_binary(node: ast.expr, op: ast.operator, left: Kind, right: Kind) -> str:
     """Return the kind of ``left op right``."""
-    if isinstance(left, tuple) and isinstance(right, tuple) and isinstance(op, ast.Add):
-        return left + right
     both = joined(left, right) if isinstance(left, str) and isinstance(right, str) else None
     if both is None:
         raise refusal(node, f"a {left} and a {right} have no such operation")
@@ -182,7 +180,6 @@ _SAME = ""
 
 _CALLS: dict[str, tuple[int, str, Build]] = {
     "abs": (1, _SAME, _absolute),
-    "bool": (1, TRUTH, _turn(TRUTH)),
     "float": (1, FLOAT, _turn(FLOAT)),
     "int": (1, WHOLE, _turn(WHOLE)),
     "max": (0, _SAME, _choice(ast.Gt())),

@@ -19,8 +19,7 @@ from vibsim.experiment.faults import Report
 from vibsim.experiment.schema.fields import TABLE, FrozenDict
 from vibsim.experiment.schema.sweep import Axis
 from vibsim.experiment.sweep_columns import columns_of
-from vibsim.formula import Expression, derivative, parse, put, size, values
-from vibsim.formula.jumps import first_jump
+from vibsim.formula import Expression, derivative, first_jump, parse, put, size, values
 from vibsim.models import FormulaField, Model, natural_end, tree
 
 CHUNK = 2**16

@@ -24,6 +24,7 @@ from vibsim.formula import (
     ExpressionError,
     derivative,
     evaluate,
+    has_rule,
     is_zero,
     names_in,
     parse,
@@ -31,7 +32,6 @@ from vibsim.formula import (
     values,
     walk,
 )
-from vibsim.formula.integral import has_rule
 from vibsim.models import FormulaField, Model, tree
 from vibsim.models.oscillator import COULOMB
 

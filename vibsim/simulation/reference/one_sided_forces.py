@@ -1,6 +1,6 @@
 """The forces of a model on one side of each of their corners, and pulses of a force between the times of a solution.
 
-Formulas are evaluated by numpy with the modes of their switches held (`vibsim.formula.switches`). The points of a
+Formulas are evaluated by numpy with the modes of their switches held (`vibsim.formula.jumps`). The points of a
 table are one more switch, whose mode is the number of the point before the present place.
 """
 

@@ -1,4 +1,4 @@
-"""Integrals of formulas, as formulas: the potential energy of a spring.
+"""Derivatives and integrals of formulas, as formulas: for Newton's method, and the potential energy of a spring.
 
 The integral is taken from 0, in forms that do not cancel there: a small energy has all its digits. A sum is integrated
 term by term; a term is a constant factor times a power of x, or a function of the table `SMOOTH` of ``a x``. What has a
@@ -12,12 +12,15 @@ that is smooth there, even if it has a corner at 0. Where a function has poles b
 from __future__ import annotations
 
 import math
-from functools import reduce
+from functools import partial, reduce
 
 import numpy as np
 
-from vibsim.formula.algebra import filled, slope_of
+from vibsim.formula.algebra import filled, minus, plus, slope_of, times
+from vibsim.formula.parser import ExpressionError
 from vibsim.formula.tree import (
+    ONE,
+    STEPS,
     ZERO,
     Binary,
     Call,
@@ -29,9 +32,128 @@ from vibsim.formula.tree import (
     literal,
     names_in,
     number,
+    paired,
     put,
+    size,
     walk,
 )
+
+MAX_NODES = 100_000
+"""Operations and names of a derivative, at most."""
+_BELL = f"{2.0 / math.sqrt(math.pi)!r}*exp(-x**2)"
+_RULES = {
+    "sin": "cos(x)",
+    "cos": "-sin(x)",
+    "tan": "1 + f**2",
+    "exp": "f",
+    "log": "1/x",
+    "sinh": "cosh(x)",
+    "cosh": "sinh(x)",
+    # 1 - tanh(x)**2 has no digits left for large x
+    "tanh": "1/cosh(x)**2",
+    # in factors: 1 - x**2 cancels near 1
+    "asin": "1/sqrt((1 - x)*(1 + x))",
+    "acos": "-(1/sqrt((1 - x)*(1 + x)))",
+    "atan": "1/(1 + x**2)",
+    # sqrt(1 + x**2) overflows before its inverse vanishes
+    "asinh": "1/hypot(1, x)",
+    # a product of roots, which has no value below 1
+    "acosh": "1/(sqrt(x - 1)*sqrt(x + 1))",
+    "atanh": "1/((1 - x)*(1 + x))",
+    "log10": "0.4342944819032518/x",
+    "log2": "1.4426950408889634/x",
+    "log1p": "1/(1 + x)",
+    "expm1": "exp(x)",
+    "cbrt": f"{1.0 / 3.0!r}/f**2",
+    "erf": _BELL,
+    "erfc": f"-({_BELL})",
+    "sqrt": "0.5/f",
+    "abs": "sign(x)",
+}
+"""Derivative of a function of one argument x, whose value is f."""
+
+
+def derivative(node: Expression, name: str) -> Expression:
+    """Return the derivative of a formula by one of its names.
+
+    Where a formula has a corner or a jump (``abs``, ``min``, ``max``, ``mod``, ``where``, a comparison, one of `STEPS`)
+    the derivative is that of the branch taken; jumps count as flat.
+
+    Raises
+    ------
+    ExpressionError
+        Where the derivative is longer than `MAX_NODES`: that of a product of n factors has n*n of them.
+    """
+    found = _derivative(node, name)
+    if size(found, MAX_NODES) > MAX_NODES:
+        rule = f"its derivatives are too long: that by {name} has more than {MAX_NODES} operations"
+        raise ExpressionError("", 0, rule, "write a simpler formula")
+    return found
+
+
+def _derivative(node: Expression, name: str) -> Expression:
+    match node:
+        case Name(own):
+            return ONE if own == name else ZERO
+        case Negate(operand):
+            return minus(ZERO, _derivative(operand, name))
+        case Binary("+" | "-" as symbol, left, right):
+            parts = _derivative(left, name), _derivative(right, name)
+            return plus(*parts) if symbol == "+" else minus(*parts)
+        case Binary("*", left, right):
+            first = times(_derivative(left, name), right)
+            return plus(first, times(left, _derivative(right, name)))
+        case Binary("/", left, right):
+            # not over right**2, which overflows before the quotient does
+            change = times(node, _derivative(right, name))
+            return _over(minus(_derivative(left, name), change), right)
+        case Binary("**", base, exponent):
+            by_base, value = _derivative(base, name), literal(exponent)
+            if value is not None:
+                lowered = Binary("**", base, number(value - 1.0))
+                power = base if value == 2.0 else ONE if value == 1.0 else lowered
+                return times(times(number(value), power), by_base)
+            lowered = Binary("**", base, Binary("-", exponent, ONE))
+            by_exponent = times(times(node, Call("log", (base,))), _derivative(exponent, name))
+            return plus(times(times(exponent, lowered), by_base), by_exponent)
+        case Call(function, arguments):
+            return _of_call(node, function, arguments, name)
+    return ZERO
+
+
+def _of_call(
+    node: Expression, function: str, arguments: tuple[Expression, ...], name: str
+) -> Expression:
+    dx, *others = (_derivative(argument, name) for argument in arguments)
+    if all(entry == ZERO for entry in (dx, *others)) or function in STEPS:
+        return ZERO
+    x, *more = arguments
+    if function in _RULES:
+        return times(filled(_RULES[function], x=x, f=node), dx)
+    if function == "where":
+        return Call("where", (x, *others))
+    [y], [dy] = more, others
+    match function:
+        case "min":
+            return filled("where(x <= y, dx, dy)", x=x, y=y, dx=dx, dy=dy)
+        case "max":
+            return filled("where(x >= y, dx, dy)", x=x, y=y, dx=dx, dy=dy)
+        case "atan2":
+            return _over(minus(times(y, dx), times(x, dy)), filled("x**2 + y**2", x=x, y=y))
+        case "hypot":
+            # 0 where both are 0, as that of abs
+            by_x, by_y = (filled("part/(f + (f == 0))", part=part, f=node) for part in (x, y))
+            return plus(times(by_x, dx), times(by_y, dy))
+        case "mod":
+            # the whole number that mod has taken away, which a rounded quotient may miss by 1
+            taken = filled("round((x - f)/y)", x=x, y=y, f=node)
+            return minus(dx, times(taken, dy))
+    raise NotImplementedError(f"{function} has no derivative here")
+
+
+def _over(left: Expression, right: Expression) -> Expression:
+    return ZERO if left == ZERO else Binary("/", left, right)
+
 
 POINTS = 24
 """Points of the rule: polynomials up to degree 47 are integrated exactly."""
@@ -215,12 +337,7 @@ def _by_quadrature(node: Expression, name: str) -> Expression:
         if way != x:
             force = Binary("*", put(node, name, Call("sinh", (y,))), Call("cosh", (y,)))
         terms.append(Binary("*", Number(weight), force))
-    # a sum in pairs, so that the tree stays flat
-    while len(terms) > 1:
-        odd = terms[len(terms) - len(terms) % 2 :]
-        pairs = zip(terms[::2], terms[1::2], strict=False)
-        terms = [*(Binary("+", left, right) for left, right in pairs), *odd]
-    return Binary("*", way, terms[0])
+    return Binary("*", way, paired(terms, partial(Binary, "+")))
 
 
 def _has_poles(node: Expression, name: str) -> bool:
