@@ -121,16 +121,6 @@ class Units:
             raise UnitError("")
         return converted(_constant(formula), unit, wanted, self.own)
 
-    def _define(self, name: str, value: Any) -> None:
-        _check_name(name)
-        halves = split(value) if isinstance(value, str) else None
-        number = _constant(halves[0] if halves else value)
-        unit = meaning(halves[1], self.own) if halves else Unit()
-        factor = finite(Fraction(repr(number)) * unit.factor)
-        if factor <= 0.0:
-            raise UnitError("a unit must be greater than 0")
-        self.own[name] = Unit(Fraction(repr(factor)), unit.powers)
-
     def _define_all(self, units: dict[str, Any]) -> None:
         if len(units) > MAX_OWN:
             rule = f"must not have more than {MAX_OWN} units, has {len(units)}"
@@ -138,7 +128,14 @@ class Units:
             return
         for name, value in units.items():
             try:
-                self._define(name, value)
+                _check_name(name)
+                halves = split(value) if isinstance(value, str) else None
+                number = _constant(halves[0] if halves else value)
+                unit = meaning(halves[1], self.own) if halves else Unit()
+                factor = finite(Fraction(repr(number)) * unit.factor)
+                if factor <= 0.0:
+                    raise UnitError("a unit must be greater than 0")
+                self.own[name] = Unit(Fraction(repr(factor)), unit.powers)
             except UnitError as error:
                 self._refuse(("units", name), error, value)
                 self.broken.add(name)
@@ -165,9 +162,8 @@ def _constant(value: Any) -> float:
     try:
         number = constant(value) if isinstance(value, str) else float(value)
     except ExpressionError as error:
-        raise UnitError(
-            f"must be {FORMULA_NOTE}, before its unit ({error.rule})", error.hint
-        ) from None
+        rule = f"must be {FORMULA_NOTE}, before its unit ({error.rule})"
+        raise UnitError(rule, error.hint) from None
     except OverflowError:
         number = math.inf
     if not math.isfinite(number):
@@ -180,13 +176,14 @@ def _wanted_units(model: Model | None) -> tuple[dict[str, str], set[str]]:
     units = {"time.end": "s", "time.base_dt": "s"}
     units |= {"time.periods": "1", "time.steps_per_period": "1"}
     texts = {"model.kind", "time.base_steps"}
-    if model is not None:
-        units |= {f"initial.{state.name}": state.unit for state in model.states}
-        units |= {f"model.{row.key}": row.unit for row in model.parameters}
-        for row in model.formulas:
-            key = f"model.{row.name}"
-            units |= {f"{key}.{word}": unit for word, unit in row.term_units.items()}
-            texts |= {key, *(f"{key}.{name}" for name in (TABLE, *(row.table or ())))}
+    if model is None:
+        return units, texts
+    units |= {f"initial.{state.name}": state.unit for state in model.states}
+    units |= {f"model.{row.key}": row.unit for row in model.parameters}
+    for row in model.formulas:
+        key = f"model.{row.name}"
+        units |= {f"{key}.{word}": unit for word, unit in row.term_units.items()}
+        texts |= {key, *(f"{key}.{name}" for name in (TABLE, *(row.table or ())))}
     return units, texts
 
 
@@ -375,13 +372,7 @@ def converted(number: float, text: str, wanted: str, own: Mapping[str, Unit]) ->
 
 
 def finite(number: Fraction) -> float:
-    """Return `number` as a float.
-
-    Raises
-    ------
-    UnitError
-        Where it is too large.
-    """
+    """Return `number` as a float; UnitError where it is too large."""
     try:
         return float(number)
     except OverflowError:
