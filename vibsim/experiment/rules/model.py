@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import keyword
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,10 +15,10 @@ from vibsim.core.array_types import Floats
 from vibsim.experiment.data import TableSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.schema.fields import DECLARED, TABLE, Section
-from vibsim.experiment.schema.model_and_schemes import name_fault
 from vibsim.experiment.tables.file import ENDINGS, TableError, read
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import (
+    FUNCTIONS,
     MAX_CHARACTERS,
     ONE,
     Binary,
@@ -35,6 +37,7 @@ from vibsim.formula.integral import has_rule
 from vibsim.models import FormulaField, Model, tree
 from vibsim.models.oscillator import COULOMB
 
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 NONE = "none"
 """Stands for a term that is left out, where others have words as well."""
 AMPLITUDES = (-6, 8)
@@ -188,16 +191,22 @@ def _check_length(model: Model) -> None:
 
 
 def _declared(section: Any, model: Model, report: Report) -> dict[str, float]:
-    taken = {state.name: f"the {state.long_name}" for state in model.states}
-    taken |= {"t": "the time"}
+    taken = {"t": "the time"}
+    taken |= {state.name: f"the {state.long_name}" for state in model.states}
     taken |= {row.name: f"the {row.description} of the model" for row in model.parameters}
     if any(row.terms and isinstance(getattr(section, row.name), Section) for row in model.formulas):
         taken["b"] = "the coefficient of the damping"
     found = {}
     for name, value in section.parameters.items():
-        fault = name_fault(name, taken)
+        fault = f"'{name}' is {taken[name]}" if name in taken else ""
+        if keyword.iskeyword(name):
+            fault = f"'{name}' is a word of the grammar of formulas and cannot be a name"
+        elif not _NAME.fullmatch(name):
+            fault = "a name must consist of letters, digits and _, and begin with a letter"
+        elif name in FUNCTIONS:
+            fault = f"'{name}' is a function"
         if fault:
-            report.add(("model", "parameters", name), fault, "choose another name", at_key=True)
+            report.add(("model", DECLARED, name), fault, "choose another name", at_key=True)
         else:
             found[name] = value
     return found
