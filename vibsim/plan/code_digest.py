@@ -89,7 +89,8 @@ def _digest(files: Iterable[Path]) -> str:
 
 def _file(module: str) -> Path:
     path = PACKAGE.joinpath(*module.split(".")[1:])
-    return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    # a folder that is left over from a package that became a module is none
+    return package if (package := path / "__init__.py").is_file() else path.with_suffix(".py")
 
 
 def _is_package(module: str) -> bool:

@@ -16,7 +16,6 @@ from vibsim.experiment.data import TableSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.schema.fields import DECLARED, TABLE, Section
 from vibsim.experiment.tables.file import ENDINGS, TableError, read
-from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import (
     FUNCTIONS,
     MAX_CHARACTERS,
@@ -66,16 +65,9 @@ class Equation:
 def equation(
     section: Any, model: Model | None, swept: Collection[str], folder: Path, report: Report
 ) -> Equation:
-    """Check the section of a `model` of the registry, and fill in what it leaves out.
+    """Check the section of a `model` of the registry (None where it is malformed), and fill in what it leaves out.
 
-    Parameters
-    ----------
-    section
-        As pydantic read it; None where that found a fault.
-    swept
-        Dotted keys that the file sweeps.
-    folder
-        Where the paths of tables begin.
+    `swept` holds the dotted keys that the file sweeps; the paths of tables begin in `folder`.
     """
     if section is None or model is None:
         # what follows from formulas is known only with all of them
@@ -100,21 +92,22 @@ def _written(
 ) -> Equation:
     assert model.written is not None
     declared = _declared(section, model, report)
+    known = (*(own.name for own in model.parameters), *declared)
     texts: dict[str, str] = {}
     tables: dict[str, TableSpec] = {}
     for row in model.formulas:
         value = getattr(section, row.name)
-        path: Path_ = ("model", row.name)
         if isinstance(value, Section) and row.table is not None:
             table = _table(row, row.table, value, folder, report)
             tables |= {row.name: table} if table is not None else {}
         elif isinstance(value, Section):
             texts |= _term(row, value, parameters, report)
         elif value is None and row.name in section.model_fields_set:
-            report.add(path, "must be a formula, or a number", "leave the key out", at_key=True)
+            rule = "must be a formula, or a number"
+            report.add(("model", row.name), rule, "leave the key out", at_key=True)
         elif value == NONE and row.terms and NONE not in declared:
             continue
-        elif value is not None and _is_sound(value, row, model, declared, path, report):
+        elif value is not None and _is_sound(value, row, known, report):
             texts[row.name] = value.strip()
     if "exact" in texts and section.force is not None:
         rule = "must not be given together with exact, from which it follows"
@@ -229,18 +222,11 @@ def _term(
     return {row.name: row.terms[word]}
 
 
-def _is_sound(
-    text: str,
-    row: FormulaField,
-    model: Model,
-    declared: Mapping[str, float],
-    path: Path_,
-    report: Report,
-) -> bool:
-    """Tell whether a formula can be read; note its fault otherwise."""
-    known = (*row.names, *(own.name for own in model.parameters), *declared)
+def _is_sound(text: str, row: FormulaField, known: Collection[str], report: Report) -> bool:
+    """Tell whether a formula of variables and some `known` parameters can be read; note its fault otherwise."""
+    path = ("model", row.name)
     try:
-        read_tree = parse(text, known)
+        read_tree = parse(text, (*row.names, *known))
     except ExpressionError as error:
         place = f" at character {error.position + 1}" if error.position < MAX_CHARACTERS else ""
         rule = f"{error.rule}{place}"
