@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic import StrictBool, TypeAdapter, ValidationError
@@ -80,21 +81,17 @@ def _axis(keys: tuple[str, ...], values: tuple[Values, ...] | Draw) -> Axis:
     return Axis.model_construct(keys=keys, values=values)
 
 
+@dataclass
 class _SweepReader:
     """Turns what is written of each key into values of its type; None stands for those with a fault."""
 
-    def __init__(
-        self,
-        time: Any,
-        model: Model | None,
-        types: Mapping[str, Any],
-        lacks_scheme: bool,
-        report: Report,
-    ) -> None:
-        self.time, self.model, self.types = time, model, types
-        self.lacks_scheme, self.report = lacks_scheme, report
-        self.first: dict[str, Path_] = {}
-        """Where each key is swept first."""
+    time: Any
+    model: Model | None
+    types: Mapping[str, Any]
+    lacks_scheme: bool
+    report: Report
+    first: dict[str, Path_] = field(default_factory=dict)
+    """Where each key is swept first."""
 
     def alone(self, key: str, written: Written) -> Axis | None:
         """Return a key that moves alone."""
@@ -118,9 +115,8 @@ class _SweepReader:
         """Return points over several keys."""
         sound = [self._is_interval(key, *ends) for key, ends in section.over.items()]
         if section.method == "latin_hypercube" and section.n > MAX_HYPERCUBE:
-            rule = (
-                f"must be at most {MAX_HYPERCUBE} for a latin hypercube, which is drawn as a whole"
-            )
+            most = f"must be at most {MAX_HYPERCUBE}"
+            rule = f"{most} for a latin hypercube, which is drawn as a whole"
             hint = "sobol and random have no such limit"
             self.report.add(("sweep", "sample", "n"), rule, hint, section.n)
             return None
