@@ -12,8 +12,7 @@ from experiment_files import GOOD, file_faults, write
 from vibsim.core.errors import InputError
 from vibsim.experiment import Experiment
 from vibsim.experiment.yaml.file_content import MAX_BYTES
-from vibsim.experiment.yaml.parse import dotted, parse
-from vibsim.experiment.yaml.scalars import resolve
+from vibsim.experiment.yaml.parse import dotted, parse, resolve
 
 
 @pytest.mark.parametrize(

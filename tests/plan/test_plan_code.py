@@ -179,7 +179,7 @@ def test_imports_are_followed_wherever_they_stand(package: Path) -> None:
 
 def test_every_lazy_name_is_found_without_running_anything() -> None:
     """A lazy name stands twice: for Python, and for the types; the digests go by the types."""
-    for package in ("vibsim", "vibsim.experiment", "vibsim.store"):
+    for package in ("vibsim", "vibsim.experiment", "vibsim.plan", "vibsim.store"):
         loaded = __import__(package, fromlist=["*"])
         for name in set(loaded.__all__) - {"__version__"}:
             found = getattr(getattr(loaded, name), "__module__", None)

@@ -20,14 +20,9 @@ def find_checkout() -> Path | None:
 
 
 def collection_of(file: Path, configs: Path | None = None) -> str:
-    """Name the collection of a file: its folder where that is a folder of `configs`, else ``adhoc``.
+    """Name the collection of an experiment file: its folder where that is a folder of `configs`, else ``adhoc``.
 
-    Parameters
-    ----------
-    file
-        The experiment file.
-    configs
-        The folder of collections; by default that of the checkout.
+    `configs` is by default the folder of collections of the checkout.
     """
     if configs is None:
         checkout = find_checkout()

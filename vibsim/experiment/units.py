@@ -96,40 +96,24 @@ class Units:
         has_formulas = self.model is not None and bool(self.model.formulas)
         is_declared = has_formulas and key.startswith(f"model.{DECLARED}.")
         wanted = self.units.get(key, _ANY if is_declared else _UNKNOWN)
+        halves = split(text)
+        if halves is None:
+            return text
         try:
-            number = self.number(text, wanted)
+            if wanted == _UNKNOWN:
+                return _STAND_IN
+            if any(factor.name in self.broken for factor in factors(halves[1])):
+                raise UnitError("")
+            return converted(_constant(halves[0]), halves[1], wanted, self.own)
         except UnitError as error:
             self._refuse(path, error, text)
             return _STAND_IN
-        return text if number is None else number
 
     def _refuse(self, path: Path_, error: UnitError, text: object) -> None:
         """Note a fault; nothing more is said about its place."""
         if error.rule:
             self.report.add(path, error.rule, error.hint, text)
         self.report.faulty.add(path)
-
-    def number(self, text: str, wanted: str) -> float | None:
-        """Return a number with a unit in the `wanted` one; None where it has no unit."""
-        halves = split(text)
-        if halves is None:
-            return None
-        if wanted == _UNKNOWN:
-            return _STAND_IN
-        formula, unit = halves
-        if any(factor.name in self.broken for factor in factors(unit)):
-            raise UnitError("")
-        return converted(_constant(formula), unit, wanted, self.own)
-
-    def _define(self, name: str, value: Any) -> None:
-        _check_name(name)
-        halves = split(value) if isinstance(value, str) else None
-        number = _constant(halves[0] if halves else value)
-        unit = meaning(halves[1], self.own) if halves else Unit()
-        factor = finite(Fraction(repr(number)) * unit.factor)
-        if factor <= 0.0:
-            raise UnitError("a unit must be greater than 0")
-        self.own[name] = Unit(Fraction(repr(factor)), unit.powers)
 
     def _define_all(self, units: dict[str, Any]) -> None:
         if len(units) > MAX_OWN:
@@ -138,7 +122,14 @@ class Units:
             return
         for name, value in units.items():
             try:
-                self._define(name, value)
+                _check_name(name)
+                halves = split(value) if isinstance(value, str) else None
+                number = _constant(halves[0] if halves else value)
+                unit = meaning(halves[1], self.own) if halves else Unit()
+                factor = finite(Fraction(repr(number)) * unit.factor)
+                if factor <= 0.0:
+                    raise UnitError("a unit must be greater than 0")
+                self.own[name] = Unit(Fraction(repr(factor)), unit.powers)
             except UnitError as error:
                 self._refuse(("units", name), error, value)
                 self.broken.add(name)
@@ -165,9 +156,8 @@ def _constant(value: Any) -> float:
     try:
         number = constant(value) if isinstance(value, str) else float(value)
     except ExpressionError as error:
-        raise UnitError(
-            f"must be {FORMULA_NOTE}, before its unit ({error.rule})", error.hint
-        ) from None
+        rule = f"must be {FORMULA_NOTE}, before its unit ({error.rule})"
+        raise UnitError(rule, error.hint) from None
     except OverflowError:
         number = math.inf
     if not math.isfinite(number):
@@ -180,13 +170,14 @@ def _wanted_units(model: Model | None) -> tuple[dict[str, str], set[str]]:
     units = {"time.end": "s", "time.base_dt": "s"}
     units |= {"time.periods": "1", "time.steps_per_period": "1"}
     texts = {"model.kind", "time.base_steps"}
-    if model is not None:
-        units |= {f"initial.{state.name}": state.unit for state in model.states}
-        units |= {f"model.{row.key}": row.unit for row in model.parameters}
-        for row in model.formulas:
-            key = f"model.{row.name}"
-            units |= {f"{key}.{word}": unit for word, unit in row.term_units.items()}
-            texts |= {key, *(f"{key}.{name}" for name in (TABLE, *(row.table or ())))}
+    if model is None:
+        return units, texts
+    units |= {f"initial.{state.name}": state.unit for state in model.states}
+    units |= {f"model.{row.key}": row.unit for row in model.parameters}
+    for row in model.formulas:
+        key = f"model.{row.name}"
+        units |= {f"{key}.{word}": unit for word, unit in row.term_units.items()}
+        texts |= {key, *(f"{key}.{name}" for name in (TABLE, *(row.table or ())))}
     return units, texts
 
 
@@ -244,13 +235,8 @@ A: a current; V: a voltage; C: a charge; ohm: a resistance; F: a capacitance; H:
 K: a temperature
 """
 """What is measured in some units, for messages."""
-_SYMBOLS = dict(
-    zip(
-        ("[angle]", "[mass]", "[length]", "[time]", "[current]", "[temperature]"),
-        ("rad", "kg", "m", "s", "A", "K"),
-        strict=True,
-    )
-)
+_DIMENSIONS = ("[angle]", "[mass]", "[length]", "[time]", "[current]", "[temperature]")
+_SYMBOLS = dict(zip(_DIMENSIONS, ("rad", "kg", "m", "s", "A", "K"), strict=True))
 """The base unit of every dimension, in the order of messages."""
 _OFFSET = ("degree_Celsius", "degree_Fahrenheit")
 """Units that are measured from a zero of their own."""
@@ -314,10 +300,7 @@ def registry() -> Any:
 def known(name: str) -> Unit | None:
     """Return the unit of one name, with or without a prefix; None where there is none.
 
-    Raises
-    ------
-    UnitError
-        Where its zero is not that of the base unit, so that it cannot be a factor.
+    One whose zero is not that of the base unit, so that it cannot be a factor, raises UnitError.
     """
     found = registry().parse_unit_name(name)
     if not found:
@@ -334,13 +317,7 @@ def known(name: str) -> Unit | None:
 
 
 def meaning(text: str, own: Mapping[str, Unit] = MappingProxyType({})) -> Unit:
-    """Return what a unit is; `own` holds the names that a file defines.
-
-    Raises
-    ------
-    UnitError
-        Where the text is no unit, or names one that does not exist.
-    """
+    """Return what a unit is; `own` holds the names that a file defines. UnitError where there is no such unit."""
     unit = Unit()
     for factor in factors(text) if text != "1" else ():
         named = own.get(factor.name) or known(factor.name)
@@ -357,12 +334,7 @@ def converted(number: float, text: str, wanted: str, own: Mapping[str, Unit]) ->
     """Return a number with the unit `text` in the unit `wanted`, correctly rounded.
 
     The number counts as the shortest decimal that is read as it: 0.3 is three tenths. Where nothing particular is
-    `wanted`, it is returned in SI base units.
-
-    Raises
-    ------
-    UnitError
-        Where the two are of different kinds, or the number is too large.
+    `wanted`, it is returned in SI base units. UnitError where the two are of different kinds, or it is too large.
     """
     unit = meaning(text, own)
     target = meaning(wanted) if wanted else Unit(powers=unit.powers)
@@ -375,13 +347,7 @@ def converted(number: float, text: str, wanted: str, own: Mapping[str, Unit]) ->
 
 
 def finite(number: Fraction) -> float:
-    """Return `number` as a float.
-
-    Raises
-    ------
-    UnitError
-        Where it is too large.
-    """
+    """Return `number` as a float; UnitError where it is too large."""
     try:
         return float(number)
     except OverflowError:

@@ -33,15 +33,13 @@ def read_document(source: Source, report: Report) -> Any:
         `checks` and `published`; of a check and of a sweep, what has no fault is kept (`Section.stand_ins`).
     """
     fields = Document.model_fields
-    data = {k: v for k, v in source.data.items() if v is not None or _is_required(fields.get(k))}
+    # a section without content is one that is left out, where it may be
+    optional = {key for key, field in fields.items() if not field.is_required()}
+    data = {k: v for k, v in source.data.items() if v is not None or k not in optional}
     units = Units(data, report)
     if isinstance(data.get("units"), dict):
         data["units"] = units.defined
     return _Reader(source, report, units).section((), data, Document)
-
-
-def _is_required(field: Any) -> bool:
-    return field is None or field.is_required()
 
 
 class _Reader:

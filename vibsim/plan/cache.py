@@ -84,13 +84,7 @@ def _experiment(choice: Choice, resolve: Resolver | None) -> Experiment:
 def load_all(
     choices: Iterable[Choice], resolve: Resolver | None = None, *, cached: bool = False
 ) -> dict[str, Plan]:
-    """Return the plans of several experiment files by their keys.
-
-    Raises
-    ------
-    InputError
-        With the faults of all files at once.
-    """
+    """Return the plans of several experiment files by their keys; InputError with the faults of all files at once."""
     plans: dict[str, Plan] = {}
     faults: list[Fault] = []
     for choice in choices:

@@ -69,9 +69,10 @@ def of_folder(name: str) -> str:
 
 def home(item: object, package: str) -> tuple[str, str]:
     """Name a module of `package` that has `item`, an entry of its list, and the name that it has there."""
-    for module in _modules(package):
+    for path in sorted(_file(package).parent.glob("[!_]*.py")):
+        module = f"{package}.{path.stem}"
         for name, value in vars(importlib.import_module(module)).items():
-            if module != package and value is item:
+            if value is item:
                 return module, name
     return package, ""
 
@@ -88,7 +89,8 @@ def _digest(files: Iterable[Path]) -> str:
 
 def _file(module: str) -> Path:
     path = PACKAGE.joinpath(*module.split(".")[1:])
-    return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    # a folder that is left over from a package that became a module is none
+    return package if (package := path / "__init__.py").is_file() else path.with_suffix(".py")
 
 
 def _is_package(module: str) -> bool:
@@ -97,11 +99,6 @@ def _is_package(module: str) -> bool:
 
 def _exists(module: str) -> bool:
     return module.split(".")[0] == "vibsim" and _file(module).is_file()
-
-
-def _modules(package: str) -> list[str]:
-    found = sorted(_file(package).parent.glob("*.py"))
-    return [f"{package}.{path.stem}".removesuffix(".__init__") for path in found]
 
 
 def _tree(module: str) -> ast.Module:
@@ -133,14 +130,11 @@ def _run(tree: ast.AST, types: bool = False) -> Iterator[ast.AST]:
     while todo:
         node = todo.pop()
         yield node
-        if not types and isinstance(node, ast.If) and _is_for_types(node.test):
+        is_for_types = isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+        if isinstance(node, ast.If) and is_for_types and not types:
             todo.extend(node.orelse)
         else:
             todo.extend(ast.iter_child_nodes(node))
-
-
-def _is_for_types(test: ast.expr) -> bool:
-    return isinstance(test, ast.Name) and test.id == "TYPE_CHECKING"
 
 
 def _bound(node: ast.AST) -> Iterator[tuple[str, tuple[str, str]]]:

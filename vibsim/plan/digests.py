@@ -10,17 +10,25 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
-_NOT_ANALYSED = ("title", "source", "output", "units")
-_NOT_EXTRAPOLATED = ("title", "source", "checks", "published", "units")
-_NOT_SIMULATED = (
-    *("title", "source", "checks", "levels", "samples", "sweep"),
-    *("output", "tolerance", "published", "units"),
-)
-
 
 def simulated(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return the part of an experiment in normal form that every member shares."""
-    return {key: value for key, value in content.items() if key not in _NOT_SIMULATED}
+    other = "title source checks levels samples sweep output tolerance published units"
+    return _without(content, other)
+
+
+def extrapolated(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the part of an experiment in normal form that an extrapolation depends on and tells of."""
+    return _without(content, "title source checks published units")
+
+
+def analysed(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the part of an experiment in normal form that an analysis depends on and tells of."""
+    return _without(content, "title source output units")
+
+
+def _without(content: Mapping[str, Any], keys: str) -> dict[str, Any]:
+    return {key: value for key, value in content.items() if key not in keys.split()}
 
 
 def in_numbers(content: Mapping[str, Any]) -> dict[str, Any]:
@@ -44,16 +52,6 @@ def values_digest(experiment: Experiment, start: int, stop: int) -> str:
         digest.update(f"{key} {'words' if words else 'numbers'}\n".encode())
         digest.update(json.dumps(values.tolist()).encode() if words else values.tobytes())
     return digest.hexdigest()
-
-
-def extrapolated(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the part of an experiment in normal form that an extrapolation depends on and tells of."""
-    return {key: value for key, value in content.items() if key not in _NOT_EXTRAPOLATED}
-
-
-def analysed(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the part of an experiment in normal form that an analysis depends on and tells of."""
-    return {key: value for key, value in content.items() if key not in _NOT_ANALYSED}
 
 
 def digest_of(content: Mapping[str, Any]) -> str:

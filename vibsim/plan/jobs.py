@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import asdict, dataclass, replace
-from functools import cached_property
+from dataclasses import asdict, dataclass, is_dataclass, replace
+from functools import cache, cached_property
+from itertools import repeat
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import UnionType
+from typing import TYPE_CHECKING, Any, get_args, get_origin, get_type_hints
 
 from vibsim.experiment.collection import ENDINGS
-from vibsim.plan.typed_json import typed
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
@@ -194,7 +195,7 @@ def from_json(text: str, file: str, key: str) -> Plan:
     ValueError
         Where it is no plan of that experiment: names and digests go into commands, and paths are written to.
     """
-    plan = replace(typed(Plan, json.loads(text)), file=file)
+    plan: Plan = replace(_typed(Plan, json.loads(text)), file=file)
     digests = [plan.analysis, plan.report, *([plan.extrapolation] if plan.extrapolation else [])]
     digests += [shard.digest for shard in plan.shards] + [batch.digest for batch in plan.batches]
     if plan.key != key or not all(map(_DIGEST.fullmatch, digests)):
@@ -210,3 +211,38 @@ def from_json(text: str, file: str, key: str) -> Plan:
         if any(not 0 <= batch.shard < shards.get(level, 0) for level in batch.levels):
             raise ValueError(f"{plan.key}: a job for files that no level has")
     return plan
+
+
+@cache
+def _parts(kind: Any) -> tuple[Any, tuple[Any, ...], dict[str, Any]]:
+    """Return the origin of a type with its arguments, and the fields of a record; a plain type is its own union."""
+    if is_dataclass(kind):
+        return None, (), get_type_hints(kind)
+    origin, inner = get_origin(kind), get_args(kind)
+    if origin in (tuple, dict):
+        return origin, inner, {}
+    inner = inner if isinstance(kind, UnionType) else (kind,)
+    # a whole number is written as one
+    return None, (*inner, int) if float in inner else inner, {}
+
+
+def _typed(kind: Any, value: Any) -> Any:
+    """Return the record of type `kind` that plain data describe; ValueError where a value is of another type."""
+    # types are compared, not tested by isinstance: for Python True is a number
+    origin, inner, fields = _parts(kind)
+    if fields:
+        if type(value) is not dict or value.keys() != fields.keys():
+            raise ValueError(f"{kind.__name__}: other fields than expected")
+        return kind(**{name: _typed(field, value[name]) for name, field in fields.items()})
+    if origin is tuple:
+        is_open = inner[-1] is ...
+        if type(value) is not list or not (is_open or len(value) == len(inner)):
+            raise ValueError(f"{value!r:.40}: no list of the length expected")
+        return tuple(map(_typed, repeat(inner[0]) if is_open else inner, value))
+    if origin is dict:
+        if type(value) is not dict:
+            raise ValueError(f"{value!r:.40}: no mapping")
+        return {key: _typed(inner[1], item) for key, item in value.items()}
+    if kind is not Any and type(value) not in inner:
+        raise ValueError(f"{value!r:.40}: another type than expected")
+    return value

@@ -24,50 +24,21 @@ _LARGE = 32 * 10**6
 class Simulation:
     """A rule: some levels; where they have several shards, a job for each, told apart by the wildcard ``shard``."""
 
-    plan: Plan
-    batches: tuple[Batch, ...]
     rule: str
     """Name of the rule."""
-
-    @property
-    def levels(self) -> list[int]:
-        """The levels."""
-        return list(self.batches[0].levels)
-
-    @property
-    def paths(self) -> list[str]:
-        """The files of one job."""
-        shards = self.plan.made_by(self.batches[0])
-        if len(self.batches) == 1:
-            return [shard.path for shard in shards]
-        folders = [Path(shard.path).parent.as_posix() for shard in shards]
-        return [f"{folder}/shard_{{shard}}.nc" for folder in folders]
-
-    @property
-    def log(self) -> str:
-        """Path of the log."""
-        return f"{self.plan.key}/logs/{self._stem}.log"
-
-    @property
-    def benchmark(self) -> str:
-        """Path of the measured time and memory."""
-        return f"{self.plan.key}/benchmarks/{self._stem}.tsv"
-
-    @property
-    def _stem(self) -> str:
-        levels = self.batches[0].levels
-        stem = f"level_{levels[0]:02d}" + (f"_to_{levels[-1]:02d}" if len(levels) > 1 else "")
-        return stem + ("_shard_{shard}" if len(self.batches) > 1 else "")
-
-    @property
-    def threads(self) -> int:
-        """Threads of a job."""
-        return _cores() if self.batches[0].is_divisible else 1
-
-    @property
-    def memory(self) -> int:
-        """Megabytes of a job."""
-        return -(-max(batch.memory for batch in self.batches) // 10**6)
+    levels: list[int]
+    paths: list[str]
+    """The files of one job."""
+    log: str
+    benchmark: str
+    """Paths of the log, and of the measured time and memory."""
+    threads: int
+    memory: int
+    """Megabytes of a job."""
+    digests: list[str]
+    """Of every job."""
+    source: str
+    """The experiment file."""
 
     def shard(self, wildcards: Any) -> int:
         """Return the number of the shard."""
@@ -75,11 +46,31 @@ class Simulation:
 
     def digest(self, wildcards: Any) -> str:
         """Return the digest of a job."""
-        return self.batches[self.shard(wildcards)].digest
+        return self.digests[self.shard(wildcards)]
 
     def file(self, wildcards: Any, input: Any) -> str:  # noqa: A002
         """Return the experiment file; see `Names.file`."""
-        return self.plan.file
+        return self.source
+
+
+def _simulation(plan: Plan, batches: Sequence[Batch], rule: str) -> Simulation:
+    first = batches[0]
+    paths, levels = [shard.path for shard in plan.made_by(first)], list(first.levels)
+    stem = f"level_{levels[0]:02d}" + (f"_to_{levels[-1]:02d}" if len(levels) > 1 else "")
+    if len(batches) > 1:
+        paths = [f"{Path(path).parent.as_posix()}/shard_{{shard}}.nc" for path in paths]
+        stem += "_shard_{shard}"
+    return Simulation(
+        rule=rule,
+        levels=levels,
+        paths=paths,
+        log=f"{plan.key}/logs/{stem}.log",
+        benchmark=f"{plan.key}/benchmarks/{stem}.tsv",
+        threads=_cores() if first.is_divisible else 1,
+        memory=-(-max(batch.memory for batch in batches) // 10**6),
+        digests=[batch.digest for batch in batches],
+        source=plan.file,
+    )
 
 
 def _of_plan(field: str) -> Callable[[Names, Any], str]:
@@ -128,7 +119,7 @@ class Names:
                 groups.setdefault((key, batch.levels), []).append(batch)
         names = _different(_rule(key, levels) for key, levels in groups)
         return [
-            Simulation(self.plans[key], tuple(found), name)
+            _simulation(self.plans[key], found, name)
             for name, ((key, _), found) in zip(names, groups.items(), strict=True)
         ]
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from vibsim.core.errors import nearest
+from vibsim.experiment.data import TimeSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.size_limits import Setting
 from vibsim.experiment.schema.checks import At
@@ -114,11 +115,13 @@ def check_place(at: At, row: Value, scope: Scope) -> None:
     level = _level(at, row, scope)
     if setting.by_tolerance and at.step is not None and "step" in row.at:
         scope.at("step").refuse(f"a step {_NOT_YET}", "t can")
-    is_stored = level is not None and "t" in row.at
-    if is_stored and level is not None and setting.time is not None and setting.knows_sweep:
+    if setting.time is None or not setting.knows_sweep:
+        return
+    level = level if "t" in row.at else None
+    if at.step is not None and level is not None:
         _check_step(at.step, level, scope.at("step"))
-    if at.t is not None and (is_stored or setting.by_tolerance):
-        _check_time(at.t, level, scope.at("t"))
+    if at.t is not None and (level is not None or setting.by_tolerance):
+        _check_time(at.t, setting.time, level, scope.at("t"))
 
 
 def _level(at: At, row: Value, scope: Scope) -> int | None:
@@ -145,22 +148,20 @@ def _level(at: At, row: Value, scope: Scope) -> int | None:
     return at.level
 
 
-def _check_step(step: int | None, level: int, scope: Scope) -> None:
+def _check_step(step: int, level: int, scope: Scope) -> None:
     steps, every = scope.setting.steps(level), scope.setting.stride(level)
-    if step is not None and step > steps:
+    if step > steps:
         scope.refuse(f"must be at most {steps}, the steps of level {level}")
-    elif step is not None and step % every:
+    elif step % every:
         low = step - step % every
         rule = f"not a stored step of level {level}, where every {every}th is stored"
         scope.refuse(rule, f"nearest are {low} and {low + every}")
 
 
-def _check_time(t: float, level: int | None, scope: Scope) -> None:
+def _check_time(t: float, time: TimeSpec, level: int | None, scope: Scope) -> None:
     """Check that a time is in the interval, and where its level is known one of the equal parts that are stored."""
     setting = scope.setting
-    if setting.time is None or not setting.knows_sweep:
-        return
-    fixed = setting.sweep.fixed_end(setting.time)
+    fixed = setting.sweep.fixed_end(time)
     end = 1.0 if fixed is None else fixed
     if not 0.0 <= t <= end:
         word = "the fraction 1 of the end" if fixed is None else f"the end {end:g}"

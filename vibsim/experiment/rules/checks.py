@@ -68,7 +68,17 @@ def _published_table(table: Any, scope: Scope) -> None:
         best = any(printed.level == "best" for printed, _ in rows)
         _check_value(row, table.quantity, best, scope)
     for j, name in enumerate(table.beside):
-        _beside(name, table, table.beside[:j], scope.at("beside", j))
+        place = scope.at("beside", j)
+        other = _known_value(name, place)
+        if name in table.beside[:j]:
+            place.refuse("a value must not be repeated", value=name)
+        if other is not None:
+            # it is of the quantity of the table where it is of one
+            choices = _allowed(other, scope.setting)
+            if choices and table.quantity not in choices:
+                rule = f"{name} is not known of the quantity of this table"
+                place.refuse(rule, "it is of " + ", ".join(choices), name)
+            _is_comparable(other, table.quantity, place)
     for printed, place in rows:
         if row is not None:
             check_place(row_at(printed), row, place)
@@ -76,20 +86,6 @@ def _published_table(table: Any, scope: Scope) -> None:
             check_scheme_and_case(row_at(printed), place)
         if table.quantity is not None:
             _has_quantity(table.quantity, [(printed.scheme, place.at("scheme"))])
-
-
-def _beside(name: str, table: Any, before: tuple[str, ...], scope: Scope) -> None:
-    """Check a further value, which is of the quantity of the table where it is of one."""
-    row = _known_value(name, scope)
-    if name in before:
-        scope.refuse("a value must not be repeated", value=name)
-    if row is None:
-        return
-    choices = _allowed(row, scope.setting)
-    if choices and table.quantity not in choices:
-        rule = f"{row.name} is not known of the quantity of this table"
-        scope.refuse(rule, "it is of " + ", ".join(choices), row.name)
-    _is_comparable(row, table.quantity, scope)
 
 
 def finish_checks(checks: Sequence[Any], setting: Setting, report: Report) -> tuple[Any, ...]:
@@ -151,40 +147,24 @@ def _check(check: Check, scope: Scope) -> None:
 def _quantity_of_schemes(name: str, key: str, schemes: Sequence[str] | None, scope: Scope) -> None:
     """Check that the quantity under a key of a check exists, and that the schemes which the check names have it."""
     if _is_quantity(name, scope.setting.quantities, scope.at(key)):
-        places = ((scheme, scope.at("schemes", i)) for i, scheme in enumerate(schemes or ()))
-        _has_quantity(name, places)
+        _has_quantity(name, ((s, scope.at("schemes", i)) for i, s in enumerate(schemes or ())))
 
 
 def _converges(check: ConvergesCheck, scope: Scope) -> None:
-    if is_error_part(check.converges):
-        _known_error_part(check.converges, scope.at("converges"))
-        _has_formal_order(check, scope)
-    else:
-        _quantity_of_schemes(check.converges, "converges", check.schemes, scope)
     _expect(check.expect, scope.at("expect"))
-
-
-def _known_error_part(name: str, scope: Scope) -> None:
-    model = scope.setting.model
-    if model is None or name in error_parts(model):
-        return
-    if has_error_parts(model):
-        scope.refuse("unknown quantity", nearest(name, error_parts(model)), name)
-        return
-    what = "events" if model.events is not None else "a force with corners"
-    rule = f"does not exist: {model.kind} has {what}, and only a smooth motion has a phase and an amplitude"
-    scope.refuse(rule, f"ask for {model.position}", name)
-
-
-def _has_formal_order(check: ConvergesCheck, scope: Scope) -> None:
-    """Check that the order of a part of an error is given as a number where theory knows none."""
-    model = scope.setting.model
-    if model is None or check.order != "scheme" or check.converges not in error_parts(model):
-        return
-    reason = why_not_free(model)
-    if reason:
+    name, model = check.converges, scope.setting.model
+    if not is_error_part(name):
+        _quantity_of_schemes(name, "converges", check.schemes, scope)
+    elif model is not None and name not in error_parts(model):
+        rule, hint = "unknown quantity", nearest(name, error_parts(model))
+        if not has_error_parts(model):
+            what = "events" if model.events is not None else "a force with corners"
+            rule = f"does not exist: {model.kind} has {what}, and only a smooth motion has a phase and an amplitude"
+            hint = f"ask for {model.position}"
+        scope.at("converges").refuse(rule, hint, name)
+    elif model is not None and check.order == "scheme" and (reason := why_not_free(model)):
         rule = (
-            f"theory knows the order of {check.converges} on linear models without forces in time only, and "
+            f"theory knows the order of {name} on linear models without forces in time only, and "
             f"{model.kind} {reason}"
         )
         place = scope.at("order" if "order" in check.model_fields_set else "converges")
@@ -204,7 +184,15 @@ def _expect(expect: Expect, scope: Scope) -> None:
 
 
 def _value(check: ValueCheck, scope: Scope) -> None:
-    _comparison(check, scope)
+    borders = ("equals", "below", "above")
+    if not any(scope.at(name).is_faulty for name in borders):
+        given = [name for name in borders if getattr(check, name) is not None]
+        if len(given) != 1:
+            found = " and ".join(given) or "none of them"
+            scope.refuse(f"must have exactly one of equals, below, above; has {found}")
+        for name in ("rtol", "atol"):
+            if getattr(check, name) is not None and "equals" not in given:
+                scope.at(name).refuse("is used with equals only", at_key=True)
     place = scope.at("at")
     row = _known_value(check.value, scope.at("value"))
     if row is None:
@@ -214,19 +202,6 @@ def _value(check: ValueCheck, scope: Scope) -> None:
     if check.quantity is not None and check.at.scheme is not None:
         _has_quantity(check.quantity, [(check.at.scheme, place.at("scheme"))])
     check_place(check.at, row, place)
-
-
-def _comparison(check: ValueCheck, scope: Scope) -> None:
-    names = ("equals", "below", "above")
-    if any(scope.at(name).is_faulty for name in names):
-        return
-    given = [name for name in names if getattr(check, name) is not None]
-    if len(given) != 1:
-        found = " and ".join(given) or "none of them"
-        scope.refuse(f"must have exactly one of equals, below, above; has {found}")
-    for name in ("rtol", "atol"):
-        if getattr(check, name) is not None and "equals" not in given:
-            scope.at(name).refuse("is used with equals only", at_key=True)
 
 
 def _equal(check: EqualCheck, scope: Scope) -> None:
@@ -243,27 +218,21 @@ def _equal(check: EqualCheck, scope: Scope) -> None:
         named.append((check.second, second))
         if check.first == check.second:
             second.refuse("must be another one than the first", value=check.second)
-    if _compared_quantity(check, scope.at("quantity")):
+    setting, what, choices = scope.setting, "", scope.setting.quantities
+    if check.second in SOLUTIONS and setting.model is not None:
+        what, choices = check.second, tuple(state.name for state in setting.model.states)
+        if check.second == "exact":
+            choices += ENERGIES
+            if _plain(check.quantity) in choices and setting.own_velocity:
+                choices += (check.quantity,)
+    if _is_quantity(check.quantity, choices, scope.at("quantity"), what):
         _has_quantity(check.quantity, named)
         if check.second == "exact":
             _known_exactly(check.quantity, check.second, second)
         elif check.second == "discrete":
             _known_by_theory(check.second, second)
-    if check.second == "discrete" and check.first in scope.setting.adaptive:
+    if check.second == "discrete" and check.first in setting.adaptive:
         first.refuse("has no steps of its own that theory could know", value=check.first)
-
-
-def _compared_quantity(check: EqualCheck, scope: Scope) -> bool:
-    """Check that a quantity exists, of the schemes or of the solution that a scheme is compared with."""
-    model = scope.setting.model
-    if check.second not in SOLUTIONS or model is None:
-        return _is_quantity(check.quantity, scope.setting.quantities, scope)
-    choices = tuple(state.name for state in model.states)
-    if check.second == "exact":
-        choices += ENERGIES
-        if _plain(check.quantity) in choices and scope.setting.own_velocity:
-            choices += (check.quantity,)
-    return _is_quantity(check.quantity, choices, scope, check.second)
 
 
 def _is_quantity(name: str, choices: tuple[str, ...], scope: Scope, what: str = "") -> bool:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import keyword
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,10 +15,9 @@ from vibsim.core.array_types import Floats
 from vibsim.experiment.data import TableSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.schema.fields import DECLARED, TABLE, Section
-from vibsim.experiment.schema.model_and_schemes import name_fault
 from vibsim.experiment.tables.file import ENDINGS, TableError, read
-from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import (
+    FUNCTIONS,
     MAX_CHARACTERS,
     ONE,
     Binary,
@@ -35,6 +36,7 @@ from vibsim.formula import (
 from vibsim.models import FormulaField, Model, tree
 from vibsim.models.oscillator import COULOMB
 
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 NONE = "none"
 """Stands for a term that is left out, where others have words as well."""
 AMPLITUDES = (-6, 8)
@@ -63,16 +65,9 @@ class Equation:
 def equation(
     section: Any, model: Model | None, swept: Collection[str], folder: Path, report: Report
 ) -> Equation:
-    """Check the section of a `model` of the registry, and fill in what it leaves out.
+    """Check the section of a `model` of the registry (None where it is malformed), and fill in what it leaves out.
 
-    Parameters
-    ----------
-    section
-        As pydantic read it; None where that found a fault.
-    swept
-        Dotted keys that the file sweeps.
-    folder
-        Where the paths of tables begin.
+    `swept` holds the dotted keys that the file sweeps; the paths of tables begin in `folder`.
     """
     if section is None or model is None:
         # what follows from formulas is known only with all of them
@@ -97,21 +92,22 @@ def _written(
 ) -> Equation:
     assert model.written is not None
     declared = _declared(section, model, report)
+    known = (*(own.name for own in model.parameters), *declared)
     texts: dict[str, str] = {}
     tables: dict[str, TableSpec] = {}
     for row in model.formulas:
         value = getattr(section, row.name)
-        path: Path_ = ("model", row.name)
         if isinstance(value, Section) and row.table is not None:
             table = _table(row, row.table, value, folder, report)
             tables |= {row.name: table} if table is not None else {}
         elif isinstance(value, Section):
             texts |= _term(row, value, parameters, report)
         elif value is None and row.name in section.model_fields_set:
-            report.add(path, "must be a formula, or a number", "leave the key out", at_key=True)
+            rule = "must be a formula, or a number"
+            report.add(("model", row.name), rule, "leave the key out", at_key=True)
         elif value == NONE and row.terms and NONE not in declared:
             continue
-        elif value is not None and _is_sound(value, row, model, declared, path, report):
+        elif value is not None and _is_sound(value, row, known, report):
             texts[row.name] = value.strip()
     if "exact" in texts and section.force is not None:
         rule = "must not be given together with exact, from which it follows"
@@ -188,16 +184,22 @@ def _check_length(model: Model) -> None:
 
 
 def _declared(section: Any, model: Model, report: Report) -> dict[str, float]:
-    taken = {state.name: f"the {state.long_name}" for state in model.states}
-    taken |= {"t": "the time"}
+    taken = {"t": "the time"}
+    taken |= {state.name: f"the {state.long_name}" for state in model.states}
     taken |= {row.name: f"the {row.description} of the model" for row in model.parameters}
     if any(row.terms and isinstance(getattr(section, row.name), Section) for row in model.formulas):
         taken["b"] = "the coefficient of the damping"
     found = {}
     for name, value in section.parameters.items():
-        fault = name_fault(name, taken)
+        fault = f"'{name}' is {taken[name]}" if name in taken else ""
+        if keyword.iskeyword(name):
+            fault = f"'{name}' is a word of the grammar of formulas and cannot be a name"
+        elif not _NAME.fullmatch(name):
+            fault = "a name must consist of letters, digits and _, and begin with a letter"
+        elif name in FUNCTIONS:
+            fault = f"'{name}' is a function"
         if fault:
-            report.add(("model", "parameters", name), fault, "choose another name", at_key=True)
+            report.add(("model", DECLARED, name), fault, "choose another name", at_key=True)
         else:
             found[name] = value
     return found
@@ -220,18 +222,11 @@ def _term(
     return {row.name: row.terms[word]}
 
 
-def _is_sound(
-    text: str,
-    row: FormulaField,
-    model: Model,
-    declared: Mapping[str, float],
-    path: Path_,
-    report: Report,
-) -> bool:
-    """Tell whether a formula can be read; note its fault otherwise."""
-    known = (*row.names, *(own.name for own in model.parameters), *declared)
+def _is_sound(text: str, row: FormulaField, known: Collection[str], report: Report) -> bool:
+    """Tell whether a formula of variables and some `known` parameters can be read; note its fault otherwise."""
+    path = ("model", row.name)
     try:
-        read_tree = parse(text, known)
+        read_tree = parse(text, (*row.names, *known))
     except ExpressionError as error:
         place = f" at character {error.position + 1}" if error.position < MAX_CHARACTERS else ""
         rule = f"{error.rule}{place}"

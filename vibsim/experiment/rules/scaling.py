@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from vibsim.experiment.data import Scaling, TimeSpec
 from vibsim.experiment.faults import Report
@@ -31,46 +30,40 @@ def characteristic(
 ) -> Numbers:
     """Return the dimensionless numbers of a run, with what leads back; as `given`, and a fault, where there are none.
 
-    Parameters
-    ----------
-    swept
-        The dotted keys of the sweep.
+    `swept` holds the dotted keys of the sweep.
     """
-    for key in swept:
-        if not key.startswith("schemes."):
-            rule = (
-                f"must not be given where {key} is swept: every member would have scales of its own"
-            )
-            report.add(("scaled",), rule, at_key=True)
-            return given
-    if model is None or given.time is None or not given.parameters:
+    key = next((key for key in swept if not key.startswith("schemes.")), "")
+    if key:
+        rule = f"must not be given where {key} is swept: every member would have scales of its own"
+        report.add(("scaled",), rule, at_key=True)
+    if key or model is None or given.time is None or not given.parameters:
         return given
+    found = _scaled(given, given.time, model)
+    if isinstance(found, Numbers):
+        return found
+    report.add(("scaled",), *found, at_key=True)
+    return given
+
+
+def _scaled(given: Numbers, time: TimeSpec, model: Model) -> Numbers | tuple[str, str]:
+    """Return the scaled numbers, or the rule that they break and what helps."""
     if model.scales is None or model.scales.parameters is None:
-        rule, hint = _refusal(model)
-        report.add(("scaled",), rule, hint, at_key=True)
-        return given
+        return _refusal(model)
     rows = {row.name: float(row.value) for row in scales(model, given.parameters, given.initial)}
     if not all(math.isfinite(value) and value > 0.0 for value in rows.values()):
-        rule = "the scales have no finite values with these parameters and initial values"
-        report.add(("scaled",), rule, at_key=True)
-        return given
+        return "the scales have no finite values with these parameters and initial values", ""
     found = scaled_parameters(model, given.parameters, given.initial)
     parameters = {name: float(value) for name, value in found.items()}
     initial = {name: value / rows[name] for name, value in given.initial.items()}
-    end = given.time.end / rows["t"]
-    if given.time.periods is not None:
-        end = float(natural_end(model, given.time.periods, parameters))
+    end = time.end / rows["t"]
+    if time.periods is not None:
+        end = float(natural_end(model, time.periods, parameters))
     if not (0.0 < end < math.inf and all(map(math.isfinite, initial.values()))):
-        report.add(("scaled",), "the scaled end or initial values are not finite", at_key=True)
-        return given
+        return "the scaled end or initial values are not finite", ""
     kept = Scaling(
-        scales=rows,
-        parameters=dict(given.parameters),
-        initial=dict(given.initial),
-        end=given.time.end,
+        scales=rows, parameters=dict(given.parameters), initial=dict(given.initial), end=time.end
     )
-    changed: dict[str, Any] = {"end": end}
-    return Numbers(parameters, initial, given.time.model_copy(update=changed), kept)
+    return Numbers(parameters, initial, time.model_copy(update={"end": end}), kept)
 
 
 def _refusal(model: Model) -> tuple[str, str]:
@@ -84,9 +77,7 @@ def _refusal(model: Model) -> tuple[str, str]:
         what = f"{rule} here: the numbers of its table have units, and stay what they are"
         return what, "leave it out, or write the table's curve as a formula"
     if model.formulas:
-        return (
-            f"{rule}: its spring has no stiffness at u = 0, by which time would be measured",
-            "leave it out",
-        )
+        why = "its spring has no stiffness at u = 0, by which time would be measured"
+        return f"{rule}: {why}", "leave it out"
     able = [row.kind for row in MODELS.values() if row.scales and row.scales.parameters]
     return rule, "choose from " + ", ".join(able)

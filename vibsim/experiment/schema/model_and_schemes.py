@@ -6,10 +6,8 @@ tolerance.
 
 from __future__ import annotations
 
-import keyword
 import math
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -30,6 +28,7 @@ from vibsim.experiment.schema.fields import (
     Line,
     MadeSection,
     Number,
+    Positive,
     Section,
     Text,
     by_shape,
@@ -40,9 +39,8 @@ from vibsim.experiment.schema.fields import (
     tagged,
 )
 from vibsim.experiment.schema.sweep import tolerance_name
-from vibsim.formula import FUNCTIONS
-from vibsim.models import FormulaField, Model
-from vibsim.schemes import AnyOption, Flag, NumberOption, Option, Scheme
+from vibsim.models import FormulaField, Model, Parameter
+from vibsim.schemes import SCHEMES, AnyOption, Flag, NumberOption, Option, Scheme
 from vibsim.schemes.base import EVENTS
 
 TOLERANCE = "tolerance"
@@ -73,18 +71,45 @@ def scheme_section(scheme: Scheme) -> type[Section]:
     return create_model(name, __base__=MadeSection, __doc__=doc, **fields)
 
 
-def _type(option: AnyOption, scheme: Scheme) -> Any:
+def _bounded(**bounds: float | None) -> Any:
+    """Return the type of a number within some of the bounds ``gt``, ``ge`` and ``le``."""
+    given: Any = {
+        name: end for name, end in bounds.items() if end is not None and math.isfinite(end)
+    }
+    return Annotated[float, Field(**given), FORMULA]
+
+
+def _parameter_type(row: Parameter) -> Any:
+    least = {"gt" if row.exclusive else "ge": row.minimum}
+    return _bounded(**least, le=row.maximum)
+
+
+def _option_type(option: AnyOption) -> Any:
     if isinstance(option, Option):
         return Literal[option.choices]
-    if isinstance(option, Flag):
-        return StrictBool
-    ends = {"ge": option.least, "le": option.most}
-    bounds: dict[str, Any] = {name: end for name, end in ends.items() if math.isfinite(end)}
-    value: Any = Annotated[float, Field(**bounds), FORMULA]
+    return StrictBool if isinstance(option, Flag) else _bounded(ge=option.least, le=option.most)
+
+
+def _type(option: AnyOption, scheme: Scheme) -> Any:
+    value: Any = _option_type(option)
     if not scheme.adaptive or option.name != TOLERANCE or not isinstance(option, NumberOption):
         return value
     several = Annotated[tuple[value, ...], Field(min_length=1), short(MAX_TOLERANCES)]
     return tagged({"one": value, "several": several}, Discriminator(_one_or_several))
+
+
+def sweep_types(model: Model | None, schemes: Iterable[tuple[str, str]]) -> dict[str, Any]:
+    """Return the type of everything that can be swept, by dotted key; `schemes` are pairs of a name and a kind."""
+    found: dict[str, Any] = {}
+    if model is not None:
+        for state in model.states if model.start is None else ():
+            found[f"initial.{state.name}"] = _bounded(ge=state.minimum)
+        found |= {f"model.{row.key}": _parameter_type(row) for row in model.parameters}
+    found["time.end"] = Positive
+    for name, kind in schemes:
+        for option in SCHEMES[kind].options_on(model):
+            found[f"schemes.{name}.{option.name}"] = _option_type(option)
+    return found
 
 
 def _one_or_several(value: Any) -> str:
@@ -109,7 +134,6 @@ def scheme_names(data: Any) -> Iterator[str]:
 
 
 MAX_DECLARED = 50
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
 def _as_text(value: Any) -> Any:
@@ -138,23 +162,6 @@ def _declared(names: Mapping[str, float]) -> Mapping[str, float]:
 Declared = Annotated[dict[str, Number], AfterValidator(_declared)]
 
 
-def name_fault(name: str, taken: Mapping[str, str]) -> str:
-    """Return what is wrong with the name of a declared parameter; empty for nothing.
-
-    Parameters
-    ----------
-    taken
-        Names that mean something already, with what they mean.
-    """
-    if keyword.iskeyword(name) or name in ("and", "or", "not", "if", "else"):
-        return f"'{name}' is a word of the grammar of formulas and cannot be a name"
-    if not _NAME.fullmatch(name):
-        return "a name must consist of letters, digits and _, and begin with a letter"
-    if name in FUNCTIONS:
-        return f"'{name}' is a function"
-    return f"'{name}' is {taken[name]}" if name in taken else ""
-
-
 def _formula_type(model: Model, field: FormulaField) -> Any:
     """Return what may stand for a formula: text, and beside it ``{word: coefficient}`` or ``{table: file}``."""
     name = f"{_class_name(model.kind)}{_class_name(field.name)}"
@@ -179,14 +186,9 @@ def model_section(model: Model) -> type[Section]:
     """Return the class of the section of a model."""
     fields: dict[str, Any] = {"kind": (Literal[model.kind], Field(description=model.title))}
     for row in model.parameters:
-        bound: dict[str, float] = {}
-        if row.minimum is not None:
-            bound = {"gt": row.minimum} if row.exclusive else {"ge": row.minimum}
-        if row.maximum is not None:
-            bound["le"] = row.maximum
         description = f"{row.description} [{row.unit}]"
-        number = Annotated[float, Field(**bound), FORMULA]
-        fields[row.name] = (number, Field(default=row.default, description=description))
+        told = Field(default=row.default, description=description)
+        fields[row.name] = (_parameter_type(row), told)
     for field in model.formulas:
         names = ", ".join((*field.names, "parameters"))
         words = f"{field.description}; a formula in {names}"

@@ -116,20 +116,13 @@ def claims(tables: Iterable[PublishedTable], source: str | None) -> tuple[ClaimC
 
 
 def _claim(table: PublishedTable, row: PublishedRow, id_: str, source: str | None) -> ClaimCheck:
-    number, half_unit = row.meaning
     places = [f"scheme {row.scheme}"]
     if row.level is not None:
         places.append("extrapolated" if row.level == "best" else f"level {row.level}")
     given = row.at.model_dump(exclude_none=True)
     places += [f"{name} {value:g}" for name, value in given.items()]
-    that = ValueCheck(
-        id=id_,
-        value=table.value,
-        quantity=table.quantity,
-        at=row_at(row),
-        equals=number,
-        atol=half_unit,
-    )
+    own = {"id": id_, "value": table.value, "quantity": table.quantity, "at": row_at(row)}
+    that = ValueCheck(**own, equals=row.meaning.number, atol=row.meaning.half_unit)
     return ClaimCheck(
         id=id_,
         claim=f"{table.title}: {', '.join(places)}: {row.printed}",

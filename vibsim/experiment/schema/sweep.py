@@ -117,12 +117,20 @@ Values = tuple[float, ...] | tuple[Text, ...] | Rule
 """Numbers, option words, or a rule that gives numbers."""
 
 
-class Draw(Section):
-    """Points scattered over a box."""
+class _Scattered(Section):
+    """How points are scattered over a box."""
 
     method: Method
+    """Latin hypercube, Sobol sequence (scrambled), or independent random numbers."""
     n: Count
+    """Number of points."""
     seed: Seed
+    """Whole number from which the points are drawn: the same ones every time."""
+
+
+class Draw(_Scattered):
+    """Points scattered over several keys, as used."""
+
     over: tuple[Interval, ...]
     """Least and largest value of every key."""
 
@@ -187,17 +195,11 @@ else:
     )
 
 
-class Sample(Section):
+class Sample(_Scattered):
     """Points scattered over several parameters, all of them one axis of the grid."""
 
     stand_ins = MappingProxyType({"method": "random", "n": 1, "seed": 0})
 
-    method: Method
-    """Latin hypercube, Sobol sequence (scrambled), or independent random numbers."""
-    n: Count
-    """Number of points."""
-    seed: Seed
-    """Whole number from which the points are drawn: the same ones every time."""
     over: Annotated[dict[str, Interval], Field(min_length=1)]
     """Least and largest value of every parameter, by dotted path."""
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import keyword
 import re
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from vibsim.core.errors import VibsimError
 from vibsim.formula import CONSTANTS, FUNCTIONS
@@ -39,8 +39,7 @@ class UnitError(VibsimError):
         return f"{self.rule}: {self.hint}" if self.hint else self.rule
 
 
-@dataclass(frozen=True)
-class Factor:
+class Factor(NamedTuple):
     """One name of a unit."""
 
     name: str
@@ -54,31 +53,19 @@ def split(text: str) -> tuple[str, str] | None:
     """
     depth, ends_value = 0, False
     for found in _TOKEN.finditer(text):
-        token, is_name = found.group(), found.lastgroup == "name"
-        if is_name and ends_value and depth == 0:
-            return None if _is_formula(token, text[found.end() :]) else _halves(text, found)
+        token = found.group()
+        if found.lastgroup == "name" and ends_value and depth == 0:
+            is_call = token in FUNCTIONS and text[found.end() :].lstrip().startswith("(")
+            if token in CONSTANTS or is_call or keyword.iskeyword(token):
+                return None
+            return text[: found.start()].strip(), text[found.start() :].strip()
         depth += (token == "(") - (token == ")")
         ends_value = found.lastgroup != "other" or token == ")"
     return None
 
 
-def _halves(text: str, found: re.Match[str]) -> tuple[str, str]:
-    return text[: found.start()].strip(), text[found.start() :].strip()
-
-
-def _is_formula(word: str, rest: str) -> bool:
-    is_call = word in FUNCTIONS and rest.lstrip().startswith("(")
-    return word in CONSTANTS or is_call or keyword.iskeyword(word)
-
-
 def factors(text: str) -> tuple[Factor, ...]:
-    """Return the names of a unit with their exponents.
-
-    Raises
-    ------
-    UnitError
-        Where the text is no unit.
-    """
+    """Return the names of a unit with their exponents; UnitError where the text is no unit."""
     if len(text) > MAX_UNIT:
         raise UnitError(f"a unit must have at most {MAX_UNIT} characters, has {len(text)}")
     found: list[Factor] = []

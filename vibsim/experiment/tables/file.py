@@ -6,13 +6,14 @@ A CSV file is UTF-8 text (`vibsim.experiment.tables.csv_text`). A netCDF file ha
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from vibsim.core import netcdf
-from vibsim.core.array_types import Floats, Integers
+from vibsim.core.array_types import Floats
 from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.experiment.data import ExperimentSpec
 from vibsim.experiment.schema.fields import TABLE
@@ -33,48 +34,21 @@ MOST_SHOWN = 40
 
 
 class TableError(ValueError):
-    """A table that is refused.
-
-    Parameters
-    ----------
-    key
-        The key of the section that is at fault: ``table``, or that of the name of a column.
-    rule, hint
-        The rule that is broken, and the nearest valid choice.
-    """
+    """A table that is refused: the key at fault (``table`` or that of a column), the rule, and the nearest choice."""
 
     def __init__(self, key: str, rule: str, hint: str = "") -> None:
         self.key, self.rule, self.hint = key, rule, hint
         super().__init__(rule)
 
 
-class _Columns(NamedTuple):
-    """The two columns of a file, and how its points are counted in messages."""
-
-    place: Floats
-    value: Floats
-    lines: Integers
-    """Line of every point in a text, else its index from 0."""
-    word: str
-    """``line`` or ``index``."""
-
-    def at(self, i: Any) -> str:
-        """Say where point number i stands."""
-        return f"{self.word} {self.lines[int(i)]}"
+_Columns = tuple[Floats, Floats, Callable[[Any], str]]
+"""Places and values, and what says where a point stands."""
 
 
 def read(path: Path, keys: tuple[str, str], names: tuple[str, str]) -> tuple[Table, str]:
-    """Return the table in the file at `path`, and the SHA-256 of its bytes.
+    """Return the table in the file at `path`, and the SHA-256 of its bytes; TableError where it is none.
 
-    Parameters
-    ----------
-    keys, names
-        Of the columns of places and values: the keys under which an experiment names them, and their names.
-
-    Raises
-    ------
-    TableError
-        Where it is none, or cannot be read.
+    Under `keys` an experiment gives the `names` of the columns of places and values.
     """
     content = _content(path)
     if names[0] == names[1]:
@@ -131,7 +105,7 @@ def _from_text(content: bytes, keys: tuple[str, str], names: tuple[str, str]) ->
             rule = f"line {error.line}: {cell}{what}{error.rule}{column}"
         raise TableError(TABLE, rule, error.hint) from None
     _check_count(len(lines))
-    return _Columns(place, value, lines, "line")
+    return place, value, lambda i: f"line {lines[i]}"
 
 
 def _found(names: list[str], name: str, key: str, word: str, *, is_told: bool = True) -> int:
@@ -157,7 +131,7 @@ def _from_netcdf(content: bytes, keys: tuple[str, str], names: tuple[str, str]) 
     if len(place) != len(value):
         rule = f"'{names[0]}' has {len(place)} points, '{names[1]}' has {len(value)}"
         raise TableError(TABLE, f"both variables must be of one dimension: {rule}")
-    return _Columns(place, value, np.arange(len(place)), "index")
+    return place, value, lambda i: f"index {i}"
 
 
 def _variable(dataset: Any, key: str, name: str) -> Floats:
@@ -185,17 +159,17 @@ def _check_count(points: int) -> None:
 
 
 def _table(columns: _Columns, names: tuple[str, str]) -> Table:
-    x, h = columns.place, columns.value
+    x, h, place_of = columns
     for name, values in zip(names, (x, h), strict=True):
         wrong = np.flatnonzero(~np.isfinite(values))
         if len(wrong):
-            rule = f"{columns.at(wrong[0])}: '{name}' is {values[wrong[0]]:g}, and must be finite"
+            rule = f"{place_of(wrong[0])}: '{name}' is {values[wrong[0]]:g}, and must be finite"
             raise TableError(TABLE, rule)
     falling = np.flatnonzero(np.diff(x) <= 0.0)
     if len(falling):
         i = int(falling[0])
         rule = f"'{names[0]}' must increase, but is {x[i]:.10g} and then {x[i + 1]:.10g}"
-        raise TableError(TABLE, f"{columns.at(i + 1)}: {rule}")
+        raise TableError(TABLE, f"{place_of(i + 1)}: {rule}")
     spacing = float(x[-1] - x[0]) / (len(x) - 1)
     if not 0.0 < spacing < np.inf:
         raise TableError(TABLE, f"'{names[0]}' must span a finite length")
@@ -207,7 +181,7 @@ def _table(columns: _Columns, names: tuple[str, str]) -> Table:
         i = min(int(odd[0] if len(odd) else np.argmax(np.abs(x - even))), len(gaps) - 1)
         rule = f"'{names[0]}' must be equally spaced, but is {gaps[i]:.10g} further than the point before"
         hint = f"the others are {usual:.10g} apart"
-        raise TableError(TABLE, f"{columns.at(i + 1)}: {rule}", hint)
+        raise TableError(TABLE, f"{place_of(i + 1)}: {rule}", hint)
     if x[0] > EVEN * spacing:
         rule = f"'{names[0]}' must begin at 0 or below, where the motion starts; it begins at {x[0]:.10g}"
         raise TableError(TABLE, rule)

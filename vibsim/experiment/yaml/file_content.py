@@ -14,34 +14,27 @@ MOST_BYTES = 2**26
 
 
 def read_bytes(path: Path) -> bytes:
-    """Return the content of the file at `path`.
+    """Return the content of the experiment file at `path`.
 
     Raises
     ------
     InputError
         When it cannot be read, is no regular file (a pipe, a device, a folder) or is too large.
     """
+    rule = f"must not be larger than {MAX_BYTES} bytes"
     try:
         content = content_of(path, MAX_BYTES)
+        if len(content) <= MAX_BYTES:
+            return content
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise _refusal(path, f"cannot be read ({reason})") from None
-    if len(content) > MAX_BYTES:
-        raise _refusal(path, f"must not be larger than {MAX_BYTES} bytes")
-    return content
+        rule = f"cannot be read ({getattr(error, 'strerror', None) or error})"
+    raise InputError([Fault(str(path), 0, "", "", rule)])
 
 
 def content_of(path: Path, most: int) -> bytes:
     """Return the content of the file at `path`, of a longer one `most` bytes and one more.
 
-    Raises
-    ------
-    OSError
-        When it cannot be read, or is no regular file.
+    OSError where it cannot be read, or is no regular file.
     """
     with regular_files.reading(path) as stream:
         return stream.read(most + 1)
-
-
-def _refusal(path: Path, rule: str) -> InputError:
-    return InputError([Fault(str(path), 0, "", "", rule)])

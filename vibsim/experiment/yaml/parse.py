@@ -2,6 +2,10 @@
 
 The tree is built from the parser's events, and its depth and size are bounded on the way: a small file can be deep, and
 a few aliases can stand for billions of nodes.
+
+Plain scalars follow the core schema of YAML 1.2: `1e-3`, `1.`, `.5` and `1E5` are numbers; `yes`, `no`, `on`, `off`,
+`1_000` and `1:30` are text; `0o10` is 8 and `0x10` is 16. `010`, which is 10 there and 8 in YAML 1.1, is refused.
+Source: YAML 1.2.2 (2021), section 10.3.2.
 """
 
 from __future__ import annotations
@@ -16,7 +20,6 @@ import yaml
 
 from vibsim.core.errors import Fault, InputError
 from vibsim.experiment.yaml.file_content import read_bytes
-from vibsim.experiment.yaml.scalars import is_ambiguous, resolve
 
 MAX_FAULTS = 1000
 MAX_ALIASES = 50
@@ -30,6 +33,18 @@ Path_ = tuple[str | int, ...]
 _NOT_PRINTABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """What YAML 1.2.2, section 5.1, does not allow in a file."""
 
+MAX_DIGITS = 1000
+"""Whole numbers of more digits are read as floats, i.e. as infinity, which is then refused."""
+
+_NULL = frozenset({"", "~", "null", "Null", "NULL"})
+_TRUE = frozenset({"true", "True", "TRUE"})
+_FALSE = frozenset({"false", "False", "FALSE"})
+_INTEGER = re.compile(r"[-+]?[0-9]+")
+_ZERO = re.compile(r"[-+]?0[0-9]")
+_OTHER_BASE = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
+_FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
+_INFINITY = re.compile(r"[-+]?\.(inf|Inf|INF)")
+_NAN = frozenset({".nan", ".NaN", ".NAN"})
 _INVALID = "is not valid YAML"
 _TAB = re.compile(" *\t")
 _Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -143,6 +158,22 @@ def _syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Fault:
     return Fault(file, line, "", "", _INVALID, problem)
 
 
+def resolve(text: str) -> str | int | float | bool | None:
+    """Return the value of a plain (unquoted) scalar."""
+    if text in _NULL:
+        return None
+    if text in _TRUE or text in _FALSE:
+        return text in _TRUE
+    is_short = len(text) <= MAX_DIGITS
+    if is_short and (_INTEGER.fullmatch(text) or _OTHER_BASE.fullmatch(text)):
+        return int(text, 0 if text[:2] in ("0o", "0x") else 10)
+    if _FLOAT.fullmatch(text) or _INTEGER.fullmatch(text):
+        return float(text)
+    if _INFINITY.fullmatch(text):
+        return float("-inf" if text[0] == "-" else "inf")
+    return float("nan") if text in _NAN else text
+
+
 class _Reader:
     """Builds the nodes of one document from the parser's events; no deeper than `MAX_DEPTH`."""
 
@@ -180,11 +211,12 @@ class _Reader:
             rule = "YAML tags are not allowed"
             self.note(Fault(self.file, _line(event), dotted(path), event.tag[:60], rule))
         if isinstance(event, yaml.ScalarEvent):
-            if not event.style and not is_key and is_ambiguous(event.value):
+            value = event.value if event.style else resolve(event.value)
+            is_number = not event.style and isinstance(value, int | float)
+            if is_number and not is_key and _ZERO.match(event.value):
                 rule = "a number must not begin with 0, which some read as octal"
                 hint = "leave the 0 out; octal numbers are written 0o10"
                 raise self.refuse(event, path, rule, event.value[:60], hint)
-            value = event.value if event.style else resolve(event.value)
             node = Node(value, _line(event), event.value)
         else:
             if depth >= MAX_DEPTH:
