@@ -8,7 +8,7 @@ import pytest
 
 from vibsim.formula import names_in, parse, to_formula
 from vibsim.formula.tree import Name
-from vibsim.models.shared.dimensions import DimensionError, over_scales, powers
+from vibsim.models.shared.linear_scales import DimensionError, over_scales, powers
 
 KNOWN = {"u": (0, 1, 0), "v": (0, 1, -1), "t": (0, 0, 1)}
 NAMES = ("k", "b", "A", "B", "w", "n", "t0", "a")

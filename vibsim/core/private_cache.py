@@ -67,17 +67,14 @@ def kept(
     folder = opened(kind)
     if folder is None:
         return make()
-
-    def found() -> Thing | None:
-        content = folder.read(name)
-        return None if content is None else load(content)
-
-    thing = found()
+    content = folder.read(name)
+    thing = None if content is None else load(content)
     if thing is not None:
         return thing
     with folder.held(name):
         # another one may have made it
-        thing = found()
+        content = folder.read(name)
+        thing = None if content is None else load(content)
         if thing is None:
             thing = make()
             content = dump(thing)
@@ -116,7 +113,7 @@ def opened(kind: str) -> Folder | None:
 
 @cache
 def _opened(place: Path, kind: str, user: int) -> Folder | None:
-    """Open the folder once for each process and user."""
+    # once for each process and user
     with suppress(OSError):
         return Folder(kind, _inside(place, kind))
     return None

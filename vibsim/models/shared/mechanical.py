@@ -34,14 +34,13 @@ from vibsim.formula import (
     values,
 )
 from vibsim.models.base import Damping, Model, Numbers, Parameter, State
-from vibsim.models.shared.dimensions import Powers
 from vibsim.models.shared.linear_motion import (
     exponentials,
     forced_motion,
     is_sum_of_exponentials,
     period,
 )
-from vibsim.models.shared.linear_scales import linear_scales, with_scaled_run
+from vibsim.models.shared.linear_scales import Powers, linear_scales, with_scaled_run
 from vibsim.models.shared.scales import Scales
 
 STATES = (State("u", "m", "displacement"), State("v", "m s-1", "velocity"))
