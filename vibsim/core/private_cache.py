@@ -129,7 +129,13 @@ def provided() -> Iterator[str]:
     from tempfile import TemporaryDirectory
 
     before = os.environ.get(VARIABLE)
-    reason = _problem()
+    reason = ""
+    try:
+        for kind in KINDS:
+            os.close(_inside(place(), kind))
+            check(place() / kind, writable=True)
+    except OSError as error:
+        reason = f"{error.filename}: {error.strerror}"
     try:
         if not reason:
             # a relative name would be another folder for processes that work elsewhere
@@ -143,17 +149,6 @@ def provided() -> Iterator[str]:
         os.environ.pop(VARIABLE)
         if before is not None:
             os.environ[VARIABLE] = before
-
-
-def _problem() -> str:
-    """Say why the user has no private cache; empty where there is one that can be written."""
-    try:
-        for kind in KINDS:
-            os.close(_inside(place(), kind))
-            check(place() / kind, writable=True)
-    except OSError as error:
-        return f"{error.filename}: {error.strerror}"
-    return ""
 
 
 @dataclass(frozen=True)

@@ -54,23 +54,18 @@ STATES = (
     State("vy", "1", "vertical velocity"),
 )
 BETA = Parameter(
-    *(
-        "beta",
-        0.9,
-        "1",
-        "length of the wire without load over that at rest; towards 1 the wire is stiff",
-    ),
+    "beta",
+    0.9,
+    "1",
+    "length of the wire without load over that at rest; towards 1 the wire is stiff",
     minimum=0.0,
     exclusive=True,
     maximum=0.999999,
 )
+LONGER = "initial stretch of the wire beyond its length at rest"
 START = (
     Parameter("Theta", 30.0, "degree", "initial angle of the wire", -180.0, maximum=180.0),
-    Parameter(
-        *("epsilon", 0.0, "1", "initial stretch of the wire beyond its length at rest"),
-        minimum=-1.0,
-        exclusive=True,
-    ),
+    Parameter("epsilon", 0.0, "1", LONGER, minimum=-1.0, exclusive=True),
 )
 DRAG = Parameter("gamma", 0.0, "1", "coefficient of the drag", minimum=0.0)
 EXACT = "exact solution x(t), from which forces then follow; the motion starts on it, without Theta and epsilon"
