@@ -7,7 +7,7 @@ from fractions import Fraction
 import pytest
 
 from vibsim.formula import Name, names_in, parse, to_formula
-from vibsim.models.shared.dimensions import DimensionError, over_scales, powers
+from vibsim.models.shared.linear_scales import DimensionError, over_scales, powers
 
 KNOWN = {"u": (0, 1, 0), "v": (0, 1, -1), "t": (0, 0, 1)}
 NAMES = ("k", "b", "A", "B", "w", "n", "t0", "a")

@@ -50,18 +50,18 @@ def _commands() -> Iterator[tuple[str, str, str, Sequence[_Row]]]:
     text = "results folder (default: results/ of the checkout)"
     results = _row("--results", _path, "DIR", text)
     files = _row("experiments", _word, "FILE", _NAMES, nargs="+")
-    text = "compare every result with its digest, also where size, time and inode are as they were"
-    yield (
-        *("run", "run.command", "Run experiments and show every verdict."),
-        (
-            results,
-            _row("experiments", _word, "EXPERIMENT", _NAMES, nargs="*"),
-            _row("--cores", _positive, "N", "jobs at once (default: all cores)"),
-            _flag("--dry-run", "show what would run and why"),
-            _flag("--verify", text),
-            _flag("--json", "print the outcome as JSON"),
-        ),
+    verify = (
+        "compare every result with its digest, also where size, time and inode are as they were"
     )
+    options: tuple[_Row, ...] = (
+        results,
+        _row("experiments", _word, "EXPERIMENT", _NAMES, nargs="*"),
+        _row("--cores", _positive, "N", "jobs at once (default: all cores)"),
+        _flag("--dry-run", "show what would run and why"),
+        _flag("--verify", verify),
+        _flag("--json", "print the outcome as JSON"),
+    )
+    yield "run", "run.command", "Run experiments and show every verdict.", options
     yield "check", "plan", "Validate experiment files, without running them.", (files,)
     text = "Show members, jobs, steps, memory, disk space and time of experiments before they run."
     yield "plan", "plan", text, (results, files, _flag("--json", "print the plans as JSON"))
@@ -81,17 +81,16 @@ def _commands() -> Iterator[tuple[str, str, str, Sequence[_Row]]]:
     perhaps = _row("experiment", _word, "EXPERIMENT", "experiment or FILE.yaml", nargs="?")
     folder = _row("--out", _path, "DIR", "folder to write to")
     several = "one level, or several to the places of the plan"
-    shard = _row("--shard", int, "K", "range of members (from 0)", default=0)
     place = "netCDF file to write (default: the place of the plan, unless it is made already)"
-    yield (
-        *("simulate", "jobs.simulate", "Simulate levels of an experiment."),
-        (
-            *(one, threads, *job),
-            _row("--level", int, "L", several, nargs="+", required=True),
-            shard,
-            _row("--out", _path, "FILE", place),
-        ),
+    options = (
+        one,
+        threads,
+        *job,
+        _row("--level", int, "L", several, nargs="+", required=True),
+        _row("--shard", int, "K", "range of members (from 0)", default=0),
+        _row("--out", _path, "FILE", place),
     )
+    yield "simulate", "jobs.simulate", "Simulate levels of an experiment.", options
     text = "Compare the levels of an experiment: convergence.nc and summary.json."
     yield "analyse", "jobs.analyse", text, (one, threads, *job, folder)
     text = "Extrapolate the solution of an experiment over all its levels: best.nc."

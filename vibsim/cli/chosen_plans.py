@@ -20,18 +20,9 @@ def resolve(experiment: Experiment) -> Experiment:
 
 
 def plans_of(words: Sequence[str], *, cached: bool = False) -> list[Plan]:
-    """Return the plans of the experiments that `words` name.
+    """Return the plans of files, experiments or collections; without `words` those of the default collections.
 
-    Parameters
-    ----------
-    words
-        Files, names of experiments or collections; none means the default collections.
-    cached
-        Whether plans that were made before will do.
-
-    Raises
-    ------
-    InputError
-        With every word that names nothing and the faults of all files.
+    With `cached`, plans that were made before will do. InputError with every word that names nothing and the faults of
+    all files.
     """
     return list(load_all(choose(words, checkout()), resolve, cached=cached).values())

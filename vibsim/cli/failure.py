@@ -39,8 +39,10 @@ def sentence(error: Exception) -> str:
         return f"not enough memory ({reason(error)})"
     if (isinstance(error, OSError) and error.errno) or netcdf.is_from_library(error):
         return reason(error)
-    text = "".join(traceback.format_exception(error))
-    return f"internal error, {_place(error)}: {reason(error)}; please report it {save_text(text)}"
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    place = f"{Path(last.filename).name}, line {last.lineno}"
+    text = save_text("".join(traceback.format_exception(error)))
+    return f"internal error, {place}: {reason(error)}; please report it {text}"
 
 
 def reason(error: BaseException) -> str:
@@ -61,12 +63,6 @@ def is_of_memory(error: BaseException) -> bool:
         return True
     cause = error.__cause__ or error.__context__
     return cause is not None and is_of_memory(cause)
-
-
-def _place(error: Exception) -> str:
-    """Name the line that raised an exception, from the folder of the package on."""
-    last = traceback.extract_tb(error.__traceback__)[-1]
-    return f"{Path(last.filename).name}, line {last.lineno}"
 
 
 def save_text(text: str) -> str:

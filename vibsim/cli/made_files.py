@@ -67,10 +67,15 @@ def load(results: Path, key: str) -> dict[str, Entry]:
         lines = _path(results, key).read_bytes().splitlines()
     except OSError:
         return found
-    for entries in map(_read, lines):
-        if "report.html" in entries:
-            found = {name: e for name, e in found.items() if not name.startswith(BESIDE)}
-        found |= entries
+    for line in lines:
+        try:
+            data = json.loads(line)
+        except (ValueError, RecursionError):
+            continue
+        if isinstance(data, dict) and all(map(_is_entry, data, data.values())):
+            if "report.html" in data:
+                found = {name: e for name, e in found.items() if not name.startswith(BESIDE)}
+            found |= {name: Entry(*values) for name, values in data.items()}
     return found
 
 
@@ -106,16 +111,6 @@ def _path(results: Path, key: str) -> Path:
 
 def _text(entries: Mapping[str, Entry]) -> str:
     return json.dumps(entries, separators=(",", ":"))
-
-
-def _read(line: bytes) -> dict[str, Entry]:
-    try:
-        data = json.loads(line)
-    except (ValueError, RecursionError):
-        return {}
-    if not isinstance(data, dict) or not all(map(_is_entry, data, data.values())):
-        return {}
-    return {name: Entry(*values) for name, values in data.items()}
 
 
 def _is_entry(name: str, values: Any) -> bool:

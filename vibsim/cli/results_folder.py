@@ -35,19 +35,17 @@ def check(results: Path, keys: Iterable[str]) -> None:
     """
     places = [results / name for name in (*_OURS, *keys)]
     with _naming():
-        strange = _strange({*places, *(place.parent for place in places)} - {results})
-        for place in places:
-            strange += [entry.path for entry in _entries(place, deep=True) if not _is_plain(entry)]
-    _refuse(strange)
+        found = (entry for place in places for entry in _entries(place, deep=True))
+        folders = {*places, *(place.parent for place in places)} - {results}
+        _refuse([*folders, *(entry for entry in found if not _is_plain(entry))])
 
 
 def check_folders(results: Path, key: str) -> None:
     """Refuse the same among the folders that the jobs of the experiment `key` write to."""
     folder = results / key
     with _naming():
-        strange = _strange([results / ".vibsim", folder.parent, folder])
-        strange += [entry.path for entry in _entries(folder) if not _is_plain(entry)]
-    _refuse(strange)
+        found = (entry for entry in _entries(folder) if not _is_plain(entry))
+        _refuse([results / ".vibsim", folder.parent, folder, *found])
 
 
 def clean(results: Path, keys: Iterable[str]) -> None:
@@ -72,12 +70,6 @@ def clean(results: Path, keys: Iterable[str]) -> None:
                     store.write_bytes(Path(entry), Path(entry).read_bytes())
 
 
-def _refuse(paths: Iterable[str]) -> None:
-    advice = "remove it, or choose another folder with --results"
-    if faults := [Fault(path, 0, "", "", _rule(path), advice) for path in paths]:
-        raise InputError(faults)
-
-
 _KINDS = {
     stat.S_IFLNK: "a symbolic link",
     stat.S_IFIFO: "a pipe",
@@ -87,19 +79,19 @@ _KINDS = {
 }
 
 
-def _rule(path: str) -> str:
-    """Say what a path is, and that it may not be."""
-    with _naming():
-        kind = _KINDS.get(stat.S_IFMT(os.lstat(path).st_mode), "no file and no folder")
-    return f"is {kind}, and vibsim writes to real files and folders only"
-
-
-def _strange(paths: Iterable[Path]) -> list[str]:
-    return [
-        str(path)
-        for path in paths
-        if path.is_symlink() or (path.exists() and not path.is_file() and not path.is_dir())
-    ]
+def _refuse(paths: Iterable[os.PathLike[str]]) -> None:
+    """Refuse those that are there, and neither a file nor a folder."""
+    advice = "remove it, or choose another folder with --results"
+    faults = []
+    for path in paths:
+        with suppress(FileNotFoundError, NotADirectoryError):
+            kind = stat.S_IFMT(os.lstat(path).st_mode)
+            if kind not in (stat.S_IFREG, stat.S_IFDIR):
+                told = _KINDS.get(kind, "no file and no folder")
+                rule = f"is {told}, and vibsim writes to real files and folders only"
+                faults.append(Fault(os.fspath(path), 0, "", "", rule, advice))
+    if faults:
+        raise InputError(faults)
 
 
 def _is_plain(entry: os.DirEntry[str]) -> bool:

@@ -67,17 +67,14 @@ def kept(
     folder = opened(kind)
     if folder is None:
         return make()
-
-    def found() -> Thing | None:
-        content = folder.read(name)
-        return None if content is None else load(content)
-
-    thing = found()
+    content = folder.read(name)
+    thing = None if content is None else load(content)
     if thing is not None:
         return thing
     with folder.held(name):
         # another one may have made it
-        thing = found()
+        content = folder.read(name)
+        thing = None if content is None else load(content)
         if thing is None:
             thing = make()
             content = dump(thing)
@@ -116,7 +113,7 @@ def opened(kind: str) -> Folder | None:
 
 @cache
 def _opened(place: Path, kind: str, user: int) -> Folder | None:
-    """Open the folder once for each process and user."""
+    # once for each process and user
     with suppress(OSError):
         return Folder(kind, _inside(place, kind))
     return None
@@ -132,7 +129,13 @@ def provided() -> Iterator[str]:
     from tempfile import TemporaryDirectory
 
     before = os.environ.get(VARIABLE)
-    reason = _problem()
+    reason = ""
+    try:
+        for kind in KINDS:
+            os.close(_inside(place(), kind))
+            check(place() / kind, writable=True)
+    except OSError as error:
+        reason = f"{error.filename}: {error.strerror}"
     try:
         if not reason:
             # a relative name would be another folder for processes that work elsewhere
@@ -146,17 +149,6 @@ def provided() -> Iterator[str]:
         os.environ.pop(VARIABLE)
         if before is not None:
             os.environ[VARIABLE] = before
-
-
-def _problem() -> str:
-    """Say why the user has no private cache; empty where there is one that can be written."""
-    try:
-        for kind in KINDS:
-            os.close(_inside(place(), kind))
-            check(place() / kind, writable=True)
-    except OSError as error:
-        return f"{error.filename}: {error.strerror}"
-    return ""
 
 
 @dataclass(frozen=True)

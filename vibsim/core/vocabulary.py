@@ -16,24 +16,13 @@ STATUSES: tuple[Status, ...] = get_args(Status)
 SEVERITY: Mapping[str, int] = MappingProxyType({"PASS": 0, "INCONCLUSIVE": 1, "FAIL": 2})
 """How bad each of `STATUSES` is, the mildest first."""
 
+_REASONS: Mapping[Status, str] = {
+    "PASS": "asymptotic exact match",
+    "FAIL": "order_low order_high mismatch wrong_limit unstable non_finite",
+    "INCONCLUSIVE": "pre_asymptotic round_off oscillating non_smooth too_few_levels not_applicable",
+}
 REASONS: Mapping[str, Status] = MappingProxyType(
-    {
-        "asymptotic": "PASS",
-        "exact": "PASS",
-        "match": "PASS",
-        "order_low": "FAIL",
-        "order_high": "FAIL",
-        "mismatch": "FAIL",
-        "wrong_limit": "FAIL",
-        "unstable": "FAIL",
-        "non_finite": "FAIL",
-        "pre_asymptotic": "INCONCLUSIVE",
-        "round_off": "INCONCLUSIVE",
-        "oscillating": "INCONCLUSIVE",
-        "non_smooth": "INCONCLUSIVE",
-        "too_few_levels": "INCONCLUSIVE",
-        "not_applicable": "INCONCLUSIVE",
-    }
+    {reason: status for status, words in _REASONS.items() for reason in words.split()}
 )
 """Every reason of a verdict, with the status that it belongs to."""
 REASON_NAMES = tuple(REASONS)

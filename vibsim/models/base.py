@@ -1,8 +1,7 @@
-"""What a model is: data about an equation of motion, its formulas as text or as trees.
+"""What a model is: data about an equation of motion, its formulas as text, or as trees where a user wrote them.
 
 A formula is no function, so that one statement of it serves every reader: the engine compiles it for each lane,
-Newton's method differentiates it, a report prints it. Models that are written down here give text; those that are made
-from the formulas of a user give trees (`vibsim.formula`).
+Newton's method differentiates it, a report prints it.
 """
 
 from __future__ import annotations

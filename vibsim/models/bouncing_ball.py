@@ -69,7 +69,11 @@ def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]
         left = np.where(e < 1, 1.0 - passed * (1.0 - e) / e, 1.0)
         number = np.where(e < 1, np.floor(np.log(left) / np.log(e)), np.floor(passed)) + 1.0
         number = np.where(left <= 0, np.inf, np.maximum(number, 1.0))
-        number = _settled(number, t, initial, parameters)
+        # logarithms may have missed the last impact up to t by one
+        sooner = impact_time(np.maximum(number, 1.0), initial, parameters) > t
+        number = np.where(sooner & (number > 1.0), number - 1.0, number)
+        later = impact_time(number + 1.0, initial, parameters) <= t
+        number = np.where(later, number + 1.0, number)
         since = t - impact_time(number, initial, parameters)
         rise = e**number * speed
         h, v = since * (rise - 0.5 * g * since), rise - g * since
@@ -81,14 +85,6 @@ def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]
     first = first | (t == 0)
     fall = initial["h"] + t * (initial["v"] - 0.5 * g * t)
     return {"h": np.where(first, fall, h), "v": np.where(first, initial["v"] - g * t, v)}
-
-
-def _settled(number: Any, t: Floats, initial: Numbers, parameters: Numbers) -> Any:
-    """Return the number of the last impact up to `t`, where logarithms may have missed it by one."""
-    sooner = impact_time(np.maximum(number, 1.0), initial, parameters) > t
-    number = np.where(sooner & (number > 1.0), number - 1.0, number)
-    later = impact_time(number + 1.0, initial, parameters) <= t
-    return np.where(later, number + 1.0, number)
 
 
 BOUNCING_BALL = Model(

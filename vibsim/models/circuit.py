@@ -97,6 +97,7 @@ def circuit(voltage: str, declared: tuple[str, ...], terms: frozenset[str]) -> M
         formulas=FORMULAS,
         written=written,
         scales=_scales,
+        output_scales=(("capacitor_voltage", "L*i_c/t_c"), ("source_voltage", "L*i_c/t_c")),
         optional=("R",),
         variant=partial(circuit, voltage, declared),
     )
@@ -105,9 +106,7 @@ def circuit(voltage: str, declared: tuple[str, ...], terms: frozenset[str]) -> M
 def _scales(forces: Forces) -> Scales | None:
     """Return the scales of the current, with the energy of the coil in place of that of a spring."""
     found = linear_scales(forces)
-    voltage = "L*i_c/t_c"
-    outputs = ("capacitor_voltage", voltage), ("source_voltage", voltage)
-    return found and replace(found, energy="L*i_c**2", outputs=outputs)
+    return found and replace(found, energy="L*i_c**2")
 
 
 CIRCUIT = replace(written({}, ()), equation="L i'' + R i' + i/C = V'(t)")

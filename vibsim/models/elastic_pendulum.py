@@ -62,26 +62,15 @@ BETA = Parameter(
     exclusive=True,
     maximum=0.999999,
 )
-ANGLE = Parameter(
-    "Theta", 30.0, "degree", "initial angle of the wire", minimum=-180.0, maximum=180.0
-)
-STRETCH = Parameter(
-    "epsilon",
-    0.0,
-    "1",
-    "initial stretch of the wire beyond its length at rest",
-    minimum=-1.0,
-    exclusive=True,
+LONGER = "initial stretch of the wire beyond its length at rest"
+START = (
+    Parameter("Theta", 30.0, "degree", "initial angle of the wire", -180.0, maximum=180.0),
+    Parameter("epsilon", 0.0, "1", LONGER, minimum=-1.0, exclusive=True),
 )
 DRAG = Parameter("gamma", 0.0, "1", "coefficient of the drag", minimum=0.0)
+EXACT = "exact solution x(t), from which forces then follow; the motion starts on it, without Theta and epsilon"
 FORMULAS = (
-    FormulaField(
-        "exact_x",
-        ("t",),
-        "0",
-        "exact solution x(t), from which forces then follow; the motion starts on it, without Theta and epsilon",
-        derivatives=2,
-    ),
+    FormulaField("exact_x", ("t",), "0", EXACT, derivatives=2),
     FormulaField("exact_y", ("t",), "0", "exact solution y(t) beside exact_x", derivatives=2),
 )
 
@@ -98,11 +87,6 @@ OUTPUTS = (
 )
 AIR = Output("drag_force", "1", "drag over the weight", f"(gamma/beta**2)*{SPEED}**2")
 EQUATION = "x'' = -beta T x/L{}, y'' = beta (T (1 - y)/L - 1){}, T = (L - beta)/(1 - beta), L = sqrt(x^2 + (1 - y)^2)"
-
-
-def natural_frequency(parameters: Numbers) -> Any:
-    """Return the angular frequency of small swings, ``sqrt(beta)``."""
-    return np.sqrt(parameters["beta"])
 
 
 def highest_frequency(parameters: Numbers) -> Any:
@@ -147,22 +131,20 @@ def elastic_pendulum(
 ) -> Model:
     """Return the elastic pendulum, with drag where `terms` has ``gamma``, off the vertical where it has ``Theta``."""
     is_dragged, formulas = "gamma" in terms, dict(texts)
-    own = (BETA, DRAG) if formulas else (BETA, ANGLE, STRETCH, DRAG)
+    own = (BETA, DRAG) if formulas else (BETA, *START, DRAG)
     parameters = (*own, *declared_parameters(declared))
     known = tuple(row.name for row in parameters)
-    names = (*(state.name for state in STATES), *known)
+    states = tuple(state.name for state in STATES)
     drags = [f" - (gamma/beta)*{SPEED}*{name}" if is_dragged else "" for name in ("vx", "vy")]
-    forces = [parse(text + drag, names) for text, drag in zip((ACROSS, UPWARD), drags, strict=True)]
-    followed = Manufactured(
-        positions=tuple(
-            parse(formulas.get(field.name, field.default), ("t", *known)) for field in FORMULAS
-        ),
-        texts=tuple(formulas.values()),
-        names=tuple(state.name for state in STATES),
-        parameters=parameters,
-    )
+    forces = [
+        parse(text + drag, (*states, *known))
+        for text, drag in zip((ACROSS, UPWARD), drags, strict=True)
+    ]
     more: dict[str, Any] = {"start": start}
     if formulas:
+        given = (formulas.get(field.name, field.default) for field in FORMULAS)
+        positions = tuple(parse(text, ("t", *known)) for text in given)
+        followed = Manufactured(positions, tuple(formulas.values()), states, parameters)
         pushes = followed.forces(forces)
         forces = [plus(force, push) for force, push in zip(forces, pushes, strict=True)]
         powers = (times(push, Name(v)) for push, v in zip(pushes, ("vx", "vy"), strict=True))
@@ -186,7 +168,7 @@ def elastic_pendulum(
         energy_unit="1",
         linear=False,
         conservative=not is_dragged and not formulas,
-        natural_frequency=natural_frequency,
+        natural_frequency=lambda parameters: np.sqrt(parameters["beta"]),
         highest_frequency=highest_frequency,
         outputs=(*OUTPUTS, AIR) if is_dragged else OUTPUTS,
         formulas=FORMULAS,

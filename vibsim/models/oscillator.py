@@ -47,24 +47,16 @@ COULOMB = "coulomb"
 TERMS = {"linear": "b*v", "quadratic": "b*abs(v)*v", COULOMB: "b*sign(v)"}
 UNITS = {"linear": "kg s-1", "quadratic": "kg m-1", COULOMB: "N"}
 
+PULLS = "force s(u) of the spring [N], positive where it pulls back"
+OPPOSES = "damping force f(v) [N], positive where it opposes v > 0"
+EXACT = "exact solution u(t) [m], from which the force then follows"
+POTENTIAL = "potential energy V(u) [J], where it cannot be found from the spring"
 FORMULAS = (
-    FormulaField(
-        "spring", ("u",), "u", "force s(u) of the spring [N], positive where it pulls back"
-    ),
-    FormulaField(
-        *("damping", ("v",), "0", "damping force f(v) [N], positive where it opposes v > 0"),
-        terms=TERMS,
-        term_units=UNITS,
-    ),
+    FormulaField("spring", ("u",), "u", PULLS),
+    FormulaField("damping", ("v",), "0", OPPOSES, terms=TERMS, term_units=UNITS),
     FormulaField("force", ("t",), "0", "driving force F(t) [N]"),
-    FormulaField(
-        *("exact", ("t",), "", "exact solution u(t) [m], from which the force then follows"),
-        derivatives=2,
-    ),
-    FormulaField(
-        *("potential", ("u",), ""),
-        "potential energy V(u) [J], where it cannot be found from the spring",
-    ),
+    FormulaField("exact", ("t",), "", EXACT, derivatives=2),
+    FormulaField("potential", ("u",), "", POTENTIAL),
 )
 
 

@@ -30,7 +30,6 @@ from vibsim.formula import (
 from vibsim.models.base import FormulaField, Model, Output, Parameter, declared_parameters
 from vibsim.models.shared.linear_scales import linear_scales
 from vibsim.models.shared.mechanical import Forces, mechanical
-from vibsim.models.shared.scales import Scales
 from vibsim.models.table import BEND, HEIGHT, Lookup
 
 PARAMETERS = (
@@ -90,12 +89,6 @@ def vehicle(
     damping = parse("b*v", ("v", *known)) if "b" in terms else ZERO
     damper = "b u' + " if "b" in terms else ""
 
-    def scales(forces: Forces) -> Scales | None:
-        # a table has numbers with units: there is no scaled equation with the same table
-        found = None if lookup else linear_scales(forces)
-        outputs = ("road_height", "u_c"), ("absolute_position", "u_c")
-        return found and replace(found, outputs=outputs)
-
     return mechanical(
         Forces(spring, damping, push, mass=Name("m")),
         parameters,
@@ -109,7 +102,9 @@ def vehicle(
         ),
         formulas=FORMULAS,
         written=written,
-        scales=scales,
+        # a table has numbers with units: there is no scaled equation with the same table
+        scales=(lambda _: None) if lookup else linear_scales,
+        output_scales=(("road_height", "u_c"), ("absolute_position", "u_c")),
         powers={"speed": (0, 1, -1)},
         optional=("b",),
         variant=lambda names: vehicle(texts, declared, names, lookup),

@@ -14,9 +14,7 @@ from functools import cache
 
 from vibsim.formula import parse
 from vibsim.models.base import Model, Output, Parameter
-from vibsim.models.shared.linear_scales import linear_scales
 from vibsim.models.shared.mechanical import Forces, mechanical
-from vibsim.models.shared.scales import Scales
 
 PARAMETERS = (
     Parameter("m", 1.0, "kg", "mass", minimum=0.0, exclusive=True),
@@ -44,16 +42,11 @@ def washing_machine(terms: frozenset[str]) -> Model:
         title="Washing machine with an unbalance",
         source="vibration text, section 10.4",
         equation=f"m u'' + {term}k u = unbalance speed^2 cos(speed t)",
-        scales=_scales,
+        output_scales=(("floor_force", "k*u_c"),),
         outputs=(Output("floor_force", "N", "force on the floor beside the weight", floor),),
         optional=("b",),
         variant=washing_machine,
     )
-
-
-def _scales(forces: Forces) -> Scales | None:
-    found = linear_scales(forces)
-    return found and replace(found, outputs=(("floor_force", "k*u_c"),))
 
 
 WASHING_MACHINE = replace(

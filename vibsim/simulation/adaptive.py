@@ -200,7 +200,7 @@ def solve(problem: Problem) -> Run:
     """Integrate a problem to its end, or as far as it goes."""
     from scipy import integrate as scipy_integrate
 
-    right, jacobian, count = _right_hand_side(problem)
+    right, jacobian = _right_hand_side(problem)
     more = {} if problem.kind == "dop853" else {"jac": jacobian}
     times: list[float] = [0.0]
     found: list[Any] = []
@@ -226,26 +226,21 @@ def solve(problem: Problem) -> Run:
             if going and solver.status != "failed":
                 found.append(solver.dense_output())
                 times.append(float(solver.t))
-    return Run(times, found, count(), len(problem.initial))
+    return Run(times, found, solver.nfev, len(problem.initial))
 
 
-def _right_hand_side(
-    problem: Problem,
-) -> tuple[Callable[..., Any], Callable[..., Any], Callable[[], int]]:
-    """Return the derivative of (u, v), that derivative's own derivative, and what counts the forces."""
+def _right_hand_side(problem: Problem) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """Return the derivative of (u, v), and that derivative's own derivative."""
     acceleration, slopes = _forces(problem.model)
     half, lookup = problem.model.coordinates, problem.model.lookup
     # what is looked up stands behind the parameters (`vibsim.engine.formulas`)
     p: tuple[Any, ...] = (*problem.parameters, *([lookup.table.rows] if lookup else []))
-    evaluations = 0
 
     def halves(y: Floats) -> tuple[Any, Any]:
         numbers = tuple(y.tolist())
         return (numbers[0], numbers[1]) if half == 1 else (numbers[:half], numbers[half:])
 
     def right(t: float, y: Floats) -> tuple[float, ...]:
-        nonlocal evaluations
-        evaluations += 1
         u, v = halves(y)
         a: Any = acceleration(u, v, float(t), p)
         return (v, a) if half == 1 else (*v, *a)
@@ -255,7 +250,7 @@ def _right_hand_side(
         by_u, by_v = np.reshape(slopes(u, v, float(t), p), (2, half, half))
         return np.block([[np.zeros((half, half)), np.eye(half)], [by_u, by_v]])
 
-    return right, jacobian, lambda: evaluations
+    return right, jacobian
 
 
 @cache

@@ -13,19 +13,18 @@ from vibsim.core.lazy import loader
 
 if TYPE_CHECKING:
     from vibsim.store.atomic import replacing, write_bytes, write_text
-    from vibsim.store.reading import Level, check, join, open_level, read
+    from vibsim.store.reading import check, join, open_level, read
     from vibsim.store.summary import read_json, write_json
     from vibsim.store.writing import write, write_parts
 
 _NAMES = {
     "atomic": ("replacing", "write_bytes", "write_text"),
-    "reading": ("Level", "check", "join", "open_level", "read"),
+    "reading": ("check", "join", "open_level", "read"),
     "summary": ("read_json", "write_json"),
     "writing": ("write", "write_parts"),
 }
 
 __all__ = [
-    "Level",
     "check",
     "join",
     "open_level",

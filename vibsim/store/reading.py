@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.core import netcdf
 from vibsim.core.errors import DamagedFileError
@@ -106,7 +105,10 @@ def _read_variable(variable: Any, cases: slice, group: str) -> Variable:
     wanted = tuple(cases if dim == "case" else slice(None) for dim in dims)
     values = np.asarray(variable[wanted] if dims else variable[...])
     if attrs.pop("_Encoding", None):
-        dims, values = dims[:-1], _texts(values)
+        # texts in a type that does not depend on which of them are read
+        width = values.shape[-1]
+        joined = np.ascontiguousarray(values).view(f"S{width}").reshape(values.shape[:-1])
+        dims, values = dims[:-1], np.char.decode(joined, "utf-8").astype(f"U{width}")
     return Variable(tuple(dims), values, attrs, group)
 
 
@@ -116,13 +118,6 @@ def _unpack(value: Any) -> Attribute:
         return numbers
     plain: Attribute = value.item() if isinstance(value, np.generic) else value
     return plain
-
-
-def _texts(values: NDArray[Any]) -> NDArray[Any]:
-    """Return the texts in a type that does not depend on which of them are read."""
-    width = values.shape[-1]
-    joined = np.ascontiguousarray(values).view(f"S{width}").reshape(values.shape[:-1])
-    return np.char.decode(joined, "utf-8").astype(f"U{width}")
 
 
 @dataclass

@@ -57,13 +57,13 @@ def _run(options: Namespace) -> int:
         ended = snakemake.run(plans, results, held, arguments, progress)
         if ended.jobs:
             _refuse_edited(plans, options)
-        findings = [outcome.collect(plan, results) for plan in plans]
+        summaries = [outcome.collect(plan, results) for plan in plans]
         progress.clear()
         jobs.extend(ended.jobs)
         changes.settle(plans, results, (path for job in ended.jobs for path in job.outputs))
         if not _tell_deleted(results):
             break
-    return _show(options, findings, ended, results, bool(jobs))
+    return _show(options, summaries, ended, results, bool(jobs))
 
 
 def _clear(plans: Sequence[Plan], results: Path, every: bool) -> None:
@@ -140,30 +140,25 @@ def _check(ended: snakemake.Outcome) -> None:
 
 def _show(
     options: Namespace,
-    findings: list[outcome.Finding],
+    summaries: list[outcome.Entry],
     ended: snakemake.Outcome,
     results: Path,
     worked: bool,
 ) -> int:
     _check(ended)
-    failures = []
-    for job in ended.failed:
-        log = results / job.log
-        # a job on a full disk cannot say so in its log
-        end = outcome.tail(log) or resources.obstacle(results)
-        failures.append(outcome.Failure(str(job), str(log), end))
+    failures = [outcome.failed_job(str(job), results / job.log, results) for job in ended.failed]
     has_index = not failures or _write_index(results)
     if options.json:
-        print(outcome.as_json(findings, failures, results))
+        print(outcome.as_json(summaries, failures, results))
     else:
         if not worked:
             print("nothing to do: all results are up to date\n")
         # what goes to a file is not cut
         columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else 10_000
-        print(*outcome.as_text(findings, failures, columns), sep="\n")
+        print(*outcome.as_text(summaries, failures, columns), sep="\n")
         if has_index:
             print(f"report: {results / 'index.html'}")
-    return 0 if outcome.status(findings, failures) == "PASS" else 1
+    return 0 if outcome.status(summaries, failures) == "PASS" else 1
 
 
 def _write_index(results: Path) -> bool:

@@ -1,127 +1,93 @@
-"""What a run has found: every experiment and every check, as a table or as JSON."""
+"""What a run found: status, reason and sentence of every check, as a table or as JSON."""
 
 from __future__ import annotations
 
 import json
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from vibsim.cli import results_folder
+from vibsim.cli import resources, results_folder
 from vibsim.core.errors import FileError
 from vibsim.core.vocabulary import FORMAT, worst
 from vibsim.plan import Plan
 from vibsim.store import read_json
 
 _LOG_LINES = 12
+Entry = Mapping[str, Any]
+"""The summary of an experiment, one without checks and with an ``error`` where it has none; or a failed job."""
 
 
-@dataclass(frozen=True)
-class Failure:
-    """A job that failed, with the end of its log."""
-
-    job: str
-    log: str
-    tail: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Finding:
-    """The summary of an experiment, or why there is none."""
-
-    plan: Plan
-    summary: Mapping[str, Any] | None
-    problem: str
-
-    @property
-    def status(self) -> str:
-        """Status of the whole experiment; one without a summary has failed."""
-        return str(self.summary["status"]) if self.summary else "FAIL"
-
-
-def collect(plan: Plan, results: Path) -> Finding:
+def collect(plan: Plan, results: Path) -> Entry:
     """Read the summary of an experiment; delete one that is damaged or outdated."""
     path = results / plan.summary
-    if not path.is_file():
-        return Finding(plan, None, "did not finish: it has no summary")
-    try:
-        return Finding(plan, read_json(path, digest=plan.analysis, name=plan.key), "")
-    except FileError as error:
-        results_folder.delete(error, results)
-        return Finding(plan, None, f"summary.json: {error.reason}")
-
-
-def tail(path: Path) -> tuple[str, ...]:
-    """Return the last lines of a log."""
-    try:
-        lines = path.read_text(errors="replace").splitlines()
-    except OSError:
-        return ()
-    return tuple(line for line in lines if line.strip())[-_LOG_LINES:]
-
-
-def status(findings: Sequence[Finding], failures: Sequence[Failure]) -> str:
-    """Return the status of the whole run: PASS where every check passed and every job ended well."""
-    return worst([finding.status for finding in findings] + ["FAIL"] * bool(failures))
-
-
-def as_json(findings: Sequence[Finding], failures: Sequence[Failure], results: Path) -> str:
-    """Return the outcome as JSON text."""
-    content = {
-        "vibsim_format": FORMAT,
-        "status": status(findings, failures),
-        "results": str(results),
-        "experiments": [_entry(finding) for finding in findings],
-        "failed_jobs": [asdict(failure) for failure in failures],
-    }
-    return json.dumps(content, indent=1, ensure_ascii=False)
-
-
-def _entry(finding: Finding) -> dict[str, Any]:
-    if finding.summary is not None:
-        return dict(finding.summary)
-    plan = finding.plan
+    problem = "did not finish: it has no summary"
+    if path.is_file():
+        try:
+            return read_json(path, digest=plan.analysis, name=plan.key)
+        except FileError as error:
+            results_folder.delete(error, results)
+            problem = f"summary.json: {error.reason}"
     return {
         "collection": plan.collection,
         "experiment": plan.name,
         "title": plan.title,
-        "status": finding.status,
+        "status": "FAIL",
         "checks": [],
         "failures": [],
-        "error": finding.problem,
+        "error": problem,
     }
 
 
-def as_text(
-    findings: Sequence[Finding], failures: Sequence[Failure], columns: int
-) -> Iterator[str]:
+def failed_job(job: str, log: Path, results: Path) -> Entry:
+    """Return a job that failed, with the end of its log."""
+    try:
+        lines = log.read_text(errors="replace").splitlines()
+    except OSError:
+        lines = []
+    tail = [line for line in lines if line.strip()][-_LOG_LINES:]
+    # a job on a full disk cannot say so in its log
+    return {"job": job, "log": str(log), "tail": tail or resources.obstacle(results)}
+
+
+def status(summaries: Sequence[Entry], failures: Sequence[Entry]) -> str:
+    """Return the status of the whole run: PASS where every check passed and every job ended well."""
+    return worst([entry["status"] for entry in summaries] + ["FAIL"] * bool(failures))
+
+
+def as_json(summaries: Sequence[Entry], failures: Sequence[Entry], results: Path) -> str:
+    """Return the outcome as JSON text."""
+    content = {
+        "vibsim_format": FORMAT,
+        "status": status(summaries, failures),
+        "results": str(results),
+        "experiments": summaries,
+        "failed_jobs": failures,
+    }
+    return json.dumps(content, indent=1, ensure_ascii=False)
+
+
+def as_text(summaries: Sequence[Entry], failures: Sequence[Entry], columns: int) -> Iterator[str]:
     """Yield the lines of the table, the failed jobs and the count of all checks.
 
-    Parameters
-    ----------
-    findings, failures
-        What was found.
-    columns
-        Width of the terminal: a check that passed has one line, any other its whole text.
+    The terminal has so many `columns`: a check that passed has one line, any other its whole text.
     """
-    for finding in findings:
-        yield f"{finding.plan.key}  {finding.status}"
-        if finding.summary is None:
-            yield f"  {finding.problem}"
-        else:
-            yield from _checks(finding.summary["checks"], columns)
+    for entry in summaries:
+        yield f"{entry['collection']}/{entry['experiment']}  {entry['status']}"
+        yield from (
+            [f"  {entry['error']}"] if "error" in entry else _checks(entry["checks"], columns)
+        )
     for failure in failures:
-        yield f"\nfailed: {failure.job} (log: {failure.log})"
-        yield from (f"  {line}" for line in failure.tail)
-    checks = [check["status"] for f in findings if f.summary for check in f.summary["checks"]]
-    counted = "1 experiment" if len(findings) == 1 else f"{len(findings)} experiments"
+        yield f"\nfailed: {failure['job']} (log: {failure['log']})"
+        yield from (f"  {line}" for line in failure["tail"])
+    checks = [check["status"] for entry in summaries for check in entry["checks"]]
+    counted = "1 experiment" if len(summaries) == 1 else f"{len(summaries)} experiments"
     passed = f"{checks.count('PASS')} of {len(checks)} checks passed"
-    yield f"\n{counted}, {passed}: {status(findings, failures)}"
+    yield f"\n{counted}, {passed}: {status(summaries, failures)}"
 
 
-def _checks(checks: Sequence[Mapping[str, Any]], columns: int) -> Iterator[str]:
+def _checks(checks: Sequence[Entry], columns: int) -> Iterator[str]:
     fields = ("status", "reason", "id")
     rows = [[str(check[field] or "") for field in fields] for check in checks]
     widths = [max(len(row[i]) for row in rows) for i in range(3)]

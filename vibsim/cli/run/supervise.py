@@ -62,7 +62,7 @@ def supervised(work: Work) -> int:
 
 def children_end_with_this() -> None:
     """Have the commands that this process starts from now on end with it."""
-    os.environ[_PARENT] = str(os.getpid())
+    os.environ.update(environment())
 
 
 def environment() -> dict[str, str]:

@@ -91,7 +91,7 @@ def damped_motion(
     return np.asarray(u_0 * rest + v_0 * odd), np.asarray(v_0 * kick - stiffness * u_0 * odd)
 
 
-def exponentials(node: Expression, numbers: Mapping[str, Any], time: str = "t") -> list[Term]:
+def exponentials(node: Expression, numbers: Mapping[str, Any]) -> list[Term]:
     """Return the pairs of C and s of a formula in the time that is a sum of exponentials, from values of other names.
 
     Raises
@@ -99,26 +99,26 @@ def exponentials(node: Expression, numbers: Mapping[str, Any], time: str = "t") 
     ValueError
         Where the formula is no such sum (see `is_sum_of_exponentials`).
     """
-    if time not in names_in(node):
+    if "t" not in names_in(node):
         return [(values(node, numbers) + 0j, 0j)]
     match node:
         case Negate(operand):
-            return [(-c, s) for c, s in exponentials(operand, numbers, time)]
+            return [(-c, s) for c, s in exponentials(operand, numbers)]
         case Binary("+" | "-" as sign, left, right):
-            rest = [(c if sign == "+" else -c, s) for c, s in exponentials(right, numbers, time)]
-            return [*exponentials(left, numbers, time), *rest]
+            rest = [(c if sign == "+" else -c, s) for c, s in exponentials(right, numbers)]
+            return [*exponentials(left, numbers), *rest]
         case Binary("*", left, right):
-            return _product(exponentials(left, numbers, time), exponentials(right, numbers, time))
-        case Binary("/", left, right) if time not in names_in(right):
+            return _product(exponentials(left, numbers), exponentials(right, numbers))
+        case Binary("/", left, right) if "t" not in names_in(right):
             divisor = values(right, numbers)
-            return [(c / divisor, s) for c, s in exponentials(left, numbers, time)]
+            return [(c / divisor, s) for c, s in exponentials(left, numbers)]
         case Binary("**", base, exponent) if _is_small_power(exponent):
-            factor, found = exponentials(base, numbers, time), [(1.0 + 0j, 0j)]
+            factor, found = exponentials(base, numbers), [(1.0 + 0j, 0j)]
             for _ in range(int(literal(exponent) or 0)):
                 found = _product(found, factor)
             return found
         case Call("sin" | "cos" | "exp" | "sinh" | "cosh" as function, (argument,)):
-            return _of_function(function, argument, numbers, time)
+            return _of_function(function, argument, numbers)
     raise ValueError("no sum of exponentials")
 
 
@@ -133,13 +133,11 @@ def _product(one: list[Term], other: list[Term]) -> list[Term]:
     return [(a * b, p + q) for a, p in one for b, q in other]
 
 
-def _of_function(
-    function: str, argument: Expression, numbers: Mapping[str, Any], time: str
-) -> list[Term]:
-    speed = derivative(argument, time)
-    if time in names_in(speed):
+def _of_function(function: str, argument: Expression, numbers: Mapping[str, Any]) -> list[Term]:
+    speed = derivative(argument, "t")
+    if "t" in names_in(speed):
         raise ValueError("no sum of exponentials")
-    start = values(argument, {**numbers, time: 0.0})
+    start = values(argument, {**numbers, "t": 0.0})
     rate = values(speed, numbers)
     if function == "exp":
         return [(np.exp(start) + 0j, rate + 0j)]
@@ -151,11 +149,11 @@ def _of_function(
     return [(0.5 * turned, 1j * rate), (0.5 * np.conj(turned), -1j * rate)]
 
 
-def is_sum_of_exponentials(node: Expression, time: str = "t") -> bool:
+def is_sum_of_exponentials(node: Expression) -> bool:
     """Tell whether `exponentials` can write a formula, whatever the values of its other names."""
-    others = {name: 0.5 for name in names_in(node) if name != time}
+    others = {name: 0.5 for name in names_in(node) if name != "t"}
     try:
-        exponentials(node, others, time)
+        exponentials(node, others)
     except ValueError:
         return False
     return True

@@ -7,7 +7,7 @@ everything else that follows from them; it may say more about itself than follow
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -33,15 +33,14 @@ from vibsim.formula import (
     times,
     values,
 )
-from vibsim.models.base import Damping, Model, Numbers, Parameter, State
-from vibsim.models.shared.dimensions import Powers
+from vibsim.models.base import Damping, Formula, Model, Numbers, Parameter, State
 from vibsim.models.shared.linear_motion import (
     exponentials,
     forced_motion,
     is_sum_of_exponentials,
     period,
 )
-from vibsim.models.shared.linear_scales import linear_scales, with_scaled_run
+from vibsim.models.shared.linear_scales import Powers, linear_scales, with_scaled_run
 from vibsim.models.shared.scales import Scales
 
 STATES = (State("u", "m", "displacement"), State("v", "m s-1", "velocity"))
@@ -103,6 +102,7 @@ def mechanical(
     parameters: tuple[Parameter, ...],
     *,
     scales: Callable[[Forces], Scales | None] = linear_scales,
+    output_scales: tuple[tuple[str, Formula], ...] = (),
     powers: Mapping[str, Powers] | None = None,
     **more: Any,
 ) -> Model:
@@ -114,6 +114,8 @@ def mechanical(
         Every parameter, in the order of the engine.
     scales
         From the forces, where they are others than those of a linear spring.
+    output_scales
+        Scales of the outputs, where there are others.
     powers
         The powers of mass, position and time of parameters, where the forces alone do not tell them.
     more
@@ -156,7 +158,8 @@ def mechanical(
         "dissipation": times(forces.damping, velocity) if forces.is_damped else None,
         "driving": times(forces.force, velocity) if forces.is_driven else None,
         "exact": _linear_motion(forces, numbers),
-        "scales": own and with_scaled_run(own, forces, parameters, powers or {}),
+        "scales": own
+        and with_scaled_run(replace(own, outputs=output_scales), forces, parameters, powers or {}),
         "exact_period": exact_period if is_free and forces.is_linear else None,
     }
     if forces.known_damping is not None:
