@@ -1,7 +1,7 @@
 """What was measured of a convergence, and what to change in the YAML: a sentence and an advice for every diagnosis.
 
 A diagnosis is the reason of a verdict, made finer by the cause where one is known. Templates are filled from the
-attributes and phrases of an `OrderText`.
+attributes and phrases of an `_Phrases`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from vibsim.checks.order_context import OrderContext
-from vibsim.checks.sentences import Description, Found, Template, growth_in_words
+from vibsim.checks.sentences import Description, Found, Template
 from vibsim.convergence.thresholds import HALF_SPACING
 from vibsim.schemes.base import is_on_the_mesh
 
@@ -34,13 +34,11 @@ Words = Mapping[str, tuple[str, str]]
 """Diagnosis to the templates of sentence and advice."""
 
 START_FINER = "Start `levels:` at {first_good} or finer ({cost_of_first}), or shorten `time: end`."
-TOO_COARSE = "The step is still too coarse to tell"
-NOTHING_SHOWN = "differences between levels do not show the error of {what}"
 CANNOT_SHOW = "{subject} cannot show order {expected}, because "
 ON_MESH = "Set `events: located` for scheme {scheme}."
 ON_TABLE = (
-    "Choose steps in `time:` that end at every point of the table: at the coarsest level, dt is its spacing over the "
-    "speed, or a whole part of that."
+    "Choose steps in `time:` that end at every point of the table: the coarsest dt is its spacing over the speed, or a "
+    "whole fraction of it."
 )
 
 NOT_FINITE = "The calculation of {what} met a number that is not finite{place}."
@@ -55,8 +53,7 @@ DIAGNOSES: Words = {
         "",
     ),
     "wrong_limit": (
-        "The levels of {what} approach each other, but not the exact solution. The error that remains is larger than "
-        "their differences allow.",
+        "The levels of {what} approach each other, but not the exact solution: too large an error remains.",
         "Check `model:` and `initial:` against the equation that you mean: finer levels will not help.",
     ),
     "unstable, beyond the limit": (
@@ -75,13 +72,10 @@ DIAGNOSES: Words = {
     ),
     "non_finite, always": (
         NOT_FINITE,
-        "End the time interval (`time: end`) before t = {singular:4}, or check the formulas of `model:`: finer "
-        "levels will not help where the motion escapes, or a formula has no finite value.",
+        "End the time interval (`time: end`) before t = {singular:4}, or check the formulas of `model:`: finer levels "
+        "will not help where the motion escapes, or a formula has no finite value.",
     ),
-    "non_finite": (
-        NOT_FINITE,
-        START_FINER,
-    ),
+    "non_finite": (NOT_FINITE, START_FINER),
     "round_off": (
         "The differences of {what} have reached the floor of round-off, where they say nothing about the "
         "scheme{before_round_off}.",
@@ -106,13 +100,11 @@ DIAGNOSES: Words = {
         "{add_missing}.",
     ),
     "not_applicable, adaptive": (
-        "Scheme {scheme} is adaptive: it chooses its own steps, whatever the level, so an order of {what} does not "
-        "exist.",
+        "Scheme {scheme} is adaptive: it chooses its own steps at every level, so {what} has no order.",
         "Name schemes with a fixed step (`schemes:`), or ask for its error with a `value:` check.",
     ),
     "not_applicable, still": (
-        "{subject} does not change after the start, or too little for an error to show: the levels agree whatever "
-        "the scheme does, and there is nothing to judge.",
+        "{subject} does not change after the start, or too little for an error to show. There is nothing to judge.",
         "Choose `initial:` values, a force or a `time: end` with which {what} moves from one common time to the next.",
     ),
     "not_applicable": (
@@ -120,35 +112,29 @@ DIAGNOSES: Words = {
         "Choose a quantity (`converges:`) that this model and scheme have.",
     ),
     "pulse": (
-        "Near t = {pulse[0]} the force has a pulse of length {pulse[1]:1} or so{within_pulse}, which lies "
-        "between two points of every level (the shortest step is {shortest:2}). No level sees it, so the "
-        + NOTHING_SHOWN
-        + ".",
+        "Near t = {pulse[0]} the force has a pulse of length {pulse[1]:1} or so{within_pulse}, between two points of "
+        "every level (the shortest step is {shortest:2}). No level sees it, and differences do not show the error.",
         "Use steps that are shorter than the pulse, from level {level_of_pulse} on, write a wider pulse of the same "
         "impulse, or end the time interval (`time: end`) before t = {pulse[0]}.",
     ),
     "decay": (
-        "The damping takes a velocity away at a rate of up to {decay:2}, within a time of {decay_time:2}. That is "
-        "less than the shortest step, {shortest:2}: no level sees how the motion decays there, so the "
-        + NOTHING_SHOWN
-        + ".",
-        "Use steps that are shorter than that, from level {level_of_decay} on, or a weaker damping; `initial:` "
-        "velocities that the damping leaves as they are may do as well.",
+        "The damping takes a velocity away at a rate of up to {decay:2}, within a time of {decay_time:2}. That is less "
+        "than the shortest step, {shortest:2}. No level sees the decay, and differences do not show the error.",
+        "Use shorter steps, from level {level_of_decay} on, a weaker damping, or `initial:` velocities that it leaves.",
     ),
     "non_smooth, mesh": (
-        "Scheme {scheme} leaves events to the mesh, which notices them up to a step late, wherever they lie between "
-        "two points: the error of {what} has no regular expansion in powers of dt.",
+        "Scheme {scheme} leaves events to the mesh and notices them up to a step late. So the error of {what} has no "
+        "regular expansion in powers of dt.",
         ON_MESH,
     ),
     "non_smooth, table": (
-        "Between the points of its table the force is a straight line, and its corners lie within steps, at each level "
-        "elsewhere: the error of {what} has no regular expansion in powers of dt.",
+        "Between the points of its table the force is a straight line, and its corners lie within steps. So the error "
+        "of {what} has no regular expansion in powers of dt.",
         ON_TABLE,
     ),
     "non_smooth, jump at a point": (
-        CANNOT_SHOW
-        + "the force jumps at a grid point: {corner.words} at t = {corner.time:4}, and the steps on both "
-        "sides use the same value there. Expect order 1{beside_corner}.",
+        CANNOT_SHOW + "the force jumps at a grid point: {corner.words} at t = {corner.time:4}, and "
+        "the steps on both sides use the same value there. Expect order 1{beside_corner}.",
         "{end_before_corner}",
     ),
     "non_smooth, corner": (
@@ -161,23 +147,21 @@ DIAGNOSES: Words = {
         "Set `order:` to what the kink allows, or end the time interval (`time: end`) before it.",
     ),
     "pre_asymptotic, still": (
-        "{subject} lies still at every common time, while the exact solution moves: the step is still too coarse to "
-        "see that.",
+        "{subject} lies still at every common time, while the exact solution moves: the step is still too coarse.",
         "{more_levels}",
     ),
     "pre_asymptotic, growing": (
-        "The differences of {what} grow from level to level ({measured}): the step is still too coarse to tell an "
+        "The differences of {what} grow from level to level ({measured}). The step is still too coarse to tell an "
         "order, or level {last} is not of one kind with those before it.{parts}",
         "{more_levels}",
     ),
     "pre_asymptotic, steep": (
-        TOO_COARSE
-        + " the order of {what}: its differences fall faster on levels {first} to {last} than those of "
-        "any power of dt, as where the coarser ones have nothing to do with the solution.{parts}",
+        "The step is still too coarse to tell the order of {what}: its differences fall faster on levels {first} to "
+        "{last} than any power of dt. The coarser levels may have nothing to do with the solution.{parts}",
         "{more_levels}",
     ),
     "pre_asymptotic": (
-        TOO_COARSE + " the order of {what}{so_far}.{hidden}{parts}",
+        "The step is still too coarse to tell the order of {what}{so_far}.{hidden}{parts}",
         "{more_levels}",
     ),
 }
@@ -213,8 +197,7 @@ LOW_CAUSES: Words = {
         "Set `start: centred` for scheme {scheme}.",
     ),
     "end": (
-        " The likely cause is the last point: `end_velocity: {options[end_velocity]}` is a one-sided formula of "
-        "lower order.",
+        " The likely cause is the last point: `end_velocity: {options[end_velocity]}` is one-sided, of lower order.",
         "Set `end_velocity: kick` for scheme {scheme}, or measure with `norm: linf_interior`.",
     ),
     "last_point": (
@@ -226,8 +209,7 @@ LOW_CAUSES: Words = {
         "Look for a formula of lower order that {what} alone is made with{or_expect}.",
     ),
     "everything": (
-        " It is so in every state and at every time, so that it is a term of the step of scheme {scheme}, of its "
-        "start, or of the force that it evaluates.",
+        " It is so in every state and at every time: the step of scheme {scheme}, its start or the force is the cause.",
         "Look for a term of lower order in scheme {scheme}{or_expect}.",
     ),
     "none": ("", "Look for a term of lower order in scheme {scheme}{or_expect}."),
@@ -239,10 +221,8 @@ HIGH_CAUSES: Words = {
     "promise": (" Scheme {scheme} promises order {promised} here.", "Set `order: scheme`."),
     "promise, exact": (" Scheme {scheme} promises to be exact here.", "Set `order: scheme`."),
     "special_times": (
-        " All common times are turning points of {what}: most of an error is a shift in time, which does not show "
-        "there. This is no higher order.",
-        "Choose another `time: end`, or start `levels:` at a finer level, so that the common times are not turning "
-        "points alone.",
+        " All common times are turning points of {what}, where a shift in time does not show. This is no higher order.",
+        "Choose another `time: end`, or start `levels:` at a finer level, so that other times are compared, too.",
     ),
     "theory": (
         " The theory of scheme {scheme} has that order on this linear model, too.",
@@ -263,10 +243,10 @@ HIGH_CAUSES: Words = {
 
 def describe(f: Found, check: ConvergesCheck) -> Description:
     """Say what was measured of a convergence, and what to change where it is not what the check asks for."""
-    return in_words(OrderText(f, check))
+    return in_words(_Phrases(f, check))
 
 
-def in_words(s: OrderText) -> Description:
+def in_words(s: _Phrases) -> Description:
     """Fill the templates of the diagnosis."""
     if s.reason == "order_low":
         why, advice = LOW_CAUSES[_cause_of_low(s)]
@@ -335,7 +315,7 @@ def _cause_of_high(s: OrderContext) -> str:
     return s.cause if s.cause in HIGH_CAUSES and math.isfinite(s.order) else "none"
 
 
-class OrderText(OrderContext):
+class _Phrases(OrderContext):
     """The context with phrases that depend on numbers."""
 
     def measured(self) -> str:
@@ -347,7 +327,6 @@ class OrderText(OrderContext):
         return f"order {self.order:.3f}{between} on levels {self.first} to {self.last}"
 
     def with_order(self) -> str:
-        """Return the same at the end of a sentence."""
         return f": with {self.measured()}" if self.measured() else ""
 
     def whose(self) -> str:
@@ -365,14 +344,9 @@ class OrderText(OrderContext):
         )
 
     def unseen(self) -> str:
-        """Say what levels that approach each other do not tell."""
         if self.has_exact:
             return ""
         return " There is no exact solution, so convergence to a wrong answer would go unnoticed."
-
-    def growth_in_words(self) -> str:
-        """Say how the solution grows at the level that is unstable."""
-        return growth_in_words(*self.growth, self.growth_of, self.notation)
 
     def first_good(self) -> int:
         """Return the coarsest level that is stable, or from which on none met a number that is not finite."""
@@ -383,7 +357,6 @@ class OrderText(OrderContext):
         return max([self.culprit, self.levels[0], *failed]) + 1
 
     def cost_of_first(self) -> str:
-        """Return what that level costs."""
         return self.cost([self.first_good()])
 
     def place(self) -> str:
@@ -400,7 +373,6 @@ class OrderText(OrderContext):
         return where if math.isnan(at) else f"{where}, at t = {number(at, 4)}"
 
     def before_round_off(self) -> str:
-        """Tell the order of the levels before round-off."""
         return f"; before it, {self.measured()} is all that is left" if self.order > 0.0 else ""
 
     def coarser(self) -> str:
@@ -438,16 +410,13 @@ class OrderText(OrderContext):
         return f"Add {which} to `levels:` ({self.cost(levels)})"
 
     def add_missing(self) -> str:
-        """Ask for the levels that are missing to four, two at most."""
         return self.add(min(max(4 - len(self.levels), 1), 2))
 
     def count(self) -> str:
-        """Say how many levels there are."""
         count = len(self.levels)
         return f"{count} level{'s are' if count > 1 else ' is'}"
 
     def more_levels(self) -> str:
-        """Ask for the levels that are probably missing."""
         kick = f", or set `end_velocity: kick` for scheme {self.scheme}" if self.ends_low else ""
         if self.more < 1:
             return f"{self.add()}{kick}; how many are needed cannot be told yet."
@@ -455,24 +424,19 @@ class OrderText(OrderContext):
         return f"{self.add(self.more)}{kick}; {self.more} more {needed} needed."
 
     def within_pulse(self) -> str:
-        """Say what a force has at the ends of a pulse, where the verdict is that it is not smooth."""
         return ", between two jumps or corners" if self.reason == "non_smooth" else ""
 
     def level_of_pulse(self) -> int:
-        """Return the first level whose step is shorter than the pulse."""
         steps = math.ceil(math.log2(self.shortest / self.pulse[1]))
         return self.levels[-1] + max(steps, 0) + 1
 
     def decay_time(self) -> float:
-        """Return the time in which damping takes a velocity away."""
         return 1.0 / self.decay
 
     def level_of_decay(self) -> int:
-        """Return the first level whose step is shorter than that."""
         return self.levels[-1] + max(math.ceil(math.log2(self.shortest * self.decay)), 1)
 
     def jump(self) -> str:
-        """Say what the force does at its corner."""
         power = self.corner.power if self.corner else math.nan
         known = {1.0: "the force jumps", 2.0: "the force has a corner"}
         return known.get(power, "a derivative of the force jumps")
@@ -500,7 +464,6 @@ class OrderText(OrderContext):
         )
 
     def so_far(self) -> str:
-        """Tell the last estimate of an order, and where orders go."""
         if not self.measured():
             return ""
         return f": the last estimate is {self.measured()}{self._trend()}"
@@ -538,16 +501,13 @@ class OrderText(OrderContext):
         )
 
     def likely(self) -> float:
-        """Return the order, rounded to a half."""
         return round(2 * self.order) / 2 if math.isfinite(self.order) else math.nan
 
     def or_expect(self) -> str:
-        """Advise to expect the order that was found."""
         if not self.likely() > 0:
             return " (`schemes:`)"
         return f", or set `order: {self.notation.number(self.likely())}` if you expect it"
 
     def or_kick(self) -> str:
-        """Give advice on the last velocity, of a scheme that has the option."""
         has_option = "end_velocity" in self.options
         return f", or set `end_velocity: kick` for scheme {self.scheme}" if has_option else ""
