@@ -27,13 +27,13 @@ from vibsim.experiment.storage import RUNNING, asked, lean_series
 from vibsim.models import centred
 from vibsim.models.events import TREATMENTS
 from vibsim.models.shared.phase_amplitude_names import is_error_part
-from vibsim.observe.input_consistency import SAME_AT_EVERY_LEVEL
+from vibsim.observe.common_grid import SAME_AT_EVERY_LEVEL
 from vibsim.observe.member_block import CENTRED, MemberBlock, block_of
 from vibsim.observe.missed_pulses import missed_variables
 from vibsim.observe.stiffness import applies as motion_decides
 from vibsim.observe.stiffness import is_damped
 from vibsim.schemes import SCHEMES
-from vibsim.simulation.reference.missed_pulses import varies_in_time
+from vibsim.simulation.reference.one_sided_forces import varies_in_time
 from vibsim.simulation.scaled import in_scales
 
 if TYPE_CHECKING:

@@ -23,8 +23,8 @@ from vibsim.experiment.schema.published import row_at, row_id
 from vibsim.experiment.value_names import VALUES
 from vibsim.observe import oscillation, predicted_oscillation
 from vibsim.observe.common_grid import take
+from vibsim.observe.energy_drift import drift_at
 from vibsim.observe.member_block import MemberBlock, by_level
-from vibsim.observe.member_energy_drift import drift_at
 
 THEORY_RUNS = 2**12
 """Runs for which theory is worked out, at about 0.1 ms each."""

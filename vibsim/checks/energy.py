@@ -25,8 +25,8 @@ from vibsim.core.array_types import Flags
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import DRIFTS
 from vibsim.experiment.schema.checks import Drift
+from vibsim.observe.energy_drift import drift_at
 from vibsim.observe.member_block import MemberBlock
-from vibsim.observe.member_energy_drift import drift_at
 
 if TYPE_CHECKING:
     from vibsim.comparison.quantity_comparison import Comparison

@@ -102,7 +102,7 @@ def describe(f: Found) -> Description:
             f"{f.notation.quantity(state)}, the largest over time); that {verb} {rule(experiment, f.notation)}."
         )
     swept = experiment.sweep.keys if experiment.sweep else ()
-    fixed = experiment.scheme_options(f.scheme).items()
+    fixed = experiment.schemes[f.scheme].options.items()
     options = {key: word for key, word in fixed if f"schemes.{name}.{key}" not in swept}
     ways = [
         "take such members into an experiment of their own, whose pilot tries them",

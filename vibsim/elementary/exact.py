@@ -1,4 +1,7 @@
-"""Rounding to whole numbers, and the remainder: both exact.
+"""What chooses between values, rounding to whole numbers, remainder and square root: exact or correctly rounded.
+
+Unlike Python's `min` and `max`, NaN in any argument that decides gives NaN: a fast function says by NaN that it has no
+value, which a comparison would swallow.
 
 Doubles from 2^52 on are whole numbers; below, adding and subtracting 2^52 rounds. The remainder ``a - q b`` of positive
 numbers is a double, whichever whole quotient leaves it below b: with a product in two parts while q fits into a double,
@@ -9,10 +12,9 @@ from __future__ import annotations
 
 import math
 
-from vibsim.elementary.doubled import two_product
+from vibsim.elementary.doubled import nearest_whole, two_product
 from vibsim.elementary.exponential import scaled
 from vibsim.elementary.primitives import exponent_of, mantissa_of
-from vibsim.elementary.rounding import nearest_whole
 
 _TWO_52 = 4503599627370496.0
 _SMALLEST_NORMAL = 2.2250738585072014e-308
@@ -22,6 +24,49 @@ _LARGEST_QUOTIENT = 1.0e15
 _SMALLEST_DIVISOR = 1.0e-270
 _LARGEST_DIVISOR = 1.0e270
 _QUOTIENT_BITS = 10
+
+
+def absolute(x: float) -> float:
+    """Return the size of `x`."""
+    return math.fabs(x)
+
+
+def sqrt(x: float) -> float:
+    """Return the square root, correctly rounded; NaN below zero."""
+    # plain Python refuses negative arguments
+    return math.sqrt(x if x >= 0.0 else math.nan)
+
+
+def sign(x: float) -> float:
+    """Return -1, 0 or 1; NaN for NaN."""
+    side = 1.0 if x > 0.0 else -1.0
+    side = 0.0 if x == 0.0 else side
+    return side if x == x else x
+
+
+def heaviside(x: float) -> float:
+    """Return Heaviside's step: 0 below 0, 1/2 at 0, 1 above; NaN for NaN."""
+    value = 1.0 if x > 0.0 else 0.0
+    value = 0.5 if x == 0.0 else value
+    return value if x == x else x
+
+
+def smaller(a: float, b: float) -> float:
+    """Return the smaller one, `a` where they are equal; NaN where one is NaN."""
+    least = b if b < a else a
+    return least if b == b else b
+
+
+def larger(a: float, b: float) -> float:
+    """Return the larger one, `a` where they are equal; NaN where one is NaN."""
+    most = b if b > a else a
+    return most if b == b else b
+
+
+def where(condition: float, yes: float, no: float) -> float:
+    """Return `yes` where the condition is not zero, else `no`; NaN where the condition is NaN."""
+    chosen = yes if condition != 0.0 else no
+    return chosen if condition == condition else math.nan
 
 
 def nearest(x: float) -> float:
