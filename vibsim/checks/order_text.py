@@ -42,6 +42,14 @@ ON_TABLE = (
 )
 
 NOT_FINITE = "The calculation of {what} met a number that is not finite{place}."
+PROMISED_LESS = " Scheme {scheme} promises no more than order {promised} here"
+NO_SYMMETRY = "Try other `initial:` values or another `time: end`, where nothing cancels by symmetry{or_expect}."
+PULSE = (
+    "Near t = {pulse[0]} the force has a pulse of length {pulse[1]:1} or so, between two points of "
+    "every level (the shortest step is {shortest:2}). No level sees it, and differences do not show the error.",
+    "Use steps that are shorter than the pulse, from level {level_of_pulse} on, write a wider pulse of the same "
+    "impulse, or end the time interval (`time: end`) before t = {pulse[0]}.",
+)
 DIAGNOSES: Words = {
     "asymptotic": (
         "{subject} converges with {measured}, as {whose} (order {expected}). The rescaled differences "
@@ -111,17 +119,13 @@ DIAGNOSES: Words = {
         "{subject} does not exist here, so there is nothing to judge.",
         "Choose a quantity (`converges:`) that this model and scheme have.",
     ),
-    "pulse": (
-        "Near t = {pulse[0]} the force has a pulse of length {pulse[1]:1} or so{within_pulse}, between two points of "
-        "every level (the shortest step is {shortest:2}). No level sees it, and differences do not show the error.",
-        "Use steps that are shorter than the pulse, from level {level_of_pulse} on, write a wider pulse of the same "
-        "impulse, or end the time interval (`time: end`) before t = {pulse[0]}.",
-    ),
-    "decay": (
+    "pre_asymptotic, decay": (
         "The damping takes a velocity away at a rate of up to {decay:2}, within a time of {decay_time:2}. That is less "
         "than the shortest step, {shortest:2}. No level sees the decay, and differences do not show the error.",
         "Use shorter steps, from level {level_of_decay} on, a weaker damping, or `initial:` velocities that it leaves.",
     ),
+    "non_smooth, pulse": PULSE,
+    "pre_asymptotic, pulse": PULSE,
     "non_smooth, mesh": (
         "Scheme {scheme} leaves events to the mesh and notices them up to a step late. So the error of {what} has no "
         "regular expansion in powers of dt.",
@@ -164,80 +168,73 @@ DIAGNOSES: Words = {
         "The step is still too coarse to tell the order of {what}{so_far}.{hidden}{parts}",
         "{more_levels}",
     ),
-}
-
-LOW = "{subject} converges slower than order {expected}, with {measured}."
-LOW_OF_EXACT = (
-    "{subject} is promised to be exact, but the levels differ by more than round-off{with_order}."
-)
-PROMISED_LESS = " Scheme {scheme} promises no more than order {promised} here"
-LOW_CAUSES: Words = {
-    "mesh": (
+    "order_low, mesh": (
         " The likely cause is `events: mesh`: an event is noticed up to a step late.",
         ON_MESH,
     ),
-    "table": (
+    "order_low, table": (
         " The likely cause is the table: the force has corners at its points, which lie within steps.",
         ON_TABLE,
     ),
-    "promise, damping": (
+    "order_low, promise, damping": (
         PROMISED_LESS + ": it takes the damping backward.",
         "Set `kind: central` for scheme {scheme}, which centres the damping, or `order: scheme`.",
     ),
-    "promise, start": (
+    "order_low, promise, start": (
         PROMISED_LESS + ".",
         "Set `start: centred` for scheme {scheme}, or `order: scheme`.",
     ),
-    "promise": (
+    "order_low, promise": (
         PROMISED_LESS + ".",
         "Set `order: scheme`, or another `kind:` than that of scheme {scheme}.",
     ),
-    "start": (
+    "order_low, start": (
         " The likely cause is the first step: `start: first_order` leaves its dt^2 term out.",
         "Set `start: centred` for scheme {scheme}.",
     ),
-    "end": (
+    "order_low, end": (
         " The likely cause is the last point: `end_velocity: {options[end_velocity]}` is one-sided, of lower order.",
         "Set `end_velocity: kick` for scheme {scheme}, or measure with `norm: linf_interior`.",
     ),
-    "last_point": (
+    "order_low, last_point": (
         " Without the last point the order is the expected one: what is of lower order is a formula at the end.",
         "Measure with `norm: linf_interior`{or_kick}.",
     ),
-    "one_quantity": (
+    "order_low, one_quantity": (
         " Another state has the expected order: what is of lower order is how {what} is made, not the step.",
         "Look for a formula of lower order that {what} alone is made with{or_expect}.",
     ),
-    "everything": (
+    "order_low, everything": (
         " It is so in every state and at every time: the step of scheme {scheme}, its start or the force is the cause.",
         "Look for a term of lower order in scheme {scheme}{or_expect}.",
     ),
-    "none": ("", "Look for a term of lower order in scheme {scheme}{or_expect}."),
-}
-
-HIGH = "{subject} converges faster than order {expected}, with {measured}."
-NO_SYMMETRY = "Try other `initial:` values or another `time: end`, where nothing cancels by symmetry{or_expect}."
-HIGH_CAUSES: Words = {
-    "promise": (" Scheme {scheme} promises order {promised} here.", "Set `order: scheme`."),
-    "promise, exact": (" Scheme {scheme} promises to be exact here.", "Set `order: scheme`."),
-    "special_times": (
+    "order_low": ("", "Look for a term of lower order in scheme {scheme}{or_expect}."),
+    "order_high, promise": (
+        " Scheme {scheme} promises order {promised} here.",
+        "Set `order: scheme`.",
+    ),
+    "order_high, promise, exact": (
+        " Scheme {scheme} promises to be exact here.",
+        "Set `order: scheme`.",
+    ),
+    "order_high, special_times": (
         " All common times are turning points of {what}, where a shift in time does not show. This is no higher order.",
         "Choose another `time: end`, or start `levels:` at a finer level, so that other times are compared, too.",
     ),
-    "theory": (
+    "order_high, theory": (
         " The theory of scheme {scheme} has that order on this linear model, too.",
         "Set `order: {likely}`, which the theory of scheme {scheme} has here.",
     ),
-    "one_norm": (
+    "order_high, one_norm": (
         " In another norm than {norm} the order is the expected one: errors cancel in this one.",
         "Measure in another `norm:`{or_expect}.",
     ),
-    "one_quantity": (
+    "order_high, one_quantity": (
         " Another state has the expected order: the leading error vanishes in {what}, not in every state.",
         "Check another state (`converges:`){or_expect}.",
     ),
-    "everything": (" It is so in every state and every norm.", NO_SYMMETRY),
-    "none": ("", NO_SYMMETRY),
+    "order_high, everything": (" It is so in every state and every norm.", NO_SYMMETRY),
+    "order_high": ("", NO_SYMMETRY),
 }
 
 
@@ -248,71 +245,54 @@ def describe(f: Found, check: ConvergesCheck) -> Description:
 
 def in_words(s: _Phrases) -> Description:
     """Fill the templates of the diagnosis."""
-    if s.reason == "order_low":
-        why, advice = LOW_CAUSES[_cause_of_low(s)]
-        sentence = LOW_OF_EXACT if math.isinf(s.expected) else f"{LOW}{why}{{parts}}"
-    elif s.reason == "order_high":
-        why, advice = HIGH_CAUSES[_cause_of_high(s)]
-        sentence = f"{HIGH}{why}{{parts}}"
-    else:
-        sentence, advice = DIAGNOSES[_diagnosis(s)]
+    sentence, advice = DIAGNOSES[_diagnosis(s)]
+    if s.reason in ("order_low", "order_high"):
+        sentence = f"{{other_order}}{sentence}{{parts}}"
     template = Template(s, s.notation)
     return Description(template.format(sentence), template.format(advice))
 
 
 def _diagnosis(s: OrderContext) -> str:
-    """Return the diagnosis of a reason but for orders that are too low or too high."""
-    if s.reason in ("non_smooth", "pre_asymptotic") and s.cause == "pulse":
-        return "pulse"
-    if s.reason == "pre_asymptotic" and s.cause == "decay":
-        return "decay"
+    """Return the first diagnosis that applies: by the options of the scheme or the force, then by the cause."""
+    by_cause, corner = f"{s.reason}, {s.cause}", s.corner
+    has_promise, less = s.shows_promise, s.promises_less
     finer = {
-        "unstable": [("beyond the limit", s.is_beyond_limit)],
-        "non_finite": [
-            ("from the start", s.singular == 0.0),
-            ("always", not math.isnan(s.singular)),
-        ],
-        "round_off": [("noise", s.cause == "noise"), ("stored", s.cause == "stored")],
-        "not_applicable": [("adaptive", "tolerance" in s.options), ("still", s.cause == "still")],
-        "non_smooth": [
-            ("mesh", is_on_the_mesh(s.options)),
-            ("table", s.has_corners),
-            ("jump at a point", s.corner is not None and s.corner.on_a_point),
-            ("corner", s.corner is not None),
-        ],
-        "pre_asymptotic": [
-            ("still", s.cause == "still"),
-            ("growing", s.order <= 0.0),
-            ("steep", s.order > HIGHEST),
-        ],
+        "unstable": {"beyond the limit": s.is_beyond_limit},
+        "non_finite": {
+            "from the start": s.singular == 0.0,
+            "always": not math.isnan(s.singular),
+        },
+        "not_applicable": {"adaptive": "tolerance" in s.options},
+        "non_smooth": {
+            "pulse": s.cause == "pulse",
+            "mesh": is_on_the_mesh(s.options),
+            "table": s.has_corners,
+            "jump at a point": corner is not None and corner.on_a_point,
+            "corner": corner is not None,
+        },
+        "pre_asymptotic": {
+            s.cause: by_cause in DIAGNOSES,
+            "growing": s.order <= 0.0,
+            "steep": s.order > HIGHEST,
+        },
+        "order_low": {
+            "mesh": is_on_the_mesh(s.options),
+            "table": s.has_corners,
+            "promise, damping": has_promise and less and s.kind == BACKWARD_DAMPING,
+            "promise, start": has_promise and less and s.centred >= s.expected - s.tolerance,
+            "promise": has_promise and less,
+            "start": s.starts_low,
+            "end": s.ends_low,
+        },
+        "order_high": {
+            "promise, exact": has_promise and math.isinf(s.promised),
+            "promise": has_promise and s.promises_more,
+        },
     }
-    for name, applies in finer.get(s.reason, []):
+    for name, applies in finer.get(s.reason, {}).items():
         if applies:
             return f"{s.reason}, {name}"
-    return s.reason
-
-
-def _cause_of_low(s: OrderContext) -> str:
-    """Return why an order is lower than expected, by the options of the scheme, else by the data."""
-    if is_on_the_mesh(s.options):
-        return "mesh"
-    if s.has_corners:
-        return "table"
-    if s.promises_less and s.shows_promise:
-        if s.kind == BACKWARD_DAMPING:
-            return "promise, damping"
-        return "promise, start" if s.centred >= s.expected - s.tolerance else "promise"
-    if s.starts_low:
-        return "start"
-    if s.ends_low:
-        return "end"
-    return s.cause if s.cause in LOW_CAUSES else "none"
-
-
-def _cause_of_high(s: OrderContext) -> str:
-    if s.promises_more and s.shows_promise:
-        return "promise" if math.isfinite(s.promised) else "promise, exact"
-    return s.cause if s.cause in HIGH_CAUSES and math.isfinite(s.order) else "none"
+    return by_cause if by_cause in DIAGNOSES else s.reason
 
 
 class _Phrases(OrderContext):
@@ -326,8 +306,14 @@ class _Phrases(OrderContext):
         between = f" (between {self.low:.3f} and {self.high:.3f})" if known else ""
         return f"order {self.order:.3f}{between} on levels {self.first} to {self.last}"
 
-    def with_order(self) -> str:
-        return f": with {self.measured()}" if self.measured() else ""
+    def other_order(self) -> str:
+        """Say that an order is lower or higher than the expected one."""
+        with_order = f", with {self.measured()}" if self.measured() else ""
+        if math.isinf(self.expected) and self.reason == "order_low":
+            return f"{self.subject} is promised to be exact, but levels differ by more than round-off{with_order}."
+        word = "slower" if self.reason == "order_low" else "faster"
+        expected = self.notation.number(self.expected)
+        return f"{self.subject} converges {word} than order {expected}{with_order}."
 
     def whose(self) -> str:
         """Say whose the order is: the scheme's, or that of the check alone, where theory has none or another one."""
@@ -422,9 +408,6 @@ class _Phrases(OrderContext):
             return f"{self.add()}{kick}; how many are needed cannot be told yet."
         needed = "is probably what is" if self.more == 1 else "are probably what is"
         return f"{self.add(self.more)}{kick}; {self.more} more {needed} needed."
-
-    def within_pulse(self) -> str:
-        return ", between two jumps or corners" if self.reason == "non_smooth" else ""
 
     def level_of_pulse(self) -> int:
         steps = math.ceil(math.log2(self.shortest / self.pulse[1]))
