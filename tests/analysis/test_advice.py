@@ -18,7 +18,7 @@ from vibsim import Experiment, analyse, simulate
 from vibsim.analysis import analyse_records, verdicts
 from vibsim.checks.fields import name_of
 from vibsim.checks.order_context import Corner
-from vibsim.checks.order_text import OrderText, in_words
+from vibsim.checks.order_text import _Phrases, in_words
 from vibsim.checks.sentences import PLAIN
 from vibsim.comparison.order_causes import CAUSES
 from vibsim.core.record import Record, Variable
@@ -170,7 +170,7 @@ def test_an_expectation_that_is_not_met_ends_with_advice(expect: dict[str, str])
             assert_specific(found.advice)
 
 
-def story(**changes: Any) -> OrderText:
+def story(**changes: Any) -> _Phrases:
     plain: dict[str, Any] = {
         "quantity": "theta",
         "reason": "order_low",
@@ -185,7 +185,7 @@ def story(**changes: Any) -> OrderText:
         "levels": (4, 5, 6, 7),
         "culprit": -1,
         "omega_dt": float("nan"),
-        "growth": (float("nan"), float("nan")),
+        "growth_in_words": "",
         "limit": 2.0,
         "options": {"start": "centred", "end_velocity": "kick", "arithmetic": "compensated"},
         "is_position": True,
@@ -197,7 +197,6 @@ def story(**changes: Any) -> OrderText:
         "decay": 1e3,
         "special": math.nan,
         "centred": math.nan,
-        "growth_of": (True, True, 1),
         "has_promise": True,
         "has_corners": False,
         "has_exact": True,
@@ -212,16 +211,16 @@ def story(**changes: Any) -> OrderText:
         "notation": PLAIN,
         "cost": lambda levels: f"{len(levels)} levels",
     }
-    made = object.__new__(OrderText)
+    made = object.__new__(_Phrases)
     vars(made).update({**plain, **changes})
     return made
 
 
-def tell(context: OrderText) -> str:
+def tell(context: _Phrases) -> str:
     return in_words(context).sentence
 
 
-def advise(context: OrderText) -> str:
+def advise(context: _Phrases) -> str:
     return in_words(context).advice
 
 
@@ -229,6 +228,8 @@ def advise(context: OrderText) -> str:
 @pytest.mark.parametrize("cause", CAUSES)
 @pytest.mark.parametrize("order", [1.02, 4.0, float("nan"), 0.1])
 def test_every_cause_ends_with_advice(reason: str, cause: str, order: float) -> None:
+    if reason == "order_high" and math.isnan(order):
+        return  # an order that is too high is known
     for more in (
         {},
         {"expected": np.inf, "promised": np.inf},

@@ -61,10 +61,16 @@ def analyse_parts(
     VibsimError
         As `analyse_records`.
     """
-    given = _read(experiment, readers, size or part_size(experiment))
+    coarsest = experiment.levels[0]
+    points = experiment.steps(coarsest) // plan.sampling(experiment, coarsest) + 1
+    size = size or max(SAMPLES // (points * len(experiment.schemes)), 1)
+    count = experiment.members
+    given = (
+        {level: read(start, min(start + size, count)) for level, read in readers.items()}
+        for start in range(0, count, size)
+    )
     if threads == 1:
-        for records in given:
-            yield analyse_records(experiment, records)
+        yield from (analyse_records(experiment, records) for records in given)
         return
     with ThreadPoolExecutor(threads) as pool:
         pending: deque[Future[Record]] = deque()
@@ -76,22 +82,6 @@ def analyse_parts(
             yield pending.popleft().result()
 
 
-def part_size(experiment: Experiment) -> int:
-    """Return the number of members of a part."""
-    coarsest = experiment.levels[0]
-    points = experiment.steps(coarsest) // plan.sampling(experiment, coarsest) + 1
-    return max(SAMPLES // (points * len(experiment.schemes)), 1)
-
-
-def _read(
-    experiment: Experiment, readers: Mapping[int, Reader], size: int
-) -> Iterator[dict[int, Record]]:
-    count = experiment.members
-    for start in range(0, count, size):
-        stop = min(start + size, count)
-        yield {level: read(start, stop) for level, read in readers.items()}
-
-
 _OF_VERDICTS = (
     *("status", "failure_time", "last_step", "omega_dt", "stability_limit", "measured_growth"),
     *("decay_rate", "pulse_time", "pulse_width", HIGHEST),
@@ -99,29 +89,20 @@ _OF_VERDICTS = (
 """Variables that every verdict and the summary may read, beside those that a check or its quantity has of its own."""
 
 
-def verdict_variables(experiment: Experiment, record: Record) -> list[str]:
-    """Name the variables of a convergence Record from which `verdicts` and `summarise` make what they say."""
+def kept(experiment: Experiment, parts: Iterable[Record], thin: list[Record]) -> Iterator[Record]:
+    """Pass parts on, and keep of each in `thin` what `verdicts` and `summarise` need of it."""
     # a claim reads what the check that decides it reads
     measured = [check.measured for check in experiment.checks]
     orders = {f"{one.converges}_observed_order" for one in measured if one.kind == "converges"}
-    return [
-        name
-        for name in record.variables
-        if name in _OF_VERDICTS
-        or name in orders
-        or name.startswith(("check_", "corner_"))
-        or is_bound(name)
-        or is_of_parts(name)
-    ]
 
+    def is_read(name: str) -> bool:
+        of_check = name.startswith(("check_", "corner_")) or is_bound(name) or is_of_parts(name)
+        return of_check or name in _OF_VERDICTS or name in orders
 
-def kept(experiment: Experiment, parts: Iterable[Record], thin: list[Record]) -> Iterator[Record]:
-    """Pass parts on, and keep of each in `thin` what `verdicts` and `summarise` need of it."""
     for part in parts:
         attrs = {**part.attrs, UNITS: json.dumps(units_in(part))}
-        names = verdict_variables(experiment, part)
-        thinned = {name: part.variables[name] for name in names} | known_errors(part)
-        thin.append(Record(part.coords, thinned, attrs))
+        thinned = {name: one for name, one in part.variables.items() if is_read(name)}
+        thin.append(Record(part.coords, thinned | known_errors(part), attrs))
         yield part
 
 

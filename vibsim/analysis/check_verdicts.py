@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from vibsim.checks import tolerance
-from vibsim.checks.kinds import KINDS, definition
+from vibsim.checks.kinds import definition, judge
 from vibsim.checks.outcome import Outcome, Results, compared_reason, truth
 from vibsim.checks.sweep_regions import where
 from vibsim.checks.verdict_text import Wording, expectation
@@ -69,12 +69,7 @@ def verdicts(experiment: Experiment, convergence: xarray.Dataset | Record) -> li
     if record.attrs["checks"] != definition(experiment):
         raise VibsimError("the checks are not those of the analysis: analyse the levels again")
     found = [
-        _verdict(
-            experiment,
-            record,
-            check,
-            KINDS[check.measured.kind].judge(experiment, record, check.measured, check.id),
-        )
+        _verdict(experiment, record, check, judge(experiment, record, check.measured, check.id))
         for check in experiment.checks
     ]
     if experiment.tolerance is not None:

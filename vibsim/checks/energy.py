@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 
 from vibsim.apriori.formal_orders import columns_of, formal_orders
-from vibsim.checks.at_level import level_of, lies_still
-from vibsim.checks.fields import LEVEL, MOTION, Field, facts, measured
+from vibsim.checks.fields import LEVEL, MOTION, Field
 from vibsim.checks.outcome import (
     MATCH,
     MISMATCH,
@@ -18,10 +17,11 @@ from vibsim.checks.outcome import (
     NOT_APPLICABLE,
     PRE_ASYMPTOTIC,
     ROUND_OFF,
-    Outcome,
-    outcome_of,
+    Judged,
 )
 from vibsim.checks.sentences import MOVE, NOT_FINITE, NOTHING_MOVES, Description, Found
+from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
+from vibsim.core.array_types import Flags
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import DRIFTS
 from vibsim.experiment.schema.checks import Drift
@@ -72,7 +72,7 @@ def measure(
     block: MemberBlock, compared: Mapping[str, Comparison], check: ConservesCheck
 ) -> Mapping[str, Any]:
     """Return what a check measures."""
-    level = level_of(block, check)
+    level = block.grid.levels[-1] if check.level is None else check.level
     found = drift_at(block, level, check.about or "")
     return {
         "drift": found.kind,
@@ -86,11 +86,25 @@ def measure(
     }
 
 
-def judge(experiment: Experiment, record: Record, check: ConservesCheck, id_: str) -> Outcome:
+def lies_still(block: MemberBlock, level: int) -> Flags:
+    """Say where no position moves by more than round-off at any step of a level, shape (scheme, case)."""
+    record, still = block.records[level], np.ones(block.shape, dtype=bool)
+    floor = ABOVE_ROUND_OFF * block.relative_floor[..., block.grid.levels.index(level)]
+    for name in block.model.positions:
+        if f"{name}_min" not in record:
+            return np.zeros(block.shape, dtype=bool)
+        low, high = (np.asarray(record[f"{name}_{end}"], dtype=float) for end in ("min", "max"))
+        with np.errstate(invalid="ignore"):
+            still &= high - low <= floor * np.maximum(np.abs(low), np.abs(high))
+    return still
+
+
+def judge(
+    experiment: Experiment, record: Record, check: ConservesCheck, found: Mapping[str, Any]
+) -> Judged:
     """Compare how the energy error grows with what a check expects."""
-    kind, largest = (measured(record, id_, field) for field in ("drift", "energy_error"))
-    still = measured(record, id_, "motion") != 0
-    broken = record["status"][..., record.place("level", int(measured(record, id_, "level")))] != 0
+    kind, largest, still = found["drift"], found["energy_error"], found["motion"] != 0
+    broken = record["status"][..., record.place("level", int(found["level"]))] != 0
     is_none, unclear = (kind == DRIFTS.index(name) for name in ("none", "unclear"))
     wanted = kind == DRIFTS.index(check.drift)
     if check.drift == "bounded":
@@ -108,7 +122,7 @@ def judge(experiment: Experiment, record: Record, check: ConservesCheck, id_: st
         (is_none & has_error, ROUND_OFF),
     ]
     reason = np.select([mask for mask, _ in cases], [code for _, code in cases], MISMATCH)
-    return outcome_of(experiment, record, check, reason, largest, facts(record, id_, FIELDS))
+    return Judged(reason, largest)
 
 
 def describe(f: Found, check: ConservesCheck) -> Description:

@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vibsim.checks.at_level import level_of, lies_still
-from vibsim.checks.fields import LEVEL, MOTION, Field, facts, measured
+from vibsim.checks.energy import lies_still
+from vibsim.checks.fields import LEVEL, MOTION, Field
 from vibsim.checks.outcome import (
     MATCH,
     MISMATCH,
     NON_FINITE,
     NOT_APPLICABLE,
-    Outcome,
-    outcome_of,
+    Judged,
 )
 from vibsim.checks.sentences import MOVE, NOT_FINITE, NOTHING_MOVES, Description, Found
 from vibsim.comparison.quantity_comparison import Comparison
@@ -51,7 +50,7 @@ def measure(
     block: MemberBlock, compared: Mapping[str, Comparison], check: EqualCheck
 ) -> Mapping[str, Any]:
     """Return what a check measures."""
-    level = level_of(block, check)
+    level = block.grid.levels[-1] if check.level is None else check.level
     found = apart(block, compared, check)
     distance, allowed = (np.full(block.shape, np.nan) for _ in range(2))
     still, names = lies_still(block, level), [row.name for row in block.experiment.schemes]
@@ -90,11 +89,12 @@ def by_place(values: Floats, count: int) -> Floats:
     return found
 
 
-def judge(experiment: Experiment, record: Record, check: EqualCheck, id_: str) -> Outcome:
+def judge(
+    experiment: Experiment, record: Record, check: EqualCheck, found: Mapping[str, Any]
+) -> Judged:
     """Compare the largest distance between two solutions with what it may be."""
-    distance, allowed = (measured(record, id_, field) for field in ("distance", "allowed"))
-    still = measured(record, id_, "motion") != 0
-    place = record.place("level", int(measured(record, id_, "level")))
+    distance, allowed, still = found["distance"], found["allowed"], found["motion"] != 0
+    place = record.place("level", int(found["level"]))
     names = record.words("scheme")
     involved = [names.index(name) for name in check.equal if name in names]
     broken = np.any(record["status"][involved, :, place] != 0, axis=0)
@@ -108,7 +108,7 @@ def judge(experiment: Experiment, record: Record, check: EqualCheck, id_: str) -
     # as a part of what is allowed, which differs from member to member
     with np.errstate(divide="ignore", invalid="ignore"):
         away = np.where(distance > 0, distance / allowed, distance)
-    return outcome_of(experiment, record, check, reason, away, facts(record, id_, FIELDS))
+    return Judged(reason, away)
 
 
 def other_solution(check: EqualCheck) -> str:

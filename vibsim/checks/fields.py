@@ -86,11 +86,6 @@ def stated(fields: Mapping[str, Field]) -> dict[str, Field]:
     }
 
 
-def facts(record: Record, check: str, fields: Mapping[str, Field]) -> Facts:
-    """Return what a check measured, of the fields that a result states."""
-    return {name: (field, measured(record, check, name)) for name, field in stated(fields).items()}
-
-
 def facts_of(table: Facts, scheme: int, case: int) -> dict[str, Any]:
     """Return the facts of one scheme and member as plain data; None where there is none, or it is not finite."""
     return {

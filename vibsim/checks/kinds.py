@@ -7,15 +7,16 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vibsim.checks import energy, equal, order, order_text, stable, value
-from vibsim.checks.fields import Field, variables
-from vibsim.checks.outcome import Outcome
+from vibsim.checks.fields import Field, measured, stated, variables
+from vibsim.checks.outcome import Judged, Outcome, outcome_of
 from vibsim.checks.sentences import Description
-from vibsim.core.record import Variable
+from vibsim.core.record import Record, Variable
 from vibsim.observe.member_block import MemberBlock
 
 if TYPE_CHECKING:
     from vibsim.comparison.quantity_comparison import Comparison
     from vibsim.experiment import Experiment
+    from vibsim.experiment.schema.checks import Measurement
 
 
 class Kind(NamedTuple):
@@ -25,8 +26,8 @@ class Kind(NamedTuple):
     """What is stored of it."""
     measure: Callable[..., Mapping[str, Any]]
     """Takes a block of members, the compared quantities and the check; returns the values of the fields."""
-    judge: Callable[..., Outcome]
-    """Takes the experiment, the convergence Record, the check and its id."""
+    judge: Callable[..., Judged]
+    """Takes the experiment, the convergence Record, the check and the values of its fields."""
     describe: Callable[..., Description]
     """Takes a `Found` and the check."""
 
@@ -48,6 +49,19 @@ def check_variables(block: MemberBlock, compared: Mapping[str, Comparison]) -> d
         found = kind.measure(block, compared, check.measured)
         table |= variables(check.id, kind.fields, found, block.lean)
     return table
+
+
+def judge(experiment: Experiment, record: Record, check: Measurement, id_: str) -> Outcome:
+    """Compare what a check measured with what it expects."""
+    kind = KINDS[check.kind]
+    found = {
+        name: measured(record, id_, name)
+        for name, field in kind.fields.items()
+        if not field.of_figure
+    }
+    facts = {name: (field, found[name]) for name, field in stated(kind.fields).items()}
+    judged = kind.judge(experiment, record, check, found)
+    return outcome_of(experiment, record, check, judged, facts)
 
 
 def definition(experiment: Experiment) -> str:

@@ -20,15 +20,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.apriori.formal_orders import columns_of, even_powers, formal_orders, relative_floors
-from vibsim.checks.fields import REASON, STATUS, Field, facts, measured
+from vibsim.checks.fields import REASON, STATUS, Field
 from vibsim.checks.outcome import (
     FAIL,
     INCONCLUSIVE,
     PASS,
     PRE_ASYMPTOTIC,
     ROUND_OFF,
-    Outcome,
-    outcome_of,
+    Judged,
 )
 from vibsim.comparison.order_causes import CAUSES, causes
 from vibsim.comparison.order_evidence import evidence, judge_check, judgement, order_of
@@ -106,25 +105,21 @@ def measure(
     }
 
 
-def judge(experiment: Experiment, record: Record, check: ConvergesCheck, id_: str) -> Outcome:
+def judge(
+    experiment: Experiment, record: Record, check: ConvergesCheck, found: Mapping[str, Any]
+) -> Judged:
     """Compare the verdict on a quantity, of every scheme and member, with the expected one."""
-    status, reason = (measured(record, id_, field) for field in ("status", "reason"))
-    order, expect = expected_order(experiment, record, check), check.expect
+    status, reason, expect = found["status"], found["reason"], check.expect
+    order = expected_order(experiment, record, check)
     as_expected = status == STATUSES.index(expect.status)
     if expect.reason is not None:
         as_expected &= reason == REASON_NAMES.index(expect.reason)
     open_ = status == INCONCLUSIVE
-    return outcome_of(
-        experiment,
-        record,
-        check,
+    return Judged(
         reason,
-        away=np.abs(measured(record, id_, "order") - order),
-        facts={
-            **facts(record, id_, FIELDS),
-            "expected": (EXPECTED, np.broadcast_to(order, status.shape)),
-        },
+        away=np.abs(found["order"] - order),
         compared=np.where(as_expected, PASS, np.where(open_, INCONCLUSIVE, FAIL)),
+        facts={"expected": (EXPECTED, np.broadcast_to(order, status.shape))},
     )
 
 

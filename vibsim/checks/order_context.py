@@ -21,10 +21,9 @@ from vibsim.apriori.formal_orders import (
 )
 from vibsim.checks.order import expected_order
 from vibsim.checks.phase_amplitude_text import parts_in_words
-from vibsim.checks.sentences import Found, cost_in_words
+from vibsim.checks.sentences import Found, cost_in_words, growth_in_words
 from vibsim.checks.stable import ALIKE
 from vibsim.comparison.exact_availability import has_exact
-from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.models.shared.phase_amplitude_names import is_error_part, whole_of
 from vibsim.observe.member_block import fastest
@@ -51,16 +50,7 @@ class OrderContext:
 
     def __init__(self, f: Found, check: ConvergesCheck) -> None:
         experiment, record, scheme, case = f.experiment, f.record, f.scheme, f.case
-        spec, model, quantity = (
-            experiment.schemes[scheme],
-            experiment.model.definition,
-            check.converges,
-        )
-        columns = columns_of(record)
-
-        def of_member(orders: Floats) -> float:
-            """Return the order of the member, from those of shape (scheme, 1 or case)."""
-            return float(orders[scheme, case if orders.shape[1] > 1 else 0])
+        model, quantity, columns = f.model, check.converges, columns_of(record)
 
         def of_case(name: str) -> float:
             return float(record[name][case]) if name in record else math.nan
@@ -87,21 +77,20 @@ class OrderContext:
         self.cost = partial(cost_in_words, experiment)
         self.parts = parts_in_words(f, quantity)
 
-        self.scheme, self.kind = spec.name, spec.kind
+        self.scheme, self.kind = f.scheme_name, experiment.schemes[scheme].kind
+        method = SCHEMES[self.kind]
         self.options = options_of(experiment, columns, scheme, case)
-        self.expected = of_member(expected_order(experiment, record, check))
+        self.expected = f.of_member(expected_order(experiment, record, check))
         """The order that was expected; infinite where the quantity was to be exact."""
-        self.promised = of_member(formal_orders(experiment, quantity, columns))
+        self.promised = f.of_member(formal_orders(experiment, quantity, columns))
         """The order that the scheme promises, ..."""
-        self.special = of_member(special_orders(experiment, quantity, columns))
+        self.special = f.of_member(special_orders(experiment, quantity, columns))
         """... has at most, in a special case of motion, model or options, ..."""
         self.centred = math.nan
         """... and would promise with `start: centred`, where it has another start."""
         if self.options.get("start") == "first_order":
             centred = {**self.options, "start": "centred"}
-            self.centred = float(
-                SCHEMES[self.kind].formal_order(whole_of(quantity), model, centred)
-            )
+            self.centred = float(method.formal_order(whole_of(quantity), model, centred))
         self.has_promise = not is_error_part(quantity) or is_promised(experiment, quantity)
         """Whether that is a promise for the quantity; of a part of an error it may be the one for its position."""
 
@@ -109,14 +98,15 @@ class OrderContext:
         """Level that failed or is beyond the stability limit."""
         at = self.levels.index(self.culprit) if self.culprit >= 0 else None
         self.omega_dt = math.nan if at is None else float(fastest(record)[case, at])
-        self.limit = of_member(stability_limits(experiment, columns))
+        self.limit = f.of_member(stability_limits(experiment, columns))
         """The largest stable w dt of the scheme; infinite for none."""
-        self.growth = self._predicted_growth(), math.nan
-        """Growth factor per period at the culprit, predicted and measured."""
-        if not math.isnan(self.growth[0]) and "measured_growth" in record:
-            self.growth = self.growth[0], float(record["measured_growth"][scheme, case, at])
-        self.growth_of = model.conservative, model.linear, len(model.positions)
-        """Whether the model is conservative, whether it is linear, its number of coordinates."""
+        self.growth_in_words = ""
+        """How the solution grows at the culprit."""
+        if not math.isnan(self.omega_dt) and not method.adaptive:
+            predicted = float(theory.dominant(method.stepper(self.options), self.omega_dt)[0])
+            name = "measured_growth"
+            measured = float(record[name][scheme, case, at]) if name in record else math.nan
+            self.growth_in_words = growth_in_words(f, predicted, measured)
         self.failures = _failures(record, scheme, case)
 
         self.has_corners = has_corners(model)
@@ -124,18 +114,11 @@ class OrderContext:
         self.corner = _corner(f)
         self.pulse = of_case("pulse_time"), of_case("pulse_width")
         """Time and length of a pulse of the force that no level sees."""
-        self.decay = (
-            float(record["decay_rate"][scheme, case]) if "decay_rate" in record else math.nan
-        )
+        rate = "decay_rate"
+        self.decay = float(record[rate][scheme, case]) if rate in record else math.nan
         """The largest rate at which damping takes a velocity away."""
         dt = np.asarray(record["dt"])[-1]
         self.shortest = float(dt[case] if dt.ndim else dt)
-
-    def _predicted_growth(self) -> float:
-        scheme = SCHEMES[self.kind]
-        if math.isnan(self.omega_dt) or scheme.adaptive:
-            return math.nan
-        return float(theory.dominant(scheme.stepper(self.options), self.omega_dt)[0])
 
     @property
     def what(self) -> str:
@@ -230,7 +213,7 @@ def _corner(f: Found) -> Corner | None:
         return None
     time, dt = np.asarray(record["corner_time"])[place], np.asarray(record["dt"])[0]
     return Corner(
-        words_of(f.experiment.model.definition, int(record["corner_switch"][place])),
+        words_of(f.model, int(record["corner_switch"][place])),
         float(time),
         float(record["corner_power"][place]),
         on_a_point=bool(is_on_a_point(time, dt[f.case] if dt.ndim else dt)),

@@ -1,7 +1,7 @@
 """What was measured of a convergence, and what to change in the YAML: a sentence and an advice for every diagnosis.
 
 A diagnosis is the reason of a verdict, made finer by the cause where one is known. Templates are filled from the
-attributes and phrases of an `OrderText`.
+attributes and phrases of an `_Phrases`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from vibsim.checks.order_context import OrderContext
-from vibsim.checks.sentences import Description, Found, Template, growth_in_words
+from vibsim.checks.sentences import Description, Found, Template
 from vibsim.convergence.thresholds import HALF_SPACING
 from vibsim.schemes.base import is_on_the_mesh
 
@@ -34,16 +34,22 @@ Words = Mapping[str, tuple[str, str]]
 """Diagnosis to the templates of sentence and advice."""
 
 START_FINER = "Start `levels:` at {first_good} or finer ({cost_of_first}), or shorten `time: end`."
-TOO_COARSE = "The step is still too coarse to tell"
-NOTHING_SHOWN = "differences between levels do not show the error of {what}"
 CANNOT_SHOW = "{subject} cannot show order {expected}, because "
 ON_MESH = "Set `events: located` for scheme {scheme}."
 ON_TABLE = (
-    "Choose steps in `time:` that end at every point of the table: at the coarsest level, dt is its spacing over the "
-    "speed, or a whole part of that."
+    "Choose steps in `time:` that end at every point of the table: the coarsest dt is its spacing over the speed, or a "
+    "whole fraction of it."
 )
 
 NOT_FINITE = "The calculation of {what} met a number that is not finite{place}."
+PROMISED_LESS = " Scheme {scheme} promises no more than order {promised} here"
+NO_SYMMETRY = "Try other `initial:` values or another `time: end`, where nothing cancels by symmetry{or_expect}."
+PULSE = (
+    "Near t = {pulse[0]} the force has a pulse of length {pulse[1]:1} or so, between two points of "
+    "every level (the shortest step is {shortest:2}). No level sees it, and differences do not show the error.",
+    "Use steps that are shorter than the pulse, from level {level_of_pulse} on, write a wider pulse of the same "
+    "impulse, or end the time interval (`time: end`) before t = {pulse[0]}.",
+)
 DIAGNOSES: Words = {
     "asymptotic": (
         "{subject} converges with {measured}, as {whose} (order {expected}). The rescaled differences "
@@ -55,8 +61,7 @@ DIAGNOSES: Words = {
         "",
     ),
     "wrong_limit": (
-        "The levels of {what} approach each other, but not the exact solution. The error that remains is larger than "
-        "their differences allow.",
+        "The levels of {what} approach each other, but not the exact solution: too large an error remains.",
         "Check `model:` and `initial:` against the equation that you mean: finer levels will not help.",
     ),
     "unstable, beyond the limit": (
@@ -75,13 +80,10 @@ DIAGNOSES: Words = {
     ),
     "non_finite, always": (
         NOT_FINITE,
-        "End the time interval (`time: end`) before t = {singular:4}, or check the formulas of `model:`: finer "
-        "levels will not help where the motion escapes, or a formula has no finite value.",
+        "End the time interval (`time: end`) before t = {singular:4}, or check the formulas of `model:`: finer levels "
+        "will not help where the motion escapes, or a formula has no finite value.",
     ),
-    "non_finite": (
-        NOT_FINITE,
-        START_FINER,
-    ),
+    "non_finite": (NOT_FINITE, START_FINER),
     "round_off": (
         "The differences of {what} have reached the floor of round-off, where they say nothing about the "
         "scheme{before_round_off}.",
@@ -106,49 +108,37 @@ DIAGNOSES: Words = {
         "{add_missing}.",
     ),
     "not_applicable, adaptive": (
-        "Scheme {scheme} is adaptive: it chooses its own steps, whatever the level, so an order of {what} does not "
-        "exist.",
+        "Scheme {scheme} is adaptive: it chooses its own steps at every level, so {what} has no order.",
         "Name schemes with a fixed step (`schemes:`), or ask for its error with a `value:` check.",
     ),
     "not_applicable, still": (
-        "{subject} does not change after the start, or too little for an error to show: the levels agree whatever "
-        "the scheme does, and there is nothing to judge.",
+        "{subject} does not change after the start, or too little for an error to show. There is nothing to judge.",
         "Choose `initial:` values, a force or a `time: end` with which {what} moves from one common time to the next.",
     ),
     "not_applicable": (
         "{subject} does not exist here, so there is nothing to judge.",
         "Choose a quantity (`converges:`) that this model and scheme have.",
     ),
-    "pulse": (
-        "Near t = {pulse[0]} the force has a pulse of length {pulse[1]:1} or so{within_pulse}, which lies "
-        "between two points of every level (the shortest step is {shortest:2}). No level sees it, so the "
-        + NOTHING_SHOWN
-        + ".",
-        "Use steps that are shorter than the pulse, from level {level_of_pulse} on, write a wider pulse of the same "
-        "impulse, or end the time interval (`time: end`) before t = {pulse[0]}.",
+    "pre_asymptotic, decay": (
+        "The damping takes a velocity away at a rate of up to {decay:2}, within a time of {decay_time:2}. That is less "
+        "than the shortest step, {shortest:2}. No level sees the decay, and differences do not show the error.",
+        "Use shorter steps, from level {level_of_decay} on, a weaker damping, or `initial:` velocities that it leaves.",
     ),
-    "decay": (
-        "The damping takes a velocity away at a rate of up to {decay:2}, within a time of {decay_time:2}. That is "
-        "less than the shortest step, {shortest:2}: no level sees how the motion decays there, so the "
-        + NOTHING_SHOWN
-        + ".",
-        "Use steps that are shorter than that, from level {level_of_decay} on, or a weaker damping; `initial:` "
-        "velocities that the damping leaves as they are may do as well.",
-    ),
+    "non_smooth, pulse": PULSE,
+    "pre_asymptotic, pulse": PULSE,
     "non_smooth, mesh": (
-        "Scheme {scheme} leaves events to the mesh, which notices them up to a step late, wherever they lie between "
-        "two points: the error of {what} has no regular expansion in powers of dt.",
+        "Scheme {scheme} leaves events to the mesh and notices them up to a step late. So the error of {what} has no "
+        "regular expansion in powers of dt.",
         ON_MESH,
     ),
     "non_smooth, table": (
-        "Between the points of its table the force is a straight line, and its corners lie within steps, at each level "
-        "elsewhere: the error of {what} has no regular expansion in powers of dt.",
+        "Between the points of its table the force is a straight line, and its corners lie within steps. So the error "
+        "of {what} has no regular expansion in powers of dt.",
         ON_TABLE,
     ),
     "non_smooth, jump at a point": (
-        CANNOT_SHOW
-        + "the force jumps at a grid point: {corner.words} at t = {corner.time:4}, and the steps on both "
-        "sides use the same value there. Expect order 1{beside_corner}.",
+        CANNOT_SHOW + "the force jumps at a grid point: {corner.words} at t = {corner.time:4}, and "
+        "the steps on both sides use the same value there. Expect order 1{beside_corner}.",
         "{end_before_corner}",
     ),
     "non_smooth, corner": (
@@ -161,181 +151,151 @@ DIAGNOSES: Words = {
         "Set `order:` to what the kink allows, or end the time interval (`time: end`) before it.",
     ),
     "pre_asymptotic, still": (
-        "{subject} lies still at every common time, while the exact solution moves: the step is still too coarse to "
-        "see that.",
+        "{subject} lies still at every common time, while the exact solution moves: the step is still too coarse.",
         "{more_levels}",
     ),
     "pre_asymptotic, growing": (
-        "The differences of {what} grow from level to level ({measured}): the step is still too coarse to tell an "
+        "The differences of {what} grow from level to level ({measured}). The step is still too coarse to tell an "
         "order, or level {last} is not of one kind with those before it.{parts}",
         "{more_levels}",
     ),
     "pre_asymptotic, steep": (
-        TOO_COARSE
-        + " the order of {what}: its differences fall faster on levels {first} to {last} than those of "
-        "any power of dt, as where the coarser ones have nothing to do with the solution.{parts}",
+        "The step is still too coarse to tell the order of {what}: its differences fall faster on levels {first} to "
+        "{last} than any power of dt. The coarser levels may have nothing to do with the solution.{parts}",
         "{more_levels}",
     ),
     "pre_asymptotic": (
-        TOO_COARSE + " the order of {what}{so_far}.{hidden}{parts}",
+        "The step is still too coarse to tell the order of {what}{so_far}.{hidden}{parts}",
         "{more_levels}",
     ),
-}
-
-LOW = "{subject} converges slower than order {expected}, with {measured}."
-LOW_OF_EXACT = (
-    "{subject} is promised to be exact, but the levels differ by more than round-off{with_order}."
-)
-PROMISED_LESS = " Scheme {scheme} promises no more than order {promised} here"
-LOW_CAUSES: Words = {
-    "mesh": (
+    "order_low, mesh": (
         " The likely cause is `events: mesh`: an event is noticed up to a step late.",
         ON_MESH,
     ),
-    "table": (
+    "order_low, table": (
         " The likely cause is the table: the force has corners at its points, which lie within steps.",
         ON_TABLE,
     ),
-    "promise, damping": (
+    "order_low, promise, damping": (
         PROMISED_LESS + ": it takes the damping backward.",
         "Set `kind: central` for scheme {scheme}, which centres the damping, or `order: scheme`.",
     ),
-    "promise, start": (
+    "order_low, promise, start": (
         PROMISED_LESS + ".",
         "Set `start: centred` for scheme {scheme}, or `order: scheme`.",
     ),
-    "promise": (
+    "order_low, promise": (
         PROMISED_LESS + ".",
         "Set `order: scheme`, or another `kind:` than that of scheme {scheme}.",
     ),
-    "start": (
+    "order_low, start": (
         " The likely cause is the first step: `start: first_order` leaves its dt^2 term out.",
         "Set `start: centred` for scheme {scheme}.",
     ),
-    "end": (
-        " The likely cause is the last point: `end_velocity: {options[end_velocity]}` is a one-sided formula of "
-        "lower order.",
+    "order_low, end": (
+        " The likely cause is the last point: `end_velocity: {options[end_velocity]}` is one-sided, of lower order.",
         "Set `end_velocity: kick` for scheme {scheme}, or measure with `norm: linf_interior`.",
     ),
-    "last_point": (
+    "order_low, last_point": (
         " Without the last point the order is the expected one: what is of lower order is a formula at the end.",
         "Measure with `norm: linf_interior`{or_kick}.",
     ),
-    "one_quantity": (
+    "order_low, one_quantity": (
         " Another state has the expected order: what is of lower order is how {what} is made, not the step.",
         "Look for a formula of lower order that {what} alone is made with{or_expect}.",
     ),
-    "everything": (
-        " It is so in every state and at every time, so that it is a term of the step of scheme {scheme}, of its "
-        "start, or of the force that it evaluates.",
+    "order_low, everything": (
+        " It is so in every state and at every time: the step of scheme {scheme}, its start or the force is the cause.",
         "Look for a term of lower order in scheme {scheme}{or_expect}.",
     ),
-    "none": ("", "Look for a term of lower order in scheme {scheme}{or_expect}."),
-}
-
-HIGH = "{subject} converges faster than order {expected}, with {measured}."
-NO_SYMMETRY = "Try other `initial:` values or another `time: end`, where nothing cancels by symmetry{or_expect}."
-HIGH_CAUSES: Words = {
-    "promise": (" Scheme {scheme} promises order {promised} here.", "Set `order: scheme`."),
-    "promise, exact": (" Scheme {scheme} promises to be exact here.", "Set `order: scheme`."),
-    "special_times": (
-        " All common times are turning points of {what}: most of an error is a shift in time, which does not show "
-        "there. This is no higher order.",
-        "Choose another `time: end`, or start `levels:` at a finer level, so that the common times are not turning "
-        "points alone.",
+    "order_low": ("", "Look for a term of lower order in scheme {scheme}{or_expect}."),
+    "order_high, promise": (
+        " Scheme {scheme} promises order {promised} here.",
+        "Set `order: scheme`.",
     ),
-    "theory": (
+    "order_high, promise, exact": (
+        " Scheme {scheme} promises to be exact here.",
+        "Set `order: scheme`.",
+    ),
+    "order_high, special_times": (
+        " All common times are turning points of {what}, where a shift in time does not show. This is no higher order.",
+        "Choose another `time: end`, or start `levels:` at a finer level, so that other times are compared, too.",
+    ),
+    "order_high, theory": (
         " The theory of scheme {scheme} has that order on this linear model, too.",
         "Set `order: {likely}`, which the theory of scheme {scheme} has here.",
     ),
-    "one_norm": (
+    "order_high, one_norm": (
         " In another norm than {norm} the order is the expected one: errors cancel in this one.",
         "Measure in another `norm:`{or_expect}.",
     ),
-    "one_quantity": (
+    "order_high, one_quantity": (
         " Another state has the expected order: the leading error vanishes in {what}, not in every state.",
         "Check another state (`converges:`){or_expect}.",
     ),
-    "everything": (" It is so in every state and every norm.", NO_SYMMETRY),
-    "none": ("", NO_SYMMETRY),
+    "order_high, everything": (" It is so in every state and every norm.", NO_SYMMETRY),
+    "order_high": ("", NO_SYMMETRY),
 }
 
 
 def describe(f: Found, check: ConvergesCheck) -> Description:
     """Say what was measured of a convergence, and what to change where it is not what the check asks for."""
-    return in_words(OrderText(f, check))
+    return in_words(_Phrases(f, check))
 
 
-def in_words(s: OrderText) -> Description:
+def in_words(s: _Phrases) -> Description:
     """Fill the templates of the diagnosis."""
-    if s.reason == "order_low":
-        why, advice = LOW_CAUSES[_cause_of_low(s)]
-        sentence = LOW_OF_EXACT if math.isinf(s.expected) else f"{LOW}{why}{{parts}}"
-    elif s.reason == "order_high":
-        why, advice = HIGH_CAUSES[_cause_of_high(s)]
-        sentence = f"{HIGH}{why}{{parts}}"
-    else:
-        sentence, advice = DIAGNOSES[_diagnosis(s)]
+    sentence, advice = DIAGNOSES[_diagnosis(s)]
+    if s.reason in ("order_low", "order_high"):
+        sentence = f"{{other_order}}{sentence}{{parts}}"
     template = Template(s, s.notation)
     return Description(template.format(sentence), template.format(advice))
 
 
 def _diagnosis(s: OrderContext) -> str:
-    """Return the diagnosis of a reason but for orders that are too low or too high."""
-    if s.reason in ("non_smooth", "pre_asymptotic") and s.cause == "pulse":
-        return "pulse"
-    if s.reason == "pre_asymptotic" and s.cause == "decay":
-        return "decay"
+    """Return the first diagnosis that applies: by the options of the scheme or the force, then by the cause."""
+    by_cause, corner = f"{s.reason}, {s.cause}", s.corner
+    has_promise, less = s.shows_promise, s.promises_less
     finer = {
-        "unstable": [("beyond the limit", s.is_beyond_limit)],
-        "non_finite": [
-            ("from the start", s.singular == 0.0),
-            ("always", not math.isnan(s.singular)),
-        ],
-        "round_off": [("noise", s.cause == "noise"), ("stored", s.cause == "stored")],
-        "not_applicable": [("adaptive", "tolerance" in s.options), ("still", s.cause == "still")],
-        "non_smooth": [
-            ("mesh", is_on_the_mesh(s.options)),
-            ("table", s.has_corners),
-            ("jump at a point", s.corner is not None and s.corner.on_a_point),
-            ("corner", s.corner is not None),
-        ],
-        "pre_asymptotic": [
-            ("still", s.cause == "still"),
-            ("growing", s.order <= 0.0),
-            ("steep", s.order > HIGHEST),
-        ],
+        "unstable": {"beyond the limit": s.is_beyond_limit},
+        "non_finite": {
+            "from the start": s.singular == 0.0,
+            "always": not math.isnan(s.singular),
+        },
+        "not_applicable": {"adaptive": "tolerance" in s.options},
+        "non_smooth": {
+            "pulse": s.cause == "pulse",
+            "mesh": is_on_the_mesh(s.options),
+            "table": s.has_corners,
+            "jump at a point": corner is not None and corner.on_a_point,
+            "corner": corner is not None,
+        },
+        "pre_asymptotic": {
+            s.cause: by_cause in DIAGNOSES,
+            "growing": s.order <= 0.0,
+            "steep": s.order > HIGHEST,
+        },
+        "order_low": {
+            "mesh": is_on_the_mesh(s.options),
+            "table": s.has_corners,
+            "promise, damping": has_promise and less and s.kind == BACKWARD_DAMPING,
+            "promise, start": has_promise and less and s.centred >= s.expected - s.tolerance,
+            "promise": has_promise and less,
+            "start": s.starts_low,
+            "end": s.ends_low,
+        },
+        "order_high": {
+            "promise, exact": has_promise and math.isinf(s.promised),
+            "promise": has_promise and s.promises_more,
+        },
     }
-    for name, applies in finer.get(s.reason, []):
+    for name, applies in finer.get(s.reason, {}).items():
         if applies:
             return f"{s.reason}, {name}"
-    return s.reason
+    return by_cause if by_cause in DIAGNOSES else s.reason
 
 
-def _cause_of_low(s: OrderContext) -> str:
-    """Return why an order is lower than expected, by the options of the scheme, else by the data."""
-    if is_on_the_mesh(s.options):
-        return "mesh"
-    if s.has_corners:
-        return "table"
-    if s.promises_less and s.shows_promise:
-        if s.kind == BACKWARD_DAMPING:
-            return "promise, damping"
-        return "promise, start" if s.centred >= s.expected - s.tolerance else "promise"
-    if s.starts_low:
-        return "start"
-    if s.ends_low:
-        return "end"
-    return s.cause if s.cause in LOW_CAUSES else "none"
-
-
-def _cause_of_high(s: OrderContext) -> str:
-    if s.promises_more and s.shows_promise:
-        return "promise" if math.isfinite(s.promised) else "promise, exact"
-    return s.cause if s.cause in HIGH_CAUSES and math.isfinite(s.order) else "none"
-
-
-class OrderText(OrderContext):
+class _Phrases(OrderContext):
     """The context with phrases that depend on numbers."""
 
     def measured(self) -> str:
@@ -346,9 +306,14 @@ class OrderText(OrderContext):
         between = f" (between {self.low:.3f} and {self.high:.3f})" if known else ""
         return f"order {self.order:.3f}{between} on levels {self.first} to {self.last}"
 
-    def with_order(self) -> str:
-        """Return the same at the end of a sentence."""
-        return f": with {self.measured()}" if self.measured() else ""
+    def other_order(self) -> str:
+        """Say that an order is lower or higher than the expected one."""
+        with_order = f", with {self.measured()}" if self.measured() else ""
+        if math.isinf(self.expected) and self.reason == "order_low":
+            return f"{self.subject} is promised to be exact, but levels differ by more than round-off{with_order}."
+        word = "slower" if self.reason == "order_low" else "faster"
+        expected = self.notation.number(self.expected)
+        return f"{self.subject} converges {word} than order {expected}{with_order}."
 
     def whose(self) -> str:
         """Say whose the order is: the scheme's, or that of the check alone, where theory has none or another one."""
@@ -365,14 +330,9 @@ class OrderText(OrderContext):
         )
 
     def unseen(self) -> str:
-        """Say what levels that approach each other do not tell."""
         if self.has_exact:
             return ""
         return " There is no exact solution, so convergence to a wrong answer would go unnoticed."
-
-    def growth_in_words(self) -> str:
-        """Say how the solution grows at the level that is unstable."""
-        return growth_in_words(*self.growth, self.growth_of, self.notation)
 
     def first_good(self) -> int:
         """Return the coarsest level that is stable, or from which on none met a number that is not finite."""
@@ -383,7 +343,6 @@ class OrderText(OrderContext):
         return max([self.culprit, self.levels[0], *failed]) + 1
 
     def cost_of_first(self) -> str:
-        """Return what that level costs."""
         return self.cost([self.first_good()])
 
     def place(self) -> str:
@@ -400,7 +359,6 @@ class OrderText(OrderContext):
         return where if math.isnan(at) else f"{where}, at t = {number(at, 4)}"
 
     def before_round_off(self) -> str:
-        """Tell the order of the levels before round-off."""
         return f"; before it, {self.measured()} is all that is left" if self.order > 0.0 else ""
 
     def coarser(self) -> str:
@@ -438,41 +396,30 @@ class OrderText(OrderContext):
         return f"Add {which} to `levels:` ({self.cost(levels)})"
 
     def add_missing(self) -> str:
-        """Ask for the levels that are missing to four, two at most."""
         return self.add(min(max(4 - len(self.levels), 1), 2))
 
     def count(self) -> str:
-        """Say how many levels there are."""
         count = len(self.levels)
         return f"{count} level{'s are' if count > 1 else ' is'}"
 
     def more_levels(self) -> str:
-        """Ask for the levels that are probably missing."""
         kick = f", or set `end_velocity: kick` for scheme {self.scheme}" if self.ends_low else ""
         if self.more < 1:
             return f"{self.add()}{kick}; how many are needed cannot be told yet."
         needed = "is probably what is" if self.more == 1 else "are probably what is"
         return f"{self.add(self.more)}{kick}; {self.more} more {needed} needed."
 
-    def within_pulse(self) -> str:
-        """Say what a force has at the ends of a pulse, where the verdict is that it is not smooth."""
-        return ", between two jumps or corners" if self.reason == "non_smooth" else ""
-
     def level_of_pulse(self) -> int:
-        """Return the first level whose step is shorter than the pulse."""
         steps = math.ceil(math.log2(self.shortest / self.pulse[1]))
         return self.levels[-1] + max(steps, 0) + 1
 
     def decay_time(self) -> float:
-        """Return the time in which damping takes a velocity away."""
         return 1.0 / self.decay
 
     def level_of_decay(self) -> int:
-        """Return the first level whose step is shorter than that."""
         return self.levels[-1] + max(math.ceil(math.log2(self.shortest * self.decay)), 1)
 
     def jump(self) -> str:
-        """Say what the force does at its corner."""
         power = self.corner.power if self.corner else math.nan
         known = {1.0: "the force jumps", 2.0: "the force has a corner"}
         return known.get(power, "a derivative of the force jumps")
@@ -500,7 +447,6 @@ class OrderText(OrderContext):
         )
 
     def so_far(self) -> str:
-        """Tell the last estimate of an order, and where orders go."""
         if not self.measured():
             return ""
         return f": the last estimate is {self.measured()}{self._trend()}"
@@ -538,16 +484,13 @@ class OrderText(OrderContext):
         )
 
     def likely(self) -> float:
-        """Return the order, rounded to a half."""
         return round(2 * self.order) / 2 if math.isfinite(self.order) else math.nan
 
     def or_expect(self) -> str:
-        """Advise to expect the order that was found."""
         if not self.likely() > 0:
             return " (`schemes:`)"
         return f", or set `order: {self.notation.number(self.likely())}` if you expect it"
 
     def or_kick(self) -> str:
-        """Give advice on the last velocity, of a scheme that has the option."""
         has_option = "end_velocity" in self.options
         return f", or set `end_velocity: kick` for scheme {self.scheme}" if has_option else ""

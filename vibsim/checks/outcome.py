@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, overload
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,24 +102,21 @@ class Outcome:
         return {name: int(np.sum(self.chosen == i)) for i, name in enumerate(STATUSES)}
 
 
-def outcome_of(
-    experiment: Experiment,
-    record: Record,
-    check: Measurement | None,
-    reason: NDArray[Any],
-    away: Floats,
-    facts: Facts,
-    compared: NDArray[Any] | None = None,
-) -> Outcome:
-    """Return the outcome of a check, of the schemes and members that it is about.
+class Judged(NamedTuple):
+    """What is decided of every scheme and member, as `Outcome` has it."""
 
-    Parameters
-    ----------
-    check
-        None for the tolerance of the experiment.
-    compared
-        Status compared with what is expected; a check that expects a PASS need not give it.
-    """
+    reason: NDArray[Any]
+    away: Floats
+    compared: NDArray[Any] | None = None
+    """A check that expects a PASS need not give it."""
+    facts: Facts = MappingProxyType({})
+    """Facts beside the fields that were measured."""
+
+
+def outcome_of(
+    experiment: Experiment, record: Record, check: Measurement | None, judged: Judged, facts: Facts
+) -> Outcome:
+    """Return the outcome of a check, of the schemes and members that it is about; None stands for the tolerance."""
     names, cases = record.words("scheme"), np.asarray(record["case"])
     if check is None:
         # what chooses its own steps is no part of the ladder
@@ -127,17 +125,17 @@ def outcome_of(
         schemes = [names.index(check.first)]
     else:
         schemes = list(schemes_of(experiment, check))
-    member, status = None if check is None else check.member, STATUS_OF[reason]
+    member, status = None if check is None else check.member, STATUS_OF[judged.reason]
     return Outcome(
         schemes=[names[i] for i in schemes],
         scheme_index=schemes,
         cases=cases,
         case_index=np.arange(len(cases)) if member is None else np.flatnonzero(cases == member),
         status=status,
-        reason=reason.astype(np.int8),
-        compared=status if compared is None else compared.astype(np.int8),
-        away=away,
-        facts=facts,
+        reason=judged.reason.astype(np.int8),
+        compared=status if judged.compared is None else judged.compared.astype(np.int8),
+        away=judged.away,
+        facts={**facts, **judged.facts},
     )
 
 

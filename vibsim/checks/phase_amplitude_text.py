@@ -22,7 +22,7 @@ def parts_in_words(f: Found, quantity: str) -> str:
 
     Of a quantity that is no state nothing is said.
     """
-    model, record, place = f.experiment.model.definition, f.record, (f.scheme, f.case)
+    model, record, place = f.model, f.record, (f.scheme, f.case)
     known = dict(zip((*model.positions, *model.velocities), model.positions * 2, strict=True))
     position = known.get(quantity, "")
     # a large run keeps only the part that a check asks for

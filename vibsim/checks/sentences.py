@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from vibsim.checks.fields import measured, name_of
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.experiment.cost import load_of
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
     from vibsim.experiment.schema.checks import Measurement
+    from vibsim.models.base import Model
 
 NEAR_ONE, ROUND_OFF = 1e-2, 1e-13
 """A factor that is nearer to 1 is written as 1 and the rest; nearer still, the rest is rounding."""
@@ -128,6 +130,15 @@ class Found:
         """Return a field that is a position in a list of words as its word."""
         return self.record.meanings(name_of(self.id, name))[self.fact(name)]
 
+    def of_member(self, orders: Floats) -> float:
+        """Return the number of the member, from those of shape (scheme, 1 or case)."""
+        return float(orders[self.scheme, self.case if orders.shape[1] > 1 else 0])
+
+    @property
+    def model(self) -> Model:
+        """The model."""
+        return self.experiment.model.definition
+
     @property
     def scheme_name(self) -> str:
         """Name of the scheme."""
@@ -141,30 +152,19 @@ class Found:
         return float(self.record["failure_time"][place]) if failed else math.nan
 
 
-def growth_in_words(
-    predicted: float,
-    measured: float,
-    of: tuple[bool, bool, int] = (True, True, 1),
-    notation: Notation = PLAIN,
-) -> str:
+def growth_in_words(f: Found, predicted: float, measured: float) -> str:
     """Say what growth theory predicts and what was measured; empty where neither is known.
 
     The theory is of free linear oscillations without damping: of a model with damping or a force in time, and of a
     nonlinear one, that is said. Of several coordinates it is that of their fastest oscillation.
-
-    Parameters
-    ----------
-    of
-        Whether the model is conservative, whether it is linear, and its number of coordinates.
     """
-    is_conservative, is_linear, coordinates = of
-    theory = "predicted" if is_linear else "predicted of small oscillations"
-    if coordinates > 1:
+    theory = "predicted" if f.model.linear else "predicted of small oscillations"
+    if len(f.model.positions) > 1:
         theory = "predicted of the fastest small oscillations"
-    if not is_conservative:
+    if not f.model.conservative:
         theory = "predicted of free oscillations without damping"
     told = [
-        f"{notation.factor(value)} {word}"
+        f"{f.notation.factor(value)} {word}"
         for value, word in ((predicted, theory), (measured, "measured"))
         if not math.isnan(value)
     ]

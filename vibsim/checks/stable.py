@@ -21,8 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.apriori.formal_orders import columns_of, stability_limits
-from vibsim.checks.at_level import level_of
-from vibsim.checks.fields import LEVEL, STATUS, Field, facts, measured
+from vibsim.checks.fields import LEVEL, STATUS, Field
 from vibsim.checks.outcome import (
     FAIL,
     MATCH,
@@ -31,8 +30,7 @@ from vibsim.checks.outcome import (
     PASS,
     STATUS_OF,
     UNSTABLE,
-    Outcome,
-    outcome_of,
+    Judged,
 )
 from vibsim.checks.sentences import ROUND_OFF, Description, Found, growth_in_words
 from vibsim.convergence.thresholds import BLOWN_UP
@@ -72,7 +70,7 @@ def measure(
     block: MemberBlock, compared: Mapping[str, Comparison], check: StableCheck
 ) -> Mapping[str, Any]:
     """Return what a check measures."""
-    level = level_of(block, check)
+    level = block.grid.levels[-1] if check.level is None else check.level
     index = block.grid.levels.index(level)
     p = np.broadcast_to(block.fastest[:, index], block.shape)
     limit, growth, broken = block.stability_limit, block.growth, block.failed[..., index]
@@ -137,20 +135,15 @@ def _differs(block: MemberBlock, index: int, measured: Floats, expected: Floats)
     return np.asarray(apart > NEAR * np.abs(whole) + late)
 
 
-def judge(experiment: Experiment, record: Record, check: StableCheck, id_: str) -> Outcome:
+def judge(
+    experiment: Experiment, record: Record, check: StableCheck, found: Mapping[str, Any]
+) -> Judged:
     """Compare whether schemes are stable with what a check expects."""
-    reason, growth = (measured(record, id_, field) for field in ("reason", "growth"))
     with np.errstate(divide="ignore", invalid="ignore"):
-        size = np.abs(np.log(growth))
-    return outcome_of(
-        experiment,
-        record,
-        check,
-        reason,
-        away=np.where(np.isnan(size), np.inf, size),
-        facts=facts(record, id_, FIELDS),
-        compared=np.where(reason == (MATCH if check.stable else UNSTABLE), PASS, FAIL),
-    )
+        size = np.abs(np.log(found["growth"]))
+    as_expected = found["reason"] == (MATCH if check.stable else UNSTABLE)
+    away = np.where(np.isnan(size), np.inf, size)
+    return Judged(found["reason"], away, np.where(as_expected, PASS, FAIL))
 
 
 def describe(f: Found, check: StableCheck) -> Description:
@@ -165,13 +158,12 @@ def describe(f: Found, check: StableCheck) -> Description:
             f"End the time interval (`time: end`){f' before t = {time}' if time else ''}, or check the formulas of "
             "`model:`.",
         )
-    factors, model = (f.fact("predicted_growth"), f.fact("growth")), f.experiment.model.definition
+    factors = f.fact("predicted_growth"), f.fact("growth")
     told = (
         f"Scheme {f.scheme_name} is {'stable' if f.reason == 'match' else 'unstable'} at level {level}"
         f"{f', w dt = {number(p, 4)}' if math.isfinite(p) else ''}"
     )
-    of = model.conservative, model.linear, len(model.positions)
-    told += growth_in_words(*factors, of, f.notation)
+    told += growth_in_words(f, *factors)
     if f.reason == "match" and _always_grows(f):
         told += _vanishing(f, factors)
     if time:
@@ -206,8 +198,7 @@ def _advice(f: Found, level: int, p: float, time: str) -> str:
             "Take another `kind:` in `schemes:`, or look for an error in this one: it does not grow as its own theory "
             "says."
         )
-    limits = stability_limits(f.experiment, columns_of(f.record))[f.scheme]
-    limit = float(limits[f.case if len(limits) > 1 else 0])
+    limit = f.of_member(stability_limits(f.experiment, columns_of(f.record)))
     if math.isfinite(limit) and math.isfinite(p) and p > limit:
         first = level + math.ceil(math.log2(p / limit) - 1e-9)
         return (

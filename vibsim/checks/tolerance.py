@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vibsim.checks.fields import Field
-from vibsim.checks.outcome import MATCH, MISMATCH, Outcome, outcome_of
+from vibsim.checks.outcome import MATCH, MISMATCH, Judged, Outcome, outcome_of
 from vibsim.checks.sentences import Description, Found, Notation
 from vibsim.comparison.best_solution import extrapolated
 from vibsim.core.array_types import Floats, Integers
@@ -71,17 +71,13 @@ def judge(experiment: Experiment, record: Record) -> Outcome:
     if experiment.tolerance is None or any(f"{name}{_BOUND}" not in record for name in states):
         raise VibsimError("the analysis knows of no tolerance: analyse the levels again")
     largest, which = _largest_bound(experiment, record)
-    return outcome_of(
-        experiment,
-        record,
-        None,
-        np.where(largest <= experiment.tolerance, MATCH, MISMATCH),
-        away=largest - experiment.tolerance,
-        facts={
-            "error_bound": (BOUND, largest),
-            "state": (Field("state with the largest bound", np.int8, states), which),
-        },
-    )
+    reason = np.where(largest <= experiment.tolerance, MATCH, MISMATCH)
+    facts = {
+        "error_bound": (BOUND, largest),
+        "state": (Field("state with the largest bound", np.int8, states), which),
+    }
+    judged = Judged(reason, largest - experiment.tolerance)
+    return outcome_of(experiment, record, None, judged, facts)
 
 
 def rule(experiment: Experiment, notation: Notation) -> str:
@@ -95,9 +91,9 @@ def describe(f: Found) -> Description:
     The pilot did not try the member, and the ladder is too coarse for it.
     """
     experiment, name = f.experiment, f.scheme_name
-    levels, model = experiment.levels, experiment.model.definition
+    levels = experiment.levels
     largest, which = (found[f.scheme, f.case] for found in _largest_bound(experiment, f.record))
-    state = model.states[which].name
+    state = f.model.states[which].name
     told = "nothing is known of the error of the extrapolated solution: its levels do not agree."
     if math.isfinite(largest):
         verb = "is" if f.reason == "match" else "is not"
@@ -112,7 +108,7 @@ def describe(f: Found) -> Description:
         "take such members into an experiment of their own, whose pilot tries them",
         f"give finer `levels:` than {levels[0]} to {levels[-1]} in place of `tolerance:`",
     ]
-    if state in model.velocities and options.get("end_velocity", "kick") != "kick":
+    if state in f.model.velocities and options.get("end_velocity", "kick") != "kick":
         ways.insert(0, f"set `end_velocity: kick` for scheme {name}")
     if options.get("arithmetic", "compensated") != "compensated":
         ways.append(f"set `arithmetic: compensated` for scheme {name}")

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.apriori.formal_orders import columns_of, options_of
-from vibsim.checks.fields import Field, facts, measured
+from vibsim.checks.fields import Field
 from vibsim.checks.outcome import (
     MATCH,
     MISMATCH,
@@ -23,8 +23,7 @@ from vibsim.checks.outcome import (
     NOT_APPLICABLE,
     PRE_ASYMPTOTIC,
     TOO_FEW_LEVELS,
-    Outcome,
-    outcome_of,
+    Judged,
 )
 from vibsim.checks.sentences import (
     NOT_FINITE,
@@ -75,18 +74,13 @@ SAMPLED = ("at", "end")
 """Numbers that are a sample of a series, and are told by its name."""
 COUNTED = frozenset({"accepted_steps", "force_evaluations"})
 """Numbers that finer levels make larger, and no more accurate."""
-FROM_THEORY = frozenset(
+SURVIVES_FAILURE = frozenset(
     {
-        "stability_limit",
-        "exact_degree",
-        "predicted_growth_per_period",
-        "predicted_frequency",
-        "predicted_phase_error",
+        *("at", "exact_period", "growth_per_period", "stability_limit", "exact_degree"),
+        *("predicted_growth_per_period", "predicted_frequency", "predicted_phase_error"),
     }
 )
-"""Numbers that no run enters."""
-SURVIVES_FAILURE = frozenset({"at", "exact_period", "growth_per_period"}) | FROM_THEORY
-"""Numbers that may be sound although the member broke down later."""
+"""Numbers that may be sound although the member broke down later; those from theory no run enters."""
 
 
 def sees_several_levels(name: str) -> bool:
@@ -176,13 +170,14 @@ def _prospects(
     return np.where(fulfilled, UNKNOWN, code), np.where(fulfilled, -1, first)
 
 
-def judge(experiment: Experiment, record: Record, check: ValueCheck, id_: str) -> Outcome:
+def judge(
+    experiment: Experiment, record: Record, check: ValueCheck, found: Mapping[str, Any]
+) -> Judged:
     """Compare a measured number with what the check asks of it.
 
     A limit of several levels that misses what is asked by less than its bound may be right: nothing is decided then.
     """
-    name = check.value
-    number, bound = (measured(record, id_, field) for field in ("value", "error_bound"))
+    name, number, bound = check.value, found["value"], found["error_bound"]
     holds, away = compare(check, number)
     survives = np.isfinite(number) & (name in SURVIVES_FAILURE)
     # of a stability limit infinity is a value; on the separatrix there is no period, and nothing went wrong
@@ -196,7 +191,7 @@ def judge(experiment: Experiment, record: Record, check: ValueCheck, id_: str) -
         (may_be_right, TOO_FEW_LEVELS if len(record["level"]) < FEWEST else PRE_ASYMPTOTIC),
     ]
     reason = np.select([mask for mask, _ in cases], [code for _, code in cases], MISMATCH)
-    return outcome_of(experiment, record, check, reason, away, facts(record, id_, FIELDS))
+    return Judged(reason, away)
 
 
 def _lacks_levels(experiment: Experiment, check: ValueCheck) -> bool:
