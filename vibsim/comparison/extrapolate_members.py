@@ -36,21 +36,18 @@ class Extrapolated:
     velocity: Floats
     position_error: Floats
     velocity_error: Floats
-    # place in the ladder of the coarsest level used for the position; -1 for none
-    first: NDArray[np.intp]
+    first: NDArray[np.intp]  # place of the coarsest level used for the position; -1 for none
     last: NDArray[np.intp]
 
     def largest_bounds(self) -> tuple[Floats, Floats]:
         """Return the largest bounds of position and velocity over all times, shape (case,); infinite without one."""
-        return (
-            _largest(self.position, self.position_error),
-            _largest(self.velocity, self.velocity_error),
-        )
 
+        def largest(values: Floats, errors: Floats) -> Floats:
+            is_known = np.isfinite(values) & ~np.isnan(errors)
+            return np.asarray(np.max(np.where(is_known, errors, np.inf), axis=0))
 
-def _largest(values: Floats, errors: Floats) -> Floats:
-    is_known = np.isfinite(values) & ~np.isnan(errors)
-    return np.asarray(np.max(np.where(is_known, errors, np.inf), axis=0))
+        velocity = largest(self.velocity, self.velocity_error)
+        return largest(self.position, self.position_error), velocity
 
 
 def level_at(
@@ -65,10 +62,7 @@ def level_at(
 ) -> Pair:
     """Run one level; return position and velocity at every `every`-th step, each of shape (t, case).
 
-    Parameters
-    ----------
-    options
-        Of the scheme; those of the method where None.
+    The options of the scheme are those of the method where None.
     """
     run = integrate(
         method.model,
@@ -102,11 +96,9 @@ def noise_of(
 
     Parameters
     ----------
-    steps, every
-        Number of steps of every level, and the stride of its samples.
-    levels
-        Their position and velocity, each of shape (t, case). The coarsest may have been sampled more often than the
-        rest, a whole number of times.
+    steps, every, levels
+        Number of steps of every level, the stride of its samples, and position and velocity, each of shape (t, case).
+        The coarsest may have been sampled more often than the rest, a whole number of times.
     threads, lane
         Of the engine; the lane is chosen by the size of the work where None.
 
@@ -169,8 +161,6 @@ def extrapolate_members(
 
     Parameters
     ----------
-    steps
-        Number of steps of every level.
     t
         Times as fractions of the end, shape (t, 1).
     levels
@@ -178,16 +168,13 @@ def extrapolate_members(
     noise
         What `noise_of` returned.
     """
-    case = len(start.end)
     size = max(PIECE // len(t), 1)
     parts = []
-    for first in range(0, case, size):
+    for first in range(0, len(start.end), size):
         part = slice(first, first + size)
-        some = start.of(part)
-        of_part = [(np.ascontiguousarray(u[:, part]), v[:, part] + 0.0) for u, v in levels]
-        parts.append(
-            _extrapolate(method, some, steps, t, of_part, None if noise is None else noise[:, part])
-        )
+        some = [(np.ascontiguousarray(u[:, part]), v[:, part] + 0.0) for u, v in levels]
+        of_part = None if noise is None else noise[:, part]
+        parts.append(_extrapolate(method, start.of(part), steps, t, some, of_part))
     return joined(parts)
 
 
@@ -221,7 +208,9 @@ def _extrapolate(
         values = [found[0].position, found[1].velocity]
         errors = [found[0].error, found[1].error + 0.0]
         if method.end_powers != powers[1] and t[-1, 0] == 1.0:
-            known, levels = _recent(known), [(u[-RECENT:], v[-RECENT:]) for u, v in levels]
+            recent = {name: getattr(known, name)[-RECENT:] for name in ("phase", "noise", "spread")}
+            known = replace(known, **recent)
+            levels = [(u[-RECENT:], v[-RECENT:]) for u, v in levels]
             for i, x in enumerate((powers[0], method.end_powers)):
                 end = _alone(method, steps, x, levels, i, known)
                 values[i][-1], errors[i][-1] = end[i][-1], end.error[-1]
@@ -250,11 +239,6 @@ def _alone(
     """Extrapolate the position (0) or the velocity (1) by itself."""
     alone = [(0.0 * u, v) if which else (u, 0.0 * v) for u, v in levels]
     return best_entry(method.tableau(steps, powers), alone, known)
-
-
-def _recent(known: Circumstances) -> Circumstances:
-    times = {name: getattr(known, name)[-RECENT:] for name in ("phase", "noise", "spread")}
-    return replace(known, **times)
 
 
 def inverse_power(x: Any, p: int) -> Any:

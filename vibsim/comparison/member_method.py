@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -43,28 +43,24 @@ class Method:
         """Whether position and velocity have the same powers at all times."""
         return self.position_powers == self.velocity_powers == self.end_powers
 
+    def _others(self) -> Iterator[Options]:
+        """Yield the options with another choice of one word."""
+        for option in self.scheme.words:
+            for choice in option.choices:
+                yield {**self.options, option.name: choice}
+
     @cached_property
     def twin(self) -> Options | None:
         """Options of the same method with other rounding errors; None where there are none."""
-        for option in self.scheme.words:
-            for choice in option.choices:
-                other = {**self.options, option.name: choice}
-                if self.scheme.round_off(other, LONG_RUN) != self.scheme.round_off(
-                    self.options, LONG_RUN
-                ):
-                    return other
-        return None
-
-    def round_off(self, steps: Sequence[int]) -> tuple[float, ...]:
-        """Return the predicted round-off relative to the solution."""
-        return tuple(self.scheme.round_off(self.options, n) for n in steps)
+        own = self.scheme.round_off(self.options, LONG_RUN)
+        return next((o for o in self._others() if self.scheme.round_off(o, LONG_RUN) != own), None)
 
     def tableau(self, steps: tuple[int, ...], powers: tuple[int, int]) -> Tableau:
         """Return the tableau of a quantity whose error has these powers."""
         known = self._tableaux.get((steps, powers))
         if known is None:
-            known = tableau(steps, *powers, self.round_off(steps))
-            self._tableaux[steps, powers] = known
+            round_off = tuple(self.scheme.round_off(self.options, n) for n in steps)
+            known = self._tableaux[steps, powers] = tableau(steps, *powers, round_off)
         return known
 
     @cached_property
@@ -77,16 +73,13 @@ class Method:
 
     def _own_end(self) -> Options:
         """Return the options with which the last velocity is the scheme's own, as all others are."""
-        for option in self.scheme.words:
-            for choice in option.choices:
-                other = {**self.options, option.name: choice}
-                if self.scheme.stepper(other).end == "own" and self._same_start(other):
-                    return other
+        mine = self.scheme.stepper(self.options)
+        for other in self._others():
+            its = self.scheme.stepper(other)
+            same = (mine.start, mine.step, mine.variant) == (its.start, its.step, its.variant)
+            if its.end == "own" and same:
+                return other
         return self.options
-
-    def _same_start(self, other: Options) -> bool:
-        mine, its = self.scheme.stepper(self.options), self.scheme.stepper(other)
-        return (mine.start, mine.step, mine.variant) == (its.start, its.step, its.variant)
 
 
 @dataclass(frozen=True)

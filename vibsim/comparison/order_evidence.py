@@ -44,28 +44,15 @@ def order_of(q: Comparison, check: ConvergesCheck) -> Floats:
 
 
 def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evidence:
-    """Collect the evidence on a quantity in a norm.
-
-    Parameters
-    ----------
-    q
-        The quantity, compared between levels.
-    norm
-        One of `vocabulary.NORMS`.
-    order
-        The order that is expected, shape (scheme, 1 or case).
-    tolerance
-        How far from it an order may be.
-
-    Returns
-    -------
-    Evidence
-        Arrays of shape (scheme, case, ...).
-    """
+    """Collect the evidence on a quantity in a norm, for the order that is expected, shape (scheme, 1 or case)."""
     block, measured = q.block, q.in_norm(norm)
     grid, shape = block.grid, block.shape
     points = len(grid.t)
-    size, exists = _size(q.values[-1])
+    size, exists = largest(q.values[-1]), np.ones(shape, dtype=bool)
+    if not np.all(np.isfinite(size)):
+        # of a member that has broken down, what there is of it
+        finest = q.values[-1]
+        size, exists = largest(np.nan_to_num(finest)), np.any(np.isfinite(finest), axis=-1)
     if plain_name(q.name) in ENERGIES or is_error_part(q.name):
         # what is left of an energy is known no better than the energy, and a part of an error no better than the motion
         size = q.scale
@@ -123,8 +110,12 @@ def _motion(q: Comparison, order: Floats, size: Floats) -> tuple[Floats, Flags]:
 
     What is promised to stay as it is, or is a part of an error, shows a scheme where the positions move.
     """
-    moved, straight = _moved(q.values[-1], size)
-    block = q.block
+    # the start is the same on every level: what lies still at all other common times shows nothing of a scheme
+    block, later = q.block, q.values[-1][..., 1:]
+    with np.errstate(all="ignore"):
+        change = np.asarray(np.max(later, axis=-1) - np.min(later, axis=-1))
+        bend = np.max(np.abs(np.diff(later, 2, axis=-1)), axis=-1, initial=0.0)
+        moved, straight = change / size, np.asarray(bend <= STRAIGHT * change)
     whole = [name for name in block.model.positions if f"{name}_max" in block.finest]
     if not whole:
         return moved, straight
@@ -133,23 +124,3 @@ def _motion(q: Comparison, order: Floats, size: Floats) -> tuple[Floats, Flags]:
         of_states = [(high - low) / np.maximum(np.abs(low), np.abs(high)) for low, high in ends]
     exactly = np.broadcast_to(np.isinf(order) | is_error_part(q.name), block.shape)
     return np.where(exactly, np.fmax.reduce(of_states), moved), straight & ~exactly
-
-
-def _moved(finest: Floats, size: Floats) -> tuple[Floats, Flags]:
-    """Return by which part of its size a solution changes behind the start, and whether in a straight line.
-
-    The start is the same on every level: what lies still at all other common times shows nothing of a scheme.
-    """
-    later = finest[..., 1:]
-    with np.errstate(all="ignore"):
-        change = np.asarray(np.max(later, axis=-1) - np.min(later, axis=-1))
-        bend = np.max(np.abs(np.diff(later, 2, axis=-1)), axis=-1, initial=0.0)
-        return change / size, np.asarray(bend <= STRAIGHT * change)
-
-
-def _size(finest: Floats) -> tuple[Floats, Flags]:
-    """Return the largest value of the finest level, and whether it has a finite one, shape (scheme, case)."""
-    size = largest(finest)
-    if np.all(np.isfinite(size)):
-        return size, np.ones(size.shape, dtype=bool)
-    return largest(np.nan_to_num(finest)), np.any(np.isfinite(finest), axis=-1)
