@@ -7,6 +7,7 @@ from typing import Any
 
 from vibsim import experiment as spec
 from vibsim.analysis import analyse_records, summarise, verdicts
+from vibsim.report import style
 from vibsim.report.figures import drawing
 from vibsim.simulation import simulate_record
 
@@ -41,6 +42,11 @@ def plan(exp: Any) -> Any:
 
 def svg(picture: Any) -> str:
     return drawing.svg(picture.figure, picture.name)
+
+
+def element(picture: Any) -> str:
+    with style.applied():
+        return drawing.element(picture)
 
 
 def plain(**changes: Any) -> Any:

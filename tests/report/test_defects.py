@@ -13,7 +13,7 @@ from vibsim.report import choice, data, style, sweep_layout
 from vibsim.report.data import Member
 from vibsim.report.figures import maps, order, solution, time
 from vibsim.report.page import cards
-from vibsim.report.tables import orders as contents
+from vibsim.report.tables import levels as contents
 
 STIFF = {
     "model": {"kind": "linear_pendulum"},

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import samples
 
-from vibsim.report.tables import events
+from vibsim.report.tables import levels
 
 BALL = {"kind": "bouncing_ball", "g": 2.0, "restitution": 0.5}
 
@@ -13,7 +13,7 @@ BALL = {"kind": "bouncing_ball", "g": 2.0, "restitution": 0.5}
 def rows(**changes):
     given = {"model": BALL, "initial": {"h": 1.0}, "time": {"end": 4.0}, "levels": [4, 5, 6]}
     experiment = samples.experiment(**given | changes)
-    found = events.table(samples.record(experiment))
+    found = levels.events(samples.record(experiment))
     assert found is not None
     names = [column.header for column in found.columns]
     return [dict(zip(names, row, strict=True)) for row in found.rows]
@@ -46,11 +46,11 @@ def test_a_row_for_every_member():
 
 
 def test_smooth_motions_have_none():
-    assert events.table(samples.record(samples.experiment(levels=[4, 5, 6]))) is None
+    assert levels.events(samples.record(samples.experiment(levels=[4, 5, 6]))) is None
 
 
 def test_a_ball_that_meets_no_ground_has_none():
     experiment = samples.experiment(
         model=BALL, initial={"h": 9.0}, time={"end": 1.0}, levels=[4, 5, 6]
     )
-    assert events.table(samples.record(experiment)) is None
+    assert levels.events(samples.record(experiment)) is None

@@ -30,7 +30,7 @@ def test_an_order_has_its_curves_and_a_point_for_every_triple():
     assert len(dots(found, BLUE)) == 2
     assert len(dots(found, "white")) == 0
     assert "rescaled differences of θ [rad]" in texts(found)
-    assert "rescaled differences of θ [rad]" in found.svg
+    assert "rescaled differences of θ [rad]" in samples.element(found)
     assert found.caption.startswith("Left: differences between levels of central")
 
 
@@ -124,8 +124,8 @@ def test_a_large_sweep_without_series_has_the_order_alone():
 
 def test_names_of_a_user_are_text():
     (found,) = pictures(ORDER, levels=[6, 7, 8], schemes=[{"kind": "rk4", "label": "a<b>&"}])
-    assert "<b>" not in found.svg
-    ElementTree.fromstring(found.svg)
+    assert "<b>" not in samples.element(found)
+    ElementTree.fromstring(samples.element(found))
 
 
 def test_points_beyond_the_frame_are_triangles_on_its_edge():

@@ -18,7 +18,6 @@ from vibsim.report.figures import (
     extrema,
     gallery,
     order,
-    period,
     sweep,
     theory,
     time,
@@ -180,7 +179,7 @@ def test_frames_are_those_of_the_members_that_stay(diverging):
     along = sweep_layout.along_of(sweep_layout.keys(record))
     with style.applied():
         error = sweep.orders(exp, record, along, "u")
-        amplitude = period.amplitude(exp, record, along)
+        amplitude = sweep.amplitude(exp, record, along)
         running = energy.running(record, 8)
     assert np.nanmax(record["u_max"]) > 1e40
     for picture, axes in ((error, [1]), (amplitude, [0, 1]), (running, [0])):

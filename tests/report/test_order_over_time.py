@@ -10,7 +10,6 @@ import samples
 
 from vibsim.report import style
 from vibsim.report.data import Member
-from vibsim.report.figures import order_panels
 from vibsim.report.figures import time as figures_time
 from vibsim.report.text import words
 
@@ -76,13 +75,13 @@ def test_where_there_is_no_order_there_is_no_panel() -> None:
     _, rec = drawn(initial={"theta": 0.0})
     with style.applied():
         assert panel(figures_time.overlay(rec, "theta", Member(0, 0, "central"))) is None
-    assert not order_panels.has_order(rec, "nothing", Member(0, 0, "central"))
+    assert not figures_time.has_order(rec, "nothing", Member(0, 0, "central"))
 
 
 def test_the_finest_sound_triples_are_chosen() -> None:
-    assert order_panels.chosen([True] * 5) == [2, 3, 4]
-    assert order_panels.chosen([False, True, True, False]) == [1, 2]
-    assert order_panels.chosen([False, False]) == [0]
+    assert figures_time.finest_sound([True] * 5) == [2, 3, 4]
+    assert figures_time.finest_sound([False, True, True, False]) == [1, 2]
+    assert figures_time.finest_sound([False, False]) == [0]
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from vibsim.core.record import Record
 from vibsim.report import style
 from vibsim.report.data import Member
 from vibsim.report.figures import time
-from vibsim.report.tables import orders
+from vibsim.report.tables import levels as tables
 
 CONTENT = {
     "title": "outside",
@@ -40,7 +40,7 @@ def made(levels: range, noise: float = 0.0, **more: Any) -> tuple[Any, Record]:
 
 def notes(record: Record) -> list[str]:
     """Return what the table of levels says of each of them."""
-    return orders._notes(record, "u", Member(0, 0, "central"))
+    return tables._notes(record, "u", Member(0, 0, "central"))
 
 
 def legend(record: Record) -> str:

@@ -6,7 +6,7 @@ import samples
 
 from vibsim import simulate
 from vibsim.report import choice, data
-from vibsim.report.figures import gallery, path
+from vibsim.report.figures import gallery, plane
 
 CONTENT = {
     "model": {"kind": "elastic_pendulum", "beta": 0.9, "Theta": 40},
@@ -22,7 +22,7 @@ def drawn(**changes):
     exp = samples.experiment(**(CONTENT | changes))
     rec = samples.record(exp)
     shown, _ = gallery.choose(exp, rec)
-    return exp, rec, shown, path.path(exp, rec, shown)
+    return exp, rec, shown, plane.path(exp, rec, shown)
 
 
 @pytest.fixture(scope="module")

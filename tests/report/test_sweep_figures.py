@@ -16,8 +16,7 @@ from vibsim import report
 from vibsim.core.vocabulary import REASONS
 from vibsim.models import MODELS
 from vibsim.report import finest_level, style, sweep_layout
-from vibsim.report.figures import cloud as figures_cloud
-from vibsim.report.figures import gallery, map_panels, maps, separatrix, spread
+from vibsim.report.figures import gallery, maps, members, separatrix
 from vibsim.report.figures import order as figures_order
 from vibsim.report.figures import sweep as figures_sweep
 from vibsim.report.sweep_layout import Key
@@ -142,7 +141,7 @@ def test_the_estimated_error_of_the_finest_level_is_the_true_one(across):
     ratio = (error.estimate / error.true)[passed]
     # the next term of the expansion is smaller by the distance of the order from 2, at most 0.1, times log 2 * 4/3
     assert np.all(np.abs(ratio - 1.0) < 0.1)
-    period = finest_level.period(record, "theta")
+    period = finest_level.measured(record, "period", "theta")
     true = np.abs(period.value - record["exact_period"])[passed]
     assert np.median(np.abs(period.error[passed] / true - 1.0)) < 0.1
 
@@ -169,7 +168,7 @@ def test_maps_show_verdict_order_error_and_the_separatrix(across):
 
 
 def test_the_scale_jumps_where_the_tolerance_ends():
-    colours = map_panels._pale_within(0.1)
+    colours = maps.pale_within(0.1)
     shade = {x: np.sum(np.abs(np.subtract(colours(x + 0.5), colours(0.5)))) for x in
              (-0.11, -0.09, 0.09, 0.11)}  # fmt: skip
     assert shade[0.09] < 0.4 < 0.6 < shade[0.11]
@@ -177,10 +176,10 @@ def test_the_scale_jumps_where_the_tolerance_ends():
 
 
 def test_a_scale_is_logarithmic_only_over_decades():
-    assert map_panels.limits(np.geomspace(1e-9, 1.0, 50))[2]
-    assert not map_panels.limits(np.linspace(1.0, 10.0, 50))[2]
-    assert not map_panels.limits(np.linspace(-1.0, 1e5, 50))[2]
-    low, high, _ = map_panels.limits(np.zeros(3))
+    assert maps.limits(np.geomspace(1e-9, 1.0, 50))[2]
+    assert not maps.limits(np.linspace(1.0, 10.0, 50))[2]
+    assert not maps.limits(np.linspace(-1.0, 1e5, 50))[2]
+    low, high, _ = maps.limits(np.zeros(3))
     assert low < 0.0 < high
 
 
@@ -229,9 +228,9 @@ def test_a_sample_of_three_keys_is_shown_against_each(cloud):
 
 def test_shares_add_up_to_one_and_count_every_member(cloud, monkeypatch):
     exp, record = cloud
-    monkeypatch.setattr(figures_cloud, "SHARES", 4)
+    monkeypatch.setattr(members, "SHARES", 4)
     with style.applied():
-        picture = figures_cloud.projections(exp, record, sweep_layout.keys(record), "theta", 0)
+        picture = members.projections(exp, record, sweep_layout.keys(record), "theta", 0)
     for ax in picture.figure.axes[2::3]:
         ends = {}
         for bar in ax.patches:
@@ -244,14 +243,14 @@ def test_shares_add_up_to_one_and_count_every_member(cloud, monkeypatch):
 
 def test_many_members_are_counted_in_cells(cloud, monkeypatch):
     exp, record = cloud
-    monkeypatch.setattr(figures_cloud, "POINTS", 10)
+    monkeypatch.setattr(members, "POINTS", 10)
     with style.applied():
-        picture = figures_cloud.projections(exp, record, sweep_layout.keys(record), "theta", 0)
+        picture = members.projections(exp, record, sweep_layout.keys(record), "theta", 0)
     for ax in picture.figure.axes[:2]:
         counts = [np.ma.filled(image.get_array(), 0.0).sum() for image in ax.collections]
         assert sum(counts) == 80
-    away = np.nan_to_num(finest_level.deviation(record, "theta")[0], nan=-figures_cloud.BEYOND)
-    inside = np.clip(away, -figures_cloud.BEYOND, figures_cloud.BEYOND)
+    away = np.nan_to_num(finest_level.deviation(record, "theta")[0], nan=-members.BEYOND)
+    inside = np.clip(away, -members.BEYOND, members.BEYOND)
     images = picture.figure.axes[0].collections
     found = sum(np.ma.filled(image.get_array(), 0.0).sum(axis=1) for image in images)
     up = images[0].get_coordinates()[:, 0, 1]
@@ -262,12 +261,12 @@ def test_many_members_are_counted_in_cells(cloud, monkeypatch):
 def test_a_histogram_counts_every_member_that_has_the_number(cloud):
     exp, record = cloud
     with style.applied():
-        picture = spread.histograms(exp, record, "theta")
+        picture = members.histograms(exp, record, "theta")
     error = finest_level.error(record, "theta").best[0]
     ax = picture.figure.axes[1]
     drawn = sum(float(np.sum(p.get_data().values - p.get_data().baseline)) for p in ax.patches)
     assert drawn == np.isfinite(error).sum()
-    assert spread.histograms(exp, samples.record(samples.plain()), "theta") is None
+    assert members.histograms(exp, samples.record(samples.plain()), "theta") is None
 
 
 def test_words_that_are_swept_are_written_on_their_axis():

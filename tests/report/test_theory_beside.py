@@ -12,14 +12,13 @@ import samples
 
 from vibsim import report
 from vibsim.models import MODELS
-from vibsim.report import choice, style
+from vibsim.report import choice, data, style
 from vibsim.report.figures import energy as figures_energy
 from vibsim.report.figures import extrema, gallery
-from vibsim.report.figures import growth as figures_growth
-from vibsim.report.figures import phase as figures_phase
+from vibsim.report.figures import plane as figures_plane
 from vibsim.report.figures import theory as figures_theory
 from vibsim.report.figures import work as figures_work
-from vibsim.report.tables import energy as contents_energy
+from vibsim.report.tables import levels as contents_levels
 from vibsim.report.tables import published
 from vibsim.report.tables import theory as contents_theory
 from vibsim.report.tables import work as contents_work
@@ -87,7 +86,7 @@ def test_printed_digits_stand_beside_ours(text, tmp_path):
     exp, rec, summary = text
     (table,) = published.tables(exp, rec, summary)
     assert column(table, "printed") == [row["printed"] for row in PRINTED["rows"]]
-    agrees = [abs(ours - row.number) <= row.half_unit for ours, row in
+    agrees = [abs(ours - row.meaning.number) <= row.meaning.half_unit for ours, row in
               zip(column(table, "ours"), exp.published[0].rows, strict=True)]  # fmt: skip
     assert agrees == [True, False, True, False]
     assert column(table, "agrees?") == ["yes", "no", "yes", "no (not as expected)"]
@@ -155,7 +154,7 @@ def test_stability_is_a_word(p, limit, word):
 
 def test_a_scheme_conserves_with_its_own_velocity_what_the_centred_difference_seems_to_lose(text):
     _, rec, _ = text
-    table = contents_energy.velocities(rec)
+    table = contents_levels.velocities(rec)
     own, centred = (column(table, f"max |dE|/E(0), {v}") for v in ("own velocity", "[D₂ₜu]"))
     implicit = [i for i, name in enumerate(column(table, "scheme")) if name == "crank_nicolson"]
     assert all(own[i] < 1e-12 < 1e-3 < centred[i] for i in implicit)
@@ -172,7 +171,7 @@ def test_a_scheme_conserves_with_its_own_velocity_what_the_centred_difference_se
 
 def test_an_energy_that_decays_does_not_grow():
     rec = samples.record(spring(schemes=["forward_euler", "backward_euler"]))
-    table = contents_energy.velocities(rec)
+    table = contents_levels.velocities(rec)
     drifts = column(table, "drift of the energy, own velocity")
     assert drifts == ["exponential growth"] * 3 + ["exponential decay"] * 3
 
@@ -206,7 +205,7 @@ def test_a_further_number_by_the_own_velocity_says_so(tmp_path):
 
 def test_the_centred_scheme_alone_has_no_second_energy():
     rec = samples.record(spring(schemes=["central"]))
-    assert contents_energy.velocities(rec) is None
+    assert contents_levels.velocities(rec) is None
     assert figures_energy.running(rec, 0) is None
 
 
@@ -251,11 +250,11 @@ def test_runs_beyond_the_limit_show_predicted_and_measured_growth():
         schemes=["central", "crank_nicolson"], time={"end": 10.0, "base_steps": 31}, levels=[0, 1]
     )
     rec = samples.record(exp)
-    picture = figures_growth.growing(exp, rec)
+    picture = figures_theory.growing(exp, rec)
     (entry,) = [t.get_text() for t in picture.figure.axes[0].get_legend().get_texts()]
     assert words.number(float(rec["theory_growth"][0, 0, 0])) in entry
     assert words.number(float(rec["measured_growth"][0, 0, 0])) in entry
-    assert figures_growth.growing(exp, samples.record(spring(schemes=["central"]))) is None
+    assert figures_theory.growing(exp, samples.record(spring(schemes=["central"]))) is None
 
 
 @pytest.mark.parametrize(("u", "v"), [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (1.0, -3.0)])
@@ -276,10 +275,10 @@ def test_levels_of_the_phase_plane_are_those_that_were_computed(text):
     exp, rec, _ = text
     member = choice.members(rec, "u")[2]
     model = MODELS["spring"]
-    values = figures_phase.of_level(rec, model.position, member, 0)
+    values = data.of_level(rec, model.position, member, 0)
     error = rec["u_exact"][0] - values
     np.testing.assert_allclose(error, rec["u_error"][2, 0, 0], atol=1e-13)
-    picture = figures_phase.plane(exp, rec, choice.members(rec, "u"))
+    picture = figures_plane.phase(exp, rec, choice.members(rec, "u"))
     assert len(picture.figure.axes) == 3
     assert all(ax.get_aspect() == 1.0 for ax in picture.figure.axes)
 

@@ -12,7 +12,7 @@ from vibsim.formula import Pulses
 from vibsim.models import Model
 from vibsim.observe.thresholds import MOST_GAPS
 from vibsim.simulation import Members
-from vibsim.simulation.reference.missed_pulses import pulses_of_force, varies_in_time
+from vibsim.simulation.reference.one_sided_forces import pulses_of_force, varies_in_time
 
 AROUND = np.arange(-2, 4)  # points around a pulse
 

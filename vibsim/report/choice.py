@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import SEVERITY, TOLERANCE, TYPICAL_NORM
+from vibsim.core.vocabulary import SEVERITY, TOLERANCE
 from vibsim.experiment.storage import asked
-from vibsim.report.data import Member, case_name, due, flags, formal_orders, pick, swept
+from vibsim.report.data import Member, case_name, due, flags, formal_orders, swept
+from vibsim.report.finest_level import deviation
 from vibsim.schemes import SCHEMES
 
 if TYPE_CHECKING:
@@ -22,9 +22,7 @@ def promises(experiment: Experiment, record: Record, quantity: str) -> list[tupl
     """Return every finite order that is due to a quantity, with its tolerance, in ascending order.
 
     It is what a scheme promises; of a part of an error of which theory says nothing, what its checks expect.
-
     What is exact has no order to compare with, nor has a scheme that chooses its own steps.
-    The tolerance is the smallest that a check has which is about the quantity and the scheme.
     """
     asked_for = {
         (float(check.order), check.tolerance)
@@ -44,16 +42,12 @@ def promises(experiment: Experiment, record: Record, quantity: str) -> list[tupl
 
 def tolerance(experiment: Experiment, quantity: str, scheme: str) -> float:
     """Return the smallest tolerance of a check that is about the order of a quantity by a scheme."""
-    found = [
-        check.tolerance
-        for check in _on_order(experiment, quantity)
-        if check.schemes is None or scheme in check.schemes
-    ]
+    checks = _on_order(experiment, quantity)
+    found = [row.tolerance for row in checks if row.schemes is None or scheme in row.schemes]
     return min(found, default=TOLERANCE)
 
 
 def _on_order(experiment: Experiment, quantity: str) -> list[ConvergesCheck]:
-    """Return the checks that are about the order of a quantity."""
     inner = [check.measured for check in experiment.checks]
     return [row for row in inner if row.kind == "converges" and row.converges == quantity]
 
@@ -79,8 +73,10 @@ def members(record: Record, quantity: str) -> list[Member]:
     schemes = record.words("scheme")
     if not swept(record):
         return [Member(s, 0, name) for s, name in enumerate(schemes)]
-    ranking = _ranking(record, quantity)
     status = flags(record, f"{quantity}_status")
+    severity = np.max([(status == word) * rank for word, rank in SEVERITY.items()], axis=(0, 1))
+    away = np.abs(deviation(record, quantity))
+    ranking = np.lexsort((np.max(np.where(np.isnan(away), np.inf, away), axis=0), severity))
     # the healthiest: members that most schemes pass, and of the others those that fewest fail
     score = np.sum(status == "PASS", axis=0) * (len(status) + 1) - np.sum(status == "FAIL", axis=0)
     healthy = ranking[score[ranking] == score.max()]
@@ -95,14 +91,3 @@ def members(record: Record, quantity: str) -> list[Member]:
 def with_levels(experiment: Experiment, found: list[Member]) -> list[Member]:
     """Leave out schemes that choose their own steps, which no level changes, unless there are no others."""
     return [m for m in found if not SCHEMES[experiment.schemes[m.scheme].kind].adaptive] or found
-
-
-def _ranking(record: Record, quantity: str) -> NDArray[np.intp]:
-    """Return the members from the best to the worst, shape (case,)."""
-    status = flags(record, f"{quantity}_status")
-    severity = np.max(
-        [np.where(status == word, rank, 0) for word, rank in SEVERITY.items()], axis=(0, 1)
-    )
-    norm = record.words("norm").index(TYPICAL_NORM)
-    away = np.abs(pick(record, f"{quantity}_order", norm=norm) - formal_orders(record, quantity))
-    return np.lexsort((np.max(np.where(np.isnan(away), np.inf, away), axis=0), severity))

@@ -14,14 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.apriori.roundoff_floor import norm_of_floor
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
-from vibsim.report.style import RAISE
+from vibsim.report.style import RAISE, finite, label
 from vibsim.simulation.scaled import has_time_unit
 
+MEMBER = ("scheme", "case")
+OF_LEVEL = ("scheme", "case", "level")
+ABOVE = 3.0
+"""A difference counts as more than round-off when it exceeds this many times the floor."""
 _LONGEST = 40
 """Characters of the name of a scheme in the name of a file."""
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -50,22 +54,7 @@ class Member:
 
 
 def pick(record: Record, name: str, **index: int) -> NDArray[Any]:
-    """Return the values of a variable at the given positions of its dimensions.
-
-    Parameters
-    ----------
-    record
-        The convergence Record.
-    name
-        A variable or coordinate of it.
-    **index
-        Position per dimension; a dimension that the variable lacks is passed over.
-
-    Returns
-    -------
-    array
-        The dimensions that were not named, in their order.
-    """
+    """Return a variable at given positions of its dimensions; a dimension that it lacks is passed over."""
     variable = record.variable(name)
     return np.asarray(variable.values[tuple(index.get(dim, slice(None)) for dim in variable.dims)])
 
@@ -96,6 +85,21 @@ def exact_periods(record: Record) -> Floats:
     return known(record, "exact_period", ("case",))
 
 
+def natural_frequency(record: Record, case: int) -> float:
+    """Return the natural frequency w of a member; NaN where there is none."""
+    return float(np.ravel(known(record, "natural_frequency", ("case",), case=case))[0])
+
+
+def omega_dt(record: Record) -> Floats:
+    """Return w dt of every member and level, shape (case, level); NaN where the record does not have it."""
+    shape = (len(record["case"]), len(record["level"]))
+    if "omega_dt" not in record:
+        return np.full(shape, np.nan)
+    variable = record.variable("omega_dt")
+    values = np.asarray(variable.values, dtype=np.float64)
+    return np.broadcast_to(values if "case" in variable.dims else values[None, :], shape)
+
+
 def unit(record: Record, name: str) -> str:
     """Return the unit of a variable, with Unicode exponents; empty where it has none."""
     return pretty_unit(str(record.variable(name).attrs.get("units", "")) if name in record else "")
@@ -106,14 +110,28 @@ def time_unit(record: Record, name: str = "t") -> str:
     return (unit(record, name) or "s") if has_time_unit(record) else ""
 
 
+def time_label(record: Record) -> str:
+    """Return the label of an axis of times."""
+    return label("t", time_unit(record))
+
+
 def pretty_unit(text: str) -> str:
     """Write a unit such as ``rad s-1`` with Unicode exponents."""
-    parts = (part.rstrip("-0123456789") for part in text.split())
-    words = [
-        base + part[len(base) :].translate(RAISE)
-        for base, part in zip(parts, text.split(), strict=True)
-    ]
+    parts = [(part, part.rstrip("-0123456789")) for part in text.split()]
+    words = [base + part[len(base) :].translate(RAISE) for part, base in parts]
     return "" if text in {"", "1"} else " ".join(words)
+
+
+def norm_unit(record: Record, quantity: str, norm: str = TYPICAL_NORM) -> str:
+    """Return the unit of a norm over time: l1 and l2 carry the time, or its root, too."""
+    time = time_unit(record)
+    extra = {"l1": time, "l2": f"√{time}" if time else ""}.get(norm, "")
+    return f"{unit(record, f'{quantity}_difference_norm')} {extra}".strip()
+
+
+def norm_index(record: Record, norm: str = TYPICAL_NORM) -> int:
+    """Return the position of a norm."""
+    return record.words("norm").index(norm)
 
 
 def times(record: Record, case: int) -> Floats:
@@ -127,6 +145,11 @@ def steps_of(record: Record, case: int) -> Floats:
     return np.asarray(pick(record, "dt", case=case), dtype=np.float64)
 
 
+def ends_of(record: Record) -> Floats:
+    """Return the end time of every member, shape (case,) or (1,)."""
+    return np.atleast_1d(pick(record, "dt", level=0) * float(record["steps"][0]))
+
+
 def flags(record: Record, name: str) -> NDArray[Any]:
     """Return a flag variable as words, same shape."""
     table, values = record.meanings(name), record[name]
@@ -138,6 +161,11 @@ def flags(record: Record, name: str) -> NDArray[Any]:
 def whole(record: Record, dim: str) -> list[int]:
     """Return a coordinate of whole numbers (levels, pairs, triples)."""
     return [int(value) for value in record[dim]] if dim in record else []
+
+
+def is_lean(record: Record) -> bool:
+    """Say whether no series over time are stored (see `vibsim.experiment.storage`)."""
+    return record.attrs.get("storage") == "lean"
 
 
 def swept(record: Record) -> list[str]:
@@ -154,14 +182,32 @@ def case_name(record: Record, case: int) -> str:
     """Name a member by its swept values; empty without a sweep."""
     parts = []
     for name in swept(record):
-        key, measure = swept_label(record, name)
-        parts.append(f"{key} = {_value(pick(record, name, case=case))} {measure}".strip())
+        (key, measure), value = swept_label(record, name), pick(record, name, case=case).item()
+        text = f"{value:.6g}" if isinstance(value, float) else str(value)
+        parts.append(f"{key} = {text} {measure}".strip())
     return ", ".join(parts)
 
 
-def _value(value: Any) -> str:
-    plain = np.asarray(value).item()
-    return f"{plain:.6g}" if isinstance(plain, float) else str(plain)
+def everyone(record: Record) -> list[Member]:
+    """Return every scheme and member, all members of a scheme together."""
+    names = [case_name(record, case) for case in range(len(record["case"]))]
+    return [
+        Member(s, case, scheme, name)
+        for s, scheme in enumerate(record.words("scheme"))
+        for case, name in enumerate(names)
+    ]
+
+
+def place_of(record: Record, case: int) -> int | None:
+    """Return the position of a member by its global index; None where the record does not have it."""
+    found = np.flatnonzero(record["case"] == case)
+    return int(found[0]) if found.size else None
+
+
+def of_several(record: Record, scheme: int) -> str:
+    """Return the name of a scheme behind a comma, for a title; empty where there is one scheme."""
+    names = record.words("scheme")
+    return f", {names[scheme]}" if len(names) > 1 else ""
 
 
 def formal_order(record: Record, member: Member, quantity: str) -> float:
@@ -195,30 +241,21 @@ def promised_text(record: Record, quantity: str, scheme: int) -> str:
     return f"{found[0]:g}".replace("inf", "∞") if found.size == 1 else due(record, quantity)
 
 
-def of_several(record: Record, scheme: int) -> str:
-    """Return the name of a scheme behind a comma, for a title; empty where there is one scheme."""
-    names = record.words("scheme")
-    return f", {names[scheme]}" if len(names) > 1 else ""
+def stated_order(
+    record: Record, quantity: str, member: Member, norm: int
+) -> tuple[float, float, float]:
+    """Return the stated order and the ends of its interval; NaN where there is none."""
+    order, low, high = (
+        float(at(record, f"{quantity}_order{end}", member, norm=norm))
+        for end in ("", "_low", "_high")
+    )
+    return order, low, high
 
 
-def is_lean(record: Record) -> bool:
-    """Say whether no series over time are stored (see `vibsim.experiment.storage`)."""
-    return record.attrs.get("storage") == "lean"
-
-
-def place_of(record: Record, case: int) -> int | None:
-    """Return the position of a member by its global index; None where the record does not have it."""
-    found = np.flatnonzero(record["case"] == case)
-    return int(found[0]) if found.size else None
-
-
-def ends_of(record: Record) -> Floats:
-    """Return the end time of every member, shape (case,) or (1,)."""
-    return np.atleast_1d(pick(record, "dt", level=0) * float(record["steps"][0]))
-
-
-ABOVE = 3.0
-"""A difference counts as more than round-off when it exceeds this many times the floor."""
+def window(record: Record, quantity: str, member: Member) -> tuple[int, int]:
+    """Return the first and the last level that the stated order rests on; -1 where there is none."""
+    first, last = (int(at(record, f"{quantity}_window_{end}", member)) for end in ("first", "last"))
+    return first, last
 
 
 def sound_pairs(record: Record, quantity: str, member: Member) -> list[bool]:
@@ -226,12 +263,11 @@ def sound_pairs(record: Record, quantity: str, member: Member) -> list[bool]:
 
     The verdict's window decides where there is one: it ends where round-off begins. Else the predicted floor does.
     """
-    levels, last = whole(record, "level"), int(at(record, f"{quantity}_window_last", member))
+    levels, (_, last) = whole(record, "level"), window(record, quantity, member)
     if last >= 0:
         return [finer <= last for finer in levels[1:]]
     floor = floor_norm(record, quantity, member, TYPICAL_NORM)
-    norm = record.words("norm").index(TYPICAL_NORM)
-    differences = at(record, f"{quantity}_difference_norm", member, norm=norm)
+    differences = at(record, f"{quantity}_difference_norm", member, norm=norm_index(record))
     return [bool(d > ABOVE * max(floor[i], floor[i + 1])) for i, d in enumerate(differences)]
 
 
@@ -241,49 +277,24 @@ def sound_triples(record: Record, quantity: str, member: Member) -> list[bool]:
     return [all(above[i : i + 2]) for i in range(len(whole(record, "triple")))]
 
 
-def stated_order(
-    record: Record, quantity: str, member: Member, norm: int
-) -> tuple[float, float, float, float, float] | None:
-    """Return the stated order, the ends of its interval and of its window; None where no order is stated."""
-    order, low, high = (
-        float(at(record, f"{quantity}_order{end}", member, norm=norm))
-        for end in ("", "_low", "_high")
-    )
-    first, last = (
-        float(at(record, f"{quantity}_window_{end}", member)) for end in ("first", "last")
-    )
-    if not np.isfinite([order, low, high, first, last]).all() or last <= first:
-        return None
-    return order, low, high, first, last
-
-
-def sound_levels(record: Record, quantity: str, member: Member) -> list[bool]:
-    """Say of every level whether its error is still seen in the difference from the next (or previous) level."""
-    if not whole(record, "pair"):
-        return [True]
-    pairs = sound_pairs(record, quantity, member)
-    return [*pairs, pairs[-1]]
-
-
 def floor_norm(record: Record, quantity: str, member: Member, norm: str) -> Floats:
     """Return the norm over time of noise as large as the predicted round-off, shape (level,)."""
     floor = at(record, f"{quantity}_floor", member)
     if "t" in record:
         t = times(record, member.case)
         return norm_of_floor(floor, norm, t.size, np.diff(t[:2]))
-    return norm_of_floor(
-        floor, norm, int(record["steps"][0]) + 1, steps_of(record, member.case)[:1]
-    )
+    count = int(record["steps"][0]) + 1
+    return norm_of_floor(floor, norm, count, steps_of(record, member.case)[:1])
 
 
-def norm_unit(record: Record, quantity: str, norm: str) -> str:
-    """Return the unit of a norm over time: l1 and l2 carry the time, or its root, too."""
-    time = time_unit(record)
-    extra = {"l1": time, "l2": f"√{time}" if time else ""}.get(norm, "")
-    return f"{unit(record, f'{quantity}_difference_norm')} {extra}".strip()
+def of_level(record: Record, name: str, member: Member, level: int) -> Floats:
+    """Return a state on a level: the finest one and the differences between it and that level."""
+    values = at(record, f"{name}_finest", member)
+    for pair in range(level, len(whole(record, "pair"))):
+        values = values + at(record, f"{name}_difference", member, pair=pair)
+    return values
 
 
 def largest(values: Floats) -> float:
     """Return the largest absolute value that is finite; 0 where there is none."""
-    finite = np.abs(values[np.isfinite(values)])
-    return float(finite.max()) if finite.size else 0.0
+    return float(np.abs(finite(values)).max(initial=0.0))

@@ -10,22 +10,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import TYPICAL_NORM
+from vibsim.report import data
 from vibsim.report.data import (
-    Floats,
+    MEMBER,
     Member,
-    at,
     exact_periods,
     formal_orders,
     known,
-    pick,
-    unit,
+    norm_index,
     whole,
 )
 from vibsim.report.style import no_zeros
-
-MEMBER = ("scheme", "case")
 
 
 @dataclass(frozen=True)
@@ -51,9 +48,9 @@ class Error:
     """Estimate with the ends of the interval of the order; NaN where no interval is stated."""
 
     @property
-    def is_known(self) -> bool:
+    def kind(self) -> str:
         """Whether any member has an exact solution to compare with."""
-        return bool(np.isfinite(self.true).any())
+        return "true" if np.isfinite(self.true).any() else "estimated"
 
     @property
     def best(self) -> Floats:
@@ -63,34 +60,31 @@ class Error:
 
 def error(record: Record, quantity: str) -> Error:
     """Return the error of a quantity at the finest level, in the typical norm."""
-    norm = record.words("norm").index(TYPICAL_NORM)
+    norm = norm_index(record)
     true = known(record, f"{quantity}_error_norm", MEMBER, norm=norm, level=-1)
     if not whole(record, "pair"):
         nothing = np.full_like(true, np.nan)
         return Error(true, nothing, nothing, nothing)
-    last = pick(record, f"{quantity}_difference_norm", norm=norm, pair=-1)
-    formal = formal_orders(record, quantity)
+    last = data.pick(record, f"{quantity}_difference_norm", norm=norm, pair=-1)
     order, low, high = orders(record, quantity)
-    stated = np.where(np.isfinite(order), order, formal)
-    estimate, least, most = (last * _part(record, p) for p in (stated, high, low))
-    return Error(true, estimate, least, most)
+    stated = np.where(np.isfinite(order), order, formal_orders(record, quantity))
+    return Error(true, *(last * _part(record, p) for p in (stated, high, low)))
 
 
 def norms(record: Record, quantity: str, member: Member) -> Floats:
     """Return the true error of a member at every level, or the differences of its levels where it is not known."""
-    norm = record.words("norm").index(TYPICAL_NORM)
-    true = no_zeros(at(record, f"{quantity}_error_norm", member, norm=norm))
-    if np.isfinite(true).any() or not whole(record, "pair"):
-        return true
-    last = no_zeros(at(record, f"{quantity}_difference_norm", member, norm=norm))
-    return np.append(last, np.nan)
+
+    def of(name: str) -> Floats:
+        return no_zeros(data.at(record, f"{quantity}_{name}_norm", member, norm=norm_index(record)))
+
+    is_known = np.isfinite(of("error")).any() or not whole(record, "pair")
+    return of("error") if is_known else np.append(of("difference"), np.nan)
 
 
 def orders(record: Record, quantity: str) -> tuple[Floats, Floats, Floats]:
     """Return the stated order of every scheme and member and the ends of its interval, shape (scheme, case)."""
-    norm = record.words("norm").index(TYPICAL_NORM)
     order, low, high = (
-        np.asarray(pick(record, f"{quantity}_order{end}", norm=norm), dtype=np.float64)
+        np.asarray(data.pick(record, f"{quantity}_order{end}", norm=norm_index(record)), np.float64)
         for end in ("", "_low", "_high")
     )
     return order, low, high
@@ -109,28 +103,19 @@ def _part(record: Record, order: Floats) -> Floats:
         return np.where(rest > 0.0, 1.0 / rest, np.where(np.isnan(rest), np.nan, np.inf))
 
 
-def period(record: Record, position: str) -> Measured:
-    """Return the period of the finest level."""
-    return _measured(record, "period", position)
-
-
-def amplitude(record: Record, position: str) -> Measured:
-    """Return the amplitude of the finest level: the peak of a run that grows without bound may have either sign."""
-    return _measured(record, "amplitude", position)
-
-
-def _measured(record: Record, name: str, position: str) -> Measured:
+def measured(record: Record, name: str, position: str) -> Measured:
+    """Return the ``period`` or the ``amplitude``, which may have either sign where a run grows without bound."""
     value = np.abs(known(record, name, MEMBER, level=-1))
     error = np.full(value.shape, np.nan)
     if whole(record, "pair"):
         coarser = np.abs(known(record, name, MEMBER, level=-2))
         error = np.abs(value - coarser) * _part(record, formal_orders(record, position))
-    return Measured(name, unit(record, name), value, error)
+    return Measured(name, data.unit(record, name), value, error)
 
 
 def period_error(record: Record, level: int) -> Floats:
     """Return the relative error of the period at a position of `level`, shape (scheme, case); NaN where not known."""
-    measured, exact = known(record, "period", MEMBER, level=level), exact_periods(record)
+    period, exact = known(record, "period", MEMBER, level=level), exact_periods(record)
     with np.errstate(invalid="ignore", divide="ignore"):
         # on the separatrix there is no period to be wrong about
-        return np.asarray(np.where(np.isinf(exact), np.nan, np.abs(measured / exact - 1.0)))
+        return np.asarray(np.where(np.isinf(exact), np.nan, np.abs(period / exact - 1.0)))

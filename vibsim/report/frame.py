@@ -6,12 +6,14 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
+from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
-from vibsim.report.data import Floats, Member, at, floor_norm, known, largest, pick, whole
+from vibsim.report import data
+from vibsim.report.data import MEMBER, OF_LEVEL, Member, known
+from vibsim.report.style import positive
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,25 +41,18 @@ def sizes(record: Record, quantity: str) -> Floats:
         variable = record.variable(f"{quantity}_exact")
         others = tuple(i for i, dim in enumerate(variable.dims) if dim != "case")
         exact = np.max(np.abs(np.asarray(variable.values, dtype=np.float64)), axis=others)
-        return _positive(np.broadcast_to(exact, (count,)))
+        return positive(np.broadcast_to(exact, (count,)))
     if quantity.startswith("energy") and "energy_initial" in record:
-        return _positive(_smallest(np.abs(known(record, "energy_initial", ("scheme", "case")))))
-    if f"{quantity}_max" in record:
-        dims = ("scheme", "case", "level")
-        ends = [np.abs(known(record, f"{quantity}_{end}", dims)) for end in ("min", "max")]
-        return _positive(_smallest(np.swapaxes(np.maximum(*ends), 1, 2).reshape(-1, count)))
-    return np.full(count, np.nan)
+        found = np.abs(known(record, "energy_initial", MEMBER))
+    elif f"{quantity}_max" in record:
+        ends = [np.abs(known(record, f"{quantity}_{end}", OF_LEVEL)) for end in ("min", "max")]
+        found = np.swapaxes(np.maximum(*ends), 1, 2).reshape(-1, count)
+    else:
+        return np.full(count, np.nan)
+    return positive(np.asarray(np.min(np.where(np.isfinite(found), found, np.inf), axis=0)))
 
 
-def _smallest(values: Floats) -> Floats:
-    return np.asarray(np.min(np.where(np.isfinite(values), values, np.inf), axis=0))
-
-
-def _positive(values: Floats) -> Floats:
-    return np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
-
-
-def is_bounded(values: Floats, size: Floats) -> NDArray[np.bool_]:
+def is_bounded(values: Floats, size: Floats) -> Flags:
     """Say of every value whether it is finite and, where the size of the motion is known, not far beyond it."""
     with np.errstate(over="ignore"):
         return np.isfinite(values) & ~(np.abs(values) > WILD * size)
@@ -67,22 +62,21 @@ def why_lost(
     record: Record, quantity: str, member: Member, levels: list[int], values: Floats
 ) -> str:
     """Say why values of some positions of levels mean nothing: round-off only where they are near its floor."""
-    status = np.asarray(pick(record, "status", scheme=member.scheme, case=member.case))
+    status = np.asarray(data.pick(record, "status", scheme=member.scheme, case=member.case))
     if np.any(status[levels] != 0):
         return BROKE_DOWN
     size = float(sizes(record, quantity)[member.case])
-    if math.isfinite(size) and largest(values) > WILD * size:
+    if math.isfinite(size) and data.largest(values) > WILD * size:
         return GROWS
-    pairs = [i for i in levels if i < len(whole(record, "pair"))]
+    pairs = [i for i in levels if i < len(data.whole(record, "pair"))]
     if not pairs:
         return NO_VALUE
-    norm = record.words("norm").index(TYPICAL_NORM)
-    differences = at(record, f"{quantity}_difference_norm", member, norm=norm)[pairs[-1:]]
-    floor = floor_norm(record, quantity, member, TYPICAL_NORM)
-    if np.isnan(differences).any():
+    name = f"{quantity}_difference_norm"
+    difference = float(data.at(record, name, member, norm=data.norm_index(record))[pairs[-1]])
+    floor = data.floor_norm(record, quantity, member, TYPICAL_NORM)
+    if math.isnan(difference):
         return NO_VALUE
-    near = differences <= ABOVE_ROUND_OFF * largest(floor[levels])
-    return ROUND_OFF if near.all() else UNLIKE
+    return ROUND_OFF if difference <= ABOVE_ROUND_OFF * data.largest(floor[levels]) else UNLIKE
 
 
 def mark_leaving(ax: Axes, x: Floats, y: Floats, *, each: bool = False, **look: Any) -> bool:
@@ -93,20 +87,12 @@ def mark_leaving(ax: Axes, x: Floats, y: Floats, *, each: bool = False, **look: 
         beyond = y > border if edge else y < border
         there = beyond if each else beyond & ~np.concatenate([[False], beyond[:-1]])
         place = np.flatnonzero(there)
-        if place.size == 0:
-            continue
-        found = True
-        ax.plot(
-            [x[i] if each else _crossing(ax, x, y, i, border) for i in place.tolist()],
-            np.full(place.size, edge),
-            transform=ax.get_xaxis_transform(),
-            clip_on=False,
-            linestyle="none",
-            marker=marker,
-            markersize=5,
-            zorder=6,
-            **look,
-        )
+        if place.size:
+            found = True
+            across = [x[i] if each else _crossing(ax, x, y, i, border) for i in place.tolist()]
+            mark: Any = {"linestyle": "none", "marker": marker, "markersize": 5, "zorder": 6}
+            where: Any = {"transform": ax.get_xaxis_transform(), "clip_on": False}
+            ax.plot(across, np.full(place.size, edge), **where, **mark, **look)
     return found
 
 
@@ -124,18 +110,17 @@ def _crossing(ax: Axes, x: Floats, y: Floats, i: int, border: float) -> float:
 def same_as(curves: list[Floats], height: float) -> list[int | None]:
     """Return for every curve the first earlier one that it cannot be told from in a frame of that height."""
     found: list[int | None] = []
+
+    def is_alike(a: Floats, b: Floats) -> bool:
+        if a.shape != b.shape:
+            return False
+        in_a, in_b = np.isfinite(a), np.isfinite(b)
+        both = in_a & in_b
+        if both.sum() < 2 or 2 * both.sum() < max(in_a.sum(), in_b.sum()):
+            return False
+        return bool(np.max(np.abs(a[both] - b[both])) <= ALIKE * height)
+
     for i, curve in enumerate(curves):
-        there = np.isfinite(curve)
-        match = None
-        for j in range(i):
-            if found[j] is not None or curves[j].shape != curve.shape:
-                continue
-            both = there & np.isfinite(curves[j])
-            together = both.sum() >= 2 and 2 * both.sum() >= max(
-                there.sum(), np.isfinite(curves[j]).sum()
-            )
-            if together and np.max(np.abs(curve[both] - curves[j][both])) <= ALIKE * height:
-                match = j
-                break
-        found.append(match)
+        firsts = (j for j in range(i) if found[j] is None and is_alike(curve, curves[j]))
+        found.append(next(firsts, None))
     return found

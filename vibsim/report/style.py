@@ -13,15 +13,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from vibsim.core.array_types import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from vibsim.core.record import Record
-
-Floats = NDArray[np.float64]
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 DASHES: tuple[Any, ...] = (
@@ -55,23 +54,20 @@ REASON_COLOURS = {
     "non_finite": "#000000",
 }
 """Greens, yellows and reds by status, dark to light within each: the reason of a verdict on a map."""
-REFERENCE: dict[str, Any] = {
-    "color": "black",
-    "linestyle": (0, (4, 3)),
-    "linewidth": 1.0,
-    "zorder": 1,
-}
+REFERENCE = dict[str, Any](color="black", linestyle=(0, (4, 3)), linewidth=1.0, zorder=1)
 """Of what is promised or exact."""
-ALLOWED: dict[str, Any] = {"color": "#ececec", "zorder": 0}
+ALLOWED = dict[str, Any](color="#ececec", zorder=0)
 """Of a band of what a tolerance allows."""
-MISSING = "#d4d4d4"
-"""Colour of what has no value."""
-WIDTH = 9.0
-"""Width of a figure [inch]."""
-POINTS = 400
-"""Horizontal resolution to which a long series is thinned."""
-LARGEST, TINIEST = 1e300, 1e-300
-"""Ends of logarithmic axes: beyond them a margin would overflow."""
+BESIDE = dict[str, Any](loc="upper left", bbox_to_anchor=(1.01, 1.03), borderaxespad=0.0)
+"""The place of a legend at the right of its axes."""
+MISSING = "#d4d4d4"  # colour of what has no value
+WIDTH = 9.0  # of a figure [inch]
+POINTS = 400  # horizontal resolution to which a long series is thinned
+MANY = len(COLOURS)
+"""Schemes above which a figure has one legend for all of its panels."""
+LARGEST, TINIEST = 1e300, 1e-300  # of logarithmic axes: beyond, a margin would overflow
+LEAST, MOST = 1e-290, 1e290  # what lies beyond is drawn at the edge
+DECADES = (1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300)  # between ticks of a logarithmic axis
 
 _RC: dict[Any, Any] = {
     "axes.edgecolor": "#404040",
@@ -102,23 +98,8 @@ _RC: dict[Any, Any] = {
 }
 
 SUPERSCRIPTS = "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"
-RAISE = str.maketrans("-0123456789", SUPERSCRIPTS)
-"""Translates digits to superscripts."""
+RAISE = str.maketrans("-0123456789", SUPERSCRIPTS)  # digits to superscripts
 LOWER = str.maketrans(SUPERSCRIPTS, "-0123456789")
-"""Translates superscripts to digits."""
-
-
-def look(i: int) -> dict[str, Any]:
-    """Return colour, dashes and marker of the i-th of several lines.
-
-    Beyond as many as there are colours, the colours come again with other dashes and markers.
-    """
-    count, turn = len(COLOURS), i // len(COLOURS)
-    return {
-        "color": COLOURS[i % count],
-        "linestyle": DASHES[(i + turn) % count],
-        "marker": MARKERS[(i + 2 * turn) % count],
-    }
 
 
 @dataclass(frozen=True)
@@ -126,13 +107,14 @@ class Picture:
     """A figure with the words that belong to it."""
 
     name: str
-    """Stem of its files; plain."""
+    """Stem of its files, and unique on its page; plain."""
     title: str
     caption: str
     """What to look for."""
     alt: str
     """The same content for a reader who cannot see it."""
-    figure: Figure
+    figure: Figure | None
+    """None of a check where there is nothing to draw; the caption says why."""
 
 
 @contextmanager
@@ -151,21 +133,26 @@ def canvas(height: float) -> Figure:
     return Figure(figsize=(WIDTH, height))
 
 
+def look(i: int) -> dict[str, Any]:
+    """Return colour, dashes and marker of the i-th of several lines; colours come again with others of these."""
+    count, turn = len(COLOURS), i // len(COLOURS)
+    return {
+        "color": COLOURS[i % count],
+        "linestyle": DASHES[(i + turn) % count],
+        "marker": MARKERS[(i + 2 * turn) % count],
+    }
+
+
+def crowded(record: Record) -> bool:
+    """Say whether a record has more schemes than there are colours: then all panels share one legend."""
+    return len(record["scheme"]) > MANY
+
+
 def thin(t: Floats, y: Floats, width: int = POINTS) -> tuple[Floats, Floats]:
     """Thin a series for drawing without losing an extreme.
 
-    Parameters
-    ----------
-    t, y
-        Abscissae in ascending order and values, shape (n,). A NaN is a gap in the curve.
-    width
-        Number of groups of neighbours; of each, the smallest and the largest value are kept.
-
-    Returns
-    -------
-    tuple of arrays
-        At most ``2 * width + 2`` points: the first, the last, every group's extremes in the order of `t`, and one
-        NaN for a group that has nothing else. Series of at most that many points are returned as they are.
+    Of ascending `t` and values `y` of shape (n,), where NaN is a gap, it keeps the first, the last, and the smallest
+    and largest value (or one NaN) of each of `width` groups of neighbours: at most ``2 * width + 2`` points.
     """
     n = y.size
     if n <= 2 * width + 2:
@@ -174,40 +161,21 @@ def thin(t: Floats, y: Floats, width: int = POINTS) -> tuple[Floats, Floats]:
     groups = np.repeat(np.arange(width), np.diff([*edges, n - 1]))
     inner = np.where(np.isfinite(y[1:-1]), y[1:-1], np.nan)
     order = np.lexsort((inner, groups))
-    finite = np.add.reduceat(np.isfinite(inner).astype(int), edges - 1)
+    count = np.add.reduceat(np.isfinite(inner).astype(int), edges - 1)
     low = order[edges - 1] + 1
-    high = order[edges - 1 + np.maximum(finite - 1, 0)] + 1
+    high = order[edges - 1 + np.maximum(count - 1, 0)] + 1
     keep = np.unique([0, *low.tolist(), *high.tolist(), n - 1])
     return t[keep], y[keep]
 
 
-MANY = 7
-"""Schemes above which a figure has one legend for all of its panels: there are no more colours than these."""
+def spaced(count: int, most: int) -> list[int]:
+    """Choose at most `most` of `count` positions: the first, the last, and even ones between."""
+    return sorted({round(x) for x in np.linspace(0, count - 1, min(most, count))})
 
 
-def crowded(record: Record) -> bool:
-    """Say whether a record has more schemes than there are colours."""
-    return len(record["scheme"]) > MANY
-
-
-def entry(text: str) -> str:
-    """Return a legend entry: matplotlib leaves out what begins with an underscore, a user's name may."""
-    return f"\N{ZERO WIDTH SPACE}{text}" if text.startswith("_") else text
-
-
-def no_zeros(values: Floats) -> Floats:
-    """Return absolute values; NaN for zero, which a logarithmic axis cannot show."""
-    return np.where(values == 0.0, np.nan, np.abs(values))
-
-
-def power(exponent: int) -> str:
-    """Write a power of ten in Unicode."""
-    return "10" + str(exponent).translate(RAISE)
-
-
-def sentences(*parts: str) -> str:
-    """Join the sentences of a caption that are there."""
-    return " ".join(part for part in parts if part)
+def finite(*series: Floats) -> Floats:
+    """Return the finite values of some arrays in one, shape (n,)."""
+    return np.concatenate([np.empty(0), *(part[np.isfinite(part)] for part in series)])
 
 
 def positive(values: Floats) -> Floats:
@@ -215,14 +183,24 @@ def positive(values: Floats) -> Floats:
     return np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
 
 
-def scale(*series: Floats) -> int:
-    """Return the exponent of ten that an axis should carry; 0 where plain numbers read well."""
-    values = [np.abs(part[np.isfinite(part)]) for part in series]
-    largest = max((float(part.max()) for part in values if part.size), default=0.0)
-    if largest == 0.0:
-        return 0
-    exponent = math.floor(math.log10(largest))
-    return 0 if -1 <= exponent <= 3 else exponent
+def no_zeros(values: Floats) -> Floats:
+    """Return absolute values; NaN for zero, which a logarithmic axis cannot show."""
+    return np.where(values == 0.0, np.nan, np.abs(values))
+
+
+def entry(text: str) -> str:
+    """Return a legend entry: matplotlib leaves out what begins with an underscore, a user's name may."""
+    return f"\N{ZERO WIDTH SPACE}{text}" if text.startswith("_") else text
+
+
+def sentences(*parts: str) -> str:
+    """Join the sentences of a caption that are there."""
+    return " ".join(part for part in parts if part)
+
+
+def power(exponent: int) -> str:
+    """Write a power of ten in Unicode."""
+    return "10" + str(exponent).translate(RAISE)
 
 
 def label(text: str, unit: str, exponent: int = 0) -> str:
@@ -232,22 +210,55 @@ def label(text: str, unit: str, exponent: int = 0) -> str:
     return f"{text} [{' '.join(scaled + units)}]" if scaled or units else text
 
 
-LEAST, MOST = 1e-290, 1e290
-"""What lies beyond is drawn at the edge: no axis has room for more decades of a float."""
+def scale(*series: Floats) -> int:
+    """Return the exponent of ten that an axis should carry; 0 where plain numbers read well."""
+    largest = float(np.abs(finite(*series)).max(initial=0.0))
+    exponent = math.floor(math.log10(largest)) if largest else 0
+    return 0 if -1 <= exponent <= 3 else exponent
+
+
+def limits(*series: Floats, margin: float = 0.08) -> tuple[float, float]:
+    """Return linear axis limits that hold every finite value, never of zero height."""
+    values = finite(*series)
+    if not values.size:
+        return -1.0, 1.0
+    low, high = float(values.min()), float(values.max())
+    room = margin * (high - low) or margin * abs(high) or 1.0
+    return low - room, high + room
+
+
+def log_limits(*series: Floats, margin: float = 0.08) -> tuple[float, float]:
+    """Return limits of a logarithmic axis that hold every finite positive value."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        low, high = limits(*(np.log10(part[part > 0.0]) for part in series), margin=margin)
+    # what a power of ten would overflow at lies beyond every axis
+    return 10.0 ** max(low, math.log10(LEAST)), 10.0 ** min(high, math.log10(MOST))
 
 
 def log_axis(ax: Axes, which: str, low: float, high: float, most: int = 7) -> None:
     """Make an axis logarithmic from `low` to `high`, with about `most` labelled ticks in Unicode."""
     low, high = _within(low, high)
     # the limits first: a margin around values near the end of the floats would overflow
-    getattr(ax, f"set_{which}lim")(low, high)
-    getattr(ax, f"set_{which}scale")("log")
-    getattr(ax, f"set_{which}lim")(low, high)
+    ax.set(**{f"{which}lim": (low, high)})
+    ax.set(**{f"{which}scale": "log"})
+    ax.set(**{f"{which}lim": (low, high)})
     log_ticks(getattr(ax, f"{which}axis"), low, high, most)
 
 
-DECADES = (1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300)
-"""Between ticks of a logarithmic axis."""
+def fit_log_axis(
+    ax: Axes, which: str, *series: Floats, below: float = 0.0, least: float = 0.0, room: float = 3.0, most: int = 7
+) -> bool:  # fmt: skip
+    """Make an axis logarithmic over the positive finite values of some series; return whether there are any.
+
+    `below` is the part of the values of each series that may lie below the axis; values under `least` times the largest
+    leave it; `room` is the factor between the outermost values and its ends; about `most` ticks are labelled.
+    """
+    parts = [found for part in series if (found := finite(part[part > 0.0])).size]
+    if parts:
+        high = min(max(float(part.max()) for part in parts), LARGEST)
+        low = max(min(float(np.quantile(p, below)) for p in parts), least * high, TINIEST)
+        log_axis(ax, which, low / room, high * room, most)
+    return bool(parts)
 
 
 def log_ticks(axis: Any, low: float, high: float, most: int = 7) -> None:
@@ -288,75 +299,12 @@ def log_tick(value: float) -> str:
     return power(exponent) if digit == 1 else f"{digit}·{power(exponent)}"
 
 
-def limits(*series: Floats, margin: float = 0.08) -> tuple[float, float]:
-    """Return linear axis limits that hold every finite value, never of zero height."""
-    parts = [part[np.isfinite(part)] for part in series]
-    parts = [part for part in parts if part.size]
-    if not parts:
-        return -1.0, 1.0
-    low, high = min(float(p.min()) for p in parts), max(float(p.max()) for p in parts)
-    room = margin * (high - low) or margin * abs(high) or 1.0
-    return low - room, high + room
-
-
-def log_limits(*series: Floats, margin: float = 0.08) -> tuple[float, float]:
-    """Return limits of a logarithmic axis that hold every finite positive value."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        low, high = limits(*(np.log10(part[part > 0.0]) for part in series), margin=margin)
-    # what a power of ten would overflow at lies beyond every axis
-    return 10.0 ** max(low, math.log10(LEAST)), 10.0 ** min(high, math.log10(MOST))
-
-
-def fit_log_axis(
-    ax: Axes,
-    which: str,
-    *series: Floats,
-    below: float = 0.0,
-    least: float = 0.0,
-    room: float = 3.0,
-    most: int = 7,
-) -> bool:
-    """Make an axis logarithmic over the positive finite values of some series; return whether there are any.
-
-    Parameters
-    ----------
-    below
-        Part of the values of each series that may lie below the axis.
-    least
-        Values below this part of the largest one leave the axis.
-    room
-        Factor between the outermost values and the ends of the axis.
-    most
-        Labelled ticks.
-    """
-    parts = [part[np.isfinite(part) & (part > 0.0)] for part in series]
-    parts = [part for part in parts if part.size]
-    if parts:
-        high = min(max(float(part.max()) for part in parts), LARGEST)
-        low = max(min(float(np.quantile(p, below)) for p in parts), least * high, TINIEST)
-        log_axis(ax, which, low / room, high * room, most)
-    return bool(parts)
-
-
-def spaced(count: int, most: int) -> list[int]:
-    """Choose at most `most` of `count` positions: the first, the last, and even ones between."""
-    return sorted({round(x) for x in np.linspace(0, count - 1, min(most, count))})
-
-
-BESIDE: dict[str, Any] = {
-    "loc": "upper left",
-    "bbox_to_anchor": (1.01, 1.03),
-    "borderaxespad": 0.0,
-}
-"""The place of a legend at the right of its axes."""
-
-
 def beside(ax: Axes, **options: Any) -> None:
     """Put the legend to the right of the axes, where it hides nothing."""
-    if not ax.get_legend_handles_labels()[0]:
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(**BESIDE, **options)
+    else:
         ax.text(0.5, 0.5, "no finite value", transform=ax.transAxes, ha="center", color=GREY)
-        return
-    ax.legend(**BESIDE, **options)
 
 
 def remark(ax: Axes, text: str) -> None:

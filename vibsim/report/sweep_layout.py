@@ -6,20 +6,27 @@ Everything is found out from the swept values, so that it does not matter how a 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, reduce
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.report.data import Floats, swept, swept_label
+from vibsim.report.data import swept, swept_label
 from vibsim.report.style import label
 
 FARTHEST = 1e100
 """Swept values from here on are not drawn to scale."""
 WIDE = 30.0
 """Positive values are drawn on a logarithmic axis only where the largest is so many times the least."""
+LINES = 6
+"""Most lines that the other parameters of a sweep may make."""
+CELLS = 400
+"""Most cells along each side of a map: more than its pixels could show."""
+BINS = 8, 100
+"""Least and most cells along each side of a map of members that lie on no grid."""
 
 
 @dataclass(frozen=True)
@@ -66,17 +73,12 @@ def _key(record: Record, name: str) -> Key:
         if np.max(np.abs(distinct)) < FARTHEST:
             return Key(key, unit, numbers, distinct)
         # no axis reaches so far: the values are numbered like words
-        names = tuple(f"{value:.6g}" for value in distinct.tolist())
-        return Key(
-            key,
-            unit,
-            place.ravel().astype(np.float64),
-            np.arange(distinct.size, dtype=np.float64),
-            names,
-        )
-    known, place = np.unique(values.astype(str), return_inverse=True)
-    numbers = place.ravel().astype(np.float64)
-    return Key(key, unit, numbers, np.arange(known.size, dtype=np.float64), tuple(known.tolist()))
+        names = [f"{value:.6g}" for value in distinct.tolist()]
+    else:
+        known, place = np.unique(values.astype(str), return_inverse=True)
+        names = known.tolist()
+    numbered = np.arange(len(names), dtype=np.float64)
+    return Key(key, unit, place.ravel().astype(np.float64), numbered, tuple(names))
 
 
 def is_geometric(distinct: Floats) -> bool:
@@ -127,12 +129,6 @@ class Grid:
         return table
 
 
-CELLS = 400
-"""Most cells along each side of a map: more than its pixels could show."""
-BINS = 8, 100
-"""Least and most cells along each side of a map of members that lie on no grid."""
-
-
 def grid_of(found: list[Key]) -> Grid | None:
     """Return the map of members that differ in two `keys`; None where they differ in one, or in more.
 
@@ -144,26 +140,21 @@ def grid_of(found: list[Key]) -> Grid | None:
     x, y = found
     size = x.distinct.size * y.distinct.size
     column, row = (np.searchsorted(key.distinct, key.values) for key in (x, y))
-    if np.any(
-        np.bincount(row * x.distinct.size + column, minlength=size) != 1
-        if size == x.values.size
-        else True
-    ):
-        return _binned(x, y)
-    block = -(-max(x.distinct.size, y.distinct.size) // CELLS)
-    across, up = (edges(key.distinct, key.is_log) for key in (x, y))
-    across, up = (np.append(border[:-1:block], border[-1]) for border in (across, up))
-    cell = row // block * (across.size - 1) + column // block
-    note = f"A cell shows the worst of {block} × {block} members." if block > 1 else ""
-    return Grid(x, y, (across, up), cell, note)
-
-
-def _binned(x: Key, y: Key) -> Grid:
-    count = int(np.clip(np.sqrt(x.values.size) / 2.0, *BINS))
-    borders = [bins(key, count) for key in (x, y)]
-    column, row = (place_in(key, border) for key, border in zip((x, y), borders, strict=True))
-    note = "A cell shows the worst of the members within it; some cells have none."
-    return Grid(x, y, (borders[0], borders[1]), row * (borders[0].size - 1) + column, note)
+    is_full = size == x.values.size and np.all(
+        np.bincount(row * x.distinct.size + column, minlength=size) == 1
+    )
+    if is_full:
+        block = -(-max(x.distinct.size, y.distinct.size) // CELLS)
+        whole = (edges(key.distinct, key.is_log) for key in (x, y))
+        across, up = (np.append(border[:-1:block], border[-1]) for border in whole)
+        column, row = column // block, row // block
+        note = f"A cell shows the worst of {block} × {block} members." if block > 1 else ""
+    else:
+        count = int(np.clip(np.sqrt(x.values.size) / 2.0, *BINS))
+        across, up = (bins(key, count) for key in (x, y))
+        column, row = place_in(x, across), place_in(y, up)
+        note = "A cell shows the worst of the members within it; some cells have none."
+    return Grid(x, y, (across, up), row * (across.size - 1) + column, note)
 
 
 def bins(key: Key, count: int) -> Floats:
@@ -178,10 +169,6 @@ def place_in(key: Key, borders: Floats) -> NDArray[np.intp]:
     """Return the bin of every member, shape (case,)."""
     found = np.searchsorted(borders, key.values, side="right") - 1
     return np.clip(found, 0, borders.size - 2)
-
-
-LINES = 6
-"""Most lines that the other parameters of a sweep may make."""
 
 
 @dataclass(frozen=True)
@@ -207,11 +194,9 @@ def along_of(found: list[Key]) -> Along | None:
         return Along(longest, (("", order),), bool(others)) if _moves_together(found) else None
     if int(np.prod([key.distinct.size for key in others])) > LINES:
         return None
-    number: NDArray[np.intp] = reduce(
-        lambda code, key: code * key.distinct.size + np.searchsorted(key.distinct, key.values),
-        others,
-        np.zeros(longest.values.size, dtype=np.intp),
-    )
+    number = np.zeros(longest.values.size, dtype=np.intp)
+    for key in others:
+        number = number * key.distinct.size + np.searchsorted(key.distinct, key.values)
     lines = []
     for code in np.unique(number):
         members = order[number[order] == code]

@@ -6,17 +6,22 @@ a drift ``a + b t^k`` has ``(m1 - m2)/(m2 - m3) = 2^k``.
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vibsim.checks.fields import name_of
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
+from vibsim.core.vocabulary import DRIFTS
+from vibsim.observe.thresholds import LEAST_PERIODS, LEAST_SAMPLES, STILL
 from vibsim.report import style
-from vibsim.report.data import Floats, Member, at, time_unit, unit
+from vibsim.report.data import Member, at, pick, time_label, times, unit, whole
 from vibsim.report.evidence import frame
-from vibsim.report.evidence.energy_caption import dashed, told
-from vibsim.report.evidence.energy_error import NAMES, POWERS, EnergyError, energy_error
-from vibsim.report.evidence.frame import Picture, measured
+from vibsim.report.evidence.frame import brief, evidence, measured, short
+from vibsim.report.style import Picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,43 +30,101 @@ if TYPE_CHECKING:
 
 WINDOWS = ((0.125, 0.25), (0.25, 0.5), (0.5, 1.0))
 """In parts of the end, those of m3, m2 and m1."""
+NAMES = ("m₃", "m₂", "m₁")
+POWERS = {"linear": 1, "quadratic": 2}
+"""Of t, in proportion to which a drift grows."""
 LEAST = 1e-4
 """Part of the time before which a logarithmic scale need not show the error."""
+
+
+@dataclass(frozen=True)
+class EnergyError:
+    """The energy error of one run as the check found it, over the energy at the start where that is not 0."""
+
+    kind: str
+    """Of `vocabulary.DRIFTS`."""
+    asked: str
+    """Kind of drift that the check asks for."""
+    t: Floats
+    running: Floats
+    """The largest error so far, shape (t,)."""
+    means: Floats
+    """m3, m2, m1."""
+    round_off: float
+    """Largest error that is taken for round-off."""
+    power: float
+    """k, NaN where it cannot be told."""
+    rate: float
+    """Of the kind of drift, see `vibsim.observe.energy_drift.Drift`."""
+
+    @property
+    def is_round_off(self) -> bool:
+        """Whether the error is so small that nothing but the border tells anything."""
+        return self.kind == "none"
+
+    @property
+    def has_border(self) -> bool:
+        """Whether the error has to be compared with round-off."""
+        return self.is_round_off or self.asked == "none"
+
+    @property
+    def is_broken(self) -> bool:
+        """Whether the run broke down, so that it has no means."""
+        return not np.isfinite(self.means).all()
 
 
 def picture(record: Record, check: ConservesCheck, name: str, member: Member) -> Picture | None:
     """Draw how the largest energy error so far grows, beside the drift that a check asks for."""
     series = f"{check.about}_running_max"
     if series not in record:
-        return Picture(f"{member.title}: the largest energy error so far is not stored.")
-    level = int(measured(record, name, "level", member.scheme, member.case))
+        return evidence(f"{member.title}: the largest energy error so far is not stored.")
+    place = {"scheme": member.scheme, "case": member.case}
+    level, kind, rate, power = (
+        measured(record, name, field, **place)
+        for field in ("level", "drift", "drift_rate", "drift_power")
+    )
     first = abs(float(at(record, "energy_initial", member)))
-    found = energy_error(record, check, name, member, first or 1.0, level)
+    running = at(record, series, member, level=whole(record, "level").index(int(level)))
+    found = EnergyError(
+        kind=DRIFTS[int(kind)],
+        asked=check.drift,
+        t=times(record, member.case),
+        # the last velocity may be a one-sided one, which the verdict does not look at
+        running=np.append(running[:-1], np.nan) / (first or 1.0),
+        means=np.asarray(pick(record, name_of(name, "window_means"), **place), np.float64)
+        / (first or 1.0),
+        round_off=measured(record, name, "round_off", **place) / (first or 1.0),
+        power=power,
+        rate=rate,
+    )
     if not frame.usable(found.running).size:
         nothing = f"{member.title}: the energy error is 0 at every step; there is nothing to draw."
-        return Picture(nothing) if np.any(found.running == 0.0) else None
-    label = "largest energy error so far" + (" / E(0)" if first else "")
+        return evidence(nothing) if np.any(found.running == 0.0) else None
     by = " by [D₂ₜu]" if check.conserves.endswith("_d2t") else ""
-    title = style.label(label + by, "" if first else unit(record, "energy_deviation_max_abs"))
+    label = f"largest energy error so far{' / E(0)' if first else ''}{by}"
+    title = style.label(label, "" if first else unit(record, "energy_deviation_max_abs"))
     figure = style.canvas(1.0)
-    _draw(frame.panel(figure, title, style.label("t", time_unit(record)), frame.WIDE), found)
-    caption = f"{member.title}, level {level}: {told(found)} {dashed(found)}".strip()
-    return Picture(caption, title, figure)
+    _draw(frame.panel(figure, title, time_label(record), frame.WIDE), found)
+    caption = f"{member.title}, level {level:.0f}: {_told(found)} {_dashed(found)}".strip()
+    return evidence(caption, title, figure)
 
 
 def _draw(ax: Axes, found: EnergyError) -> None:
     """Draw windows, error, means and the drift asked for."""
     t, end = found.t, float(found.t[-1])
+    has_bars = not (found.is_round_off or found.is_broken)
     ax.set_xlim(float(t[0]), end)
-    border = np.array([found.round_off if found.has_border else np.nan])
-    if found.is_log:
-        late = found.running[t > LEAST * end]
+    if found.has_border or found.kind == "exponential" or found.is_broken:
+        late, border = (
+            found.running[t > LEAST * end],
+            found.round_off if found.has_border else np.nan,
+        )
         lowest = 0.1 * np.max(frame.usable(found.running))
-        frame.scale(ax, late, found.means, border, np.array([lowest]), is_log=True)
+        frame.scale(ax, late, found.means, np.array([border]), np.array([lowest]), is_log=True)
     else:
         frame.scale(ax, found.running, found.means, np.zeros(1), margin=0.22)
         ax.set_ylim(bottom=0.0)
-    if found.has_bars:
+    if has_bars:
         for first, last in WINDOWS[::2]:
             ax.axvspan(first * end, last * end, color=frame.BAND, alpha=0.6, linewidth=0, zorder=0)
     if found.has_border and found.round_off > 0.0:
@@ -72,12 +135,11 @@ def _draw(ax: Axes, found: EnergyError) -> None:
     ax.plot(*style.thin(t, found.running, 160), color=frame.COLOUR, linewidth=1.2)
     later = np.linspace(WINDOWS[0][0] * end, end, 60)
     ax.plot(later, _expected(found, later), **frame.DASHED)
-    if found.has_bars:
+    if has_bars:
         for (first, last), mean, text in zip(WINDOWS, found.means, NAMES, strict=True):
             ax.plot([first * end, last * end], [mean, mean], color=frame.SECOND, linewidth=1.8)
-            ax.annotate(
-                text, (first * end, mean), (2, 3), textcoords="offset points", fontsize=frame.SIZE
-            )
+            place = (first * end, mean)
+            ax.annotate(text, place, (2, 3), textcoords="offset points", fontsize=frame.SIZE)
 
 
 def _expected(found: EnergyError, t: Floats) -> Floats:
@@ -88,12 +150,56 @@ def _expected(found: EnergyError, t: Floats) -> Floats:
     if found.asked == "bounded":
         return np.full(t.shape, second)
     power = POWERS[found.asked]
-    earlier, later = (_mean_power(window, power) for window in WINDOWS[1:])
+    # the mean of t^k over a window
+    earlier, later = (
+        (b ** (power + 1) - a ** (power + 1)) / ((power + 1) * (b - a)) for a, b in WINDOWS[1:]
+    )
     part = (t / found.t[-1]) ** power
     return np.asarray(second + (first - second) * (part - earlier) / (later - earlier))
 
 
-def _mean_power(window: tuple[float, float], power: int) -> float:
-    """Return the mean of t^power over a window."""
-    a, b = window
-    return (b ** (power + 1) - a ** (power + 1)) / ((power + 1) * (b - a))
+def _told(found: EnergyError) -> str:
+    """Say by which number the drift was named."""
+    most = float(np.nanmax(found.running))
+    third, second, first = found.means.tolist()
+    numbers = ", ".join(
+        f"{n} = {short(m)}" for n, m in zip(NAMES, found.means.tolist(), strict=True)
+    )
+    bars = f"the largest energy error so far has the means (bars) {numbers}."
+    if found.is_round_off:
+        border = brief(found.round_off)
+        return f"the largest energy error, {brief(most)}, is within the round-off of this run, {border}."
+    if found.is_broken:
+        return "the largest energy error so far; it ends where the run breaks down."
+    if found.kind == "bounded":
+        part = 100.0 * (first - second) / most
+        how = "no growth" if part <= 100.0 * STILL else "it creeps ever more slowly"
+        return f"{bars} m₁ is above m₂ by {brief(part)} % of the largest error: {how}."
+    if found.kind == "exponential":
+        factor = short(float(np.exp(found.rate)))
+        return f"{bars} The energy itself changes by the factor {factor} per period: exponential."
+    if math.isnan(found.power):
+        return (
+            f"{bars} That is too short a run to name a drift: {LEAST_PERIODS:g} periods and {LEAST_SAMPLES} times "
+            "are needed."
+        )
+    before = second - third
+    law = f"(m₁ − m₂)/(m₂ − m₃) = {short((first - second) / before) if before else '∞'}"
+    if found.kind in POWERS:
+        return f"{bars} {law}; a drift like {_like(found.kind)} has {2 ** POWERS[found.kind]}."
+    return f"{bars} {law}, which is that of no drift that has a name."
+
+
+def _dashed(found: EnergyError) -> str:
+    """Say what the dashed line is."""
+    if found.is_broken:
+        return ""
+    if found.has_border:
+        return "Dashed: the most that is taken for round-off."
+    if found.asked == "bounded":
+        return "Dashed: m₂, above which a bounded error does not rise."
+    return f"Dashed: a drift in proportion to {_like(found.asked)} through m₂ and m₁."
+
+
+def _like(drift: str) -> str:
+    return "t²" if drift == "quadratic" else "t"

@@ -12,7 +12,8 @@ from vibsim.core.record import Record
 from vibsim.report import data, style
 from vibsim.report.data import Member
 from vibsim.report.evidence import frame
-from vibsim.report.evidence.frame import Picture, brief, measured, short
+from vibsim.report.evidence.frame import brief, evidence, measured, short
+from vibsim.report.style import Picture
 from vibsim.report.text import words
 
 if TYPE_CHECKING:
@@ -37,21 +38,20 @@ def picture(record: Record, check: EqualCheck, name: str, member: Member) -> Pic
         return None
     seen = frame.usable(distance)
     if not seen.size:
-        return Picture(f"{who} and that of {second} are the same bit by bit at every time.")
+        return evidence(f"{who} and that of {second} are the same bit by bit at every time.")
     title = style.label(
         f"difference of {words.symbol(check.quantity)}",
         data.unit(record, f"{check.quantity}_finest"),
     )
     figure = style.canvas(1.0)
-    ax = frame.panel(figure, title, style.label("t", data.time_unit(record)), frame.WIDE)
+    ax = frame.panel(figure, title, data.time_label(record), frame.WIDE)
     ends = data.ends_of(record)
     t = np.linspace(0.0, ends[member.case if ends.size > 1 else 0], distance.size)
     ax.set_xlim(t[0], t[-1])
     usual = seen[seen >= np.percentile(seen, DIPS)]
     frame.scale(ax, usual, np.array([bound, 0.1 * usual.max()]), is_log=True, margin=0.12)
     if 0.0 < bound < math.inf:
-        frame.allowed(ax, 0.0, bound)
-        ax.axhline(bound, **frame.DASHED)
+        frame.below(ax, bound)
     # 0 lies below every frame
     lowest = ax.get_ylim()[0]
     ax.plot(t, np.where(distance == 0.0, lowest, distance), color=frame.COLOUR, linewidth=0.9)
@@ -61,7 +61,7 @@ def picture(record: Record, check: EqualCheck, name: str, member: Member) -> Pic
     # a number that is not finite is the largest of all
     told = "; then the run breaks down" if math.isnan(most) else _allowed(largest, bound)
     where = f"It is largest at t = {short(float(t[nearest]))}, {short(largest)} (dot)"
-    return Picture(f"{who} less that of {second}. {where}{told}.", title, figure)
+    return evidence(f"{who} less that of {second}. {where}{told}.", title, figure)
 
 
 def _allowed(distance: float, allowed: float) -> str:

@@ -10,14 +10,31 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from vibsim.checks.fields import name_of
 from vibsim.core.record import Record
-from vibsim.report import style
-from vibsim.report.data import Member, case_name, is_lean, place_of
-from vibsim.report.evidence import energy, equal, members, order, stable, value
-from vibsim.report.evidence.frame import Picture
+from vibsim.core.vocabulary import DECISIVE
+from vibsim.report import style, sweep_layout
+from vibsim.report.data import Member, case_name, is_lean, pick, place_of, unit
+from vibsim.report.evidence import energy, equal, frame, order, stable, value
+from vibsim.report.evidence.frame import GrowthScale, evidence, usable
+from vibsim.report.style import Picture
+from vibsim.report.text import words
 
 if TYPE_CHECKING:
+    from vibsim.core.array_types import Floats
     from vibsim.experiment import Check, Experiment
+    from vibsim.experiment.schema.checks import ConservesCheck, EqualCheck, StableCheck
+
+MANY = 60
+"""Up to so many members each has a dot; of more the range is drawn."""
+ALONE = "a run of so many samples keeps no series over time, so that nothing is drawn: the number alone decides."
+BESIDE = {
+    "stable": ("predicted_growth", "; orange is what theory predicts, for small oscillations"),
+    "equal": ("allowed", "; orange is what is allowed"),
+}
+"""Kind of a check to the field that is drawn beside the one that decides, and the words on it."""
 
 
 def picture(
@@ -36,18 +53,18 @@ def picture(
 def _draw(
     experiment: Experiment, record: Record, asserted: Check, member: Member
 ) -> Picture | None:
-    measured = asserted.measured
+    measured, name = asserted.measured, asserted.id
     if measured.kind == "converges":
         return order.picture(record, measured, member)
     if measured.kind == "value":
-        return value.picture(experiment, record, measured, asserted.id, member)
+        return value.picture(experiment, record, measured, name, member)
     if is_lean(record):
-        return members.picture(record, measured, asserted.id, member)
+        return _of_members(record, measured, name, member)
     if measured.kind == "conserves":
-        return energy.picture(record, measured, asserted.id, member)
+        return energy.picture(record, measured, name, member)
     if measured.kind == "equal":
-        return equal.picture(record, measured, asserted.id, member)
-    return stable.picture(experiment, record, asserted.id, member)
+        return equal.picture(record, measured, name, member)
+    return stable.picture(experiment, record, name, member)
 
 
 def _member(record: Record, result: Mapping[str, Any]) -> Member | None:
@@ -56,3 +73,61 @@ def _member(record: Record, result: Mapping[str, Any]) -> Member | None:
     if name not in names or case is None:
         return None
     return Member(names.index(name), case, name, case_name(record, case))
+
+
+def _of_members(
+    record: Record, check: StableCheck | ConservesCheck | EqualCheck, name: str, member: Member
+) -> Picture:
+    """Draw the number that decides a check against the swept value, or the number of the member."""
+    count = len(record["case"])
+    if count == 1:
+        return evidence(f"{member.title}: {ALONE}")
+
+    def of(field: str) -> Floats:
+        return np.asarray(pick(record, name_of(name, field), scheme=member.scheme), np.float64)
+
+    other_field, more = BESIDE.get(check.kind, ("", ""))
+    values = of(DECISIVE[check.kind])
+    beside = of(other_field) if other_field else np.full(count, np.nan)
+    known = usable(values)
+    if not known.size:
+        return evidence(f"{member.title}: no member has a number that could be drawn.")
+    up = _scale(record, check, known)
+    # members that differ by rounding are alike on the scale
+    is_growth = check.kind == "stable"
+    around = frame.ALIKE if is_growth else np.median(known) * 10.0 ** np.array([-0.5, 0.5])
+    keys = sweep_layout.keys(record)
+    key = keys[0] if len(keys) == 1 and not keys[0].words else None
+    x = key.values if key else np.arange(count, dtype=np.float64)
+    figure = style.canvas(1.0)
+    ax = frame.panel(figure, up.title, key.label if key else "number of the member", frame.WIDE)
+    if key and key.is_log:
+        style.log_axis(ax, "x", *style.log_limits(x, margin=0.02))
+    else:
+        ax.set_xlim(*style.limits(x, margin=0.02))
+    shown, other = values - up.less, beside - up.less
+    frame.scale(ax, shown, other, around - up.less, is_log=up.is_log, margin=0.1)
+    order = np.argsort(x, kind="stable")
+    ax.plot(*style.thin(x[order], other[order], 160), color=frame.SECOND, linewidth=0.9)
+    if count > MANY:
+        ax.plot(*style.thin(x[order], shown[order], 160), color=frame.COLOUR, linewidth=0.8)
+    else:
+        frame.points(ax, x.tolist(), shown, [False] * count)
+    frame.points(ax, [x[member.case]], shown[[member.case]], [True])
+    caption = (
+        f"{member.scheme_name}, all {words.number(count, 'integer')} members, of which no series are kept: filled is "
+        f"the one that decides, {member.case_name}{more if usable(beside).size else ''}."
+    )
+    return evidence(caption, up.title, figure)
+
+
+def _scale(
+    record: Record, check: StableCheck | ConservesCheck | EqualCheck, values: Floats
+) -> GrowthScale:
+    if check.kind == "stable":
+        return frame.growth_scale(values)
+    if check.kind == "conserves":
+        return GrowthScale("largest energy error / E(0)", is_log=True)
+    measure = unit(record, f"{check.quantity}_difference_norm")
+    title = style.label(f"largest difference of {words.symbol(check.quantity)}", measure)
+    return GrowthScale(title, is_log=True)

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from vibsim.checks.fields import name_of
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report import frame, style
-from vibsim.report.data import Floats, pick
-from vibsim.report.figures import drawing
+from vibsim.report.data import pick
+from vibsim.report.style import Picture
 from vibsim.report.text import words
 
 if TYPE_CHECKING:
@@ -33,7 +32,6 @@ MOST_LEVELS = 12
 FEWEST = 2
 """Round numbers on a scale: one alone does not tell how large a curve is."""
 DASHED: dict[str, Any] = {"color": INK, "linewidth": 0.8, "linestyle": (0, (4, 3))}
-
 ALIKE = np.array([1.0 - 1e-11, 1.0 + 1e-11])
 """Growth factors between these differ by rounding only: a scale need not tell them apart."""
 NEAR_ONE = 0.02
@@ -42,25 +40,9 @@ FACTOR = 3.0
 """Growth factors beyond this, or one over it, have a logarithmic scale."""
 
 
-@dataclass(frozen=True)
-class Picture:
-    """A drawing and the words below it."""
-
-    caption: str
-    alt: str = ""
-    """What is drawn, for a reader who cannot see it."""
-    figure: Figure | None = None
-    """None where there is nothing to draw; the caption says why."""
-    name: str = "evidence"
-    """Unique on its page."""
-
-    @cached_property
-    def svg(self) -> str:
-        """The SVG element of its figure, in the size it was drawn in; empty without a figure."""
-        if self.figure is None:
-            return ""
-        with style.applied():
-            return drawing.inline(drawing.svg(self.figure, self.name), self.alt, is_scaled=False)
+def evidence(caption: str, alt: str = "", figure: Figure | None = None) -> Picture:
+    """Return a drawing and the words below it, or the words that say why there is nothing to draw."""
+    return Picture("", "", caption, alt, figure)
 
 
 def panel(figure: Figure, title: str, x_name: str, width: float = 2.5) -> Axes:
@@ -105,6 +87,12 @@ def allowed(ax: Axes, low: float, high: float) -> None:
     ax.axhspan(max(low, bottom), min(high, top), color=BAND, linewidth=0.0, zorder=0)
 
 
+def below(ax: Axes, limit: float) -> None:
+    """Draw the limit that a number must stay below."""
+    allowed(ax, 0.0, limit)
+    ax.axhline(limit, **DASHED)
+
+
 def points(ax: Axes, x: Sequence[float], y: Floats, counts: Sequence[bool]) -> None:
     """Draw dots, hollow ones that do not count; those beyond the frame are triangles on its edge."""
     low, high = ax.get_ylim()
@@ -114,9 +102,8 @@ def points(ax: Axes, x: Sequence[float], y: Floats, counts: Sequence[bool]) -> N
         inside = (value >= low) & (value <= high)
         look: dict[str, Any] = {"color": COLOUR, "markerfacecolor": COLOUR if is_full else "white"}
         if inside.any():
-            ax.plot(
-                place[inside], value[inside], "o", **look, markersize=5.0, clip_on=False, zorder=4
-            )
+            dot: Any = {"markersize": 5.0, "clip_on": False, "zorder": 4}
+            ax.plot(place[inside], value[inside], "o", **look, **dot)
         frame.mark_leaving(ax, place, value, each=True, **look)
 
 
@@ -128,8 +115,7 @@ def level_axis(ax: Axes, levels: Sequence[int], most: int = MOST_LEVELS, extra: 
     ax.set_xticks(list(named), list(named.values()))
 
 
-@dataclass(frozen=True)
-class GrowthScale:
+class GrowthScale(NamedTuple):
     """The vertical scale of growth factors."""
 
     title: str
@@ -148,7 +134,7 @@ def growth_scale(factors: Floats) -> GrowthScale:
 
 def usable(values: Floats) -> Floats:
     """Return the values that are positive and finite."""
-    return values[(values > 0.0) & np.isfinite(values)]
+    return style.finite(values[values > 0.0])
 
 
 def measured(record: Record, check: str, name: str, scheme: int, case: int) -> float:

@@ -11,9 +11,10 @@ from vibsim.core.record import Record
 from vibsim.report import data, style
 from vibsim.report.data import Member, at
 from vibsim.report.evidence import frame
-from vibsim.report.evidence.frame import Picture
-from vibsim.report.figures import local_order
+from vibsim.report.evidence.frame import evidence
+from vibsim.report.figures.order import draw_stated
 from vibsim.report.figures.time import differences as curves_of_differences
+from vibsim.report.style import Picture
 from vibsim.report.text import words
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 def picture(record: Record, check: ConvergesCheck, member: Member) -> Picture | None:
     """Draw the rescaled differences over time, where series are kept, and the order by level."""
     quantity = check.converges
-    norm = record.words("norm").index(check.norm)
+    norm = data.norm_index(record, check.norm)
     name = f"{quantity}_observed_order"
     if name not in record or not np.isfinite(at(record, name, member, norm=norm)).any():
         return None
@@ -35,18 +36,16 @@ def picture(record: Record, check: ConvergesCheck, member: Member) -> Picture | 
         "for. Bar: the stated order with its interval."
     )
     figure = style.canvas(1.0)
-    if data.is_lean(record):
-        _draw_orders(figure, record, check, member, norm)
-        return Picture(f"{member.title}: {told}", alt, figure)
-    _draw_differences(figure, record, quantity, member)
+    has_series = not data.is_lean(record)
+    if has_series:
+        _draw_differences(figure, record, quantity, member)
     _draw_orders(figure, record, check, member, norm)
+    if not has_series:
+        return evidence(f"{member.title}: {told}", alt, figure)
     order = data.power(record, member, quantity)
     how = f"rescaled to coincide where the error has order {order:g}" if order else "as they are"
-    left = (
-        f"Left: differences between levels of {member.title}, {how}; the finest pair is the "
-        "thinnest line."
-    )
-    return Picture(f"{left} Right: {told}", alt, figure)
+    left = f"Left: differences between levels of {member.title}, {how}; the finest pair is the thinnest line."
+    return evidence(f"{left} Right: {told}", alt, figure)
 
 
 def _draw_differences(figure: Figure, record: Record, quantity: str, member: Member) -> None:
@@ -55,7 +54,7 @@ def _draw_differences(figure: Figure, record: Record, quantity: str, member: Mem
     shown = [curve for curve in curves if curve.is_whole and curve.sound] or curves
     measure = data.unit(record, f"{quantity}_rescaled")
     title = style.label(f"rescaled differences of {words.symbol(quantity)}", measure)
-    ax = frame.panel(figure, title, style.label("t", data.time_unit(record)))
+    ax = frame.panel(figure, title, data.time_label(record))
     ax.set_xlim(float(t[0]), float(t[-1]))
     frame.scale(ax, *(curve.values for curve in shown), margin=0.05)
     ax.axhline(0.0, color=frame.BAND, linewidth=0.8, zorder=0)
@@ -73,7 +72,7 @@ def _draw_orders(
     formal = data.formal_order(record, member, quantity)
     expected = float(formal if check.order == "scheme" else check.order)
     triples, levels = data.whole(record, "triple"), data.whole(record, "level")
-    first, last = (int(at(record, f"{quantity}_window_{end}", member)) for end in ("first", "last"))
+    first, last = data.window(record, quantity, member)
     good = np.array(data.sound_triples(record, quantity, member))
     near = orders[good & np.isfinite(orders)] if good.any() else orders
     around = expected + np.array([-0.5, 0.5])
@@ -85,4 +84,4 @@ def _draw_orders(
         ax.axhline(expected, **frame.DASHED)
     counts = [first <= triple and levels[i + 2] <= last for i, triple in enumerate(triples)]
     frame.points(ax, triples, orders, counts)
-    local_order.draw_stated(ax, record, quantity, member, norm, frame.COLOUR)
+    draw_stated(ax, record, quantity, member, norm, frame.COLOUR)

@@ -12,16 +12,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vibsim.checks.fields import name_of
-from vibsim.checks.value import criteria
-from vibsim.checks.value.by_level import own_levels
-from vibsim.checks.value.units import unit_of
-from vibsim.checks.words.value import what
+from vibsim.checks.value import SAMPLED, own_levels, unit_of, what
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report import style
-from vibsim.report.data import Floats, Member, at, norm_unit, pick, pretty_unit, unit, whole
+from vibsim.report.data import OF_LEVEL, Member, at, norm_index, norm_unit, pretty_unit, unit, whole
 from vibsim.report.evidence import frame
-from vibsim.report.evidence.frame import COLOUR, Picture, measured
+from vibsim.report.evidence.frame import COLOUR, evidence, measured
 from vibsim.report.figures.panels import figure_of
+from vibsim.report.style import Picture
 from vibsim.report.text import words
 
 if TYPE_CHECKING:
@@ -32,7 +31,6 @@ if TYPE_CHECKING:
 
 WIDE = 30.0
 """Positive numbers of which the largest is more than so many times the least have a logarithmic scale."""
-OF_LEVEL = ("scheme", "case", "level")
 
 
 def picture(
@@ -57,7 +55,7 @@ def picture(
 def _spoken(check: ValueCheck) -> str:
     """Return the name of a number as a title has it."""
     told = what(check, words.PAGE)
-    if check.value in criteria.SAMPLED or (check.at.t is None and check.at.step is None):
+    if check.value in SAMPLED or (check.at.t is None and check.at.step is None):
         return told
     return f"{told} up to {f't = {check.at.t:g}' if check.at.t is not None else f'step {check.at.step}'}"
 
@@ -67,10 +65,8 @@ def _values(
 ) -> tuple[Floats, str] | None:
     """Return a number on every level with its unit; None where the record does not have it."""
     if (field := name_of(name, "value_by_level")) in record:
-        found = np.asarray(
-            pick(record, field, scheme=member.scheme, case=member.case), dtype=np.float64
-        )
-        return found, pretty_unit(unit_of(experiment, record, check)).replace("sqrt(s)", "√s")
+        measure = pretty_unit(unit_of(experiment, record, check)).replace("sqrt(s)", "√s")
+        return at(record, field, member), measure
     if check.at.t is not None or check.at.step is not None:
         return None
     kept = f"{check.quantity}_{check.value}" if check.quantity else check.value
@@ -79,8 +75,8 @@ def _values(
     norm, errors = check.value.removeprefix("error_"), f"{check.quantity}_error_norm"
     if norm == check.value or errors not in record or norm not in record.words("norm"):
         return None
-    index = record.words("norm").index(norm)
-    return at(record, errors, member, norm=index), norm_unit(record, str(check.quantity), norm)
+    found = at(record, errors, member, norm=norm_index(record, norm))
+    return found, norm_unit(record, str(check.quantity), norm)
 
 
 @dataclass(frozen=True)
@@ -120,7 +116,7 @@ class ByLevel:
         one = len(self.levels) == 1 and len(self.values) == 1
         head = f"{self.scheme}, level {self.levels[0]}" if one else f"{self.scheme}, level by level"
         caption = f"{head}: filled the one that is asked for{bar}; grey is {told}."
-        return Picture(caption, ax.get_title(loc="left"), figure_of(ax))
+        return evidence(caption, ax.get_title(loc="left"), figure_of(ax))
 
 
 def _row(
@@ -161,8 +157,7 @@ def _distance(row: ByLevel, wanted: float, allowed: float) -> Picture | None:
     around = np.append(ends[1:], [allowed, 0.1 * known.max()])
     title = f"distance of {row.name} from {words.number(wanted, 'step')}"
     ax = row.panel(title, away, around, is_log=True)
-    frame.allowed(ax, 0.0, allowed)
-    ax.axhline(allowed, **frame.DASHED)
+    frame.below(ax, allowed)
     told = "what the tolerance allows"
     if np.any(away == 0.0):
         told += "; a triangle at the lower edge has no distance at all"

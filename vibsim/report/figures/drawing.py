@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.transforms import Bbox
 
+    from vibsim.report.style import Picture
+
 FORMATS = ("svg", "png", "pdf")
 """Formats of figures."""
 FAMILY = "'DejaVu Sans', Verdana, Arial, Helvetica, sans-serif"
@@ -17,24 +19,21 @@ MARGIN = 0.05
 """Between words and the border of a figure [inch]."""
 _PLACES = re.compile(r' (?:d|x|y)="[^"]*"')
 _DIGITS = re.compile(r"(\.\d\d)\d+")
+_NOTHING = re.compile(
+    r"<!--.*?-->\s*|<metadata>.*?</metadata>\s*|<!DOCTYPE.*?>\s*| transform=\"rotate\(-0 [^\"]*\"",
+    flags=re.DOTALL,
+)
 
 
 def box(figure: Figure) -> Bbox:
     """Return what is saved of a figure [inch]: all of it, and the words that leave it."""
     from matplotlib.transforms import Bbox
 
-    whole, drawn = figure.bbox_inches, figure.get_tightbbox().padded(MARGIN)
-    return Bbox.union([whole, drawn])
+    return Bbox.union([figure.bbox_inches, figure.get_tightbbox().padded(MARGIN)])
 
 
 def svg(figure: Figure, name: str) -> str:
-    """Return the SVG document of a figure: no date, and the same bytes every time.
-
-    Parameters
-    ----------
-    name
-        Unique on the page: the ids of the document begin with it.
-    """
+    """Return the SVG document of a figure; the ids in it begin with `name`, which is unique on the page."""
     import matplotlib
 
     stream = io.StringIO()
@@ -51,16 +50,8 @@ def _tidy(text: str, name: str) -> str:
     text = re.sub(r'(url\(#|href="#)', rf"\g<1>{name}-", text)
     # hundredths of a point are more than anyone sees
     text = _PLACES.sub(lambda match: _DIGITS.sub(r"\1", match[0]), text)
-    text = re.sub(
-        r"<!--.*?-->\s*|<metadata>.*?</metadata>\s*|<!DOCTYPE.*?>\s*| transform=\"rotate\(-0 [^\"]*\"",
-        "",
-        text,
-        flags=re.DOTALL,
-    )
-    text = re.sub(
-        r"; font-family: [^;\"]*", "", text.replace("<svg ", f'<svg font-family="{FAMILY}" ', 1)
-    )
-    text = re.sub(r"<g ?/>", "", text)
+    text = _NOTHING.sub("", text).replace("<svg ", f'<svg font-family="{FAMILY}" ', 1)
+    text = re.sub(r"<g ?/>", "", re.sub(r"; font-family: [^;\"]*", "", text))
     bare: list[bool] = []
 
     def without_bare_groups(match: re.Match[str]) -> str:
@@ -73,14 +64,9 @@ def _tidy(text: str, name: str) -> str:
 
 
 def inline(document: str, alt: str, *, is_scaled: bool = True) -> str:
-    """Return the ``<svg>`` element of an SVG document for use within HTML.
+    """Return the ``<svg>`` element of an SVG document for use within HTML, with its accessible name `alt`.
 
-    Parameters
-    ----------
-    alt
-        Its accessible name.
-    is_scaled
-        Whether it takes the width that the page has, not its own.
+    It takes the width that the page has where it `is_scaled`, else its own.
     """
     from markupsafe import escape
 
@@ -93,11 +79,17 @@ def inline(document: str, alt: str, *, is_scaled: bool = True) -> str:
     return element.replace("<svg", f'<svg role="img" aria-label="{escape(alt)}"', 1)
 
 
+def element(picture: Picture) -> str:
+    """Return the SVG element of a picture in the size it was drawn in; empty without a figure."""
+    if picture.figure is None:
+        return ""
+    return inline(svg(picture.figure, picture.name), picture.alt, is_scaled=False)
+
+
 def binary(figure: Figure, form: str) -> bytes:
     """Return a figure as PNG or PDF, free of dates."""
     stream = io.BytesIO()
-    metadata = {"pdf": {"CreationDate": None, "Creator": None, "Producer": None}}.get(
-        form, {"Software": None}
-    )
+    dates = {"pdf": ["CreationDate", "Creator", "Producer"]}.get(form, ["Software"])
+    metadata = dict.fromkeys(dates)
     figure.savefig(stream, format=form, metadata=metadata, bbox_inches=box(figure))
     return stream.getvalue()

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report import frame, style
-from vibsim.report.data import Floats, flags, known, largest, pick, time_unit, times, unit, whole
+from vibsim.report.data import MEMBER, flags, known, largest, pick, time_label, times, unit, whole
 from vibsim.report.figures.panels import figure_of, panels
 from vibsim.report.style import Picture
-from vibsim.report.tables.theory import MEMBER
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,24 +36,31 @@ def running(record: Record, case: int) -> Picture | None:
     if not {OWN, CENTRED} <= set(record.variables):
         return None
     t, level = times(record, case)[1:], whole(record, "level")[0]
-    first = np.abs(known(record, "energy_initial", MEMBER)[:, case])
-    usable = bool(np.all(first > 0.0))
     if not np.isfinite(np.asarray(record[CENTRED], dtype=np.float64)).any():
         return None
-    both = [_series(record, name, case, first if usable else None) for name in (OWN, CENTRED)]
+    first = np.abs(known(record, "energy_initial", MEMBER)[:, case])
+    usable = bool(np.all(first > 0.0))
+    # running maxima of the coarsest level, shape (scheme, t), the first time left out
+    both = [
+        np.asarray(pick(record, name, case=case, level=0), np.float64)[:, 1:]
+        for name in (OWN, CENTRED)
+    ]
+    both = [style.no_zeros(part / first[:, None] if usable else part) for part in both]
+    # of a body at rest nothing else tells a size
+    sizes = [1.0] if usable else [size for part in both for row in part if (size := largest(row))]
+    most = frame.WILD * min(sizes, default=1.0)
     names = record.words("scheme")
     groups = [range(i, min(i + TOGETHER, len(names))) for i in range(0, len(names), TOGETHER)]
     axes = panels([2.5] * len(groups))
-    most = frame.WILD * (1.0 if usable else _least(both))
     leaves = False
     for ax, group in zip(axes, groups, strict=True):
         for s in group:
             look = style.look(s)
             text = style.entry(names[s] + _drift(record, s, case))
-            _draw(
-                ax, t, both[0][s], {"color": look["color"], "marker": look["marker"], "label": text}
-            )
-            _draw(ax, t, both[1][s], {"color": look["color"], "marker": "", "linestyle": DASHED})
+            solid = {"marker": look["marker"], "label": text}
+            _draw(ax, t, both[0][s], color=look["color"], **solid)
+            if np.isfinite(both[1][s]).any():
+                _draw(ax, t, both[1][s], color=look["color"], marker="", linestyle=DASHED)
         style.log_axis(ax, "x", float(t[0]), float(t[-1]))
         style.log_axis(ax, "y", *_limits([part[s] for part in both for s in group], most))
         for s in group:
@@ -62,12 +69,10 @@ def running(record: Record, case: int) -> Picture | None:
         ax.plot([], [], color=style.GREY, label="own velocity")
         ax.plot([], [], color=style.GREY, linestyle=DASHED, label="[D₂ₜu]")
         style.beside(ax, fontsize=8, handlelength=2.4)
-        text = "max |dE| / E(0) so far" if usable else "max |dE| so far"
-        ax.set_ylabel(
-            text if usable else style.label(text, unit(record, "energy_deviation_max_abs"))
-        )
+        text = style.label("max |dE| so far", unit(record, "energy_deviation_max_abs"))
+        ax.set_ylabel("max |dE| / E(0) so far" if usable else text)
     axes[0].set_title("Energy error by the velocity that it is made with")
-    axes[-1].set_xlabel(style.label("t", time_unit(record)))
+    axes[-1].set_xlabel(time_label(record))
     return Picture(
         name=f"energy_running_{case}",
         title=f"How does the energy error grow with time? Level {level}",
@@ -79,14 +84,6 @@ def running(record: Record, case: int) -> Picture | None:
         alt="Running maximum of the energy error of every scheme, with two velocities, against time, logarithmic",
         figure=figure_of(axes[0]),
     )
-
-
-def _series(record: Record, name: str, case: int, first: Floats | None) -> Floats:
-    """Return running maxima of the coarsest level, shape (scheme, t), the first time left out."""
-    if name not in record:
-        return np.full((len(record["scheme"]), len(record["t"]) - 1), np.nan)
-    values = np.asarray(pick(record, name, case=case, level=0), dtype=np.float64)[:, 1:]
-    return style.no_zeros(values if first is None else values / first[:, None])
 
 
 def _drift(record: Record, s: int, case: int) -> str:
@@ -102,17 +99,9 @@ def _drift(record: Record, s: int, case: int) -> str:
     return f": {kind}" if kind not in {"", "unknown", "not applicable"} else ""
 
 
-def _draw(ax: Axes, t: Floats, values: Floats, look: dict[str, Any]) -> None:
-    if not np.isfinite(values).any() and "label" not in look:
-        return
+def _draw(ax: Axes, t: Floats, values: Floats, **look: Any) -> None:
     x, y = style.thin(t, values, 120)
     ax.plot(x, y, linewidth=1.3, markersize=4, markevery=max(1, x.size // 8), **look)
-
-
-def _least(both: list[Floats]) -> float:
-    """Return the largest error of the scheme that has the smallest: of a body at rest nothing else tells a size."""
-    sizes = [size for part in both for row in part if (size := largest(row)) > 0.0]
-    return min(sizes, default=1.0)
 
 
 def _limits(series: list[Floats], most: float) -> tuple[float, float]:
@@ -120,8 +109,7 @@ def _limits(series: list[Floats], most: float) -> tuple[float, float]:
     kept = [values for values in series if 0.0 < largest(values) <= most]
     grown = [values for values in series if largest(values) > most]
     shown = kept or [values[values <= most] for values in grown]
-    values = np.concatenate([*shown, [np.nan]])
-    values = values[np.isfinite(values)]
+    values = style.finite(*shown)
     if values.size == 0:
         return (most / frame.WILD, most) if grown else (0.1, 1.0)
     high = min(float(values.max()), style.LARGEST)

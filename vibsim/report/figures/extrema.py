@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.report import frame, style
+from vibsim.report import data, frame, style
 from vibsim.report.choice import position
-from vibsim.report.data import Floats, Member, at, exact_periods, pick, time_unit, unit, whole
+from vibsim.report.data import Member, at, whole
 from vibsim.report.figures.panels import figure_of, note, panels
 from vibsim.report.style import Picture
 
@@ -32,6 +33,9 @@ MOSTLY = 0.5
 WILD = 10.0
 """Amplitudes and periods beyond so many times the exact one are cut off, and the panel says so."""
 
+Run = tuple[str, Member, int]
+"""A curve: its label, the scheme and member, and the position of its level."""
+
 
 def local(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
     """Draw local periods, amplitudes and the phase error of one member; None where there are fewer than two periods."""
@@ -42,31 +46,30 @@ def local(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     if not runs:
         return None
     axes = panels([2.1, 2.1, 2.1])
-    exact = float(exact_periods(record)[case])
+    exact = float(data.exact_periods(record)[case])
     start = first_peak(experiment, record, case, exact)
-    schemes = {member.scheme for _, member, _ in runs}
-    drawn: list[list[Any]] = [[], [], []]
-    for label, member, level in runs:
-        look = _look(member, level, len(schemes) > 1, runs)
-        lines = _draw(axes, record, member, level, style.entry(label), look, exact, start)
-        for part, line in zip(drawn, lines, strict=True):
-            part.append(line)
-    where = position(experiment)
+    looks = _looks(runs)
+    each = [
+        _draw(axes, record, run, look, exact, start) for run, look in zip(runs, looks, strict=True)
+    ]
+    drawn = list(zip(*each, strict=True))
     size = _amplitude(experiment, record, case)
-    for ax, value in ((axes[0], exact), (axes[1], size), (axes[2], 0.0)):
+    for ax, value in zip(axes, (exact, size, 0.0), strict=True):
         if math.isfinite(value):
             ax.axhline(value, label="exact" if ax is axes[0] else "", **style.REFERENCE)
-    leaves = _ranges(axes, drawn, exact, size)
-    for ax in axes:
+    leaves = _ranges(axes, drawn, (exact, size, math.nan))
+    time, measure = data.time_unit(record), data.unit(record, f"{position(experiment)}_finest")
+    for ax, title, text, of in zip(
+        axes,
+        ("Local period", "Local amplitude", "Phase error of the peaks"),
+        ("local period", "local amplitude", "peak early by"),
+        (time, measure, time),
+        strict=True,
+    ):
         # amplitudes that hardly differ need long numbers
         ax.yaxis.set_label_coords(-0.115, 0.5)
-    time = time_unit(record)
-    axes[0].set_ylabel(style.label("local period", time))
-    axes[1].set_ylabel(style.label("local amplitude", unit(record, f"{where}_finest")))
-    axes[2].set_ylabel(style.label("peak early by", time))
-    axes[0].set_title("Local period")
-    axes[1].set_title("Local amplitude")
-    axes[2].set_title("Phase error of the peaks")
+        ax.set_ylabel(style.label(text, of))
+        ax.set_title(title)
     axes[2].set_xlabel("number of the peak")
     for ax, lines in zip(axes, drawn, strict=True):
         _tell_alike(ax, lines, [label for label, _, _ in runs])
@@ -85,7 +88,7 @@ def local(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     )
 
 
-def _runs(record: Record, members: list[Member]) -> list[tuple[str, Member, int]]:
+def _runs(record: Record, members: list[Member]) -> list[Run]:
     """Choose the curves: of one or two schemes several levels, of more schemes the coarsest level."""
     levels = whole(record, "level")
     each = max(1, min(len(levels), 4, CURVES // max(1, len(members))))
@@ -99,76 +102,65 @@ def _runs(record: Record, members: list[Member]) -> list[tuple[str, Member, int]
     return found
 
 
+def _looks(runs: list[Run]) -> list[dict[str, Any]]:
+    """Return the look of each run: of several schemes a colour is a scheme, and dashes and marker are a level."""
+    levels = sorted({level for _, _, level in runs})
+    if len({member.scheme for _, member, _ in runs}) == 1:
+        return [style.look(k) for k in range(len(runs))]
+    looks = []
+    for _, member, level in runs:
+        k, look = levels.index(level), style.look(member.scheme)
+        of_level = {"linestyle": style.DASHES[k], "marker": style.MARKERS[k]}
+        looks.append(look | of_level if len(levels) > 1 else look)
+    return looks
+
+
 def _draw(
-    axes: list[Axes],
-    record: Record,
-    member: Member,
-    level: int,
-    label: str,
-    look: dict[str, Any],
-    exact: float,
-    start: float,
+    axes: list[Axes], record: Record, run: Run, look: dict[str, Any], exact: float, start: float
 ) -> list[Any]:
     """Draw a run in the three panels and return its lines."""
-    time, peak, trough = (
-        at(record, name, member, level=level) for name in ("peak_time", "peak", "trough")
+    label, member, level = run
+    time, grid, peak, trough, trough_time = (
+        at(record, name, member, level=level)
+        for name in ("peak_time", "peak_time_grid", "peak", "trough", "trough_time")
     )
-    trough_time = at(record, "trough_time", member, level=level)
     keep = np.isfinite(time)
-    number, time, peak = np.arange(1, keep.sum() + 1), time[keep], peak[keep]
-    line = look | {"linewidth": 1.1, "markersize": 4}
-    line |= {"marker": look["marker"] if number.size <= MARKED else ""}
-    grid = at(record, "peak_time_grid", member, level=level)[keep]
-    faint: dict[str, Any] = {
-        "color": look["color"],
-        "linestyle": "none",
-        "marker": "o",
-        "markerfacecolor": "none",
-        "alpha": 0.45,
-    }
-    axes[0].plot(number[:-1], np.diff(grid), **faint, markersize=6.5, zorder=1.5)
+    time, grid, peak = time[keep], grid[keep], peak[keep]
+    number = np.arange(1, time.size + 1)
+    marker = look["marker"] if number.size <= MARKED else ""
+    line = look | {"linewidth": 1.1, "markersize": 4, "marker": marker}
+    faint: dict[str, Any] = {"color": look["color"], "linestyle": "none", "marker": "o"}
+    faint |= {"markerfacecolor": "none", "alpha": 0.45, "markersize": 6.5, "zorder": 1.5}
+    axes[0].plot(number[:-1], np.diff(grid), **faint)
     offset = time[0] - exact if math.isnan(start) else start - exact
     return [
-        *axes[0].plot(number[:-1], np.diff(time), label=label, **line),
+        *axes[0].plot(number[:-1], np.diff(time), label=style.entry(label), **line),
         *axes[1].plot(number, heights(time, peak, trough_time, trough), **line),
         *axes[2].plot(number, offset + number * exact - time, **line),
     ]
 
 
-def _look(
-    member: Member, level: int, several: bool, runs: list[tuple[str, Member, int]]
-) -> dict[str, Any]:
-    """Return the look of a run: of several schemes a colour is a scheme, and dashes and marker are a level."""
-    if not several:
-        return style.look([run[1:] for run in runs].index((member, level)))
-    look = style.look(member.scheme)
-    if len({i for _, _, i in runs}) == 1:
-        return look
-    place = sorted({i for _, _, i in runs}).index(level)
-    return look | {"linestyle": style.DASHES[place], "marker": style.MARKERS[place]}
-
-
-def _tell_alike(ax: Axes, lines: list[Any], labels: list[str]) -> None:
+def _tell_alike(ax: Axes, lines: tuple[Any, ...], labels: list[str]) -> None:
     """Say beside a panel which curves lie on one another there, and draw the first of them wide and pale beneath."""
     low, high = ax.get_ylim()
-    curves = [
-        np.where((y >= low) & (y <= high), y, np.nan)
-        for y in (np.asarray(line.get_ydata(), dtype=np.float64) for line in lines)
-    ]
+    curves = [np.where((y >= low) & (y <= high), y, np.nan) for y in map(_heights_of, lines)]
+    is_first = not str(lines[0].get_label()).startswith("_")
     texts: list[tuple[Any, str]] = []
     for i, first in enumerate(frame.same_as(curves, high - low)):
-        if first is None:
-            continue
-        lines[first].set(linewidth=3.4, alpha=0.5)
-        lines[i].set(zorder=3.0 + 0.01 * i)
-        text = style.entry(f"{labels[i]}:\n  same as {labels[first]}")
-        texts.append((lines[i], text))
-        if lines[i].get_label()[:1] != "_":
-            # the panel with the legend of all
-            lines[i].set_label(text)
-    if texts and lines[0].get_label()[:1] == "_":
-        handles, words = zip(*texts, strict=True)
-        ax.legend(list(handles), list(words), **style.BESIDE, fontsize=7.5)
+        if first is not None:
+            lines[first].set(linewidth=3.4, alpha=0.5)
+            lines[i].set(zorder=3.0 + 0.01 * i)
+            texts.append((lines[i], style.entry(f"{labels[i]}:\n  same as {labels[first]}")))
+    if is_first:
+        # the panel with the legend of all
+        for line, text in texts:
+            line.set_label(text)
+    elif texts:
+        ax.legend(*map(list, zip(*texts, strict=True)), **style.BESIDE, fontsize=7.5)
+
+
+def _heights_of(line: Any) -> Floats:
+    return np.asarray(line.get_ydata(), dtype=np.float64)
 
 
 def heights(time: Floats, peak: Floats, trough_time: Floats, trough: Floats) -> Floats:
@@ -199,10 +191,9 @@ def first_peak(experiment: Experiment, record: Record, case: int, period: float)
 
 def _start(experiment: Experiment, record: Record, case: int) -> tuple[float, float]:
     """Return the first position and velocity of a member."""
-    model = experiment.model.definition
+    model, member = experiment.model.definition, Member(0, case, "")
     u, v = (
-        float(at(record, f"{n}_finest", Member(0, case, ""))[0])
-        for n in (model.position, model.velocity)
+        float(at(record, f"{name}_finest", member)[0]) for name in (model.position, model.velocity)
     )
     return u, v
 
@@ -212,59 +203,43 @@ def _amplitude(experiment: Experiment, record: Record, case: int) -> float:
     u, v = _start(experiment, record, case)
     if v == 0.0:
         return abs(u)
-    model = experiment.model.definition
-    if not model.linear or "natural_frequency" not in record:
-        return math.nan
-    w = float(np.ravel(pick(record, "natural_frequency", case=case))[0])
-    return math.hypot(u, v / w)
+    linear = experiment.model.definition.linear
+    return math.hypot(u, v / data.natural_frequency(record, case)) if linear else math.nan
 
 
-def _ranges(axes: list[Axes], drawn: list[list[Any]], exact: float, size: float) -> bool:
+def _ranges(
+    axes: list[Axes], drawn: list[tuple[Any, ...]], sizes: tuple[float, float, float]
+) -> bool:
     """Hold what is drawn; cut off what grows far beyond the exact number, with a mark; say whether anything is."""
     from matplotlib.ticker import MaxNLocator
 
     leaves = False
-    for ax, lines, value in zip(axes, drawn, (exact, size, math.nan), strict=True):
-        values = np.concatenate(
-            [np.asarray(line.get_ydata(), dtype=np.float64) for line in ax.lines]
-        )
-        beyond = np.isfinite(values) & (np.abs(values) > WILD * abs(value))
-        kept = values[~beyond]
-        if not np.isfinite(kept).any() or not beyond.any():
+    for ax, lines, value in zip(axes, drawn, sizes, strict=True):
+        most = WILD * abs(value)
+        values = style.finite(*map(_heights_of, ax.lines))
+        kept = values[~(np.abs(values) > most)]
+        if kept.size in (0, values.size):
             ax.set_ylim(*style.limits(values))
             continue
-        shown = [_within(line, WILD * abs(value)) for line in lines]
-        if sum(shown) < MOSTLY * len(shown):
-            # most of them would not be seen
+        # most of the curves have to be seen at two places at least
+        seen = [int(np.sum(np.abs(_heights_of(line)) <= most)) > 1 for line in lines]
+        if sum(seen) < MOSTLY * len(seen):
             _grow(ax, lines, abs(value))
         else:
             ax.set_ylim(*style.limits(kept))
             note(ax, f"cut off beyond {WILD:g} times the exact one")
-        found = [
-            frame.mark_leaving(
-                ax,
-                np.asarray(line.get_xdata(), dtype=np.float64),
-                np.asarray(line.get_ydata(), dtype=np.float64),
-                color=line.get_color(),
-            )
-            for line in lines
-        ]
-        leaves |= any(found)
+        for line in lines:
+            x = np.asarray(line.get_xdata(), dtype=np.float64)
+            leaves |= frame.mark_leaving(ax, x, _heights_of(line), color=line.get_color())
     axes[0].xaxis.set_major_locator(MaxNLocator(nbins=10, integer=True))
     return leaves
 
 
-def _within(line: Any, most: float) -> bool:
-    """Say whether at least two points of a line are finite and not beyond `most`."""
-    values = np.abs(np.asarray(line.get_ydata(), dtype=np.float64))
-    return int(np.sum(values <= most)) > 1
-
-
-def _grow(ax: Axes, lines: list[Any], size: float) -> None:
+def _grow(ax: Axes, lines: tuple[Any, ...], size: float) -> None:
     """Show on a logarithmic scale how numbers grow, as far as a frame has room."""
     for line in lines:
-        line.set_ydata(style.no_zeros(np.asarray(line.get_ydata(), dtype=np.float64)))
-    values = np.concatenate([np.asarray(line.get_ydata()) for line in lines] + [np.array([size])])
+        line.set_ydata(style.no_zeros(_heights_of(line)))
+    values = np.concatenate([*map(_heights_of, lines), [size]])
     shown = values[(values <= frame.WILD * size) & (values >= size / frame.WILD)]
     style.log_axis(ax, "y", float(shown.min()) / 2.0, 2.0 * float(shown.max()))
     note(ax, "size, logarithmic")

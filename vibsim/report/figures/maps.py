@@ -2,117 +2,132 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vibsim.checks.fields import measured
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASONS, SEVERITY, TYPICAL_NORM
 from vibsim.report import finest_level, style
 from vibsim.report.choice import position, tolerance
-from vibsim.report.data import (
-    Floats,
-    due,
-    exact_periods,
-    norm_unit,
-    of_several,
-    pick,
-    promised_text,
-    whole,
-)
-from vibsim.report.figures import map_panels, separatrix
-from vibsim.report.figures.map_panels import Panel
+from vibsim.report.data import due, exact_periods, norm_unit, of_several, pick, promised_text, whole
+from vibsim.report.figures.panels import rows_of
+from vibsim.report.figures.separatrix import separatrix
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Grid
 from vibsim.report.text import words
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from vibsim.experiment import Experiment
+
+COLUMNS = 3
+LEFT, WIDE, TALL, GAP = 0.68, 2.52, 2.1, 0.27
+"""Left margin, width and height of a panel, gap between panels [inch]."""
+ABOVE, BELOW = 0.32, 1.12
+"""Room for the title above a panel, for ticks and the scale below it [inch]."""
+BORDERED = 400
+"""Most cells that are drawn one by one, with borders; more are one image."""
+DECADES = 12.0
+"""Most decades that a logarithmic scale spans, from the largest value down."""
+SPREAD = 20.0
+"""Positive values that spread by more than this factor, but for a hundredth, have a logarithmic scale."""
+FEW = 5.0
+"""The same of periods: those of rotation are much shorter."""
+RANGE = 0.5
+"""Distance from the promised order at which the colours end."""
+APART = 0.025
+"""Distance between the dots of a separatrix, as part of the panel."""
+SHOWN_ALREADY = ("period", "period_error", "exact_period", "amplitude")
+"""Values of checks that have maps of their own."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One map."""
+
+    title: str
+    table: Floats
+    """Shape (y, x) of cells or blocks; NaN where there is nothing."""
+    label: str = ""
+    """What the colours mean, with the unit."""
+    kind: str = "size"
+    """``size`` (dark to light), ``distance`` (around 0, pale within `tolerance`), ``factor`` (around 1), ``code``."""
+    tolerance: float = 0.0
+    scale: Floats | None = None
+    """Values that set the range of the colours, where it is that of another panel."""
+    spread: float = SPREAD
+    codes: tuple[tuple[str, str], ...] = ()
+    """Of kind ``code``: text and colour of every number."""
 
 
 def verdicts(
     experiment: Experiment, record: Record, grid: Grid, quantity: str, scheme: int
 ) -> Picture:
     """Draw verdict, order and error of a quantity with the width of their intervals."""
-    name, letter = record.words("scheme")[scheme], words.symbol(quantity)
-    allowed = tolerance(experiment, quantity, name)
-    promised = promised_text(record, quantity, scheme)
+    letter, promise = words.symbol(quantity), due(record, quantity)
+    allowed = tolerance(experiment, quantity, record.words("scheme")[scheme])
     panels = [_reasons(record, grid, quantity, scheme)]
     if whole(record, "triple"):
         away = finest_level.deviation(record, quantity)[scheme]
         _, low, high = (part[scheme] for part in finest_level.orders(record, quantity))
-        text = f"order of {letter} − {promised}"
-        order = grid.worst(away, np.abs(away))
-        panels.append(
-            Panel(
-                f"Order against the {due(record, quantity)} one", order, text, "distance", allowed
-            )
-        )
-        panels.append(
-            Panel("Error bar of the order", grid.worst(high - low), "width of the interval")
-        )
-        panels.append(_window(record, grid, quantity, scheme))
+        text = f"order of {letter} − {promised_text(record, quantity, scheme)}"
+        worst = grid.worst(away, np.abs(away))
+        panels += [
+            Panel(f"Order against the {promise} one", worst, text, "distance", allowed),
+            Panel("Error bar of the order", grid.worst(high - low), "width of the interval"),
+            _window(record, grid, quantity, scheme),
+        ]
     panels += _errors(record, grid, quantity, scheme)
     several = of_several(record, scheme)
-    marked = separatrix.separatrix(experiment, grid)
     kinds = {panel.kind for panel in panels}
-    return Picture(
-        name=f"map_{quantity}_{scheme}",
-        title=f"Where does it converge, how fast, how well? {letter}{several}",
-        caption=style.sentences(
-            f"Pale colours are orders within ± {allowed:g} of the {due(record, quantity)} one, where the scale jumps."
-            if "distance" in kinds
-            else "",
-            "Where estimated over true error is pale, two levels alone tell the error."
-            if "factor" in kinds
-            else "",
-            _notes(panels, grid, marked),
-        ),
-        alt=f"Maps over two swept parameters: verdict on {words.name(quantity)}, its order and its error{several}",
-        figure=map_panels.draw(grid, panels, marked),
+    pale = (
+        f"Pale colours are orders within ± {allowed:g} of the {promise} one, where the scale jumps."
     )
+    return _picture(
+        experiment, grid, panels, f"map_{quantity}_{scheme}",
+        f"Where does it converge, how fast, how well? {letter}{several}",
+        f"Maps over two swept parameters: verdict on {words.name(quantity)}, its order and its error{several}",
+        pale if "distance" in kinds else "",
+        "Where estimated over true error is pale, two levels alone tell the error." if "factor" in kinds else "",
+    )  # fmt: skip
 
 
 def motion(experiment: Experiment, record: Record, grid: Grid, scheme: int) -> Picture | None:
     """Draw period and amplitude with their errors; None where no member has either."""
-    where = position(experiment)
-    time, size = finest_level.period(record, where), finest_level.amplitude(record, where)
+    time, size = (
+        finest_level.measured(record, name, position(experiment))
+        for name in ("period", "amplitude")
+    )
     panels: list[Panel] = []
     if np.isfinite(time.value[scheme]).any():
         panels += _periods(record, grid, time, scheme)
-    if np.isfinite(size.value[scheme]).any():
-        measure = style.label("amplitude", size.unit)
-        panels.append(Panel("Amplitude", grid.worst(size.value[scheme]), measure))
-        if np.isfinite(size.error[scheme]).any():
-            measure = style.label("estimated error", size.unit)
-            panels.append(
-                Panel("Error bar of the amplitude", grid.worst(size.error[scheme]), measure)
-            )
+    for title, text, values in (
+        ("Amplitude", "amplitude", size.value[scheme]),
+        ("Error bar of the amplitude", "estimated error", size.error[scheme]),
+    ):
+        if np.isfinite(size.value[scheme]).any() and np.isfinite(values).any():
+            panels.append(Panel(title, grid.worst(values), style.label(text, size.unit)))
     if not panels:
         return None
     several = of_several(record, scheme)
-    marked = separatrix.separatrix(experiment, grid)
-    parts = [
+    bars = (
         f"Numbers of level {whole(record, 'level')[-1]}. The error bars come from the two finest levels alone: "
-        "where they agree with the true error, they can be trusted where it is not known.",
-        _notes(panels, grid, marked),
-    ]
-    return Picture(
-        name=f"map_period_{scheme}",
-        title=f"Period and amplitude{several}",
-        caption=style.sentences(*parts),
-        alt=f"Maps of the period, the exact period, the error of the period and the amplitude{several}",
-        figure=map_panels.draw(grid, panels, marked),
+        "where they agree with the true error, they can be trusted where it is not known."
     )
-
-
-SHOWN_ALREADY = ("period", "period_error", "exact_period", "amplitude")
-"""Values of checks that have maps of their own."""
+    return _picture(
+        experiment, grid, panels, f"map_period_{scheme}", f"Period and amplitude{several}",
+        f"Maps of the period, the exact period, the error of the period and the amplitude{several}", bars,
+    )  # fmt: skip
 
 
 def numbers(experiment: Experiment, record: Record, grid: Grid, scheme: int) -> Picture | None:
-    """Draw the numbers that checks ask for of every member; None where there are no others than those of `motion`."""
+    """Draw the numbers that checks are about and no other map shows; None where there are none."""
     name, panels = record.words("scheme")[scheme], []
     for check in experiment.checks:
         inner = check.measured
@@ -125,128 +140,237 @@ def numbers(experiment: Experiment, record: Record, grid: Grid, scheme: int) -> 
     if not panels:
         return None
     several = of_several(record, scheme)
-    marked = separatrix.separatrix(experiment, grid)
-    return Picture(
-        name=f"map_checks_{scheme}",
-        title=f"The numbers that the checks are about{several}",
-        caption=style.sentences(
-            "Each panel has the name of its check.", _notes(panels, grid, marked)
-        ),
-        alt=f"Maps of the numbers that checks ask for{several}",
-        figure=map_panels.draw(grid, panels, marked),
-    )
+    return _picture(
+        experiment, grid, panels, f"map_checks_{scheme}", f"The numbers that the checks are about{several}",
+        f"Maps of the numbers that checks ask for{several}", "Each panel has the name of its check.",
+    )  # fmt: skip
 
 
-FEW = 5.0
-"""Periods that spread by this factor have a logarithmic scale: those of rotation are much shorter."""
+def _picture(
+    experiment: Experiment, grid: Grid, panels: list[Panel], name: str, title: str, alt: str, *caption: str
+) -> Picture:  # fmt: skip
+    """Draw panels, and explain what is grey, dotted or gathered in blocks; nothing that is not there."""
+    ridge = separatrix(experiment, grid)
+    has_gaps = any(not np.isfinite(panel.table).all() for panel in panels)
+    text = style.sentences(
+        *caption,
+        "Grey hatched cells have no such number." if has_gaps else "",
+        "The dotted line is the separatrix, where the exact period is infinite." if ridge[0].size else "",
+        grid.note,
+    )  # fmt: skip
+    return Picture(name, title, text, alt, draw(grid, panels, ridge))
 
 
 def _periods(record: Record, grid: Grid, time: finest_level.Measured, scheme: int) -> list[Panel]:
-    exact = exact_periods(record)
-    known = np.isfinite(exact)
-    value, label = time.value[scheme], style.label("period", time.unit)
-    both = np.concatenate([value[np.isfinite(value)], exact[known]])
-    panels = [Panel("Period", grid.worst(value), label, scale=both, spread=FEW)]
-    if known.any():
-        panels.append(
-            Panel(
-                "Exact period",
-                grid.worst(np.where(known, exact, np.nan)),
-                label,
-                scale=both,
-                spread=FEW,
-            )
-        )
-        relative = finest_level.period_error(record, -1)[scheme]
-        panels.append(
-            Panel("Relative error of the period", grid.worst(relative), "|period / exact − 1|")
-        )
+    exact, value = exact_periods(record), time.value[scheme]
+    label, scale = style.label("period", time.unit), style.finite(value, exact)
+    panels = [Panel("Period", grid.worst(value), label, scale=scale, spread=FEW)]
+    if np.isfinite(exact).any():
+        known = grid.worst(np.where(np.isfinite(exact), exact, np.nan))
+        relative = grid.worst(finest_level.period_error(record, -1)[scheme])
+        panels += [
+            Panel("Exact period", known, label, scale=scale, spread=FEW),
+            Panel("Relative error of the period", relative, "|period / exact − 1|"),
+        ]
     if np.isfinite(time.error[scheme]).any():
         with np.errstate(invalid="ignore", divide="ignore"):
-            relative = time.error[scheme] / value
-        panels.append(
-            Panel("Error bar of the period", grid.worst(relative), "estimated error / period")
-        )
+            relative = grid.worst(time.error[scheme] / value)
+        panels.append(Panel("Error bar of the period", relative, "estimated error / period"))
     return panels
 
 
+def _codes(
+    title: str, grid: Grid, values: Floats, present: list[int], texts: list[tuple[str, str]]
+) -> Panel:
+    """Return a map of whole numbers, each with a text, to which its count is added, and a colour; the last is worst."""
+    place = np.full(values.shape, np.nan)
+    for i, code in enumerate(present):
+        place[values == code] = i
+    counts = [words.number(int(np.sum(values == code)), "integer") for code in present]
+    named = zip(texts, counts, strict=True)
+    codes = tuple((f"{text} ({count})", colour) for (text, colour), count in named)
+    return Panel(title, grid.worst(place), kind="code", codes=codes)
+
+
 def _reasons(record: Record, grid: Grid, quantity: str, scheme: int) -> Panel:
-    """Return the map of verdicts: one colour per reason, the worst of a block."""
-    name = f"{quantity}_reason"
-    reason, meanings = record[name][scheme], record.meanings(name)
-    counted = {int(code): int(np.sum(reason == code)) for code in np.unique(reason)}
+    """Return the map of the reasons of the verdicts; of several members in a cell the worst."""
+    reason = pick(record, f"{quantity}_reason", scheme=scheme)
+    meanings = record.meanings(f"{quantity}_reason")
+    codes, counts = np.unique(reason, return_counts=True)
+    counted = dict(zip(codes.tolist(), counts.tolist(), strict=True))
+    # the milder first, of equal ones the rarer last
     ranked = sorted(counted, key=lambda code: (SEVERITY[REASONS[meanings[code]]], -counted[code]))
-    place = np.zeros(reason.shape)
-    for i, code in enumerate(ranked):
-        place[reason == code] = i
-    codes = tuple(
-        (
-            f"{REASONS[meanings[code]]}: {meanings[code]} ({words.number(counted[code], 'integer')})",
-            style.REASON_COLOURS[meanings[code]],
-        )
-        for code in ranked
-    )
-    return Panel("Verdict", grid.worst(place), "", "code", codes=codes)
+    named = [meanings[code] for code in ranked]
+    texts = [(f"{REASONS[word]}: {word}", style.REASON_COLOURS[word]) for word in named]
+    return _codes("Verdict", grid, reason, ranked, texts)
 
 
 def _window(record: Record, grid: Grid, quantity: str, scheme: int) -> Panel:
     """Return the map of the coarsest level that the stated order rests on."""
-    first = pick(record, f"{quantity}_window_first", scheme=scheme).astype(np.float64)
-    levels = whole(record, "level")
-    colours = _shades(len(levels))
-    present = [level for level in levels if np.any(first == level)]
-    place = np.full(first.shape, np.nan)
-    for i, level in enumerate(present):
-        place[first == level] = i
-    counts = [words.number(int(np.sum(first == level)), "integer") for level in present]
-    codes = tuple(
-        (f"from level {level} on ({count})", colours[levels.index(level)])
-        for level, count in zip(present, counts, strict=True)
-    )
-    return Panel("Levels that the order rests on", grid.worst(place), "", "code", codes=codes)
-
-
-def _shades(count: int) -> list[str]:
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
-    return [to_hex(colormaps["viridis"](x)) for x in np.linspace(1.0, 0.0, count)]
+    first = pick(record, f"{quantity}_window_first", scheme=scheme).astype(np.float64)
+    levels = whole(record, "level")
+    shades = np.linspace(1.0, 0.0, len(levels))
+    present = [level for level in levels if np.any(first == level)]
+    colours = [to_hex(colormaps["viridis"](shades[levels.index(level)])) for level in present]
+    texts = [f"from level {level} on" for level in present]
+    named = list(zip(texts, colours, strict=True))
+    return _codes("Levels that the order rests on", grid, first, present, named)
 
 
 def _errors(record: Record, grid: Grid, quantity: str, scheme: int) -> list[Panel]:
-    found = finest_level.error(record, quantity)
-    measure = norm_unit(record, quantity, TYPICAL_NORM)
-    kind = "true" if found.is_known else "estimated"
-    letter, level = words.symbol(quantity), whole(record, "level")[-1]
-    text = style.label(f"{kind} error of {letter} ({TYPICAL_NORM})", measure)
-    panels = [
-        Panel(f"Error on level {level}", grid.worst(style.positive(found.best[scheme])), text)
-    ]
-    if not np.isfinite(found.estimate[scheme]).any():
+    found, level = finest_level.error(record, quantity), whole(record, "level")[-1]
+    text = f"{found.kind} error of {words.symbol(quantity)} ({TYPICAL_NORM})"
+    text = style.label(text, norm_unit(record, quantity))
+    best, estimate = style.positive(found.best[scheme]), found.estimate[scheme]
+    panels = [Panel(f"Error on level {level}", grid.worst(best), text)]
+    if not np.isfinite(estimate).any():
         return panels
     with np.errstate(invalid="ignore", divide="ignore"):
-        if found.is_known:
-            ratio = style.positive(found.estimate[scheme] / found.true[scheme])
-            worst = grid.worst(ratio, np.abs(np.log(ratio)))
-            return [
-                *panels,
-                Panel("Can the estimate be trusted?", worst, "estimated / true error", "factor"),
-            ]
-        width = (found.high - found.low)[scheme] / found.estimate[scheme]
-    return [
-        *panels,
-        Panel("Error bar of the error", grid.worst(style.positive(width)), "relative width"),
-    ]
+        if found.kind == "true":
+            ratio = style.positive(estimate / found.true[scheme])
+            worst, text = grid.worst(ratio, np.abs(np.log(ratio))), "estimated / true error"
+            return [*panels, Panel("Can the estimate be trusted?", worst, text, "factor")]
+        width = style.positive((found.high - found.low)[scheme] / estimate)
+    return [*panels, Panel("Error bar of the error", grid.worst(width), "relative width")]
 
 
-def _notes(panels: list[Panel], grid: Grid, marked: tuple[Floats, Floats]) -> str:
-    """Explain what is grey, dotted or gathered in blocks; nothing that is not there."""
-    return style.sentences(
-        "Grey hatched cells have no such number."
-        if any(panel.has_gaps for panel in panels)
-        else "",
-        "The dotted line is the separatrix, where the exact period is infinite."
-        if marked[0].size
-        else "",
-        grid.note,
-    )
+def draw(grid: Grid, panels: list[Panel], ridge: tuple[Floats, Floats]) -> Figure:
+    """Return a figure with the panels in rows of three, all over the same two parameters."""
+    columns = [(LEFT + i * (WIDE + GAP), WIDE) for i in range(COLUMNS)]
+    figure, axes = rows_of(len(panels), columns, TALL, ABOVE, BELOW)
+    for i, (ax, panel) in enumerate(zip(axes, panels, strict=True)):
+        image = _cells(ax, grid, panel)
+        _frame(ax, grid, panel.title, first=i % COLUMNS == 0)
+        _mark(ax, ridge)
+        if panel.kind == "code":
+            _legend(ax, panel)
+        elif image is not None:
+            box, high = ax.get_position(), figure.get_figheight()
+            bar = figure.add_axes((box.x0, box.y0 - 0.62 / high, box.width, 0.11 / high))
+            _scale(bar, image, panel)
+    return figure
+
+
+def _cells(ax: Axes, grid: Grid, panel: Panel) -> Any:
+    many = panel.table.size > BORDERED
+    ax.patch.set(facecolor=style.MISSING, hatch="////", edgecolor="#b4b4b4", linewidth=0.0)
+    if not np.isfinite(panel.table).any():
+        style.remark(ax, "no value anywhere")
+        return None
+    cmap, norm = _colours(panel)
+    border: Any = {"edgecolors": "none" if many else "#8c8c8c", "linewidth": 0.0 if many else 0.4}
+    table = np.ma.masked_invalid(panel.table)
+    return ax.pcolormesh(*grid.borders, table, cmap=cmap, norm=norm, **border, rasterized=many)
+
+
+def _colours(panel: Panel) -> tuple[Any, Any]:
+    """Return the colour map of a panel and how values become its numbers."""
+    from matplotlib import colormaps
+    from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm, Normalize
+
+    if panel.kind == "code":
+        borders = np.arange(len(panel.codes) + 1) - 0.5
+        colours = [colour for _, colour in panel.codes]
+        return ListedColormap(colours), BoundaryNorm(borders, len(panel.codes))
+    if panel.kind == "distance":
+        return pale_within(panel.tolerance), Normalize(-RANGE, RANGE)
+    if panel.kind == "factor":
+        return colormaps["PuOr"], LogNorm(0.5, 2.0)
+    values = style.finite(panel.table if panel.scale is None else panel.scale)
+    low, high, logarithmic = limits(values, panel.spread)
+    return colormaps["viridis"], (LogNorm if logarithmic else Normalize)(low, high)
+
+
+def pale_within(tolerance: float) -> Any:
+    """Return colours around zero from -RANGE to RANGE that jump where the tolerance ends."""
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+
+    x = np.linspace(-RANGE, RANGE, 401)
+    size = np.abs(x)
+    inner = 0.10 * size / max(tolerance, 1e-9)
+    outer = 0.22 + 0.28 * (size - tolerance) / max(RANGE - tolerance, 1e-9)
+    place = 0.5 + np.sign(x) * np.where(size <= tolerance, inner, outer)
+    return ListedColormap(colormaps["PuOr"](np.clip(place, 0.0, 1.0)))
+
+
+def limits(values: Floats, spread: float = SPREAD) -> tuple[float, float, bool]:
+    """Return the range of a scale, and whether it is logarithmic: then a hundredth of the values may lie below it."""
+    low, high = float(values.min()), float(values.max())
+    if low >= 0.0 and high > 0.0:
+        usual = max(float(np.quantile(values[values > 0.0], 0.01)), high * 10.0**-DECADES)
+        if high >= spread * usual:
+            return usual, high, True
+    room = 0.0 if high > low else 0.01 * abs(high) or 1.0
+    return low - room, high + room, False
+
+
+def _frame(ax: Axes, grid: Grid, title: str, first: bool) -> None:
+    for which, key, shown in (("x", grid.x, True), ("y", grid.y, first)):
+        axis = getattr(ax, f"{which}axis")
+        if key.is_log:
+            style.log_axis(ax, which, *getattr(ax, f"get_{which}lim")())
+        if key.words:
+            axis.set_ticks(key.distinct, key.words)
+        if shown:
+            getattr(ax, f"set_{which}label")(key.label, fontsize=8.5, labelpad=2)
+        else:
+            axis.set_tick_params(labelleft=False)
+    ax.set_title(title, fontsize=9)
+    ax.grid(visible=False)
+    ax.tick_params(labelsize=7.5)
+
+
+def _mark(ax: Axes, ridge: tuple[Floats, Floats]) -> None:
+    """Draw the separatrix as dots that stand out from light and dark, no two of them closer than `APART`."""
+    if not ridge[0].size:
+        return
+    ends = ax.get_xlim(), ax.get_ylim()
+    places = ax.transAxes.inverted().transform(ax.transData.transform(np.column_stack(ridge)))
+    kept: list[int] = []
+    for i in np.lexsort((places[:, 1], places[:, 0])).tolist():
+        if not kept or np.hypot(*(places[kept] - places[i]).T).min() >= APART:
+            kept.append(i)
+    dot: Any = {"linestyle": "none", "marker": "o", "markeredgewidth": 0.0}
+    for size, colour in ((3.0, "white"), (1.6, "black")):
+        ax.plot(ridge[0][kept], ridge[1][kept], markersize=size, color=colour, **dot)
+    ax.set(xlim=ends[0], ylim=ends[1])
+
+
+def _legend(ax: Axes, panel: Panel) -> None:
+    from matplotlib.patches import Patch
+
+    edge: Any = {"edgecolor": "#404040", "linewidth": 0.4}
+    ax.legend(
+        handles=[Patch(facecolor=colour, label=text, **edge) for text, colour in panel.codes],
+        loc="upper left", bbox_to_anchor=(-0.02, -0.19), ncols=1 if len(panel.codes) <= 4 else 2, fontsize=7.5,
+        handlelength=1.2, borderaxespad=0.0, columnspacing=0.8, labelspacing=0.3,
+    )  # fmt: skip
+
+
+def _scale(ax: Axes, image: Any, panel: Panel) -> None:
+    """Draw the colour bar below a panel."""
+    from matplotlib.ticker import MaxNLocator
+
+    values = style.finite(panel.table)
+    low, high = float(image.norm.vmin), float(image.norm.vmax)
+    below, above = values.min() < low, values.max() > high
+    beyond = "both" if below and above else "min" if below else "max" if above else "neither"
+    bar = ax.figure.colorbar(image, cax=ax, orientation="horizontal", extend=beyond)
+    bar.set_label(panel.label, fontsize=8.5, labelpad=2)
+    bar.ax.tick_params(labelsize=7.5)
+    bar.outline.set_linewidth(0.5)
+    bar.ax.grid(visible=False)
+    if panel.kind == "distance":
+        bar.set_ticks([-RANGE, -panel.tolerance, 0.0, panel.tolerance, RANGE])
+        bar.ax.set_xticklabels([f"{x:+g}".replace("-", "−") if x else "0" for x in bar.get_ticks()])
+    elif panel.kind == "factor":
+        bar.set_ticks([0.5, 0.7, 1.0, 1.4, 2.0], labels=["0.5", "0.7", "1", "1.4", "2"])
+        bar.ax.minorticks_off()
+    elif type(image.norm).__name__ == "LogNorm":
+        style.log_ticks(bar.ax.xaxis, low, high, most=5)
+    else:
+        bar.ax.xaxis.set_major_locator(MaxNLocator(5))

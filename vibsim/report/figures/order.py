@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.report import data, style
 from vibsim.report.choice import promises
-from vibsim.report.data import Floats, Member
-from vibsim.report.figures import local_order
+from vibsim.report.data import Member
 from vibsim.report.figures.panels import legend_above, rows_of
 from vibsim.report.style import Picture
 from vibsim.report.text import words
@@ -28,145 +28,113 @@ SLOPES: tuple[Any, ...] = ((0, (4, 3)), (0, (1.2, 1.6)), (0, (7, 2, 1.2, 2)), (0
 """Dashes of several promised slopes."""
 WILD = 1e4
 """Errors beyond so many times the upper quartile leave the frame."""
+KINDS: dict[str, tuple[str, dict[str, Any]]] = {
+    "difference": ("level difference", {"marker": "o", "linestyle": "none", "markersize": 5}),
+    "true": ("true error", {"marker": "o", "linestyle": "none", "markersize": 7, "markerfacecolor": "none"}),
+    "floor": ("predicted round-off", {"linestyle": ":", "linewidth": 1.0}),
+}  # fmt: skip
+"""What filled, hollow and dotted mean, once for all schemes."""
 
 
 def against_step(experiment: Experiment, record: Record, quantity: str, case: int) -> Picture:
     """Draw the norms of differences and errors against the step, and the local order against the level."""
-    schemes = record.words("scheme")
-    many = style.crowded(record)
+    schemes, many = record.words("scheme"), style.crowded(record)
     panel = max(2.2, 0.17 * len(schemes)) if many else 2.2
     second = (6.1, 2.7) if many else (5.0, 3.8)
     figure, (left, right) = rows_of(2, [(0.8, 3.3), second], panel, 0.6, 0.5)
-    kinds = _draw_norms(left, experiment, record, quantity, case, schemes)
-    draw = local_order.draw_each if many else local_order.draw
-    is_settled = draw(right, experiment, record, quantity, case, schemes)
+    members = [Member(s, case, scheme) for s, scheme in enumerate(schemes)]
+    kinds = _draw_norms(left, experiment, record, quantity, members)
+    draw = _draw_each if many else _draw_by_level
+    there = _has_order(right, record, quantity, case)
+    is_settled = draw(right, experiment, record, quantity, members) if there else None
     legend_above(figure, left)
-    member = data.case_name(record, case)
-    suffix = f", {member}" if member else ""
-    letter = words.symbol(quantity)
+    name, letter = data.case_name(record, case), words.symbol(quantity)
     return Picture(
         name=f"order_{quantity}_{case}",
-        title=f"How fast does the error shrink? {letter}{suffix}",
+        title=f"How fast does the error shrink? {letter}{f', {name}' if name else ''}",
         caption=_caption(kinds, is_settled, many, data.due(record, quantity)),
         alt=f"Norm of the level differences of {words.name(quantity)} against the step, and local order against level",
         figure=figure,
     )
 
 
-def _caption(
-    kinds: frozenset[str], is_settled: bool | None, many: bool = False, due: str = "promised"
-) -> str:
-    """Explain what is drawn, and nothing else (see `_draw_norms`, `_draw_orders`)."""
+def _caption(kinds: set[str], is_settled: bool | None, many: bool, due: str) -> str:
+    """Explain what is drawn, and nothing else."""
     if not kinds:
         return "Nothing is drawn: there is no error to measure here."
     shown = "size of the level differences (filled)" if "difference" in kinds else ""
     true = "size of the true error (hollow)" if "true" in kinds else ""
-    parts = [
+    orders = {
+        True: "Right: the stated order of every scheme with its interval; where none is stated, hollow, the order of "
+        f"the finest three levels; the vertical stroke is the {due} one.",
+        False: "Right: the order that three successive levels give, drawn at the coarsest of the three; it should "
+        "settle inside a grey band; orders beyond the frame come from levels that are too coarse, within "
+        "round-off, or of runs that grow without bound. A scheme that differs by round-off alone has none.",
+    }
+    return style.sentences(
         f"Left: {' and '.join(filter(None, [shown, true]))} against dt.",
         f"Parallel to a dashed line means that {due} order." if "slope" in kinds else "",
         "Points on the dotted line are round-off." if "floor" in kinds else "",
-    ]
-    if is_settled is not None and many:
-        parts.append(
-            "Right: the stated order of every scheme with its interval; where none is stated, hollow, the order of the "
-            f"finest three levels; the vertical stroke is the {due} one."
-        )
-    elif is_settled is not None:
-        parts.append(
-            "Right: the order that three successive levels give, drawn at the coarsest of the three; it should "
-            "settle inside a grey band; orders beyond the frame come from levels that are too coarse, within "
-            "round-off, or of runs that grow without bound. A scheme that differs by round-off alone has none."
-        )
-    if is_settled and not many:
-        parts.append("The bar is the stated order with its interval, over the levels it rests on.")
-    return style.sentences(*parts)
+        "" if is_settled is None else orders[many],
+        "The bar is the stated order with its interval, over the levels it rests on."
+        if is_settled and not many
+        else "",
+    )
 
 
 def _draw_norms(
-    ax: Axes, experiment: Experiment, record: Record, quantity: str, case: int, schemes: list[str]
-) -> frozenset[str]:
+    ax: Axes, experiment: Experiment, record: Record, quantity: str, members: list[Member]
+) -> set[str]:
     """Draw the norms; return what is seen: ``difference``, ``true``, ``slope``, ``floor``."""
-    dt, norm = data.steps_of(record, case), record.words("norm").index(TYPICAL_NORM)
-    measure = data.norm_unit(record, quantity, TYPICAL_NORM)
-    seen: list[Floats] = []
-    floors: list[Floats] = []
-    promised = data.formal_orders(record, quantity)[:, case]
-    for s, scheme in enumerate(schemes):
-        if np.isnan(promised[s]):
+    dt, norm = data.steps_of(record, members[0].case), data.norm_index(record)
+    kinds: dict[str, list[Floats]] = {"difference": [], "true": [], "floor": []}
+    for member in members:
+        if np.isnan(data.formal_order(record, member, quantity)):
             # a scheme that chooses its own steps has no error against dt
             continue
-        member = Member(s, case, scheme)
-        look = style.look(s)
-        difference = style.no_zeros(
-            data.at(record, f"{quantity}_difference_norm", member, norm=norm)
+        look = style.look(member.scheme)
+        difference, true = (
+            style.no_zeros(data.at(record, f"{quantity}_{name}_norm", member, norm=norm))
+            for name in ("difference", "error")
         )
-        true = style.no_zeros(data.at(record, f"{quantity}_error_norm", member, norm=norm))
-        ax.plot(
-            dt[: difference.size],
-            difference,
-            **look,
-            markersize=5,
-            linewidth=1.1,
-            label=style.entry(scheme),
-        )
+        floor = style.no_zeros(data.floor_norm(record, quantity, member, TYPICAL_NORM))
+        name = style.entry(member.scheme_name)
+        ax.plot(dt[: difference.size], difference, **look, markersize=5, linewidth=1.1, label=name)
         if np.isfinite(true).any():
-            ax.plot(
-                dt,
-                true,
-                **look | {"linestyle": "none"},
-                markersize=7,
-                markerfacecolor="none",
-            )
-        floors.append(style.no_zeros(data.floor_norm(record, quantity, member, TYPICAL_NORM)))
-        ax.plot(dt, floors[-1], color=look["color"], linestyle=":", linewidth=1.0)
-        seen += [difference, true]
+            ax.plot(dt, true, **look | KINDS["true"][1] | {"marker": look["marker"]})
+        ax.plot(dt, floor, color=look["color"], **KINDS["floor"][1])
+        for kind, values in zip(kinds, (difference, true, floor), strict=True):
+            kinds[kind].append(values)
+    # two schemes apart, differences and errors stand by turns
+    seen = [part for pair in zip(kinds["difference"], kinds["true"], strict=True) for part in pair]
     if not any(np.isfinite(part).any() for part in seen):
         for line in list(ax.lines):
             line.remove()
         ax.set(xticks=[], yticks=[])
         style.remark(ax, "every difference and error is zero,\nor not finite: nothing to draw")
-        return frozenset()
-    orders = dict.fromkeys(order for order, _ in promises(experiment, record, quantity))
+        return set()
+    orders = list(dict.fromkeys(order for order, _ in promises(experiment, record, quantity)))
+    due = data.due(record, quantity)
     slopes = [
-        _reference(
-            ax,
-            dt,
-            seen,
-            order,
-            f"slope {order:g} ({data.due(record, quantity)})",
-            SLOPES[k % len(SLOPES)] if len(orders) > 1 else "",
-        )
+        _reference(ax, dt, seen, order, due, SLOPES[k % len(SLOPES)] if len(orders) > 1 else None)
         for k, order in enumerate(orders)
     ]
-    near = _step_limits(ax, dt, seen, floors)
-    kinds = {
-        "difference": any(np.isfinite(part).any() for part in seen[::2]),
-        "true": any(np.isfinite(part).any() for part in seen[1::2]),
-        "slope": any(slopes),
-        "floor": near,
-    }
-    found = frozenset(kind for kind, is_seen in kinds.items() if is_seen)
-    _explain(ax, found)
+    near = _step_limits(ax, dt, seen, kinds["floor"])
+    found = {name for name in ("difference", "true") if style.finite(*kinds[name]).size}
+    found |= {"floor"} if near else set()
+    for kind, (text, mark) in KINDS.items():
+        if kind in found:
+            ax.plot([], [], color=style.GREY, **mark, label=text)
     ax.set_xlabel(style.label("dt", data.time_unit(record, "dt")))
+    measure = data.norm_unit(record, quantity)
     ax.set_ylabel(style.label(f"{TYPICAL_NORM} norm, {words.symbol(quantity)}", measure))
     _level_axis(ax, dt, data.whole(record, "level"))
-    return found
-
-
-def _explain(ax: Axes, kinds: frozenset[str]) -> None:
-    """Add to the legend what filled, hollow and dotted mean, once for all schemes."""
-    look: dict[str, Any] = {"color": style.GREY, "marker": "o", "linestyle": "none"}
-    if "difference" in kinds:
-        ax.plot([], [], **look, markersize=5, label="level difference")
-    if "true" in kinds:
-        ax.plot([], [], **look, markersize=7, markerfacecolor="none", label="true error")
-    if "floor" in kinds:
-        ax.plot([], [], color=style.GREY, linestyle=":", linewidth=1.0, label="predicted round-off")
+    return found | ({"slope"} if any(slopes) else set())
 
 
 def _positive(parts: list[Floats]) -> Floats:
-    joined = np.concatenate([part[np.isfinite(part) & (part > 0)] for part in parts])
-    return joined if joined.size else np.array([1.0])
+    found = style.finite(*(part[part > 0] for part in parts))
+    return found if found.size else np.array([1.0])
 
 
 def _highest(values: Floats) -> float:
@@ -175,7 +143,7 @@ def _highest(values: Floats) -> float:
 
 
 def _reference(
-    ax: Axes, dt: Floats, seen: list[Floats], order: float, label: str, dashes: Any
+    ax: Axes, dt: Floats, seen: list[Floats], order: float, due: str, dashes: Any
 ) -> bool:
     """Draw the promised slope a little above the largest value at the coarsest step, and say whether there is room.
 
@@ -183,30 +151,19 @@ def _reference(
     """
     coarsest = np.array([part[0] for part in seen if np.isfinite(part[0])] or [1.0])
     start = 2.5 * _highest(coarsest)
-    lowest = _positive(seen).min()
-    reach = dt[start * (dt / dt[0]) ** order >= lowest]
-    is_drawn = bool(reach.size > 1 and start > 0)
-    if is_drawn:
-        ax.plot(
-            reach,
-            start * (reach / dt[0]) ** order,
-            **style.REFERENCE | ({"linestyle": dashes} if dashes else {}),
-            label=label,
-        )
-    if is_drawn and dashes:
-        end = float(reach[-1]), float(start * (reach[-1] / dt[0]) ** order)
+    line = start * (dt / dt[0]) ** order
+    reach = line >= _positive(seen).min()
+    if reach.sum() < 2 or start <= 0.0:
+        return False
+    look = style.REFERENCE | ({"linestyle": dashes} if dashes else {})
+    ax.plot(dt[reach], line[reach], **look, label=f"slope {order:g} ({due})")
+    if dashes:
+        plain = {"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8}
         ax.annotate(
-            f"{order:g}",
-            end,
-            xytext=(-2, 0),
-            textcoords="offset points",
-            ha="right",
-            va="center",
-            fontsize=7.5,
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8},
-            annotation_clip=True,
-        )
-    return is_drawn
+            f"{order:g}", (float(dt[reach][-1]), float(line[reach][-1])), xytext=(-2, 0),
+            textcoords="offset points", ha="right", va="center", fontsize=7.5, bbox=plain, annotation_clip=True,
+        )  # fmt: skip
+    return True
 
 
 def _step_limits(ax: Axes, dt: Floats, seen: list[Floats], floors: list[Floats]) -> bool:
@@ -235,3 +192,105 @@ def _level_axis(ax: Axes, dt: Floats, levels: list[int]) -> None:
         FuncFormatter(lambda x, _: str(chosen[min(chosen, key=lambda d: abs(d - x))]))
     )
     ax.text(-0.02, 1.03, "level", transform=ax.transAxes, ha="right", va="bottom", fontsize=8.5)
+
+
+def _has_order(ax: Axes, record: Record, quantity: str, case: int) -> bool:
+    """Say whether three levels give an order; the panel says why where they do not."""
+    name = f"{quantity}_observed_order"
+    if name in record and np.isfinite(data.pick(record, name, case=case)).any():
+        return True
+    few = len(data.whole(record, "level")) < 3
+    ax.set(xticks=[], yticks=[])
+    why = " it takes three levels" if few else "\nno ratio of differences exists"
+    style.remark(ax, f"no order:{why}")
+    return False
+
+
+def _draw_by_level(
+    ax: Axes, experiment: Experiment, record: Record, quantity: str, members: list[Member]
+) -> bool:
+    """Draw the local orders; return whether an order is stated."""
+    from matplotlib.ticker import MaxNLocator
+
+    triples, norm = data.whole(record, "triple"), data.norm_index(record)
+    promised = promises(experiment, record, quantity)
+    for order, tolerance in promised:
+        ax.axhspan(order - tolerance, order + tolerance, **style.ALLOWED)
+        ax.axhline(order, **style.REFERENCE)
+    sound: list[Floats] = []
+    stated = False
+    seen = [data.sound_triples(record, quantity, member) for member in members]
+    for member, good in zip(members, seen, strict=True):
+        if any(map(any, seen)) and not any(good):
+            # beside orders, those of noise would be taken for some
+            continue
+        look = style.look(member.scheme)
+        local = data.at(record, f"{quantity}_observed_order", member, norm=norm)
+        sound.append(local[good] if any(good) else local)
+        ax.plot(triples, local, **look, markersize=5, linewidth=1.1)
+        stated |= draw_stated(ax, record, quantity, member, norm, look["color"])
+    ax.set_ylim(*_order_limits(style.finite(*sound), [order for order, _ in promised]))
+    if len(members) == 1 and len(triples) <= 8:
+        above: Any = {"xytext": (0, 7), "textcoords": "offset points", "ha": "center"}
+        for level, order in zip(triples, local.tolist(), strict=True):
+            if np.isfinite(order):
+                text = words.number(order, "order")
+                ax.annotate(text, (level, order), **above, fontsize=8, annotation_clip=True)
+    levels = data.whole(record, "level")
+    ax.set_xlim(levels[0] - 0.5, levels[-1] + 0.5)
+    ax.xaxis.set_major_locator(MaxNLocator(nbins=10, integer=True))
+    ax.set_xlabel("level (coarsest of three)")
+    ax.set_ylabel(f"local order of {words.symbol(quantity)} ({TYPICAL_NORM})")
+    return stated
+
+
+def _draw_each(
+    ax: Axes, experiment: Experiment, record: Record, quantity: str, members: list[Member]
+) -> bool:
+    """Draw the stated order of every scheme in a row of its own; return whether an order is stated."""
+    norm, seen, settled = data.norm_index(record), list[float](), False
+    members = [m for m in members if not np.isnan(data.formal_order(record, m, quantity))]
+    for row, member in enumerate(members):
+        look, promised = style.look(member.scheme), data.formal_order(record, member, quantity)
+        order, low, high = data.stated_order(record, quantity, member, norm)
+        is_stated = bool(np.isfinite(order))
+        settled |= is_stated
+        last = data.at(record, f"{quantity}_observed_order", member, norm=norm)[-1]
+        value, face = (order, look["color"]) if is_stated else (float(last), "white")
+        ax.plot([low, high], [row, row], color=look["color"], linewidth=3.0, alpha=0.35)
+        ax.plot([value], [row], **look | {"markerfacecolor": face, "markersize": 5})
+        ax.plot([promised], [row], color="black", marker="|", markersize=9, markeredgewidth=1.2)
+        seen += [x for x in (promised, value if is_stated else promised) if np.isfinite(x)]
+    if seen:
+        ax.set_xlim(min(seen) - 0.6, max(seen) + 0.6)
+    names = [style.entry(member.scheme_name) for member in members]
+    ax.set_yticks(range(len(members)), names, fontsize=7.5)
+    ax.set_ylim(len(members) - 0.4, -0.6)
+    ax.set_xlabel(f"order of {words.symbol(quantity)} ({TYPICAL_NORM})")
+    return settled
+
+
+def draw_stated(
+    ax: Axes, record: Record, quantity: str, member: Member, norm: int, colour: str
+) -> bool:
+    """Draw the stated order as a bar over the levels of its window, with its interval; say whether there is one."""
+    order, low, high = data.stated_order(record, quantity, member, norm)
+    first, last = data.window(record, quantity, member)
+    if not np.isfinite([order, low, high]).all() or last <= first:
+        return False
+    ends = [first, last]
+    ax.fill_between(ends, low, high, color=colour, alpha=0.18, linewidth=0, zorder=0.5)
+    wide: Any = {"linewidth": 4, "alpha": 0.35, "solid_capstyle": "butt", "zorder": 1.2}
+    ax.plot(ends, [order, order], color=colour, **wide)
+    return True
+
+
+def _order_limits(values: Floats, promised: list[float]) -> tuple[float, float]:
+    """Hold the promised orders and those that count, no further than 5 below the least and 2 above the largest."""
+    if not promised:
+        # of schemes that promise none
+        return style.limits(values)
+    low = min([promised[0] - 0.3, *values.tolist()])
+    high = max([promised[-1] + 0.3, *values.tolist()])
+    room = 0.08 * (high - low)
+    return max(low - room, promised[0] - 5), min(high + room, promised[-1] + 2)

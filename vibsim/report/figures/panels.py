@@ -1,4 +1,4 @@
-"""Panels that share a time axis, and curves that may coincide."""
+"""Panels of a figure, and curves over time that may coincide."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vibsim.core.array_types import Floats
 from vibsim.report import frame, style
-from vibsim.report.data import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,9 +19,12 @@ WILD = 1e6
 """Curves whose largest value is so many times a usual one are drawn on a logarithmic scale."""
 APART = 8.0
 """Spreads that differ by more than this are drawn on a logarithmic scale."""
-
 LONG = 36
 """Letters of a label above which its unit stands in a line of its own."""
+LEGEND_COLUMNS = 7
+"""Most columns of a legend above panels."""
+STAMP = (136, 64)
+"""Width and height of the small figure of the index [pixel]."""
 
 
 @dataclass(frozen=True)
@@ -50,13 +53,7 @@ class Curve:
 
 
 def figure_of(axes: Axes) -> Figure:
-    """Return the figure that holds `axes`.
-
-    Raises
-    ------
-    ValueError
-        Where they were taken out of it.
-    """
+    """Return the figure that holds `axes`; a ValueError where they were taken out of it."""
     figure = axes.get_figure(root=True)
     if figure is None:
         raise ValueError("these axes belong to no figure")
@@ -88,37 +85,19 @@ def panels(heights: list[float]) -> list[Axes]:
 def rows_of(
     count: int, columns: Sequence[tuple[float, float]], tall: float, above: float, below: float
 ) -> tuple[Figure, list[Axes]]:
-    """Return a figure and its panels, row by row.
+    """Return a figure and its `count` panels, row by row.
 
-    Parameters
-    ----------
-    count
-        Number of panels.
-    columns
-        Left and width of each column [inch].
-    tall, above, below
-        Height of a panel, and the room above and below each [inch].
+    `columns` are left and width of each, `tall` is the height of a panel with the room `above` and `below` it [inch].
     """
-    rows = -(-count // len(columns))
-    height = rows * (above + tall + below)
+    height = -(-count // len(columns)) * (above + tall + below)
     figure = style.canvas(height)
     axes = []
     for i in range(count):
         row, column = divmod(i, len(columns))
-        left, width = columns[column]
+        left, width = (x / style.WIDTH for x in columns[column])
         bottom = height - row * (above + tall + below) - above - tall
-        axes.append(axes_at(figure, left, bottom, width, tall))
+        axes.append(figure.add_axes((left, bottom / height, width, tall / height)))
     return figure, axes
-
-
-def axes_at(figure: Figure, left: float, bottom: float, width: float, tall: float) -> Axes:
-    """Return new axes of a figure at a place [inch]."""
-    high = figure.get_figheight()
-    return figure.add_axes((left / style.WIDTH, bottom / high, width / style.WIDTH, tall / high))
-
-
-LEGEND_COLUMNS = 7
-"""Most columns of a legend above panels."""
 
 
 def legend_above(figure: Figure, ax: Axes) -> None:
@@ -165,8 +144,8 @@ def draw_curves(ax: Axes, t: Floats, curves: list[Curve], text: str, measure: st
 
 def stop_at_breakdown(ax: Axes, t: Floats, series: list[Floats]) -> None:
     """Let the time end with the last finite value of all series, and say so where that is not the end."""
-    finite = np.flatnonzero(np.any([np.isfinite(values) for values in series], axis=0))
-    last = max(int(finite[-1]), 1) if finite.size else t.size - 1
+    found = np.flatnonzero(np.any([np.isfinite(values) for values in series], axis=0))
+    last = max(int(found[-1]), 1) if found.size else t.size - 1
     # a centred formula has no value at the last time
     last = t.size - 1 if last >= t.size - 2 else last
     ax.set_xlim(float(t[0]), float(t[last]))
@@ -176,21 +155,21 @@ def stop_at_breakdown(ax: Axes, t: Floats, series: list[Floats]) -> None:
 
 def explosive(series: list[Floats]) -> bool:
     """Say whether values grow beyond all bounds, so that on a linear scale only the last of them would be seen."""
-    sizes = [part for values in series if (part := _sizes(values)).size]
+    sizes = _sizes(series)
     return bool(sizes) and max(s.max() for s in sizes) > WILD * min(np.median(s) for s in sizes)
 
 
 def decades(series: list[Floats]) -> tuple[float, float]:
     """Return limits of a logarithmic axis over values that grow, from what they begin with."""
-    sizes = [part for values in series if (part := _sizes(values)).size]
+    sizes = _sizes(series)
     high = min(max(float(s.max()) for s in sizes), style.LARGEST)
     low = min(float(s[:2].max()) for s in sizes)
     return max(min(low, high) / 2, style.TINIEST), 2 * high
 
 
-def _sizes(values: Floats) -> Floats:
-    kept: Floats = np.abs(values[np.isfinite(values) & (values != 0.0)])
-    return kept
+def _sizes(series: list[Floats]) -> list[Floats]:
+    found = [np.abs(style.finite(values[values != 0.0])) for values in series]
+    return [size for size in found if size.size]
 
 
 def _look(i: int, count: int, points: int) -> dict[str, Any]:
@@ -222,7 +201,9 @@ def draw_spread(ax: Axes, t: Floats, curves: list[Curve], measure: str) -> None:
     reference = curves[sound[-1]]
     gaps = {i: curves[i].values - reference.values for i in sound[:-1]}
     shown = list(gaps.values())
-    sizes = [size for gap in shown if (size := _typical(gap)) > 0]
+    # an end point of its own kind does not count
+    typical = [float(np.nanquantile(np.abs(gap), 0.9)) for gap in shown]
+    sizes = [size for size in typical if size > 0]
     logarithmic = bool(sizes) and max(sizes) > APART * min(sizes)
     exponent = 0 if logarithmic else style.scale(*shown)
     for i, gap in gaps.items():
@@ -240,6 +221,19 @@ def draw_spread(ax: Axes, t: Floats, curves: list[Curve], measure: str) -> None:
     ax.set_title(f"Spread: distance from {reference.label}", fontweight="normal", fontsize=9)
 
 
-def _typical(values: Floats) -> float:
-    """Return a size that nine tenths of the values stay below: an end point of its own kind does not count."""
-    return float(np.nanquantile(np.abs(values), 0.9))
+def stamp(t: Floats, curves: list[Curve]) -> Figure:
+    """Return a figure the size of a stamp for the index, with every sound curve as one line and without axes."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(STAMP[0] / 96.0, STAMP[1] / 96.0))
+    ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    whole = [curve for curve in curves if curve.is_whole] or curves
+    sound = [curve for curve in whole if curve.sound] or whole
+    for i, curve in enumerate(sound):
+        width = 2.4 - 1.6 * i / max(1, len(sound) - 1)
+        x, y = style.thin(t, curve.values, STAMP[0] // 2)
+        ax.plot(x, y, color=style.look(i)["color"], linewidth=width)
+    ax.set_xlim(float(t[0]), float(t[-1]) if t[-1] > t[0] else float(t[0]) + 1.0)
+    ax.set_ylim(*style.limits(*(curve.values for curve in sound), margin=0.1))
+    ax.set_axis_off()
+    return figure

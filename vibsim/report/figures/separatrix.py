@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vibsim.report.data import Floats
+from vibsim.core.array_types import Floats
 from vibsim.report.sweep_layout import Grid, Key
 
 if TYPE_CHECKING:
@@ -28,12 +28,11 @@ SCANNED = 201
 
 def separatrix(experiment: Experiment, grid: Grid) -> tuple[Floats, Floats]:
     """Return points of the separatrix within a grid; none where the model has no exact period or no separatrix."""
-    model = experiment.model.definition
-    if model.exact_period is None or grid.x.words or grid.y.words:
+    if experiment.model.definition.exact_period is None or grid.x.words or grid.y.words:
         return np.empty(0), np.empty(0)
 
     def period(x: Floats, y: Floats) -> Floats:
-        return period_at(experiment, {grid.x.key: x, grid.y.key: y})
+        return _period_at(experiment, {grid.x.key: x, grid.y.key: y})
 
     down = _peaks(period, grid.x.distinct, grid.y.distinct)
     across = _peaks(lambda y, x: period(x, y), grid.y.distinct, grid.x.distinct)
@@ -44,23 +43,19 @@ def on_line(experiment: Experiment, key: Key) -> Floats:
     """Return the values of one swept key on the separatrix; none where there is no such value."""
     if experiment.model.definition.exact_period is None or key.words or key.distinct.size < 3:
         return np.empty(0)
-    return _peaks(lambda _, y: period_at(experiment, {key.key: y}), np.zeros(1), key.distinct)[1]
+    return _peaks(lambda _, y: _period_at(experiment, {key.key: y}), np.zeros(1), key.distinct)[1]
 
 
-def period_at(experiment: Experiment, values: dict[str, Floats]) -> Floats:
+def _period_at(experiment: Experiment, values: dict[str, Floats]) -> Floats:
     """Return the exact period with some keys replaced by `values`; infinite where it does not exist."""
-    model = experiment.model.definition
-    if model.exact_period is None:
-        raise ValueError(f"model {model.kind} has no exact period")
+    model, period = experiment.model, experiment.model.definition.exact_period
+    assert period is not None
     initial, parameters = (
         {name: values.get(f"{section}.{name}", value) for name, value in found.items()}
-        for section, found in (
-            ("initial", experiment.initial),
-            ("model", experiment.model.parameters),
-        )
+        for section, found in (("initial", experiment.initial), ("model", model.parameters))
     )
     shape = np.broadcast_shapes(*(np.shape(value) for value in values.values()))
-    return np.array(np.broadcast_to(model.exact_period(initial, parameters), shape), dtype=float)
+    return np.array(np.broadcast_to(period(initial, parameters), shape), dtype=float)
 
 
 def _peaks(period: Period, fixed: Floats, moving: Floats) -> tuple[Floats, Floats]:

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report import data, style
-from vibsim.report.data import Floats, Member
+from vibsim.report.data import Member
 from vibsim.report.figures.panels import (
     decades,
     explosive,
@@ -30,75 +31,76 @@ CUT = 3.0
 """A solution that grows beyond so many times the exact one is cut off there, and the panel says so."""
 TINY = 1e-18
 """Smallest relative size that a logarithmic panel shows: anything below is an accident of rounding."""
+PALE = "#56B4E9"
 
 
 def solution(record: Record, quantity: str, member: Member) -> Picture:
     """Draw the solution, and below it, on a logarithmic scale, its estimated and its true error."""
     t, letter = data.times(record, member.case), words.symbol(quantity)
     measure = data.unit(record, f"{quantity}_finest")
+    exact = data.exact_series(record, quantity, member)
+    best, bound = (data.at(record, f"{quantity}_richardson{end}", member) for end in ("", "_error"))
+    is_known = bool(np.isfinite(exact).any())
     axes = panels([2.3, 2.5])
-    exact = _draw_solution(axes[0], t, record, quantity, member)
+    _draw_solution(axes[0], t, data.at(record, f"{quantity}_finest", member), best, exact,
+                   data.whole(record, "level")[-1])  # fmt: skip
     axes[0].set_ylabel(style.label(letter, measure))
     axes[0].set_title(f"Solution {letter}(t)")
-    thickness = _draw_band(axes[0], t, record, quantity, member)
-    _draw_errors(axes[1], t, record, quantity, member)
+    thickness = _draw_band(axes[0], t, best, bound, measure)
+    _draw_errors(axes[1], t, record, quantity, member, bound, exact - best)
     axes[1].set_ylabel(style.label(f"|error of {letter}|", measure))
-    axes[1].set_title("Estimated beside true error" if exact else "Estimated error")
-    axes[1].set_xlabel(style.label("t", data.time_unit(record)))
-    caption = (
-        f"Top: the finest level, and the value extrapolated from the two finest ones with its error bar{thickness}. "
-        "Bottom: the error that the difference of two levels predicts"
-    )
-    caption += (
+    axes[1].set_title("Estimated beside true error" if is_known else "Estimated error")
+    axes[1].set_xlabel(data.time_label(record))
+    trust = (
         " (lines), and the true error (dots). Dots on the lines mean that the estimate can be trusted."
-        if exact
+        if is_known
         else ". No exact solution is known here, so the estimate stands alone."
     )
     return Picture(
         name=f"solution_{quantity}_{member.stem}",
         title=f"Solution with its error: {letter}, {member.title}",
-        caption=caption,
+        caption=f"Top: the finest level, and the value extrapolated from the two finest ones with its error bar"
+        f"{thickness}. Bottom: the error that the difference of two levels predicts{trust}",
         alt=f"{words.name(quantity)} against time for {member.title}, and its estimated error on a logarithmic scale",
         figure=figure_of(axes[0]),
     )
 
 
-def _draw_band(ax: Axes, t: Floats, record: Record, quantity: str, member: Member) -> str:
+def _draw_band(ax: Axes, t: Floats, centre: Floats, bound: Floats, measure: str) -> str:
     """Draw the error bar of the extrapolated solution as a band, and say how thick it is."""
-    centre = data.at(record, f"{quantity}_richardson", member)
-    bound = data.at(record, f"{quantity}_richardson_error", member)
     if not np.isfinite(bound).all():
         return ""
     thickest = float(np.max(bound))
-    size = f"at most {words.number(thickest)} {data.unit(record, f'{quantity}_finest')}".strip()
+    size = f"at most {words.number(thickest)} {measure}".strip()
     low, high = ax.get_ylim()
     if thickest < 0.005 * (high - low):
         return f" ({size}: thinner than the line)"
     (x, bottom), (x_top, top) = style.thin(t, centre - bound), style.thin(t, centre + bound)
-    ax.fill([*x, *x_top[::-1]], [*bottom, *top[::-1]], color="#56B4E9", alpha=0.35, linewidth=0)
+    ax.fill([*x, *x_top[::-1]], [*bottom, *top[::-1]], color=PALE, alpha=0.35, linewidth=0)
     ax.set_ylim(low, high)
     return f" (the band, {size})"
 
 
-def _draw_solution(ax: Axes, t: Floats, record: Record, quantity: str, member: Member) -> bool:
-    finest = data.whole(record, "level")[-1]
-    exact = data.exact_series(record, quantity, member)
-    pale: dict[str, Any] = {"color": "#56B4E9", "linewidth": 4.5, "alpha": 0.7}
+def _draw_solution(
+    ax: Axes, t: Floats, finest: Floats, best: Floats, exact: Floats, level: int
+) -> None:
+    pale: dict[str, Any] = {"color": PALE, "linewidth": 4.5, "alpha": 0.7}
     solid: dict[str, Any] = {"color": "#0072B2", "linewidth": 1.4}
     dotted: dict[str, Any] = {"color": "black", "linewidth": 1.4, "linestyle": (0, (1, 3))}
     rows = [
-        (data.at(record, f"{quantity}_richardson", member), "extrapolated (Richardson)", pale),
-        (data.at(record, f"{quantity}_finest", member), f"level {finest}", solid),
+        (best, "extrapolated (Richardson)", pale),
+        (finest, f"level {level}", solid),
         (exact, "exact", dotted),
     ]
-    drawn = [(y, text, look) for y, text, look in rows if np.isfinite(y).any()]
-    for y, text, look in drawn:
+    rows = [row for row in rows if np.isfinite(row[0]).any()]
+    for y, text, look in rows:
         ax.plot(*style.thin(t, y), label=text, **look)
-    stop_at_breakdown(ax, t, [data.at(record, f"{quantity}_finest", member)])
+    stop_at_breakdown(ax, t, [finest])
+    drawn = [y for y, _, _ in rows]
     # a run that blew up would hide the others
-    ranged = [y for y, _, _ in drawn if np.isfinite(y).all()] or [y for y, _, _ in drawn]
+    ranged = [y for y in drawn if np.isfinite(y).all()] or drawn
     size = data.largest(exact) if np.isfinite(exact).all() else 0.0
-    if 0.0 < size < max(data.largest(y) for y, _, _ in drawn) / CUT:
+    if 0.0 < size < max(map(data.largest, drawn)) / CUT:
         ax.set_ylim(-CUT * size, CUT * size)
         note(ax, f"cut off at {CUT:g} times the exact solution", 0.11)
     elif explosive(ranged):
@@ -109,63 +111,41 @@ def _draw_solution(ax: Axes, t: Floats, record: Record, quantity: str, member: M
     else:
         ax.set_ylim(*style.limits(*ranged))
     style.beside(ax)
-    return bool(np.isfinite(exact).any())
 
 
-def _draw_errors(ax: Axes, t: Floats, record: Record, quantity: str, member: Member) -> None:
+def _draw_errors(
+    ax: Axes, t: Floats, record: Record, quantity: str, member: Member, bound: Floats, true: Floats
+) -> None:
+    """Draw the estimates of the coarsest and the finest pair of levels, and the bound of the extrapolated solution."""
     pairs = data.whole(record, "pair")
+    drawn: list[Floats] = []
+
+    def add(line: Floats, dots: Floats, of: str, true_of: str, **look: Any) -> None:
+        """Draw an estimate as a line and a true error as dots, few enough to leave the line visible."""
+        drawn.append(style.no_zeros(line))
+        ax.plot(*style.thin(t, drawn[-1]), label=of, **look)
+        if np.isfinite(style.no_zeros(dots)).any():
+            drawn.append(style.no_zeros(dots))
+            every = slice(None, None, max(1, t.size // 60))
+            mark: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.2}
+            mark |= {"color": look["color"], "markerfacecolor": "white", "markeredgewidth": 0.9}
+            ax.plot(t[every], drawn[-1][every], label=true_of, **mark)
+
     estimates = [
         data.at(record, f"{quantity}_error_estimate", member, pair=i) for i in range(len(pairs))
     ]
     # a run that blew up has no error worth a scale of its own, unless all did
-    chosen = [i for i, estimate in enumerate(estimates) if np.isfinite(estimate).all()] or list(
-        range(len(pairs))
-    )
-    drawn: list[Floats] = []
+    whole = [i for i, estimate in enumerate(estimates) if np.isfinite(estimate).all()]
+    chosen = whole or list(range(len(pairs)))
     for k, i in enumerate(dict.fromkeys([chosen[0], chosen[-1]]) if chosen else []):
-        drawn += _draw_pair(ax, t, record, quantity, member, i, style.COLOURS[k])
-    bound = data.at(record, f"{quantity}_richardson_error", member)
+        error = data.at(record, f"{quantity}_error", member, pair=i)
+        text = f"level {pairs[i]}"
+        look = {"color": style.COLOURS[k], "linestyle": style.DASHES[k]}
+        add(estimates[i], error, f"estimate, {text}", f"true, {text}", **look)
     if np.isfinite(bound).all():
-        drawn.append(style.no_zeros(bound))
-        ax.plot(*style.thin(t, drawn[-1]), color=style.COLOURS[2], label="bound, extrapolated")
-        true = data.exact_series(record, quantity, member)
-        true = true - data.at(record, f"{quantity}_richardson", member)
-        drawn += _dots(ax, t, style.no_zeros(true), style.COLOURS[2], "true, extrapolated")
+        of, true_of = "bound, extrapolated", "true, extrapolated"
+        add(bound, true, of, true_of, color=style.COLOURS[2])
     # dips at zero crossings may leave the range below
     if not style.fit_log_axis(ax, "y", *drawn, below=0.03, least=TINY):
         style.remark(ax, "no error to draw: it is zero, or not known")
     style.beside(ax)
-
-
-def _draw_pair(
-    ax: Axes, t: Floats, record: Record, quantity: str, member: Member, i: int, colour: str
-) -> list[Floats]:
-    pair = data.whole(record, "pair")[i]
-    estimate = style.no_zeros(data.at(record, f"{quantity}_error_estimate", member, pair=i))
-    ax.plot(
-        *style.thin(t, estimate),
-        color=colour,
-        linestyle="-" if colour == style.COLOURS[0] else style.DASHES[1],
-        label=f"estimate, level {pair}",
-    )
-    true = style.no_zeros(data.at(record, f"{quantity}_error", member, pair=i))
-    return [estimate, *_dots(ax, t, true, colour, f"true, level {pair}")]
-
-
-def _dots(ax: Axes, t: Floats, values: Floats, colour: str, text: str) -> list[Floats]:
-    """Draw a true error as dots, few enough to leave the line beneath them visible."""
-    if not np.isfinite(values).any():
-        return []
-    every = slice(None, None, max(1, t.size // 60))
-    ax.plot(
-        t[every],
-        values[every],
-        linestyle="none",
-        marker="o",
-        markersize=3.2,
-        color=colour,
-        markerfacecolor="white",
-        markeredgewidth=0.9,
-        label=text,
-    )
-    return [values]

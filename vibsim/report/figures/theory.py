@@ -1,6 +1,7 @@
-"""Growth and phase error per period against w dt: theory as curves, measurement as dots.
+"""What theory predicts of schemes beside what was measured: growth and phase error against w dt, and runs that grow.
 
-Source: vibration text, sections 4.1 to 4.6, and exercise 2; theory from the matrix of a scheme's own step.
+Source: vibration text, sections 4.1 to 4.6, and exercise 2; theory from the matrix of a scheme's own step; section 4.5
+(figure 4): beyond the limit of stability the amplitude grows by a constant factor in each step.
 """
 
 from __future__ import annotations
@@ -10,12 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.report import frame, style
-from vibsim.report.data import Floats, known
+from vibsim.report import data, frame, style
+from vibsim.report.choice import position
+from vibsim.report.data import MEMBER, OF_LEVEL, Member, known, omega_dt
 from vibsim.report.figures.panels import figure_of, panels
 from vibsim.report.style import Picture
-from vibsim.report.tables.theory import MEMBER, OF_LEVEL, omega_dt, predicted
+from vibsim.report.tables.theory import predicted
+from vibsim.report.text import words
 from vibsim.schemes import SCHEMES
 
 if TYPE_CHECKING:
@@ -32,6 +36,18 @@ ALIKE = 1e-9
 """Curves that differ by less than this part of themselves are the same."""
 FEW = 40
 """Dots of one scheme up to which they are large."""
+MOST = 6
+"""Most unstable runs that are drawn: the slowest and the fastest among them."""
+NOTABLE = 1e-3
+"""A run is drawn where it grows over the whole time by more than this part."""
+WHOLE = 4.0
+"""On a linear scale the solution is drawn up to so many times the exact one."""
+HIGHEST = 1e250
+"""Sizes beyond are not drawn."""
+SEEN = 0.2
+"""Only runs that stay within the frame for so much of the time are drawn beside the exact solution."""
+BEYOND = 100.0
+"""What is beyond so many times the exact solution is not drawn on that scale, so that curves leave the frame."""
 
 
 def order_and_stability(experiment: Experiment, record: Record) -> Picture | None:
@@ -43,7 +59,9 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
     if not predicted(record) or np.unique(p[np.isfinite(p) & (p > 0.0)]).size < 2:
         return None
     growth = [known(record, f"{who}_growth", OF_LEVEL) - 1.0 for who in ("theory", "measured")]
-    turns = p / (2.0 * np.pi) / _dt(record)
+    variable = record.variable("dt")
+    dt = np.asarray(variable.values, dtype=np.float64)
+    turns = p / (2.0 * np.pi) / (dt.T if variable.dims == ("level", "case") else dt[None, :])
     phase = [
         known(record, f"{who}_phase_error", OF_LEVEL) * turns for who in ("theory", "measured")
     ]
@@ -52,7 +70,9 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
         [told, np.where(np.isnan(told), np.nan, seen)] for told, seen in (growth, phase)
     )
     axes = panels([2.9, 2.9])
-    grid = np.geomspace(0.9 * _least(p), 1.1 * float(np.nanmax(p)), POINTS)
+    grid = np.geomspace(
+        0.9 * float(np.min(style.finite(p[p > 0.0]))), 1.1 * float(np.nanmax(p)), POINTS
+    )
     curves = [_theory(experiment, s, grid) for s in range(len(record["scheme"]))]
     limits = known(record, "stability_limit", MEMBER)[:, 0]
     for k, (ax, (told, found)) in enumerate(zip(axes, (growth, phase), strict=True)):
@@ -74,9 +94,14 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
     axes[1].set_title("Phase error per period: filled comes early, hollow late")
     axes[1].set_xlabel("w dt")
     style.beside(axes[0], fontsize=8, handlelength=1.6)
-    if alike and not style.crowded(record):
-        for ax, kind in zip(axes, KINDS, strict=True):
-            _tell(ax, axes[0], [words for words in alike if words[0] == kind], KINDS.index(kind))
+    if not style.crowded(record):
+        # in the upper panel below the legend
+        rows = len(axes[0].get_legend_handles_labels()[0]) + 2
+        for ax, kind, below in zip(axes, KINDS, ("\n" * rows, ""), strict=True):
+            same = [f"{name}:\n  same as {other}" for of, name, other in alike if of == kind]
+            small: dict[str, Any] = {"va": "top", "fontsize": 7.5, "linespacing": 1.25}
+            if same:
+                ax.text(1.02, 1.0, below + "\n".join(same), transform=ax.transAxes, **small)
     return Picture(
         name="order_and_stability",
         title="Theory beside measurement: growth and phase error per period",
@@ -105,17 +130,6 @@ def _alike(
     return found
 
 
-def _tell(ax: Axes, first: Axes, alike: list[tuple[str, str, str]], k: int) -> None:
-    """Say beside a panel which curves of it are the same; in the upper panel below the legend."""
-    if not alike:
-        return
-    text = "\n".join(f"{name}:\n  same as {other}" for _, name, other in alike)
-    if k == 0:
-        rows = len(first.get_legend_handles_labels()[0])
-        text = "\n" * (rows + 2) + text
-    ax.text(1.02, 1.0, text, transform=ax.transAxes, va="top", fontsize=7.5, linespacing=1.25)
-
-
 def _sentence(alike: list[tuple[str, str, str]]) -> str:
     """Say for the caption which curves are the same; empty where none are."""
     told = []
@@ -126,17 +140,6 @@ def _sentence(alike: list[tuple[str, str, str]]) -> str:
                 groups.setdefault(other, []).append(name)
         told += [f"{kind} of {', '.join(names)} as of {first}" for first, names in groups.items()]
     return f" The same curve: {'; '.join(told)}." if told else ""
-
-
-def _dt(record: Record) -> Floats:
-    """Return dt, shape (case, level) or (1, level)."""
-    variable = record.variable("dt")
-    dt = np.asarray(variable.values, dtype=np.float64)
-    return dt.T if variable.dims == ("level", "case") else dt[None, :]
-
-
-def _least(p: Floats) -> float:
-    return float(np.min(p[np.isfinite(p) & (p > 0.0)]))
 
 
 def _theory(experiment: Experiment, s: int, grid: Floats) -> tuple[Floats, Floats] | None:
@@ -152,9 +155,9 @@ def _theory(experiment: Experiment, s: int, grid: Floats) -> tuple[Floats, Float
     scheme = SCHEMES[spec.kind]
     if varied or scheme.adaptive:
         return None
-    stepper = scheme.stepper(experiment.scheme_options(s))
+    stepper = scheme.stepper(experiment.schemes[s].options)
     with np.errstate(all="ignore"):
-        growth = np.expm1(theory.log_growth(stepper, grid) * (2.0 * np.pi / grid))
+        growth = np.expm1(theory.roots(stepper, grid).log_growth * (2.0 * np.pi / grid))
         phase = theory.phase_error_per_period(stepper, grid)
     return np.asarray(growth), np.asarray(phase)
 
@@ -194,11 +197,96 @@ def _finish(ax: Axes, told: Floats, found: Floats, limits: Floats, grid: Floats)
     else:
         style.log_axis(ax, "y", float(size.min()) / 3.0, min(3.0 * float(size.max()), 1e9))
     style.log_axis(ax, "x", float(grid[0]), float(grid[-1]))
+    edge: Any = {"transform": ax.get_xaxis_transform(), "clip_on": False, "linestyle": "none"}
     for s, limit in enumerate(limits.tolist()):
         if grid[0] < limit < grid[-1]:
-            edge: dict[str, Any] = {
-                "transform": ax.get_xaxis_transform(),
-                "clip_on": False,
-                "linestyle": "none",
-            }
             ax.plot([limit], [1.0], marker="v", color=style.look(s)["color"], markersize=5, **edge)
+
+
+def growing(experiment: Experiment, record: Record) -> Picture | None:
+    """Draw the solutions that theory predicts to grow without bound, and their predicted growth; None without such.
+
+    These are runs with w dt beyond the limit of stability of their scheme, or at it.
+    """
+    runs = _unstable(record)
+    if not runs:
+        return None
+    quantity = position(experiment)
+    letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_finest")
+    upper, lower = panels([2.2, 2.6])
+    sizes, reference = [], 0.0
+    for k, (member, level) in enumerate(runs):
+        t, colour = data.times(record, member.case), style.look(k)["color"]
+        values = data.of_level(record, quantity, member, level)
+        exact = data.exact_series(record, quantity, member)
+        most = data.largest(exact)
+        reference = max(reference, most)
+        if k == 0 or np.mean(np.abs(values) <= WHOLE * most) >= SEEN:
+            within = np.abs(values) <= BEYOND * most if most > 0.0 else np.isfinite(values)
+            upper.plot(
+                *style.thin(t, np.where(within, values, np.nan)), color=colour, linewidth=1.2
+            )
+        # the margin of an axis would overflow beyond
+        size = style.no_zeros(values)
+        size = np.where(size < HIGHEST, size, np.nan)
+        sizes.append(size)
+        text = _of_run(record, member, level)
+        lower.plot(*style.thin(t, size), color=colour, linewidth=0.9, label=text)
+        growth = data.at(record, "theory_growth", member, level=level).item()
+        w = data.natural_frequency(record, member.case)
+        if math.isfinite(growth) and math.isfinite(w) and most > 0.0:
+            exponent = (t - t[0]) * w / (2.0 * np.pi) * math.log10(growth) + math.log10(most)
+            keep = exponent < math.log10(HIGHEST)
+            dashed: dict[str, Any] = {"linestyle": (0, (4, 2)), "linewidth": 1.0}
+            lower.plot(t[keep], 10.0 ** exponent[keep], color=colour, **dashed)
+        if k == 0 and np.isfinite(exact).any():
+            upper.plot(*style.thin(t, exact), color="black", linestyle=(0, (1, 2)), zorder=5)
+    if reference > 0.0:
+        upper.set_ylim(-WHOLE * reference, WHOLE * reference)
+    found = style.finite(*sizes)
+    found = found if found.size else np.array([1.0])
+    least = 0.2 * (reference or float(np.median(found)))
+    style.log_axis(lower, "y", least, 3.0 * float(found.max()))
+    upper.set_ylabel(style.label(letter, measure))
+    lower.set_ylabel(style.label(f"|{letter}|", measure))
+    upper.set_title(
+        f"The slowest beside the exact solution (dotted), up to {WHOLE:g} times its size"
+    )
+    lower.set_title("Size of the solution, and the predicted growth (dashed)")
+    lower.set_xlabel(data.time_label(record))
+    # one legend for both panels
+    upper.legend(*lower.get_legend_handles_labels(), **style.BESIDE, fontsize=8, handlelength=1.4)
+    return Picture(
+        name="growing",
+        title="Unstable runs: growth predicted and measured",
+        caption="Runs whose w dt is at or beyond the limit of stability of their scheme; the legend has the factor by "
+        "which the amplitude grows in each natural period, measured and by theory. On the logarithmic scale a "
+        "constant factor in every step is a straight line; it should become parallel to the dashed one, the factor "
+        "that the matrix of one step predicts. How far above or below depends on the start.",
+        alt=f"{words.name(quantity)} of unstable runs against time, linear and logarithmic, with the predicted growth",
+        figure=figure_of(upper),
+    )
+
+
+def _unstable(record: Record) -> list[tuple[Member, int]]:
+    """Choose the unstable runs, from the slowest growth to the fastest."""
+    growth = known(record, "theory_growth", OF_LEVEL)
+    limit, product = known(record, "stability_limit", MEMBER), omega_dt(record)
+    found: list[tuple[float, Member, int]] = []
+    for member in data.everyone(record):
+        most = float(limit[member.scheme, member.case])
+        for i, factor in enumerate(growth[member.scheme, member.case].tolist()):
+            is_beyond = 0.0 < most <= product[member.case, i] * (1.0 + 1e-9)
+            if is_beyond and factor > 1.0 + NOTABLE:
+                found.append((factor, member, i))
+    found.sort(key=lambda run: run[0])
+    return [found[i][1:] for i in style.spaced(len(found), MOST)]
+
+
+def _of_run(record: Record, member: Member, level: int) -> str:
+    told, seen = (
+        words.number(data.at(record, f"{who}_growth", member, level=level).item())
+        for who in ("theory", "measured")
+    )
+    product = words.number(float(omega_dt(record)[member.case, level]), "step")
+    return style.entry(f"{member.scheme_name}, w dt = {product}\n× {seen}, theory {told}")

@@ -1,6 +1,6 @@
-"""Figures over time: do the rescaled differences coincide, and what is the ratio between them?
+"""Figures over time: do the rescaled differences coincide, what is the ratio between them, and which order has it?
 
-Source: pendulum lecture, sections 2.5 and 2.6.
+Source: pendulum lecture, sections 2.5 and 2.6; `vibsim.convergence.local_order` for the order in windows.
 """
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.convergence.differences import gap_ratio, rescaling, target_ratio
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report import data, frame, style
-from vibsim.report.data import Floats, Member
-from vibsim.report.figures import order_panels
+from vibsim.report.data import Member
 from vibsim.report.figures.panels import (
     Curve,
     comparable,
@@ -31,61 +31,57 @@ if TYPE_CHECKING:
 
 CURVES = 6
 """Most curves in one panel; more cannot be told apart."""
-
-
-EXACT = (
-    ". The scheme is exact in this quantity, so nothing is rescaled and what is seen is round-off."
-)
+ORDERS = 3
+"""Triples whose order is drawn over time: the finest ones above round-off."""
+UNSURE = 1.0
+"""An interval of an order that is wider, or unbounded, leaves a place marked as uncertain."""
+ROOM, BEYOND = 0.35, 3.0
+"""Least and most distance from the promised order to the frame."""
+SPREAD = "the spread: how far each curve is from the finest one above round-off."
 
 
 def overlay(record: Record, quantity: str, member: Member) -> Picture:
-    """Draw the rescaled level differences of a quantity, their spread, and the ratio over time."""
+    """Draw the rescaled level differences of a quantity, their spread, ratio and order over time."""
     t, order = data.times(record, member.case), data.power(record, member, quantity)
-    is_exact = math.isinf(data.formal_order(record, member, quantity))
     letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_difference")
+    levels, good = data.whole(record, "level"), data.sound_triples(record, quantity, member)
     curves = differences(record, quantity, member)
-    spread, ratios = comparable(curves), len(data.whole(record, "triple")) > 0
-    orders = ratios and order_panels.has_order(record, quantity, member)
-    heights = [
-        2.4,
-        *([1.3] if spread else []),
-        *([1.5] if ratios else []),
-        *([1.5] if orders else []),
-    ]
-    axes = panels(heights)
+    spread, ratios = comparable(curves), bool(good)
+    orders = ratios and has_order(record, quantity, member)
+    axes = panels([2.4, *[1.3] * spread, *[1.5] * ratios, *[1.5] * orders])
     draw_curves(axes[0], t, curves, f"rescaled difference of {letter}", measure)
     axes[0].set_title("Rescaled differences between successive levels")
     if spread:
         draw_spread(axes[1], t, curves, measure)
     if ratios:
-        _draw_ratios(axes[-2 if orders else -1], t, record, quantity, member, order)
+        _draw_ratios(axes[-2 if orders else -1], t, record, quantity, member, good)
     if orders:
-        good = data.sound_triples(record, quantity, member)
-        order_panels.draw_orders(axes[-1], t, record, quantity, member, good, _few(good))
-    axes[-1].set_xlabel(style.label("t", data.time_unit(record)))
-    first = data.whole(record, "pair")[0]
-    low = words.lowered(first)
+        _draw_orders(axes[-1], t, record, quantity, member, good)
+    axes[-1].set_xlabel(data.time_label(record))
     law = f"dt{words.raised(order)}" if order != 1.0 else "dt"
-    shrinks = (
-        f"{_multiplied(order, data.whole(record, 'level'))}; if the error shrinks as {law}, the curves "
-        "fall on one another."
+    what = (
+        ". The scheme is exact in this quantity, so nothing is rescaled and what is seen is round-off."
+        if math.isinf(data.formal_order(record, member, quantity))
+        else f", {_multiplied(order, levels)}; if the error shrinks as {law}, the curves fall on one another."
     )
-    parts = [
-        f"{letter}{low} is {letter} on level {first}, and so on. Top: the differences between successive levels"
-        + (EXACT if is_exact else f", {shrinks}"),
-        "Then the spread: how far each curve is from the finest one above round-off."
-        if spread
-        else "",
-        "Below it: the ratio of successive differences; it should settle at the dashed line. Near a zero crossing a "
-        "ratio of two small numbers means nothing: it is left out."
-        if ratios
-        else "",
-        order_panels.CAPTION if orders else "",
-    ]
     return Picture(
         name=f"differences_{quantity}_{member.stem}",
         title=f"Do the levels agree? {words.title(quantity)}, {member.title}",
-        caption=style.sentences(*parts),
+        caption=style.sentences(
+            f"{letter}{words.lowered(levels[0])} is {letter} on level {levels[0]}, and so on. Top: the differences "
+            f"between successive levels{what}",
+            f"Then {SPREAD}" if spread else "",
+            "Below it: the ratio of successive differences; it should settle at the dashed line. Near a zero crossing "
+            "a ratio of two small numbers means nothing: it is left out."
+            if ratios
+            else "",
+            "Last: the order at each time, from the sizes of the differences in a window of half a period, with its "
+            "interval as a band. Grey dots: uncertain, the two differences have different shapes there or are near "
+            "round-off (interval wider than 1). Gaps: within round-off, or nothing differs. Circles: the last point, "
+            "which stands for itself."
+            if orders
+            else "",
+        ),
         alt=f"Rescaled level differences of {words.name(quantity)} against time for {member.title}"
         + (", with the ratio of successive differences" if ratios else "")
         + (" and the order over time" if orders else ""),
@@ -95,42 +91,37 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
 
 def energy(record: Record, member: Member) -> Picture:
     """Draw the energy deviation of every level times ``(2**p)**k``: convergence to conservation."""
-    order = data.power(record, member, "energy_deviation")
-    is_exact = math.isinf(data.formal_order(record, member, "energy_deviation"))
-    measure, levels = data.unit(record, "energy_deviation_scaled"), data.whole(record, "level")
-    above = data.sound_levels(record, "energy_deviation", member)
+    name, levels = "energy_deviation", data.whole(record, "level")
+    order = data.power(record, member, name)
+    measure, t = data.unit(record, f"{name}_scaled"), data.times(record, member.case)
+    above = data.sound_pairs(record, name, member) if len(levels) > 1 else [True]
+    # the error of the finest level is seen in the difference from the one before it
+    above = [*above, above[-1]][: len(levels)]
     curves = []
-    for i, level in enumerate(levels):
-        values = data.at(record, "energy_deviation_scaled", member, level=i)
-        factor = words.factor(float(gap_ratio(order, level - levels[0])), 2.0**order)
-        text = f"{factor}dE{words.lowered(level)}"
-        curves.append(Curve(text, values, above[i], _lost(record, "energy_deviation", member, [i])))
-    curves = [curves[i] for i in _few([curve.sound for curve in curves])]
+    for i in _few(above):
+        values = data.at(record, f"{name}_scaled", member, level=i)
+        factor = words.factor(float(gap_ratio(order, levels[i] - levels[0])), 2.0**order)
+        text = f"{factor}dE{words.lowered(levels[i])}"
+        curves.append(Curve(text, values, above[i], _lost(record, name, member, [i])))
     spread = comparable(curves)
-    axes = panels([2.4, 1.3] if spread else [2.4])
-    t = data.times(record, member.case)
+    axes = panels([2.4, *[1.3] * spread])
     draw_curves(axes[0], t, curves, "rescaled dE", measure)
     axes[0].set_title("Energy deviation dE = E(t) − E(0), rescaled")
     if spread:
         draw_spread(axes[1], t, curves, measure)
-    axes[-1].set_xlabel(style.label("t", data.time_unit(record)))
-    caption = (
-        f"dE{words.lowered(levels[0])} is dE on level {levels[0]}, and so on. The exact energy is constant, so dE "
-        "itself is an error. "
-    )
-    if is_exact:
-        caption += "The scheme conserves the energy exactly: what is seen is round-off."
-    else:
-        caption += (
-            f"Multiplied by {2.0**order:g} for each level the curves should coincide; look at the last point too, "
-            "where the velocity comes from a formula of its own."
-        )
-    if spread:
-        caption += " Below, the spread: how far each curve is from the finest one above round-off."
+    axes[-1].set_xlabel(data.time_label(record))
     return Picture(
         name=f"conservation_{member.stem}",
         title=f"Convergence to conservation: {member.title}",
-        caption=caption,
+        caption=style.sentences(
+            f"dE{words.lowered(levels[0])} is dE on level {levels[0]}, and so on. The exact energy is constant, so dE "
+            "itself is an error.",
+            "The scheme conserves the energy exactly: what is seen is round-off."
+            if math.isinf(data.formal_order(record, member, name))
+            else f"Multiplied by {2.0**order:g} for each level the curves should coincide; look at the last point "
+            "too, where the velocity comes from a formula of its own.",
+            f"Below, {SPREAD}" if spread else "",
+        ),
         alt=f"Rescaled energy deviation against time on levels {words.levels(levels)} for {member.title}",
         figure=figure_of(axes[0]),
     )
@@ -152,11 +143,12 @@ def differences(record: Record, quantity: str, member: Member) -> list[Curve]:
 
 def _lost(record: Record, quantity: str, member: Member, levels: list[int]) -> str:
     """Say why values of these positions of levels would mean nothing (see `frame.why_lost`)."""
-    pairs = [i for i in levels if i < len(data.whole(record, "pair"))]
-    found = [data.at(record, f"{quantity}_difference", member, pair=i) for i in pairs[:1]]
+    values = np.zeros(1)
     if f"{quantity}_scaled" in record and len(levels) == 1:
-        found = [data.at(record, f"{quantity}_scaled", member, level=levels[0])]
-    return frame.why_lost(record, quantity, member, levels, np.concatenate([*found, np.zeros(1)]))
+        values = data.at(record, f"{quantity}_scaled", member, level=levels[0])
+    elif levels[0] < len(data.whole(record, "pair")):
+        values = data.at(record, f"{quantity}_difference", member, pair=levels[0])
+    return frame.why_lost(record, quantity, member, levels, values)
 
 
 def _multiplied(order: float, levels: list[int]) -> str:
@@ -182,40 +174,40 @@ def _few(sound: list[bool]) -> list[int]:
 
 
 def _draw_ratios(
-    ax: Axes, t: Floats, record: Record, quantity: str, member: Member, order: float
+    ax: Axes, t: Floats, record: Record, quantity: str, member: Member, good: list[bool]
 ) -> None:
-    levels, count = data.whole(record, "level"), len(data.whole(record, "triple"))
-    good = data.sound_triples(record, quantity, member)
-    chosen = _few(good)
+    levels, order = data.whole(record, "level"), data.power(record, member, quantity)
     drawn: list[Floats] = []
-    lost = [_lost(record, quantity, member, [i, i + 1, i + 2]) for i in range(count)]
-    for k, i in enumerate(chosen):
-        sound, values = (
-            good[i] or not any(good),
-            data.at(record, f"{quantity}_ratio", member, triple=i),
-        )
+    lost = [_lost(record, quantity, member, [i, i + 1, i + 2]) for i in range(len(good))]
+    for k, i in enumerate(_few(good)):
+        values = data.at(record, f"{quantity}_ratio", member, triple=i)
         if not np.isfinite(values).any():
             continue
         look: dict[str, Any] = {"color": "#b0b0b0", "linewidth": 0.6, "zorder": 1.5}
-        if sound:
+        if good[i] or not any(good):
             look = {"color": style.COLOURS[k], "linestyle": style.DASHES[k], "linewidth": 1.3}
             drawn.append(values)
-        text = "levels " + ", ".join(map(str, levels[i : i + 3]))
-        ax.plot(
-            *style.thin(t, values),
-            label=text + ("" if good[i] else f"\n({lost[i]})"),
-            **look,
-        )
+        text = _triple(levels, i) + ("" if good[i] else f"\n({lost[i]})")
+        ax.plot(*style.thin(t, values), label=text, **look)
     if not drawn:
         style.remark(ax, _why_no_ratio(good, lost))
-    triples = [(levels[i], levels[i + 1], levels[i + 2]) for i in chosen]
-    targets = sorted({float(target_ratio(order, triple)) for triple in triples})
+    targets = sorted({float(target_ratio(order, levels[i : i + 3])) for i in _few(good)})
     for k, target in enumerate(targets):
         ax.axhline(target, **style.REFERENCE, label="" if k else data.due(record, quantity))
-    ax.set_ylim(*_ratio_limits(drawn, targets))
+    # the target and the middle nine tenths of the ratios, but no wild outlier
+    every = style.finite(*drawn)
+    every = every if every.size else np.array(targets)
+    low = min(float(np.quantile(every, 0.05)), 0.97 * targets[0])
+    high = max(float(np.quantile(every, 0.95)), 1.03 * targets[-1])
+    room = 0.15 * (high - low)
+    ax.set_ylim(max(low - room, -targets[-1]), min(high + room, 3 * targets[-1]))
     ax.set_ylabel("ratio")
     ax.set_title("Ratio of successive differences", fontweight="normal", fontsize=9)
     style.beside(ax)
+
+
+def _triple(levels: list[int], i: int) -> str:
+    return "levels " + ", ".join(map(str, levels[i : i + 3]))
 
 
 def _why_no_ratio(good: list[bool], lost: list[str]) -> str:
@@ -227,11 +219,58 @@ def _why_no_ratio(good: list[bool], lost: list[str]) -> str:
     return "nothing to divide: every difference is within round-off, or zero"
 
 
-def _ratio_limits(drawn: list[Floats], targets: list[float]) -> tuple[float, float]:
-    """Return limits that hold the target and the middle nine tenths of the ratios, but no wild outlier."""
-    every = np.concatenate([values[np.isfinite(values)] for values in drawn] or [np.array(targets)])
-    every = every if every.size else np.array(targets)
-    low = min(float(np.quantile(every, 0.05)), 0.97 * targets[0])
-    high = max(float(np.quantile(every, 0.95)), 1.03 * targets[-1])
-    room = 0.15 * (high - low)
-    return max(low - room, -targets[-1]), min(high + room, 3 * targets[-1])
+def has_order(record: Record, quantity: str, member: Member) -> bool:
+    """Tell whether there is an order over time to be drawn."""
+    name = f"{quantity}_local_order"
+    return name in record and bool(np.isfinite(data.at(record, name, member)).any())
+
+
+def finest_sound(sound: list[bool]) -> list[int]:
+    """Choose triples: the finest ones that stand above round-off; where none does, the coarsest."""
+    return [i for i, good in enumerate(sound) if good][-ORDERS:] or [0]
+
+
+def _draw_orders(
+    ax: Axes, t: Floats, record: Record, quantity: str, member: Member, good: list[bool]
+) -> None:
+    """Draw the order over time of the finest triples, their intervals, and the promised order.
+
+    A triple has the colour of its ratio. The last point stands apart; where an order is uncertain it is a grey dot.
+    """
+    levels, promised = data.whole(record, "level"), data.formal_order(record, member, quantity)
+    colours = _few(good)
+    drawn: list[Floats] = []
+    for i in finest_sound(good):
+        order, low, high = (
+            data.at(record, f"{quantity}_local_order{end}", member, triple=i)
+            for end in ("", "_low", "_high")
+        )
+        if not np.isfinite(order).any():
+            continue
+        sure = high - low <= UNSURE
+        k = colours.index(i) if i in colours else i
+        colour, dashes = (part[k % style.MANY] for part in (style.COLOURS, style.DASHES))
+        band: dict[str, Any] = {"color": colour, "alpha": 0.18, "linewidth": 0}
+        ax.fill_between(t[:-1], low[:-1], high[:-1], where=sure[:-1].tolist(), **band)
+        inner = style.thin(t[:-1], np.where(sure, order, np.nan)[:-1])
+        ax.plot(*inner, color=colour, linestyle=dashes, linewidth=1.3, label=_triple(levels, i))
+        point: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 4.2}
+        point |= {"markerfacecolor": "white", "markeredgecolor": colour}
+        ax.plot(t[-1:], order[-1:], clip_on=False, zorder=5, **point)
+        unsure = np.isfinite(order) & ~sure
+        if unsure.any():
+            every = max(1, int(np.count_nonzero(unsure)) // 60)
+            x, y = t[unsure][::every], order[unsure][::every]
+            ax.plot(x, y, ".", color="#a0a0a0", markersize=2.6, zorder=1.5)
+        drawn += [order[sure] if sure.any() else order, order[-1:]]
+    found = style.finite(*drawn)
+    ends = np.array([found.min(), found.max()] if found.size else [])
+    if math.isfinite(promised):
+        ax.axhline(promised, **style.REFERENCE, label=data.due(record, quantity))
+        low_end = max(float(min([promised - ROOM, *(ends - 0.1)])), promised - BEYOND)
+        ax.set_ylim(low_end, min(float(max([promised + ROOM, *(ends + 0.1)])), promised + BEYOND))
+    else:
+        ax.set_ylim(*style.limits(ends))
+    ax.set_ylabel("order")
+    ax.set_title("Order over time, in windows of half a period", fontweight="normal", fontsize=9)
+    style.beside(ax)

@@ -49,31 +49,27 @@ def precision(experiment: Experiment, record: Record, case: int) -> Picture | No
     for ax in axes[1:]:
         ax.tick_params(labelleft=False)
     legend_above(figure, axes[0])
-    name = case_name(record, case)
-    adaptive = (
-        " Hollow: adaptive methods over their tolerances."
-        if any(line.is_adaptive for line in found)
-        else ""
-    )
-    below = (
-        " Below the dotted line the reference is no better than the solution."
-        if floor > 0.0
-        else ""
-    )
+    name, is_adaptive = case_name(record, case), any(line.is_adaptive for line in found)
     return Picture(
         name=f"work_precision_{case}",
         title=f"Work and precision{f': {name}' if name else ''}",
-        caption="Lower left is better: a small error for little work. The slope of a line is minus the order, until "
-        f"round-off.{adaptive}{below} Of an implicit scheme the evaluations of one iteration per step are counted. The "
-        "time is that of the cost model: one compiled member alone, and SciPy's own pace for adaptive methods.",
+        caption=style.sentences(
+            "Lower left is better: a small error for little work. The slope of a line is minus the order, until "
+            "round-off.",
+            "Hollow: adaptive methods over their tolerances." if is_adaptive else "",
+            "Below the dotted line the reference is no better than the solution."
+            if floor > 0.0
+            else "",
+            "Of an implicit scheme the evaluations of one iteration per step are counted. The time is that of the cost "
+            "model: one compiled member alone, and SciPy's own pace for adaptive methods.",
+        ),
         alt="Largest error against steps, force evaluations and estimated time, all axes logarithmic",
         figure=figure,
     )
 
 
 def _ranges(axes: list[Axes], found: list[Line]) -> None:
-    errors = np.concatenate([line.error for line in found])
-    errors = errors[np.isfinite(errors) & (errors > 0.0)]
+    errors = style.finite(*(line.error[line.error > 0.0] for line in found))
     if errors.size:
         # an unstable level has an error without bound, which would hide all others
         high = min(float(errors.max()), 1e3 * float(np.quantile(errors, 0.75)))

@@ -3,76 +3,26 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from shlex import quote
 from typing import TYPE_CHECKING, Any
 
-from vibsim.checks.results import Result
-from vibsim.checks.value.units import unit_of
-from vibsim.checks.words.verdict import Wording, expectation
+from vibsim.checks.outcome import Result
+from vibsim.checks.value import unit_of
+from vibsim.checks.verdict_text import Wording, expectation
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import decisive_number, worst
+from vibsim.core.vocabulary import worst
 from vibsim.experiment.collection import ADHOC, ENDINGS
-from vibsim.experiment.schema.checks import ClaimCheck
 from vibsim.plan.versions import DRAWING, versions
 from vibsim.report import data
 from vibsim.report.evidence import figure
-from vibsim.report.tables import orders, published
-from vibsim.report.tables.table import Cell, Column, Table, Written
+from vibsim.report.tables import checks as check_tables
+from vibsim.report.tables import published
 from vibsim.report.text import assertions, reasons, setting, words
 
 if TYPE_CHECKING:
     from vibsim.experiment import Check, Experiment
     from vibsim.experiment.schema.checks import Measurement
-
-
-def context(
-    experiment: Experiment,
-    record: Record,
-    summary: Mapping[str, Any],
-    provenance: Mapping[str, Any],
-) -> dict[str, Any]:
-    """Return the words of a page by the names that its template uses."""
-    checks = _carded(experiment, summary)
-    asserted = {spec.id: spec for spec in experiment.checks}
-    made = {check["id"]: card(experiment, record, check) for check in summary["checks"]}
-    plain = [check["id"] for check in checks if _is_plain(asserted.get(check["id"]), check)]
-    plain = plain if len(checks) >= MANY else []
-    full = [check["id"] for check in checks if check["id"] not in plain]
-    return {
-        "collection": experiment.collection,
-        "name": experiment.name,
-        "title": experiment.title,
-        "source": experiment.source,
-        "status": summary["status"],
-        "sentence": words.overall(summary),
-        "unsettled": [made[check["id"]] for check in summary["checks"] if check["status"] != "PASS"]
-        if len(summary["checks"]) > 1
-        else [],
-        "checks": [made[name] for name in full],
-        "plain": [made[name] | assertions.row(asserted[name]) for name in plain],
-        "brief": len(checks) > BRIEF,
-        "failures": orders.failures(summary, record),
-        "unlisted": _unlisted(summary),
-        "setup": list(setting.setup(experiment, record)),
-        "provenance": list(_provenance(provenance)),
-        "used": json.dumps(provenance.get("experiment"), indent=1, ensure_ascii=False, default=str)
-        if provenance.get("experiment")
-        else "",
-        "target": quote(experiment.word),
-        "python": _python(experiment),
-    }
-
-
-def _carded(experiment: Experiment, summary: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the checks that get a card: of printed numbers those that did not come out as expected."""
-    in_tables = published.ids(experiment)
-    return [
-        check
-        for check in summary["checks"]
-        if check["id"] not in in_tables or check["status"] != "PASS"
-    ]
-
 
 MANY = 6
 """From so many checks on, those that passed share a table; fewer have a card each."""
@@ -87,6 +37,47 @@ experiment = Experiment.from_yaml("{file}"){alone}
 convergence = analyse(experiment, {{level: simulate(experiment, level) for level in experiment.levels}})
 for verdict in verdicts(experiment, convergence):
     print(verdict.id, verdict.status, verdict.reason)"""
+
+
+def context(
+    experiment: Experiment,
+    record: Record,
+    summary: Mapping[str, Any],
+    provenance: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Return the words of a page by the names that its template uses."""
+    in_tables = published.ids(experiment)
+    asserted = {spec.id: spec for spec in experiment.checks}
+    made = {check["id"]: card(experiment, record, check) for check in summary["checks"]}
+    unsettled = [made[check["id"]] for check in summary["checks"] if check["status"] != "PASS"]
+    # of printed numbers those get a card that did not come out as expected
+    carded = [
+        check
+        for check in summary["checks"]
+        if check["id"] not in in_tables or check["status"] != "PASS"
+    ]
+    plain = [check["id"] for check in carded if _is_plain(asserted.get(check["id"]), check)]
+    plain = plain if len(carded) >= MANY else []
+    used = provenance.get("experiment")
+    return {
+        "collection": experiment.collection,
+        "name": experiment.name,
+        "title": experiment.title,
+        "source": experiment.source,
+        "status": summary["status"],
+        "sentence": words.overall(summary),
+        "unsettled": unsettled if len(summary["checks"]) > 1 else [],
+        "checks": [made[check["id"]] for check in carded if check["id"] not in plain],
+        "plain": [made[name] | assertions.row(asserted[name]) for name in plain],
+        "brief": len(carded) > BRIEF,
+        "failures": check_tables.failures(summary, record),
+        "unlisted": _unlisted(summary),
+        "setup": list(setting.setup(experiment, record)),
+        "provenance": list(_provenance(provenance)),
+        "used": json.dumps(used, indent=1, ensure_ascii=False, default=str) if used else "",
+        "target": quote(experiment.word),
+        "python": _python(experiment),
+    }
 
 
 def _python(experiment: Experiment) -> str:
@@ -107,21 +98,25 @@ def _is_plain(asserted: Check | None, check: Mapping[str, Any]) -> bool:
 
 
 def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what the page says of one check."""
+    """Return what the page says of one check; an experiment with a tolerance has one that nothing asserts."""
     asserted = next((spec for spec in experiment.checks if spec.id == check["id"]), None)
     measured = asserted.measured if asserted else None
+    value = measured if measured and measured.kind == "value" else None
     explained = reasons.reason(
         check["reason"],
         measured.kind if measured else check["kind"],
-        value=measured.value if measured and measured.kind == "value" else "",
+        value=value.value if value else "",
         levels=len(data.whole(record, "level")),
         is_promised=_keeps_promise(record, measured, check),
     )
-    unit = (
-        data.pretty_unit(unit_of(experiment, record, measured)).replace("sqrt(s)", "√s")
-        if measured and measured.kind == "value"
-        else ""
-    )
+    is_refuted = asserted is not None and asserted.kind == "claim" and not asserted.holds
+    unit = unit_of(experiment, record, value) if value else ""
+    wording = Wording(experiment, record, asserted, words.PAGE)
+    decisive, counts = check["results"][0], check["counts"]
+    facts = (decisive[key] for key in ("scheme", "case", "status", "reason", "facts"))
+    result = Result(*facts)
+    # the result that decides has a settled order
+    settled = check["status"] != "INCONCLUSIVE" and decisive["reason"] in SETTLED
     return {
         "id": check["id"],
         "kind": check["kind"],
@@ -129,28 +124,23 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         if asserted
         else assertions.of_tolerance(check["expected"]),
         "background": assertions.background(asserted) if asserted else "",
-        "note": (getattr(asserted, "note", None) or "") if asserted else "",
+        "note": getattr(asserted, "note", None) or "",
         "status": check["status"],
         "reason": check["reason"] or "–",
-        "meaning": _meaning(asserted, check, explained),
+        # of a claim that is refuted as expected, what the reason does not say is the point
+        "meaning": reasons.REFUTED
+        if is_refuted and check["reason"] == "match"
+        else explained.meaning,
         "needs": explained.needs,
         "expected": expectation(experiment, asserted, words.PAGE),
-        "factor": _factor(check),
-        "results": _results(record, check, unit),
+        "factor": words.ratio(words.fact(decisive, "order")) if settled else "",
+        "results": check_tables.results(
+            record, check, data.pretty_unit(unit).replace("sqrt(s)", "√s")
+        ),
         "more": _more(check),
         "where": _where(check),
         "alone": _alone(check),
         "picture": figure.picture(experiment, record, asserted, check),
-        **_said(Wording(experiment, record, asserted, words.PAGE), check),
-    }
-
-
-def _said(wording: Wording, check: Mapping[str, Any]) -> dict[str, str]:
-    """Return what was measured in a sentence and in a few words, and what to change."""
-    first, counts = check["results"][0], check["counts"]
-    facts = (first[key] for key in ("scheme", "case", "status", "reason", "facts"))
-    result = Result(*facts)
-    return {
         "text": wording.text(result, counts, check["where"]),
         "measured": wording.measured(result, counts),
         "advice": wording.advice(check["status"], result, counts),
@@ -169,77 +159,6 @@ def _keeps_promise(record: Record, measured: Measurement | None, check: Mapping[
     own = promised[record.words("scheme").index(decisive["scheme"]), place]
     is_due = data.due(record, measured.converges) == "promised"
     return bool(is_due and abs(own - order) <= measured.tolerance)
-
-
-def _meaning(asserted: object, check: Mapping[str, Any], explained: reasons.Reason) -> str:
-    """Return what the reason means; of a claim that is refuted as expected, what it does not say is the point."""
-    is_refuted = (
-        isinstance(asserted, ClaimCheck) and not asserted.holds and check["reason"] == "match"
-    )
-    return reasons.REFUTED if is_refuted else explained.meaning
-
-
-def _factor(check: Mapping[str, Any]) -> str:
-    """Say by what factor halving the step shrinks the error, where the result that decides has a settled order."""
-    decisive: Mapping[str, Any] = next(iter(check.get("results") or []), {})
-    settled = check["status"] != "INCONCLUSIVE" and decisive.get("reason") in SETTLED
-    return words.ratio(words.fact(decisive, "order")) if settled else ""
-
-
-def _results(record: Record, check: Mapping[str, Any], unit: str) -> Table | None:
-    """Return the table of what was measured, with the unit of its numbers."""
-    results: Sequence[Mapping[str, Any]] = check.get("results") or []
-    if not results:
-        return None
-    sweep = bool(data.swept(record))
-    measured = check.get("kind") == "converges" or any(
-        words.fact(r, "order") is not None for r in results
-    )
-    valued = any(_number(r) is not None for r in results)
-    columns = [Column("scheme")]
-    columns += [Column("case", form="integer"), Column("member")] if sweep else []
-    columns += [Column("measured"), Column("reason")]
-    columns += (
-        [Column("order", form="order"), Column("interval"), Column("levels")] if measured else []
-    )
-    # how far apart two solutions are has no digits worth reading, a number that a check names may have
-    form = "small" if check.get("kind") == "equal" else "value"
-    columns += [Column("value", unit, form)] if valued else []
-    rows = [tuple(_cells(record, r, sweep, measured, valued)) for r in results]
-    return Table(f"results_{check['id']}", "Measured", tuple(columns), tuple(rows))
-
-
-def _cells(
-    record: Record, result: Mapping[str, Any], sweep: bool, measured: bool, valued: bool
-) -> Iterator[Cell]:
-    yield result.get("scheme")
-    if sweep:
-        place = data.place_of(record, result.get("case", -1))
-        yield from (result.get("case"), "all" if place is None else data.case_name(record, place))
-    yield result.get("status")
-    yield result.get("reason")
-    if measured:
-        yield from (
-            words.fact(result, "order"),
-            words.interval(words.interval_of(result)),
-            words.levels(words.levels_of(result)),
-        )
-    if valued:
-        yield _value(_number(result))
-
-
-ROUND_OFF = 1e-12
-"""Numbers no larger than this have two digits: more would be noise."""
-
-
-def _number(result: Mapping[str, Any]) -> float | None:
-    return decisive_number(result.get("facts") or {})
-
-
-def _value(value: float | None) -> Cell:
-    """Return a measured number, with two digits where it is round-off."""
-    is_noise = value is not None and 0.0 < abs(value) <= ROUND_OFF
-    return Written(value, words.number(value, "brief")) if is_noise and value else value
 
 
 def _where(check: Mapping[str, Any]) -> list[str]:

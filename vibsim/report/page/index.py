@@ -11,8 +11,9 @@ from urllib.parse import quote
 
 from vibsim import store
 from vibsim.core.errors import FileError
-from vibsim.core.vocabulary import SEVERITY, decisive_number, worst
+from vibsim.core.vocabulary import SEVERITY, worst
 from vibsim.report.page.page import environment
+from vibsim.report.tables.checks import measured_order, number_of
 from vibsim.report.tables.table import Column, Table, to_csv
 from vibsim.report.text import words
 
@@ -32,74 +33,51 @@ class Row:
     status: str
     why: str
     """Text and reason of the worst check, or what is wrong with the file."""
-    counts: str
-    failures: str
-    link: str
-    thumbnail: str
-    checks: Sequence[Mapping[str, Any]]
-    broken: int
+    counts: str = "–"
+    failures: str = "–"
+    link: str = ""
+    thumbnail: str = ""
+    checks: Sequence[Mapping[str, Any]] = ()
+    broken: int = 0
     """Number of runs that broke down."""
 
 
 def write_index(results: Path) -> None:
     """Write ``index.html`` and ``summary.csv`` over all experiments below a results folder.
 
-    Parameters
-    ----------
-    results
-        Folder with ``<collection>/<experiment>/summary.json``. A damaged summary, and an experiment with results but
-        without a summary, have a row of their own: what is not known to be right is not passed over.
+    It holds ``<collection>/<experiment>/summary.json``. A damaged summary, and an experiment with results but without a
+    summary, have a row of their own: what is not known to be right is not passed over.
     """
-    rows = [_row(results, folder) for folder in _folders(results)]
+    patterns = ("*/*/summary.json", "*/*/convergence.nc", "*/*/level_*")
+    folders = {path.parent for pattern in patterns for path in results.glob(pattern)}
+    rows = [_row(results, folder) for folder in sorted(folders)]
     grouped = [(key, list(group)) for key, group in groupby(rows, key=lambda row: row.collection)]
     status = worst("FAIL" if row.status in UNREADABLE else row.status for row in rows)
     context = {"status": status, "sentence": _sentence(rows), "collections": grouped}
-    store.write_text(
-        results / "index.html", environment().get_template("index.html").render(context)
-    )
+    page = environment().get_template("index.html").render(context)
+    store.write_text(results / "index.html", page)
     store.write_text(results / "summary.csv", to_csv(_table(rows)))
-
-
-def _folders(results: Path) -> list[Path]:
-    found = {path.parent for path in results.glob("*/*/summary.json")}
-    found |= {path.parent for path in results.glob("*/*/convergence.nc")}
-    found |= {path.parent for path in results.glob("*/*/level_*")}
-    return sorted(found)
 
 
 def _row(results: Path, folder: Path) -> Row:
     collection, name = folder.parent.name, folder.name
-    files = {
-        part: folder / part for part in ("summary.json", "report.html", "figures/thumbnail.svg")
-    }
-    relative = {
-        part: quote(path.relative_to(results).as_posix()) if path.is_file() else ""
-        for part, path in files.items()
-    }
-    link, thumbnail = relative["report.html"], relative["figures/thumbnail.svg"]
-    if not relative["summary.json"]:
+
+    def relative(part: str) -> str:
+        path = folder / part
+        return quote(path.relative_to(results).as_posix()) if path.is_file() else ""
+
+    if not relative("summary.json"):
         why = "no summary: the run of this experiment has not come to its end"
-        return Row(collection, name, name, "MISSING", why, "–", "–", "", "", (), 0)
+        return Row(collection, name, name, "MISSING", why)
     try:
-        summary = store.read_json(files["summary.json"], name=f"{collection}/{name}")
+        summary = store.read_json(folder / "summary.json", name=f"{collection}/{name}")
     except FileError as error:
-        return Row(
-            collection,
-            name,
-            name,
-            "DAMAGED",
-            f"summary.json: {error.reason}",
-            "–",
-            "–",
-            "",
-            "",
-            (),
-            0,
-        )
+        return Row(collection, name, name, "DAMAGED", f"summary.json: {error.reason}")
     checks, broken = summary["checks"], words.broken(summary)
+    passed = sum(check["status"] == "PASS" for check in checks)
     return Row(
-        collection, name, summary["title"], summary["status"], _why(checks), _counts(checks), str(broken), link,
-        thumbnail, checks, broken,
+        collection, name, summary["title"], summary["status"], _why(checks), f"{passed} of {len(checks)}",
+        str(broken), relative("report.html"), relative("figures/thumbnail.svg"), checks, broken,
     )  # fmt: skip
 
 
@@ -113,17 +91,11 @@ def _why(checks: Sequence[Mapping[str, Any]]) -> str:
     return f"{first['reason']}: {first['text']}"
 
 
-def _counts(checks: Sequence[Mapping[str, Any]]) -> str:
-    passed = sum(check["status"] == "PASS" for check in checks)
-    return f"{passed} of {len(checks)}"
-
-
 def _sentence(rows: Sequence[Row]) -> str:
     if not rows:
         return "There is no experiment here yet."
-    told = [
-        f"{count} {word}" for word in ORDER if (count := sum(row.status == word for row in rows))
-    ]
+    statuses = [row.status for row in rows]
+    told = [f"{statuses.count(word)} {word}" for word in ORDER if word in statuses]
     whole = "experiment" if len(rows) == 1 else "experiments"
     return f"{len(rows)} {whole}: {', '.join(told)}."
 
@@ -135,7 +107,7 @@ def _table(rows: Sequence[Row]) -> Table:
         "failures",
     )  # fmt: skip
     cells = tuple(line for row in rows for line in _lines(row))
-    return Table("summary", "All checks", tuple(Column(header) for header in headers), cells)
+    return Table("summary", "All checks", tuple(map(Column, headers)), cells)
 
 
 def _lines(row: Row) -> Iterator[tuple[Any, ...]]:
@@ -143,14 +115,14 @@ def _lines(row: Row) -> Iterator[tuple[Any, ...]]:
     head = (row.collection, row.name, row.title, row.status)
     if not row.checks:
         yield (*head, *[None] * 5, row.status, row.why, *[None] * 8, row.broken)
+    of_check = ("id", "kind", "text", "quantity", "expected", "status", "reason")
     for check in row.checks:
         results = check.get("results") or [{}]
         decides = max(results, key=lambda r: SEVERITY[r.get("status") or "PASS"])
-        low, high = words.interval_of(decides) or (None, None)
-        window = words.levels_of(decides)
-        yield (
-            *head, check["id"], check["kind"], check["text"], check.get("quantity"),
-            check.get("expected"), check["status"], check["reason"], decides.get("scheme"),
-            decides.get("case"), words.fact(decides, "order"), low, high, words.levels(window) if window else None,
-            decisive_number(decides.get("facts") or {}), check.get("advice"), row.broken,
-        )  # fmt: skip
+        measured = (
+            decides.get("scheme"),
+            decides.get("case"),
+            *measured_order(decides),
+            number_of(decides),
+        )
+        yield (*head, *map(check.get, of_check), *measured, check.get("advice"), row.broken)

@@ -37,63 +37,47 @@ def table(model: Model, record: Record, shown: Sequence[Member]) -> Table | None
     """Return the limit of every number of the members; None where there is none, or one level only."""
     if len(whole(record, "level")) < 2 or "period_richardson" not in record:
         return None
-    several = bool(swept(record))
     columns = (
-        Column("number"), Column("scheme"), *([Column("member")] if several else []),
+        Column("number"), Column("scheme"), *([Column("member")] if swept(record) else []),
         Column("finest level", form="full"), Column("GCI", form="small"), Column("GCI relative", form="small"),
         Column("best value", form="full"), Column("bound", form="small"), Column("true error", form="small"),
         Column("order", form="order"), Column("levels"), Column("convergence"),
     )  # fmt: skip
-    rows = list(_rows(model, record, shown, several))
+    rows = tuple(_rows(model, record, shown))
     if not rows:
         return None
-    headers = [column.header for column in columns]
-    error = headers.index("true error")
-    missing = [] if any(math.isfinite(_float(row[error])) for row in rows) else ["true error"]
-    missing += [] if "scalar" in record else PER_NUMBER
-    return Table("best_values", _caption(missing), columns, tuple(rows), 1).without(missing)
-
-
-def _caption(missing: Sequence[str]) -> str:
-    """Say what the columns are."""
     text = (
         "Best values from the ladder: extrapolated over the levels named, with a bound of the error that held in more "
         "than 95 % of a large random set; “unknown” where the levels do not approach each other"
     )
-    if "GCI" not in missing:
+    if "scalar" in record:
         text += (
             "; “as it is” where no extrapolation can be trusted. The grid convergence index (GCI) is the usual error "
             "bar of the finest level's value, not of the best one; relative to it where it is not near zero"
         )
-    return text
+    missing = ["true error", *(() if "scalar" in record else PER_NUMBER)]
+    return Table("best_values", text, columns, rows, 1).without_empty(missing)
 
 
-def _float(cell: Cell) -> float:
-    return float(cell) if isinstance(cell, int | float) else math.nan
-
-
-def _rows(
-    model: Model, record: Record, shown: Sequence[Member], several: bool
-) -> Iterator[tuple[Cell, ...]]:
-    for k, row in enumerate(scalars(model, "scalar" not in record)):
-        name = row.variable
+def _rows(model: Model, record: Record, shown: Sequence[Member]) -> Iterator[tuple[Cell, ...]]:
+    has_series = "scalar" in record
+    for k, row in enumerate(scalars(model, not has_series)):
+        name, nothing = row.variable, (None, None, None)
         for member in shown:
             value = float(at(record, f"{name}_richardson", member))
             bound = float(at(record, f"{name}_richardson_error", member))
             if not math.isfinite(value):
                 continue
-            finest = _finest(record, name, k, member)
-            known = bound if math.isfinite(bound) else _float(finest[1])
-            who = [member.scheme_name, *([member.case_name] if several else [])]
-            exact = _exact(record, name, member)
+            index = float(at(record, f"{name}_gci", member)) if has_series else math.nan
             yield (
                 _name(record, row),
-                *who,
-                *finest,
-                _rounded(value, known),
+                member.scheme_name,
+                *([member.case_name] if swept(record) else []),
+                *(_finest(record, index, k, member) if has_series else nothing),
+                _rounded(value, bound if math.isfinite(bound) else index),
                 Written(bound, "unknown") if math.isnan(bound) else _error(bound),
-                _error(abs(value - exact)),
-                *_approach(record, k, member),
+                _error(abs(value - _exact(record, name, member))),
+                *(_approach(record, k, member) if has_series else nothing),
             )
 
 
@@ -103,13 +87,11 @@ def _name(record: Record, row: Scalar) -> str:
     return style.label(text, unit(record, f"{row.variable}_richardson"))
 
 
-def _finest(record: Record, name: str, k: int, member: Member) -> tuple[Cell, ...]:
+def _finest(record: Record, index: float, k: int, member: Member) -> tuple[Cell, Cell, Cell]:
     """Return the value of the finest level and its grid convergence index, absolute and relative."""
-    if "scalar" not in record:
-        return None, None, None
-    index = float(at(record, f"{name}_gci", member))
-    value = float(at(record, "scalar_finest", member, scalar=k))
-    relative = float(at(record, "scalar_gci", member, scalar=k))
+    value, relative = (
+        float(at(record, f"scalar_{of}", member, scalar=k)) for of in ("finest", "gci")
+    )
     return _rounded(value, index), _error(index), _error(relative)
 
 
@@ -133,10 +115,8 @@ def _rounded(value: float, error: float) -> Written:
     return Written(value, words.PAGE.digits(f"{value:.{digits}e}").replace("-", "−"))
 
 
-def _approach(record: Record, k: int, member: Member) -> tuple[Cell, ...]:
+def _approach(record: Record, k: int, member: Member) -> tuple[Cell, Cell, Cell]:
     """Return the observed order, the levels that were used, and how the levels follow each other."""
-    if "scalar" not in record:
-        return None, None, None
     first, last = (int(at(record, f"scalar_{end}", member, scalar=k)) for end in ("first", "last"))
     used = words.levels((first, last)) if first < last else f"{last} as it is"
     order = float(at(record, "scalar_order", member, scalar=k))

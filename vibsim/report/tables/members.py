@@ -47,7 +47,7 @@ def fields(record: Record, quantity: str) -> list[Field]:
     """Return what is listed of every member: first what it is, then what was measured of it."""
     letter = words.symbol(quantity)
     error, measure = finest_level.error(record, quantity), norm_unit(record, quantity, TYPICAL_NORM)
-    time, size = finest_level.period(record, quantity), finest_level.amplitude(record, quantity)
+    time, size = (finest_level.measured(record, name, quantity) for name in ("period", "amplitude"))
     level = whole(record, "level")[-1]
     names = [f"order of {letter}", "order, low", "order, high"]
     orders = zip(names, finest_level.orders(record, quantity), strict=True)

@@ -17,77 +17,64 @@ if TYPE_CHECKING:
     from vibsim.experiment import Experiment
     from vibsim.experiment.schema.published import PublishedRow, PublishedTable
 
+AGREES = "agrees?"
+OWN = "by own velocity"
+
 
 def ids(experiment: Experiment) -> frozenset[str]:
     """Name the checks that printed numbers made: a page has tables of these in place of cards."""
     from vibsim.experiment.schema.published import row_id
 
-    return frozenset(
-        row_id(i, j)
-        for i, table in enumerate(experiment.published, 1)
-        for j, _ in enumerate(table.rows, 1)
-    )
-
-
-def tables(experiment: Experiment, record: Record, summary: Mapping[str, Any]) -> list[Table]:
-    """Return one table for every table of printed numbers."""
-    checks = {check["id"]: check for check in summary["checks"]}
-    return [
-        _table(experiment, record, i, table, checks)
-        for i, table in enumerate(experiment.published, 1)
-    ]
+    every = enumerate(experiment.published, 1)
+    return frozenset(row_id(i, j) for i, table in every for j in range(1, len(table.rows) + 1))
 
 
 def sentence(found: list[Table]) -> str:
     """Say how many printed numbers ours agree with; empty where there is none."""
-    marks = [row[_place(table, AGREES)] for table in found for row in table.rows]
-    if not marks:
-        return ""
-    agreed = sum(str(mark).startswith("yes") for mark in marks)
-    return f"{agreed} of {len(marks)} printed numbers agree with ours to the last printed digit."
+    marks = []
+    for table in found:
+        place = [column.header for column in table.columns].index(AGREES)
+        marks += [str(row[place]) for row in table.rows]
+    agreed = sum(mark.startswith("yes") for mark in marks)
+    told = f"{agreed} of {len(marks)} printed numbers agree with ours to the last printed digit."
+    return told if marks else ""
 
 
-AGREES = "agrees?"
+def tables(experiment: Experiment, record: Record, summary: Mapping[str, Any]) -> list[Table]:
+    """Return one table for every table of printed numbers."""
+    from vibsim.experiment.schema.published import row_id
+
+    checks = {check["id"]: check for check in summary["checks"]}
+    found = []
+    for i, table in enumerate(experiment.published, 1):
+        columns = _columns(record, table)
+        rows = tuple(
+            tuple(_row(record, row_id(i, j), table, row, columns, checks))
+            for j, row in enumerate(table.rows, 1)
+        )
+        of = f" of {words.symbol(table.quantity)}" if table.quantity else ""
+        named = table.source or experiment.source
+        caption = (
+            f"{table.title}{f' ({named})' if named else ''}. Ours: {_told(table.value)}{of}; it agrees where it "
+            "differs by half a unit of the last printed digit at most"
+        )
+        found.append(Table(f"published_{i}", caption, columns, rows))
+    return found
 
 
-def _place(table: Table, header: str) -> int:
-    return [column.header for column in table.columns].index(header)
-
-
-def _table(
-    experiment: Experiment, record: Record, i: int, table: PublishedTable, checks: Mapping[str, Any]
-) -> Table:
+def _columns(record: Record, table: PublishedTable) -> tuple[Column, ...]:
     at = [
         key
         for key in ("t", "step", "case")
         if any(getattr(row.at, key) is not None for row in table.rows)
     ]
-    noted = any(row.note for row in table.rows)
-    columns = [
-        Column("scheme"),
-        Column("level"),
-        Column("dt", data.time_unit(record, "dt"), "step"),
-    ]
-    columns += [Column(key, form="step") for key in at]
-    columns += [
-        Column("printed", form="printed"),
-        Column("ours", form="close"),
-        Column("difference", form="brief"),
-        Column(AGREES),
-        *(Column(_beside_header(name, table), form="norm") for name in table.beside),
-        *([Column("why")] if noted else []),
-    ]
-    rows = tuple(
-        tuple(_row(experiment, record, (i, j), table, row, at, noted, checks))
-        for j, row in enumerate(table.rows, 1)
-    )
-    of = f" of {words.symbol(table.quantity)}" if table.quantity else ""
-    source = f" ({table.source or experiment.source})" if table.source or experiment.source else ""
-    caption = (
-        f"{table.title}{source}. Ours: {_told(table.value)}{of}; it agrees where it differs by half a unit of the "
-        "last printed digit at most"
-    )
-    return Table(f"published_{i}", caption, tuple(columns), rows)
+    return (
+        Column("scheme"), Column("level"), Column("dt", data.time_unit(record, "dt"), "step"),
+        *(Column(key, form="step") for key in at),
+        Column("printed", form="printed"), Column("ours", form="close"), Column("difference", form="brief"),
+        Column(AGREES), *(Column(_beside_header(name, table), form="norm") for name in table.beside),
+        *([Column("why")] if any(row.note for row in table.rows) else []),
+    )  # fmt: skip
 
 
 def _beside_header(name: str, table: PublishedTable) -> str:
@@ -98,71 +85,45 @@ def _beside_header(name: str, table: PublishedTable) -> str:
     return f"beside: {_told(name)}{own}"
 
 
-OWN = "by own velocity"
-
-
 def _told(value: str) -> str:
     return value.replace("_d2t", " by [D₂ₜu]").replace("_", " ")
 
 
 def _row(
-    experiment: Experiment,
     record: Record,
-    place: tuple[int, int],
+    name: str,
     table: PublishedTable,
     row: PublishedRow,
-    at: list[str],
-    noted: bool,
+    columns: tuple[Column, ...],
     checks: Mapping[str, Any],
 ) -> Iterator[Cell]:
-    from vibsim.experiment.schema.published import row_id
-
-    name = row_id(*place)
-    check = checks.get(name, {})
-    ours = _ours(record, name, row)
+    headers = {column.header for column in columns}
+    # without a member it is the first
+    case = 0 if row.at.case is None else data.place_of(record, row.at.case) or 0
+    ours = float(measured(record, name, "value")[record.words("scheme").index(row.scheme), case])
+    levels: list[int | str] = [*data.whole(record, "level")]
+    level = levels[-1] if row.level is None else row.level
+    steps = dict(zip(levels, data.steps_of(record, case).tolist(), strict=True))
     yield row.scheme
-    yield str(record["level"][-1]) if row.level is None else str(row.level)
-    yield _dt(record, row)
-    yield from (getattr(row.at, key) for key in at)
+    yield str(level)
+    # the extrapolated solution has no step
+    yield steps.get(level, math.nan)
+    yield from (getattr(row.at, key) for key in ("t", "step", "case") if key in headers)
     yield row.printed
     yield Written(ours, words.like(ours, row.printed))
-    yield ours - row.number
-    yield _agrees(check, row)
-    yield from _beside(record, name, row, len(table.beside))
-    if noted:
+    yield ours - row.meaning.number
+    yield _agrees(checks.get(name, {}).get("status"), row)
+    if table.beside:
+        place = record.words("check").index(name)
+        found = data.pick(record, "published_beside", check=place, case=case)
+        yield from (float(value) for value in found[: len(table.beside)])
+    if "why" in headers:
         yield row.note or ""
 
 
-def _agrees(check: Mapping[str, Any], row: PublishedRow) -> str:
+def _agrees(status: str | None, row: PublishedRow) -> str:
     """Say whether the measured number agrees with the printed one, and whether that was expected."""
-    if check.get("status") not in {"PASS", "FAIL"}:
+    if status not in {"PASS", "FAIL"}:
         return "not known"
-    agrees = (check["status"] == "PASS") == row.holds
-    expected = "" if check["status"] == "PASS" else " (not as expected)"
-    return ("yes" if agrees else "no") + expected
-
-
-def _member(record: Record, row: PublishedRow) -> tuple[int, int]:
-    """Return the positions of a row's scheme and member; without a member it is the first."""
-    case = 0 if row.at.case is None else data.place_of(record, row.at.case)
-    return record.words("scheme").index(row.scheme), 0 if case is None else case
-
-
-def _ours(record: Record, name: str, row: PublishedRow) -> float:
-    return float(measured(record, name, "value")[_member(record, row)])
-
-
-def _dt(record: Record, row: PublishedRow) -> float:
-    """Return the step of a row's level; NaN for the extrapolated solution, which has none."""
-    levels, (_, case) = data.whole(record, "level"), _member(record, row)
-    level = levels[-1] if row.level is None else row.level
-    return float(data.steps_of(record, case)[levels.index(level)]) if level in levels else math.nan
-
-
-def _beside(record: Record, name: str, row: PublishedRow, count: int) -> Iterator[float]:
-    """Yield the values that a row has beside it, without a claim."""
-    if not count:
-        return
-    place = record.words("check").index(name)
-    found = data.pick(record, "published_beside", check=place, case=_member(record, row)[1])
-    yield from (float(value) for value in found[:count])
+    expected = "" if status == "PASS" else " (not as expected)"
+    return ("yes" if (status == "PASS") == row.holds else "no") + expected

@@ -6,9 +6,12 @@ import csv
 import io
 import math
 import re
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
+from vibsim.core.array_types import Floats
+from vibsim.core.record import Record
+from vibsim.report.data import Member, steps_of, swept, time_unit, whole
 from vibsim.report.style import LOWER, SUPERSCRIPTS
 from vibsim.report.text import words
 
@@ -60,14 +63,15 @@ class Table:
         if any(len(row) != len(self.columns) for row in self.rows):
             raise ValueError(f"table {self.name}: a row does not have {len(self.columns)} cells")
 
-    def only(self, kept: Sequence[int]) -> Table:
-        """Return the table with the columns at these positions."""
+    def without_empty(self, headers: Collection[str]) -> Table:
+        """Return the table without those columns of some headers that hold nothing."""
+        kept = [
+            i
+            for i, column in enumerate(self.columns)
+            if column.header not in headers or any(row[i] is not None for row in self.rows)
+        ]
         rows = tuple(tuple(row[i] for i in kept) for row in self.rows)
         return replace(self, columns=tuple(self.columns[i] for i in kept), rows=rows)
-
-    def without(self, headers: Collection[str]) -> Table:
-        """Return the table without the columns of these headers."""
-        return self.only([i for i, row in enumerate(self.columns) if row.header not in headers])
 
     def text_rows(self) -> Iterator[list[str]]:
         """Yield every row as it is read."""
@@ -85,6 +89,51 @@ class Table:
             if form == "norm" and nonzero and not 0.1 <= min(nonzero) <= max(nonzero) < 1e4
             else form
         )
+
+
+Fill = Callable[[Member, int], Cell]
+"""Returns the cell of a member and the position of a level."""
+
+
+def by_level(
+    record: Record,
+    name: str,
+    caption: str,
+    members: Sequence[Member],
+    filled: Sequence[tuple[Column, Fill] | None],
+    *,
+    titled: bool = False,
+) -> Table:
+    """Return a table with a row for every member and level.
+
+    `filled` are the columns after scheme, member and level, each with what fills it (None is left out); scheme and
+    member share a column where the table is `titled`.
+    """
+    several = bool(swept(record))
+    names = ["scheme", "member"] if several and not titled else ["scheme"]
+    shown = [column for column in filled if column is not None]
+    columns = (*map(Column, names), Column("level", form="integer"), *(c for c, _ in shown))
+    rows = tuple(
+        (
+            *([m.title] if titled else [m.scheme_name, m.case_name])[: len(names)],
+            level,
+            *(fill(m, i) for _, fill in shown),
+        )
+        for m in members
+        for i, level in enumerate(whole(record, "level"))
+    )
+    return Table(name, caption, columns, rows, heads=len(names) * several)
+
+
+def cells(values: Floats, kind: type[int] | type[float] = float) -> Fill:
+    """Return what fills a column with numbers of shape (scheme, case, level)."""
+    return lambda member, i: kind(values[member.scheme, member.case, i])
+
+
+def step_column(record: Record) -> tuple[Column, Fill]:
+    """Return the column of the time steps."""
+    column = Column("dt", time_unit(record, "dt"), "step")
+    return column, lambda member, i: float(steps_of(record, member.case)[i])
 
 
 def _text(cell: Cell, form: str) -> str:
@@ -135,52 +184,29 @@ def _exact(cell: Cell) -> str:
 def to_latex(table: Table) -> str:
     r"""Return a table as LaTeX for the package ``booktabs``: ``\input`` it into a document."""
     alignment = "".join("l" if column.form == "text" else "r" for column in table.columns)
-    head = " & ".join(escape(column.title) for column in table.columns)
-    body = [" & ".join(escape(text) for text in row) + r" \\" for row in table.text_rows()]
-    lines = [
-        r"\begin{table}",
-        r"\centering",
-        rf"\caption{{{escape(table.caption)}}}",
-        rf"\begin{{tabular}}{{{alignment}}}",
-        r"\toprule",
-        head + r" \\",
-        r"\midrule",
-        *body,
-        r"\bottomrule",
-        r"\end{tabular}",
-        r"\end{table}",
-    ]
-    return "\n".join(lines) + "\n"
+    texts = [[column.title for column in table.columns], *table.text_rows()]
+    head, *body = [" & ".join(map(escape, row)) + r" \\" for row in texts]
+    rows = "\n".join([head, r"\midrule", *body])
+    return LATEX % (escape(table.caption), alignment, rows)
 
 
+LATEX = r"""\begin{table}
+\centering
+\caption{%s}
+\begin{tabular}{%s}
+\toprule
+%s
+\bottomrule
+\end{tabular}
+\end{table}
+"""
 _SPECIAL = {
-    "\\": r"\textbackslash{}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "&": r"\&",
-    "%": r"\%",
-    "$": r"\$",
-    "#": r"\#",
-    "_": r"\_",
-    "{": r"\{",
-    "}": r"\}",
-    "<": r"\textless{}",
-    ">": r"\textgreater{}",
-    "|": r"\textbar{}",
-    '"': r"\textquotedbl{}",
-    "\n": " ",
-    "\r": " ",
-    "\t": " ",
-    "–": "--",
-    "−": "$-$",
-    "±": r"$\pm$",
-    "·": r"$\cdot$",
-    "∞": r"$\infty$",
-    "θ": r"$\theta$",
-    "ω": r"$\omega$",
-    "Δ": r"$\Delta$",
+    "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "&": r"\&", "%": r"\%",
+    "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}", "<": r"\textless{}", ">": r"\textgreater{}",
+    "|": r"\textbar{}", '"': r"\textquotedbl{}", "\n": " ", "\r": " ", "\t": " ", "–": "--", "−": "$-$",
+    "±": r"$\pm$", "·": r"$\cdot$", "∞": r"$\infty$", "θ": r"$\theta$", "ω": r"$\omega$", "Δ": r"$\Delta$",
     "\N{NARROW NO-BREAK SPACE}": r"\,",
-}
+}  # fmt: skip
 
 
 def escape(text: str) -> str:

@@ -13,20 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vibsim.analysis.motion_variables import PEAKS
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
-from vibsim.report import choice, finest_level
-from vibsim.report.data import (
-    Floats,
-    Member,
-    case_name,
-    formal_orders,
-    known,
-    swept,
-    time_unit,
-    unit,
-    whole,
-)
+from vibsim.report import choice, data, finest_level
+from vibsim.report.data import MEMBER, OF_LEVEL, known, swept, whole
 from vibsim.report.tables.table import Cell, Column, Table, Written
 from vibsim.report.text import words
 from vibsim.schemes import SCHEMES
@@ -34,21 +25,12 @@ from vibsim.schemes import SCHEMES
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
-MEMBER = ("scheme", "case")
-OF_LEVEL = ("scheme", "case", "level")
 LIMITS = {0.0: "never", math.inf: "any"}
 """Words for limits of stability that are no number."""
 EDGE = 1e-9
 """Relative distance within which a step counts as lying on the limit of stability."""
-
-
-def everyone(record: Record) -> list[Member]:
-    """Return every scheme and member, all members of a scheme together."""
-    return [
-        Member(s, case, name, case_name(record, case))
-        for s, name in enumerate(record.words("scheme"))
-        for case in range(len(record["case"]))
-    ]
+ROUNDINGS = 32.0
+"""Predicted and measured numbers agree to round-off within so many of them for each step of a period."""
 
 
 def predicted(record: Record) -> bool:
@@ -74,17 +56,13 @@ def schemes(experiment: Experiment, record: Record) -> Table | None:
         if whole(record, "triple"):
             columns.append(Column("measured, ± half its interval", form="order"))
     rows = tuple(tuple(_scheme(experiment, record, s, quantities)) for s in range(len(names)))
-    several = (
-        "; of a sweep the member whose order is farthest from the stated one"
-        if swept(record)
-        else ""
-    )
-    measured = (
-        f", and the order measured in the {TYPICAL_NORM} norm" if whole(record, "triple") else ""
-    )
+    measured = several = ""
+    if whole(record, "triple"):
+        measured = f", and the order measured in the {TYPICAL_NORM} norm"
+        several = "; of a sweep the member whose order is farthest from the stated one"
     caption = (
         f"Schemes: what each states (explicit or implicit, s: symplectic){measured} (order ∞: exact, there is no "
-        f"error to shrink){several if measured else ''}"
+        f"error to shrink){several if swept(record) else ''}"
     )
     return Table("schemes", caption, tuple(columns), rows)
 
@@ -104,7 +82,7 @@ def _scheme(
         limit = Written(limit, LIMITS.get(limit, words.number(limit, "step")))
     yield limit
     for quantity in quantities:
-        formal = formal_orders(record, quantity)[s]
+        formal = data.formal_orders(record, quantity)[s]
         value, low, high = (part[s] for part in finest_level.orders(record, quantity))
         with np.errstate(invalid="ignore"):
             away = np.abs(value - formal)
@@ -134,31 +112,23 @@ def predictions(record: Record) -> list[Table]:
     """Return what is predicted and measured of every scheme, member and level: growth; frequency and phase error."""
     if not predicted(record):
         return []
-    time = time_unit(record)
-    rate = unit(record, "theory_frequency") or f"rad/{time}"
+    time = data.time_unit(record)
+    rate = data.unit(record, "theory_frequency") or f"rad/{time}"
     by_peaks = record.variable("measured_growth").attrs.get("method") == PEAKS
-    peaks = (
+    how = (
         "The measured numbers come from peaks interpolated by a parabola, which leaves an error of its own on coarse "
         "levels"
         if by_peaks
         else "The measured numbers are those of the recurrence that the computed steps satisfy"
     )
-    growth = (
-        "Theory beside measurement: growth of the amplitude per natural period, predicted by the matrix of one step. "
-        f"{peaks}"
-    )
-    phase = (
-        "Theory beside measurement: frequency, and the time by which the peaks come early (+) or late (−) in each "
-        f"period. {peaks}"
-    )
+    growth = "growth of the amplitude per natural period, predicted by the matrix of one step"
+    phase = "frequency, and the time by which the peaks come early (+) or late (−) in each period"
+    shown = {"frequency": ("frequency", rate), "phase_error": ("phase error", time)}
     return [
-        _predictions(record, "theory_growth", growth, {"growth": ("growth per period − 1", "")}),
         _predictions(
-            record,
-            "theory_phase",
-            phase,
-            {"frequency": ("frequency", rate), "phase_error": ("phase error", time)},
+            record, "growth", f"{growth}. {how}", {"growth": ("growth per period − 1", "")}
         ),
+        _predictions(record, "phase", f"{phase}. {how}", shown),
     ]
 
 
@@ -173,61 +143,47 @@ def _predictions(
         columns += [
             Column(f"{text}: predicted", measure, "close"),
             Column("measured", measure, "close"),
-            Column(DIFFERENCE, measure, "brief"),
+            Column("difference", measure, "brief"),
         ]
-    rows = tuple(_prediction_rows(record, tuple(shown)))
-    table = Table(name, caption, tuple(columns), rows, 2 * bool(swept(record)))
-    kept = [
-        i
-        for i, column in enumerate(columns)
-        if column.header != DIFFERENCE or any(row[i] is not None for row in rows)
-    ]
-    agree = ". Where no difference is shown, the two agree to round-off"
-    return (
-        table if len(kept) == len(columns) else replace(table.only(kept), caption=caption + agree)
+    caption, rows = (
+        f"Theory beside measurement: {caption}",
+        tuple(_prediction_rows(record, [*shown])),
     )
+    table = Table(f"theory_{name}", caption, tuple(columns), rows, 2 * bool(swept(record)))
+    found = table.without_empty(["difference"])
+    agree = ". Where no difference is shown, the two agree to round-off"
+    return found if found.columns == table.columns else replace(found, caption=caption + agree)
 
 
-DIFFERENCE = "difference"
-ROUNDINGS = 32.0
-"""Predicted and measured numbers agree to round-off within so many of them for each step of a period."""
-
-
-def _beside(name: str, told: float, seen: float, noise: float) -> Iterator[Cell]:
-    """Yield a predicted and a measured number and their difference, None where it is round-off; growth less one."""
-    difference = seen - told
-    for value in (told, seen):
-        shown = value - 1.0 if name == "growth" else value
-        is_noise = 0.0 < abs(shown) <= noise
-        yield Written(shown, words.number(shown, "brief")) if is_noise else shown
-    yield None if abs(difference) <= noise else difference
-
-
-def _prediction_rows(record: Record, names: tuple[str, ...]) -> Iterator[tuple[Cell, ...]]:
-    levels, product = whole(record, "level"), omega_dt(record)
-    limit = known(record, "stability_limit", MEMBER)
-    theory = known(record, "theory_growth", OF_LEVEL)
-    rates = known(record, "theory_frequency", OF_LEVEL)
-    pairs = [
-        (known(record, f"theory_{name}", OF_LEVEL), known(record, f"measured_{name}", OF_LEVEL))
-        for name in names
-    ]
-    for member in everyone(record):
-        place = member.scheme, member.case
-        for i, level in enumerate(levels):
-            if not math.isfinite(theory[(*place, i)]):
+def _prediction_rows(record: Record, names: list[str]) -> Iterator[tuple[Cell, ...]]:
+    product, limit = data.omega_dt(record), known(record, "stability_limit", MEMBER)
+    told, seen = (
+        {name: known(record, f"{who}_{name}", OF_LEVEL) for name in {*names, "growth", "frequency"}}
+        for who in ("theory", "measured")
+    )
+    for member in data.everyone(record):
+        for i, level in enumerate(whole(record, "level")):
+            place = member.scheme, member.case, i
+            if not math.isfinite(told["growth"][place]):
                 continue
             who = [member.scheme_name, *([member.case_name] if swept(record) else [])]
             p = float(product[member.case, i])
             step = math.ulp(1.0) * ROUNDINGS * 2.0 * math.pi / p if p > 0.0 else 0.0
-            rate = abs(float(rates[(*place, i)]))
+            rate = abs(float(told["frequency"][place]))
             sizes = {"frequency": rate, "phase_error": 2.0 * math.pi / rate if rate > 0.0 else 1.0}
             numbers: list[Cell] = []
-            for name, (told, seen) in zip(names, pairs, strict=True):
-                a, b = float(told[(*place, i)]), float(seen[(*place, i)])
-                size = sizes.get(name, max(abs(a), 1.0) if math.isfinite(a) else 1.0)
-                numbers += _beside(name, a, b, step * size)
-            yield (*who, level, p, is_stable(p, float(limit[place])), *numbers)
+            for name in names:
+                a, b = float(told[name][place]), float(seen[name][place])
+                noise = step * sizes.get(name, max(abs(a), 1.0) if math.isfinite(a) else 1.0)
+                for value in (a, b):
+                    shown = value - 1.0 if name == "growth" else value
+                    is_noise = 0.0 < abs(shown) <= noise
+                    numbers.append(
+                        Written(shown, words.number(shown, "brief")) if is_noise else shown
+                    )
+                # nothing where it is round-off
+                numbers.append(None if abs(b - a) <= noise else b - a)
+            yield (*who, level, p, is_stable(p, float(limit[place[:2]])), *numbers)
 
 
 def is_stable(p: float, limit: float) -> str:
@@ -239,13 +195,3 @@ def is_stable(p: float, limit: float) -> str:
     if abs(p - limit) <= EDGE * p:
         return "at the limit"
     return "yes" if p < limit else "no"
-
-
-def omega_dt(record: Record) -> Floats:
-    """Return w dt of every member and level, shape (case, level); NaN where the record does not have it."""
-    if "omega_dt" not in record:
-        return np.full((len(record["case"]), len(record["level"])), np.nan)
-    variable = record.variable("omega_dt")
-    values = np.asarray(variable.values, dtype=np.float64)
-    values = values if "case" in variable.dims else values[None, :]
-    return np.broadcast_to(values, (len(record["case"]), len(record["level"])))

@@ -13,10 +13,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.experiment.cost import ONE_SECONDS
+from vibsim.report import data
 from vibsim.report.choice import position
-from vibsim.report.data import Floats, Member, at, case_name, ends_of, known, unit, whole
+from vibsim.report.data import Member, at, case_name, unit, whole
 from vibsim.report.tables.table import Cell, Column, Table
 from vibsim.report.text import words
 from vibsim.schemes import SCHEMES
@@ -75,8 +77,7 @@ def _of_tolerances(
     """Return the points of the schemes of one adaptive kind, from the loosest tolerance to the tightest."""
     from vibsim.schemes.adaptive import seconds
 
-    w = float(np.ravel(known(record, "natural_frequency", ("case",), case=case))[0])
-    ends = ends_of(record)
+    w, ends = data.natural_frequency(record, case), data.ends_of(record)
     periods = w * float(ends[min(case, ends.size - 1)]) / (2.0 * math.pi)
     rows = []
     for s in members:

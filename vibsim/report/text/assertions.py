@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vibsim.checks.value.criteria import SAMPLED
-from vibsim.checks.words.value import what
+from vibsim.checks.value import SAMPLED, what
 from vibsim.report.text import words
 
 if TYPE_CHECKING:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
-from vibsim.checks.value.criteria import COUNTED, depends_on_level
+from vibsim.checks.value import COUNTED, depends_on_level
 from vibsim.core.vocabulary import BY_TOLERANCE
 
 
-@dataclass(frozen=True)
-class Reason:
+class Reason(NamedTuple):
     """What a reason means and what would settle the question."""
 
     meaning: str
@@ -85,24 +84,13 @@ REASONS = {
     ),
 }
 
-_UNKNOWN = Reason("", "")
-_SAYS = "The measured number is what the check says."
-_NUMBER = Reason(
-    _SAYS,
-    "A number on which finer levels agree, and which is not close to its limit. The tables show both.",
-)
-_NUMBER_OF_ONE = Reason(
-    _SAYS,
-    "More levels. One level alone does not show the error of the step.",
-)
-_NUMBER_OF_SCHEME = Reason(
-    _SAYS,
-    "Nothing more. It follows from the equations of the scheme or the model, without a run.",
-)
-_NUMBER_COUNTED = Reason(
-    _SAYS,
-    "Nothing more. It is a count, and exact.",
-)
+_NUMBERS = {
+    "several": "A number on which finer levels agree, and which is not close to its limit. The tables show both.",
+    "one": "More levels. One level alone does not show the error of the step.",
+    "scheme": "Nothing more. It follows from the equations of the scheme or the model, without a run.",
+    "counted": "Nothing more. It is a count, and exact.",
+}
+"""What a number that is as it should be needs: of several levels, of one, of none, and one that is counted."""
 _BY_KIND = {
     "stable": Reason(
         "The scheme grows, or does not, as the check says.",
@@ -120,7 +108,6 @@ _BY_KIND = {
         "allowed.",
     ),
 }
-
 
 _OF_PROMISE = {
     "order_low": Reason(
@@ -156,14 +143,8 @@ def reason(
 ) -> Reason:
     """Return the explanation of a reason for a kind of measurement; empty words for one that has none.
 
-    Parameters
-    ----------
-    value
-        What a ``value`` check measures.
-    levels
-        How many levels the page has.
-    is_promised
-        Whether an order that is not the one of the check is the one that the scheme promises.
+    `value` is what a ``value`` check measures, on so many `levels`; `is_promised` says whether an order that is not the
+    one of the check is the one that the scheme promises.
     """
     if is_promised and word in _OF_PROMISE:
         return _OF_PROMISE[word]
@@ -172,14 +153,15 @@ def reason(
     if word == "match" and kind in _BY_KIND:
         return _BY_KIND[kind]
     if word == "match" and kind != "converges":
-        return _number(value, levels)
-    return REASONS.get(word or "", _UNKNOWN)
-
-
-def _number(value: str, levels: int) -> Reason:
-    """Return the words on a number that is as it should be."""
-    if value in COUNTED:
-        return _NUMBER_COUNTED
-    if value and not depends_on_level(value):
-        return _NUMBER_OF_SCHEME
-    return _NUMBER if levels > 1 else _NUMBER_OF_ONE
+        is_of_scheme = value and not depends_on_level(value)
+        of = (
+            "counted"
+            if value in COUNTED
+            else "scheme"
+            if is_of_scheme
+            else "several"
+            if levels > 1
+            else "one"
+        )
+        return Reason("The measured number is what the check says.", _NUMBERS[of])
+    return REASONS.get(word or "", Reason("", ""))

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 from typing import Any
 
-from vibsim.checks.words.notation import Notation
+from vibsim.checks.sentences import Notation
 from vibsim.experiment.value_names import VALUES
 from vibsim.models.shared.phase_amplitude_names import AMPLITUDE, PHASE, is_error_part, whole_of
 from vibsim.report.style import power
@@ -29,12 +28,8 @@ NAMES = {
     "potential_energy": "the potential energy V",
     "energy_deviation": "the energy deviation dE = E(t) − E(0)",
 }
-
-
 CENTRED = "_d2t"
 """Ends the name of a quantity that is made with the centred difference ``[D_2t u]`` of the position."""
-
-
 PARTS = {PHASE: ("φ({})", "phase error of {}"), AMPLITUDE: ("a({})", "amplitude error of {}")}
 """Of a part of a position's error, by the end of its name: letter and words."""
 
@@ -70,9 +65,8 @@ def name(quantity: str) -> str:
 
 def overall(summary: Mapping[str, Any]) -> str:
     """Return the verdict on a whole experiment in one or two sentences."""
-    checks: Sequence[Mapping[str, Any]] = summary["checks"]
     failures = broken(summary)
-    parts = [_counted([check["status"] for check in checks])]
+    parts = [_counted([check["status"] for check in summary["checks"]])]
     if failures:
         parts.append(f"{failures} {'run' if failures == 1 else 'runs'} broke down (see Failures).")
     return " ".join(parts)
@@ -98,6 +92,10 @@ def broken(summary: Mapping[str, Any]) -> int:
     return int(summary.get("failure_count") or len(summary.get("failures") or []))
 
 
+DIGITS = {"brief": 2, "close": 7, "full": 10, "step": 6, "value": 12}
+"""Significant digits of forms."""
+MOST_DIGITS = 11
+"""Characters of a mantissa that are read."""
 PROSE = {"phase", "amplitude"} | {name.partition("_")[0] for name in VALUES}
 """With what the name of a value, or of a part of an error, begins."""
 
@@ -106,19 +104,16 @@ class _Page(Notation):
     """The notation of a page: letters for quantities, words for values, powers of ten."""
 
     def quantity(self, name: str) -> str:
-        """Write a quantity as a letter, or a part of an error in words."""
         return title(name)
 
     def value(self, name: str) -> str:
-        """Write the name of a number as words."""
         return name.replace(CENTRED, " by [D₂ₜu]").replace("_", " ")
 
     def opening(self, text: str) -> str:
-        """Begin a sentence that begins with a word, not a letter of mathematics, with a capital letter."""
+        # a letter of mathematics stays as it is
         return text[:1].upper() + text[1:] if text.partition(" ")[0] in PROSE else text
 
     def digits(self, text: str) -> str:
-        """Write a number with no more digits than say something, and with a power of ten."""
         mantissa, has_power, exponent = text.partition("e")
         if len(mantissa) > MOST_DIGITS or (mantissa.endswith(".0") and not has_power):
             mantissa = f"{float(mantissa):.10g}"
@@ -132,21 +127,13 @@ class _Page(Notation):
 
 PAGE = _Page()
 
-MOST_DIGITS = 11
-"""Characters of a mantissa that are read."""
-
 
 def number(value: Any, form: str = "norm") -> str:
-    """Write a number for reading.
+    """Write a number for reading; a dash for NaN and None.
 
-    Parameters
-    ----------
-    value
-        A number, or None; NaN and None give a dash.
-    form
-        ``norm``: 4 significant digits; ``small``: the same, always with a power of ten; ``order``: 3 decimals;
-        ``integer``; ``close``, ``full``: 7 and 10 significant digits; ``brief``: 2; ``step``, ``value``: up to 6 and
-        12 significant digits, no trailing zeros.
+    Forms are ``norm``: 4 significant digits; ``small``: the same, always with a power of ten; ``order``: 3 decimals;
+    ``integer``; ``close``, ``full``: 7 and 10 significant digits; ``brief``: 2; ``step``, ``value``: up to 6 and 12
+    significant digits, no trailing zeros.
     """
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "–"
@@ -161,12 +148,6 @@ def number(value: Any, form: str = "norm") -> str:
         return text
     mantissa, dot, exponent = text.partition("·")
     return mantissa.rstrip("0").rstrip(".") + dot + exponent
-
-
-DIGITS: Mapping[str, int] = MappingProxyType(
-    {"brief": 2, "close": 7, "full": 10, "step": 6, "value": 12}
-)
-"""Significant digits of forms."""
 
 
 def printed(text: str) -> str:

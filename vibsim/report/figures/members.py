@@ -1,0 +1,251 @@
+"""How numbers and verdicts are spread over the members of a sweep: histograms, and each number against each key.
+
+Few members are points; many are counted in cells, so that a page stays small however many there are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.core.array_types import Flags, Floats
+from vibsim.core.record import Record
+from vibsim.core.vocabulary import SEVERITY
+from vibsim.report import finest_level, style
+from vibsim.report.choice import position, tolerance
+from vibsim.report.data import due, flags, norm_unit, of_several, promised_text, whole
+from vibsim.report.figures.panels import rows_of
+from vibsim.report.style import Picture
+from vibsim.report.sweep_layout import Key, bins, place_in
+from vibsim.report.text import words
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from vibsim.experiment import Experiment
+
+Masks = dict[str, Flags]
+"""Which members come to each verdict, shape (case,)."""
+FEWEST, BARS = 60, 50
+"""Of fewer members a histogram says nothing; bars of one."""
+SHOWN = 6
+"""Most schemes, and most keys, that have a row; the members' table has all."""
+POINTS = 4000
+"""Most members that are drawn as points."""
+BEYOND = 1.5
+"""Distance from the promised order at which the frame ends."""
+SHARES = 24
+"""Most bars of shares along a key."""
+MESH = 160, 60
+"""Cells that members are counted in, along and up."""
+
+
+def histograms(experiment: Experiment, record: Record, quantity: str) -> Picture | None:
+    """Draw the spread of order, error and period error, one row per scheme; None for few members."""
+    if len(record["case"]) < FEWEST:
+        return None
+    schemes, letter = record.words("scheme")[:SHOWN], words.symbol(quantity)
+    error, away = finest_level.error(record, quantity), finest_level.deviation(record, quantity)
+    period = finest_level.period_error(record, -1)
+    has_period = quantity == position(experiment) and bool(np.isfinite(period).any())
+    size = style.label(f"{error.kind} error", norm_unit(record, quantity))
+    count = 3 if has_period else 2
+    columns = [(0.68 + 2.83 * i, 2.45) for i in range(count)]
+    figure, axes = rows_of(len(schemes) * count, columns, 1.5, 0.36, 0.56)
+    status = flags(record, f"{quantity}_status")
+    missing = 0
+    for s, scheme in enumerate(schemes):
+        row = axes[s * count : (s + 1) * count]
+        allowed = tolerance(experiment, quantity, scheme)
+        row[0].set_ylabel("members")
+        row[0].set_title(f"Order of {letter}{of_several(record, s)}", fontsize=9)
+        row[0].set_xlabel(
+            f"stated order − {promised_text(record, quantity, s)}", fontsize=8.5, labelpad=2
+        )
+        missing += _histogram(row[0], away[s], status[s], (-allowed, allowed))
+        row[1].set_title(f"Error of {letter}, level {whole(record, 'level')[-1]}", fontsize=9)
+        row[1].set_xlabel(size, fontsize=8.5, labelpad=2)
+        missing += _histogram(row[1], error.best[s], status[s])
+        if has_period:
+            row[2].set_title("Error of the period", fontsize=9)
+            row[2].set_xlabel("|period / exact − 1|", fontsize=8.5, labelpad=2)
+            missing += _histogram(row[2], period[s], status[s])
+    _explain(axes[0], status)
+    return Picture(
+        name=f"spread_{quantity}",
+        title=f"How the members are spread: {letter}",
+        caption="Number of members by what was measured of them, on a logarithmic scale so that a single one is seen; "
+        "the colour is the verdict on the order. A few far from the rest are the ones to look at."
+        + (" Members without the number are left out." if missing else ""),
+        alt=f"Histograms of the order and the error of {words.name(quantity)} over the members",
+        figure=figure,
+    )
+
+
+def _explain(ax: Axes, status: NDArray[Any]) -> None:
+    from matplotlib.patches import Patch
+
+    counts = {word: int(np.sum(status == word)) for word in SEVERITY}
+    handles = [
+        Patch(color=style.STATUS_COLOURS[word], label=f"{word} ({words.number(n, 'integer')})")
+        for word, n in counts.items()
+        if n
+    ]
+    ax.legend(handles=handles, fontsize=7, handlelength=1.0, loc="upper left", borderaxespad=0.2)
+
+
+def _histogram(
+    ax: Axes, values: Floats, status: NDArray[Any], band: tuple[float, float] | None = None
+) -> int:
+    """Draw a histogram stacked by verdict, logarithmic without a band; return how many members have no such number."""
+    usable = np.isfinite(values) & (values > 0.0 if band is None else True)
+    ax.tick_params(labelsize=7.5)
+    if not usable.any():
+        style.remark(ax, "no such number")
+        return values.size
+    if band is None:
+        low, high = float(values[usable].min()), float(values[usable].max())
+        low, high = max(low, high * 1e-18, style.TINIEST), min(high, style.LARGEST)
+        borders = np.geomspace(low / 1.2, high * 1.2, BARS + 1)
+        style.log_axis(ax, "x", float(borders[0]), float(borders[-1]))
+    else:
+        borders = np.linspace(*style.limits(values[usable], np.array(band)), BARS + 1)
+        ax.axvspan(*band, **style.ALLOWED)
+    base = np.zeros(BARS)
+    for word in reversed(tuple(SEVERITY)):
+        count = np.histogram(values[usable & (status == word)], borders)[0]
+        if count.any():
+            colour = style.STATUS_COLOURS[word]
+            ax.stairs(base + count, borders, baseline=base, fill=True, color=colour)
+        base = base + count
+    ax.set_yscale("log")
+    style.log_axis(ax, "y", 0.7, 2.0 * max(float(base.max()), 1.0))
+    return int(np.sum(~usable))
+
+
+def projections(
+    experiment: Experiment, record: Record, keys: list[Key], quantity: str, scheme: int
+) -> Picture:
+    """Draw order, error and shares of the verdicts of one scheme against every swept key."""
+    letter, shown = words.symbol(quantity), keys[:SHOWN]
+    columns = ((0.68, 2.5), (3.78, 2.3), (6.5, 2.3))
+    figure, axes = rows_of(3 * len(shown), columns, 1.45, 0.0, 0.5)
+    status = flags(record, f"{quantity}_status")[scheme]
+    masks = {word: status == word for word in SEVERITY}
+    away = finest_level.deviation(record, quantity)[scheme]
+    error = finest_level.error(record, quantity)
+    size = np.log10(style.positive(error.best[scheme]))
+    allowed = tolerance(experiment, quantity, record.words("scheme")[scheme])
+    for i, key in enumerate(shown):
+        order, error_size, share = row = axes[3 * i : 3 * i + 3]
+        order.axhspan(-allowed, allowed, **style.ALLOWED)
+        _draw_members(order, key, away, masks, (-BEYOND, BEYOND))
+        text = f"order of {letter} − {promised_text(record, quantity, scheme)}"
+        order.set_ylabel(text, fontsize=8.5)
+        _draw_members(error_size, key, size, masks, None)
+        _label_decades(error_size)
+        _draw_shares(share, key, masks)
+        for ax in row:
+            _frame(ax, key)
+    measure = style.label(f"{error.kind} error".capitalize(), norm_unit(record, quantity))
+    for ax, title in zip(axes, ("Order", measure, "Share"), strict=False):
+        ax.set_title(title, fontsize=9)
+    axes[2].legend(
+        loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=3, fontsize=7, handlelength=0.9,
+        columnspacing=0.8, borderaxespad=0.1,
+    )  # fmt: skip
+    several, more = of_several(record, scheme), len(keys) - len(shown)
+    return Picture(
+        name=f"projections_{quantity}_{scheme}",
+        title=f"Where do members fail? {letter}{several}",
+        caption=style.sentences(
+            "Each row shows all members against one swept key, whatever the others are: left the stated order less "
+            f"the {due(record, quantity)} one, with its tolerance in grey; then the error on level "
+            f"{whole(record, 'level')[-1]}; right what share of the members near a value comes to which verdict. A "
+            "key whose shares do not vary does not matter.",
+            "Darker cells hold more members; FAIL lies over INCONCLUSIVE over PASS."
+            if away.size > POINTS
+            else "",
+            "Orders beyond the frame are drawn at its edge, members without an order at the lower edge."
+            if np.any(~(np.abs(away) < BEYOND))
+            else "",
+            f"{more} more keys are not shown; the table of members has them." if more else "",
+        ),
+        alt=f"Order and error of {words.name(quantity)} and the shares of verdicts against every swept key{several}",
+        figure=figure,
+    )
+
+
+def _frame(ax: Axes, key: Key) -> None:
+    if key.is_log:
+        room = (key.distinct[-1] / key.distinct[0]) ** 0.02
+        style.log_axis(ax, "x", float(key.distinct[0] / room), float(key.distinct[-1] * room))
+    if key.words:
+        ax.set_xticks(key.distinct, key.words)
+    ax.set_xlabel(key.label, fontsize=8.5, labelpad=2)
+    ax.tick_params(labelsize=7.5)
+
+
+def _label_decades(ax: Axes) -> None:
+    """Write the ticks of an axis that holds logarithms as powers of ten."""
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+    ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
+    ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: style.power(round(y))))
+
+
+def _draw_members(
+    ax: Axes, key: Key, values: Floats, masks: Masks, ends: tuple[float, float] | None
+) -> None:
+    """Draw a number of every member by verdict; what is beyond `ends`, or no number, at the edge."""
+    low, high = ends or style.limits(values)
+    inside = np.clip(np.where(np.isnan(values), low, values), low, high)
+    room, some = 0.06 * (high - low), values.size > 500
+    for word, chosen in masks.items():
+        colour = style.STATUS_COLOURS[word]
+        if values.size <= POINTS:
+            dot: Any = {"linestyle": "none", "marker": style.STATUS_MARKERS[word], "color": colour}
+            dot |= {"markersize": 2.6 if some else 4.0, "markeredgewidth": 0.0, "rasterized": some}
+            ax.plot(key.values[chosen], inside[chosen], **dot)
+        elif chosen.any():
+            up = np.linspace(low - room, high + room, MESH[1] + 1)
+            _draw_counts(ax, replace(key, values=key.values[chosen]), inside[chosen], colour, up)
+    ax.set_ylim(low - room, high + room)
+    ax.grid(visible=False, axis="both" if values.size > POINTS else "x")
+
+
+def _draw_counts(ax: Axes, key: Key, values: Floats, colour: str, up: Floats) -> None:
+    """Count members in cells; the more, the darker."""
+    from matplotlib.colors import LinearSegmentedColormap, LogNorm, to_rgb
+
+    across = bins(key, MESH[0])
+    column = place_in(key, across)
+    row = np.clip(np.searchsorted(up, values, side="right") - 1, 0, MESH[1] - 1)
+    width = across.size - 1
+    count = np.bincount(row * width + column, minlength=MESH[1] * width).astype(np.float64)
+    pale, dark = (tuple(0.5 * part + 0.5 * grey for part in to_rgb(colour)) for grey in (1.0, 0.0))
+    shades = LinearSegmentedColormap.from_list("", [pale, to_rgb(colour), dark])
+    table = np.ma.masked_equal(count.reshape(MESH[1], width), 0.0)
+    norm = LogNorm(1.0, max(float(count.max()), 2.0))
+    ax.pcolormesh(across, up, table, cmap=shades, norm=norm, rasterized=True)
+
+
+def _draw_shares(ax: Axes, key: Key, masks: Masks) -> None:
+    """Draw stacked bars along a key: the shares of the verdicts among the members there."""
+    borders = bins(key, SHARES)
+    place, count = place_in(key, borders), borders.size - 1
+    total, base = np.bincount(place, minlength=count), np.zeros(count)
+    for word, chosen in masks.items():
+        with np.errstate(invalid="ignore"):
+            share = np.nan_to_num(np.bincount(place[chosen], minlength=count) / total)
+        ax.bar(
+            borders[:-1], share, width=np.diff(borders), bottom=base, align="edge", edgecolor="white", linewidth=0.3,
+            color=style.STATUS_COLOURS[word], label=word,
+        )  # fmt: skip
+        base = base + share
+    ax.set_ylim(0.0, 1.0)
+    ax.set_yticks([0.0, 0.5, 1.0], ["0", "½", "1"])
+    ax.grid(visible=False)

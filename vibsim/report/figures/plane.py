@@ -1,0 +1,204 @@
+"""Motions in a plane with equal scales: velocity against position, and the path of a body with two coordinates.
+
+Source: vibration text, sections 5.5 and 7 (figures 6, 8 and 10) for the phase plane, where velocities are divided by
+the natural frequency w so that the orbit of a linear oscillation is a circle; exercise 22 for the path.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vibsim.core.array_types import Flags, Floats
+from vibsim.core.record import Record
+from vibsim.report import data, style
+from vibsim.report.data import Member, of_level, unit, whole
+from vibsim.report.figures.panels import legend_above, rows_of
+from vibsim.report.style import Picture
+from vibsim.report.text import words
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from vibsim.experiment import Experiment
+    from vibsim.models import Model
+
+ACROSS = 3
+"""Panels in a row of the phase plane, and most panels of the path."""
+MOST = 6
+"""Most panels of the phase plane, and most schemes in them."""
+CUT_ORBIT, CUT_PATH = 2.5, 1.3
+"""What leaves the exact orbit or path by more than this factor is cut off."""
+PERIODS = 3.0
+"""Of a longer motion the first period and the last so many are drawn."""
+SAMPLED = 8
+"""Fewer samples than this in a period do not draw an orbit."""
+FLATTEST = 0.15
+"""Least height of the frame of a path over its width, or the other way round."""
+TALLEST = 4.5
+"""Largest height of a panel [inch]."""
+
+Points = tuple[Floats, Floats]
+
+
+def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
+    """Draw the phase plane of the schemes shown, one panel per level; None where it would show nothing.
+
+    A few schemes only, and series with samples enough in a period.
+    """
+    model = experiment.model.definition
+    if not shown or len({member.scheme for member in shown}) > MOST:
+        return None
+    case = shown[0].case
+    members = [member for member in shown if member.case == case]
+    w, t = data.natural_frequency(record, case), data.times(record, case)
+    exact = float(data.exact_periods(record)[case])
+    period = exact if math.isfinite(exact) else 2.0 * math.pi / w if w > 0.0 else math.nan
+    if not math.isfinite(w) or w <= 0.0 or period < SAMPLED * float(t[1] - t[0]):
+        return None
+    levels, dt = whole(record, "level"), data.steps_of(record, case)
+    chosen = style.spaced(len(levels), MOST)
+    columns = [(0.62 + 2.75 * i, 2.35) for i in range(ACROSS)]
+    figure, axes = rows_of(len(chosen), columns, 2.35, 0.5, 0.45)
+    size = _draw_orbit(axes, record, model, case, w, t <= 1.02 * period)
+    is_long = bool(t[-1] > (PERIODS + 1.0) * period)
+    parts = [(t <= t[0] + period, 0.9), (t >= t[-1] - PERIODS * period, 1.4)]
+    parts = parts if is_long else [(np.ones(t.size, dtype=bool), 1.2)]
+    largest = 0.0
+    for ax, i in zip(axes, chosen, strict=True):
+        for k, member in enumerate(members):
+            u, v = (of_level(record, name, member, i) for name in (model.position, model.velocity))
+            v = v / w
+            for keep, width in parts:
+                colour = style.look(k)["color"]
+                ax.plot(u[keep], v[keep], color=colour, linewidth=width, alpha=0.9)
+            _draw_end(ax, (u, v), k, 1.3, member.scheme_name)
+            largest = max(largest, data.largest(np.hypot(u, v)))
+        ax.set_title(f"level {levels[i]}, w dt = {words.number(w * float(dt[i]), 'step')}")
+    edge = 1.12 * (min(largest, CUT_ORBIT * size) if size > 0.0 else largest)
+    if edge == 0.0:
+        # a body at rest has no orbit
+        return None
+    letter, measure = words.symbol(model.position), unit(record, f"{model.position}_finest")
+    for n, ax in enumerate(axes):
+        ax.set(xlim=(-edge, edge), ylim=(-edge, edge), aspect="equal")
+        ax.set_xlabel(style.label(letter, measure))
+        if n % ACROSS == 0:
+            ax.set_ylabel(style.label(f"{words.symbol(model.velocity)} / w", measure))
+    legend_above(figure, axes[0])
+    told = (
+        f"Of the whole motion the first period (thin) and the last {PERIODS:g} are drawn."
+        if is_long
+        else ""
+    )
+    return Picture(
+        name=f"phase_plane_{case}",
+        title="Phase plane: velocity against position",
+        caption=style.sentences(
+            told,
+            "Black, dashed: the exact orbit. The marker is the end of the motion. A spiral outwards gains energy, one "
+            "inwards loses it; an orbit that closes beside the exact one conserves an energy of its own.",
+        ),
+        alt="Velocity over the natural frequency against position for each level, with the exact orbit",
+        figure=figure,
+    )
+
+
+def _draw_orbit(
+    axes: list[Axes], record: Record, model: Model, case: int, w: float, first: Flags
+) -> float:
+    """Draw the exact orbit, and return its size; 0 where it is not known."""
+    names = f"{model.position}_exact", f"{model.velocity}_exact"
+    if any(name not in record for name in names):
+        return 0.0
+    u, v = (np.asarray(data.pick(record, name, case=case), np.float64)[first] for name in names)
+    if model.linear:
+        angle = np.linspace(0.0, 2.0 * np.pi, 121)
+        radius = float(np.hypot(u[0], v[0] / w))
+        u, v = radius * np.cos(angle), radius * w * np.sin(angle)
+    for ax in axes:
+        ax.plot(u, v / w, **style.REFERENCE | {"zorder": 5}, label="exact")
+    return float(np.max(np.hypot(u, v / w)))
+
+
+def _draw_end(ax: Axes, points: Points, k: int, width: float, name: str) -> None:
+    """Mark the last point of the k-th scheme, with its entry in the legend."""
+    last = np.flatnonzero(np.isfinite(points[0]))[-1:]
+    look: dict[str, Any] = style.look(k) | {"linestyle": "-", "linewidth": width, "markersize": 5}
+    ax.plot(points[0][last], points[1][last], **look, label=style.entry(name))
+
+
+def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture | None:
+    """Draw the paths of the schemes shown: a panel for each level, or for each member of a sweep at its finest level.
+
+    None of a model with one coordinate.
+    """
+    model = experiment.model.definition
+    if model.coordinates < 2 or not shown:
+        return None
+    names, levels = model.positions[:2], whole(record, "level")
+    if data.swept(record):
+        cases = sorted({member.case for member in shown})[:ACROSS]
+        groups = [[member for member in shown if member.case == case] for case in cases]
+        panels = [(found[0].case_name, found, len(levels) - 1) for found in groups]
+    else:
+        panels = [(f"level {levels[i]}", shown, i) for i in style.spaced(len(levels), ACROSS)]
+    references = [_reference(record, names, members[0].case) for _, members, _ in panels]
+    curves = [[_path(record, names, m, level) for m in members] for _, members, level in panels]
+    both = zip(references, curves, strict=True)
+    frame = _frame([points for reference, panel in both for points in (*reference, *panel)])
+    if frame is None:
+        return None
+    (left, right), (low, high) = frame
+    wide = style.WIDTH - 1.0
+    tall = min(wide * (high - low) / (right - left), TALLEST)
+    figure, axes = rows_of(len(panels), [(0.75, wide)], tall, 0.4, 0.3)
+    labels = [style.label(words.symbol(name), unit(record, f"{name}_finest")) for name in names]
+    for i, (title, members, _) in enumerate(panels):
+        # from thick to thin, so that no scheme hides another
+        for k, (member, (x, y)) in enumerate(zip(members, curves[i], strict=True)):
+            width = 1.0 + 1.8 * (len(members) - 1 - k) / len(members)
+            axes[i].plot(x, y, color=style.look(k)["color"], linewidth=width, alpha=0.8)
+            _draw_end(axes[i], (x, y), k, width, member.scheme_name)
+        for x, y in references[i]:
+            dashed = style.REFERENCE | {"zorder": 5, "linewidth": 0.8}
+            axes[i].plot(x, y, **dashed, label="reference")
+        axes[i].set_title(title)
+        axes[i].set(xlim=frame[0], ylim=frame[1], aspect="equal", ylabel=labels[1])
+    axes[-1].set_xlabel(labels[0])
+    legend_above(figure, max(axes, key=lambda ax: len(ax.get_lines())))
+    return Picture(
+        name="path",
+        title=f"Path: {names[1]} against {names[0]}",
+        caption="Both axes have the same scale. The marker is the end of the motion; black, dashed: the reference.",
+        alt=f"{names[1]} against {names[0]} for each level or member, with the reference",
+        figure=figure,
+    )
+
+
+def _path(record: Record, names: tuple[str, ...], member: Member, level: int) -> Points:
+    x, y = (of_level(record, name, member, level) for name in names)
+    return x, y
+
+
+def _reference(record: Record, names: tuple[str, ...], case: int) -> list[Points]:
+    """Return the exact path of a member in a list, which is empty where it is not known at every time."""
+    x, y = (data.known(record, f"{name}_exact", ("t",), case=case) for name in names)
+    return [(x, y)] if np.isfinite(x).all() and np.isfinite(y).all() else []
+
+
+def _frame(seen: list[Points]) -> tuple[tuple[float, float], tuple[float, float]] | None:
+    """Return the limits of both axes: around the first path, with room for the others as far as they stay near it."""
+    first = [style.finite(values) for values in seen[0]]
+    if not all(values.size for values in first):
+        return None
+    middle = [0.5 * float(np.min(values) + np.max(values)) for values in first]
+    half = [0.5 * float(np.ptp(values)) for values in first]
+    limits = []
+    for axis in (0, 1):
+        reach = max(data.largest(points[axis] - middle[axis]) for points in seen)
+        room = max(min(reach, CUT_PATH * half[axis]), FLATTEST * max(half))
+        limits.append((middle[axis] - 1.08 * room, middle[axis] + 1.08 * room))
+    return (limits[0], limits[1]) if max(half) > 0.0 else None

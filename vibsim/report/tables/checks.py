@@ -1,0 +1,110 @@
+"""Tables of what a summary holds: checks, their results, all experiments, and runs that broke down."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from vibsim.core.record import Record
+from vibsim.core.vocabulary import decisive_number
+from vibsim.report import data
+from vibsim.report.tables.table import Cell, Column, Table, Written
+from vibsim.report.text import words
+
+ROUND_OFF = 1e-12
+"""Numbers no larger than this have two digits: more would be noise."""
+
+
+def measured_order(result: Mapping[str, Any]) -> tuple[Cell, Cell, Cell, Cell]:
+    """Return the order of a result, the ends of its interval, and the levels that it rests on."""
+    low, high = words.interval_of(result) or (None, None)
+    window = words.levels_of(result)
+    return words.fact(result, "order"), low, high, words.levels(window) if window else None
+
+
+def number_of(result: Mapping[str, Any]) -> float | None:
+    """Return the number that decides a result."""
+    return decisive_number(result.get("facts") or {})
+
+
+def checks(summary: Mapping[str, Any]) -> Table:
+    """Return every check with every result that the summary lists."""
+    columns = (
+        Column("check"), Column("kind"), Column("quantity"), Column("status"), Column("reason"), Column("expected"),
+        Column("scheme"), Column("case", form="integer"), Column("measured status"), Column("measured reason"),
+        Column("order", form="order"), Column("order, low", form="order"), Column("order, high", form="order"),
+        Column("levels"), Column("value", form="full"),
+    )  # fmt: skip
+    of_check = ("id", "kind", "quantity", "status", "reason", "expected")
+    of_result = ("scheme", "case", "status", "reason")
+    rows = tuple(
+        (
+            *map(check.get, of_check),
+            *map(result.get, of_result),
+            *measured_order(result),
+            number_of(result),
+        )
+        for check in summary["checks"]
+        for result in check.get("results") or [{}]
+    )
+    return Table("checks", "Checks: expected and measured", columns, rows)
+
+
+def results(record: Record, check: Mapping[str, Any], unit: str) -> Table | None:
+    """Return the table of what was measured of one check, with the unit of its numbers."""
+    listed: Sequence[Mapping[str, Any]] = check.get("results") or []
+    if not listed:
+        return None
+    has_order = check.get("kind") == "converges" or any(
+        words.fact(result, "order") is not None for result in listed
+    )
+    has_value = any(number_of(result) is not None for result in listed)
+    columns = [Column("scheme")]
+    columns += [Column("case", form="integer"), Column("member")] if data.swept(record) else []
+    columns += [Column("measured"), Column("reason")]
+    columns += (
+        [Column("order", form="order"), Column("interval"), Column("levels")] if has_order else []
+    )
+    # how far apart two solutions are has no digits worth reading, a number that a check names may have
+    form = "small" if check.get("kind") == "equal" else "value"
+    columns += [Column("value", unit, form)] if has_value else []
+
+    def cells(result: Mapping[str, Any]) -> Iterator[Cell]:
+        yield result.get("scheme")
+        if data.swept(record):
+            yield result.get("case")
+            yield member(record, result.get("case", -1)) or "all"
+        yield from (result.get("status"), result.get("reason"))
+        if has_order:
+            yield words.fact(result, "order")
+            yield words.interval(words.interval_of(result))
+            yield words.levels(words.levels_of(result))
+        if has_value:
+            value = number_of(result)
+            is_noise = value is not None and 0.0 < abs(value) <= ROUND_OFF
+            yield Written(value, words.number(value, "brief")) if is_noise and value else value
+
+    rows = tuple(tuple(cells(result)) for result in listed)
+    return Table(f"results_{check['id']}", "Measured", tuple(columns), rows)
+
+
+def member(record: Record, case: int) -> str:
+    """Name a member by its global index; empty where the record does not have it."""
+    place = data.place_of(record, case)
+    return "" if place is None else data.case_name(record, place)
+
+
+def failures(summary: Mapping[str, Any], record: Record) -> Table | None:
+    """Return the runs that broke down; None where there is none."""
+    found: Iterable[Mapping[str, Any]] = summary.get("failures") or []
+    if not found:
+        return None
+    columns = (
+        Column("scheme"), Column("level", form="integer"), Column("case", form="integer"), Column("member"),
+        Column("t", data.time_unit(record), "step"), Column("step", form="integer"), Column("error"),
+    )  # fmt: skip
+    keys = ("scheme", "level", "case", "member", "t", "step", "error")
+    named = [{**row, "member": member(record, row["case"])} for row in found]
+    rows = tuple(tuple(row[key] for key in keys) for row in named)
+    caption = "Runs that broke down: the first moment at which the solution was not finite"
+    return Table("failures", caption, columns, rows)

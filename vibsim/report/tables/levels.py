@@ -1,0 +1,226 @@
+"""Tables with a row for every scheme, member and level: orders, periods, energy errors, events.
+
+Source of the two energy errors: vibration text, sections 6.2 and 7.1. The text uses ``[D_2t u]^n = (u^(n+1) -
+u^(n-1))/(2 dt)``, n = 1 .. N-1, whatever the scheme; for many schemes that shows the error of that difference and not
+the scheme's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from vibsim.core.array_types import Flags, Floats
+from vibsim.core.record import Record
+from vibsim.core.vocabulary import TYPICAL_NORM
+from vibsim.report import data, frame
+from vibsim.report.data import MEMBER, OF_LEVEL, Member, at, known, time_unit, unit, whole
+from vibsim.report.tables.table import (
+    Cell,
+    Column,
+    Fill,
+    Table,
+    Written,
+    by_level,
+    cells,
+    step_column,
+)
+from vibsim.report.text import words
+
+OWN, CENTRED = "energy_deviation_max_abs", "energy_deviation_d2t_max_abs"
+ROUND_OFF = 1e-13
+"""A relative error that is no larger is rounding, and nothing is worth comparing with it."""
+
+
+def orders(
+    record: Record, quantity: str, shown: Sequence[Member], norm: str = TYPICAL_NORM
+) -> Table:
+    """Return norms, ratios and orders of a quantity, one row per scheme, member and level."""
+    measure, n = data.norm_unit(record, quantity, norm), data.norm_index(record, norm)
+    letter, pairs = words.symbol(quantity), bool(whole(record, "pair"))
+    triples, count = bool(whole(record, "triple")), len(whole(record, "level"))
+    floors = {member: data.floor_norm(record, quantity, member, norm) for member in shown}
+    notes = {member: _notes(record, quantity, member) for member in shown}
+
+    def of(name: str) -> Fill:
+        name = f"{quantity}_{name}"
+        found = {
+            m: [
+                *(at(record, name, m, norm=n).tolist() if name in record else []),
+                *[math.nan] * count,
+            ]
+            for m in shown
+        }
+        return lambda member, i: found[member][i]
+
+    filled = (
+        (Column("steps", form="integer"), lambda member, i: int(record["steps"][i])),
+        step_column(record),
+        (Column("difference", measure, "norm"), of("difference_norm")) if pairs else None,
+        (Column("ratio", form="order"), of("ratio_norm")) if triples else None,
+        (Column("order", form="order"), of("observed_order")) if triples else None,
+        (Column("true error", measure, "norm"), of("error_norm")),
+        (Column("floor", measure, "norm"), lambda member, i: float(floors[member][i])),
+        (Column("counts"), lambda member, i: notes[member][i]) if triples else None,
+    )
+    caption = f"{letter}: {norm} norm of {f'{letter}(level) − {letter}(next level)' if pairs else 'its error'}"
+    caption += "; ratio and order from three levels starting here" if triples else ""
+    return by_level(record, f"orders_{quantity}_{norm}", caption, shown, filled)
+
+
+def _notes(record: Record, quantity: str, member: Member) -> list[str]:
+    """Say of every row whether the stated order rests on the three levels that start there."""
+    levels, (first, last) = whole(record, "level"), data.window(record, quantity, member)
+    above = data.sound_pairs(record, quantity, member) if len(levels) > 1 else []
+    notes = []
+    for i, level in enumerate(levels):
+        places, has_three = list(range(i, min(i + 3, len(levels)))), i + 2 < len(levels)
+        if has_three and first <= level and levels[i + 2] <= last:
+            notes.append("yes")
+        elif 0 <= level < first:
+            notes.append("too coarse")
+        elif all(above[k] for k in places[:-1]):
+            notes.append("no" if has_three else "–")
+        else:
+            lost = frame.why_lost(record, quantity, member, places, np.zeros(1))
+            notes.append(lost.removeprefix("lost in "))
+    return notes
+
+
+def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
+    """Return max|dE| over every step with and without the last point, and their ratios from level to level."""
+    if OWN not in record:
+        return None
+    measure, several = unit(record, OWN), len(whole(record, "level")) > 1
+    filled: list[tuple[Column, Fill] | None] = []
+    for name, text, ratio in (
+        (OWN, "max |dE|", "ratio"),
+        (f"{OWN}_interior", "max |dE| without the last point", "ratio, without"),
+    ):
+        # lean records leave the second out
+        if name in record:
+            values = np.asarray(record[name], dtype=np.float64)
+            filled.append((Column(text, measure, "norm"), cells(values)))
+            is_sound = np.asarray(record["status"]) == 0
+            filled.append(
+                (Column(ratio, form="order"), cells(_ratios(values, is_sound))) if several else None
+            )
+    caption = (
+        "Largest energy deviation over every step; the last point has an end formula of its own"
+    )
+    return by_level(record, "energy_maxima", caption, shown, filled, titled=True)
+
+
+def _ratios(values: Floats, is_sound: Flags) -> Floats:
+    """Return the ratio of each level's value to that of the next one, shape (scheme, case, level); NaN without one."""
+    found = np.full(values.shape, np.nan)
+    here, next_one = values[..., :-1], values[..., 1:]
+    there = is_sound[..., :-1] & is_sound[..., 1:] & (next_one != 0.0)
+    np.divide(here, next_one, out=found[..., :-1], where=there)
+    return found
+
+
+def scalars(record: Record, shown: Sequence[Member]) -> Table | None:
+    """Return period, amplitude and the period's error on every level."""
+    period, exact = known(record, "period", OF_LEVEL), data.exact_periods(record)
+    if not np.isfinite(period).any():
+        return None
+    time, angle = unit(record, "period"), unit(record, "amplitude")
+    usable = np.where(np.isfinite(exact), exact, np.nan)[:, None]
+    filled = (
+        (Column("period", time, "full"), cells(period)),
+        (Column("exact period", time, "full"), lambda member, i: float(exact[member.case])),
+        (Column("relative error", form="norm"), cells(period / usable - 1.0)),
+        # the peak of a run that grows without bound may have either sign
+        (Column("amplitude", angle, "full"), cells(np.abs(record["amplitude"]))),
+    )
+    caption = "Period (interpolated) and amplitude"
+    return by_level(record, "scalars", caption, shown, filled, titled=True)
+
+
+def velocities(record: Record) -> Table | None:
+    """Return the largest relative energy error with both velocities; None where no scheme has one of its own."""
+    if CENTRED not in record or not np.isfinite(known(record, CENTRED, OF_LEVEL)).any():
+        return None
+    first = np.abs(known(record, "energy_initial", MEMBER))[..., None]
+    first = np.where(first > 0.0, first, np.nan)
+    own, centred, interior = (
+        known(record, name, OF_LEVEL) / first for name in (OWN, CENTRED, f"{OWN}_interior")
+    )
+    # the velocity of a scheme without another one is the centred difference, but at the last step
+    is_same = np.asarray(np.isnan(centred).all(axis=-1))
+    second = np.where(is_same[..., None], interior, centred)
+    is_named = "energy_drift_kind" in record
+    kinds = data.flags(record, "energy_drift_kind") if is_named else np.full(own.shape, "")
+    rates = known(record, "energy_drift_rate", OF_LEVEL)
+
+    def quotient(member: Member, i: int) -> Cell:
+        place = member.scheme, member.case, i
+        is_noise = own[place] <= ROUND_OFF or kinds[place] == "none"
+        return None if is_same[place[:2]] or is_noise else _plain(float(second[place] / own[place]))
+
+    def drift(member: Member, i: int) -> Cell:
+        place = member.scheme, member.case, i
+        if kinds[place] == "exponential":
+            return "exponential decay" if rates[place] < 0.0 else "exponential growth"
+        return str(kinds[place]).replace("_", " ")
+
+    caption = (
+        "Energy error by the velocity that it is made with: the scheme's own, over every step; and [D₂ₜu], over every "
+        "step but the first and the last, as in the tables of the text. Where the second is much larger, it shows the "
+        "error of the centred difference and not that of the scheme; where both are alike, the scheme makes it; where "
+        "the second is smaller, the own velocity is the less accurate one, as that of Euler-Cromer, which is of first "
+        "order only"
+    )
+    filled = (
+        step_column(record),
+        (Column("max |dE|/E(0), own velocity", form="small"), cells(own)),
+        (Column("max |dE|/E(0), [D₂ₜu]", form="small"), cells(second)),
+        (Column("second over first", form="norm"), quotient),
+        (Column("drift of the energy, own velocity"), drift) if is_named else None,
+    )
+    return by_level(record, "energy_velocities", caption, data.everyone(record), filled)
+
+
+def _plain(quotient: float) -> Cell:
+    """Return a quotient that is written without powers of ten, with three digits at least."""
+    if not math.isfinite(quotient) or quotient <= 0.0:
+        return quotient
+    rounded = float(f"{quotient:.2e}")
+    places = max(2 - math.floor(math.log10(rounded)), 0)
+    return Written(quotient, f"{quotient:.{places}f}")
+
+
+def events(record: Record) -> Table | None:
+    """Return number and times of impacts, turns of friction and rest; None where there are none."""
+    count, first, last, rest = (
+        known(record, name, OF_LEVEL)
+        for name in ("event_count", "first_event_time", "last_event_time", "rest_time")
+    )
+    if not (count > 0.0).any():
+        return None
+    caption = (
+        "Events (impacts; turns and starts of a body under friction): where they are located, their times move with "
+        "the level as the error of the scheme does, else by part of a step"
+    )
+    seconds = time_unit(record, "first_event_time")
+
+    def change(member: Member, i: int) -> Cell:
+        """Return by how much the last event is later than on the next finer level; None where it is another event."""
+        counts, times = (part[member.scheme, member.case, i : i + 2] for part in (count, last))
+        is_same = counts.size == 2 and counts[0] == counts[1] and np.isfinite(times[0] - times[1])
+        return float(times[0] - times[1]) if is_same else None
+
+    filled = (
+        step_column(record),
+        (Column("events", form="integer"), cells(count, int)),
+        (Column("first", seconds, "value"), cells(first)),
+        (Column("last", seconds, "value"), cells(last)),
+        (Column("at rest from", seconds, "value"), cells(rest))
+        if np.isfinite(rest).any()
+        else None,
+        (Column("last, less that of the next finer level", seconds, "small"), change),
+    )
+    return by_level(record, "events", caption, data.everyone(record), filled)
