@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from vibsim import plan
 from vibsim.comparison.extrapolate_members import (
     Extrapolated,
+    Method,
+    Start,
     extrapolate_members,
     joined,
     noise_of,
 )
-from vibsim.comparison.member_method import Method, Start
 from vibsim.convergence.state_extrapolation import Pair
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.record import Attribute, Record, Variable, attributes
