@@ -7,7 +7,7 @@ from spring_runs import spring
 from vibsim import theory
 from vibsim.engine import integrate
 from vibsim.models import MODELS
-from vibsim.observe.recurrence import fitted
+from vibsim.observe.oscillation import fitted
 from vibsim.observe.thresholds import LEAST_STEPS
 from vibsim.schemes import FIXED_STEP
 

@@ -9,7 +9,7 @@ from scheme_variants import VARIANTS
 from vibsim import theory
 from vibsim.engine import integrate
 from vibsim.models import MODELS
-from vibsim.observe.recurrence import fitted
+from vibsim.observe.oscillation import fitted
 from vibsim.schemes import FIXED_STEP, SCHEMES
 
 SPRING = MODELS["spring"]

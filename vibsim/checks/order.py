@@ -29,8 +29,14 @@ from vibsim.checks.outcome import (
     ROUND_OFF,
     Judged,
 )
-from vibsim.comparison.order_causes import CAUSES, causes
-from vibsim.comparison.order_evidence import evidence, judge_check, judgement, order_of
+from vibsim.comparison.order_evidence import (
+    CAUSES,
+    causes,
+    evidence,
+    judge_check,
+    judgement,
+    order_of,
+)
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.convergence.thresholds import (

@@ -59,7 +59,7 @@ class OrderContext:
         self.is_position = quantity in model.positions
         self.notation, self.reason = f.notation, f.reason
         self.cause = f.word("cause")
-        """Why the order is another one, one of `vibsim.comparison.order_causes.CAUSES`."""
+        """Why the order is another one, one of `vibsim.comparison.order_evidence.CAUSES`."""
         order = float(f.fact("order"))
         self.order = order if math.isfinite(order) else math.nan
         self.low, self.high = float(f.fact("order_low")), float(f.fact("order_high"))

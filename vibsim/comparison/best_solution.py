@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from vibsim import plan
 from vibsim.comparison.extrapolate_members import (
     Extrapolated,
+    Method,
+    Start,
     extrapolate_members,
     joined,
     noise_of,
 )
-from vibsim.comparison.member_method import Method, Start
 from vibsim.convergence.state_extrapolation import Pair
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.record import Attribute, Record, Variable, attributes
@@ -26,7 +27,6 @@ from vibsim.simulation.scaled import in_scales
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
-
 
 SERIES = ("scheme", "case", "t")
 REACHED = ("no", "yes")
@@ -142,42 +142,34 @@ def record_of(
     kept["scheme"] = Variable(("scheme",), names, coords["scheme"].attrs)
     variables: dict[str, Variable] = {}
 
-    def add(name: str, values: Sequence[NDArray[Any]], words: str, units: str, **more: Any) -> None:
-        stacked = np.stack([np.ascontiguousarray(row.T) for row in values])
-        variables[name] = Variable(SERIES, stacked, attributes(words, units, **more))
+    def add(name: str, fields: Iterable[NDArray[Any]], words: str, units: str) -> None:
+        stacked = np.stack([np.ascontiguousarray(values.T) for values in fields])
+        variables[name] = Variable(SERIES, stacked, attributes(words, units))
 
-    fields = ("position", "velocity")
-    for state, field in zip(model.states, fields, strict=True):
+    states = list(zip(model.states, ("position", "velocity"), strict=True))
+    for state, field in states:
         words = f"{state.long_name}, extrapolated over the levels"
-        add(state.name, [getattr(row, field) for row in rows], words, state.unit)
-    for state, field in zip(model.states, fields, strict=True):
+        add(state.name, (getattr(row, field) for row in rows), words, state.unit)
+    for state, field in states:
         words = f"{state.long_name}: bound of the error of the extrapolation"
-        add(
-            f"{state.name}_error",
-            [getattr(row, f"{field}_error") for row in rows],
-            words,
-            state.unit,
-        )
+        found = (getattr(row, f"{field}_error") for row in rows)
+        add(f"{state.name}_error", found, words, state.unit)
+    numbers = np.array([*levels, -1], dtype=np.int8)
     for name, words in (("first", "coarsest"), ("last", "finest")):
-        places = [np.array([*levels, -1], dtype=np.int8)[getattr(row, name)] for row in rows]
         words = f"{words} level used for the {model.states[0].long_name}, -1 for none"
-        add(f"level_{name}", places, words, "1")
+        add(f"level_{name}", (numbers[getattr(row, name)] for row in rows), words, "1")
     if experiment.tolerance is not None:
-        variables["reached"] = _reached(rows, experiment.tolerance)
-    attrs: dict[str, Attribute] = {
+        tolerance = experiment.tolerance
+        reached = np.stack([np.maximum(*row.largest_bounds()) <= tolerance for row in rows])
+        words = (
+            f"whether every bound of the member is at most {tolerance:g} in the unit of its state"
+        )
+        codes = np.arange(len(REACHED), dtype=np.int8)
+        attrs = attributes(words, "1", flag_values=codes, flag_meanings=" ".join(REACHED))
+        variables["reached"] = Variable(SERIES[:2], reached.astype(np.int8), attrs)
+    about: dict[str, Attribute] = {
         "title": experiment.title,
         "model": model.kind,
         "levels": list(levels),
     }
-    return in_scales(Record(kept, variables, attrs), experiment)
-
-
-def _reached(rows: Sequence[Extrapolated], tolerance: float) -> Variable:
-    reached = np.stack([np.maximum(*row.largest_bounds()) <= tolerance for row in rows])
-    words = f"whether every bound of the member is at most {tolerance:g} in the unit of its state"
-    flags = {
-        "flag_values": np.arange(len(REACHED), dtype=np.int8),
-        "flag_meanings": " ".join(REACHED),
-    }
-    attrs = {**attributes(words, "1"), **flags}
-    return Variable(("scheme", "case"), reached.astype(np.int8), attrs)
+    return in_scales(Record(kept, variables, about), experiment)

@@ -17,31 +17,25 @@ from numpy.typing import NDArray
 
 from vibsim.apriori.formal_orders import even_powers, formal_orders
 from vibsim.comparison import value_numbers
+from vibsim.comparison.comparison_variables import MEMBER, Table
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.comparison.thresholds import MISSED_EXTREMUM, OF_GRID, OF_PARABOLA
 from vibsim.convergence import gci
 from vibsim.convergence.number_extrapolation import Limit, limit, observed_order
 from vibsim.convergence.thresholds import ORDER_ABOVE_ROUND_OFF
-from vibsim.core.array_types import Codes, Flags, Floats
+from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Variable, attributes
 from vibsim.experiment.value_names import HAVE_LIMITS
 from vibsim.models import Model
 from vibsim.observe import oscillation
 from vibsim.observe.member_block import MemberBlock
 
-Table = dict[str, Variable]
-
-MEMBER = ("scheme", "case")
-
-_INTERPOLATED = frozenset(
-    {"period", "period_error", "amplitude", "amplitude_error", "growth_factor"}
-)
-_AT_POINTS = frozenset({"min", "max", "max_abs"})
-_ON_THE_GRID = frozenset({"min", "max", "max_abs", "relative_energy_error"})
-_OF_ROOTS = frozenset(
-    {"frequency", "error_of_frequency", "phase_error_per_period", "growth_per_period"}
-)
+_INTERPOLATED = {"period", "period_error", "amplitude", "amplitude_error", "growth_factor"}
+_AT_POINTS = {"min", "max", "max_abs"}
+_OF_SERIES = {"end", "at"}
+_OF_ROOTS = {"frequency", "error_of_frequency", "phase_error_per_period", "growth_per_period"}
 """Made of the recurrence of the steps, whose round-off is eps/(w dt)^2; by peaks where there is none."""
+_OWN_SIZE = {"period", "frequency", "amplitude", "growth_per_period", "growth_factor"}
 
 
 @dataclass(frozen=True)
@@ -53,18 +47,6 @@ class Scalar:
     quantity: str  # empty where it is of none
     units: str
     words: str
-
-
-@dataclass(frozen=True)
-class Best:
-    """A number at every level, and what its limit is; arrays of shape (scheme, case) and (scheme, case, level)."""
-
-    levels: Floats
-    limit: Limit
-    order: Floats  # observed order; NaN where there is none
-    kind: Codes  # position in `gci.CLASSES`
-    index: Floats  # grid convergence index of the finest level
-    relative: Floats  # the same over the number; NaN where that is near zero
 
 
 def has_limit(name: str, level: int | str | None) -> bool:
@@ -87,13 +69,13 @@ def value(name: str, place: value_numbers.Place) -> tuple[Floats, Floats]:
 class _Ladder:
     """A number at every level, and what is promised of it; shapes (scheme, case, level) and (scheme, case)."""
 
-    values: Floats
+    levels: tuple[int, ...]
+    values: Floats  # NaN for schemes that have no levels
     order: Floats
     even: Flags
     floor: Floats
-    # what the points of the finest grid may miss of an extremum, shape (scheme, case)
-    missed: Floats
-    levels: tuple[int, ...]
+    size: Floats  # that such a number has: of the solution, or of the number itself
+    missed: Floats  # what the points of the finest grid may miss of an extremum
 
     def limit(self) -> Limit:
         """Return the limit."""
@@ -102,53 +84,36 @@ class _Ladder:
 
 
 def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
-    """Return the ladder of the number `name`; NaN for schemes that have no levels."""
-    found = _at_levels(name, place)
-    found[place.block.adaptive] = np.nan
-    order, even = _promised(name, place)
-    floor = _floor(name, place, found)
-    return _Ladder(found, order, even, floor, _missed(name, place, found, floor), place.levels)
+    block, comparison = place.block, place.comparison()
+    if name in _OF_SERIES:
+        rows = value_numbers.samples(place)
+    else:
+        rows = [value_numbers.value(name, replace(place, level=lv)) for lv in place.levels]
+    values = np.stack(rows, axis=-1)
+    values[block.adaptive] = np.nan
+    size = _size(name, place, values)
+    if comparison is not None and name in _OF_SERIES:
+        floor = comparison.floor
+    else:
+        relative = block.relative_floor * block.magnified[:, None]
+        if name in _OF_ROOTS and oscillation.has_recurrence(block, place.levels[-1]):
+            relative = relative / np.minimum(block.omega_dt, 1.0) ** 2
+        floor = np.broadcast_to(relative * size[..., None], values.shape)
+    missed = _missed(block, values, floor, size) if name in _AT_POINTS else np.zeros(size.shape)
+    return _Ladder(place.levels, values, *_promised(name, place), floor, size, missed)
 
 
-def _missed(name: str, place: value_numbers.Place, found: Floats, floor: Floats) -> Floats:
+def _missed(block: MemberBlock, values: Floats, floor: Floats, size: Floats) -> Floats:
     """Return how much of an extremum lies between grid points: ``w^2 dt^2/8`` of its size at most.
 
     How much differs from level to level by accident, which no extrapolation takes away. Nothing is missed where the
     levels have the same number.
     """
-    nothing = np.zeros(found.shape[:-1])
-    if name not in _AT_POINTS:
-        return nothing
-    p = np.minimum(place.block.omega_dt[:, -1], 1.0)
-    apart = np.abs(np.diff(found[..., -3:], axis=-1))
+    p = np.minimum(block.omega_dt[:, -1], 1.0)
+    apart = np.abs(np.diff(values[..., -3:], axis=-1))
     with np.errstate(invalid="ignore"):
         same = np.all(apart <= ORDER_ABOVE_ROUND_OFF * floor[..., -1:], axis=-1)
-    return np.where(same, nothing, MISSED_EXTREMUM * p**2 * _scale(name, place, found))
-
-
-def best(name: str, place: value_numbers.Place) -> Best:
-    """Return the limit of the number `name`, and how its levels approach it."""
-    one = _ladder(name, place)
-    kinds = gci.classify(one.values, one.levels, one.floor)
-    index = gci.index(one.values, one.levels, one.order, kinds)
-    return Best(
-        levels=one.values,
-        limit=one.limit(),
-        order=observed_order(one.values, one.levels, one.floor),
-        kind=kinds,
-        index=index,
-        relative=gci.relative(index, one.values[..., -1], _scale(name, place, one.values)),
-    )
-
-
-def _at_levels(name: str, place: value_numbers.Place) -> Floats:
-    """Return the number at every level, shape (scheme, case, level); those of a series at a common time."""
-    if name in ("end", "at"):
-        found = value_numbers.samples(place)
-    else:
-        rows = (replace(place, level=level) for level in place.levels)
-        found = [value_numbers.value(name, row) for row in rows]
-    return np.stack(found, axis=-1)
+    return np.where(same, 0.0, MISSED_EXTREMUM * p**2 * size)
 
 
 def _promised(name: str, place: value_numbers.Place) -> tuple[Floats, Flags]:
@@ -161,124 +126,104 @@ def _promised(name: str, place: value_numbers.Place) -> tuple[Floats, Flags]:
     even = even_powers(experiment, quantity, block.columns)
     if name in _INTERPOLATED:
         order, even = np.minimum(order, OF_PARABOLA), np.zeros_like(even)
-    elif name in _ON_THE_GRID:
+    elif name in _AT_POINTS or name == "relative_energy_error":
         order, even = np.minimum(order, OF_GRID), np.zeros_like(even)
     return np.broadcast_to(order, block.shape), np.broadcast_to(even, block.shape)
 
 
-def _floor(name: str, place: value_numbers.Place, found: Floats) -> Floats:
-    """Return the predicted round-off of a number at every level, in its unit."""
-    block, comparison = place.block, place.comparison()
-    if comparison is not None and name in ("end", "at"):
-        return comparison.floor
-    relative = block.relative_floor * block.magnified[:, None]
-    if name in _OF_ROOTS and oscillation.has_recurrence(block, place.levels[-1]):
-        relative = relative / np.minimum(block.omega_dt, 1.0) ** 2
-    size = _scale(name, place, found)
-    return np.broadcast_to(relative * size[..., None], found.shape)
-
-
-def _scale(name: str, place: value_numbers.Place, found: Floats) -> Floats:
+def _size(name: str, place: value_numbers.Place, values: Floats) -> Floats:
     """Return the size that such a number has: of the solution, or of the number itself."""
-    if name in ("end", "at", "min", "max", "max_abs"):
-        q, block = place.comparison(), place.block
+    finest = replace(place, level=place.levels[-1])
+    if name in _OF_SERIES | _AT_POINTS:
+        q = place.comparison()
         if q is not None:
             return q.scale
-        rows = [value_numbers.value(which, replace(place, level=block.grid.levels[-1]))
-                for which in ("min", "max")]  # fmt: skip
-        return np.asarray(np.maximum(*np.abs(rows)))
-    if name in ("period", "frequency", "amplitude", "growth_per_period", "growth_factor"):
-        return np.abs(found[..., -1])
+        rows = [np.abs(value_numbers.value(which, finest)) for which in ("min", "max")]
+        return np.asarray(np.maximum(*rows))
+    if name in _OWN_SIZE:
+        return np.abs(values[..., -1])
     if name == "phase_error_per_period":
-        return value_numbers.value("period", replace(place, level=place.levels[-1]))
+        return value_numbers.value("period", finest)
     # relative errors
-    return np.ones(found.shape[:-1])
+    return np.ones(values.shape[:-1])
 
 
 def scalars(model: Model, lean: bool = False) -> tuple[Scalar, ...]:
     """Name the numbers whose limits are kept; where storage is bounded, period and amplitude."""
-    first = model.states[0]
-    whole = [
-        Scalar("period", "period", "", "s", "period"),
-        Scalar("amplitude", "amplitude", "", first.unit, "amplitude"),
-    ]
-    if lean:
-        return tuple(whole)
-    whole += [
-        Scalar("frequency", "frequency", "", "rad s-1", "angular frequency"),
-        Scalar("growth_per_period", "growth_per_period", "", "1", "growth factor per period"),
-        Scalar("relative_energy_error", "relative_energy_error", "", "1", "max |E - E(0)| / |E(0)|"),
-    ]  # fmt: skip
-    for state in model.states:
-        whole += _of(state.name, state.unit, state.long_name, ("end", "min", "max"))
-    for output in model.outputs:
-        whole += _of(output.name, output.unit, output.long_name, ("min", "max"))
-    return tuple(whole)
+    rows = [("period", "s", "period"), ("amplitude", model.states[0].unit, "amplitude")]
+    if not lean:
+        rows += [
+            ("frequency", "rad s-1", "angular frequency"),
+            ("growth_per_period", "1", "growth factor per period"),
+            ("relative_energy_error", "1", "max |E - E(0)| / |E(0)|"),
+        ]
+    found = [Scalar(name, name, "", unit, words) for name, unit, words in rows]
+    for quantities, which in ((model.states, WORDS), (model.outputs, ("min", "max"))):
+        for row in () if lean else quantities:
+            for w in which:
+                words = f"{row.long_name}, {WORDS[w]}"
+                found.append(Scalar(f"{row.name}_{w}", w, row.name, row.unit, words))
+    return tuple(found)
 
 
 WORDS = {"end": "at the end", "min": "least value", "max": "largest value"}
 
-
-def _of(name: str, unit: str, words: str, which: tuple[str, ...]) -> list[Scalar]:
-    return [Scalar(f"{name}_{w}", w, name, unit, f"{words}, {WORDS[w]}") for w in which]
+COLUMNS = {
+    "finest": "finest level, in its own unit",
+    "gci": "relative grid convergence index",
+    "order": "observed order",
+    "convergence": "how the levels follow each other",
+    "first": "coarsest level used",
+    "last": "finest level used",
+}
+"""What is kept along the numbers where series are kept."""
 
 
 def table(block: MemberBlock, compared: Mapping[str, Comparison]) -> Table:
-    """Return the limits of all numbers, as variables of the convergence Record."""
+    """Return the limits of all numbers with their bounds, as variables of the convergence Record."""
     found: Table = {}
-    kept = []
+    kept: dict[str, list[NDArray[Any]]] = {name: [] for name in COLUMNS}
+    levels = np.array(block.grid.levels, dtype=np.int16)
     for row in scalars(block.model, block.lean):
         place = value_numbers.Place(block, compared, row.quantity, "best", None, None)
+        one = _ladder(row.value, place)
+        best = one.limit()
+        words = f"{row.words}: extrapolated over the levels"
+        of_value = Variable(MEMBER, np.array(best.value), attributes(words, row.units))
+        words = f"{row.words}: bound of the error of the extrapolated value"
+        of_bound = Variable(MEMBER, best.bound, attributes(words, row.units))
+        name = f"{row.variable}_richardson"
+        found |= {name: of_value, f"{name}_error": of_bound}
         if block.lean:
-            found |= _of_limit(row, _ladder(row.value, place).limit())
             continue
-        one = best(row.value, place)
+        kinds = gci.classify(one.values, one.levels, one.floor)
+        index = gci.index(one.values, one.levels, one.order, kinds)
         words = f"{row.words}: grid convergence index of the finest level"
-        index = Variable(MEMBER, one.index, attributes(words, row.units))
-        found |= _of_limit(row, one.limit) | {f"{row.variable}_gci": index}
-        kept.append(one)
-    return found | _stacked(block, kept) if kept else found
-
-
-def _of_limit(row: Scalar, found: Limit) -> Table:
-    """Return the limit of a number and its bound."""
-    value = attributes(f"{row.words}: extrapolated over the levels", row.units)
-    bound = attributes(f"{row.words}: bound of the error of the extrapolated value", row.units)
-    return {
-        f"{row.variable}_richardson": Variable(MEMBER, np.array(found.value), value),
-        f"{row.variable}_richardson_error": Variable(MEMBER, found.bound, bound),
-    }
-
-
-def _stacked(block: MemberBlock, kept: list[Best]) -> Table:
-    """Return what is kept along the numbers: the finest level, the relative index, order, class, levels."""
-    levels = np.array(block.grid.levels, dtype=np.int16)
-    dims = ("scalar", *MEMBER)
-    flags: dict[str, Any] = {
-        "flag_values": np.arange(len(gci.CLASSES), dtype=np.int8),
-        "flag_meanings": " ".join(gci.CLASSES),
-    }
-    columns: Mapping[str, tuple[list[NDArray[Any]], str]] = {
-        "finest": ([one.levels[..., -1] for one in kept], "finest level, in its own unit"),
-        "gci": ([one.relative for one in kept], "relative grid convergence index"),
-        "order": ([one.order for one in kept], "observed order"),
-        "convergence": ([one.kind for one in kept], "how the levels follow each other"),
-        "first": ([levels[one.limit.first] for one in kept], "coarsest level used"),
-        "last": ([levels[one.limit.last] for one in kept], "finest level used"),
-    }
-    found = {
-        f"scalar_{name}": Variable(dims, np.stack(rows), attributes(words, "1"))
-        for name, (rows, words) in columns.items()
-    }
-    flagged = found["scalar_convergence"]
-    attrs: dict[str, Any] = {**flagged.attrs, **flags}
-    return found | {"scalar_convergence": Variable(dims, flagged.values, attrs)}
+        found[f"{row.variable}_gci"] = Variable(MEMBER, index, attributes(words, row.units))
+        columns: tuple[NDArray[Any], ...] = (
+            one.values[..., -1],
+            gci.relative(index, one.values[..., -1], one.size),
+            observed_order(one.values, one.levels, one.floor),
+            kinds,
+            levels[best.first],
+            levels[best.last],
+        )
+        for column, values in zip(kept.values(), columns, strict=True):
+            column.append(values)
+    codes = np.arange(len(gci.CLASSES), dtype=np.int8)
+    of_kinds = {"flag_values": codes, "flag_meanings": " ".join(gci.CLASSES)}
+    for name, rows in kept.items():
+        if rows:
+            more = of_kinds if name == "convergence" else {}
+            attrs = attributes(COLUMNS[name], "1", **more)
+            found[f"scalar_{name}"] = Variable(("scalar", *MEMBER), np.stack(rows), attrs)
+    return found
 
 
 def coordinate(block: MemberBlock) -> Table:
     """Return the coordinate of the numbers; empty where only their limits are kept."""
     if block.lean:
         return {}
-    names = np.array([row.variable for row in scalars(block.model, block.lean)])
+    names = np.array([row.variable for row in scalars(block.model)])
     words = "numbers of which the limit was sought"
     return {"scalar": Variable(("scalar",), names, attributes(words, "1"))}

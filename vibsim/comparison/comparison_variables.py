@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,14 +32,17 @@ LEAST_ORDER = (
     "order that the scheme promises for the position, at least that of a part of its error"
 )
 """What is said of the order of a part of an error of which theory says nothing."""
-SERIES = ("scheme", "case", "t")
+MEMBER = ("scheme", "case")
+SERIES = (*MEMBER, "t")
 _IN_NORM = "{} in a norm over time (times s for l1, times the square root of s for l2)"
 
 
 def _adder(table: Table, q: Comparison) -> Add:
-    """Return the function that puts values into a table under the quantity's name."""
+    """Return the function that puts values into a table under the quantity's name, in its unit if no other is given."""
 
-    def add(name: str, dims: tuple[str, ...], values: Floats, words: str, units: str) -> None:
+    def add(
+        name: str, dims: tuple[str, ...], values: NDArray[Any], words: str, units: str = q.units
+    ) -> None:
         attrs = attributes(f"{q.long_name}: {words}", units)
         if dims[-1] == "t" and q.name.endswith(CENTRED):
             values = np.array(values)
@@ -49,60 +53,54 @@ def _adder(table: Table, q: Comparison) -> Add:
 
 
 def numbers(q: Comparison) -> Table:
-    """Return the numbers that a quantity is compared by: norms, orders, bounds."""
+    """Return the numbers that a quantity is compared by: norms, orders, bounds.
+
+    Where storage is bounded, ratios and coincidence are in single precision.
+    """
     table: Table = {}
     add = _adder(table, q)
     block, levels = q.block, len(q.block.grid.levels)
-    of_level = ("scheme", "case", "level")
+    of_level, of_triple = (*MEMBER, "level"), (*MEMBER, "triple", "norm")
 
-    def stacked(kind: str) -> Floats:
-        return np.stack([getattr(q.in_norm(norm), kind) for norm in block.norms], axis=-1)
+    def stacked(of: Callable[[str], Floats]) -> Floats:
+        return np.stack([of(norm) for norm in block.norms], axis=-1)
 
-    add("error_norm", (*of_level, "norm"), stacked("error"), _IN_NORM.format("true error"), q.units)
+    words = _IN_NORM.format("true error")
+    add("error_norm", (*of_level, "norm"), stacked(lambda n: q.in_norm(n).error), words)
     words = _IN_NORM.format("true error of the extrapolation")
-    add(
-        "richardson_error_norm",
-        ("scheme", "case", "norm"),
-        stacked("extrapolation"),
-        words,
-        q.units,
-    )
+    found = stacked(lambda n: q.in_norm(n).extrapolation)
+    add("richardson_error_norm", (*MEMBER, "norm"), found, words)
     if block.lean:
         words = "largest error bound of the extrapolation"
-        add("richardson_error_max", ("scheme", "case"), q.largest_bound, words, q.units)
-    add("floor", of_level, q.floor, "predicted round-off", q.units)
+        add("richardson_error_max", MEMBER, q.largest_bound, words)
+    add("floor", of_level, q.floor, "predicted round-off")
     is_due = not is_error_part(q.name) or is_promised(block.experiment, q.name)
     words = PROMISED_ORDER if is_due else LEAST_ORDER
     attrs = attributes(f"{q.long_name}: {words}", "1", promised=int(is_due))
     formal = Variable(("scheme",), q.order[:, 0], attrs)
     if orders_vary(block.experiment, q.name):
-        formal = Variable(("scheme", "case"), np.broadcast_to(q.order, block.shape), attrs)
+        formal = Variable(MEMBER, np.broadcast_to(q.order, block.shape), attrs)
     table[f"{q.name}_formal_order"] = formal
     if levels > 1:
-        words = _IN_NORM.format("difference")
-        add(
-            "difference_norm",
-            ("scheme", "case", "pair", "norm"),
-            stacked("difference"),
-            words,
-            q.units,
-        )
+        found = stacked(lambda n: q.in_norm(n).difference)
+        add("difference_norm", (*MEMBER, "pair", "norm"), found, _IN_NORM.format("difference"))
     if levels > 2:
-        _triples(q, add)
+        words = "ratio of successive differences in a norm over time"
+        add("ratio_norm", of_triple, in_precision(q, stacked(q.ratios)), words, "1")
+        add("observed_order", of_triple, stacked(q.observed_orders), "observed order", "1")
+        words = "relative distance of the rescaled differences"
+        add("coincidence", of_triple[:-1], in_precision(q, q.coincidence), words, "1")
     if levels > 1 and not block.lean:
         words = _IN_NORM.format("grid convergence index of the finest level")
-        rows = [_index(q, norm, q.in_norm(norm).difference[..., -1]) for norm in block.norms]
-        add("gci_norm", ("scheme", "case", "norm"), np.stack(rows, axis=-1), words, q.units)
+        found = stacked(lambda n: _index(q, n, q.in_norm(n).difference[..., -1]))
+        add("gci_norm", (*MEMBER, "norm"), found, words)
     return table
 
 
 def _index(q: Comparison, norm: str, change: Floats) -> Floats:
     """Return the grid convergence index of a change between the finest two levels, by the order in a norm.
 
-    Parameters
-    ----------
-    change
-        Shape (scheme, case), or (scheme, case, t).
+    The change has the shape (scheme, case), or (scheme, case, t).
     """
     levels = q.block.grid.levels
     promised = np.where(np.isfinite(q.order), q.order, ORDINARY_ORDER)
@@ -114,29 +112,11 @@ def _index(q: Comparison, norm: str, change: Floats) -> Floats:
     return of_order(change, levels[-1] - levels[-2], seen, promised)
 
 
-def _triples(q: Comparison, add: Add) -> None:
-    """Add the numbers of triples of levels; where storage is bounded, all but the order in single precision."""
-    dims = ("scheme", "case", "triple", "norm")
-
-    def stacked(of: Callable[[str], Floats]) -> Floats:
-        return np.stack([of(norm) for norm in q.block.norms], axis=-1)
-
-    words = "ratio of successive differences in a norm over time"
-    add("ratio_norm", dims, in_precision(q, stacked(q.ratios)), words, "1")
-    add("observed_order", dims, stacked(q.observed_orders), "observed order", "1")
-    words = "relative distance of the rescaled differences"
-    add("coincidence", dims[:-1], in_precision(q, q.coincidence), words, "1")
-
-
 def in_precision(q: Comparison, values: Floats) -> NDArray[np.floating]:
-    """Return values in the type in which they are kept: infinite where they are beyond its range."""
+    """Return ratios and orders in the type in which they are kept: infinite where they are beyond its range."""
     with np.errstate(over="ignore"):
-        return values.astype(precision_of(q))
-
-
-def precision_of(q: Comparison) -> type[np.floating]:
-    """Return the type in which ratios and orders are kept: seven digits are more than they have."""
-    return np.float32 if q.block.lean else np.float64
+        # seven digits are more than they have
+        return values.astype(np.float32 if q.block.lean else np.float64)
 
 
 def over_time(q: Comparison) -> Table:
@@ -144,24 +124,23 @@ def over_time(q: Comparison) -> Table:
     table: Table = {}
     add = _adder(table, q)
     value, bound = q.extrapolation
-    add("richardson", SERIES, value, "Richardson extrapolation", q.units)
-    add("richardson_error", SERIES, bound, "error bound of the extrapolation", q.units)
-    add("finest", SERIES, q.values[-1], "finest level", q.units)
+    add("richardson", SERIES, value, "Richardson extrapolation")
+    add("richardson_error", SERIES, bound, "error bound of the extrapolation")
+    add("finest", SERIES, q.values[-1], "finest level")
     if q.exact is not None:
         if plain_name(q.name) in ENERGIES:
-            add("exact", SERIES, np.broadcast_to(q.exact, value.shape), "exact", q.units)
+            add("exact", SERIES, np.broadcast_to(q.exact, value.shape), "exact")
         else:
-            add("exact", SERIES[1:], q.exact[0], "exact", q.units)
+            add("exact", SERIES[1:], q.exact[0], "exact")
     if q.differences:
         _pairs(q, add)
     if len(q.differences) > 1:
-        _ratios(q, add)
-        _local_orders(q, add)
+        _triples(q, add)
     return table
 
 
 def _pairs(q: Comparison, add: Add) -> None:
-    dims = ("scheme", "case", "pair", "t")
+    dims = (*MEMBER, "pair", "t")
     levels, d, p = q.block.grid.levels, q.differences, q.power[..., None]
     unknown = [np.full_like(x, np.nan) for x in d]
     rescaled = [x * differences.rescaling(p, levels[: i + 2]) for i, x in enumerate(d)]
@@ -169,11 +148,11 @@ def _pairs(q: Comparison, add: Add) -> None:
     # where a difference passes zero, the error does not
     around = np.where(np.isfinite(d[-1]), differences.local_scale(d[-1]), np.nan)
     words = "grid convergence index of the finest level"
-    add("gci", SERIES, _index(q, TYPICAL_NORM, around), words, q.units)
-    add("difference", dims, np.stack(d, 2), "level minus next level", q.units)
-    add("rescaled", dims, np.stack(rescaled, 2), "difference, rescaled", q.units)
-    add("error_estimate", dims, np.stack(estimates(q), 2), "estimated error", q.units)
-    add("error", dims, np.stack(errors, 2), "true error", q.units)
+    add("gci", SERIES, _index(q, TYPICAL_NORM, around), words)
+    add("difference", dims, np.stack(d, 2), "level minus next level")
+    add("rescaled", dims, np.stack(rescaled, 2), "difference, rescaled")
+    add("error_estimate", dims, np.stack(estimates(q), 2), "estimated error")
+    add("error", dims, np.stack(errors, 2), "true error")
 
 
 def estimates(q: Comparison) -> list[Floats]:
@@ -185,31 +164,21 @@ def estimates(q: Comparison) -> list[Floats]:
     ]
 
 
-def _ratios(q: Comparison, add: Add) -> None:
-    of_triple = ("scheme", "case", "triple")
-    ratio, factor = [], []
-    for i, (first, second) in enumerate(pairwise(q.differences)):
-        floor = (q.floor[..., i + 1] + q.floor[..., i + 2])[..., None]
-        ratio.append(differences.masked_ratio(first, second, floor))
-        factor.append(differences.proportionality(first, second))
-    words = "ratio of successive differences"
-    add("ratio", (*of_triple, "t"), np.stack(ratio, 2), words, "1")
-    words = "least-squares factor between successive differences"
-    add("proportionality", of_triple, by_level(factor), words, "1")
-
-
-def _local_orders(q: Comparison, add: Add) -> None:
-    """Add the order of every triple as a function of time, with its interval, in single precision."""
-    grid = q.block.grid
+def _triples(q: Comparison, add: Add) -> None:
+    """Add ratios, and the order of every triple as a function of time, with its interval, in single precision."""
+    grid, dims = q.block.grid, (*MEMBER, "triple", "t")
     counts = window_points(ORDER_WINDOW * period_scale(q.block), grid.spacing, len(grid.t))
     floor = [q.floor[..., i] + q.floor[..., i + 1] for i in range(len(q.differences))]
-    rows = [
-        local_order(
-            a, b, grid.levels[i : i + 3], (floor[i], floor[i + 1]), counts, grid.end_included
-        )
-        for i, (a, b) in enumerate(pairwise(q.differences))
-    ]
-    words = {"": "order over time", "_low": "its lower end", "_high": "its upper end"}
-    for k, (end, text) in enumerate(words.items()):
-        found = np.stack([row[k] for row in rows], 2).astype(np.float32)
-        add(f"local_order{end}", ("scheme", "case", "triple", "t"), found, text, "1")
+    ratios, factors, orders = [], [], []
+    for i, (a, b) in enumerate(pairwise(q.differences)):
+        ratios.append(differences.masked_ratio(a, b, floor[i + 1][..., None]))
+        factors.append(differences.proportionality(a, b))
+        triple, floors = grid.levels[i : i + 3], (floor[i], floor[i + 1])
+        orders.append(local_order(a, b, triple, floors, counts, grid.end_included))
+    add("ratio", dims, np.stack(ratios, 2), "ratio of successive differences", "1")
+    words = "least-squares factor between successive differences"
+    add("proportionality", dims[:-1], by_level(factors), words, "1")
+    ends = {"": "order over time", "_low": "its lower end", "_high": "its upper end"}
+    for k, (end, words) in enumerate(ends.items()):
+        found = np.stack([row[k] for row in orders], 2).astype(np.float32)
+        add(f"local_order{end}", dims, found, words, "1")

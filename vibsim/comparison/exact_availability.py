@@ -11,23 +11,15 @@ KNOWN = "_error_known"
 
 
 def known_errors(record: Record) -> dict[str, Variable]:
-    """Return of each quantity whether a true error is known at some level: all that verdicts need of its norms.
+    """Return of each quantity of a convergence Record whether a true error is known at some level.
 
-    Parameters
-    ----------
-    record
-        Convergence Record.
-
-    Returns
-    -------
-    dict
-        `<q>_error_known` over ``scheme, case``, of every quantity that has `<q>_error_norm`.
+    It is `<q>_error_known` over ``scheme, case``, of every q with `<q>_error_norm`: all that verdicts need of norms.
     """
     found = {}
+    attrs = attributes("whether a true error is known", "1")
     for name, norms in record.variables.items():
         if norms.dims[:2] == ("scheme", "case") and name.endswith(NORM):
             known = np.isfinite(norms.values).any(axis=tuple(range(2, norms.values.ndim)))
-            attrs = attributes("whether a true error is known", "1")
             found[name.removesuffix(NORM) + KNOWN] = Variable(("scheme", "case"), known, attrs)
     return found
 

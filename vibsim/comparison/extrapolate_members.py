@@ -9,23 +9,116 @@ other rounding errors, and the difference of the two runs says what this motion 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.comparison.member_method import Method, Start, rate_of
-from vibsim.comparison.thresholds import RECENT, RESOLVED_STEP
-from vibsim.convergence.state_extrapolation import Best, Circumstances, Pair, best_entry
+from vibsim.comparison.thresholds import LONG_RUN, RECENT, RESOLVED_STEP
+from vibsim.convergence.state_extrapolation import (
+    Best,
+    Circumstances,
+    Pair,
+    Tableau,
+    best_entry,
+    tableau,
+)
 from vibsim.convergence.thresholds import KNOWN_DIGIT
-from vibsim.core.array_types import Floats
+from vibsim.core.array_types import Floats, Integers
 from vibsim.engine import integrate
-from vibsim.schemes.base import Options
+from vibsim.models import Model
+from vibsim.schemes import Options, Scheme
 
-PIECE = 2**14
-"""Points extrapolated at a time, so that the tableau stays in cache."""
+PIECE = 2**14  # points extrapolated at a time, so that the tableau stays in cache
+
+
+@dataclass(frozen=True)
+class Method:
+    """A scheme with its options on a model."""
+
+    model: Model
+    scheme: Scheme
+    options: Options
+
+    @cached_property
+    def position_powers(self) -> tuple[int, int]:
+        """First power of the expansion of the error, and the distance to the next."""
+        return self._powers(self.model.position, self.options)
+
+    @cached_property
+    def velocity_powers(self) -> tuple[int, int]:
+        """The same of the velocity before the last time."""
+        return self._powers(self.model.velocity, self._own_end())
+
+    @cached_property
+    def end_powers(self) -> tuple[int, int]:
+        """The same of the velocity at the last time."""
+        return self._powers(self.model.velocity, self.options)
+
+    @cached_property
+    def has_one_expansion(self) -> bool:
+        """Whether position and velocity have the same powers at all times."""
+        return self.position_powers == self.velocity_powers == self.end_powers
+
+    def _others(self) -> Iterator[Options]:
+        """Yield the options with another choice of one word."""
+        for option in self.scheme.words:
+            for choice in option.choices:
+                yield {**self.options, option.name: choice}
+
+    @cached_property
+    def twin(self) -> Options | None:
+        """Options of the same method with other rounding errors; None where there are none."""
+        own = self.scheme.round_off(self.options, LONG_RUN)
+        return next((o for o in self._others() if self.scheme.round_off(o, LONG_RUN) != own), None)
+
+    def tableau(self, steps: tuple[int, ...], powers: tuple[int, int]) -> Tableau:
+        """Return the tableau of a quantity whose error has these powers."""
+        known = self._tableaux.get((steps, powers))
+        if known is None:
+            round_off = tuple(self.scheme.round_off(self.options, n) for n in steps)
+            known = self._tableaux[steps, powers] = tableau(steps, *powers, round_off)
+        return known
+
+    @cached_property
+    def _tableaux(self) -> dict[tuple[tuple[int, ...], tuple[int, int]], Tableau]:
+        return {}
+
+    def _powers(self, quantity: str, options: Options) -> tuple[int, int]:
+        p = int(self.scheme.formal_order(quantity, self.model, options))
+        return p, 2 if self.scheme.has_even_powers(quantity, self.model, options) else 1
+
+    def _own_end(self) -> Options:
+        """Return the options with which the last velocity is the scheme's own, as all others are."""
+        mine = self.scheme.stepper(self.options)
+        for other in self._others():
+            its = self.scheme.stepper(other)
+            same = (mine.start, mine.step, mine.variant) == (its.start, its.step, its.variant)
+            if its.end == "own" and same:
+                return other
+        return self.options
+
+
+@dataclass(frozen=True)
+class Start:
+    """The numbers of some members."""
+
+    parameters: Floats  # in the order of `Model.parameters`, shape (case, n_parameters)
+    initial: Floats  # position and velocity, shape (case, 2)
+    end: Floats  # shape (case,)
+    frequency: Floats  # angular frequency of small oscillations, shape (case,)
+
+    def of(self, some: Integers | slice) -> Start:
+        """Return the numbers of some of the members."""
+        return Start(*(values[some] for values in vars(self).values()))
+
+
+def rate_of(start: Start) -> Floats:
+    """Return w, shape (case,): a change of the velocity is w times one of the position. At least 1 over the time."""
+    return np.asarray(np.fmax(start.frequency, 1.0 / start.end))
 
 
 @dataclass(frozen=True)
@@ -36,21 +129,18 @@ class Extrapolated:
     velocity: Floats
     position_error: Floats
     velocity_error: Floats
-    # place in the ladder of the coarsest level used for the position; -1 for none
-    first: NDArray[np.intp]
+    first: NDArray[np.intp]  # place of the coarsest level used for the position; -1 for none
     last: NDArray[np.intp]
 
     def largest_bounds(self) -> tuple[Floats, Floats]:
         """Return the largest bounds of position and velocity over all times, shape (case,); infinite without one."""
-        return (
-            _largest(self.position, self.position_error),
-            _largest(self.velocity, self.velocity_error),
-        )
 
+        def largest(values: Floats, errors: Floats) -> Floats:
+            is_known = np.isfinite(values) & ~np.isnan(errors)
+            return np.asarray(np.max(np.where(is_known, errors, np.inf), axis=0))
 
-def _largest(values: Floats, errors: Floats) -> Floats:
-    is_known = np.isfinite(values) & ~np.isnan(errors)
-    return np.asarray(np.max(np.where(is_known, errors, np.inf), axis=0))
+        velocity = largest(self.velocity, self.velocity_error)
+        return largest(self.position, self.position_error), velocity
 
 
 def level_at(
@@ -65,10 +155,7 @@ def level_at(
 ) -> Pair:
     """Run one level; return position and velocity at every `every`-th step, each of shape (t, case).
 
-    Parameters
-    ----------
-    options
-        Of the scheme; those of the method where None.
+    The options of the scheme are those of the method where None.
     """
     run = integrate(
         method.model,
@@ -102,11 +189,9 @@ def noise_of(
 
     Parameters
     ----------
-    steps, every
-        Number of steps of every level, and the stride of its samples.
-    levels
-        Their position and velocity, each of shape (t, case). The coarsest may have been sampled more often than the
-        rest, a whole number of times.
+    steps, every, levels
+        Number of steps of every level, the stride of its samples, and position and velocity, each of shape (t, case).
+        The coarsest may have been sampled more often than the rest, a whole number of times.
     threads, lane
         Of the engine; the lane is chosen by the size of the work where None.
 
@@ -169,8 +254,6 @@ def extrapolate_members(
 
     Parameters
     ----------
-    steps
-        Number of steps of every level.
     t
         Times as fractions of the end, shape (t, 1).
     levels
@@ -178,16 +261,13 @@ def extrapolate_members(
     noise
         What `noise_of` returned.
     """
-    case = len(start.end)
     size = max(PIECE // len(t), 1)
     parts = []
-    for first in range(0, case, size):
+    for first in range(0, len(start.end), size):
         part = slice(first, first + size)
-        some = start.of(part)
-        of_part = [(np.ascontiguousarray(u[:, part]), v[:, part] + 0.0) for u, v in levels]
-        parts.append(
-            _extrapolate(method, some, steps, t, of_part, None if noise is None else noise[:, part])
-        )
+        some = [(np.ascontiguousarray(u[:, part]), v[:, part] + 0.0) for u, v in levels]
+        of_part = None if noise is None else noise[:, part]
+        parts.append(_extrapolate(method, start.of(part), steps, t, some, of_part))
     return joined(parts)
 
 
@@ -221,7 +301,9 @@ def _extrapolate(
         values = [found[0].position, found[1].velocity]
         errors = [found[0].error, found[1].error + 0.0]
         if method.end_powers != powers[1] and t[-1, 0] == 1.0:
-            known, levels = _recent(known), [(u[-RECENT:], v[-RECENT:]) for u, v in levels]
+            recent = {name: getattr(known, name)[-RECENT:] for name in ("phase", "noise", "spread")}
+            known = replace(known, **recent)
+            levels = [(u[-RECENT:], v[-RECENT:]) for u, v in levels]
             for i, x in enumerate((powers[0], method.end_powers)):
                 end = _alone(method, steps, x, levels, i, known)
                 values[i][-1], errors[i][-1] = end[i][-1], end.error[-1]
@@ -250,11 +332,6 @@ def _alone(
     """Extrapolate the position (0) or the velocity (1) by itself."""
     alone = [(0.0 * u, v) if which else (u, 0.0 * v) for u, v in levels]
     return best_entry(method.tableau(steps, powers), alone, known)
-
-
-def _recent(known: Circumstances) -> Circumstances:
-    times = {name: getattr(known, name)[-RECENT:] for name in ("phase", "noise", "spread")}
-    return replace(known, **times)
 
 
 def inverse_power(x: Any, p: int) -> Any:

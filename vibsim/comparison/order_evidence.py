@@ -1,7 +1,16 @@
-"""From a comparison of levels to the numbers that a verdict rests on, and the verdict, for one norm."""
+"""The numbers that a verdict on an order rests on, the verdict, and why the order is another one than expected.
+
+Too low: is it one time (the last point, which has a formula of its own), one quantity, or everything? Too high: is
+it the whole solution, or is the leading error hidden: at times where it vanishes by symmetry, in one quantity, in one
+norm? An error that is cancelled there is no mistake, and no higher order either.
+
+Most of an error of an oscillation is a shift in time, ``e(t) = -s(t) u'(t)``: it vanishes wherever u' does. Common
+times that all lie at turning points (Dt = pi/w after a release from rest) therefore show the next power only.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -9,26 +18,40 @@ import numpy as np
 
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, norm_of_floor
 from vibsim.comparison.quantity_comparison import Comparison
-from vibsim.comparison.thresholds import STRAIGHT
-from vibsim.convergence.differences import largest
-from vibsim.convergence.ladder_statistics import Evidence
+from vibsim.comparison.thresholds import STRAIGHT, THEORY_ROUNDING, VANISHING_RATE
+from vibsim.convergence.differences import largest, safe_ratio
+from vibsim.convergence.ladder_statistics import Evidence, at_rest, floor_of_pairs, unresolved
+from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING
 from vibsim.convergence.verdict import Judgement, judge
-from vibsim.core.array_types import Flags, Floats
-from vibsim.core.vocabulary import TOLERANCE
+from vibsim.core.array_types import Codes, Flags, Floats
+from vibsim.core.vocabulary import NORMS, REASON_NAMES, TOLERANCE
 from vibsim.models import ENERGIES
 from vibsim.models.shared.phase_amplitude_names import is_error_part
-from vibsim.observe.member_block import plain_name
+from vibsim.observe import predicted_oscillation
+from vibsim.observe.member_block import plain_name, stored
 
 if TYPE_CHECKING:
     from vibsim.experiment.schema.checks import ConvergesCheck
 
+CAUSES = (
+    *("none", "last_point", "one_quantity", "everything", "special_times", "one_norm", "theory"),
+    *("stored", "still", "pulse", "noise", "decay"),
+)
+"""What was found; files hold a position here."""
+NONE, LAST_POINT, ONE_QUANTITY, EVERYTHING, SPECIAL_TIMES, ONE_NORM, THEORY = range(7)
+STORED, STILL, PULSE, NOISE, DECAY = range(7, len(CAUSES))
+
+UNSEEN = ("pre_asymptotic", "not_applicable")
+"""What is said of a motion that lies still wherever levels are compared."""
+ROUGH = ("pre_asymptotic", "non_smooth")
+"""What is said where the force has a pulse that no level sees."""
+
 
 def judgement(q: Comparison, norm: str) -> Judgement:
     """Judge a quantity by the order that its scheme promises."""
-    key = norm, "scheme", TOLERANCE
-    if key not in q.judged:
-        q.judged[key] = judge(evidence(q, norm, q.order, TOLERANCE))
-    return q.judged[key]
+    if norm not in q.judged:
+        q.judged[norm] = judge(evidence(q, norm, q.order, TOLERANCE))
+    return q.judged[norm]
 
 
 def judge_check(q: Comparison, check: ConvergesCheck) -> Judgement:
@@ -44,28 +67,15 @@ def order_of(q: Comparison, check: ConvergesCheck) -> Floats:
 
 
 def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evidence:
-    """Collect the evidence on a quantity in a norm.
-
-    Parameters
-    ----------
-    q
-        The quantity, compared between levels.
-    norm
-        One of `vocabulary.NORMS`.
-    order
-        The order that is expected, shape (scheme, 1 or case).
-    tolerance
-        How far from it an order may be.
-
-    Returns
-    -------
-    Evidence
-        Arrays of shape (scheme, case, ...).
-    """
+    """Collect the evidence on a quantity in a norm, for the order that is expected, shape (scheme, 1 or case)."""
     block, measured = q.block, q.in_norm(norm)
     grid, shape = block.grid, block.shape
     points = len(grid.t)
-    size, exists = _size(q.values[-1])
+    size, exists = largest(q.values[-1]), np.ones(shape, dtype=bool)
+    if not np.all(np.isfinite(size)):
+        # of a member that has broken down, what there is of it
+        finest = q.values[-1]
+        size, exists = largest(np.nan_to_num(finest)), np.any(np.isfinite(finest), axis=-1)
     if plain_name(q.name) in ENERGIES or is_error_part(q.name):
         # what is left of an energy is known no better than the energy, and a part of an error no better than the motion
         size = q.scale
@@ -123,8 +133,12 @@ def _motion(q: Comparison, order: Floats, size: Floats) -> tuple[Floats, Flags]:
 
     What is promised to stay as it is, or is a part of an error, shows a scheme where the positions move.
     """
-    moved, straight = _moved(q.values[-1], size)
-    block = q.block
+    # the start is the same on every level: what lies still at all other common times shows nothing of a scheme
+    block, later = q.block, q.values[-1][..., 1:]
+    with np.errstate(all="ignore"):
+        change = np.asarray(np.max(later, axis=-1) - np.min(later, axis=-1))
+        bend = np.max(np.abs(np.diff(later, 2, axis=-1)), axis=-1, initial=0.0)
+        moved, straight = change / size, np.asarray(bend <= STRAIGHT * change)
     whole = [name for name in block.model.positions if f"{name}_max" in block.finest]
     if not whole:
         return moved, straight
@@ -135,21 +149,123 @@ def _motion(q: Comparison, order: Floats, size: Floats) -> tuple[Floats, Flags]:
     return np.where(exactly, np.fmax.reduce(of_states), moved), straight & ~exactly
 
 
-def _moved(finest: Floats, size: Floats) -> tuple[Floats, Flags]:
-    """Return by which part of its size a solution changes behind the start, and whether in a straight line.
+def causes(
+    q: Comparison,
+    others: Mapping[str, Comparison],
+    judged: Judgement,
+    norm: str,
+    order: Floats,
+    tolerance: float,
+) -> Codes:
+    """Return why orders are too low, too high, or not seen, as positions in `CAUSES`, shape (scheme, case).
 
-    The start is the same on every level: what lies still at all other common times shows nothing of a scheme.
+    Parameters
+    ----------
+    q, others
+        The quantity, compared between levels, and the quantities beside it.
+    judged
+        The verdict on it.
+    norm, order, tolerance
+        The norm, the expected order (which broadcasts against (scheme, case)) and its tolerance.
     """
-    later = finest[..., 1:]
-    with np.errstate(all="ignore"):
-        change = np.asarray(np.max(later, axis=-1) - np.min(later, axis=-1))
-        bend = np.max(np.abs(np.diff(later, 2, axis=-1)), axis=-1, initial=0.0)
-        return change / size, np.asarray(bend <= STRAIGHT * change)
+    shape = judged.reason.shape
+    found = np.full(shape, NONE, dtype=np.int8)
+
+    def has(*reasons: str) -> Flags:
+        return np.isin(judged.reason, [REASON_NAMES.index(word) for word in reasons])
+
+    low, high, lost, unseen = has("order_low"), has("order_high"), has("round_off"), has(*UNSEEN)
+    coarse = has("pre_asymptotic")
+    if np.any(lost | unseen | coarse):
+        e = evidence(q, norm, order, tolerance)
+        found[lost & (e.difference[..., -1] > ABOVE_ROUND_OFF * floor_of_pairs(e)[..., -1])] = NOISE
+        if q.block.stored_floor[-1] > 0.0:
+            found[lost] = STORED
+        found[unseen & at_rest(e)] = STILL
+        found[coarse & unresolved(e) & (found == NONE)] = DECAY
+    found[has(*ROUGH) & np.isfinite(q.block.missed.time)] = PULSE
+    if not np.any(low | high):
+        return found
+    wanted, model = np.broadcast_to(order, shape), q.block.model
+    beside = [state.name for state in model.states if state.name != q.name and state.name in others]
+
+    def near(of: Comparison, kind: str, order: Floats) -> Flags:
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.abs(judgement(of, kind).order - order) <= tolerance)
+
+    def is_usual(names: Iterable[str]) -> Flags:
+        """Say where one of other states has the expected order."""
+        return np.asarray(np.any([near(others[name], norm, wanted) for name in names], axis=0))
+
+    def is_alike() -> Flags:
+        """Say where every state has the order of the quantity: one of which nothing is known need not."""
+        return np.asarray(
+            np.all([near(others[name], norm, judged.order) for name in beside], axis=0)
+        )
+
+    if np.any(low):
+        inside = near(q, "linf_interior", wanted) & (norm != "linf_interior")
+        kinds = [(inside, LAST_POINT), (is_usual(beside), ONE_QUANTITY), (is_alike(), EVERYTHING)]
+        found = np.where(low, _first(kinds, shape), found)
+    if np.any(high):
+        # frequency and growth are those of the position: one of the expected order says that they are not the cause
+        positions = [name for name in beside if name in model.positions]
+        in_other_norm = [near(q, other, wanted) for other in NORMS if other != norm]
+        same = np.all([near(q, other, judged.order) for other in NORMS], axis=0)
+        kinds = [
+            (_at_rest(q, others), SPECIAL_TIMES),
+            (_in_theory(q, judged) & ~is_usual(positions), THEORY),
+            (np.any(in_other_norm, axis=0), ONE_NORM),
+            (is_usual(beside), ONE_QUANTITY),
+            (is_alike() & same, EVERYTHING),
+        ]
+        found = np.where(high, _first(kinds, shape), found)
+    return found.astype(np.int8)
 
 
-def _size(finest: Floats) -> tuple[Floats, Flags]:
-    """Return the largest value of the finest level, and whether it has a finite one, shape (scheme, case)."""
-    size = largest(finest)
-    if np.all(np.isfinite(size)):
-        return size, np.ones(size.shape, dtype=bool)
-    return largest(np.nan_to_num(finest)), np.any(np.isfinite(finest), axis=-1)
+def _first(kinds: list[tuple[Flags, int]], shape: tuple[int, ...]) -> Codes:
+    """Return the first cause that applies, `NONE` where none is seen."""
+    masks = [np.broadcast_to(mask, shape) for mask, _ in kinds]
+    return np.asarray(np.select(masks, [code for _, code in kinds], NONE), dtype=np.int8)
+
+
+def _at_rest(q: Comparison, others: Mapping[str, Comparison]) -> Flags:
+    """Say where the rate of change of a state vanishes at every common time, but not between them."""
+    block, model = q.block, q.block.model
+    name = ""
+    if q.name in model.positions:
+        name = model.velocities[model.positions.index(q.name)]
+    elif q.name in model.velocities and model.linear and model.conservative:
+        # u'' = -w^2 u
+        name = model.positions[model.velocities.index(q.name)]
+    if name not in others:
+        return np.zeros(block.shape, dtype=bool)
+    rate = others[name].exact
+    if rate is None:
+        rate = others[name].extrapolation[0]
+    # over every step; data of other programs do not tell
+    low, high = (stored(block.finest, f"{name}_{end}", block.shape) for end in ("min", "max"))
+    most = np.maximum(np.abs(low), np.abs(high))
+    with np.errstate(invalid="ignore"):
+        return np.asarray((most > 0) & (largest(rate) <= VANISHING_RATE * most))
+
+
+def _in_theory(q: Comparison, judged: Judgement) -> Flags:
+    """Say where the theory of the scheme has the measured order too: of its frequency and its growth."""
+    block, theory = q.block, predicted_oscillation
+    if not theory.is_simple(block) or len(block.grid.levels) < 2:
+        return np.zeros(block.shape, dtype=bool)
+    coarse, fine = block.grid.levels[-2:]
+    # a phase error in units of 1/w: a time would be small in small units alone
+    w = theory.natural_frequency(block)
+    phases = [theory.phase_error(block, level) * w for level in (coarse, fine)]
+    growths = [theory.growth_per_period(block, level) - 1.0 for level in (coarse, fine)]
+    orders = []
+    for found in (phases, growths):
+        errors = np.abs(found)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            fall = np.log2(safe_ratio(errors[0], errors[1])) / (fine - coarse)
+        exact = np.all(errors <= THEORY_ROUNDING, axis=0)
+        orders.append(np.where(exact, np.inf, fall))
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.abs(np.minimum(*orders) - judged.order) <= HALF_SPACING)

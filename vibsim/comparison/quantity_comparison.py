@@ -26,13 +26,10 @@ class InNorm:
     """A quantity in a norm over time."""
 
     difference: Floats  # of successive levels, shape (scheme, case, pair)
-    # of successive differences (`differences.scatters`), shape (scheme, case, triple)
-    scatter: Floats
-    # exact less computed, shape (scheme, case, level); NaN where the exact solution is not known
-    error: Floats
+    scatter: Floats  # of the triples (`differences.scatters`), shape (scheme, case, triple)
+    error: Floats  # exact less computed, shape (scheme, case, level); NaN where not known
     extrapolation: Floats  # exact less extrapolated, shape (scheme, case)
-    # of the errors of successive levels, shape (scheme, case, pair); NaN for other numbers of levels than `FEW_LEVELS`
-    error_scatter: Floats
+    error_scatter: Floats  # the same of `FEW_LEVELS` errors, shape (scheme, case, pair); else NaN
 
 
 @dataclass(frozen=True)
@@ -48,10 +45,9 @@ class Comparison:
     order: Floats  # formal order, shape (scheme, 1 or case)
     floor: Floats  # predicted round-off at one point, shape (scheme, case, level)
     scale: Floats  # size that round-off is relative to, shape (scheme, case)
-    # what the measurement of the quantity is off by, rounding apart, shape (scheme, case, level); None for nothing
-    blur: Floats
-    # judgements made so far, by norm, order and tolerance
-    judged: dict[tuple[str, str, float], Judgement] = field(default_factory=dict, repr=False)
+    blur: Floats  # what it is measured wrong by, rounding apart, shape (scheme, case, level)
+    # judgements by the promised order that were made so far, by norm
+    judged: dict[str, Judgement] = field(default_factory=dict, repr=False)
     _norms: dict[str, InNorm] = field(default_factory=dict, repr=False)
 
     @property
@@ -109,9 +105,8 @@ class Comparison:
             return np.zeros(self.block.shape, dtype=bool)
         d = self.differences[-1]
         least = th.VANISHING_POINT * differences.largest(d)[..., None]
-        return np.asarray(
-            np.count_nonzero((d > least) | (d < -least), axis=-1) <= th.SHAPELESS_POINTS
-        )
+        count = np.count_nonzero((d > least) | (d < -least), axis=-1)
+        return np.asarray(count <= th.SHAPELESS_POINTS)
 
     def in_norm(self, kind: str) -> InNorm:
         """Measure the quantity in a norm."""
@@ -120,14 +115,9 @@ class Comparison:
         return self._norms[kind]
 
     def combined(self, kind: str, rows: Flags, first: int, weights: Floats) -> Floats:
-        """Return the norm of a weighted sum of successive differences, shape (count of rows,).
+        """Return the norm of a weighted sum of successive differences from a first one on, shape (count of rows,).
 
-        Parameters
-        ----------
-        rows
-            Which schemes and members, shape (scheme, case).
-        first
-            The difference that the first weight belongs to.
+        `rows` says of which schemes and members, shape (scheme, case).
         """
         grid = self.block.grid
         parts = zip(weights, self.differences[first:], strict=False)
@@ -136,28 +126,26 @@ class Comparison:
         return differences.norm(whole, kind, spacing, grid.end_included)
 
     def _measured(self, kind: str) -> InNorm:
-        grid, shape = self.block.grid, self.block.shape
-        none = np.empty((*shape, 0))
+        grid, shape, errors = self.block.grid, self.block.shape, self.errors
+
+        def stacked(rows: list[Floats]) -> Floats:
+            return by_level(rows) if rows else np.empty((*shape, 0))
 
         def size(of: Floats) -> Floats:
             return differences.norm(of, kind, grid.spacing, grid.end_included)
 
-        levels, d = len(grid.levels), self.differences
-        unknown = np.full((*shape, levels), np.nan)
-        scatters = differences.scatters(d, kind, grid.end_included) if len(d) > 1 else []
-        errors = self.errors if levels == th.FEW_LEVELS else None
+        def scatters(series: list[Floats]) -> Floats:
+            return stacked(differences.scatters(series, kind, grid.end_included))
+
+        unknown = np.full((*shape, len(grid.levels)), np.nan)
+        few = errors if len(grid.levels) == th.FEW_LEVELS else None
+        of_limit = None if self.exact is None else self.exact - self.extrapolation[0]
         return InNorm(
-            difference=by_level([size(x) for x in d]) if d else none,
-            scatter=by_level(scatters) if scatters else none,
-            error=unknown if self.errors is None else by_level([size(e) for e in self.errors]),
-            extrapolation=(
-                unknown[..., 0] if self.exact is None else size(self.exact - self.extrapolation[0])
-            ),
-            error_scatter=(
-                unknown[..., 1:]
-                if errors is None
-                else by_level(differences.scatters(errors, kind, grid.end_included))
-            ),
+            difference=stacked([size(x) for x in self.differences]),
+            scatter=scatters(self.differences),
+            error=unknown if errors is None else stacked([size(e) for e in errors]),
+            extrapolation=unknown[..., 0] if of_limit is None else size(of_limit),
+            error_scatter=unknown[..., 1:] if few is None else scatters(few),
         )
 
     @cached_property
@@ -165,12 +153,11 @@ class Comparison:
         """Relative distance of the rescaled differences, shape (scheme, case, triple); NaN without a finite order."""
         levels = self.block.grid.levels
         order = np.where(np.isinf(self.order), np.nan, self.order)
-        return by_level(
-            [
-                differences.coincidence(a, b, differences.target_ratio(order, levels[i : i + 3]))
-                for i, (a, b) in enumerate(pairwise(self.differences))
-            ]
-        )
+        ratios = [
+            differences.target_ratio(order, levels[i : i + 3]) for i in range(len(levels) - 2)
+        ]
+        pairs = zip(pairwise(self.differences), ratios, strict=True)
+        return by_level([differences.coincidence(a, b, ratio) for (a, b), ratio in pairs])
 
     def ratios(self, kind: str) -> Floats:
         """Return the ratio of successive differences in a norm, shape (scheme, case, triple)."""
@@ -188,7 +175,9 @@ def comparisons(block: MemberBlock, names: tuple[str, ...]) -> Mapping[str, Comp
     apart = wanted(block, names)
     names = tuple(name for name in names if name not in apart)
     values = {name: block.series(name) for name in dict.fromkeys((*positions, *names))}
-    sizes = {"energy": _energy_size(block)}
+    # of the energy what it was plus what became of it
+    became = solution_size(block.series("energy_deviation"))
+    sizes = {"energy": np.abs(energy_at_start(block.finest)) + became}
     # what is rounded in one coordinate is felt by the others
     whole = [block.size(name, values[name], sizes) for name in positions]
     sizes |= {name: np.asarray(np.maximum.reduce(whole)) for name in positions}
@@ -210,8 +199,3 @@ def comparisons(block: MemberBlock, names: tuple[str, ...]) -> Mapping[str, Comp
             blur=np.zeros_like(floor),
         )
     return found | parts_of_errors(block, found, apart, Comparison)
-
-
-def _energy_size(block: MemberBlock) -> Floats:
-    """Return the size of the energy, shape (scheme, case): what it was plus what became of it."""
-    return np.abs(energy_at_start(block.finest)) + solution_size(block.series("energy_deviation"))

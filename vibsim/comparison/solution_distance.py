@@ -20,8 +20,10 @@ from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.array_types import Floats
 from vibsim.models import ENERGIES
-from vibsim.observe.member_block import CENTRED, MemberBlock, energy_at_start, plain_name
+from vibsim.observe.common_grid import whole
+from vibsim.observe.member_block import CENTRED, MemberBlock, energy_at_start, plain_name, stored
 from vibsim.observe.predicted_oscillation import is_simple, natural_frequency, steppers
+from vibsim.observe.sensitivity import in_columns
 from vibsim.schemes import SCHEMES
 
 if TYPE_CHECKING:
@@ -33,8 +35,7 @@ class Apart:
     """How far two solutions are from each other, in the unit of the quantity; NaN where one of them does not exist."""
 
     scheme: int  # number of the scheme that is compared
-    # at every stored time, shape (case, t); NaN where the quantity has no value, at the ends of ``[D_2t u]``
-    over_time: Floats
+    over_time: Floats  # shape (case, t); NaN without a value, at the ends of ``[D_2t u]``
     largest: Floats  # shape (case,)
     allowed: Floats  # what that may be, shape (case,)
 
@@ -45,8 +46,7 @@ def apart(block: MemberBlock, compared: Mapping[str, Comparison], check: EqualCh
     level = block.grid.levels[-1] if check.level is None else check.level
     first, name = names.index(check.first), check.quantity
     record = block.records[level]
-    missing = np.full((*block.shape, len(record["t"])), np.nan)
-    values = np.asarray(record[name], dtype=float) if name in record else missing
+    values = stored(record, name, (*block.shape, len(record["t"])))
     floor = ABOVE_ROUND_OFF * compared[name].floor[..., block.grid.levels.index(level)]
     bound = rounding(block, level, name, first, floor[first])
     if check.second in names:
@@ -72,13 +72,14 @@ def rounding(block: MemberBlock, level: int, name: str, scheme: int, floor: Floa
     if not is_simple(block) or plain in ENERGIES or block.adaptive[scheme]:
         return np.broadcast_to(floor, block.shape[1:])
     found = np.full(block.shape[1:], np.nan)
-    which = int(plain == block.model.velocity)
+    steps, numbers = _numbers(block, level)
     for options, where in steppers(block, scheme):
         stepper = SCHEMES[block.experiment.schemes[scheme].kind].stepper(options)
-        w, dt, u, v = (x[where] for x in _numbers(block, level))
-        bounds = theory.rounding_bound(stepper, w, dt, u, v, steps_of(block, level))
+        w, dt, u, v = (x[where] for x in numbers)
+        bounds = theory.rounding_bound(stepper, w, dt, u, v, steps)
         # the centred difference divides the rounding errors of two positions by 2 dt
-        found[where] = bounds[0] / dt if name.endswith(CENTRED) else bounds[which]
+        own = bounds[int(plain == block.model.velocity)]
+        found[where] = bounds[0] / dt if name.endswith(CENTRED) else own
     return found
 
 
@@ -87,17 +88,18 @@ def discrete(block: MemberBlock, level: int, name: str) -> Floats:
 
     Of a linear model without damping; NaN elsewhere, and for what is no state.
     """
-    record = block.records[level]
+    record, model = block.records[level], block.model
     found = np.full((*block.shape, len(record["t"])), np.nan)
-    if not is_simple(block) or name not in (block.model.position, block.model.velocity):
+    if not is_simple(block) or name not in (model.position, model.velocity):
         return found
-    which, steps = int(name == block.model.velocity), steps_of(block, level)
-    n = np.arange(len(record["t"])) * int(np.asarray(record.attrs["every"]).item())
+    steps, numbers = _numbers(block, level)
+    n = np.arange(len(record["t"])) * whole(record, "every")
     for i, scheme in enumerate(block.experiment.schemes):
         for options, where in steppers(block, i):
+            w, dt, u, v = (x[where] for x in numbers)
             stepper = SCHEMES[scheme.kind].stepper(options)
-            w, dt, u, v = (x[where] for x in _numbers(block, level))
-            found[i, where] = theory.discrete(stepper, w, dt, u, v, n, steps=steps)[which]
+            states = theory.discrete(stepper, w, dt, u, v, n, steps=steps)
+            found[i, where] = states[int(name == model.velocity)]
     return found
 
 
@@ -110,21 +112,13 @@ def discrete_error(block: MemberBlock, level: int, name: str) -> Floats:
         return np.asarray(np.max(np.abs(record[name] - discrete(block, level, name)), axis=-1))
 
 
-def steps_of(block: MemberBlock, level: int) -> int:
-    """Return the number of steps of a level."""
-    return block.grid.steps[block.grid.levels.index(level)]
-
-
-def _numbers(block: MemberBlock, level: int) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return w, dt and the initial position and velocity, each of shape (case,)."""
+def _numbers(block: MemberBlock, level: int) -> tuple[int, tuple[Floats, ...]]:
+    """Return the number of steps, and w, dt and the initial position and velocity, each of shape (case,)."""
     model, initial = block.model, block.group.initial
-    cases = block.shape[1:]
-    return (
-        np.broadcast_to(natural_frequency(block), cases),
-        np.broadcast_to(block.group.end / steps_of(block, level), cases),
-        np.broadcast_to(initial[model.position], cases),
-        np.broadcast_to(initial[model.velocity], cases),
-    )
+    steps = block.grid.steps[block.grid.levels.index(level)]
+    start = initial[model.position], initial[model.velocity]
+    numbers = natural_frequency(block), block.group.end / steps, *start
+    return steps, tuple(np.broadcast_to(x, block.shape[1:]) for x in numbers)
 
 
 def exact_series(block: MemberBlock, level: int, name: str) -> Floats:
@@ -133,21 +127,18 @@ def exact_series(block: MemberBlock, level: int, name: str) -> Floats:
     shape = (*block.shape, len(record["t"]))
     if plain == "energy" and model.conservative:
         return np.broadcast_to(energy_at_start(record)[..., None], shape)
-    n = np.arange(shape[-1]) * int(np.asarray(record.attrs["every"]).item())
-    t = n * (block.group.end / steps_of(block, level))[:, None]
-    initial, parameters = (
-        {key: values[:, None] for key, values in table.items()}
-        for table in (block.group.initial, block.group.parameters)
-    )
+    n = np.arange(shape[-1]) * whole(record, "every")
+    t = n * (block.group.end / block.grid.steps[block.grid.levels.index(level)])[:, None]
     if model.exact is not None:
-        states = model.exact(t, initial, parameters)
+        group = block.group
+        states = model.exact(t, in_columns(group.initial), in_columns(group.parameters))
     else:
         names = (model.position, model.velocity)
         states = {n: record[f"{n}_exact"] for n in names if f"{n}_exact" in record}
-    if plain in states:
-        return np.broadcast_to(np.asarray(states[plain]), shape)
-    found = known_values(model, plain, states, t, block.group)
-    return np.full(shape, np.nan) if found is None else np.broadcast_to(found, shape)
+    found = states.get(plain)
+    if found is None:
+        found = known_values(model, plain, states, t, block.group)
+    return np.broadcast_to(np.nan if found is None else np.asarray(found), shape)
 
 
 def _of_exact(block: MemberBlock, level: int, name: str, values: Floats) -> Floats:

@@ -18,14 +18,15 @@ from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.observe import oscillation, predicted_oscillation
-from vibsim.observe.member_block import MemberBlock, energy_at_start
+from vibsim.observe.common_grid import whole
+from vibsim.observe.member_block import MemberBlock, energy_at_start, stored
 
 
 @dataclass(frozen=True)
 class Place:
     """Where a value is taken, and what it may be taken from."""
 
-    block: MemberBlock  # the members
+    block: MemberBlock
     compared: Mapping[str, Comparison]  # quantities that were compared between levels
     quantity: str  # empty where the value is of none
     level: int | str | None
@@ -52,24 +53,27 @@ class Place:
         """Return the level Record that is asked for."""
         return None if self.at_level is None else self.block.records[self.at_level]
 
+    def gathered(self, name: str) -> Floats:
+        """Return what the level that is asked for holds of every member; NaN where it does not hold it."""
+        data = self.data()
+        return self.missing if data is None else stored(data, name, self.block.shape)
+
+    def of_quantity(self, which: str) -> Floats:
+        """Return what was gathered of the quantity over every step."""
+        return self.gathered(f"{self.quantity}_{which}")
+
     def comparison(self) -> Comparison | None:
         """Return the quantity as it was compared between levels."""
         return self.compared.get(self.quantity)
 
 
+Number = Callable[[Place], Any]
+
+
 def value(name: str, place: Place) -> Floats:
     """Return the number `name` at `place`, shape (scheme, case)."""
     found = np.asarray(KNOWN[name](place), dtype=np.float64)
-    return np.array(np.broadcast_to(found, place.missing.shape))
-
-
-def _sample(p: Place) -> Floats:
-    """Return the value of a series at a time, by default the last one."""
-    data = p.data()
-    if data is None or p.quantity not in data:
-        return p.missing
-    index = _index(p, data["t"], int(np.asarray(data.attrs["every"]).item()))
-    return p.missing if index is None else np.asarray(data[p.quantity][..., index], dtype=float)
+    return np.array(np.broadcast_to(found, place.block.shape))
 
 
 def samples(p: Place) -> list[Floats]:
@@ -92,49 +96,55 @@ def _index(p: Place, t: Floats, every: int) -> int | None:
     return index if abs(float(t[index]) - p.t) <= 1e-9 * float(t[-1]) else None
 
 
-def _gathered(name: str) -> Callable[[Place], Floats]:
-    def take(p: Place) -> Floats:
+def _needs_data(of: Callable[[Place, Record], Any]) -> Number:
+    """Return a number that is made of the Record of a level."""
+
+    def take(p: Place) -> Any:
         data = p.data()
-        return (
-            p.missing if data is None or name not in data else np.asarray(data[name], dtype=float)
-        )
+        return p.missing if data is None else of(p, data)
 
     return take
 
 
-def _of_quantity(which: str) -> Callable[[Place], Floats]:
-    """Return what was gathered of the quantity over every step."""
-
-    def take(p: Place) -> Floats:
-        return _gathered(f"{p.quantity}_{which}")(p)
-
-    return take
+def _at_level(of: Callable[[MemberBlock, int], Floats]) -> Number:
+    """Return what belongs to a level of the members."""
+    return lambda p: p.missing if p.at_level is None else of(p.block, p.at_level)
 
 
-def _extreme(which: str, of_series: Callable[..., Floats]) -> Callable[[Place], Floats]:
+@_needs_data
+def _sample(p: Place, data: Record) -> Floats:
+    """Return the value of a series at a time, by default the last one."""
+    if p.quantity not in data:
+        return p.missing
+    index = _index(p, data["t"], whole(data, "every"))
+    return p.missing if index is None else np.asarray(data[p.quantity][..., index], dtype=float)
+
+
+def _extreme(which: str, of_series: Callable[..., Floats]) -> Number:
     """Return what was gathered of a state over every step; of an output, that of its samples."""
 
-    def take(p: Place) -> Floats:
-        data = p.data()
-        outputs = {output.name for output in p.block.model.outputs}
-        if data is None or p.quantity not in outputs or p.quantity not in data:
-            return _of_quantity(which)(p)
+    def take(p: Place, data: Record) -> Any:
+        is_output = p.quantity in {output.name for output in p.block.model.outputs}
         # NaN where a member has failed
-        return np.asarray(of_series(data[p.quantity], axis=-1), dtype=float)
+        sampled = is_output and p.quantity in data
+        return of_series(data[p.quantity], axis=-1) if sampled else p.of_quantity(which)
 
-    return take
+    return _needs_data(take)
 
 
-def _max_abs(p: Place) -> Floats:
+@_needs_data
+def _max_abs(p: Place, data: Record) -> Floats:
     """Return the largest absolute value: gathered as such, or from the least and the largest value."""
-    data, name = p.data(), f"{p.quantity}_max_abs"
-    if data is not None and name in data:
-        return _gathered(name)(p)
-    low, high = (_of_quantity(which)(p) for which in ("min", "max"))
-    return np.asarray(np.maximum(np.abs(low), np.abs(high)))
+    if f"{p.quantity}_max_abs" in data:
+        return p.of_quantity("max_abs")
+    return np.asarray(np.maximum(*(np.abs(p.of_quantity(which)) for which in ("min", "max"))))
 
 
-def _fall(of: Callable[[Place], Floats]) -> Callable[[Place], Floats]:
+def _max_abs_interior(p: Place) -> Floats:
+    return p.of_quantity("max_abs_interior")
+
+
+def _fall(of: Number) -> Number:
     """Return how many times smaller a number is at the next finer level; by default the last two are compared."""
 
     def take(p: Place) -> Floats:
@@ -143,53 +153,24 @@ def _fall(of: Callable[[Place], Floats]) -> Callable[[Place], Floats]:
         if level not in levels[:-1]:
             return p.missing
         finer = levels[levels.index(int(level)) + 1]
-        coarse, fine = (of(replace(p, level=which)) for which in (level, finer))
-        return safe_ratio(coarse, fine)
+        return safe_ratio(*(of(replace(p, level=which)) for which in (level, finer)))
 
     return take
 
 
-def _quotient(top: str, bottom: str) -> Callable[[Place], Floats]:
-    def take(p: Place) -> Floats:
-        return safe_ratio(*np.broadcast_arrays(_gathered(top)(p), _gathered(bottom)(p)))
-
-    return take
-
-
-def _measured(of: Callable[[Record], Floats]) -> Callable[[Place], Floats]:
-    """Return what is measured of the Record of a level."""
-
-    def take(p: Place) -> Floats:
-        data = p.data()
-        return p.missing if data is None else of(data)
-
-    return take
-
-
-def _at_level(of: Callable[[MemberBlock, int], Floats]) -> Callable[[Place], Floats]:
-    """Return what belongs to a level of the members."""
-
-    def take(p: Place) -> Floats:
-        return p.missing if p.at_level is None else of(p.block, p.at_level)
-
-    return take
-
-
-def _own_norm(p: Place) -> Floats:
+@_needs_data
+def _own_norm(p: Place, data: Record) -> Floats:
     """Return ``sqrt(dt sum (u_exact - u)^2 / T)`` over the stored points of a level (vibration text, section 2.2)."""
-    data = p.data()
-    if data is None or p.at_level is None:
-        return p.missing
-    error = exact_series(p.block, p.at_level, p.quantity) - np.asarray(
-        data[p.quantity], dtype=float
-    )
+    exact = exact_series(p.block, whole(data, "level"), p.quantity)
+    error = exact - np.asarray(data[p.quantity], dtype=float)
     return np.asarray(np.sqrt(np.sum(error**2, axis=-1) / (error.shape[-1] - 1)))
 
 
-def _second_difference(p: Place) -> Floats:
+@_needs_data
+def _second_difference(p: Place, data: Record) -> Floats:
     """Return ``E = [D_tD_t u]/u''`` of the exact position by least squares (vibration text, exercise 7)."""
-    data, position = p.data(), p.block.model.position
-    if data is None or f"{position}_exact" not in data or int(np.asarray(data.attrs["every"])) != 1:
+    position = p.block.model.position
+    if f"{position}_exact" not in data or whole(data, "every") != 1:
         return p.missing
     exact = np.asarray(data[f"{position}_exact"])
     inner = exact[..., 1:-1]
@@ -198,46 +179,28 @@ def _second_difference(p: Place) -> Floats:
     return safe_ratio(-np.sum((ahead - behind) * inner, axis=-1), squares)
 
 
-def _running_max(p: Place) -> Floats:
+def _running_max(p: Place) -> Any:
     """Return the largest deviation so far; at the end it is the largest of all, which is there without the series."""
-    data, name = p.data(), f"{p.quantity}_running_max"
     at_end = p.t is None and p.step is None
-    return _max_abs(p) if at_end or data is None else _sample(replace(p, quantity=name))
+    return _max_abs(p) if at_end else _sample(replace(p, quantity=f"{p.quantity}_running_max"))
 
 
-def _over_initial(of: Callable[[Place], Floats]) -> Callable[[Place], Floats]:
+def _over_initial(of: Number) -> Number:
     """Return a number over the size of the energy at the start."""
 
-    def take(p: Place) -> Floats:
-        data = p.data()
-        if data is None:
-            return p.missing
+    def take(p: Place, data: Record) -> Floats:
         return safe_ratio(*np.broadcast_arrays(of(p), np.abs(energy_at_start(data))))
 
-    return take
+    return _needs_data(take)
 
 
-def _energy_error_d2t(p: Place) -> Floats:
-    data = p.data()
-    return p.missing if data is None else oscillation.energy_error_d2t(p.block, data)
-
-
-def _discrete_error(p: Place) -> Floats:
-    return p.missing if p.at_level is None else discrete_error(p.block, p.at_level, p.quantity)
-
-
-def _period_error(p: Place) -> Floats:
-    return _quotient("period", "exact_period")(p) - 1.0
-
-
-def _error(norm: str) -> Callable[[Place], Floats]:
+def _error(norm: str) -> Number:
     def take(p: Place) -> Floats:
         q = p.comparison()
         if q is None:
             return p.missing
-        if p.level == "best":
-            return q.in_norm(norm).extrapolation
-        return _along(p, q.in_norm(norm).error)
+        found = q.in_norm(norm)
+        return found.extrapolation if p.level == "best" else _along(p, found.error)
 
     return take
 
@@ -249,7 +212,7 @@ def _along(p: Place, found: Floats) -> Floats:
     return found[..., levels.index(level)] if level in levels else p.missing
 
 
-def _of_triple(of: Callable[[Comparison], Floats]) -> Callable[[Place], Floats]:
+def _of_triple(of: Callable[[Comparison], Floats]) -> Number:
     def take(p: Place) -> Floats:
         q = p.comparison()
         return p.missing if q is None or len(p.levels) < 3 else _along(p, of(q))
@@ -273,19 +236,27 @@ def _richardson_error(p: Place) -> Floats:
     return p.missing if q is None else q.largest_bound
 
 
-KNOWN: Mapping[str, Callable[[Place], Any]] = {
+def _gathered(name: str) -> Number:
+    return lambda p: p.gathered(name)
+
+
+GATHERED = (
+    *("period", "period_grid", "exact_period", "amplitude"),
+    *("event_count", "first_event_time", "last_event_time", "rest_time"),
+)
+"""Numbers that the levels hold under their own names."""
+
+KNOWN: Mapping[str, Number] = {
+    **{name: _gathered(name) for name in GATHERED},
     "end": _sample,
     "at": _sample,
     "min": _extreme("min", np.min),
     "max": _extreme("max", np.max),
     "max_abs": _max_abs,
-    "max_abs_interior": _of_quantity("max_abs_interior"),
+    "max_abs_interior": _max_abs_interior,
     "max_abs_ratio": _fall(_max_abs),
-    "max_abs_interior_ratio": _fall(_of_quantity("max_abs_interior")),
-    "period": _gathered("period"),
-    "period_grid": _gathered("period_grid"),
-    "exact_period": _gathered("exact_period"),
-    "period_error": _period_error,
+    "max_abs_interior_ratio": _fall(_max_abs_interior),
+    "period_error": lambda p: safe_ratio(p.gathered("period"), p.gathered("exact_period")) - 1.0,
     "running_max": _running_max,
     "relative_running_max": _over_initial(_running_max),
     "frequency": _at_level(oscillation.frequency),
@@ -293,25 +264,22 @@ KNOWN: Mapping[str, Callable[[Place], Any]] = {
     "error_of_frequency": _at_level(oscillation.error_of_frequency),
     "phase_error_per_period": _at_level(oscillation.phase_error),
     "predicted_phase_error": _at_level(predicted_oscillation.phase_error),
-    "phase_error_slope": _measured(oscillation.phase_error_slope),
-    "amplitude": _gathered("amplitude"),
-    "amplitude_error": _measured(oscillation.amplitude_error),
-    "growth_factor": _measured(oscillation.growth_factor),
+    "phase_error_slope": _needs_data(lambda p, data: oscillation.phase_error_slope(data)),
+    "amplitude_error": _needs_data(lambda p, data: oscillation.amplitude_error(data)),
+    "growth_factor": _needs_data(lambda p, data: oscillation.growth_factor(data)),
     "growth_per_period": _at_level(oscillation.growth_per_period),
     "predicted_growth_per_period": _at_level(predicted_oscillation.growth_per_period),
     "stability_limit": lambda p: predicted_oscillation.limits(p.block),
     "exact_degree": lambda p: predicted_oscillation.exact_degrees(p.block),
     "relative_energy_error": _over_initial(_gathered("energy_deviation_max_abs")),
-    "relative_energy_error_d2t": _over_initial(_energy_error_d2t),
-    "event_count": _gathered("event_count"),
-    "first_event_time": _gathered("first_event_time"),
-    "last_event_time": _gathered("last_event_time"),
-    "rest_time": _gathered("rest_time"),
+    "relative_energy_error_d2t": _over_initial(
+        _needs_data(lambda p, data: oscillation.energy_error_d2t(p.block, data))
+    ),
     "accepted_steps": _at_level(oscillation.steps_taken),
     "force_evaluations": _at_level(oscillation.force_evaluations),
     "error_rate": lambda p: np.log2(_fall(_own_norm)(p)),
     "second_difference_fraction": _second_difference,
-    "discrete_error": _discrete_error,
+    "discrete_error": lambda p: _at_level(lambda b, level: discrete_error(b, level, p.quantity))(p),
     "error_l1": _error("l1"),
     "error_l2": _error("l2"),
     "error_linf": _error("linf"),

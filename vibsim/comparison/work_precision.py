@@ -20,10 +20,8 @@ from vibsim.comparison.comparison_variables import Table
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Variable, attributes
+from vibsim.observe import oscillation
 from vibsim.observe.member_block import MemberBlock, by_level
-from vibsim.schemes import SCHEMES
-
-OF_LEVEL = ("scheme", "case", "level")
 
 
 def work_precision(block: MemberBlock, found: Mapping[str, Comparison]) -> Table:
@@ -40,35 +38,28 @@ def work_precision(block: MemberBlock, found: Mapping[str, Comparison]) -> Table
         ``work_steps``, ``work_force_evaluations`` and ``work_error``, shape (scheme, case, level), and
         ``work_reference_error``, shape (case,): 0 where the exact solution is known, else the bound of the reference.
     """
-    position = found[block.model.position]
+    position, levels = found[block.model.position], block.grid.levels
     reference, bound = reference_of(position)
     errors = by_level([np.max(np.abs(u - reference), axis=-1) for u in position.values])
-    steps, forces = _work(block)
+    steps = by_level([oscillation.steps_taken(block, level) for level in levels])
+    forces = by_level([oscillation.force_evaluations(block, level) for level in levels])
     is_exact = position.exact is not None
-    for values in (steps, forces, errors):
-        values[block.adaptive, :, :-1] = np.nan
     words = "the exact solution" if is_exact else "the best extrapolation"
-    once = "; of an adaptive scheme once, at the finest level"
-    units = position.units
-    rows = {
-        "work_steps": (steps, attributes(f"steps that were taken{once}", "1")),
-        "work_force_evaluations": (
-            forces,
-            attributes(
-                f"evaluations of the acceleration, of an implicit scheme per iteration{once}", "1"
-            ),
-        ),
-        "work_error": (
-            errors,
-            attributes(
-                f"largest distance of the {position.long_name} from {words}{once}",
-                units,
-                reference="exact" if is_exact else "Richardson",
-            ),
-        ),
-    }
-    table = {name: Variable(OF_LEVEL, values, attrs) for name, (values, attrs) in rows.items()}
-    attrs = attributes(f"largest error bound of {words}", units)
+    reference_name = {"reference": "exact" if is_exact else "Richardson"}
+    of_forces = "evaluations of the acceleration, of an implicit scheme per iteration"
+    of_error = f"largest distance of the {position.long_name} from {words}"
+    table = {}
+    for name, values, text, units, more in (
+        ("work_steps", steps, "steps that were taken", "1", {}),
+        ("work_force_evaluations", forces, of_forces, "1", {}),
+        ("work_error", errors, of_error, position.units, reference_name),
+    ):
+        values[block.adaptive, :, :-1] = np.nan
+        attrs = attributes(
+            f"{text}; of an adaptive scheme once, at the finest level", units, **more
+        )
+        table[name] = Variable(("scheme", "case", "level"), values, attrs)
+    attrs = attributes(f"largest error bound of {words}", position.units)
     return table | {"work_reference_error": Variable(("case",), bound, attrs)}
 
 
@@ -85,17 +76,3 @@ def reference_of(position: Comparison) -> tuple[Floats, Floats]:
     known = np.isfinite(smallest)
     reference = np.where(known[:, None], value[best, case], np.nan)
     return reference, np.where(known, smallest, np.nan)
-
-
-def _work(block: MemberBlock) -> tuple[Floats, Floats]:
-    """Return steps and evaluations of the acceleration, shape (scheme, case, level)."""
-    schemes = [SCHEMES[scheme.kind] for scheme in block.experiment.schemes]
-    shape = (*block.shape, len(block.grid.levels))
-    steps = np.broadcast_to(np.asarray(block.grid.steps, dtype=np.float64), shape).copy()
-    per_step = np.array([scheme.force_evaluations for scheme in schemes], dtype=np.float64)
-    forces = steps * per_step[:, None, None]
-    if block.adaptive.any():
-        own = block.adaptive
-        steps[own] = block.finest["accepted_steps"][own][..., None]
-        forces[own] = block.finest["force_evaluations_total"][own][..., None]
-    return steps, forces

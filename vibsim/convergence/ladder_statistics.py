@@ -33,8 +33,7 @@ class Evidence:
     blur: Floats  # how well the quantity is measured at every level, rounding apart, shape (..., n)
     promised: Floats  # the order of the scheme, infinite or NaN where it promises none
     special: Floats  # the highest order of the scheme in a special case
-    # norms of weighted sums of differences: of ladders, from a pair on, with weights
-    combined: Callable[[Flags, int, Floats], Floats]
+    combined: Callable[[Flags, int, Floats], Floats]  # norms of weighted sums of differences
     numbers: Flags  # whether the series are single numbers: no more than two points count
     failed: Flags  # whether a member broke down, shape (..., n)
     applicable: Flags  # whether the quantity exists

@@ -102,8 +102,7 @@ class Best(NamedTuple):
 
     position: Any
     velocity: Any
-    # bound of the error of the position, and over w of the velocity; infinite where nothing is known
-    error: Any
+    error: Any  # bound for the position, and over w the velocity; infinite if not known
     # which entry: its row times the number of levels, plus its column. Where nothing is known of the error, the finest
     # level; -1 where that has failed
     entry: Any

@@ -51,8 +51,7 @@ class Judgement:
     high: Floats  # upper end of its interval
     first: Integers  # coarsest level that the order rests on; -1 where there is no order
     last: Integers  # finest level that the order rests on; -1 where there is no order
-    # the coarsest level that failed, or whose w dt is beyond the limit; -1 where there is none
-    culprit: Integers
+    culprit: Integers  # the coarsest level that failed, or is beyond the limit; -1 for none
     orders: Floats = field(repr=False)  # local order of every triple, shape (..., n-2)
 
 

@@ -5,8 +5,7 @@ its own error. `best` gives the extrapolated solution of an experiment in memory
 levels of an experiment that names a tolerance. `solve` is what both stand on.
 """
 
-from vibsim.comparison.extrapolate_members import Extrapolated
-from vibsim.comparison.member_method import Method, Start
+from vibsim.comparison.extrapolate_members import Extrapolated, Method, Start
 from vibsim.ladder.choosing import resolve
 from vibsim.ladder.product import best
 from vibsim.ladder.solving import climb, solve

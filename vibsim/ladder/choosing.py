@@ -21,11 +21,12 @@ from vibsim import plan
 from vibsim.comparison.best_solution import methods, start_of
 from vibsim.comparison.extrapolate_members import (
     Extrapolated,
+    Method,
+    Start,
     extrapolate_members,
     level_at,
     noise_of,
 )
-from vibsim.comparison.member_method import Method, Start
 from vibsim.convergence.state_extrapolation import Pair
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.errors import Fault, InputError, VibsimError

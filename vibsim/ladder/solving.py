@@ -8,12 +8,14 @@ import numpy as np
 
 from vibsim.comparison.extrapolate_members import (
     Extrapolated,
+    Method,
+    Start,
     extrapolate_members,
     inverse_power,
     level_at,
     noise_of,
+    rate_of,
 )
-from vibsim.comparison.member_method import Method, Start, rate_of
 from vibsim.convergence.state_extrapolation import FLOATS, Circumstances, Pair, best_entry
 from vibsim.convergence.thresholds import KNOWN_DIGIT
 from vibsim.core.array_types import Floats

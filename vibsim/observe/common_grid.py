@@ -39,10 +39,8 @@ class Grid:
     levels: tuple[int, ...]  # strictly increasing
     steps: tuple[int, ...]  # number of steps of every level
     strides: tuple[int, ...]  # distance between common points, in stored samples of each level
-    # common times, shape (t,); fractions of the end time where the end differs between members
-    t: Floats
-    # step of every level, shape (level, case), with one case where all members have the same
-    dt: Floats
+    t: Floats  # common times, shape (t,); fractions of the end where that differs between members
+    dt: Floats  # shape (level, case), with one case where all members have the same
     apart: int  # distance between common points, in steps of the coarsest level
     end_included: bool  # whether the last common point is the end of the time interval
 

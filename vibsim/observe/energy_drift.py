@@ -157,18 +157,15 @@ def drift_of(
         means = _means(running)
         rise, k = _rise(means)
         fall, k_log = _power(np.abs(change))
-        last = change[..., -2]
-        gone = (np.abs(ratio * energy[..., None])[..., -2] < th.SMALLEST_NORMAL) & (
-            np.abs(energy) > th.SMALLEST_NORMAL
-        )
+        last, left = change[..., -2], np.abs(ratio * energy[..., None])[..., -2]
+        gone = (left < th.SMALLEST_NORMAL) & (np.abs(energy) > th.SMALLEST_NORMAL)
     size = np.where(np.isfinite(end) & (end > 0), end, 1.0)
     allowed = np.broadcast_to(ABOVE_ROUND_OFF * floor, end.shape)
     still = _is_still(rise, k, size)
     if deviation is not None:
         # M stands still until a drift has overtaken an oscillation to the other side, and is of no power then
-        widens = (still | ~(_is_near(k, 1) | _is_near(k, 2))) & (
-            samples >= th.LEAST_PER_PERIOD * periods
-        )
+        widens = still | ~(_is_near(k, 1) | _is_near(k, 2))
+        widens &= samples >= th.LEAST_PER_PERIOD * periods
         of_range = _means(_range(deviation))
         widens &= ~_is_still(*_rise(of_range), size)
         means = np.where(widens[..., None], of_range, means)
@@ -198,19 +195,12 @@ def drift_of(
         per_sample, k[at] = _decay(change[at], np.abs(ratio[at] * energy[at]) >= th.SMALLEST_NORMAL)
         if per_sample < 0:
             kind[at], of_log[at] = EXPONENTIAL, per_sample * samples / periods[at[-1]]
-    zero = np.zeros(end.shape)
-    rates = {NONE: zero, BOUNDED: zero, LINEAR: per_period, QUADRATIC: per_square}
-    rates[EXPONENTIAL] = of_log
-    rate = np.select([kind == code for code in rates], list(rates.values()), np.nan)
-    known = (kind != NONE) & ~unknown & ~short
-    return Drift(
-        kind.astype(np.int8),
-        rate,
-        np.where(known, k, np.nan),
-        safe_ratio(end, np.abs(energy)),
-        means,
-        allowed,
-    )
+    rates = {LINEAR: per_period, QUADRATIC: per_square, EXPONENTIAL: of_log}
+    still_or_none = np.where((kind == NONE) | (kind == BOUNDED), 0.0, np.nan)
+    rate = np.select([kind == code for code in rates], list(rates.values()), still_or_none)
+    power = np.where((kind != NONE) & ~unknown & ~short, k, np.nan)
+    relative = safe_ratio(end, np.abs(energy))
+    return Drift(kind.astype(np.int8), rate, power, relative, means, allowed)
 
 
 def _is_near(k: Floats, power: int) -> Flags:

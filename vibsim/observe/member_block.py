@@ -54,12 +54,10 @@ class MemberBlock:
     lean: bool  # whether no series are kept
     norms: tuple[str, ...]  # the norms that are kept
     columns: Columns
-    # exact states on the common grid, shape (c, t); empty where they are not known
-    exact: Mapping[str, Floats]
+    exact: Mapping[str, Floats]  # states on the common grid, shape (c, t); empty if not known
     magnified: Floats  # factor by which disturbances grow, shape (c,)
     relative_floor: Floats  # predicted round-off relative to the solution, shape (s, 1 or c, l)
-    # round-off of storing relative to the solution, shape (l,): 0 for double precision, which the above knows
-    stored_floor: Floats
+    stored_floor: Floats  # of storing, relative to the solution, shape (l,): 0 for double precision
     omega_dt: Floats  # w dt, shape (c, l)
     fastest: Floats  # the same of the highest frequency, which a step has to resolve
     decay: Floats  # the largest rate at which damping takes a velocity away, shape (s, c)
@@ -67,12 +65,10 @@ class MemberBlock:
     group: Members  # the numbers of the members
     stability_limit: Floats  # largest stable w dt, infinite for none, shape (s, 1 or c)
     adaptive: Flags  # whether a scheme chooses its own steps and so has no levels, shape (s,)
-    # the power that is left of errors where the mesh decides what steps see, NaN elsewhere, shape (s, 1 or c)
-    left_to_the_mesh: Floats
+    left_to_the_mesh: Floats  # power of errors where the mesh decides, else NaN, shape (s, 1 or c)
     corners: Corners  # where the force has its first corner within a step
     missed: Missed  # pulses of the force between the points of every level
-    # largest position over that of the exact motion, shape (s, c, l); NaN where not known
-    growth: Floats
+    growth: Floats  # largest position over the largest exact one, shape (s, c, l); NaN if not known
 
     @property
     def model(self) -> Model:
