@@ -22,10 +22,8 @@ from vibsim.simulation.scaled import has_time_unit
 
 MEMBER = ("scheme", "case")
 OF_LEVEL = ("scheme", "case", "level")
-ABOVE = 3.0
-"""A difference counts as more than round-off when it exceeds this many times the floor."""
-_LONGEST = 40
-"""Characters of the name of a scheme in the name of a file."""
+ABOVE = 3.0  # a difference counts as more than round-off when it exceeds this many times the floor
+_LONGEST = 40  # characters of the name of a scheme in the name of a file
 
 
 @dataclass(frozen=True)

@@ -17,16 +17,12 @@ from vibsim.core.record import Record
 from vibsim.report.data import swept, swept_label
 from vibsim.report.style import label
 
-FARTHEST = 1e100
-"""Swept values from here on are not drawn to scale."""
+FARTHEST = 1e100  # swept values from here on are not drawn to scale
 WIDE = 30.0
 """Positive values are drawn on a logarithmic axis only where the largest is so many times the least."""
-LINES = 6
-"""Most lines that the other parameters of a sweep may make."""
-CELLS = 400
-"""Most cells along each side of a map: more than its pixels could show."""
-BINS = 8, 100
-"""Least and most cells along each side of a map of members that lie on no grid."""
+LINES = 6  # most lines that the other parameters of a sweep may make
+CELLS = 400  # most cells along each side of a map: more than its pixels could show
+BINS = 8, 100  # least and most cells along each side of a map of members that lie on no grid
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,19 +21,12 @@ from vibsim.report.data import Member, at, pick, time_label, times, unit, whole
 from vibsim.report.evidence import frame
 from vibsim.report.evidence.frame import brief, evidence, measured, short
 from vibsim.report.style import Picture
+from vibsim.report.types import Axes, ConservesCheck
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from vibsim.experiment.schema.checks import ConservesCheck
-
-WINDOWS = ((0.125, 0.25), (0.25, 0.5), (0.5, 1.0))
-"""In parts of the end, those of m3, m2 and m1."""
+WINDOWS = ((0.125, 0.25), (0.25, 0.5), (0.5, 1.0))  # in parts of the end, those of m3, m2 and m1
 NAMES = ("m₃", "m₂", "m₁")
-POWERS = {"linear": 1, "quadratic": 2}
-"""Of t, in proportion to which a drift grows."""
-LEAST = 1e-4
-"""Part of the time before which a logarithmic scale need not show the error."""
+POWERS = {"linear": 1, "quadratic": 2}  # of t, in proportion to which a drift grows
+LEAST = 1e-4  # part of the time before which a logarithmic scale need not show the error
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,11 +14,9 @@ from vibsim.report.evidence import frame
 from vibsim.report.evidence.frame import brief, evidence, measured, short
 from vibsim.report.style import Picture
 from vibsim.report.text import words
+from vibsim.report.text.assertions import SOLUTIONS
+from vibsim.report.types import EqualCheck
 
-if TYPE_CHECKING:
-    from vibsim.experiment.schema.checks import EqualCheck
-
-OTHERS = {"exact": "the exact solution", "discrete": "the exact solution of its own steps"}
 DIPS = 10.0
 """Percentage of the places whose difference is so small, near a zero, that the scale need not show it."""
 
@@ -32,7 +29,7 @@ def picture(record: Record, check: EqualCheck, name: str, member: Member) -> Pic
         measured(record, name, field, member.scheme, member.case)
         for field in ("allowed", "level", "distance")
     )
-    second = OTHERS.get(check.second, check.second)
+    second = SOLUTIONS.get(check.second, check.second)
     who = f"{member.title}, level {level:.0f}: its {words.symbol(check.quantity)}"
     if not np.isfinite(distance).any():
         return None

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from vibsim.checks.fields import name_of
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import DECISIVE
 from vibsim.report import style, sweep_layout
@@ -21,14 +22,9 @@ from vibsim.report.evidence import energy, equal, frame, order, stable, value
 from vibsim.report.evidence.frame import GrowthScale, evidence, usable
 from vibsim.report.style import Picture
 from vibsim.report.text import words
+from vibsim.report.types import Check, ConservesCheck, EqualCheck, Experiment, StableCheck
 
-if TYPE_CHECKING:
-    from vibsim.core.array_types import Floats
-    from vibsim.experiment import Check, Experiment
-    from vibsim.experiment.schema.checks import ConservesCheck, EqualCheck, StableCheck
-
-MANY = 60
-"""Up to so many members each has a dot; of more the range is drawn."""
+MANY = 60  # up to so many members each has a dot; of more the range is drawn
 ALONE = "a run of so many samples keeps no series over time, so that nothing is drawn: the number alone decides."
 BESIDE = {
     "stable": ("predicted_growth", "; orange is what theory predicts, for small oscillations"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,30 +19,20 @@ from vibsim.report.figures.separatrix import separatrix
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Grid
 from vibsim.report.text import words
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from vibsim.experiment import Experiment
+from vibsim.report.types import Axes, Experiment, Figure
 
 COLUMNS = 3
 LEFT, WIDE, TALL, GAP = 0.68, 2.52, 2.1, 0.27
 """Left margin, width and height of a panel, gap between panels [inch]."""
 ABOVE, BELOW = 0.32, 1.12
 """Room for the title above a panel, for ticks and the scale below it [inch]."""
-BORDERED = 400
-"""Most cells that are drawn one by one, with borders; more are one image."""
-DECADES = 12.0
-"""Most decades that a logarithmic scale spans, from the largest value down."""
+BORDERED = 400  # most cells that are drawn one by one, with borders; more are one image
+DECADES = 12.0  # most decades that a logarithmic scale spans, from the largest value down
 SPREAD = 20.0
 """Positive values that spread by more than this factor, but for a hundredth, have a logarithmic scale."""
-FEW = 5.0
-"""The same of periods: those of rotation are much shorter."""
-RANGE = 0.5
-"""Distance from the promised order at which the colours end."""
-APART = 0.025
-"""Distance between the dots of a separatrix, as part of the panel."""
+FEW = 5.0  # the same of periods: those of rotation are much shorter
+RANGE = 0.5  # distance from the promised order at which the colours end
+APART = 0.025  # distance between the dots of a separatrix, as part of the panel
 SHOWN_ALREADY = ("period", "period_error", "exact_period", "amplitude")
 """Values of checks that have maps of their own."""
 

@@ -6,7 +6,7 @@ Few members are points; many are counted in cells, so that a page stays small ho
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,26 +21,16 @@ from vibsim.report.figures.panels import rows_of
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Key, bins, place_in
 from vibsim.report.text import words
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from vibsim.experiment import Experiment
+from vibsim.report.types import Axes, Experiment
 
 Masks = dict[str, Flags]
 """Which members come to each verdict, shape (case,)."""
-FEWEST, BARS = 60, 50
-"""Of fewer members a histogram says nothing; bars of one."""
-SHOWN = 6
-"""Most schemes, and most keys, that have a row; the members' table has all."""
-POINTS = 4000
-"""Most members that are drawn as points."""
-BEYOND = 1.5
-"""Distance from the promised order at which the frame ends."""
-SHARES = 24
-"""Most bars of shares along a key."""
-MESH = 160, 60
-"""Cells that members are counted in, along and up."""
+FEWEST, BARS = 60, 50  # of fewer members a histogram says nothing; bars of one
+SHOWN = 6  # most schemes, and most keys, that have a row; the members' table has all
+POINTS = 4000  # most members that are drawn as points
+BEYOND = 1.5  # distance from the promised order at which the frame ends
+SHARES = 24  # most bars of shares along a key
+MESH = 160, 60  # cells that members are counted in, along and up
 
 
 def histograms(experiment: Experiment, record: Record, quantity: str) -> Picture | None:

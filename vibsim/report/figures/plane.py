@@ -7,38 +7,28 @@ the natural frequency w so that the orbit of a linear oscillation is a circle; e
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
+from vibsim.models import Model
 from vibsim.report import data, style
 from vibsim.report.data import Member, of_level, unit, whole
 from vibsim.report.figures.panels import legend_above, rows_of
 from vibsim.report.style import Picture
 from vibsim.report.text import words
+from vibsim.report.types import Axes, Experiment
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from vibsim.experiment import Experiment
-    from vibsim.models import Model
-
-ACROSS = 3
-"""Panels in a row of the phase plane, and most panels of the path."""
-MOST = 6
-"""Most panels of the phase plane, and most schemes in them."""
+ACROSS = 3  # panels in a row of the phase plane, and most panels of the path
+MOST = 6  # most panels of the phase plane, and most schemes in them
 CUT_ORBIT, CUT_PATH = 2.5, 1.3
 """What leaves the exact orbit or path by more than this factor is cut off."""
-PERIODS = 3.0
-"""Of a longer motion the first period and the last so many are drawn."""
-SAMPLED = 8
-"""Fewer samples than this in a period do not draw an orbit."""
-FLATTEST = 0.15
-"""Least height of the frame of a path over its width, or the other way round."""
-TALLEST = 4.5
-"""Largest height of a panel [inch]."""
+PERIODS = 3.0  # of a longer motion the first period and the last so many are drawn
+SAMPLED = 8  # fewer samples than this in a period do not draw an orbit
+FLATTEST = 0.15  # least height of the frame of a path over its width, or the other way round
+TALLEST = 4.5  # largest height of a panel [inch]
 
 Points = tuple[Floats, Floats]
 

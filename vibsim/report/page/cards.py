@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from shlex import quote
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from vibsim.checks.results import Result
 from vibsim.checks.value.units import unit_of
@@ -19,17 +19,12 @@ from vibsim.report.evidence import figure
 from vibsim.report.tables import checks as check_tables
 from vibsim.report.tables import published
 from vibsim.report.text import assertions, reasons, setting, words
+from vibsim.report.types import Check, Experiment, Measurement
 
-if TYPE_CHECKING:
-    from vibsim.experiment import Check, Experiment
-    from vibsim.experiment.schema.checks import Measurement
-
-MANY = 6
-"""From so many checks on, those that passed share a table; fewer have a card each."""
+MANY = 6  # from so many checks on, those that passed share a table; fewer have a card each
 SETTLED = ("asymptotic", "order_low", "order_high")
 """Reasons of a result whose order is known: any other has at most an estimate that may be an accident."""
-BRIEF = 3
-"""With more checks than this, the evidence of those that passed is folded away."""
+BRIEF = 3  # with more checks than this, the evidence of those that passed is folded away
 PYTHON = """\
 from vibsim import Experiment, analyse, simulate, verdicts
 

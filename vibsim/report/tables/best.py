@@ -27,8 +27,7 @@ CLASSES = {
     "round_off": "round-off",
 }
 """How the levels follow each other, in words."""
-MOST_DIGITS = 16
-"""Significant digits of a double."""
+MOST_DIGITS = 16  # significant digits of a double
 PER_NUMBER = ("finest level", "GCI", "GCI relative", "order", "levels", "convergence")
 """Columns that are kept with series only."""
 
@@ -82,8 +81,8 @@ def _rows(model: Model, record: Record, shown: Sequence[Member]) -> Iterator[tup
 
 
 def _name(record: Record, row: Scalar) -> str:
-    letter = words.SYMBOLS.get(row.quantity)
-    text = f"{letter} {WORDS[row.value]}" if letter else row.words
+    is_named = row.quantity in words.NAMES
+    text = f"{words.symbol(row.quantity)} {WORDS[row.value]}" if is_named else row.words
     return style.label(text, unit(record, f"{row.variable}_richardson"))
 
 

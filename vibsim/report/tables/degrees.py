@@ -6,34 +6,25 @@ Source: vibration text, sections 2.2 and 8.5, problem 1 and exercise 9.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from vibsim import theory
 from vibsim.formula import Binary, Expression, Name, Negate, literal, names_in, parse
 from vibsim.models import Model
-from vibsim.report.tables.table import Column, Table
-from vibsim.schemes import SCHEMES, Stepper
+from vibsim.report.tables.table import Cell, Column, Table
+from vibsim.report.types import Experiment
+from vibsim.schemes import SCHEMES
+from vibsim.theory import Miss, Residual
 from vibsim.theory.degrees import HIGHEST, applies
 
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
-    from vibsim.theory import Miss, Residual
-
-LONGEST = 40
-"""Characters of a coefficient that a table shows."""
-DIGITS = 6
-"""Digits of whole numbers in a coefficient above which it is written with decimals."""
-EXACT, NOTHING = "exact", "–"
-CAUSES: Mapping[str, str] = MappingProxyType(
-    {
-        "": "the first step alone",
-        "differences": "its formulas for u' and u''",
-        "force": "the force, taken at a point that is off the solution",
-        "damping": "its treatment of damping",
-    }
-)
+LONGEST = 40  # characters of a coefficient that a table shows
+DIGITS = 6  # digits of whole numbers in a coefficient above which it is written with decimals
+EXACT = "exact"
+CAUSES = {
+    "": "the first step alone",
+    "differences": "its formulas for u' and u''",
+    "force": "the force, taken at a point that is off the solution",
+    "damping": "its treatment of damping",
+}
 """Where the blame lies, by `vibsim.theory.Miss.cause`."""
 
 
@@ -50,25 +41,25 @@ def table(experiment: Experiment) -> Table | None:
         Column("scheme"), Column("exact up to degree", form="integer"), Column("first miss at degree", form="integer"),
         Column("first step off by"), Column("a step at t off by"), Column("because of"),
     )  # fmt: skip
-    rows = []
+    keys = experiment.sweep.keys if experiment.sweep is not None else ()
+    rows: list[tuple[Cell, ...]] = []
     for spec in experiment.schemes:
-        if not (spec.adaptive or _is_swept(experiment, spec.name)):
-            stepper = SCHEMES[spec.kind].stepper_for(model, spec.options)
-            rows.append((spec.name, *_row(stepper, model)))
+        if spec.adaptive or any(key.startswith(f"schemes.{spec.name}.") for key in keys):
+            continue
+        stepper = SCHEMES[spec.kind].stepper_for(model, spec.options)
+        degree = theory.exact_degree(stepper, model)
+        if degree == HIGHEST:
+            rows.append((spec.name, degree, None, EXACT, EXACT, "–"))
+        else:
+            found = theory.miss(stepper, model, degree + 1)
+            off = told(found.start), told(found.step)
+            rows.append((spec.name, degree, found.degree, *off, _blame(found)))
     caption = (
         "Polynomials c₀ + c₁ t + c₂ t² + … that schemes reproduce exactly, as solutions of "
         f"{_plain(model)} with a force for each, while the velocity keeps its sign; and the first term of what they "
         "are off by (computed less exact) on the next degree"
     )
     return Table("exact_degrees", caption, columns, tuple(rows)) if rows else None
-
-
-def _row(stepper: Stepper, model: Model) -> tuple[str | int | None, ...]:
-    degree = theory.exact_degree(stepper, model)
-    if degree == HIGHEST:
-        return degree, None, EXACT, EXACT, NOTHING
-    found = theory.miss(stepper, model, degree + 1)
-    return degree, found.degree, told(found.start), told(found.step), _blame(found)
 
 
 def _blame(found: Miss) -> str:
@@ -104,11 +95,6 @@ def coefficient(residual: Residual) -> str:
 def _asks(experiment: Experiment) -> bool:
     measured = (check.measured for check in experiment.checks)
     return any(getattr(check, "value", None) == "exact_degree" for check in measured)
-
-
-def _is_swept(experiment: Experiment, scheme: str) -> bool:
-    keys = experiment.sweep.keys if experiment.sweep is not None else ()
-    return any(key.startswith(f"schemes.{scheme}.") for key in keys)
 
 
 def _solution(experiment: Experiment) -> Expression | None:

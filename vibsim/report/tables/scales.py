@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,9 +11,7 @@ from vibsim.core.record import Record
 from vibsim.models.shared.scales import dimensionless, scales
 from vibsim.report import data
 from vibsim.report.tables.table import Cell, Column, Table
-
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
+from vibsim.report.types import Experiment
 
 
 def table(experiment: Experiment, record: Record) -> Table | None:
