@@ -88,7 +88,14 @@ def _of_members(
     known = usable(values)
     if not known.size:
         return evidence(f"{member.title}: no member has a number that could be drawn.")
-    up = _scale(record, check, known)
+    if check.kind == "stable":
+        up = frame.growth_scale(known)
+    elif check.kind == "conserves":
+        up = GrowthScale("largest energy error / E(0)", is_log=True)
+    else:
+        measure = unit(record, f"{check.quantity}_difference_norm")
+        text = f"largest difference of {words.symbol(check.quantity)}"
+        up = GrowthScale(style.label(text, measure), is_log=True)
     # members that differ by rounding are alike on the scale
     is_growth = check.kind == "stable"
     around = frame.ALIKE if is_growth else np.median(known) * 10.0 ** np.array([-0.5, 0.5])
@@ -115,15 +122,3 @@ def _of_members(
         f"the one that decides, {member.case_name}{more if usable(beside).size else ''}."
     )
     return evidence(caption, up.title, figure)
-
-
-def _scale(
-    record: Record, check: StableCheck | ConservesCheck | EqualCheck, values: Floats
-) -> GrowthScale:
-    if check.kind == "stable":
-        return frame.growth_scale(values)
-    if check.kind == "conserves":
-        return GrowthScale("largest energy error / E(0)", is_log=True)
-    measure = unit(record, f"{check.quantity}_difference_norm")
-    title = style.label(f"largest difference of {words.symbol(check.quantity)}", measure)
-    return GrowthScale(title, is_log=True)

@@ -62,8 +62,7 @@ def local(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     ):
         # amplitudes that hardly differ need long numbers
         ax.yaxis.set_label_coords(-0.115, 0.5)
-        ax.set_ylabel(style.label(text, of))
-        ax.set_title(title)
+        ax.set(ylabel=style.label(text, of), title=title)
     axes[2].set_xlabel("number of the peak")
     for ax, lines in zip(axes, drawn, strict=True):
         _tell_alike(ax, lines, [label for label, _, _ in runs])

@@ -33,10 +33,9 @@ def solution(record: Record, quantity: str, member: Member) -> Picture:
     best, bound = (data.at(record, f"{quantity}_richardson{end}", member) for end in ("", "_error"))
     is_known = bool(np.isfinite(exact).any())
     axes = panels.stacked([2.3, 2.5])
-    _draw_solution(axes[0], t, data.at(record, f"{quantity}_finest", member), best, exact,
-                   data.whole(record, "level")[-1])  # fmt: skip
-    axes[0].set_ylabel(style.label(letter, measure))
-    axes[0].set_title(f"Solution {letter}(t)")
+    finest = data.at(record, f"{quantity}_finest", member)
+    _draw_solution(axes[0], t, finest, best, exact, data.whole(record, "level")[-1])
+    axes[0].set(ylabel=style.label(letter, measure), title=f"Solution {letter}(t)")
     thickness = _draw_band(axes[0], t, best, bound, measure)
     _draw_errors(axes[1], t, record, quantity, member, bound, exact - best)
     axes[1].set_ylabel(style.label(f"|error of {letter}|", measure))

@@ -292,8 +292,7 @@ def _draw_period_errors(ax: Axes, record: Record, along: Along, found: Measured)
                 look |= {"linestyle": style.look(colour)["linestyle"]}
                 _line(ax, x, style.no_zeros(of_level[s, members]), label=label, **look)
     style.fit_log_axis(ax, "y", *error.values(), room=2.0)
-    ax.set_ylabel("|period / exact − 1|")
-    ax.set_title("Relative error of the period")
+    ax.set(ylabel="|period / exact − 1|", title="Relative error of the period")
     if not style.crowded(record):
         style.beside(ax, fontsize=8)
 

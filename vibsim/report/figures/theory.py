@@ -72,7 +72,11 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
             if curve is None:
                 _dots(ax, p, told[s], look | {"marker": "+"}, "")
             else:
-                _signed(ax, grid, curve[k], look["color"])
+                y = curve[k]
+                size = np.where(np.abs(y) < SMALLEST, np.nan, np.abs(y))
+                for keep, dashes, width in ((y > 0.0, "-", 1.1), (y < 0.0, (0, (1, 1.3)), 1.5)):
+                    line: dict[str, Any] = {"linestyle": dashes, "linewidth": width}
+                    ax.plot(grid, np.where(keep, size, np.nan), color=look["color"], **line)
             _dots(ax, p, found[s], look, style.entry(name))
         _finish(ax, told, found, limits, grid)
     alike = _alike(record.words("scheme"), curves)
@@ -148,13 +152,6 @@ def _theory(experiment: Experiment, s: int, grid: Floats) -> tuple[Floats, Float
         growth = np.expm1(theory.log_growth(stepper, grid) * (2.0 * np.pi / grid))
         phase = theory.phase_error_per_period(stepper, grid)
     return np.asarray(growth), np.asarray(phase)
-
-
-def _signed(ax: Axes, x: Floats, y: Floats, colour: Any) -> None:
-    """Draw the size of a curve: solid where it is positive, dotted where it is negative."""
-    size = np.where(np.abs(y) < SMALLEST, np.nan, np.abs(y))
-    for keep, dashes, width in ((y > 0.0, "-", 1.1), (y < 0.0, (0, (1, 1.3)), 1.5)):
-        ax.plot(x, np.where(keep, size, np.nan), color=colour, linestyle=dashes, linewidth=width)
 
 
 def _dots(ax: Axes, p: Floats, y: Floats, look: dict[str, Any], text: str) -> None:

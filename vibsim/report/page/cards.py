@@ -54,6 +54,7 @@ def context(
     plain = [check["id"] for check in carded if _is_plain(asserted.get(check["id"]), check)]
     plain = plain if len(carded) >= MANY else []
     used = provenance.get("experiment")
+    broken, listed = words.broken(summary), len(summary.get("failures") or [])
     return {
         "collection": experiment.collection,
         "name": experiment.name,
@@ -66,7 +67,9 @@ def context(
         "plain": [made[name] | assertions.row(asserted[name]) for name in plain],
         "brief": len(carded) > BRIEF,
         "failures": check_tables.failures(summary, record),
-        "unlisted": _unlisted(summary),
+        "unlisted": f"In all {broken} runs broke down; listed are the first {listed}."
+        if broken > listed
+        else "",
         "setup": list(setting.setup(experiment, record)),
         "provenance": list(_provenance(provenance)),
         "used": json.dumps(used, indent=1, ensure_ascii=False, default=str) if used else "",
@@ -110,6 +113,11 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
     decisive, counts = check["results"][0], check["counts"]
     facts = (decisive[key] for key in ("scheme", "case", "status", "reason", "facts"))
     result = Result(*facts)
+    decides = worst(word for word, count in counts.items() if count)
+    told, listed = (
+        ", ".join(f"{n} {word}" for word, n in counts.items() if n),
+        len(check["results"]),
+    )
     # the result that decides has a settled order
     settled = check["status"] != "INCONCLUSIVE" and decisive["reason"] in SETTLED
     return {
@@ -132,8 +140,11 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         "results": check_tables.results(
             record, check, data.pretty_unit(unit).replace("sqrt(s)", "√s")
         ),
-        "more": _more(check),
-        "where": _where(check),
+        "more": f"In all: {told}. Listed are the {listed} worst."
+        if sum(counts.values()) > listed
+        else "",
+        # but for those that the check's own text has
+        "where": [f"{place['text']}." for word, place in check["where"].items() if word != decides],
         "alone": _alone(check),
         "picture": figure.picture(experiment, record, asserted, check),
         "text": wording.text(result, counts, check["where"]),
@@ -156,12 +167,6 @@ def _keeps_promise(record: Record, measured: Measurement | None, check: Mapping[
     return bool(is_due and abs(own - order) <= measured.tolerance)
 
 
-def _where(check: Mapping[str, Any]) -> list[str]:
-    """Return the sentences on where in a sweep results lie, but for those that the check's own text has."""
-    decides = worst(status for status, count in check["counts"].items() if count)
-    return [f"{place['text']}." for status, place in check["where"].items() if status != decides]
-
-
 def _alone(check: Mapping[str, Any]) -> str:
     """Return the commands that run the listed members alone, a line for each; of a check that passes the first."""
     listed = (check.get("results") or [])[: 1 if check["status"] == "PASS" else None]
@@ -173,25 +178,6 @@ def _alone(check: Mapping[str, Any]) -> str:
             lines.setdefault(f".venv/bin/{result['command']}", found)
     width = max(map(len, lines), default=0)
     return "\n".join(f"{command:{width}}  # {found}" for command, found in lines.items())
-
-
-def _more(check: Mapping[str, Any]) -> str:
-    """Say how many members the listed results stand for."""
-    counts: Mapping[str, Any] = check.get("counts") or {}
-    told = ", ".join(
-        f"{count} {word}" for word, count in counts.items() if isinstance(count, int) and count
-    )
-    total = sum(count for count in counts.values() if isinstance(count, int))
-    listed = len(check.get("results") or [])
-    return f"In all: {told}. Listed are the {listed} worst." if total > listed else ""
-
-
-def _unlisted(summary: Mapping[str, Any]) -> str:
-    """Say how many failures the summary counts but does not list."""
-    total, listed = words.broken(summary), len(summary.get("failures") or [])
-    return (
-        f"In all {total} runs broke down; listed are the first {listed}." if total > listed else ""
-    )
 
 
 def _provenance(provenance: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

@@ -213,9 +213,9 @@ def _tables(
 def _folded(tables: Sequence[Table]) -> list[tuple[str, list[Table]]]:
     """Return tables with their headings, which differ: of two that would be the same each says more."""
     short = [_heading(table.caption) for table in tables]
-    whole = [re.split(r"[,;]|\. ", table.caption, maxsplit=1)[0] for table in tables]
-    both = zip(short, whole, tables, strict=True)
-    return [(more if short.count(text) > 1 else text, [table]) for text, more, table in both]
+    more = [re.split(r"[,;]|\. ", table.caption, maxsplit=1)[0] for table in tables]
+    headings = (b if short.count(a) > 1 else a for a, b in zip(short, more, strict=True))
+    return [(text, [table]) for text, table in zip(headings, tables, strict=True)]
 
 
 def _heading(caption: str) -> str:

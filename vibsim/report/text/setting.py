@@ -11,7 +11,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import HIGHEST
 from vibsim.report import data
 from vibsim.report.text import words
-from vibsim.report.types import Axis, Experiment, SchemeSpec, TableSpec
+from vibsim.report.types import Axis, Experiment, SchemeSpec
 
 LISTED = 8  # most values of a key that are written out
 
@@ -24,9 +24,17 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     sizes = {p.key: data.pretty_unit(p.unit) for p in model.parameters}
     units = {state.name: data.pretty_unit(state.unit) for state in model.states}
     yield "Model", f"{model.title}: {model.equation}"
-    yield from (("Table", _table(name, spec)) for name, spec in experiment.model.tables.items())
+    for name, spec in experiment.model.tables.items():
+        steps = (
+            "no step has one of its points inside"
+            if spec.is_met
+            else "steps have its points inside, where the force has corners"
+        )
+        yield "Table", f"{name} from {spec.file}, columns {spec.place} and {spec.value}; {steps}"
     if experiment.units:
-        yield "Units of the file", ", ".join(_unit(*item) for item in experiment.units.items())
+        parts = [(name, *text.partition(" ")) for name, text in experiment.units.items()]
+        told = [f"1 {name} = {number} {data.pretty_unit(base)}" for name, number, _, base in parts]
+        yield "Units of the file", ", ".join(text.rstrip() for text in told)
     if (scaling := experiment.scaling) is not None:
         # everything else on the page is in characteristic units
         given = (
@@ -51,21 +59,6 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     if axes:
         count = words.number(len(record["case"]), "integer")
         yield "Sweep", f"{count} members. {'; '.join(map(_axis, axes))}"
-
-
-def _unit(name: str, text: str) -> str:
-    number, _, base = text.partition(" ")
-    return f"1 {name} = {number} {data.pretty_unit(base)}".rstrip()
-
-
-def _table(name: str, spec: TableSpec) -> str:
-    """Write where a table stands, and whether steps end at its points."""
-    told = (
-        "no step has one of its points inside"
-        if spec.is_met
-        else "steps have its points inside, where the force has corners"
-    )
-    return f"{name} from {spec.file}, columns {spec.place} and {spec.value}; {told}"
 
 
 def _scheme(spec: SchemeSpec, swept: set[str]) -> str:
