@@ -16,8 +16,7 @@ from vibsim.engine import LANES, integrate
 from vibsim.engine.kernel import kernel
 from vibsim.models import MODELS
 from vibsim.schemes import FIXED_STEP, Scheme
-from vibsim.schemes.code_generation import written
-from vibsim.schemes.one_step import self_starting
+from vibsim.schemes.code_generation import self_starting, written
 
 TITLE = "Schemes in every lane"
 LIMIT = 1.3

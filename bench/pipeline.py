@@ -104,7 +104,7 @@ def size(
 def common_intervals(file: Path) -> int:
     """Return on how many intervals the pipeline compares the levels, which the scripts must do as well."""
     from vibsim.experiment import Experiment
-    from vibsim.plan.cases import sampling
+    from vibsim.experiment.storage import sampling
 
     experiment = Experiment.from_yaml(file)
     level = experiment.levels[0]

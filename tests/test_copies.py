@@ -18,8 +18,7 @@ import pytest
 import vibsim
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.checks.fields import Field
-from vibsim.checks.outcome import Outcome
-from vibsim.checks.results import Results
+from vibsim.checks.outcome import Outcome, Results
 from vibsim.core.errors import (
     DamagedFileError,
     Fault,

@@ -9,7 +9,7 @@ import pytest
 
 from vibsim import Experiment, simulate
 from vibsim.models import MODELS
-from vibsim.models.shared.dry_friction import swings
+from vibsim.models.shared.linear_motion import swings
 from vibsim.schemes import FIXED_STEP, SCHEMES
 
 BOX, BALL = MODELS["sliding_box"], MODELS["bouncing_ball"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import pickle
+import re
 
 import pytest
 from hypothesis import given, settings
@@ -13,6 +14,7 @@ from vibsim.elementary import ELEMENTARY
 from vibsim.formula import (
     MAX_DEPTH,
     Binary,
+    Expression,
     ExpressionError,
     Name,
     Negate,
@@ -22,7 +24,6 @@ from vibsim.formula import (
     names_in,
     parse,
     to_formula,
-    to_python,
     to_statements,
     walk,
 )
@@ -31,12 +32,16 @@ from vibsim.models import MODELS, Model
 FUNCTIONS = {name: function.full for name, function in ELEMENTARY.items()}
 
 
+def source_of(tree: Expression) -> str:
+    """Return the text for the engine in one line, with every factor of a power as often as it stands there."""
+    *factors, last = (line.partition(" = ")[2] for line in to_statements(tree, "_result"))
+    for i, factor in reversed(list(enumerate(factors, 1))):
+        last = re.sub(rf"\b_{i}\b", factor, last)
+    return last
+
+
 def run(text: str, **values: float) -> float:
     """Evaluate what the engine would get: this test trusts its own texts only."""
-    return float(eval(to_python(parse(text, values)), {**FUNCTIONS, **values}))
-
-
-def run_statements(text: str, **values: float) -> float:
     scope = {**FUNCTIONS, **values}
     exec("\n".join(to_statements(parse(text, values), "_result")), scope)
     return float(scope["_result"])
@@ -301,7 +306,7 @@ def test_declared_name_wins_over_constant() -> None:
     ],
 )
 def test_source_for_the_engine(text: str, source: str) -> None:
-    assert to_python(parse(text, ["x", "y", "a", "b"])) == source
+    assert source_of(parse(text, ["x", "y", "a", "b"])) == source
 
 
 def test_statements_work_out_a_factor_once() -> None:
@@ -311,8 +316,6 @@ def test_statements_work_out_a_factor_once() -> None:
 
 def test_powers_of_powers_do_not_explode() -> None:
     tree = parse("(" * 12 + "x" + "**1000)" * 12, ["x"])
-    with pytest.raises(ExpressionError, match="too long"):
-        to_python(tree)
     assert len("\n".join(to_statements(tree, "y"))) < 20_000
 
 
@@ -327,7 +330,7 @@ def test_model_formulas(model: Model) -> None:
         # the formula is Python too; only the powers are taken differently, which costs a few roundings
         expected = eval(text, {**FUNCTIONS, **values})
         assert run(text, **values) == pytest.approx(expected, rel=1e-15)
-        assert evaluate(tree, values) == run(text, **values) == run_statements(text, **values)
+        assert evaluate(tree, values) == run(text, **values)
 
 
 _LEAVES = st.one_of(
@@ -352,22 +355,13 @@ FORMULAS = st.recursive(
 
 @given(FORMULAS)
 @settings(max_examples=300, deadline=None)
-def test_three_ways_give_the_same_bits(text: str) -> None:
+def test_both_ways_give_the_same_bits(text: str) -> None:
     values = {"x": 1.3, "y": -0.6}
     try:
         expected = evaluate(parse(text, values), values)
     except ExpressionError:
         return
     assert repr(run(text, **values)) == repr(expected)
-    assert repr(run_statements(text, **values)) == repr(expected)
-
-
-@given(FORMULAS)
-@settings(max_examples=200, deadline=None)
-def test_written_source_reads_back_as_itself(text: str) -> None:
-    tree = parse(text, ["x", "y"])
-    source = to_python(tree)
-    assert to_python(parse(source, ["x", "y"])) == source
 
 
 @given(st.text(alphabet="xy019.+-*/()<>=!, esinqrtadofl^_'\"[]{}:;\\\n\t\u03c0\u0660", max_size=60))

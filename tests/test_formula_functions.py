@@ -13,7 +13,6 @@ import pytest
 
 from vibsim.elementary import ELEMENTARY, primitives
 from vibsim.engine import text as kernel_text
-from vibsim.engine.entry import bind
 from vibsim.formula import FUNCTIONS, Call, evaluate, integral, parse, to_statements, values, walk
 from vibsim.formula.integral import has_rule
 from vibsim.native.linking import link
@@ -125,7 +124,7 @@ def test_the_compiled_lane_has_the_bits_of_the_plain_one() -> None:
         statements = to_statements(parse(formula, ("u", "k")), f"found[{i}]")
         lines += [f"    {line}" for line in statements]
     text = module.text + "\n".join(lines)
-    corpus = bind(link(machine_code(text, "corpus", "f f f1"), "corpus"), "f f f1")
+    corpus = link(machine_code(text, "corpus", "f f f1"), "corpus", "f f f1")
     for j, u in enumerate(PLACES):
         found = np.empty(len(CORPUS))
         corpus(u, K, found)

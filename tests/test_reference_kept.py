@@ -11,7 +11,7 @@ import pytest
 
 from vibsim.core import private_cache
 from vibsim.models import MODELS, Model
-from vibsim.simulation.reference import reference_cache, solve
+from vibsim.simulation.reference import solve
 
 FRACTION = np.arange(33) / 32
 
@@ -85,17 +85,15 @@ def test_an_entry_that_is_not_as_it_was_written_is_computed_again(home: Path, da
 
 
 def test_the_digest_knows_all_that_the_numbers_depend_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    first = reference_cache.digest_of(MODELS_["corners"], OWN)
-    assert first == reference_cache.digest_of(model(damping="0.3*abs(v)*v", spring="sinh(u)"), OWN)
+    first = solve.digest_of(MODELS_["corners"], OWN)
+    assert first == solve.digest_of(model(damping="0.3*abs(v)*v", spring="sinh(u)"), OWN)
     others = [
-        reference_cache.digest_of(MODELS_["smooth"], OWN),
-        reference_cache.digest_of(
-            MODELS_["corners"], (*OWN[:2], numbers([6.0, 3.0, 9.1])[0], OWN[3])
-        ),
-        reference_cache.digest_of(MODELS_["corners"], OWN[:3]),
+        solve.digest_of(MODELS_["smooth"], OWN),
+        solve.digest_of(MODELS_["corners"], (*OWN[:2], numbers([6.0, 3.0, 9.1])[0], OWN[3])),
+        solve.digest_of(MODELS_["corners"], OWN[:3]),
     ]
-    monkeypatch.setattr(reference_cache, "_surroundings", lambda: (b"other code",))
-    others.append(reference_cache.digest_of(MODELS_["corners"], OWN))
+    monkeypatch.setattr(solve, "_surroundings", lambda: (b"other code",))
+    others.append(solve.digest_of(MODELS_["corners"], OWN))
     assert len({first, *others}) == 5
 
 
@@ -105,16 +103,13 @@ def test_the_digest_knows_the_table() -> None:
     road = MODELS["vehicle"].written({"spring": "u"}, ())
     heights = np.array([0.0, 0.1, 0.0, 0.2])
     tables = [Table(0.0, 1.0, heights), Table(0.0, 1.0, heights * 2), Table(0.5, 1.0, heights)]
-    assert (
-        len({reference_cache.digest_of(road.with_table(table, False), OWN) for table in tables})
-        == 3
-    )
+    assert len({solve.digest_of(road.with_table(table, False), OWN) for table in tables}) == 3
 
 
 def test_a_large_entry_is_not_kept(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    reference_cache.kept("a" * 64, lambda: {"x": np.zeros(1000)})
+    solve.kept("a" * 64, lambda: {"x": np.zeros(1000)})
     monkeypatch.setattr(private_cache, "MOST_OF_ENTRY", 7999)
-    reference_cache.kept("e" * 64, lambda: {"x": np.zeros(1000)})
+    solve.kept("e" * 64, lambda: {"x": np.zeros(1000)})
     assert [path.name[0] for path in entries(home)] == ["a"]
 
 
@@ -130,7 +125,7 @@ def test_a_folder_that_cannot_be_written_changes_nothing(
 JOB = """
 import sys, numpy as np
 from pathlib import Path
-from vibsim.simulation.reference import reference_cache as kept
+from vibsim.simulation.reference import solve as kept
 def compute():
     with Path(sys.argv[1]).open("a") as file:
         file.write("x")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from vibsim.apriori.roundoff_floor import norm_of_floor
 from vibsim.convergence import differences
 from vibsim.convergence.ladder_statistics import Evidence
+from vibsim.core.vocabulary import TOLERANCE
 
 Floats = NDArray[np.float64]
 
@@ -45,7 +47,7 @@ def evidence_of(
     floor: Floats | float = 1e-15,
     exact: Floats | None = None,
     tolerance: float = 0.1,
-    **more: object,
+    **more: Any,
 ) -> Evidence:
     """Return the evidence of one ladder: arrays of shape (1, ...)."""
     d = [(coarse - fine)[None] for coarse, fine in itertools.pairwise(fields)]
@@ -56,9 +58,8 @@ def evidence_of(
         return np.stack([differences.norm(v.reshape(1, -1), norm, SPACING) for v in values], -1)
 
     errors = [] if exact is None else [(exact - u)[None] for u in fields]
-    of_errors = [differences.scatter(x, y, norm) for x, y in itertools.pairwise(errors)]
-    scatter = [differences.scatter(x, y, norm) for x, y in itertools.pairwise(d)]
-    return Evidence(
+    of_errors, scatter = (differences.scatters(x, norm) for x in (errors, d))
+    return evidence_with(
         levels=levels,
         difference=measure(d) if d else np.empty((1, 0)),
         scatter=np.stack(scatter, -1) if scatter else np.empty((1, 0)),
@@ -67,11 +68,43 @@ def evidence_of(
         omega_dt=T[-1] * 2.0 ** -np.array([levels], dtype=float),
         relative_floor=floors[:, 0] / (size or 1.0),
         tolerance=tolerance,
-        error_scatter=np.stack(of_errors, -1) if of_errors and len(levels) == 3 else None,
-        error=None if exact is None else measure([exact - u for u in fields]),
         size=norm_of_floor(np.array([size]), norm, len(T), SPACING),
-        **more,  # type: ignore[arg-type]
+        **({"error_scatter": np.stack(of_errors, -1)} if of_errors and len(levels) == 3 else {}),
+        **({} if exact is None else {"error": measure([exact - u for u in fields])}),
+        **more,
     )
+
+
+def evidence_with(**known: Any) -> Evidence:
+    """Return the evidence of a ladder; what is not given is what says nothing."""
+    order, n = known["order"], len(known["levels"])
+    shape = order.shape
+    unknown, no = np.full(shape, np.nan), np.zeros(shape, dtype=bool)
+    neutral = {
+        "tolerance": TOLERANCE,
+        "ceiling": known["floor"],
+        "error": np.full((*shape, n), np.nan),
+        "error_scatter": np.full((*shape, n - 1), np.nan),
+        "blur": np.zeros((*shape, n)),
+        "promised": order,
+        "special": order,
+        "combined": lambda rows, first, weights: np.full(np.count_nonzero(rows), np.nan),
+        "numbers": no,
+        "failed": np.zeros((*shape, n), dtype=bool),
+        "applicable": ~no,
+        "stability_limit": np.full(shape, np.inf),
+        "span": np.full(shape, np.inf),
+        "steps": np.nan,
+        "moved": np.ones(shape),
+        "straight": no,
+        "left_to_the_mesh": unknown,
+        "corner": unknown,
+        "missed": no,
+        "jumps": no,
+        "decay": np.zeros(shape),
+        "growth": np.full((*shape, n), np.nan),
+    }
+    return Evidence(**{**neutral, **known})
 
 
 def shape_in_time(rng: np.random.Generator) -> Floats:

@@ -10,7 +10,7 @@ import pytest
 from level_records import experiment, level_records, standard_error
 
 from vibsim.analysis import Verdict, analyse_records, summarise, verdicts
-from vibsim.checks.value.criteria import sees_several_levels
+from vibsim.checks.value import sees_several_levels
 from vibsim.comparison import value_numbers as values
 from vibsim.comparison.order_evidence import evidence
 from vibsim.comparison.quantity_comparison import comparisons

@@ -12,8 +12,8 @@ from vibsim.core.vocabulary import DRIFTS
 from vibsim.observe.energy_drift import drift_of
 from vibsim.observe.thresholds import STILL
 from vibsim.schemes import SCHEMES
+from vibsim.schemes.code_generation import self_starting
 from vibsim.schemes.implicit import step_crank_nicolson
-from vibsim.schemes.one_step import self_starting
 
 PERIODS = 20.0
 SAMPLES = 512

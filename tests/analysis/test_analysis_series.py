@@ -139,11 +139,11 @@ def test_coincidence_and_proportionality() -> None:
 def test_scatter_measures_the_angle_in_its_own_norm() -> None:
     a, b = np.array([[1.0, 0.0, 0.0]]), np.array([[1.0, 0.1, 0.0]])
     angle = np.arctan(0.1)
-    assert differences.scatter(a, b, "l2") == pytest.approx([2 * np.sin(angle / 2)])
-    assert differences.scatter(a, 5 * a, "l2") == pytest.approx([0.0])
-    assert differences.scatter(a, -b, "l2") == pytest.approx([-2 * np.sin(angle / 2)])
+    assert differences.scatters([a, b], "l2")[0] == pytest.approx([2 * np.sin(angle / 2)])
+    assert differences.scatters([a, 5 * a], "l2")[0] == pytest.approx([0.0])
+    assert differences.scatters([a, -b], "l2")[0] == pytest.approx([-2 * np.sin(angle / 2)])
     # only the end differs: linf_interior does not see it
     c = np.array([[1.0, 0.0, 0.5]])
-    assert differences.scatter(a, c, "linf_interior") == pytest.approx([0.0])
-    assert differences.scatter(a, c, "linf") == pytest.approx([0.5])
-    assert np.isnan(differences.scatter(a, 0 * a, "l2"))[0]
+    assert differences.scatters([a, c], "linf_interior")[0] == pytest.approx([0.0])
+    assert differences.scatters([a, c], "linf")[0] == pytest.approx([0.5])
+    assert np.isnan(differences.scatters([a, 0 * a], "l2")[0])[0]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ladders import T, Truth, evidence_of, random_truth, shape_in_time
+from ladders import T, Truth, evidence_of, evidence_with, random_truth, shape_in_time
 
 from vibsim.convergence import ladder_statistics
 from vibsim.convergence.verdict import judge
@@ -321,7 +321,7 @@ def from_orders(
     """Decide on a ladder of neighbouring levels from its local orders and its scatter alone."""
     difference = SMALL / np.cumprod([1.0, *(2.0**p for p in orders)])
     levels = tuple(range(6, 8 + len(orders)))
-    evidence = ladder_statistics.Evidence(
+    evidence = evidence_with(
         levels=levels,
         difference=difference[None],
         scatter=np.array([scatter]),

@@ -10,8 +10,7 @@ import pytest
 from sweeps import SWEEPS, of, simulated
 
 from vibsim.analysis import analyse_records, summarise, verdicts
-from vibsim.checks.outcome import Outcome
-from vibsim.checks.results import Results
+from vibsim.checks.outcome import Outcome, Results
 from vibsim.checks.sweep_regions import where
 from vibsim.core.record import Record, Variable
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from vibsim import Experiment
-from vibsim.checks.words.value import what
+from vibsim.checks.value import what
 
 
 @pytest.mark.parametrize(

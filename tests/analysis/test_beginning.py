@@ -9,8 +9,7 @@ import pytest
 
 from vibsim import Experiment, analyse, plan, simulate, verdicts
 from vibsim.analysis import Verdict
-from vibsim.apriori.formal_orders import formal_orders
-from vibsim.apriori.initial_motion import BEGINNINGS, beginnings
+from vibsim.apriori.formal_orders import BEGINNINGS, beginnings, formal_orders
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
 

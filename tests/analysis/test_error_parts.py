@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from spring_runs import Run, judged, spring
 
-from vibsim.checks.words.phase_amplitude import sentence
+from vibsim.checks.phase_amplitude_text import sentence
 from vibsim.core.errors import InputError
 from vibsim.core.record import Record, Variable
 from vibsim.experiment import Experiment

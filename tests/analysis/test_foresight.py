@@ -10,7 +10,7 @@ import pytest
 from spring_runs import spring
 
 from vibsim.analysis import Verdict, analyse_records, verdicts
-from vibsim.checks.words.costs import cost_in_words
+from vibsim.checks.sentences import cost_in_words
 from vibsim.comparison.order_causes import CAUSES
 from vibsim.core.record import Record
 from vibsim.experiment import Experiment

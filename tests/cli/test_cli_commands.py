@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from vibsim.cli import main, resources
-from vibsim.cli.jobs import deleted, extrapolate
+from vibsim.cli import main, resources, results_folder
+from vibsim.cli.jobs import extrapolate
 from vibsim.cli.run import snakemake
 from vibsim.core.errors import FileError, VibsimError
 from vibsim.models import MODELS
@@ -310,11 +310,11 @@ def test_a_folder_in_the_place_of_a_file_is_deleted_only_when_empty(tmp_path: Pa
     folder = tmp_path / "level_08.nc"
     (folder / "inner").mkdir(parents=True)
     with pytest.raises(VibsimError, match=r"level_08\.nc: cannot be deleted"):
-        deleted.delete(FileError(folder, "bad"), tmp_path)
+        results_folder.delete(FileError(folder, "bad"), tmp_path)
     (folder / "inner").rmdir()
-    deleted.delete(FileError(folder, "bad"), tmp_path)
+    results_folder.delete(FileError(folder, "bad"), tmp_path)
     assert not folder.exists()
-    assert deleted.take(tmp_path) == [f"{folder}: bad"]
+    assert results_folder.deleted(tmp_path) == [f"{folder}: bad"]
 
 
 def test_search_paths_do_not_mean_the_results_folder(

@@ -12,10 +12,9 @@ import pytest
 from snakemake_interface_logger_plugins.common import LogEvent
 from snakemake_interface_logger_plugins.tests import MockOutputSettings
 
-from vibsim.cli.run.progress import Job, Progress
-from vibsim.cli.run.snakemake import Outcome, follow
+from vibsim.cli.resources import amount, duration, size
+from vibsim.cli.run.snakemake import Job, Outcome, Progress, follow
 from vibsim.cli.run.snakemake_process import LogHandler, LogHandlerSettings
-from vibsim.cli.sizes import amount, duration, size
 
 EVENTS: list[tuple[str, LogEvent | None, dict[str, Any]]] = [
     ("Building DAG of jobs...", None, {}),

@@ -9,7 +9,6 @@ from elementary_arguments import arguments
 
 from vibsim.elementary import ELEMENTARY, primitives
 from vibsim.engine import text
-from vibsim.engine.entry import bind
 from vibsim.native.linking import link
 from vibsim.native.machine import machine_code, optimised
 
@@ -50,7 +49,7 @@ def loop_over(definition, count):
 def run(loop, columns):
     text, kinds = loop
     values = np.empty(len(columns[0]))
-    bind(link(machine_code(text, "loop", kinds), "loop"), kinds)(*columns, values)
+    link(machine_code(text, "loop", kinds), "loop", kinds)(*columns, values)
     return values
 
 

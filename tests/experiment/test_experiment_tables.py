@@ -260,7 +260,7 @@ def test_what_is_kept_of_an_experiment_is_restored(tmp_path: Path) -> None:
 
 def test_between_the_points() -> None:
     """The cubic meets the heights, and its second derivative is the line between the second differences."""
-    from vibsim.engine.lookup import looked_up
+    from vibsim.engine.formulas import looked_up
 
     heights = np.random.default_rng(2).normal(size=9)
     one = Table(-0.3, 0.2, heights)

@@ -126,7 +126,7 @@ def test_a_file_keeps_the_digits_that_it_has(tmp_path: Path) -> None:
     experiment = Experiment.from_yaml(write(tmp_path, GOOD + FILE))
     rows = experiment.published[0].rows
     assert [r.printed for r in rows] == ["1.120e8", "4.930", "-300", "1.120 10^8"]
-    assert [r.half_unit for r in rows] == [5e4, 5e-4, 0.5, 5e4]
+    assert [r.meaning.half_unit for r in rows] == [5e4, 5e-4, 0.5, 5e4]
     assert [check.measured.equals for check in experiment.checks] == [1.12e8, 4.93, -300, 1.12e8]
 
 
@@ -313,5 +313,5 @@ def test_the_schema_knows_tables() -> None:
     validator.validate(content(**tables(TABLE, FIELD)))
     validator.validate(content(**row(printed=4.93)))
     assert not validator.is_valid(content(**row(nots="x")))
-    assert math.isclose(build(**row(printed=4.93)).published[0].rows[0].half_unit, 0.005)
+    assert math.isclose(build(**row(printed=4.93)).published[0].rows[0].meaning.half_unit, 0.005)
     assert faults_of(**row(printed=True))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from vibsim.experiment.storage import FEWEST, LARGE, LEAN, SMALL, is_lean, stride
+from vibsim.experiment.storage import FEWEST_INTERVALS, LARGE, LEAN, SMALL, is_lean, stride
 
 
 @pytest.mark.parametrize("coarsest", [2, 16, 48, 64, 1000, 1024, 2**20])
@@ -22,10 +22,10 @@ def test_auto_keeps_as_much_as_it_may(coarsest: int, trajectories: int, finer: i
     assert thinning & (thinning - 1) == 0
     intervals = steps // every
     if thinning > 1:
-        assert intervals >= FEWEST
+        assert intervals >= FEWEST_INTERVALS
         assert trajectories * (2 * intervals + 1) > LARGE, "half as many would have done"
     if trajectories * (intervals + 1) > LARGE:
-        assert intervals % 2 or intervals // 2 < FEWEST
+        assert intervals % 2 or intervals // 2 < FEWEST_INTERVALS
 
 
 @pytest.mark.parametrize("finer", [1, 4])

@@ -117,7 +117,6 @@ def test_options_are_words() -> None:
     assert experiment.sweep is not None
     assert experiment.sweep.axes[0].values == (words,)
     assert experiment.members == 4
-    assert experiment.scheme_options(1) == experiment.schemes[1].options
     assert not experiment.end_varies
 
 

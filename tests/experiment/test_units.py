@@ -19,8 +19,7 @@ from test_fuzz import QUIET, attempt
 from vibsim import plan
 from vibsim.experiment import Experiment
 from vibsim.experiment.schema.unit_text import MAX_EXPONENT, MAX_UNIT, UnitError, factors, split
-from vibsim.experiment.units.convert import MAX_OWN
-from vibsim.experiment.units.names import DEFINITIONS, finite, known, meaning, registry
+from vibsim.experiment.units import DEFINITIONS, MAX_OWN, finite, known, meaning, registry
 from vibsim.models import MODELS
 
 OSCILLATOR = {"kind": "oscillator", "spring": "k*u", "damping": {"linear": 0.1}}

@@ -6,8 +6,7 @@ from fractions import Fraction
 
 import pytest
 
-from vibsim.formula import names_in, parse, to_formula
-from vibsim.formula.tree import Name
+from vibsim.formula import Name, names_in, parse, to_formula
 from vibsim.models.shared.dimensions import DimensionError, over_scales, powers
 
 KNOWN = {"u": (0, 1, 0), "v": (0, 1, -1), "t": (0, 0, 1)}

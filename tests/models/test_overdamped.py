@@ -4,8 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from vibsim.models.shared.forced import forced_motion
-from vibsim.models.shared.harmonic import damped_motion
+from vibsim.models.shared.linear_motion import damped_motion, forced_motion
 
 
 def true_motion(t, stiffness, half, u_0, v_0):

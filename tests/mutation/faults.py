@@ -23,7 +23,7 @@ class Fault:
 
 
 def _central(name: str, place: str, right: str, wrong: str) -> Fault:
-    return Fault(name, place, "schemes/central_steps.py", right, wrong)
+    return Fault(name, place, "schemes/central.py", right, wrong)
 
 
 FAULTS = (
@@ -225,14 +225,14 @@ FAULTS = (
     Fault(
         "a weight of the Nystrom method",
         "scheme",
-        "schemes/nystrom.py",
+        "schemes/runge_kutta.py",
         'velocity=("1/6", "2/3", "1/6")',
         'velocity=("1/6", "1/3", "1/2")',
     ),
     Fault(
         "a coefficient of the Gauss method",
         "scheme",
-        "schemes/gauss.py",
+        "schemes/implicit.py",
         '"A_12": "1/4 - sqrt(3)/6"',
         '"A_12": "1/4 - sqrt(3)/7"',
     ),
@@ -294,7 +294,7 @@ FAULTS = (
     Fault(
         "velocity of the increment form one-sided",
         "end",
-        "schemes/central_steps.py",
+        "schemes/central.py",
         "return (u + d_ahead, d_ahead), (d + d_ahead) * (0.5 / dt)",
         "return (u + d_ahead, d_ahead), d_ahead / dt",
     ),
@@ -353,7 +353,7 @@ FAULTS = (
     Fault(
         "exact solution without its frequency",
         "exact",
-        "models/shared/harmonic.py",
+        "models/shared/linear_motion.py",
         "u_0 * cos + v_0 / w * sin",
         "u_0 * cos + v_0 * sin",
     ),
@@ -361,8 +361,8 @@ FAULTS = (
         "exact solution at other times",
         "exact",
         "simulation/level.py",
-        "t = _numbers(steps, every) * (group.end / steps)[:, None]",
-        "t = _numbers(steps, every) * (group.end / (steps + 1))[:, None]",
+        "number * (group.end / steps)[:, None],",
+        "number * (group.end / (steps + 1))[:, None],",
     ),
     # analysis
     Fault(

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from vibsim.elementary import primitives
-from vibsim.engine.entry import bind
 from vibsim.native.linking import identity, link
 from vibsim.native.machine import machine_code
 from vibsim.native.source import NativeError
@@ -22,7 +21,7 @@ WHOLES = [0, 1, -1, 2, 7, -7, 12, 2**40 + 3, -(2**40) - 5]
 
 
 def compiled(text: str, kinds: str):
-    return bind(link(machine_code(text, "entry_point", kinds), "entry_point"), kinds)
+    return link(machine_code(text, "entry_point", kinds), "entry_point", kinds)
 
 
 def plain(text: str):

@@ -86,7 +86,7 @@ def test_printed_digits_stand_beside_ours(text, tmp_path):
     exp, rec, summary = text
     (table,) = published.tables(exp, rec, summary)
     assert column(table, "printed") == [row["printed"] for row in PRINTED["rows"]]
-    agrees = [abs(ours - row.number) <= row.half_unit for ours, row in
+    agrees = [abs(ours - row.meaning.number) <= row.meaning.half_unit for ours, row in
               zip(column(table, "ours"), exp.published[0].rows, strict=True)]  # fmt: skip
     assert agrees == [True, False, True, False]
     assert column(table, "agrees?") == ["yes", "no", "yes", "no (not as expected)"]

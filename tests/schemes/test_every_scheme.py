@@ -106,7 +106,7 @@ def test_the_error_expands_in_the_powers_that_the_scheme_says(scheme, model):
     parameters = {parameter.name: parameter.default for parameter in model.parameters}
     for name in (model.position, model.velocity):
         order = scheme.formal_order(name, model, options)
-        left = order + (2 if scheme.even_powers(name, model, options) else 1)
+        left = order + (2 if scheme.has_even_powers(name, model, options) else 1)
         levels = runs_of.levels_for(left, digits=8.5)
         values = [
             runs_of.series(scheme, model, options, 2**level)[name][2**i - 1 :: 2**i]

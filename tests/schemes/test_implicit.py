@@ -212,7 +212,7 @@ def test_errors_expand_in_the_powers_that_the_scheme_says(kind, options):
     values = [run(kind, model, 2 ** (first + i), **options).position[0, -1] for i in range(4)]
     best = [b + (b - a) / (2**p - 1) for a, b in itertools.pairwise(values)]
     apart = np.diff(best)
-    following = 2 if scheme.even_powers(model.position, model, chosen) else 1
+    following = 2 if scheme.has_even_powers(model.position, model, chosen) else 1
     assert np.log2(abs(apart[0] / apart[1])) == pytest.approx(p + following, abs=0.25)
 
 

@@ -57,7 +57,10 @@ CONSTANT = "CHANGED = True"
 CHANGES = {
     "experiment/data.py": ("def schemes_of(experiment, check): return ()", EVERYTHING),
     "experiment/storage.py": ("def asked(experiment): return ()", EVERYTHING),
-    "plan/cases.py": ("def option_groups(experiment, scheme, columns): return []", EVERYTHING),
+    "experiment/sweep_columns.py": (
+        "def option_groups(experiment, scheme, columns): return []",
+        EVERYTHING,
+    ),
     "cli/jobs/simulate.py": (CONSTANT, EVERYTHING),
     "cli/jobs/analyse.py": (CONSTANT, LATER),
     "cli/jobs/extrapolate.py": (CONSTANT, {"extrapolate", "index"}),
@@ -66,10 +69,10 @@ CHANGES = {
     "report/page/index.py": (CONSTANT, {"report", "index"}),
     "store/writing.py": ("CONVENTIONS = 'CF-1.8'", EVERYTHING),
     "store/summary.py": (CONSTANT, LATER),
-    "checks/order/judge.py": (CONSTANT, LATER),
-    "checks/words/order_advice.py": (CONSTANT, LATER),
+    "checks/order.py": (CONSTANT, LATER),
+    "checks/order_text.py": (CONSTANT, LATER),
     "comparison/best_solution.py": (CONSTANT, {*LATER, "extrapolate"}),
-    "theory/amplification.py": (CONSTANT, LATER),
+    "theory/roots.py": (CONSTANT, LATER),
     "simulation/members.py": (CONSTANT, EVERYTHING),
     "engine/extrema.py": (CONSTANT, EVERYTHING),
     "native/lowering.py": (CONSTANT, EVERYTHING),
@@ -77,14 +80,14 @@ CHANGES = {
     "formula/render.py": (CONSTANT, EVERYTHING),
     "schemes/base.py": (CONSTANT, EVERYTHING),
     "schemes/central.py": (CONSTANT, EVERYTHING),
-    "schemes/gauss.py": (CONSTANT, NOTHING),
+    "schemes/newmark.py": (CONSTANT, NOTHING),
     "models/pendulum.py": (CONSTANT, EVERYTHING),
     "models/circuit.py": (CONSTANT, NOTHING),
     "core/record.py": (CONSTANT, EVERYTHING),
     "experiment/faults.py": (CONSTANT, NOTHING),
     "ladder/choosing.py": (CONSTANT, NOTHING),
 }
-QUICK = {"store/summary.py", "plan/cases.py"}
+QUICK = {"store/summary.py", "experiment/sweep_columns.py"}
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from vibsim.analysis.blockwise import analyse_parts, joined, kept
 from vibsim.analysis.check_verdicts import Verdict, verdicts
 from vibsim.analysis.compare_levels import analyse, analyse_records
 from vibsim.analysis.summary import summarise
-from vibsim.checks.results import Result
+from vibsim.checks.outcome import Result
 
 __all__ = [
     "Result",

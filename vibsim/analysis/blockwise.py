@@ -16,9 +16,9 @@ import numpy as np
 
 from vibsim import plan
 from vibsim.analysis.compare_levels import analyse_records
-from vibsim.checks.order.phase_at_start import is_told
-from vibsim.checks.tolerance_check import is_bound
-from vibsim.checks.value.units import UNITS, units_in
+from vibsim.checks.order import is_of_parts
+from vibsim.checks.tolerance import is_bound
+from vibsim.checks.value import UNITS, units_in
 from vibsim.comparison.exact_availability import known_errors
 from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import HIGHEST
@@ -111,7 +111,7 @@ def verdict_variables(experiment: Experiment, record: Record) -> list[str]:
         or name in orders
         or name.startswith(("check_", "corner_"))
         or is_bound(name)
-        or is_told(name)
+        or is_of_parts(name)
     ]
 
 

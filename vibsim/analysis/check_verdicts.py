@@ -9,15 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from vibsim.analysis.check_variables import definition
-from vibsim.checks import energy, equal, stable
-from vibsim.checks.order.judge import converges
-from vibsim.checks.outcome import Outcome, compared_reason, truth
-from vibsim.checks.results import Results
+from vibsim.checks import tolerance
+from vibsim.checks.kinds import KINDS, definition
+from vibsim.checks.outcome import Outcome, Results, compared_reason, truth
 from vibsim.checks.sweep_regions import where
-from vibsim.checks.tolerance_check import reached
-from vibsim.checks.value.judge import valued
-from vibsim.checks.words.verdict import Wording, expectation
+from vibsim.checks.verdict_text import Wording, expectation
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import BY_TOLERANCE, worst
@@ -26,7 +22,7 @@ if TYPE_CHECKING:
     import xarray
 
     from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.checks import Check, Measurement
+    from vibsim.experiment.schema.checks import Check
 
 
 @dataclass(frozen=True)
@@ -73,11 +69,16 @@ def verdicts(experiment: Experiment, convergence: xarray.Dataset | Record) -> li
     if record.attrs["checks"] != definition(experiment):
         raise VibsimError("the checks are not those of the analysis: analyse the levels again")
     found = [
-        _verdict(experiment, record, check, _judge(experiment, record, check.measured, check.id))
+        _verdict(
+            experiment,
+            record,
+            check,
+            KINDS[check.measured.kind].judge(experiment, record, check.measured, check.id),
+        )
         for check in experiment.checks
     ]
     if experiment.tolerance is not None:
-        found.append(_verdict(experiment, record, None, reached(experiment, record)))
+        found.append(_verdict(experiment, record, None, tolerance.judge(experiment, record)))
     return found
 
 
@@ -115,16 +116,3 @@ def _verdict(
         where=found,
         note=getattr(check, "note", None),
     )
-
-
-def _judge(experiment: Experiment, record: Record, check: Measurement, id_: str) -> Outcome:
-    match check.kind:
-        case "converges":
-            return converges(experiment, record, check, id_)
-        case "value":
-            return valued(experiment, record, check, id_)
-        case "stable":
-            return stable.judge(experiment, record, check, id_)
-        case "conserves":
-            return energy.judge(experiment, record, check, id_)
-    return equal.judge(experiment, record, check, id_)

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.analysis.check_variables import definition, measured
 from vibsim.analysis.motion_variables import motion
 from vibsim.apriori.force_discontinuities import corner_variables, switches_of
 from vibsim.checks.fields import flags
-from vibsim.checks.order.phase_at_start import at_start
-from vibsim.checks.tolerance_check import bounds
+from vibsim.checks.kinds import check_variables, definition
+from vibsim.checks.order import phase_at_start
+from vibsim.checks.tolerance import bounds
 from vibsim.comparison import best_values
 from vibsim.comparison.comparison_variables import SERIES, Table, in_precision, numbers, over_time
 from vibsim.comparison.order_evidence import judgement
@@ -27,23 +27,19 @@ from vibsim.experiment.storage import RUNNING, asked, lean_series
 from vibsim.models import centred
 from vibsim.models.events import TREATMENTS
 from vibsim.models.shared.phase_amplitude_names import is_error_part
-from vibsim.observe.input_consistency import SAME_AT_EVERY_LEVEL
+from vibsim.observe.common_grid import SAME_AT_EVERY_LEVEL
 from vibsim.observe.member_block import CENTRED, MemberBlock, block_of
 from vibsim.observe.missed_pulses import missed_variables
 from vibsim.observe.stiffness import applies as motion_decides
 from vibsim.observe.stiffness import is_damped
 from vibsim.schemes import SCHEMES
-from vibsim.simulation.reference.missed_pulses import varies_in_time
+from vibsim.simulation.reference.one_sided_forces import varies_in_time
 from vibsim.simulation.scaled import in_scales
 
 if TYPE_CHECKING:
     import xarray
 
     from vibsim.experiment import Experiment
-
-__all__ = ["analyse", "analyse_records", "asked", "compared"]
-
-Floats = NDArray[np.float64]
 
 ONCE = SAME_AT_EVERY_LEVEL | {"energy_initial"}
 """What is taken from the finest level alone; the first energy differs between levels by its rounding only."""
@@ -91,41 +87,39 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
     asked_for = asked(experiment)
     for q in found.values():
         if is_error_part(q.name) and q.name not in asked_for:
-            table |= _verdict(q) | at_start(q)
+            table |= _verdict(q) | phase_at_start(q)
             continue
-        table |= numbers(q) | _verdict(q) | at_start(q)
+        table |= numbers(q) | _verdict(q) | phase_at_start(q)
         if not block.lean:
             table |= over_time(q)
-    table |= _scalars(block) | measured(block, found) | motion(block, found)
+    table |= _scalars(block) | check_variables(block, found) | motion(block, found)
     if switches_of(block.model):
         table |= corner_variables(block.corners)
     if varies_in_time(block.model):
         table |= missed_variables(block.missed)
     if is_damped(block.model):
-        words = "largest rate at which damping takes a velocity away"
-        of_rate = attributes(words, "1/s")
-        table["decay_rate"] = Variable(("scheme", "case"), block.decay, of_rate)
+        attrs = attributes("largest rate at which damping takes a velocity away", "1/s")
+        table["decay_rate"] = Variable(("scheme", "case"), block.decay, attrs)
     table |= best_values.table(block, found)
     if experiment.tolerance is not None:
         table |= bounds(block)
     if not block.lean:
         table |= _scaled_deviation(found["energy_deviation"]) | work_precision(block, found)
-    attrs: dict[str, Any] = {
+    about: dict[str, Any] = {
         "title": experiment.title,
         "model": experiment.model.kind,
         "end_included": int(block.grid.end_included),
         "storage": "lean" if block.lean else "series",
         "checks": definition(experiment),
     }
-    return in_scales(Record(_coords(block), table, attrs), experiment)
+    return in_scales(Record(_coords(block), table, about), experiment)
 
 
 def compared(experiment: Experiment, lean: bool = False) -> tuple[str, ...]:
     """Name the quantities that are compared between levels: states, energy, and what a check asks for."""
-    if lean:
-        return tuple(dict.fromkeys([*lean_series(experiment), *asked(experiment)]))
     states = (state.name for state in experiment.model.definition.states)
-    return tuple(dict.fromkeys([*states, "energy", "energy_deviation", *asked(experiment)]))
+    own = lean_series(experiment) if lean else (*states, "energy", "energy_deviation")
+    return tuple(dict.fromkeys([*own, *asked(experiment)]))
 
 
 def _centred(block: MemberBlock) -> tuple[str, ...]:
@@ -135,27 +129,28 @@ def _centred(block: MemberBlock) -> tuple[str, ...]:
 
 
 def _coords(block: MemberBlock) -> Table:
-    grid = block.grid
-    levels = np.array(grid.levels, dtype=np.int64)
+    grid, finest = block.grid, block.finest
     kept = ("scheme",), ("case",)
-    coords = {n: _widened(block, v) for n, v in block.finest.coords.items() if v.dims in kept}
-    coords["t"] = Variable(("t",), grid.t, block.finest.coords["t"].attrs)
-    coords["level"] = Variable(("level",), levels, attributes("level", "1"))
+    coords = {n: _widened(block, v) for n, v in finest.coords.items() if v.dims in kept}
+    coords["t"] = Variable(("t",), grid.t, finest.coords["t"].attrs)
+    levels = np.array(grid.levels, dtype=np.int64)
+
+    def add(name: str, values: Any, words: str, dim: str = "") -> None:
+        coords[name] = Variable((dim or name,), np.array(values), attributes(words, "1"))
+
+    add("level", levels, "level")
     if len(levels) > 1:
-        words = "coarser level of two successive ones"
-        coords["pair"] = Variable(("pair",), levels[:-1], attributes(words, "1"))
+        add("pair", levels[:-1], "coarser level of two successive ones")
     if len(levels) > 2:
-        words = "coarsest level of three successive ones"
-        coords["triple"] = Variable(("triple",), levels[:-2], attributes(words, "1"))
-    coords["norm"] = Variable(("norm",), np.array(block.norms), attributes("norm over time", "1"))
-    ids = [check.id for check in block.experiment.checks]
-    if ids:
-        coords["check"] = Variable(("check",), np.array(ids), attributes("name of the check", "1"))
+        add("triple", levels[:-2], "coarsest level of three successive ones")
+    add("norm", block.norms, "norm over time")
+    if block.experiment.checks:
+        add("check", [check.id for check in block.experiment.checks], "name of the check")
     coords |= best_values.coordinate(block)
-    steps = np.array(grid.steps, dtype=np.int64)
-    coords["steps"] = Variable(("level",), steps, attributes("number of time steps", "1"))
-    dims = ("level", "case") if "end" in block.finest else ("level",)
-    dt = grid.dt if "end" in block.finest else grid.dt[:, 0]
+    add("steps", np.array(grid.steps, dtype=np.int64), "number of time steps", "level")
+    is_of_case = "end" in finest
+    dt = grid.dt if is_of_case else grid.dt[:, 0]
+    dims = ("level", "case") if is_of_case else ("level",)
     coords["dt"] = Variable(dims, dt, attributes("time step", "s"))
     return coords
 
@@ -187,21 +182,21 @@ def _scaled_deviation(q: Comparison) -> Table:
 def _scalars(block: MemberBlock) -> Table:
     """Gather what the levels hold once per member, and the last value of every series."""
     rows = [block.records[level] for level in block.grid.levels]
+    largest = {f"{state.name}_max" for state in block.model.states}
     table: Table = {}
     for name, variable in rows[-1].variables.items():
         attrs, dims = dict(variable.attrs), variable.dims
-        if dims == SERIES and name.endswith((CENTRED, RUNNING)):
-            # neither has a value of its own at the end
-            continue
         if dims == SERIES:
-            attrs["long_name"] = f"{attrs.get('long_name', name)} at the last stored time"
-            last = np.stack([row[name][..., -1] for row in rows], -1)
-            table[f"{name}_end"] = Variable(("scheme", "case", "level"), last, attrs)
-        elif dims not in (("scheme", "case"), ("case",)) or (block.lean and not _kept(block, name)):
+            # neither of these has a value of its own at the end
+            if not name.endswith((CENTRED, RUNNING)):
+                attrs["long_name"] = f"{attrs.get('long_name', name)} at the last stored time"
+                last = np.stack([row[name][..., -1] for row in rows], -1)
+                table[f"{name}_end"] = Variable(("scheme", "case", "level"), last, attrs)
+        elif dims not in (("scheme", "case"), ("case",)):
             continue
         elif name in ONCE:
             table[name] = variable
-        else:
+        elif not block.lean or name in _LEAN | largest:
             stacked = np.stack([row[name] for row in rows], -1)
             table[name] = Variable((*dims, "level"), stacked, attrs)
     if motion_decides(block.model):
@@ -210,43 +205,31 @@ def _scalars(block: MemberBlock) -> Table:
     return table
 
 
-def _kept(block: MemberBlock, name: str) -> bool:
-    """Tell whether a number that the levels hold of every member is kept where storage is bounded."""
-    largest = {f"{state.name}_max" for state in block.model.states}
-    return name in _LEAN | ONCE | largest
-
-
-_LEAN = frozenset(
-    {
-        "status",
-        "failure_time",
-        "omega_dt",
-        HIGHEST,
-        "period",
-        "amplitude",
-        "energy_deviation_max_abs",
-    }
-)
+_LEAN = {
+    *("status", "failure_time", "omega_dt", HIGHEST),
+    *("period", "amplitude", "energy_deviation_max_abs"),
+}
+"""Numbers that the levels hold of every member, kept where storage is bounded."""
 
 
 def _verdict(q: Comparison) -> Table:
     """Judge a quantity by the formal order; the order in every norm, status and window in the typical norm."""
-    name, norms, typical = q.name, q.block.norms, judgement(q, TYPICAL_NORM)
-    member = ("scheme", "case")
+    typical = judgement(q, TYPICAL_NORM)
     table: Table = {}
-    words = {"order": "stated order", "order_low": "its lower end", "order_high": "its upper end"}
-    for key, field in (("order", "order"), ("order_low", "low"), ("order_high", "high")):
-        values = np.stack([getattr(judgement(q, kind), field) for kind in norms], axis=-1)
-        attrs = attributes(f"{name}: {words[key]}", "1")
-        table[f"{name}_{key}"] = Variable((*member, "norm"), in_precision(q, values), attrs)
+
+    def add(key: str, values: NDArray[Any], words: str, **more: Any) -> None:
+        dims = ("scheme", "case", "norm")[: values.ndim]
+        attrs = attributes(f"{q.name}: {words}", "1", **more)
+        table[f"{q.name}_{key}"] = Variable(dims, values, attrs)
+
+    words = {"order": "stated order", "low": "its lower end", "high": "its upper end"}
+    for field, text in words.items():
+        values = np.stack([getattr(judgement(q, norm), field) for norm in q.block.norms], axis=-1)
+        key = "order" if field == "order" else f"order_{field}"
+        add(key, in_precision(q, values), text)
     for key, levels in (("first", typical.first), ("last", typical.last)):
-        words_ = f"{name}: {key} level that the order rests on, -1 for none"
-        kept = levels.astype(np.int16)
-        table[f"{name}_window_{key}"] = Variable(member, kept, attributes(words_, "1"))
-    for key, codes, names in (
-        ("status", typical.status, STATUSES),
-        ("reason", typical.reason, REASON_NAMES),
-    ):
-        attrs = attributes(f"{name}: {key} of the verdict on its order", "1", **flags(names))
-        table[f"{name}_{key}"] = Variable(member, codes, attrs)
+        text = f"{key} level that the order rests on, -1 for none"
+        add(f"window_{key}", levels.astype(np.int16), text)
+    add("status", typical.status, "status of the verdict on its order", **flags(STATUSES))
+    add("reason", typical.reason, "reason of the verdict on its order", **flags(REASON_NAMES))
     return table

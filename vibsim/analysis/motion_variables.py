@@ -11,22 +11,20 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.checks.fields import flags
 from vibsim.comparison import best_values, value_numbers
 from vibsim.comparison.comparison_variables import Table
 from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Variable, attributes
 from vibsim.core.vocabulary import DRIFTS
 from vibsim.experiment.schema.published import row_at, row_id
 from vibsim.experiment.value_names import VALUES
 from vibsim.observe import oscillation, predicted_oscillation
 from vibsim.observe.common_grid import take
+from vibsim.observe.energy_drift import drift_at
 from vibsim.observe.member_block import MemberBlock, by_level
-from vibsim.observe.member_energy_drift import drift_at
-
-Floats = NDArray[np.float64]
 
 THEORY_RUNS = 2**12
 """Runs for which theory is worked out, at about 0.1 ms each."""
@@ -45,119 +43,103 @@ def motion(block: MemberBlock, compared: Mapping[str, Comparison]) -> Table:
     table = _theory(block) | _drift(block) | _extrema(block) | _running(block)
     table |= _beside(block, compared)
     words = "largest stable w dt: infinite for none, 0 where every step grows"
-    limit = Variable(
-        ("scheme", "case"), predicted_oscillation.limits(block), attributes(words, "1")
-    )
-    words = "evaluations of the acceleration; of an implicit scheme those of one iteration per step"
-    counts = _by_level(block, lambda level: oscillation.force_evaluations(block, level))
-    total = Variable(OF_LEVEL, counts, attributes(words, "1"))
+    limits, member = predicted_oscillation.limits(block), ("scheme", "case")
+    table["stability_limit"] = Variable(member, limits, attributes(words, "1"))
     words = "largest position over the largest exact one, or over that of the coarsest level"
-    size = Variable(OF_LEVEL, block.growth, attributes(words, "1"))
-    return table | {
-        "stability_limit": limit,
-        "size_over_exact": size,
-        "force_evaluations_total": total,
-    }
+    table["size_over_exact"] = Variable(OF_LEVEL, block.growth, attributes(words, "1"))
+    words = "evaluations of the acceleration; of an implicit scheme those of one iteration per step"
+    counts = _by_level(block, oscillation.force_evaluations)
+    table["force_evaluations_total"] = Variable(OF_LEVEL, counts, attributes(words, "1"))
+    return table
 
 
-def _by_level(block: MemberBlock, of: Callable[[int], Floats]) -> Floats:
-    return by_level([np.broadcast_to(of(level), block.shape) for level in block.grid.levels])
+def _by_level(block: MemberBlock, of: Callable[[MemberBlock, int], Floats]) -> Floats:
+    return by_level([np.broadcast_to(of(block, level), block.shape) for level in block.grid.levels])
 
 
 def _theory(block: MemberBlock) -> Table:
     """Return growth, frequency and phase error, predicted and measured."""
-    measured: dict[str, Callable[[int], Floats]] = {
-        "growth": lambda level: oscillation.growth_of_motion(block, level),
-        "frequency": lambda level: oscillation.frequency(block, level),
-        "phase_error": lambda level: oscillation.phase_error(block, level),
+    known, seen = predicted_oscillation, oscillation
+    words: dict[str, tuple[str, str, Callable[..., Floats], Callable[..., Floats]]] = {
+        "growth": (
+            "growth factor of the amplitude per period",
+            "1",
+            known.growth_per_period,
+            seen.growth_of_motion,
+        ),
+        "frequency": ("angular frequency", "rad s-1", known.frequency, seen.frequency),
+        "phase_error": (
+            "time by which peaks come early, per period",
+            "s",
+            known.phase_error,
+            seen.phase_error,
+        ),
     }
-    known: dict[str, Callable[[int], Floats]] = {
-        "growth": lambda level: predicted_oscillation.growth_per_period(block, level),
-        "frequency": lambda level: predicted_oscillation.frequency(block, level),
-        "phase_error": lambda level: predicted_oscillation.phase_error(block, level),
-    }
-    if _different(block) > THEORY_RUNS:
-        missing = np.full(block.shape, np.nan)
-        known = dict.fromkeys(known, lambda level: missing)
-    words = {
-        "growth": ("growth factor of the amplitude per period", "1"),
-        "frequency": ("angular frequency", "rad s-1"),
-        "phase_error": ("time by which peaks come early, per period", "s"),
-    }
-    table: Table = {}
-    for prefix, functions, adjective in (
-        ("theory", known, "predicted"),
-        ("measured", measured, "measured"),
-    ):
-        for name, of in functions.items():
-            text, units = words[name]
-            attrs = attributes(f"{adjective} {text}", units)
-            if functions is measured:
-                attrs["method"] = _method(block)
-            table[f"{prefix}_{name}"] = Variable(OF_LEVEL, _by_level(block, of), attrs)
-    return table
-
-
-def _method(block: MemberBlock) -> str:
-    """Say how growth and frequency were measured."""
-    seen = all(oscillation.has_recurrence(block, level) for level in block.grid.levels)
-    return RECURRENCE if seen else PEAKS
+    by_recurrence = all(seen.has_recurrence(block, level) for level in block.grid.levels)
+    method = {"method": RECURRENCE if by_recurrence else PEAKS}
+    predicted: Table = {}
+    measured: Table = {}
+    for name, (text, unit, theory, measurement) in words.items():
+        values = np.full((*block.shape, len(block.grid.levels)), np.nan)
+        if _different(block) <= THEORY_RUNS:
+            values = _by_level(block, theory)
+        attrs = attributes(f"predicted {text}", unit)
+        predicted[f"theory_{name}"] = Variable(OF_LEVEL, values, attrs)
+        attrs = attributes(f"measured {text}", unit, **method)
+        measured[f"measured_{name}"] = Variable(OF_LEVEL, _by_level(block, measurement), attrs)
+    return predicted | measured
 
 
 def _different(block: MemberBlock) -> int:
     """Return how many runs of the whole experiment may differ in w dt or in options: it depends on no part of it."""
     experiment = block.experiment
     keys = experiment.sweep.keys if experiment.sweep else ()
-    alike = all(key.startswith("initial.") for key in keys)
     runs = len(experiment.schemes) * len(block.grid.levels)
+    alike = all(key.startswith("initial.") for key in keys)
     return runs if alike else runs * experiment.members
 
 
 def _drift(block: MemberBlock) -> Table:
     """Return how the energy error by the scheme's own velocity grows with time."""
     found = [drift_at(block, level) for level in block.grid.levels]
-    words = "how the energy error grows with time"
     kinds = np.stack([drift.kind for drift in found], axis=-1)
-    rate_words = (
-        "relative energy error per period of a linear drift, per period squared of a quadratic one, change of "
-        "its logarithm per period of an exponential one"
-    )
     rates = by_level([drift.rate for drift in found])
+    of_kind = attributes("how the energy error grows with time", "1", **flags(DRIFTS))
+    of_rate = attributes(
+        "relative energy error per period of a linear drift, per period squared of a quadratic one, change of its "
+        "logarithm per period of an exponential one",
+        "1",
+    )
     return {
-        "energy_drift_kind": Variable(OF_LEVEL, kinds, attributes(words, "1", **flags(DRIFTS))),
-        "energy_drift_rate": Variable(OF_LEVEL, rates, attributes(rate_words, "1")),
+        "energy_drift_kind": Variable(OF_LEVEL, kinds, of_kind),
+        "energy_drift_rate": Variable(OF_LEVEL, rates, of_rate),
     }
-
-
-_KINDS = ("peak", "trough")
 
 
 def _extrema(block: MemberBlock) -> Table:
     """Return the peaks and troughs of every level side by side, NaN behind those of coarse levels."""
-    names = [f"{kind}{of}" for kind in _KINDS for of in ("_time", "", "_time_grid", "_grid")]
+    rows = [block.records[level] for level in block.grid.levels]
     table: Table = {}
-    for name in names:
-        rows = [block.records[level] for level in block.grid.levels]
-        if any(name not in row for row in rows):
-            continue
-        longest = max(row[name].shape[-1] for row in rows)
-        found = np.full((*block.shape, len(rows), longest), np.nan)
-        for i, row in enumerate(rows):
-            found[:, :, i, : row[name].shape[-1]] = row[name]
-        table[name] = Variable((*OF_LEVEL, "extremum"), found, rows[-1].variable(name).attrs)
+    for kind in ("peak", "trough"):
+        for name in (f"{kind}{of}" for of in ("_time", "", "_time_grid", "_grid")):
+            if all(name in row for row in rows):
+                longest = max(row[name].shape[-1] for row in rows)
+                found = np.full((*block.shape, len(rows), longest), np.nan)
+                for i, row in enumerate(rows):
+                    found[:, :, i, : row[name].shape[-1]] = row[name]
+                attrs = rows[-1].variable(name).attrs
+                table[name] = Variable((*OF_LEVEL, "extremum"), found, attrs)
     return table
 
 
 def _running(block: MemberBlock) -> Table:
     """Return the largest energy deviation so far, at the common times."""
+    rows = [block.records[level] for level in block.grid.levels]
     table: Table = {}
-    for deviation in ("energy_deviation", "energy_deviation_d2t"):
-        name = f"{deviation}_running_max"
-        rows = [block.records[level] for level in block.grid.levels]
-        if any(name not in row for row in rows):
-            continue
-        found = np.ascontiguousarray(np.stack([take(block.grid, row, name) for row in rows], 2))
-        table[name] = Variable((*OF_LEVEL, "t"), found, rows[-1].variable(name).attrs)
+    for name in ("energy_deviation_running_max", "energy_deviation_d2t_running_max"):
+        if all(name in row for row in rows):
+            found = np.ascontiguousarray(np.stack([take(block.grid, row, name) for row in rows], 2))
+            table[name] = Variable((*OF_LEVEL, "t"), found, rows[-1].variable(name).attrs)
     return table
 
 
@@ -172,18 +154,12 @@ def _beside(block: MemberBlock, compared: Mapping[str, Comparison]) -> Table:
     found = np.full((len(ids), block.shape[1], width), np.nan)
     for i, table in enumerate(experiment.published, 1):
         for j, row in enumerate(table.rows, 1):
-            at = row_at(row)
-            place = value_numbers.Place(
-                block, compared, table.quantity or "", at.level, at.t, at.step
-            )
-            index = ids.index(row_id(i, j))
+            at, of = row_at(row), table.quantity or ""
+            place = value_numbers.Place(block, compared, of, at.level, at.t, at.step)
             for k, name in enumerate(table.beside):
-                beside, _ = best_values.value(name, _fitting(place, name))
-                found[index, :, k] = beside[names.index(row.scheme)]
+                # a value of the motion as a whole is of no quantity
+                own = place if VALUES[name].of != "none" else replace(place, quantity="")
+                values, _ = best_values.value(name, own)
+                found[ids.index(row_id(i, j)), :, k] = values[names.index(row.scheme)]
     attrs = attributes("numbers beside each row of a published table", "1")
     return {"published_beside": Variable(("check", "case", "beside"), found, attrs)}
-
-
-def _fitting(place: value_numbers.Place, name: str) -> value_numbers.Place:
-    """Return the place with the quantity left out where a value is of none."""
-    return place if VALUES[name].of != "none" else replace(place, quantity="")

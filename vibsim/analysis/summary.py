@@ -7,12 +7,10 @@ from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.analysis.check_verdicts import Verdict
-from vibsim.apriori.formal_orders import Columns, columns_of
-from vibsim.checks.results import Result
-from vibsim.checks.words.verdict import Wording
+from vibsim.apriori.formal_orders import columns_of
+from vibsim.checks.verdict_text import Wording
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import FORMAT, jsonable, worst
 
@@ -52,9 +50,7 @@ def summarise(
             "title": experiment.title,
             "status": worst(verdict.status for verdict in verdicts),
             "checks": [_check(experiment, record, verdict, most) for verdict in verdicts],
-            "failures": [
-                row | _member(experiment, record, row["case"]) for row in _failures(record, most)
-            ],
+            "failures": _failures(experiment, record, most),
             "failure_count": int(np.count_nonzero(record["status"])),
         }
     )
@@ -67,34 +63,33 @@ def _check(
     check = next((check for check in experiment.checks if check.id == verdict.id), None)
     wording = Wording(experiment, record, check)
     rows = [
-        {**_plain(row), "sentence": wording.sentence(row), **_member(experiment, record, row.case)}
+        vars(row) | {"sentence": wording.sentence(row)} | _member(experiment, record, row.case)
         for row in verdict.results.worst(most)
     ]
-    return {name: getattr(verdict, name) for name in verdict.__dataclass_fields__} | {
-        "results": rows
-    }
-
-
-def _plain(result: Result) -> dict[str, Any]:
-    return {name: getattr(result, name) for name in ("scheme", "case", "status", "reason", "facts")}
+    return {**vars(verdict), "results": rows}
 
 
 def _member(experiment: Experiment, record: Record, case: int) -> dict[str, Any]:
     """Return the swept values of a member of a sweep, and what runs it alone."""
-    columns: Columns = columns_of(record)
     if experiment.sweep is None:
         return {}
-    at = int(np.flatnonzero(np.asarray(record["case"]) == case)[0])
+    at = record.place("case", case)
     return {
-        "values": {key: values[at] for key, values in columns.items()},
+        "values": {key: values[at] for key, values in columns_of(record).items()},
         "command": f"vibsim run {quote(f'{experiment.word}@{case}')}",
     }
 
 
-def _failures(record: Record, most: int | None) -> list[dict[str, Any]]:
-    """List the members that broke down, the earliest first."""
-    names, schemes = record.meanings("status"), record.words("scheme")
-    at = _earliest(record, most)
+def _failures(experiment: Experiment, record: Record, most: int | None) -> list[dict[str, Any]]:
+    """List the members that broke down, the earliest first: all, or so many."""
+    failed, names, schemes = (
+        record["status"] != 0,
+        record.meanings("status"),
+        record.words("scheme"),
+    )
+    if most is not None and np.count_nonzero(failed) > most:
+        times = np.nan_to_num(record["failure_time"], nan=np.inf)
+        failed &= times <= np.partition(times[failed], most - 1)[most - 1]
     rows = [
         {
             "scheme": schemes[s],
@@ -104,27 +99,15 @@ def _failures(record: Record, most: int | None) -> list[dict[str, Any]]:
             "step": _step(record, s, c, lv),
             "error": names[int(record["status"][s, c, lv])],
         }
-        for s, c, lv in at
+        for s, c, lv in np.argwhere(failed)
     ]
     rows.sort(key=lambda row: (row["t"], row["scheme"], row["case"], row["level"]))
-    return rows[:most]
-
-
-def _earliest(record: Record, most: int | None) -> NDArray[np.int64]:
-    """Return the positions of failures: all, or those not later than the `most` earliest."""
-    failed = record["status"] != 0
-    count = np.count_nonzero(failed)
-    if most is not None and count > most:
-        times = np.where(failed, np.nan_to_num(record["failure_time"], nan=np.inf), np.nan)
-        least = np.partition(times[failed], most - 1)[most - 1]
-        failed &= times <= least
-    return np.argwhere(failed)
+    return [row | _member(experiment, record, row["case"]) for row in rows[:most]]
 
 
 def _step(record: Record, scheme: int, case: int, level: int) -> int:
     """Return the step at which a member failed."""
     if "last_step" in record:
         return int(record["last_step"][scheme, case, level]) + 1
-    dt = record.variable("dt")
-    step = dt.values[level, case] if "case" in dt.dims else dt.values[level]
-    return round(float(record["failure_time"][scheme, case, level] / step))
+    dt = record["dt"][level]
+    return round(float(record["failure_time"][scheme, case, level] / (dt[case] if dt.ndim else dt)))

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.analysis.check_variables import FIELDS
-from vibsim.checks.fields import MEMBERS, Field
-from vibsim.checks.order.judge import EXPECTED
-from vibsim.checks.tolerance_check import BOUND
+from vibsim.checks.fields import MEMBERS, Field, stated
+from vibsim.checks.kinds import KINDS
+from vibsim.checks.order import EXPECTED
+from vibsim.checks.tolerance import BOUND
 from vibsim.core.vocabulary import BY_TOLERANCE, FORMAT, REASON_NAMES, STATUSES
 
 TEXT = {"type": "string"}
@@ -41,28 +41,19 @@ def _fact(field: Field) -> dict[str, Any]:
     if field.words:
         return {"enum": list(field.words), "description": field.meaning}
     kind = "integer" if np.issubdtype(field.type, np.integer) else "number"
-    kind = "boolean" if np.issubdtype(field.type, np.bool_) else kind
-    if len(field.dims) > len(MEMBERS):
-        items: dict[str, Any] = {"type": ["array", "null"], "items": {"type": kind}}
-        return items | {"description": field.meaning}
-    return {"type": [kind, "null"], "description": field.meaning}
-
-
-def _facts(kind: str, fields: Mapping[str, Field]) -> dict[str, Any]:
-    """Return the schema of the facts of a kind of check."""
-    stated = {
-        name: _fact(field)
-        for name, field in fields.items()
-        if not field.of_figure and name not in ("status", "reason")
-    }
-    return _object(stated, title=f"facts of a check `{kind}`")
+    several = {"type": ["array", "null"], "items": {"type": kind}}
+    one = {"type": [kind, "null"]}
+    return (several if len(field.dims) > len(MEMBERS) else one) | {"description": field.meaning}
 
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12) of a summary."""
-    kinds = {kind: dict(fields) for kind, fields in FIELDS.items()}
-    kinds["converges"]["expected"] = EXPECTED
-    facts = [_facts(kind, fields) for kind, fields in kinds.items()]
+    facts = []
+    for kind, row in KINDS.items():
+        of_kind = {name: _fact(field) for name, field in stated(row.fields).items()}
+        if kind == "converges":
+            of_kind["expected"] = _fact(EXPECTED)
+        facts.append(_object(of_kind, title=f"facts of a check `{kind}`"))
     reached = {"error_bound": _fact(BOUND), "state": TEXT}
     facts.append(_object(reached, title=f"facts of the check `{BY_TOLERANCE}`"))
     member = {"values": {"type": "object"}, "command": TEXT}
@@ -77,7 +68,7 @@ def schema() -> dict[str, Any]:
     }
     check = {
         "id": TEXT,
-        "kind": {"enum": [*FIELDS, "claim", BY_TOLERANCE]},
+        "kind": {"enum": [*KINDS, "claim", BY_TOLERANCE]},
         "text": TEXT,
         "quantity": {"type": ["string", "null"]},
         "expected": TEXT,

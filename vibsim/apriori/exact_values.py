@@ -14,15 +14,6 @@ from vibsim.models.table import BEND, HEIGHT
 from vibsim.simulation.members import Members
 
 
-def formulas_of(model: Model) -> dict[str, Formula]:
-    """Return the quantities that follow from the states at one time, with their formulas."""
-    energies = {
-        "kinetic_energy": model.kinetic_energy,
-        "potential_energy": model.potential_energy,
-    }
-    return energies | {row.name: row.formula for row in model.outputs}
-
-
 def known_values(
     model: Model, name: str, states: Mapping[str, Floats], t: Floats, group: Members
 ) -> Floats | None:
@@ -39,7 +30,11 @@ def known_values(
         return np.zeros(t.shape)
     if not states:
         return None
-    formulas = formulas_of(model)
+    formulas = {
+        "kinetic_energy": model.kinetic_energy,
+        "potential_energy": model.potential_energy,
+        **{row.name: row.formula for row in model.outputs},
+    }
     parameters = {row.name: group.parameters[row.key][:, None] for row in model.parameters}
     numbers = {**parameters, **states, "t": t}
     if model.lookup is not None:

@@ -14,10 +14,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from vibsim.apriori.thresholds import FAR, HALVINGS, MOST_SMOOTH, NEAR, ON_A_POINT
 from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.record import Record, Variable, attributes
 from vibsim.formula import Name, Switch, names_in, to_formula
@@ -25,6 +26,16 @@ from vibsim.models import Model
 from vibsim.models.events import Friction
 from vibsim.simulation import Members
 from vibsim.simulation.reference.one_sided_forces import TABLE, Sides, sides
+
+ON_A_POINT = 1e-6
+"""Part of a step within which a corner is at its end. [convention]"""
+FAR, NEAR = 1.0 / 16.0, 1.0 / 128.0
+"""Distances from the corner at which both formulas are compared, over the largest value of the quantity.
+[convention]"""
+HALVINGS = 40
+"""Halvings of a step that find the place of a corner. [convention]"""
+MOST_SMOOTH = 8
+"""A jump of a higher derivative than this one is none. [convention]"""
 
 
 @dataclass(frozen=True)
@@ -36,25 +47,6 @@ class Corners:
     time: Floats
     switch: Integers
     """Index into `switches_of`, -1 for none."""
-
-
-@dataclass(frozen=True)
-class _Path:
-    """The samples around a corner, flat over schemes and members; the straight line through them is the path."""
-
-    held: Sides
-    states: Floats
-    """Shape (2 samples, state, n)."""
-    times: Floats
-    """Shape (2, n)."""
-    modes: Floats
-    """Before and behind, shape (2, switch, n)."""
-
-    def at(self, s: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return positions, velocities and times after a part s of the way."""
-        y = self.states[0] + s * (self.states[1] - self.states[0])
-        u, v = np.split(y, 2)
-        return u, v, self.times[0] + s * (self.times[1] - self.times[0])
 
 
 @cache
@@ -122,9 +114,34 @@ def _of_scheme(
     passed &= np.array([_is_left_to_steps(held.model, row) for row in held.switches])[:, None, None]
     is_within = ~is_on_a_point(at, dt[:, None])
     of_time = np.array(_of_time(held))[:, None, None]
-    followed = _Followed(held, states, t, numbers, q, modes, edge)
-    within = followed.first(np.where(passed & is_within, at, np.inf))
-    on_point = followed.first(np.where(passed & of_time & ~is_within, at, np.inf))
+
+    def first(when: Floats) -> tuple[Floats, Floats, Integers]:
+        """Return the first corner of those whose times are given, infinite elsewhere, shape (switch, case, sample)."""
+        own = np.arange(cases)
+        sample = np.argmin(np.min(when, axis=0), axis=-1)
+        switch = np.argmin(when[:, own, sample], axis=0)
+        before, behind = modes[:, own, sample], modes[:, own, sample].copy()
+        # what else changes between these two samples is another corner
+        behind[switch, own] = modes[switch, own, sample + 1]
+        path = _Path(
+            Sides(held.model, held.formulas, held.switches, numbers),
+            switch,
+            np.stack([states[:, own, sample], states[:, own, sample + 1]]),
+            np.stack([t[own, sample], t[own, sample + 1]]),
+            (before, behind),
+        )
+        size = np.nanmax(np.abs(q), axis=-1)[switch, own]
+        exists = np.isfinite(when[switch, own, sample])
+        power = np.where(exists, path.power(edge[switch, own, sample], size), np.nan)
+        exists &= np.isfinite(power)
+        return (
+            power,
+            np.where(exists, when[switch, own, sample], np.nan),
+            np.where(exists, switch - len(held.switches) + len(switches_of(held.model)), -1),
+        )
+
+    within = first(np.where(passed & is_within, at, np.inf))
+    on_point = first(np.where(passed & of_time & ~is_within, at, np.inf))
     is_first = (on_point[0] == 1.0) & ~(within[1] <= on_point[1])
     power, time, switch = (np.where(is_first, *pair) for pair in zip(on_point, within, strict=True))
     return power, time, np.asarray(switch, dtype=np.int64)
@@ -138,62 +155,13 @@ def is_on_a_point(t: Floats, dt: Floats) -> Flags:
 
 def _of_time(held: Sides) -> list[bool]:
     """Tell of every switch whether time alone moves it."""
-    state_names = {state.name for state in held.model.states}
-    moved = set(state_names)
+    moved = {state.name for state in held.model.states}
     found = []
     for row in held.switches:
         found.append(moved.isdisjoint(names_in(row.quantity)))
         if not found[-1]:
             moved.add(row.mode)
     return found
-
-
-@dataclass(frozen=True)
-class _Followed:
-    """What all switches look at along the samples of every member."""
-
-    held: Sides
-    states: Floats
-    t: Floats
-    numbers: Mapping[str, Floats]
-    q: Floats
-    """Shape (switch, case, sample)."""
-    modes: Floats
-    edge: Floats
-    """The value that is passed between two samples, shape (switch, case, sample - 1)."""
-
-    def first(self, when: Floats) -> tuple[Floats, Floats, Integers]:
-        """Return power, time and switch of the first corner of every member, each of shape (case,).
-
-        Parameters
-        ----------
-        when
-            The times of those that count, infinite elsewhere, shape (switch, case, sample - 1).
-        """
-        held, own = self.held, np.arange(len(self.t))
-        first = np.argmin(np.min(when, axis=0), axis=-1)
-        switch = np.argmin(when[:, own, first], axis=0)
-        exists = np.isfinite(when[switch, own, first])
-        around = np.stack([first, first + 1])
-        own_modes = np.stack([self.modes[:, own, i] for i in around])
-        # what else changes between these two samples is another corner
-        behind = own_modes[0].copy()
-        behind[switch, own] = own_modes[1][switch, own]
-        path = _Path(
-            Sides(held.model, held.formulas, held.switches, self.numbers),
-            np.stack([self.states[:, own, i] for i in around]),
-            np.stack([self.t[own, i] for i in around]),
-            np.stack([own_modes[0], behind]),
-        )
-        size = np.nanmax(np.abs(self.q), axis=-1)[switch, own]
-        power = _power(path, switch, self.edge[switch, own, first], size)
-        power = np.where(exists, power, np.nan)
-        exists &= np.isfinite(power)
-        return (
-            power,
-            np.where(exists, when[switch, own, first], np.nan),
-            np.where(exists, switch - len(held.switches) + len(switches_of(held.model)), -1),
-        )
 
 
 def _modes(held: Sides, states: Floats, t: Floats) -> tuple[Floats, Floats]:
@@ -208,45 +176,61 @@ def _modes(held: Sides, states: Floats, t: Floats) -> tuple[Floats, Floats]:
     return q, modes
 
 
-def _power(path: _Path, switch: Integers, edge: Floats, size: Floats) -> Floats:
-    """Return the power of dt that a corner leaves, shape (n,); NaN where both formulas are the same."""
-    s = _crossing(path, switch, edge)
-    slope = _quantity(path, switch, np.ones(len(s))) - _quantity(path, switch, np.zeros(len(s)))
-    gaps = []
-    for distance in (FAR, NEAR):
-        u, v, t = path.at(s + distance * size / slope)
-        before, behind = (path.held.force(modes)(u, v, t) for modes in path.modes)
-        gaps.append(np.max(np.abs(behind - before), axis=0))
-    k = np.round(np.log(gaps[0] / gaps[1]) / np.log(FAR / NEAR))
-    return np.where((gaps[0] > 0.0) & (k < MOST_SMOOTH), np.maximum(k, 0.0) + 1.0, np.nan)
+@dataclass(frozen=True)
+class _Path:
+    """The samples around a corner of n members; the straight line through them is the path."""
 
+    held: Sides
+    switch: Integers
+    """Shape (n,)."""
+    states: Floats
+    """Shape (2 samples, state, n)."""
+    times: Floats
+    """Shape (2, n)."""
+    modes: tuple[Floats, Floats]
+    """Before and behind, each of shape (switch, n)."""
 
-def _quantity(path: _Path, switch: Integers, s: Floats) -> Floats:
-    u, v, t = path.at(s)
-    return path.held.quantities(path.modes[0], u, v, t)[switch, np.arange(len(s))]
+    def at(self, s: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return positions, velocities and times after a part s of the way."""
+        u, v = np.split(self.states[0] + s * (self.states[1] - self.states[0]), 2)
+        return u, v, self.times[0] + s * (self.times[1] - self.times[0])
 
+    def quantity(self, s: Floats) -> Floats:
+        """Return what the switch looks at there."""
+        return self.held.quantities(self.modes[0], *self.at(s))[self.switch, np.arange(len(s))]
 
-def _crossing(path: _Path, switch: Integers, edge: Floats) -> Floats:
-    """Return after which part of the way a switch has the value `edge`, by bisection."""
-    low, high = np.zeros(len(edge)), np.ones(len(edge))
-    start = _quantity(path, switch, low) > edge
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        is_before = (_quantity(path, switch, middle) > edge) == start
-        low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
-    return 0.5 * (low + high)
+    def crossing(self, edge: Floats) -> Floats:
+        """Return after which part of the way a switch has the value `edge`, by bisection."""
+        low, high = np.zeros(len(edge)), np.ones(len(edge))
+        start = self.quantity(low) > edge
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            is_before = (self.quantity(middle) > edge) == start
+            low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
+        return 0.5 * (low + high)
+
+    def power(self, edge: Floats, size: Floats) -> Floats:
+        """Return the power of dt that a corner leaves, shape (n,); NaN where both formulas are the same."""
+        s = self.crossing(edge)
+        slope = self.quantity(np.ones(len(s))) - self.quantity(np.zeros(len(s)))
+        gaps = []
+        for distance in (FAR, NEAR):
+            place = self.at(s + distance * size / slope)
+            before, behind = (self.held.force(modes)(*place) for modes in self.modes)
+            gaps.append(np.max(np.abs(behind - before), axis=0))
+        k = np.round(np.log(gaps[0] / gaps[1]) / np.log(FAR / NEAR))
+        exists = (gaps[0] > 0.0) & (k < MOST_SMOOTH)
+        return np.where(exists, np.maximum(k, 0.0) + 1.0, np.nan)
 
 
 def corner_variables(corners: Corners) -> dict[str, Variable]:
     """Return the corners as variables of the convergence Record."""
-    dims = ("scheme", "case")
-    words = "first time at which the force has a corner within a step"
+    rows: dict[str, tuple[NDArray[Any], str, str]] = {
+        "time": (corners.time, "first time at which the force has a corner within a step", "s"),
+        "power": (corners.power, "power of dt that this corner leaves of errors", "1"),
+        "switch": (corners.switch.astype(np.int16), "number of its condition, or -1", "1"),
+    }
     return {
-        "corner_time": Variable(dims, corners.time, attributes(words, "s")),
-        "corner_power": Variable(
-            dims, corners.power, attributes("power of dt that this corner leaves of errors", "1")
-        ),
-        "corner_switch": Variable(
-            dims, corners.switch.astype(np.int16), attributes("number of its condition, or -1", "1")
-        ),
+        f"corner_{name}": Variable(("scheme", "case"), values, attributes(words, unit))
+        for name, (values, words, unit) in rows.items()
     }

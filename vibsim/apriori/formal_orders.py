@@ -1,31 +1,37 @@
-"""What schemes promise to members: order, powers, round-off, stability. It depends on options, which may be swept."""
+"""What schemes promise to members: order, powers, round-off, stability.
+
+It depends on options, which may be swept; the order of some schemes, on how a motion begins (`vibsim.schemes.orders`).
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vibsim import plan
-from vibsim.apriori.initial_motion import BEGINNINGS, beginning_varies, beginnings
 from vibsim.apriori.phase_amplitude_orders import is_promised, part_orders
-from vibsim.apriori.roundoff_floor import relative_floor
-from vibsim.core.array_types import Flags, Floats
+from vibsim.apriori.roundoff_floor import SPACING_AT_ONE
+from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.core.record import Record
-from vibsim.models import Model
+from vibsim.formula import values
+from vibsim.models import Model, tree
 from vibsim.models.shared.phase_amplitude_names import whole_of
 from vibsim.schemes import SCHEMES, Options, Scheme
-from vibsim.schemes.base import ORDER_AT_CORNERS, OptionValue, is_on_the_mesh
-from vibsim.schemes.orders import Beginning
+from vibsim.schemes.base import ORDER_AT_CORNERS, is_on_the_mesh
+from vibsim.schemes.orders import Beginning, depends_on_velocity, is_autonomous
+from vibsim.simulation.members import numbers_of
 from vibsim.theory import stability_limit
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
+BALANCED = 1e-12
+"""A force that makes so little of the velocity within a radian is rounding. [convention]"""
+BEGINNINGS: tuple[Beginning, ...] = get_args(Beginning)
 Columns = Mapping[str, NDArray[Any]]
 """Swept values by dotted key, each of shape (case,)."""
 
@@ -41,14 +47,58 @@ def columns_of(record: Record) -> Columns:
 
 def options_swept(experiment: Experiment) -> bool:
     """Tell whether an option of a scheme differs between members."""
-    keys = experiment.sweep.keys if experiment.sweep else ()
-    return any(key.startswith("schemes.") for key in keys)
+    return _sweeps(experiment, "schemes.")
 
 
 def options_of(experiment: Experiment, columns: Columns, scheme: int, case: int) -> Options:
     """Return the options that one member has of one scheme, by their positions."""
     own = {key: values[case : case + 1] for key, values in columns.items()}
     return plan.option_groups(experiment, scheme, own)[0][0]
+
+
+def beginning_matters(experiment: Experiment) -> bool:
+    """Tell whether some scheme promises other orders to motions that begin in a special way."""
+    model = experiment.model.definition
+    if model.events is not None or model.lookup is not None or depends_on_velocity(model):
+        return False
+    # a swept option is another one in every member
+    return options_swept(experiment) or any(
+        orders.from_rest is not None or orders.from_balance is not None
+        for orders in (SCHEMES[s.kind].orders(s.options) for s in experiment.schemes)
+    )
+
+
+def beginning_varies(experiment: Experiment) -> bool:
+    """Tell whether members may begin in different ways, so that each has orders of its own."""
+    return beginning_matters(experiment) and _sweeps(experiment, "initial.", "model.")
+
+
+def _sweeps(experiment: Experiment, *sections: str) -> bool:
+    """Tell whether something in one of these sections is swept."""
+    keys = experiment.sweep.keys if experiment.sweep else ()
+    return any(key.startswith(sections) for key in keys)
+
+
+def beginnings(experiment: Experiment, columns: Columns) -> Integers:
+    """Return the index in `BEGINNINGS` for every member, shape (case,); of shape (1,) where it is one for all."""
+    size = len(next(iter(columns.values()))) if beginning_varies(experiment) else 1
+    if not beginning_matters(experiment):
+        return np.zeros(size, dtype=np.int64)
+    model = experiment.model.definition
+    own = {key: column[:size] for key, column in columns.items()}
+    parameters, initial = numbers_of(experiment, own, size)
+    fastest = np.max([np.abs(initial[name]) for name in model.velocities], axis=0)
+    at_rest = (fastest == 0.0) & is_autonomous(model)
+    with np.errstate(all="ignore"):
+        frequency = np.asarray(model.natural_frequency(parameters), dtype=float)
+        rounding = BALANCED * fastest * np.nan_to_num(frequency)
+        named = {row.name: np.asarray(parameters[row.key], float) for row in model.parameters}
+        named |= {**initial, "t": np.zeros(1)}
+        pulls = [np.abs(values(tree(model, a), named)) for a in model.accelerations]
+        is_balanced = np.max(pulls, axis=0) <= rounding
+    found = np.where(at_rest, BEGINNINGS.index("rest"), BEGINNINGS.index("any"))
+    found = np.where(is_balanced, BEGINNINGS.index("balance"), found)
+    return np.broadcast_to(found, size)
 
 
 def formal_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floats:
@@ -115,17 +165,17 @@ def left_to_the_mesh(experiment: Experiment, columns: Columns) -> Floats:
     regular expansion.
     """
     model = experiment.model.definition
+
+    def left(scheme: Scheme, options: Options) -> float:
+        if model.events is not None:
+            return 1.0 if is_on_the_mesh(options) else math.nan
+        # the error of a scheme of first order is its own
+        order = scheme.formal_order(model.position, model, options)
+        return ORDER_AT_CORNERS if order >= ORDER_AT_CORNERS else math.nan
+
     if model.events is None and not has_corners(model):
         return np.full((len(experiment.schemes), 1), np.nan)
-    return _each(experiment, columns, lambda s, o: _left(s, o, model))
-
-
-def _left(scheme: Scheme, options: Options, model: Model) -> float:
-    if model.events is not None:
-        return 1.0 if is_on_the_mesh(options) else math.nan
-    # the error of a scheme of first order is its own
-    order = scheme.formal_order(model.position, model, options)
-    return ORDER_AT_CORNERS if order >= ORDER_AT_CORNERS else math.nan
+    return _each(experiment, columns, left)
 
 
 def relative_floors(
@@ -141,10 +191,10 @@ def relative_floors(
         Of schemes that have several; the one that they have where None.
     """
 
-    def floor(scheme: Scheme, options: Options) -> Floats:
+    def floor(scheme: Scheme, options: Options) -> list[float]:
         if arithmetic is not None and "arithmetic" in options:
             options = {**options, "arithmetic": arithmetic}
-        return relative_floor(scheme, options, steps)
+        return [max(scheme.round_off(options, n), SPACING_AT_ONE) for n in steps]
 
     return _each(experiment, columns, floor)
 
@@ -155,22 +205,13 @@ def stability_limits(experiment: Experiment, columns: Columns) -> Floats:
     It is infinite too for a scheme that grows at every step (its growth vanishes with dt, and is no instability), and
     for one that chooses its own steps.
     """
-    return _each(experiment, columns, _finite_limit)
-
-
-def _finite_limit(scheme: Scheme, options: Options) -> float:
-    limit = limit_of(scheme, options)
-    return limit if limit > 0.0 else np.inf
+    limits = _each(experiment, columns, limit_of)
+    return np.where(limits > 0.0, limits, np.inf)
 
 
 def limit_of(scheme: Scheme, options: Options) -> float:
     """Return the largest stable w dt of a scheme, infinite for none, 0 where every step grows; NaN where it adapts."""
-    return math.nan if scheme.adaptive else _limit(scheme, tuple(sorted(options.items())))
-
-
-@lru_cache(maxsize=1024)
-def _limit(scheme: Scheme, options: tuple[tuple[str, OptionValue], ...]) -> float:
-    return float(stability_limit(scheme, dict(options)))
+    return math.nan if scheme.adaptive else stability_limit(scheme, options)
 
 
 def _each(

@@ -10,22 +10,17 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from vibsim.apriori.thresholds import STORED
 from vibsim.convergence.differences import largest
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.schemes import Options, Scheme
 
 SPACING_AT_ONE = float(np.finfo(np.float64).eps)
 """Distance from 1 to the next number, 2^-52: twice the unit round-off.
 
 No stored number is known better than this, relative to its size.
 """
-
-
-def relative_floor(scheme: Scheme, options: Options, steps: tuple[int, ...]) -> Floats:
-    """Return the predicted round-off at every level relative to the solution's size, shape (level,)."""
-    return np.array([max(scheme.round_off(options, n), SPACING_AT_ONE) for n in steps])
+STORED = 1.0 / 7.0
+"""Root mean square of the error that storing leaves of numbers from 1/2 to 1: half a spacing over root 12. [derived]"""
 
 
 def stored_floor(
@@ -43,15 +38,12 @@ def stored_floor(
     names
         The states.
     """
-    kinds = [
-        {np.asarray(records[level][name]).dtype for name in names if name in records[level]}
-        for level in levels
-    ]
-    known = [
-        max((float(np.finfo(kind).eps) for kind in found if kind.kind == "f"), default=0.0)
-        for found in kinds
-    ]
-    return np.array([STORED * eps if eps > SPACING_AT_ONE else 0.0 for eps in known])
+    floors = []
+    for level in levels:
+        kinds = (np.asarray(records[level][name]).dtype for name in names if name in records[level])
+        eps = max((float(np.finfo(kind).eps) for kind in kinds if kind.kind == "f"), default=0.0)
+        floors.append(STORED * eps if eps > SPACING_AT_ONE else 0.0)
+    return np.array(floors)
 
 
 def solution_size(series: list[Floats]) -> Floats:

@@ -2,32 +2,34 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
 from vibsim.apriori.formal_orders import columns_of, formal_orders
-from vibsim.checks.fields import Field, measured
-from vibsim.checks.of_schemes import (
+from vibsim.checks.at_level import level_of, lies_still
+from vibsim.checks.fields import LEVEL, MOTION, Field, facts, measured
+from vibsim.checks.outcome import (
     MATCH,
     MISMATCH,
-    MOTIONS,
     NON_FINITE,
     NOT_APPLICABLE,
     PRE_ASYMPTOTIC,
     ROUND_OFF,
-    by_reason,
-    level_of,
-    lies_still,
+    Outcome,
+    outcome_of,
 )
-from vibsim.checks.outcome import Outcome
+from vibsim.checks.sentences import MOVE, NOT_FINITE, NOTHING_MOVES, Description, Found
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import DRIFTS
+from vibsim.experiment.schema.checks import Drift
+from vibsim.observe.energy_drift import drift_at
 from vibsim.observe.member_block import MemberBlock
-from vibsim.observe.member_energy_drift import drift_at
 
 if TYPE_CHECKING:
+    from vibsim.comparison.quantity_comparison import Comparison
     from vibsim.experiment import Experiment
     from vibsim.experiment.schema.checks import ConservesCheck
 
@@ -36,8 +38,8 @@ FIELDS = {
     "drift_rate": Field("rate of the drift per period, as a part of the energy at the start"),
     "drift_power": Field("power of time with which the energy error grows"),
     "energy_error": Field("largest energy error, as a part of the energy at the start"),
-    "motion": Field("whether anything moves", np.int8, MOTIONS),
-    "level": Field("level", np.int16, dims=()),
+    "motion": MOTION,
+    "level": LEVEL,
     "window_means": Field(
         "means of the largest energy error so far over [T/8, T/4], [T/4, T/2] and [T/2, T], in the unit of the energy",
         dims=("scheme", "case", "window"),
@@ -49,8 +51,26 @@ FIELDS = {
     ),
 }
 
+EXPECTED_DRIFTS = get_args(Drift)
+"""What `drift:` may be."""
+_DRIFTS = {
+    "none": "is round-off",
+    "bounded": "is bounded: its largest value no longer grows",
+    "linear": "grows in proportion to the time",
+    "quadratic": "grows in proportion to the square of the time",
+    "exponential": "grows exponentially with time",
+    "unclear": "is more than round-off, but this run does not show how it grows",
+}
+_RATES = {
+    "linear": "by {} of the energy per period",
+    "quadratic": "by {} of the energy per period squared",
+    "exponential": "the energy by the factor exp({}) per period",
+}
 
-def measure(block: MemberBlock, check: ConservesCheck) -> Mapping[str, Any]:
+
+def measure(
+    block: MemberBlock, compared: Mapping[str, Comparison], check: ConservesCheck
+) -> Mapping[str, Any]:
     """Return what a check measures."""
     level = level_of(block, check)
     found = drift_at(block, level, check.about or "")
@@ -71,23 +91,76 @@ def judge(experiment: Experiment, record: Record, check: ConservesCheck, id_: st
     kind, largest = (measured(record, id_, field) for field in ("drift", "energy_error"))
     still = measured(record, id_, "motion") != 0
     broken = record["status"][..., record.place("level", int(measured(record, id_, "level")))] != 0
-    wanted = {DRIFTS.index(check.drift)}
+    is_none, unclear = (kind == DRIFTS.index(name) for name in ("none", "unclear"))
+    wanted = kind == DRIFTS.index(check.drift)
     if check.drift == "bounded":
         # what is conserved is bounded too
-        wanted.add(DRIFTS.index("none"))
-    unclear = kind == DRIFTS.index("unclear")
+        wanted |= is_none
     # an error that theory has, lost in round-off, may grow in any way; one that it has not does not grow
     has_error = np.isfinite(formal_orders(experiment, check.about or "", columns_of(record)))
-    lost = (kind == DRIFTS.index("none")) & has_error
-    masks = [
+    cases = [
         (broken, NON_FINITE),
         (np.isnan(largest) & unclear, NOT_APPLICABLE),
-        (still & (kind == DRIFTS.index("none")), NOT_APPLICABLE),
+        (still & is_none, NOT_APPLICABLE),
         # an error above round-off is not none, however short the run
         (unclear & (check.drift != "none"), PRE_ASYMPTOTIC),
-        (np.isin(kind, list(wanted)), MATCH),
-        (lost, ROUND_OFF),
+        (wanted, MATCH),
+        (is_none & has_error, ROUND_OFF),
     ]
-    reason = np.select([mask for mask, _ in masks], [code for _, code in masks], MISMATCH)
+    reason = np.select([mask for mask, _ in cases], [code for _, code in cases], MISMATCH)
+    return outcome_of(experiment, record, check, reason, largest, facts(record, id_, FIELDS))
 
-    return by_reason(experiment, record, check, id_, FIELDS, reason, away=largest)
+
+def describe(f: Found, check: ConservesCheck) -> Description:
+    """Say how the error of the energy grows with time, and what to change where a check expects otherwise."""
+    size, rate, drift = f.fact("energy_error"), f.fact("drift_rate"), f.word("drift")
+    number, name, expects = (
+        f.notation.number,
+        check.conserves,
+        f"The check expects `drift: {check.drift}`.",
+    )
+    match f.reason:
+        case "non_finite":
+            return Description(NOT_FINITE[0].format(name), NOT_FINITE[1])
+        case "not_applicable" if f.word("motion") == "rests":
+            told = f"{NOTHING_MOVES.format('the energy')}, and there is nothing to conserve."
+            return Description(told, MOVE)
+        case "not_applicable":
+            return Description(
+                f"{name} does not exist here, or was not stored.",
+                f"Name `schemes:` that have {name}, or ask for `conserves: energy`.",
+            )
+        case "round_off":
+            return Description(
+                f"The error of {name} is at most {number(size, 4)} of the energy, which may be round-off, so its "
+                f"growth cannot be seen. {expects}",
+                "Take a coarser `level:`, whose error is larger than round-off, lengthen the run (`time: end`), or set "
+                "`drift: none`, which is what this level shows.",
+            )
+    told = _DRIFTS[drift]
+    if drift == "exponential" and rate < 0:
+        told = "is that of an energy that decays exponentially"
+    if rate and math.isfinite(rate):
+        told += f", {_RATES.get(drift, '').format(number(rate, 4))}"
+    most = (
+        f"it is at most {number(size, 4)} of the energy"
+        if math.isfinite(size)
+        else "the energy is 0"
+    )
+    return Description(
+        f"The error of {name} {told}; {most}. {expects}", _advice(f.reason, drift, check)
+    )
+
+
+def _advice(reason: str, drift: str, check: ConservesCheck) -> str:
+    if reason == "pre_asymptotic":
+        return "Lengthen the run (`time: end`), or store more of it (`samples: all`). It is too short to show a drift."
+    other = "leave the check out (`checks:`)"
+    if drift in EXPECTED_DRIFTS:
+        if EXPECTED_DRIFTS.index(drift) < EXPECTED_DRIFTS.index(check.drift):
+            return f"Set `drift: {drift}`, which was measured. The energy is conserved better than the check asks for."
+        other = f"set `drift: {drift}`, which was measured"
+    return (
+        f"Take a scheme that conserves the energy better (`schemes:`), or {other}. Finer `levels:` make the error "
+        "smaller, but do not change how it grows."
+    )

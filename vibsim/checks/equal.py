@@ -2,40 +2,40 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from decimal import ROUND_CEILING, Context
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vibsim.checks.fields import Field, measured
-from vibsim.checks.of_schemes import (
+from vibsim.checks.at_level import level_of, lies_still
+from vibsim.checks.fields import LEVEL, MOTION, Field, facts, measured
+from vibsim.checks.outcome import (
     MATCH,
     MISMATCH,
-    MOTIONS,
     NON_FINITE,
     NOT_APPLICABLE,
-    by_reason,
-    level_of,
-    lies_still,
+    Outcome,
+    outcome_of,
 )
-from vibsim.checks.outcome import Outcome
+from vibsim.checks.sentences import MOVE, NOT_FINITE, NOTHING_MOVES, Description, Found
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.comparison.solution_distance import apart
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
+from vibsim.experiment.schema.checks import SOLUTIONS
 from vibsim.observe.member_block import MemberBlock
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
     from vibsim.experiment.schema.checks import EqualCheck
 
-Floats = NDArray[np.float64]
-
 FIELDS = {
     "distance": Field("largest distance of the two solutions, in the unit of the quantity"),
     "allowed": Field("how far they may be apart, in the unit of the quantity"),
-    "motion": Field("whether anything moves in either", np.int8, MOTIONS),
-    "level": Field("level", np.int16, dims=()),
+    "motion": Field("whether anything moves in either", MOTION.type, MOTION.words),
+    "level": LEVEL,
     "distance_over_time": Field(
         "largest distance around each of evenly spaced places in time, in the unit of the quantity",
         dims=("case", "place"),
@@ -57,18 +57,14 @@ def measure(
     still, names = lies_still(block, level), [row.name for row in block.experiment.schemes]
     second = names.index(check.second) if check.second in names else found.scheme
     distance[found.scheme], allowed[found.scheme] = found.largest, found.allowed
+    places = min(PLACES, max(len(record["t"]) for record in block.records.values()))
     return {
         "distance": distance,
         "allowed": allowed,
         "motion": np.broadcast_to(still[found.scheme] & still[second], block.shape),
         "level": level,
-        "distance_over_time": by_place(found.over_time, places(block)),
+        "distance_over_time": by_place(found.over_time, places),
     }
-
-
-def places(block: MemberBlock) -> int:
-    """Return at how many places in time a distance is kept."""
-    return min(PLACES, max(len(record["t"]) for record in block.records.values()))
 
 
 def by_place(values: Floats, count: int) -> Floats:
@@ -102,14 +98,65 @@ def judge(experiment: Experiment, record: Record, check: EqualCheck, id_: str) -
     names = record.words("scheme")
     involved = [names.index(name) for name in check.equal if name in names]
     broken = np.any(record["status"][involved, :, place] != 0, axis=0)
-    masks = [
+    cases = [
         (np.broadcast_to(broken, distance.shape), NON_FINITE),
         (np.isnan(distance) | np.isnan(allowed), NOT_APPLICABLE),
         ((distance <= allowed) & still, NOT_APPLICABLE),
         (distance <= allowed, MATCH),
     ]
-    reason = np.select([mask for mask, _ in masks], [code for _, code in masks], MISMATCH)
+    reason = np.select([mask for mask, _ in cases], [code for _, code in cases], MISMATCH)
     # as a part of what is allowed, which differs from member to member
     with np.errstate(divide="ignore", invalid="ignore"):
         away = np.where(distance > 0, distance / allowed, distance)
-    return by_reason(experiment, record, check, id_, FIELDS, reason, away)
+    return outcome_of(experiment, record, check, reason, away, facts(record, id_, FIELDS))
+
+
+def other_solution(check: EqualCheck) -> str:
+    """Name what a scheme must equal."""
+    known = {"exact": "the exact solution", "discrete": "the exact solution of its own steps"}
+    return known.get(check.second, f"scheme {check.second}")
+
+
+def describe(f: Found, check: EqualCheck) -> Description:
+    """Say how far two solutions are from each other, and what to change where that is too far."""
+    what, other = f.notation.opening(f.notation.quantity(check.quantity)), other_solution(check)
+    distance, allowed, number = f.fact("distance"), f.fact("allowed"), f.notation.number
+    both = f"{what} of scheme {check.first} and {other}"
+    apart = f"at most {number(distance, 4)} apart"
+    brief = f"{apart}; {number(allowed, 4)} is allowed"
+    enough = f"above {_rounded_up(distance)} if so much is right"
+    sentence = f"{what} of scheme {check.first} {{}} {other}. They are {brief}."
+    match f.reason:
+        case "match":
+            return Description(sentence.format("equals"), "", brief)
+        case "non_finite":
+            return Description(NOT_FINITE[0].format(what), NOT_FINITE[1], brief)
+        case "not_applicable" if distance <= allowed:
+            told = f"{NOTHING_MOVES.format(what)}, and {other} shows no difference."
+            return Description(told, MOVE, brief)
+        case "not_applicable" if math.isfinite(distance):
+            told = f"{both} are {apart}, and the round-off to compare that with is not known here."
+            return Description(told, f"Give `atol:`, {enough}.", brief)
+        case "not_applicable":
+            return Description(
+                f"{what} and {other} cannot be compared here, or were not stored.",
+                "Name in `equal:` a scheme or a solution that exists here, or another `quantity:`.",
+                brief,
+            )
+    ways = " or the options of one of the `schemes:`,"
+    if check.second in SOLUTIONS:
+        ways = ", take a finer `level:`,"
+    return Description(
+        sentence.format("differs from"),
+        f"Correct what `equal:` names{ways} or give `atol:` {enough}.",
+        brief,
+    )
+
+
+def _rounded_up(distance: float) -> str:
+    """Write a number with two digits that is no smaller than a distance: one that is asked for must suffice."""
+    if not 0.0 < distance < math.inf:
+        return f"{distance:.2g}"
+    return (
+        f"{float(Context(prec=2, rounding=ROUND_CEILING).create_decimal_from_float(distance)):.2g}"
+    )

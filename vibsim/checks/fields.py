@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.core.record import Record, Variable, attributes
+from vibsim.core.vocabulary import REASON_NAMES, STATUSES
 
 GROUP = "checks"
 """Group of ``convergence.nc`` that holds what the checks measured."""
@@ -34,6 +35,12 @@ class Field:
     """Whether only its figure needs it: it is left out where no series are stored."""
 
 
+STATUS = Field("status", np.int8, STATUSES)
+REASON = Field("reason", np.int8, REASON_NAMES)
+MOTION = Field("whether anything moves", np.int8, ("moves", "rests"))
+LEVEL = Field("level", np.int16, dims=())
+
+
 def flags(words: tuple[str, ...]) -> dict[str, Any]:
     """Return the attributes of a variable that holds positions in a list of words."""
     return {"flag_values": np.arange(len(words), dtype=np.int8), "flag_meanings": " ".join(words)}
@@ -47,40 +54,41 @@ def name_of(check: str, field: str) -> str:
 def variables(
     check: str, fields: Mapping[str, Field], found: Mapping[str, Any], lean: bool
 ) -> dict[str, Variable]:
-    """Return what a check measured as variables.
+    """Return what a check measured as variables: the values `found` of its fields.
 
-    Parameters
-    ----------
-    check
-        Its id.
-    fields, found
-        The fields of its kind, and their values, of the shape that the field has.
-    lean
-        Whether no series are stored.
+    Where no series are stored (`lean`) those are left out that only its figure needs.
     """
     table = {}
     for name, field in fields.items():
-        if lean and field.of_figure:
-            continue
-        attrs = attributes(f"check {check}: {field.meaning}", "1")
-        attrs |= flags(field.words) if field.words else {}
-        values = np.asarray(found[name], dtype=field.type)
-        table[name_of(check, name)] = Variable(field.dims, values, attrs, GROUP)
+        if not (lean and field.of_figure):
+            more = flags(field.words) if field.words else {}
+            attrs = attributes(f"check {check}: {field.meaning}", "1", **more)
+            values = np.asarray(found[name], dtype=field.type)
+            table[name_of(check, name)] = Variable(field.dims, values, attrs, GROUP)
     return table
+
+
+def measured(record: Record, check: str, field: str) -> NDArray[Any]:
+    """Return the values of a field of a check."""
+    return record[name_of(check, field)]
 
 
 Facts = Mapping[str, tuple[Field, NDArray[Any]]]
 """Name of a fact to what it is, and its values: of every scheme and member, or one for all."""
 
 
-def facts(record: Record, check: str, fields: Mapping[str, Field]) -> Facts:
-    """Return what a check measured, but for what only its figure needs and what every result has."""
-    names = [name for name, field in fields.items() if not field.of_figure]
+def stated(fields: Mapping[str, Field]) -> dict[str, Field]:
+    """Return the fields that a result states: not what its figure alone needs, nor what every result has."""
     return {
-        name: (fields[name], measured(record, check, name))
-        for name in names
-        if name not in ("status", "reason")
+        name: field
+        for name, field in fields.items()
+        if not field.of_figure and name not in ("status", "reason")
     }
+
+
+def facts(record: Record, check: str, fields: Mapping[str, Field]) -> Facts:
+    """Return what a check measured, of the fields that a result states."""
+    return {name: (field, measured(record, check, name)) for name, field in stated(fields).items()}
 
 
 def facts_of(table: Facts, scheme: int, case: int) -> dict[str, Any]:
@@ -97,13 +105,6 @@ def _plain(field: Field, value: NDArray[Any]) -> Any:
         return None if None in several else several
     if field.words:
         return field.words[int(value)]
-    if np.issubdtype(field.type, np.bool_):
-        return bool(value)
     if np.issubdtype(field.type, np.integer):
         return None if value == field.none else int(value)
     return float(value) if np.isfinite(value) else None
-
-
-def measured(record: Record, check: str, field: str) -> NDArray[Any]:
-    """Return the values of a field of a check."""
-    return record[name_of(check, field)]

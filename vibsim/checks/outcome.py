@@ -1,24 +1,36 @@
-"""What a check measured of every scheme and member, and which of them decides."""
+"""What a check measured of every scheme and member, which of them decides, and each of them as a result."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.checks.fields import Facts
-from vibsim.core.vocabulary import SEVERITY, STATUSES
+from vibsim.checks.fields import Facts, facts_of
+from vibsim.core.array_types import Floats, Integers
+from vibsim.core.record import Record
+from vibsim.core.vocabulary import REASON_NAMES, REASONS, SEVERITY, STATUSES, decisive_number
+from vibsim.experiment.data import schemes_of
 
 if TYPE_CHECKING:
+    from vibsim.experiment import Experiment
     from vibsim.experiment.schema.checks import ClaimCheck, Measurement
-
-Floats = NDArray[np.float64]
 
 PASS, FAIL, INCONCLUSIVE = map(STATUSES.index, ("PASS", "FAIL", "INCONCLUSIVE"))
 """Index into `STATUSES`."""
+MATCH, MISMATCH, UNSTABLE, NON_FINITE = map(
+    REASON_NAMES.index, ("match", "mismatch", "unstable", "non_finite")
+)
+PRE_ASYMPTOTIC, ROUND_OFF, TOO_FEW_LEVELS, NOT_APPLICABLE = map(
+    REASON_NAMES.index, ("pre_asymptotic", "round_off", "too_few_levels", "not_applicable")
+)
+"""Index into `REASON_NAMES`."""
+STATUS_OF = np.array([STATUSES.index(status) for status in REASONS.values()], dtype=np.int8)
+"""The status that each of `REASON_NAMES` belongs to."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +43,7 @@ class Outcome:
     """Their positions."""
     cases: NDArray[Any]
     """Global index of every member, shape (case,)."""
-    case_index: NDArray[np.int64]
+    case_index: Integers
     """Positions of the members that the check is about."""
     status: NDArray[Any]
     """Measured, index into `STATUSES`."""
@@ -50,7 +62,7 @@ class Outcome:
         return len(self.scheme_index) * len(self.case_index)
 
     @property
-    def _at(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _at(self) -> tuple[Integers, Integers]:
         return np.array(self.scheme_index, dtype=np.int64)[:, None], self.case_index[None]
 
     @cached_property
@@ -59,22 +71,22 @@ class Outcome:
         return self.compared[self._at]
 
     @cached_property
-    def _keys(self) -> tuple[NDArray[np.int64], Floats]:
+    def _keys(self) -> tuple[Integers, Floats]:
         """Severity and distance of every result that counts, flat."""
         away = self.away[self._at]
         severity = np.array([SEVERITY[name] for name in STATUSES])[self.chosen]
         return severity.ravel(), np.where(np.isnan(away), np.inf, away).ravel()
 
     @cached_property
-    def ranking(self) -> NDArray[np.int64]:
+    def ranking(self) -> Integers:
         """Numbers of all results, worst first; equals in their order."""
         severity, away = self._keys
         return np.lexsort((-away, -severity))
 
-    def worst(self, most: int) -> NDArray[np.int64]:
+    def worst(self, most: int) -> Integers:
         """Return the beginning of `ranking`, without sorting all of it."""
         severity, away = self._keys
-        found: list[NDArray[np.int64]] = []
+        found: list[Integers] = []
         for value in sorted(set(SEVERITY.values()), reverse=True):
             left = most - sum(map(len, found))
             rows = np.flatnonzero(severity == value) if left > 0 else np.empty(0, dtype=np.int64)
@@ -84,14 +96,138 @@ class Outcome:
             found.append(rows[np.argsort(-away[rows], kind="stable")][: max(left, 0)])
         return np.concatenate(found)
 
-    def position(self, number: int) -> tuple[int, int]:
-        """Return scheme and case of a result."""
-        scheme, case = divmod(int(number), len(self.case_index))
-        return self.scheme_index[scheme], int(self.case_index[case])
-
     def counts(self) -> dict[str, int]:
         """Return the number of results by compared status."""
         return {name: int(np.sum(self.chosen == i)) for i, name in enumerate(STATUSES)}
+
+
+def outcome_of(
+    experiment: Experiment,
+    record: Record,
+    check: Measurement | None,
+    reason: NDArray[Any],
+    away: Floats,
+    facts: Facts,
+    compared: NDArray[Any] | None = None,
+) -> Outcome:
+    """Return the outcome of a check, of the schemes and members that it is about.
+
+    Parameters
+    ----------
+    check
+        None for the tolerance of the experiment.
+    compared
+        Status compared with what is expected; a check that expects a PASS need not give it.
+    """
+    names, cases = record.words("scheme"), np.asarray(record["case"])
+    if check is None:
+        # what chooses its own steps is no part of the ladder
+        schemes = list(experiment.ladder)
+    elif check.kind == "equal":
+        schemes = [names.index(check.first)]
+    else:
+        schemes = list(schemes_of(experiment, check))
+    member, status = None if check is None else check.member, STATUS_OF[reason]
+    return Outcome(
+        schemes=[names[i] for i in schemes],
+        scheme_index=schemes,
+        cases=cases,
+        case_index=np.arange(len(cases)) if member is None else np.flatnonzero(cases == member),
+        status=status,
+        reason=reason.astype(np.int8),
+        compared=status if compared is None else compared.astype(np.int8),
+        away=away,
+        facts=facts,
+    )
+
+
+@dataclass(frozen=True)
+class Result:
+    """What was measured of one scheme and one member."""
+
+    scheme: str
+    case: int
+    """Global index of the member."""
+    status: str
+    """The measured one, whatever was expected."""
+    reason: str
+    facts: Mapping[str, Any] = field(hash=False)
+    """What was measured, by name, as plain data; None where there is none."""
+
+    @property
+    def value(self) -> float | None:
+        """The number that decides; None where an order does, or where it is not finite."""
+        return decisive_number(self.facts)
+
+    @property
+    def order(self) -> float | None:
+        """The observed order."""
+        return self.facts.get("order")
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """The interval of the order."""
+        low, high = self.facts.get("order_low"), self.facts.get("order_high")
+        return None if self.order is None or low is None or high is None else (low, high)
+
+    @property
+    def levels(self) -> tuple[int, int] | None:
+        """First and last level that the order rests on."""
+        found = None if self.order is None else self.facts.get("levels")
+        return found and (found[0], found[1])
+
+
+class Results(Sequence[Result]):
+    """Every result of a check, the worst first; made when they are looked at, for there may be millions."""
+
+    def __init__(self, outcome: Outcome) -> None:
+        self._outcome = outcome
+
+    def __len__(self) -> int:
+        return self._outcome.total
+
+    @overload
+    def __getitem__(self, index: int) -> Result: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Result, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Result | tuple[Result, ...]:
+        if isinstance(index, slice):
+            return tuple(map(self._one, self._outcome.ranking[index]))
+        return self._one(self._outcome.ranking[index])
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Results) or len(self) != len(other):
+            return False
+        return all(a == b for a, b in zip(self, other, strict=True))
+
+    def __hash__(self) -> int:
+        return hash(tuple(self))
+
+    def __reduce__(self) -> tuple[type[Results], tuple[Outcome]]:
+        """Copy and pickle what was measured, without the ranking."""
+        return Results, (replace(self._outcome),)
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} results>"
+
+    def worst(self, most: int | None) -> Iterator[Result]:
+        """Yield the worst results, all of them where `most` is None, without sorting more."""
+        outcome = self._outcome
+        yield from map(self._one, outcome.ranking if most is None else outcome.worst(most))
+
+    def _one(self, number: int) -> Result:
+        outcome = self._outcome
+        row, column = divmod(int(number), len(outcome.case_index))
+        scheme, case = outcome.scheme_index[row], int(outcome.case_index[column])
+        return Result(
+            scheme=outcome.schemes[row],
+            case=int(outcome.cases[case]),
+            status=STATUSES[int(outcome.status[scheme, case])],
+            reason=REASON_NAMES[int(outcome.reason[scheme, case])],
+            facts=facts_of(outcome.facts, scheme, case),
+        )
 
 
 def compared_reason(check: Measurement | None, status: str, measured: str, reason: str) -> str:
@@ -99,22 +235,21 @@ def compared_reason(check: Measurement | None, status: str, measured: str, reaso
 
     Parameters
     ----------
+    check
+        None for the tolerance of the experiment.
     status, measured
         Status compared with what was expected, and the measured one.
     """
-    expects_pass = expects_a_pass(check)
+    expects_pass = True
+    if check is not None and check.kind == "converges":
+        expects_pass = check.expect.status == "PASS"
+    elif check is not None and check.kind == "stable":
+        expects_pass = check.stable
     if status == "PASS" and not expects_pass:
         return "match"
     if status == "FAIL" and (not expects_pass or measured == "PASS"):
         return "mismatch"
     return reason
-
-
-def expects_a_pass(check: Measurement | None) -> bool:
-    """Tell whether a check expects that what it measures passes; None stands for a tolerance."""
-    if check is not None and check.kind == "converges":
-        return check.expect.status == "PASS"
-    return check.stable if check is not None and check.kind == "stable" else True
 
 
 def truth(claim: ClaimCheck, status: str, reason: str) -> bool | None:

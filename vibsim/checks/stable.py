@@ -1,33 +1,54 @@
-"""The check ``stable``: whether schemes grow where the exact solution does not."""
+"""The check ``stable``: whether schemes grow where the exact solution does not, and by as much as theory predicts.
+
+Unstable is an overflow, w dt beyond the stability limit of the scheme, or growth beyond the exact solution's that
+refinement within the ladder does not remove (``docs/verdicts.md``, Stable, conserves, equal). The growth of Forward
+Euler vanishes with dt and is none. An overflow at a time that finer levels do not move is that of the motion, an escape
+or a formula that has no value there, and no instability.
+At the limit itself a scheme may be stable or grow in proportion to t: there the measurement alone decides.
+
+Beyond the limit of a linear model the growth must be the predicted one. The amplitude may follow it late: at a limit
+two roots meet, and ``1 + 2 N`` comes before the power takes over. So the logarithms of both over the whole run may
+differ by `NEAR` of themselves and ln(4 + 2 N). A larger difference means that scheme or theory is not what it claims to
+be.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vibsim.checks.fields import Field, facts, measured
-from vibsim.checks.growth import growth_at
-from vibsim.checks.of_schemes import (
+from vibsim.apriori.formal_orders import columns_of, stability_limits
+from vibsim.checks.at_level import level_of
+from vibsim.checks.fields import LEVEL, STATUS, Field, facts, measured
+from vibsim.checks.outcome import (
+    FAIL,
     MATCH,
     MISMATCH,
     NON_FINITE,
+    PASS,
+    STATUS_OF,
     UNSTABLE,
-    level_of,
+    Outcome,
     outcome_of,
 )
-from vibsim.checks.outcome import FAIL, PASS, Outcome
+from vibsim.checks.sentences import ROUND_OFF, Description, Found, growth_in_words
+from vibsim.convergence.thresholds import BLOWN_UP
+from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import REASON_NAMES, STATUSES
+from vibsim.core.vocabulary import REASON_NAMES
+from vibsim.observe import oscillation, predicted_oscillation
 from vibsim.observe.member_block import MemberBlock
 
 if TYPE_CHECKING:
+    from vibsim.comparison.quantity_comparison import Comparison
     from vibsim.experiment import Experiment
     from vibsim.experiment.schema.checks import StableCheck
 
 FIELDS = {
-    "status": Field("status", np.int8, STATUSES),
+    "status": STATUS,
     "reason": Field(
         "match where it is stable, mismatch where theory and growth differ, non_finite where the motion itself ends",
         np.int8,
@@ -36,40 +57,166 @@ FIELDS = {
     "growth": Field("growth factor of the amplitude per period"),
     "predicted_growth": Field("the same by theory"),
     "omega_dt": Field("highest w dt"),
-    "level": Field("level", np.int16, dims=()),
+    "level": LEVEL,
 }
 
+LIMIT_ROUNDING = 1e-9
+"""w dt within this part of the limit is at the limit, as in `ladder_statistics.breakdown`."""
+ALIKE = 0.15
+"""Two levels fail at one time that fail within this part of it: the finer one sees it at most a step earlier."""
+NEAR = 0.1
+"""How far the logarithm of a growth may be from the predicted one, as a part of it."""
 
-def measure(block: MemberBlock, check: StableCheck) -> Mapping[str, Any]:
+
+def measure(
+    block: MemberBlock, compared: Mapping[str, Comparison], check: StableCheck
+) -> Mapping[str, Any]:
     """Return what a check measures."""
     level = level_of(block, check)
-    found = growth_at(block, level)
-    reason = np.select([found.unstable, found.escaped], [UNSTABLE, NON_FINITE], MATCH)
+    index = block.grid.levels.index(level)
+    p = np.broadcast_to(block.fastest[:, index], block.shape)
+    limit, growth, broken = block.stability_limit, block.growth, block.failed[..., index]
+    beyond = p > limit * (1.0 + LIMIT_ROUNDING)
+    at_limit = ~beyond & (p >= limit * (1.0 - LIMIT_ROUNDING))
+    grown = (growth[..., index] > BLOWN_UP) & (at_limit | ~_removed(growth, index))
+    escaped = broken & ~beyond & _breaks_down_alike(block)
+    found = _measured_growth(block, level)
+    expected = predicted_oscillation.dominant_growth(block, level)
+    contradicted = ~broken & predicted_oscillation.is_simple(block) & beyond
+    contradicted &= _differs(block, index, found, expected)
+    unstable = (broken & ~escaped) | beyond | grown
+    reason = np.select(
+        [contradicted, unstable, escaped], [MISMATCH, UNSTABLE, NON_FINITE], default=MATCH
+    )
     return {
-        "status": np.where((reason != MATCH) | found.contradicted, FAIL, PASS),
-        "reason": np.where(found.contradicted, MISMATCH, reason),
-        "growth": found.measured,
-        "predicted_growth": found.predicted,
-        "omega_dt": np.broadcast_to(block.fastest[:, block.grid.levels.index(level)], block.shape),
+        "status": STATUS_OF[reason],
+        "reason": reason,
+        "growth": found,
+        "predicted_growth": expected,
+        "omega_dt": p,
         "level": level,
     }
 
 
+def _removed(growth: Floats, index: int) -> Flags:
+    """Say where the next finer level, or the step from the next coarser one, at least halves the growth."""
+    if growth.shape[-1] == 1:
+        return np.zeros(growth.shape[:-1], dtype=bool)
+    coarse = min(index, growth.shape[-1] - 2)
+    return np.asarray(growth[..., coarse + 1] < 0.5 * growth[..., coarse])
+
+
+def _breaks_down_alike(block: MemberBlock) -> Flags:
+    """Say where the two finest levels broke down at the same time, which a finer one does not move, shape (s, c)."""
+    finest = [block.records[level] for level in block.grid.levels[-2:]]
+    if len(finest) == 1 or any("failure_time" not in record for record in finest):
+        return np.zeros(block.shape, dtype=bool)
+    before, last = (np.asarray(record["failure_time"], dtype=float) for record in finest)
+    alike = np.abs(before - last) <= ALIKE * before
+    return np.asarray(np.all(block.failed[..., -2:], axis=-1) & alike)
+
+
+def _measured_growth(block: MemberBlock, level: int) -> Floats:
+    """Return the growth per period, where a run is too short for that the one over all of it.
+
+    NaN below two peaks, and of several coordinates.
+    """
+    found = oscillation.growth_of_motion(block, level)
+    if len(block.model.positions) > 1:
+        return found
+    whole = oscillation.growth_over_run(block, block.records[level])
+    return np.where(np.isfinite(found), found, whole)
+
+
+def _differs(block: MemberBlock, index: int, measured: Floats, expected: Floats) -> Flags:
+    periods = predicted_oscillation.natural_frequency(block) * block.group.end / (2.0 * np.pi)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        apart = np.abs(np.log(measured) - np.log(expected)) * periods
+        whole = np.log(expected) * periods
+    late = np.log(4.0 + 2.0 * block.grid.steps[index])
+    return np.asarray(apart > NEAR * np.abs(whole) + late)
+
+
 def judge(experiment: Experiment, record: Record, check: StableCheck, id_: str) -> Outcome:
     """Compare whether schemes are stable with what a check expects."""
-    status, reason, growth = (
-        measured(record, id_, field) for field in ("status", "reason", "growth")
-    )
-    as_expected = reason == (MATCH if check.stable else UNSTABLE)
+    reason, growth = (measured(record, id_, field) for field in ("reason", "growth"))
     with np.errstate(divide="ignore", invalid="ignore"):
         size = np.abs(np.log(growth))
     return outcome_of(
         experiment,
         record,
         check,
-        status=status,
-        reason=reason,
-        compared=np.where(as_expected, PASS, FAIL).astype(np.int8),
+        reason,
         away=np.where(np.isnan(size), np.inf, size),
         facts=facts(record, id_, FIELDS),
+        compared=np.where(reason == (MATCH if check.stable else UNSTABLE), PASS, FAIL),
     )
+
+
+def describe(f: Found, check: StableCheck) -> Description:
+    """Say whether a scheme is stable at the level of a check, and why."""
+    level, p, failed, number = f.fact("level"), f.fact("omega_dt"), f.failed_at, f.notation.number
+    time = "" if math.isnan(failed) else number(failed, 4)
+    if f.reason == "non_finite":
+        return Description(
+            f"Scheme {f.scheme_name} met a number that is not finite or too large at level "
+            f"{level}{f', at t = {time}' if time else ''}, and the finest levels did so at the same time. So the "
+            "motion itself escapes, or a formula has no finite value, which says nothing about stability.",
+            f"End the time interval (`time: end`){f' before t = {time}' if time else ''}, or check the formulas of "
+            "`model:`.",
+        )
+    factors, model = (f.fact("predicted_growth"), f.fact("growth")), f.experiment.model.definition
+    told = (
+        f"Scheme {f.scheme_name} is {'stable' if f.reason == 'match' else 'unstable'} at level {level}"
+        f"{f', w dt = {number(p, 4)}' if math.isfinite(p) else ''}"
+    )
+    of = model.conservative, model.linear, len(model.positions)
+    told += growth_in_words(*factors, of, f.notation)
+    if f.reason == "match" and _always_grows(f):
+        told += _vanishing(f, factors)
+    if time:
+        told += f"; it met a number that is not finite or too large at t = {time}"
+    if f.reason == "mismatch":
+        told += "; the two do not agree, so this is not the scheme that the theory describes"
+    return Description(f"{told}.", _advice(f, level, p, time))
+
+
+def _always_grows(f: Found) -> bool:
+    """Tell whether a scheme has no limit of stability of its own, so that it grows at every step."""
+    place = f.scheme, f.case
+    return "stability_limit" not in f.record or bool(f.record["stability_limit"][place] == 0.0)
+
+
+def _vanishing(f: Found, factors: tuple[float, float]) -> str:
+    """Say by how much a scheme grows that grows at every step; empty where it does not, or nothing is known."""
+    known = [value for value in factors if not math.isnan(value)]
+    if not known or min(known) - 1.0 <= ROUND_OFF:
+        return ""
+    number = f.notation.number
+    is_small = known[0] < 2.0
+    much = f"by {number(known[0] - 1.0, 3)}" if is_small else f"by the factor {number(known[0])}"
+    return f"; it grows {much} per period, which vanishes with dt"
+
+
+def _advice(f: Found, level: int, p: float, time: str) -> str:
+    if f.reason == "match":
+        return "Set `stable: true`, or take coarser `levels:` where the scheme has a limit (w dt beyond it)."
+    if f.reason == "mismatch":
+        return (
+            "Take another `kind:` in `schemes:`, or look for an error in this one: it does not grow as its own theory "
+            "says."
+        )
+    limits = stability_limits(f.experiment, columns_of(f.record))[f.scheme]
+    limit = float(limits[f.case if len(limits) > 1 else 0])
+    if math.isfinite(limit) and math.isfinite(p) and p > limit:
+        first = level + math.ceil(math.log2(p / limit) - 1e-9)
+        return (
+            f"Take finer `levels:`, from {first} on (w dt within the limit {f.notation.number(limit)}), or correct "
+            "`stable:`."
+        )
+    if time:
+        return (
+            f"End the time interval (`time: end`) before t = {time} if the motion itself escapes there, take "
+            "finer `levels:` if it does not, or correct `stable:`."
+        )
+    return "Take finer `levels:`, shorten `time: end`, or correct `stable:`."

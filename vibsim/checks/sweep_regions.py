@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from vibsim.apriori.formal_orders import columns_of
 from vibsim.checks.outcome import PASS, Outcome
-from vibsim.checks.words.notation import PLAIN
+from vibsim.checks.sentences import PLAIN
+from vibsim.core.array_types import Integers
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import STATUSES
 
 Column = NDArray[Any]
-Counts = NDArray[np.int64]
 
 IN_BOX = 0.95
 """Part of the results that the box holds, at least."""
@@ -30,14 +30,7 @@ TOLD = 2
 
 
 def where(record: Record, outcome: Outcome) -> dict[str, Any]:
-    """Tell where in a sweep the results lie that did not pass.
-
-    Parameters
-    ----------
-    record
-        Convergence Record, for the swept values.
-    outcome
-        What a check measured, compared with what was expected.
+    """Tell where in a sweep, whose values the convergence Record has, the results lie that did not pass.
 
     Returns
     -------
@@ -54,23 +47,23 @@ def where(record: Record, outcome: Outcome) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for code, status in enumerate(STATUSES):
         mask = outcome.chosen == code
-        if code != PASS and mask.any():
-            hits = mask.sum(axis=0)
-            keys = {
-                key: _along(values, bins[key], hits, len(outcome.schemes), len(columns))
-                for key, values in columns.items()
-            }
-            by_scheme = zip(outcome.schemes, mask.sum(axis=1).tolist(), strict=True)
-            found[status] = {
-                "text": _sentence(status, int(hits.sum()), outcome.total, columns, keys, hits),
-                "count": int(hits.sum()),
-                "schemes": dict(by_scheme),
-                "keys": keys,
-            }
+        if code == PASS or not mask.any():
+            continue
+        hits, count = mask.sum(axis=0), int(mask.sum())
+        keys = {
+            key: _along(values, bins[key], hits, len(outcome.schemes), len(columns))
+            for key, values in columns.items()
+        }
+        found[status] = {
+            "text": _sentence(status, count, outcome.total, columns, keys, hits),
+            "count": count,
+            "schemes": dict(zip(outcome.schemes, mask.sum(axis=1).tolist(), strict=True)),
+            "keys": keys,
+        }
     return found
 
 
-def _bins(values: Column) -> Counts:
+def _bins(values: Column) -> Integers:
     """Return the number of the bin of every value; equal values share a bin, and a bin is an interval."""
     ordered = np.sort(values)
     distinct = ordered[np.r_[True, ordered[1:] != ordered[:-1]]]
@@ -80,40 +73,27 @@ def _bins(values: Column) -> Counts:
     return np.searchsorted(distinct, values, side="right") - 1
 
 
-def _along(values: Column, bins: Counts, hits: Counts, schemes: int, keys: int) -> dict[str, Any]:
+def _along(
+    values: Column, bins: Integers, hits: Integers, schemes: int, keys: int
+) -> dict[str, Any]:
     """Describe along one key where `hits`, the number of results of every member, are."""
     members = np.bincount(bins)
-    shares = np.bincount(bins, weights=hits, minlength=len(members)) / (members * schemes)
+    shares = (np.bincount(bins, weights=hits) / (members * schemes)).tolist()
+    inside = [values[bins == place] for place in range(len(members))]
     if values.dtype.kind != "f":
-        _, first = np.unique(bins, return_index=True)
-        words = map(str, values[first])
-        return {"shares": dict(zip(words, shares.tolist(), strict=True))}
-    among = np.sort(values[hits > 0])
-    low, high = _ends(values, bins, len(members))
+        return {"shares": {str(one[0]): share for one, share in zip(inside, shares, strict=True)}}
+    found = np.sort(np.repeat(values, hits))
+    # the shortest interval that holds its share; what each key may leave out adds up
+    held = math.ceil((1.0 - (1.0 - IN_BOX) / keys) * len(found))
+    first = int(np.argmin(found[held - 1 :] - found[: len(found) - held + 1]))
     return {
-        "range": [float(among[0]), float(among[-1])],
-        # what each key may leave out adds up
-        "box": _shortest(np.sort(np.repeat(values, hits)), 1.0 - (1.0 - IN_BOX) / keys),
+        "range": [float(found[0]), float(found[-1])],
+        "box": [float(found[first]), float(found[first + held - 1])],
         "bins": [
-            {"from": a, "to": b, "share": share}
-            for a, b, share in zip(low, high, shares.tolist(), strict=True)
+            {"from": float(one.min()), "to": float(one.max()), "share": share}
+            for one, share in zip(inside, shares, strict=True)
         ],
     }
-
-
-def _ends(values: Column, bins: Counts, count: int) -> tuple[list[float], list[float]]:
-    """Return the least and the largest value of every bin."""
-    low, high = np.full(count, np.inf), np.full(count, -np.inf)
-    np.minimum.at(low, bins, values)
-    np.maximum.at(high, bins, values)
-    return low.tolist(), high.tolist()
-
-
-def _shortest(ordered: Column, share: float) -> list[float]:
-    """Return the shortest interval that holds a share of some values."""
-    held = math.ceil(share * len(ordered))
-    first = int(np.argmin(ordered[held - 1 :] - ordered[: len(ordered) - held + 1]))
-    return [float(ordered[first]), float(ordered[first + held - 1])]
 
 
 def _sentence(
@@ -122,7 +102,7 @@ def _sentence(
     total: int,
     columns: Mapping[str, Column],
     keys: Mapping[str, Any],
-    hits: Counts,
+    hits: Integers,
 ) -> str:
     """Say how many results have a status, and where they are, if they are anywhere in particular."""
     if count == total:
@@ -130,37 +110,28 @@ def _sentence(
     start = f"{status} in {count} of {total} results"
     all_with = "all with" if count > 1 else "with"
     for name, words in (("range", all_with), ("box", f"at least {IN_BOX:.0%} of them with")):
-        places = [_place(key, columns[key], keys[key], name, hits) for key in columns]
-        telling = _telling(sorted(places)[:TOLD])
+        places = sorted(_place(key, columns[key], keys[key], name, hits) for key in columns)[:TOLD]
+        telling = [text for part, text, alone in places if part <= TELLING or (alone and part < 1)]
+        if not telling and math.prod(part for part, _, _ in places) <= TELLING:
+            telling = [text for part, text, _ in places if part < 1]
         if telling:
             return f"{start}, {words} {' and '.join(telling)}"
     return start if count == 1 else f"{start}, spread over the sweep"
 
 
-def _telling(places: list[tuple[float, str, bool]]) -> list[str]:
-    """Return the places that tell where something is, each for itself or, if none does, together.
-
-    However large, a place tells it that holds nothing else.
-    """
-    found = [text for part, text, alone in places if part <= TELLING or (alone and part < 1)]
-    if not found and math.prod(part for part, _, _ in places) <= TELLING:
-        return [text for part, text, _ in places if part < 1]
-    return found
-
-
 def _place(
-    key: str, values: Column, found: Mapping[str, Any], name: str, hits: Counts
+    key: str, values: Column, found: Mapping[str, Any], name: str, hits: Integers
 ) -> tuple[float, str, bool]:
     """Return the part of all members that a range or box holds along one key, that in words, and if it holds all alone.
 
-    All alone means that it separates the members with results from those without.
+    All alone means that it separates the members with results from those without, and so tells, however large.
     """
-    if name not in found:
-        words = [word for word, share in found["shares"].items() if share > 0]
-        inside, text = np.isin(values, words), f"{key} {' or '.join(words)}"
-    else:
+    if name in found:
         low, high = found[name]
         inside, text = (values >= low) & (values <= high), _interval(key, values, low, high)
+    else:
+        words = [word for word, share in found["shares"].items() if share > 0]
+        inside, text = np.isin(values, words), f"{key} {' or '.join(words)}"
     return float(np.mean(inside)), text, bool(np.array_equal(inside, hits > 0))
 
 

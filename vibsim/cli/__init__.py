@@ -5,6 +5,9 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
+LEAST_BYTES = 600 * 10**6
+"""Address space that a run needs. Measured with 2 cores: 450 MB are sometimes too little, 500 MB were enough."""
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit status.
@@ -24,14 +27,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is not None:
         return _perform(arguments)
     try:
-        from vibsim.cli import limits
-
-        limits.check()
+        _check_limits()
         from vibsim.cli.run.supervise import supervised
 
         return supervised(lambda: _perform(sys.argv[1:]))
     except Exception as error:
         return _failed(error)
+
+
+def _check_limits() -> None:
+    """Refuse to start with too little address space: libraries fail in many ways then, and some without a word."""
+    import resource
+
+    from vibsim.core.errors import VibsimError
+
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if limit != resource.RLIM_INFINITY and limit < LEAST_BYTES:
+        found, needed = limit // 10**6, LEAST_BYTES // 10**6
+        text = f"not enough memory: the limit is {found} MB (ulimit -v), {needed} MB are needed"
+        raise VibsimError(text)
 
 
 def _perform(arguments: Sequence[str]) -> int:

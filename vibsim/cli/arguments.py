@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any
 
 import vibsim
 
 _NAMES = "experiment (name or collection/name), one member of its sweep (NAME@CASE), collection, or FILE.yaml"
 LISTS = ("models", "schemes", "checks", "experiments")
-_Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
+_Row = tuple[str, dict[str, Any]]
+"""An option with what `argparse` takes of it."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -20,81 +22,85 @@ def parser() -> argparse.ArgumentParser:
     top = argparse.ArgumentParser(prog="vibsim", description="Verify vibration simulations.")
     top.add_argument("--version", action="version", version=f"vibsim {vibsim.__version__}")
     commands = top.add_subparsers(required=True, metavar="COMMAND")
-    results = argparse.ArgumentParser(add_help=False)
-    text = "results folder (default: results/ of the checkout)"
-    results.add_argument("--results", type=_path, metavar="DIR", help=text)
-    _add_plain(commands, results)
-    _add_jobs(commands, results)
+    for name, module, text, options in _commands():
+        sub = commands.add_parser(name, help=text, description=text)
+        function = "list_" if name == "list" else name
+        sub.set_defaults(command=partial(_perform, f"vibsim.cli.{module}", function))
+        for option, settings in options:
+            sub.add_argument(option, **settings)
     return top
 
 
-def _add(
-    commands: _Commands, name: str, module: str, text: str, *shared: argparse.ArgumentParser
-) -> argparse.ArgumentParser:
-    """Add a command, a function of its name in a module that is imported when it is called."""
-    sub = commands.add_parser(name, help=text, description=text, parents=shared)
-    function = "list_" if name == "list" else name
-    sub.set_defaults(command=partial(_perform, f"vibsim.cli.{module}", function))
-    return sub
-
-
 def _perform(module: str, name: str, options: argparse.Namespace) -> int:
+    """Call the function of a command, in a module that is imported for it."""
     status: int = getattr(import_module(module), name)(options)
     return status
 
 
-def _add_plain(commands: _Commands, results: argparse.ArgumentParser) -> None:
-    sub = _add(commands, "run", "run.command", "Run experiments and show every verdict.", results)
-    sub.add_argument("experiments", type=_word, nargs="*", metavar="EXPERIMENT", help=_NAMES)
-    text = "jobs at once (default: all cores)"
-    sub.add_argument("--cores", type=_positive, metavar="N", help=text)
-    sub.add_argument("--dry-run", action="store_true", help="show what would run and why")
+def _row(name: str, kind: Callable[[str], Any], metavar: str, text: str, **more: Any) -> _Row:
+    return name, {"type": kind, "metavar": metavar, "help": text, **more}
+
+
+def _flag(name: str, text: str) -> _Row:
+    return name, {"action": "store_true", "help": text}
+
+
+def _commands() -> Iterator[tuple[str, str, str, Sequence[_Row]]]:
+    """Yield the name of each command, the module of its function, what it does, and its options."""
+    text = "results folder (default: results/ of the checkout)"
+    results = _row("--results", _path, "DIR", text)
+    files = _row("experiments", _word, "FILE", _NAMES, nargs="+")
     text = "compare every result with its digest, also where size, time and inode are as they were"
-    sub.add_argument("--verify", action="store_true", help=text)
-    sub.add_argument("--json", action="store_true", help="print the outcome as JSON")
-    sub = _add(commands, "check", "check", "Validate experiment files, without running them.")
-    sub.add_argument("experiments", type=_word, nargs="+", metavar="FILE", help=_NAMES)
+    yield (
+        *("run", "run.command", "Run experiments and show every verdict."),
+        (
+            results,
+            _row("experiments", _word, "EXPERIMENT", _NAMES, nargs="*"),
+            _row("--cores", _positive, "N", "jobs at once (default: all cores)"),
+            _flag("--dry-run", "show what would run and why"),
+            _flag("--verify", text),
+            _flag("--json", "print the outcome as JSON"),
+        ),
+    )
+    yield "check", "plan", "Validate experiment files, without running them.", (files,)
     text = "Show members, jobs, steps, memory, disk space and time of experiments before they run."
-    sub = _add(commands, "plan", "plan", text, results)
-    sub.add_argument("experiments", type=_word, nargs="+", metavar="FILE", help=_NAMES)
-    sub.add_argument("--json", action="store_true", help="print the plans as JSON")
-    sub = _add(commands, "list", "listing", "List what there is to choose from.")
-    sub.add_argument("what", choices=LISTS)
+    yield "plan", "plan", text, (results, files, _flag("--json", "print the plans as JSON"))
+    what: _Row = "what", {"choices": LISTS}
+    yield "list", "listing", "List what there is to choose from.", (what,)
 
-
-def _add_jobs(commands: _Commands, results: argparse.ArgumentParser) -> None:
-    job = argparse.ArgumentParser(add_help=False, parents=[results])
-    text = "refuse when the experiment or the code is not the one with this digest"
-    job.add_argument("--digest", type=_word, metavar="SHA256", help=text)
-    text = "delete a damaged or outdated input, so that the next run makes it again"
-    job.add_argument("--discard", action="store_true", help=text)
-    one = argparse.ArgumentParser(add_help=False)
-    text = "experiment or FILE.yaml"
-    one.add_argument("experiment", type=_word, metavar="EXPERIMENT", help=text)
-    threads = argparse.ArgumentParser(add_help=False)
+    digest = "refuse when the experiment or the code is not the one with this digest"
+    discard = "delete a damaged or outdated input, so that the next run makes it again"
+    job = (
+        results,
+        _row("--digest", _word, "SHA256", digest),
+        _flag("--discard", discard),
+    )
     text = "threads to use (default: 1); no number depends on it"
-    threads.add_argument("--threads", type=_positive, default=1, metavar="N", help=text)
-
-    text = "Simulate levels of an experiment."
-    sub = _add(commands, "simulate", "jobs.simulate", text, one, threads, job)
-    text = "one level, or several to the places of the plan"
-    sub.add_argument("--level", type=int, nargs="+", required=True, metavar="L", help=text)
-    sub.add_argument("--shard", type=int, default=0, metavar="K", help="range of members (from 0)")
-    text = "netCDF file to write (default: the place of the plan, unless it is made already)"
-    sub.add_argument("--out", type=_path, metavar="FILE", help=text)
+    threads = _row("--threads", _positive, "N", text, default=1)
+    one = _row("experiment", _word, "EXPERIMENT", "experiment or FILE.yaml")
+    perhaps = _row("experiment", _word, "EXPERIMENT", "experiment or FILE.yaml", nargs="?")
+    folder = _row("--out", _path, "DIR", "folder to write to")
+    several = "one level, or several to the places of the plan"
+    shard = _row("--shard", int, "K", "range of members (from 0)", default=0)
+    place = "netCDF file to write (default: the place of the plan, unless it is made already)"
+    yield (
+        *("simulate", "jobs.simulate", "Simulate levels of an experiment."),
+        (
+            *(one, threads, *job),
+            _row("--level", int, "L", several, nargs="+", required=True),
+            shard,
+            _row("--out", _path, "FILE", place),
+        ),
+    )
     text = "Compare the levels of an experiment: convergence.nc and summary.json."
-    sub = _add(commands, "analyse", "jobs.analyse", text, one, threads, job)
-    sub.add_argument("--out", type=_path, metavar="DIR", help="folder to write to")
+    yield "analyse", "jobs.analyse", text, (one, threads, *job, folder)
     text = "Extrapolate the solution of an experiment over all its levels: best.nc."
-    sub = _add(commands, "extrapolate", "jobs.extrapolate", text, one, job)
-    sub.add_argument("--out", type=_path, metavar="FILE", help="netCDF file to write")
+    best = _row("--out", _path, "FILE", "netCDF file to write")
+    yield "extrapolate", "jobs.extrapolate", text, (one, *job, best)
     text = "Write the report of an experiment; without one, the index over all results."
-    sub = _add(commands, "report", "jobs.report", text, job)
-    text = "experiment or FILE.yaml"
-    sub.add_argument("experiment", type=_word, nargs="?", metavar="EXPERIMENT", help=text)
-    sub.add_argument("--out", type=_path, metavar="DIR", help="folder to write to")
-    text = "formats of the figure files: svg, png, pdf; several with commas (default: svg)"
-    sub.add_argument("--formats", type=_word, metavar="LIST", help=text)
+    formats = "formats of the figure files: svg, png, pdf; several with commas (default: svg)"
+    formats_row = _row("--formats", _word, "LIST", formats)
+    yield "report", "jobs.report", text, (*job, perhaps, folder, formats_row)
 
 
 def _path(text: str) -> Path:

@@ -86,23 +86,18 @@ def _choices(option: AnyOption) -> str:
 def _checks() -> Iterable[tuple[str, str]]:
     from vibsim.experiment.value_names import VALUES
 
+    drifts = "{conserves: energy | energy_d2t, drift: none | bounded | linear | quadratic}"
+    equal = "{equal: [scheme, scheme | exact | discrete], quantity:, atol:}"
+    value = "{value: NAME, quantity:, at:, equals | below | above:}"
+    text = "a statement of a source, with the check that decides it"
     yield "converges", "a quantity converges with an order: {converges: q, order: scheme | number}"
-    yield (
-        "claim",
-        "a statement of a source, with the check that decides it: {claim:, that:, holds:}",
-    )
+    yield "claim", f"{text}: {{claim:, that:, holds:}}"
     yield "stable", "schemes are stable, or not: {stable: true | false, schemes:, level:, case:}"
-    yield (
-        "conserves",
-        "how the energy drifts: {conserves: energy | energy_d2t, drift: none | bounded | linear | quadratic}",
-    )
-    yield (
-        "equal",
-        "two solutions are one: {equal: [scheme, scheme | exact | discrete], quantity:, atol:}",
-    )
-    yield "value", "a number of the outcome: {value: NAME, quantity:, at:, equals | below | above:}"
-    for name, value in VALUES.items():
-        yield f"  {name}", value.description
+    yield "conserves", f"how the energy drifts: {drifts}"
+    yield "equal", f"two solutions are one: {equal}"
+    yield "value", f"a number of the outcome: {value}"
+    for name, row in VALUES.items():
+        yield f"  {name}", row.description
 
 
 def _experiments() -> Iterable[tuple[str, str]]:

@@ -48,27 +48,16 @@ class Entry(NamedTuple):
 def add(results: Path, key: str, names: Iterable[str]) -> None:
     """Add files that a job has just made; a report comes with all that it consists of.
 
-    Parameters
-    ----------
-    results
-        The results folder.
-    key
-        Folder of the experiment within it, or `INDEX`.
-    names
-        Paths of the files within that folder.
+    `key` is the folder of the experiment in `results`, or `INDEX`; `names` are paths within that folder.
     """
-    entries = {name: _made(results / key / name) for name in names}
-    path = _path(results, key)
-    # One write in append mode: jobs at the same time do not mix, and a line that a kill cut short ends here.
-    line = f"\n{_text(entries)}\n".encode()
-    # What is not on record is compared with its seal, or made again.
+    entries = {}
+    for name in names:
+        file = results / key / name
+        digest = seal.stored_digest(file) if file.suffix == ".nc" else content(file)
+        entries[name] = entry(file.lstat(), digest)
+    # A line that a kill cut short ends here. What is not on record is compared with its seal, or made again.
     with suppress(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        descriptor = regular_files.own(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT)
-        try:
-            os.write(descriptor, line)
-        finally:
-            os.close(descriptor)
+        regular_files.append(_path(results, key), f"\n{_text(entries)}\n".encode())
 
 
 def load(results: Path, key: str) -> dict[str, Entry]:
@@ -106,11 +95,6 @@ def content(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _made(path: Path) -> Entry:
-    digest = seal.stored_digest(path) if path.suffix == ".nc" else content(path)
-    return entry(path.lstat(), digest)
-
-
 def entry(status: os.stat_result, digest: str) -> Entry:
     """Return the entry of a file with this status."""
     return Entry(status.st_size, status.st_mtime_ns, status.st_ino, digest)
@@ -135,11 +119,8 @@ def _read(line: bytes) -> dict[str, Entry]:
 
 
 def _is_entry(name: str, values: Any) -> bool:
-    return (
-        isinstance(values, list)
-        and len(values) == len(Entry._fields)
-        and all(type(value) is int and 0 <= value < 2**63 for value in values[:3])
-        and isinstance(values[3], str)
-        and _DIGEST.fullmatch(values[3]) is not None
-        and _NAME.fullmatch(name) is not None
-    )
+    match values:
+        case [*numbers, str(digest)] if len(numbers) == len(Entry._fields) - 1:
+            known = all(type(number) is int and 0 <= number < 2**63 for number in numbers)
+            return bool(known and _DIGEST.fullmatch(digest) and _NAME.fullmatch(name))
+    return False

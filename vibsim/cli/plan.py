@@ -1,4 +1,7 @@
-"""``vibsim plan``: what a run would cost, without running it. Files are counted as they are before compression."""
+"""``vibsim check`` and ``vibsim plan``: whether experiments are valid, and what a run would cost, without running it.
+
+Files are counted as they are before compression.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +16,19 @@ from typing import Any
 from vibsim.cli import resources
 from vibsim.cli.chosen_plans import plans_of
 from vibsim.cli.jobs.common import chosen_results
-from vibsim.cli.sizes import amount, duration, size
+from vibsim.cli.resources import amount, duration, size
 from vibsim.plan import Plan
 
 _WIDTHS = (7, 12, 12, 7, 14, 10, 10, 10)
 _HEAD = ("level", "steps", "kept every", "files", "member-steps", "disk", "memory", "time")
+
+
+def check(options: Namespace) -> int:
+    """Validate experiment files and say that they are valid."""
+    for item in plans_of(options.experiments):
+        levels = ", ".join(str(level.level) for level in item.levels)
+        print(f"{item.file}: valid ({_members(item)}, levels {levels})")
+    return 0
 
 
 def plan(options: Namespace) -> int:
@@ -51,10 +62,13 @@ def _steps(item: Plan) -> int:
     return sum(level.member_steps for level in item.levels)
 
 
+def _members(item: Plan) -> str:
+    return "1 member" if item.cases == 1 else f"{item.cases} members"
+
+
 def _lines(item: Plan) -> Iterator[str]:
-    members = "1 member" if item.cases == 1 else f"{item.cases} members"
     schemes = "scheme" if len(item.schemes) == 1 else "schemes"
-    yield f"{item.key}: {members}, {schemes} {', '.join(item.schemes)}"
+    yield f"{item.key}: {_members(item)}, {schemes} {', '.join(item.schemes)}"
     yield _row(_HEAD)
     for level in item.levels:
         numbers = map(str, (level.level, level.steps, level.every, len(level.shards)))

@@ -1,4 +1,4 @@
-"""Whether the machine has room for what is planned."""
+"""Whether the machine has room for what is planned, and numbers with units that people read."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from vibsim.cli.sizes import size
 from vibsim.core.errors import Fault, InputError
 from vibsim.plan import Plan
 from vibsim.store.atomic import check_room
@@ -78,3 +77,25 @@ def _memory(name: str) -> int:
         if key == name:
             return int(value.split()[0]) * 1024
     return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+
+
+def size(number: float) -> str:
+    """Return bytes as text: ``1.2 GB``."""
+    for unit in ("B", "kB", "MB", "GB"):
+        if number < 999.5:
+            return f"{number:.3g} {unit}"
+        number /= 1000.0
+    return f"{number:.3g} TB"
+
+
+def amount(number: float) -> str:
+    """Return a count as text: ``960``, ``1.3e+06``."""
+    return f"{number:.0f}" if number < 1e5 else f"{number:.2g}"
+
+
+def duration(seconds: float) -> str:
+    """Return seconds as text: ``0.4 s``, ``3.1 min``, ``2.5 h``."""
+    for limit, factor, unit in ((100.0, 1.0, "s"), (6000.0, 60.0, "min"), (172800.0, 3600.0, "h")):
+        if seconds < limit:
+            return f"{seconds / factor:.1f} {unit}"
+    return f"{seconds / 86400.0:.1f} d"

@@ -1,7 +1,8 @@
 """A results folder holds files and folders only, so that nothing is written outside of it, and no pipe is waited for.
 
 It may come from somebody else, who put a link where a run writes. Such a folder is refused. The results folder itself
-may be a link, which its user has named.
+may be a link, which its user has named. Of files that must not be used, which were deleted, a job leaves notes there
+for the run that started it.
 """
 
 from __future__ import annotations
@@ -13,8 +14,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from vibsim import store
-from vibsim.core.errors import Fault, InputError, VibsimError
+from vibsim.core import regular_files
+from vibsim.core.errors import Fault, FileError, InputError, VibsimError
 
+_NOTE = ".vibsim/deleted.txt"
 _OURS = (".vibsim", ".snakemake", "index.html", "summary.csv")
 _IN_PLACE = ("logs", "benchmarks", "figures", "tables")
 """Folders of an experiment where the shell and Snakemake write to files that are there."""
@@ -118,3 +121,38 @@ def _naming() -> Iterator[None]:
         yield
     except OSError as error:
         raise VibsimError(f"{error.filename}: cannot be used ({error.strerror})") from error
+
+
+def delete(error: FileError, results: Path) -> None:
+    """Delete the file that `error` names and leave a note, so that the run makes it again.
+
+    Raises
+    ------
+    VibsimError
+        Where a folder with something in it has the place of the file, which is not ours to delete, or the note cannot
+        be written.
+    """
+    try:
+        if error.path.is_dir() and not error.path.is_symlink():
+            error.path.rmdir()
+        else:
+            error.path.unlink(missing_ok=True)
+    except OSError as reason:
+        text = f"{error.path}: cannot be deleted ({reason.strerror}); move it away"
+        raise VibsimError(text) from None
+    try:
+        regular_files.append(results / _NOTE, f"{error}\n".encode())
+    except OSError as reason:
+        raise VibsimError(f"{results / _NOTE}: cannot be written ({reason.strerror})") from None
+
+
+def deleted(results: Path) -> list[str]:
+    """Return what was deleted since the last time, and why."""
+    note = results / _NOTE
+    try:
+        with regular_files.reading(note) as file:
+            lines = file.read().decode(errors="replace").splitlines()
+    except FileNotFoundError:
+        return []
+    note.unlink()
+    return lines

@@ -19,8 +19,7 @@ from vibsim.comparison.member_method import Method, Start
 from vibsim.convergence.state_extrapolation import Pair
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.record import Attribute, Record, Variable, attributes
-from vibsim.observe.common_grid import Grid, common_grid, take
-from vibsim.observe.input_consistency import check_belonging
+from vibsim.observe.common_grid import Grid, check_belonging, common_grid, take
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import Members, members
 from vibsim.simulation.scaled import in_scales

@@ -48,12 +48,9 @@ _OF_ROOTS = frozenset(
 class Scalar:
     """A number of every scheme and member that has a limit."""
 
-    variable: str
-    """Name in the convergence Record."""
-    value: str
-    """Name among `vibsim.experiment.value_names.VALUES`."""
-    quantity: str
-    """Empty where it is of none."""
+    variable: str  # name in the convergence Record
+    value: str  # name among `vibsim.experiment.value_names.VALUES`
+    quantity: str  # empty where it is of none
     units: str
     words: str
 
@@ -64,14 +61,10 @@ class Best:
 
     levels: Floats
     limit: Limit
-    order: Floats
-    """Observed order; NaN where there is none."""
-    kind: Codes
-    """Position in `gci.CLASSES`."""
-    index: Floats
-    """Grid convergence index of the finest level."""
-    relative: Floats
-    """The same over the number; NaN where that is near zero."""
+    order: Floats  # observed order; NaN where there is none
+    kind: Codes  # position in `gci.CLASSES`
+    index: Floats  # grid convergence index of the finest level
+    relative: Floats  # the same over the number; NaN where that is near zero
 
 
 def has_limit(name: str, level: int | str | None) -> bool:
@@ -98,8 +91,8 @@ class _Ladder:
     order: Floats
     even: Flags
     floor: Floats
+    # what the points of the finest grid may miss of an extremum, shape (scheme, case)
     missed: Floats
-    """What the points of the finest grid may miss of an extremum, shape (scheme, case)."""
     levels: tuple[int, ...]
 
     def limit(self) -> Limit:

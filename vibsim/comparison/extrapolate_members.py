@@ -36,8 +36,8 @@ class Extrapolated:
     velocity: Floats
     position_error: Floats
     velocity_error: Floats
+    # place in the ladder of the coarsest level used for the position; -1 for none
     first: NDArray[np.intp]
-    """Place in the ladder of the coarsest level used for the position; -1 for none."""
     last: NDArray[np.intp]
 
     def largest_bounds(self) -> tuple[Floats, Floats]:

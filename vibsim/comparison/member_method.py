@@ -93,14 +93,10 @@ class Method:
 class Start:
     """The numbers of some members."""
 
-    parameters: Floats
-    """In the order of `Model.parameters`, shape (case, n_parameters)."""
-    initial: Floats
-    """Position and velocity, shape (case, 2)."""
-    end: Floats
-    """Shape (case,)."""
-    frequency: Floats
-    """Angular frequency of small oscillations, shape (case,)."""
+    parameters: Floats  # in the order of `Model.parameters`, shape (case, n_parameters)
+    initial: Floats  # position and velocity, shape (case, 2)
+    end: Floats  # shape (case,)
+    frequency: Floats  # angular frequency of small oscillations, shape (case,)
 
     def of(self, some: Integers | slice) -> Start:
         """Return the numbers of some of the members."""

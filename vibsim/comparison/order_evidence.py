@@ -76,43 +76,45 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
     def by_level(noise: Floats) -> Floats:
         return np.moveaxis(in_norm(np.moveaxis(noise, -1, 0)), 0, -1)
 
+    def all_cases(values: Floats) -> Floats:
+        return np.broadcast_to(values, shape)
+
     moved, straight = _motion(q, order, size)
     steps = np.array(grid.steps, dtype=np.float64)
     worst = SPACING_AT_ONE * steps**2 * (q.scale * block.magnified)[..., None]
+    # where nothing oscillates, no order is promised of a part of an error
+    promised = ~block.adaptive[:, None] & ~np.isnan(order)
     return Evidence(
         levels=grid.levels,
+        order=all_cases(order),
+        tolerance=tolerance,
         difference=measured.difference,
         scatter=measured.scatter,
         floor=by_level(q.floor),
         ceiling=by_level(np.maximum(worst, q.floor)),
-        blur=None if q.blur is None else by_level(q.blur),
-        order=np.broadcast_to(order, shape),
-        promised=np.broadcast_to(q.order, shape),
-        special=np.broadcast_to(q.special, shape),
-        combined=partial(q.combined, norm),
-        tolerance=tolerance,
+        relative_floor=all_cases(block.relative_floor[..., 0]),
+        size=in_norm(size),
         error=measured.error,
         error_scatter=measured.error_scatter,
+        blur=by_level(q.blur),
+        promised=all_cases(q.order),
+        special=all_cases(q.special),
+        combined=partial(q.combined, norm),
         numbers=q.are_numbers,
-        size=in_norm(size),
         failed=block.failed,
-        # where nothing oscillates, no order is promised of a part of an error
-        applicable=(exists | np.any(block.failed, axis=-1))
-        & ~block.adaptive[:, None]
-        & ~np.isnan(order),
+        applicable=(exists | np.any(block.failed, axis=-1)) & promised,
         omega_dt=np.broadcast_to(block.fastest, (*shape, len(grid.levels))),
-        stability_limit=np.broadcast_to(block.stability_limit, shape),
-        growth=block.growth,
-        left_to_the_mesh=np.broadcast_to(block.left_to_the_mesh, shape),
+        stability_limit=all_cases(block.stability_limit),
+        span=all_cases(block.omega_dt[:, 0] * float(grid.steps[0])),
+        steps=float(grid.steps[0]),
+        moved=moved,
+        straight=straight,
+        left_to_the_mesh=all_cases(block.left_to_the_mesh),
         corner=block.corners.power,
         missed=np.broadcast_to(np.isfinite(block.missed.time), shape),
         jumps=np.broadcast_to(block.missed.jumps, shape),
         decay=block.decay * block.group.end / grid.steps[-1],
-        steps=float(grid.steps[0]),
-        moved=moved,
-        straight=straight,
-        span=np.broadcast_to(block.omega_dt[:, 0] * float(grid.steps[0]), shape),
-        relative_floor=np.broadcast_to(block.relative_floor[..., 0], shape),
+        growth=block.growth,
     )
 
 

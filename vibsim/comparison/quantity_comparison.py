@@ -11,13 +11,7 @@ import numpy as np
 
 from vibsim.apriori.formal_orders import even_powers, formal_orders, special_orders
 from vibsim.apriori.roundoff_floor import solution_size
-from vibsim.comparison.thresholds import (
-    EXACT_ORDER,
-    FEW_LEVELS,
-    IRREGULAR,
-    SHAPELESS_POINTS,
-    VANISHING_POINT,
-)
+from vibsim.comparison import thresholds as th
 from vibsim.convergence import differences
 from vibsim.convergence.extrapolation import extrapolate_series
 from vibsim.convergence.thresholds import ROUND_OFF_SAFETY
@@ -31,16 +25,14 @@ from vibsim.observe.phase_amplitude_error import parts_of_errors, wanted
 class InNorm:
     """A quantity in a norm over time."""
 
-    difference: Floats
-    """Of successive levels, shape (scheme, case, pair)."""
+    difference: Floats  # of successive levels, shape (scheme, case, pair)
+    # of successive differences (`differences.scatters`), shape (scheme, case, triple)
     scatter: Floats
-    """Of successive differences (`differences.scatters`), shape (scheme, case, triple)."""
+    # exact less computed, shape (scheme, case, level); NaN where the exact solution is not known
     error: Floats
-    """Exact less computed, shape (scheme, case, level); NaN where the exact solution is not known."""
-    extrapolation: Floats
-    """Exact less extrapolated, shape (scheme, case)."""
-    error_scatter: Floats | None
-    """Of the errors of successive levels, shape (scheme, case, pair); None without `FEW_LEVELS` levels and errors."""
+    extrapolation: Floats  # exact less extrapolated, shape (scheme, case)
+    # of the errors of successive levels, shape (scheme, case, pair); NaN for other numbers of levels than `FEW_LEVELS`
+    error_scatter: Floats
 
 
 @dataclass(frozen=True)
@@ -51,20 +43,15 @@ class Comparison:
     name: str
     long_name: str
     units: str
-    values: list[Floats]
-    """Per level, coarse to fine."""
-    exact: Floats | None
-    """Broadcasts against a series."""
-    order: Floats
-    """Formal order, shape (scheme, 1 or case)."""
-    floor: Floats
-    """Predicted round-off at one point, shape (scheme, case, level)."""
-    scale: Floats
-    """Size that round-off is relative to, shape (scheme, case)."""
-    blur: Floats | None = None
-    """What the measurement of the quantity is off by, rounding apart, shape (scheme, case, level); None for nothing."""
+    values: list[Floats]  # per level, coarse to fine
+    exact: Floats | None  # broadcasts against a series
+    order: Floats  # formal order, shape (scheme, 1 or case)
+    floor: Floats  # predicted round-off at one point, shape (scheme, case, level)
+    scale: Floats  # size that round-off is relative to, shape (scheme, case)
+    # what the measurement of the quantity is off by, rounding apart, shape (scheme, case, level); None for nothing
+    blur: Floats
+    # judgements made so far, by norm, order and tolerance
     judged: dict[tuple[str, str, float], Judgement] = field(default_factory=dict, repr=False)
-    """Judgements made so far, by norm, order and tolerance."""
     _norms: dict[str, InNorm] = field(default_factory=dict, repr=False)
 
     @property
@@ -101,12 +88,12 @@ class Comparison:
         """Extrapolation to a vanishing step, and the bound of its error; for a lean part its largest value only."""
         block = self.block
         even = even_powers(block.experiment, self.name, block.columns)
-        order = np.where(np.isinf(self.order), EXACT_ORDER, self.order)
+        order = np.where(np.isinf(self.order), th.EXACT_ORDER, self.order)
         value, bound = extrapolate_series(
             self.values, block.grid.levels, order, even, largest=block.lean
         )
         if block.model.events is not None:
-            bound = IRREGULAR * bound
+            bound = th.IRREGULAR * bound
         return value, bound + ROUND_OFF_SAFETY * self.floor[..., -1:]
 
     @property
@@ -121,8 +108,10 @@ class Comparison:
         if not self.differences:
             return np.zeros(self.block.shape, dtype=bool)
         d = self.differences[-1]
-        least = VANISHING_POINT * differences.largest(d)[..., None]
-        return np.asarray(np.count_nonzero((d > least) | (d < -least), axis=-1) <= SHAPELESS_POINTS)
+        least = th.VANISHING_POINT * differences.largest(d)[..., None]
+        return np.asarray(
+            np.count_nonzero((d > least) | (d < -least), axis=-1) <= th.SHAPELESS_POINTS
+        )
 
     def in_norm(self, kind: str) -> InNorm:
         """Measure the quantity in a norm."""
@@ -156,7 +145,7 @@ class Comparison:
         levels, d = len(grid.levels), self.differences
         unknown = np.full((*shape, levels), np.nan)
         scatters = differences.scatters(d, kind, grid.end_included) if len(d) > 1 else []
-        errors = self.errors if levels == FEW_LEVELS else None
+        errors = self.errors if levels == th.FEW_LEVELS else None
         return InNorm(
             difference=by_level([size(x) for x in d]) if d else none,
             scatter=by_level(scatters) if scatters else none,
@@ -165,7 +154,7 @@ class Comparison:
                 unknown[..., 0] if self.exact is None else size(self.exact - self.extrapolation[0])
             ),
             error_scatter=(
-                None
+                unknown[..., 1:]
                 if errors is None
                 else by_level(differences.scatters(errors, kind, grid.end_included))
             ),
@@ -206,6 +195,7 @@ def comparisons(block: MemberBlock, names: tuple[str, ...]) -> Mapping[str, Comp
     found: dict[str, Comparison] = {}
     for name in names:
         scale = block.size(name, values[name], sizes)
+        floor = block.floor_of(name, scale)
         attrs = block.finest.variables[name].attrs if name in block.finest else {}
         found[name] = Comparison(
             block=block,
@@ -215,8 +205,9 @@ def comparisons(block: MemberBlock, names: tuple[str, ...]) -> Mapping[str, Comp
             values=values[name],
             exact=block.exact_of(name),
             order=formal_orders(block.experiment, name, block.columns),
-            floor=block.floor_of(name, scale),
+            floor=floor,
             scale=scale,
+            blur=np.zeros_like(floor),
         )
     return found | parts_of_errors(block, found, apart, Comparison)
 

@@ -32,14 +32,11 @@ if TYPE_CHECKING:
 class Apart:
     """How far two solutions are from each other, in the unit of the quantity; NaN where one of them does not exist."""
 
-    scheme: int
-    """Number of the scheme that is compared."""
+    scheme: int  # number of the scheme that is compared
+    # at every stored time, shape (case, t); NaN where the quantity has no value, at the ends of ``[D_2t u]``
     over_time: Floats
-    """At every stored time, shape (case, t); NaN where the quantity has no value, at the ends of ``[D_2t u]``."""
-    largest: Floats
-    """Shape (case,)."""
-    allowed: Floats
-    """What that may be, shape (case,)."""
+    largest: Floats  # shape (case,)
+    allowed: Floats  # what that may be, shape (case,)
 
 
 def apart(block: MemberBlock, compared: Mapping[str, Comparison], check: EqualCheck) -> Apart:

@@ -25,12 +25,9 @@ from vibsim.observe.member_block import MemberBlock, energy_at_start
 class Place:
     """Where a value is taken, and what it may be taken from."""
 
-    block: MemberBlock
-    """The members."""
-    compared: Mapping[str, Comparison]
-    """Quantities that were compared between levels."""
-    quantity: str
-    """Empty where the value is of none."""
+    block: MemberBlock  # the members
+    compared: Mapping[str, Comparison]  # quantities that were compared between levels
+    quantity: str  # empty where the value is of none
     level: int | str | None
     t: float | None
     step: int | None

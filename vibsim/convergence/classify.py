@@ -9,7 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from vibsim.convergence.asymptotic_range import Trend, mismatches
+from vibsim.convergence import thresholds as th
+from vibsim.convergence import true_errors as errors
+from vibsim.convergence.asymptotic_range import Trend, lowest, mismatches, most_left
 from vibsim.convergence.hidden_order import is_promise_hidden
 from vibsim.convergence.ladder_statistics import (
     Evidence,
@@ -20,46 +22,6 @@ from vibsim.convergence.ladder_statistics import (
     unresolved,
 )
 from vibsim.convergence.roundoff_onset import steepest
-from vibsim.convergence.settled_orders import lowest, most_left
-from vibsim.convergence.thresholds import (
-    COINCIDENT,
-    DEPARTED,
-    FADING,
-    FARTHEST,
-    GROWS,
-    HALF_SPACING,
-    HIDDEN,
-    INCOHERENT,
-    JUMP,
-    LEAST_CANDIDATE,
-    LOG2,
-    MOST_ABOVE,
-    MOVES,
-    NARROW,
-    OF_SCATTER,
-    OF_SINGLE,
-    ORDINARY_ORDER,
-    PROPORTIONAL_ALONE,
-    PURE,
-    QUIET,
-    REACH,
-    REACH_SETTLED,
-    READABLE,
-    SINGLE_WIDTH,
-    STEADY,
-    SUNK,
-    UNRELATED,
-)
-from vibsim.convergence.true_errors import (
-    contradicts,
-    errors_agree,
-    errors_confirm,
-    errors_leave,
-    errors_stay,
-    errors_vouch,
-    irregular,
-    limit_is_missed,
-)
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.vocabulary import TOLERANCE
 
@@ -71,7 +33,7 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Floats]:
     """
     exactly, tol = np.isinf(e.order), e.tolerance
     # the rules of an order do not reach those ladders
-    p = np.where(exactly, ORDINARY_ORDER, e.order)
+    p = np.where(exactly, th.ORDINARY_ORDER, e.order)
     nothing = t.count == 0
     exact = (exactly | nothing) & truly_exact(e)
     right = _right(e, t, p)
@@ -79,50 +41,50 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Floats]:
     right |= doubtful
     low = np.where(doubtful, _below(t), t.low)
     # neither that order nor a failure of the promised one, until the levels exclude this or show it
-    promised = e.order if e.promised is None else e.promised
     hidden = is_promise_hidden(e, t)
-    low = np.where(hidden, np.minimum(low, promised), low)
-    hidden &= p >= promised - tol
+    low = np.where(hidden, np.minimum(low, e.promised), low)
+    hidden &= p >= e.promised - tol
     right &= ~hidden
     excluded = (t.high < p - tol) | (t.low > p + tol)
     above = t.order > p
-    wrong = excluded & (_pure(t) | _plausible(t, p, tol)) & ~_on_the_way(t, p, tol)
-    wrong &= ~t.open | above | (t.local <= p - SUNK)
-    wrong &= ~t.gap & ~t.turning & ~(t.scatter_before > UNRELATED)
+    # one pure power, whatever the power
+    pure = t.several & (np.abs(t.scatter) <= th.PURE) & (np.abs(t.change) <= th.PURE)
+    wrong = excluded & (pure | _plausible(t, p, tol)) & ~_on_the_way(t, p, tol)
+    wrong &= ~t.open | above | (t.local <= p - th.SUNK)
+    wrong &= ~t.gap & ~t.turning & ~(t.scatter_before > th.UNRELATED)
     # a lower power may hide below or emerge from a higher one, not the other way round
     several, likely = t.several, np.round(2.0 * t.order) / 2
-    together = np.abs(t.scatter) <= np.where(several, COINCIDENT, PROPORTIONAL_ALONE)
+    together = np.abs(t.scatter) <= np.where(several, th.COINCIDENT, th.PROPORTIONAL_ALONE)
     wrong &= np.where(
         above,
-        together & (t.width <= NARROW) & ~t.drifting & ~t.hiding & _alone(e, t, likely),
-        several | (np.abs(t.scatter) <= COINCIDENT),
+        together & (t.width <= th.NARROW) & ~t.drifting & ~t.hiding & _alone(e, t, likely),
+        several | (np.abs(t.scatter) <= th.COINCIDENT),
     )
     wrong |= _settled_elsewhere(e, t, p)
     wrong &= ~(hidden & above)
-    too_large, too_small = contradicts(e, t)
-    accidental = irregular(e, t)
-    sure = several | (np.abs(t.scatter) <= HIDDEN)
+    too_large, too_small = errors.contradicts(e, t)
+    accidental = errors.irregular(e, t)
+    sure = several | (np.abs(t.scatter) <= th.HIDDEN)
     # one pure power to another limit is at fault whatever its errors look like
-    missed = too_large & (right | (wrong & sure & (errors_stay(e, t) | _pure(t))))
-    missed |= right & limit_is_missed(e, t, p) & ~accidental
-    wrong &= errors_agree(e, t)
-    left = np.full(p.shape, np.nan) if e.left_to_the_mesh is None else e.left_to_the_mesh
-    rough = ~np.isnan(left)
+    missed = too_large & (right | (wrong & sure & (errors.stay(e, t) | pure)))
+    missed |= right & errors.limit_is_missed(e, t, p) & ~accidental
+    wrong &= errors.agree(e, t)
+    left, rough = e.left_to_the_mesh, ~np.isnan(e.left_to_the_mesh)
     # any other power is the accident of where events or corners lie between grid points
     regular = ~rough | ((np.abs(t.order - left) <= tol) & ~t.alternating)
     kinked, deeper = _kinked(e, t, p)
     # where no triple is left although the differences are above round-off, the corner has made them unlike each other
-    unlike = np.zeros(p.shape, dtype=bool) if e.corner is None else nothing & (p >= e.corner)
+    unlike = nothing & (p >= e.corner)
     kinked |= unlike | (too_small & accidental)
     swings = t.alternating & ~rough & ~kinked & ~doubtful
     still = at_rest(e) & (exactly | nothing)
-    pulse, jumps = _missed(e)
     # what no level sees, no difference tells of: an exact solution alone would say that it does not matter
-    blind = pulse & (missed | ((exact | nothing | exactly) & far_from_exact(e)) | _unknown(e))
+    unseen = missed | ((exact | nothing | exactly) & far_from_exact(e)) | np.isnan(e.error[..., -1])
+    blind = e.missed & unseen
     # an implicit scheme with steps as long goes on with a velocity that has gone, and that is no fault of it
     coarse = unresolved(e) & (exact | missed | (wrong & ~right))
     return [
-        (blind & jumps, "non_smooth"),
+        (blind & e.jumps, "non_smooth"),
         (blind, "pre_asymptotic"),
         # at rest on every level, and away from a motion: steps as long as that see nothing of it
         (still & far_from_exact(e), "pre_asymptotic"),
@@ -131,7 +93,7 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Floats]:
         (exact & far_from_exact(e), "wrong_limit"),
         (exact, "exact"),
         (exactly & ~at_round_off(e), "order_low"),
-        (nothing & ~exactly & _lies_still(e) & far_from_exact(e), "pre_asymptotic"),
+        (nothing & ~exactly & (e.moved == 0.0) & far_from_exact(e), "pre_asymptotic"),
         (nothing & ~exactly & ~(rough | unlike) & _opposite(e), "oscillating"),
         (exactly | (nothing & (at_round_off(e) | ~(rough | unlike))), "round_off"),
         # orders that swing into a floor do so by noise
@@ -142,8 +104,8 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Floats]:
         (wrong & ~above & regular & (~kinked | deeper), "order_low"),
         (kinked, "non_smooth"),
         (wrong & above & ~rough, "order_high"),
-        (pulse & jumps, "non_smooth"),
-        (pulse, "pre_asymptotic"),
+        (e.missed & e.jumps, "non_smooth"),
+        (e.missed, "pre_asymptotic"),
         (rough, "non_smooth"),
         (t.cut, "round_off"),
     ], low
@@ -157,11 +119,11 @@ def _right(e: Evidence, t: Trend, p: Floats) -> Flags:
     """
     several, tol = t.several, e.tolerance
     both = several & (np.abs(t.local - p) <= tol) & (np.abs(t.local - t.change - p) <= tol)
-    both &= t.width <= NARROW
+    both &= t.width <= th.NARROW
     both |= several & t.fading & (np.abs(t.local - p) <= tol) & (np.abs(t.change) <= tol)
-    both |= errors_confirm(e, t, p) & (np.abs(t.local - p) <= tol)
+    both |= errors.confirm(e, t, p) & (np.abs(t.local - p) <= tol)
     near = (np.abs(t.order - p) <= tol) & ((t.width <= tol) | both | ~several)
-    together = np.abs(t.scatter) <= np.where(several, COINCIDENT, PROPORTIONAL_ALONE)
+    together = np.abs(t.scatter) <= np.where(several, th.COINCIDENT, th.PROPORTIONAL_ALONE)
     clear = _alone(e, t, p)
     right = near & together & clear & ~np.signbit(t.scatter)
     right &= ~t.gap & ~t.turning
@@ -174,7 +136,7 @@ def _settled_elsewhere(e: Evidence, t: Trend, p: Floats) -> Flags:
 
     What is enough to believe an order is enough to say that it is not p.
     """
-    likely = np.maximum(np.round(2.0 * t.order) / 2, LEAST_CANDIDATE)
+    likely = np.maximum(np.round(2.0 * t.order) / 2, th.LEAST_CANDIDATE)
     usual = replace(e, tolerance=min(e.tolerance, TOLERANCE))
     settled = _right(usual, t, likely)
     doubtful = ~settled & _two_ratios(usual, t, likely)
@@ -188,43 +150,17 @@ def _kinked(e: Evidence, t: Trend, p: Floats) -> tuple[Flags, Flags]:
 
     A corner leaves all powers up to its own: a ladder that settles lower has another cause.
     """
-    if e.corner is None:
-        nothing = np.zeros(p.shape, dtype=bool)
-        return nothing, nothing
     low = (t.order < p - e.tolerance) | (t.local < p - e.tolerance)
     low |= t.several & (t.local - t.change < p - e.tolerance)
     kinked = ~np.isnan(e.corner) & (p >= e.corner) & (low | t.alternating)
-    return kinked, np.asarray(t.order < e.corner - np.maximum(e.tolerance, HALF_SPACING))
-
-
-def _missed(e: Evidence) -> tuple[Flags, Flags]:
-    """Say where the force has a pulse that no level sees, and where it jumps there."""
-    none = np.zeros(e.order.shape, dtype=bool)
-    return (none if e.missed is None else e.missed), (none if e.jumps is None else e.jumps)
-
-
-def _unknown(e: Evidence) -> Flags:
-    """Say where the true error of the finest level is not known."""
-    if e.error is None:
-        return np.ones(e.order.shape, dtype=bool)
-    return np.asarray(np.isnan(e.error[..., -1]))
-
-
-def _lies_still(e: Evidence) -> Flags:
-    """Say where nothing moves at the common times behind the start."""
-    return np.zeros(e.order.shape, dtype=bool) if e.moved is None else np.asarray(e.moved == 0.0)
+    return kinked, np.asarray(t.order < e.corner - np.maximum(e.tolerance, th.HALF_SPACING))
 
 
 def _opposite(e: Evidence) -> Flags:
     """Say where differences change their sign from level to level and fall: those of an error do, of noise do not."""
-    opposite = np.signbit(e.scatter) & (np.abs(e.scatter) <= INCOHERENT)
-    falls = e.difference[..., 1:] <= e.difference[..., :-1] * 2.0**-HALF_SPACING
+    opposite = np.signbit(e.scatter) & (np.abs(e.scatter) <= th.INCOHERENT)
+    falls = e.difference[..., 1:] <= e.difference[..., :-1] * 2.0**-th.HALF_SPACING
     return np.asarray(np.all(opposite & falls, axis=-1) & ~at_round_off(e))
-
-
-def _pure(t: Trend) -> Flags:
-    """Say where a ladder is one pure power, whatever the power."""
-    return np.asarray(t.several & (np.abs(t.scatter) <= PURE) & (np.abs(t.change) <= PURE))
 
 
 def _alone(e: Evidence, t: Trend, p: Floats) -> Flags:
@@ -233,15 +169,17 @@ def _alone(e: Evidence, t: Trend, p: Floats) -> Flags:
     clear = _little_left(t, p)
     clear |= t.several & ((t.fading & ~t.slow) | t.irregular)
     # as much as one triple alone may show, where it does not grow: the interval then reaches to a lower power
-    steady = t.several & (np.abs(t.change) <= STEADY * e.tolerance)
-    clear |= steady & (mismatch <= np.minimum(PROPORTIONAL_ALONE, GROWS * before))
+    steady = t.several & (np.abs(t.change) <= th.STEADY * e.tolerance)
+    clear |= steady & (mismatch <= np.minimum(th.PROPORTIONAL_ALONE, th.GROWS * before))
     # one order alone: two terms of one shape tell from a power by nothing but the number
-    own = np.abs(t.local - p) <= np.maximum(SINGLE_WIDTH, OF_SCATTER * np.abs(t.scatter) / LOG2)
-    clear |= t.several & (mismatch <= PROPORTIONAL_ALONE) & (mismatch <= FADING * before)
+    own = np.abs(t.local - p) <= np.maximum(
+        th.SINGLE_WIDTH, th.OF_SCATTER * np.abs(t.scatter) / th.LOG2
+    )
+    clear |= t.several & (mismatch <= th.PROPORTIONAL_ALONE) & (mismatch <= th.FADING * before)
     # one triple says too little for an order that few schemes have
-    own &= (p == np.round(p)) | (np.abs(t.local - p) <= SINGLE_WIDTH)
-    clear = np.where(t.several, clear | errors_confirm(e, t, p), own | errors_vouch(e, p))
-    return np.asarray(clear & ~errors_leave(e, t, p))
+    own &= (p == np.round(p)) | (np.abs(t.local - p) <= th.SINGLE_WIDTH)
+    clear = np.where(t.several, clear | errors.confirm(e, t, p), own | errors.vouch(e, p))
+    return np.asarray(clear & ~errors.leave(e, t, p))
 
 
 def _leaving(t: Trend, p: Floats) -> Flags:
@@ -252,8 +190,8 @@ def _leaving(t: Trend, p: Floats) -> Flags:
         t.several
         & (away * before > 0)
         & (np.abs(away) > np.abs(before))
-        & (np.abs(t.change) > MOVES)
-        & (np.abs(away) > DEPARTED)
+        & (np.abs(t.change) > th.MOVES)
+        & (np.abs(away) > th.DEPARTED)
         & ~t.noisy
     )
 
@@ -266,24 +204,28 @@ def _plausible(t: Trend, p: Floats, tol: float) -> Flags:
     """
     several = t.several
     before = t.local - t.change
-    alone = np.hypot(t.scatter, LOG2 * (t.order - np.round(2.0 * t.order) / 2)) <= HIDDEN
+    alone = np.hypot(t.scatter, th.LOG2 * (t.order - np.round(2.0 * t.order) / 2)) <= th.HIDDEN
     towards_p = np.abs(t.local - p) < np.abs(before - p)
     found = np.zeros(p.shape, dtype=bool)
     for candidate in (np.floor(2.0 * t.order) / 2, np.ceil(2.0 * t.order) / 2):
         whole = candidate == np.round(candidate)
         passing = several & towards_p
-        passing &= np.abs(t.local - candidate) > np.abs(before - candidate) + QUIET
+        passing &= np.abs(t.local - candidate) > np.abs(before - candidate) + th.QUIET
         # one triple tells a pure power from two proportional terms by nothing but the number
-        least = np.where(whole, REACH_SETTLED, REACH)
-        wide = np.where(whole, OF_SINGLE * np.abs(t.scatter) / LOG2, np.minimum(t.width, REACH))
-        reach = np.where(several, np.maximum(t.width, least), np.maximum(wide, SINGLE_WIDTH))
+        least = np.where(whole, th.REACH_SETTLED, th.REACH)
+        wide = np.where(
+            whole, th.OF_SINGLE * np.abs(t.scatter) / th.LOG2, np.minimum(t.width, th.REACH)
+        )
+        reach = np.where(several, np.maximum(t.width, least), np.maximum(wide, th.SINGLE_WIDTH))
         near = (np.abs(t.order - candidate) <= reach) & (np.abs(candidate - p) > tol)
-        near &= (candidate >= LEAST_CANDIDATE) & (several | alone | (candidate <= p + MOST_ABOVE))
-        pure = np.abs(t.order - candidate) <= SINGLE_WIDTH
+        near &= (candidate >= th.LEAST_CANDIDATE) & (
+            several | alone | (candidate <= p + th.MOST_ABOVE)
+        )
+        pure = np.abs(t.order - candidate) <= th.SINGLE_WIDTH
         found |= (
             near
             & ~passing
-            & (whole | np.where(several, np.abs(t.scatter) <= 2 * PROPORTIONAL_ALONE, pure))
+            & (whole | np.where(several, np.abs(t.scatter) <= 2 * th.PROPORTIONAL_ALONE, pure))
         )
     return found
 
@@ -303,17 +245,17 @@ def _two_ratios(e: Evidence, t: Trend, p: Floats) -> Flags:
     """
     now, before = mismatches(t, p)
     near = np.maximum(np.abs(t.local - p), np.abs(t.local - t.change - p)) <= e.tolerance
-    both = t.several & near & (now <= PROPORTIONAL_ALONE) & (before <= COINCIDENT)
+    both = t.several & near & (now <= th.PROPORTIONAL_ALONE) & (before <= th.COINCIDENT)
     # behind a jump two orders may be neighbours by accident
-    both &= ~np.signbit(t.scatter) & ~t.gap & ~t.alternating & ~(np.abs(t.earlier) > JUMP)
+    both &= ~np.signbit(t.scatter) & ~t.gap & ~t.alternating & ~(np.abs(t.earlier) > th.JUMP)
     # nor are they the orders of one power where the differences have turned round between them
     both &= ~t.turning
-    return np.asarray(both & ~_emerges(t, p) & (t.irregular | ~errors_leave(e, t, p)))
+    return np.asarray(both & ~_emerges(t, p) & (t.irregular | ~errors.leave(e, t, p)))
 
 
 def _below(t: Trend) -> Floats:
     """Return the lower end of an interval that reaches to the lowest power that may be hiding, shape (...)."""
-    return np.minimum(t.low, lowest(t.order - t.width, FARTHEST))
+    return np.minimum(t.low, lowest(t.order - t.width, th.FARTHEST))
 
 
 def _little_left(t: Trend, p: Floats) -> Flags:
@@ -331,12 +273,12 @@ def _emerges(t: Trend, p: Floats) -> Flags:
     """
     now, _ = mismatches(t, p)
     spread, before = np.abs(t.scatter), t.scatter_before
-    by_shape = (spread > QUIET) & (spread > GROWS * before)
+    by_shape = (spread > th.QUIET) & (spread > th.GROWS * before)
     # what rises more steeply than any lower power is a floor that begins
     by_shape &= ~(spread > steepest(t.local - t.change) * before)
     last = t.local - p
     away, then, earlier = np.abs(last), np.abs(last - t.change), np.abs(last - t.change - t.earlier)
-    calm = (before > READABLE) & (spread <= FADING * before)
-    two = np.isnan(t.earlier) & (now > HIDDEN) & ~calm
-    by_order = (away > GROWS * then) & ((then > GROWS * earlier) | two)
+    calm = (before > th.READABLE) & (spread <= th.FADING * before)
+    two = np.isnan(t.earlier) & (now > th.HIDDEN) & ~calm
+    by_order = (away > th.GROWS * then) & ((then > th.GROWS * earlier) | two)
     return np.asarray((by_shape | by_order) & (now > t.noise) & ~_little_left(t, p))

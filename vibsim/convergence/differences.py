@@ -54,18 +54,11 @@ def norm(error: Floats, kind: str, spacing: Floats, end_included: bool = True) -
     Parameters
     ----------
     error
-        Shape (..., case, t).
-    kind
-        One of `vocabulary.NORMS`.
+        Shape (..., case, t); the norm has the shape (..., case), and NaN where the series has a NaN.
     spacing
         Distance between the points, shape (case,) or (1,).
     end_included
         Whether the last point is the end of the time interval.
-
-    Returns
-    -------
-    array
-        Shape (..., case). NaN where the series has a NaN.
     """
     if kind == "linf_interior" and end_included:
         error = error[..., :-1]
@@ -126,15 +119,9 @@ def rescaling(order: Floats | float, levels: Sequence[int]) -> Floats:
 
 
 def order_of_ratio(ratio: Floats, levels: Sequence[int]) -> Floats:
-    """Solve `target_ratio` for the order.
+    """Solve `target_ratio` for the order; NaN where that is beyond `STEEPEST`, or the ratio not positive and finite.
 
     The ratio grows with the order, so there is one root; it is found by bisection, for all entries at once.
-
-    Returns
-    -------
-    array
-        The shape of `ratio`; NaN where the ratio is not positive, not finite, or beyond what any order in
-        [-`STEEPEST`, `STEEPEST`] gives.
     """
     first, second, third = levels
     ratio = np.asarray(ratio, dtype=np.float64)
@@ -177,15 +164,8 @@ def masked_ratio(first: Floats, second: Floats, floor: Floats | float = 0.0) -> 
     """Return the ratio of successive differences as a function of time.
 
     Masked (NaN) at a zero crossing of either difference, that is where one is below `ZERO_CROSSING` times its
-    `local_scale` or has another sign than its neighbour, and where the denominator is below `ROUND_OFF_SAFETY` times
-    the round-off floor.
-
-    Parameters
-    ----------
-    first, second
-        Differences of the coarser and the finer pair, shape (..., t).
-    floor
-        Round-off floor of the finer difference, shape (..., 1) or a number.
+    `local_scale` or has another sign than its neighbour, and where the finer one is below `ROUND_OFF_SAFETY` times its
+    round-off floor, of shape (..., 1).
     """
     keep = np.abs(second) > ROUND_OFF_SAFETY * np.asarray(floor)
     for series in (first, second):
@@ -216,19 +196,9 @@ def proportionality(first: Floats, second: Floats) -> Floats:
 
 
 def coincidence(first: Floats, second: Floats, ratio: Floats) -> Floats:
-    """Return ``||d - R d'|| / ||d||`` in the L2 norm: 0 where the rescaled curves coincide.
+    """Return ``||d - R d'|| / ||d||`` in the L2 norm, shape (...): 0 where the rescaled curves coincide.
 
-    Parameters
-    ----------
-    first, second
-        Differences of the coarser and the finer pair, shape (..., t).
-    ratio
-        R, the ratio that the order gives (`target_ratio`), shape (...) or ().
-
-    Returns
-    -------
-    array
-        Shape (...); 0 where both differences vanish, NaN where only the first does.
+    R is the ratio that the order gives (`target_ratio`). It is 0 where both differences vanish, NaN where d alone does.
     """
     one = np.ones(1)
     whole = norm(first, "l2", one)
@@ -241,13 +211,8 @@ def scatters(differences: Sequence[Floats], kind: str, end_included: bool = True
     """Return how far successive differences are from being proportional, in a norm, for every two of them.
 
     ``||d/||d|| - s d'/||d'||||`` with s the sign of their inner product: 0 for proportional series, 1 and more for
-    unrelated ones. Each norm sees its own part of the series: one bad point matters to linf as much as it weighs
-    there.
-
-    Returns
-    -------
-    list
-        Arrays of shape (...); with the sign bit of s, also where they are 0; NaN where a difference vanishes.
+    unrelated ones, of shape (...), with the sign bit of s also where it is 0; NaN where a difference vanishes. Each
+    norm sees its own part of the series: one bad point matters to linf as much as it weighs there.
     """
     one = np.ones(1)
     if kind == "linf_interior" and end_included:
@@ -260,8 +225,3 @@ def scatters(differences: Sequence[Floats], kind: str, end_included: bool = True
         # a norm of 0 may carry either sign
         found.append(np.copysign(left, sign))
     return found
-
-
-def scatter(first: Floats, second: Floats, kind: str, end_included: bool = True) -> Floats:
-    """Return the scatter of two successive differences; see `scatters`."""
-    return scatters([first, second], kind, end_included)[0]

@@ -48,16 +48,13 @@ from vibsim.core.array_types import Flags, Floats
 class Entry:
     """What the steps of the levels say about one entry ``T[i][j]``, j > 0."""
 
-    factor: float
-    """f of the recursion."""
-    fall: float
-    """Factor K by which the error of column j - 1 falls from row i - 1 to row i."""
+    factor: float  # f of the recursion
+    fall: float  # factor K by which the error of column j - 1 falls from row i - 1 to row i
+    # factor by which the changes of column j - 1 fall from row i - 1 to row i; 0 where row i - 1 has none
     change_fall: float
-    """Factor by which the changes of column j - 1 fall from row i - 1 to row i; 0 where row i - 1 has none."""
+    # what the coarsest of the levels costs: the ratio of steps to the next coarser level to the power q
     coarser: float
-    """What the coarsest of the levels costs: the ratio of steps to the next coarser level to the power q."""
-    weights: tuple[float, ...]
-    """Sizes of the weights of the levels i - j to i in the combination."""
+    weights: tuple[float, ...]  # sizes of the weights of the levels i - j to i in the combination
 
     def round_off(self, of_levels: Sequence[Any]) -> Any:
         """Return the most that round-off of the levels i - j to i makes of the entry."""
@@ -72,16 +69,9 @@ Scheme = tuple[tuple[Entry, ...], ...]
 def triangular_scheme(
     steps: tuple[int, ...], p: float, q: int, columns: int | None = None
 ) -> Scheme:
-    """Return the triangular scheme of a ladder.
+    """Return the scheme of a ladder whose error expands in the powers p, p + q, p + 2 q, ... of the time step, p > 0.
 
-    Parameters
-    ----------
-    steps
-        Number of steps of every level, strictly increasing; only their ratios matter.
-    p, q
-        The error expands in the powers p, p + q, p + 2 q, ... of the time step, p > 0.
-    columns
-        So many powers are removed at most; as many as can be where None.
+    Of the numbers of `steps`, strictly increasing, only the ratios matter. No more powers than `columns` are removed.
     """
     n = len(steps)
     depth = n - 1 if columns is None else min(columns, n - 1)
@@ -125,16 +115,9 @@ def _combined(rows: Sequence[Sequence[Fraction]], i: int, f: Fraction) -> list[F
 def next_row(
     entries: Sequence[Entry], level: Any, before: Sequence[Any]
 ) -> tuple[list[Any], list[Any]]:
-    """Return the row of a level, and what its entries differ by from those of the row before.
+    """Return the row of a level, and what its entries differ by from those of the row before, if there is one.
 
-    Parameters
-    ----------
-    entries
-        The row of the `Scheme`.
-    level
-        What the level has: a float or an array.
-    before
-        The row of the level before; empty for the first level.
+    `level` is what the level has, a float or an array; `entries` is the row of the `Scheme`.
     """
     row, changes = [level], []
     for j, coarse in enumerate(before):
@@ -178,13 +161,9 @@ def extrapolate_series(
     ----------
     series
         The solution at every level, each of shape (scheme, case, t).
-    levels
-        Their levels, strictly increasing.
-    order
-        Formal order p, shape (scheme, case or 1).
-    even
-        Whether the next power is p + 2 rather than p + 1, shape (scheme, case or 1); from four levels on the data
-        decide.
+    order, even
+        Formal order p, and whether the next power is p + 2 rather than p + 1, shape (scheme, case or 1); from four
+        levels on the data decide about that.
     largest
         Whether the largest bound is enough.
 
@@ -199,7 +178,13 @@ def extrapolate_series(
         than the next power gives. It is honest for a solution of a lower order than p, too. With two levels it is the
         estimated error of the finer one; with one level NaN.
     """
-    so_far = _at_most if largest else _so_far
+
+    def so_far(change: Floats) -> Floats:
+        if largest:
+            return absolute(change)[..., None]
+        # a zero crossing of an estimate is no small error
+        return np.asarray(np.maximum.accumulate(np.abs(change), axis=-1))
+
     if len(series) == 1:
         return series[0], so_far(np.full_like(series[0], np.nan))
     series, levels = series[-4:], levels[-4:]
@@ -232,16 +217,6 @@ def extrapolate_series(
         size = np.maximum(so_far(change), np.where(vanishing[..., None], expected, 0.0))
         factor = np.where(vanishing, np.minimum(factor, np.maximum(slow, 2.0)), factor)
         return value, np.asarray(error_left(SERIES_SAFETY * size, factor[..., None]))
-
-
-def _at_most(change: Floats) -> Floats:
-    """Return the largest absolute value, shape (scheme, case, 1)."""
-    return absolute(change)[..., None]
-
-
-def _so_far(change: Floats) -> Floats:
-    """Return the largest absolute value up to each time: a zero crossing of an estimate is no small error."""
-    return np.asarray(np.maximum.accumulate(np.abs(change), axis=-1))
 
 
 def _seen_fall(before: Floats, change: Floats) -> Floats:

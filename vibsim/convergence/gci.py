@@ -21,19 +21,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from vibsim.convergence import thresholds as th
 from vibsim.convergence.differences import gap_ratio, order_of_ratio, safe_ratio
 from vibsim.convergence.extrapolation import error_left
 from vibsim.convergence.number_extrapolation import triple_at
-from vibsim.convergence.thresholds import (
-    GCI_AGREES,
-    GCI_CAUTIOUS,
-    GCI_EXPONENTS,
-    GCI_FITTED,
-    GCI_LEAST_ORDER,
-    GCI_NEAR_ZERO,
-    GCI_TRUSTED,
-    ORDINARY_ORDER,
-)
 from vibsim.core.array_types import Codes, Flags, Floats
 
 CLASSES = (
@@ -49,15 +40,10 @@ UNKNOWN, MONOTONE, OSCILLATING, DIVERGING, SWINGING, ROUND_OFF = range(len(CLASS
 
 
 def classify(values: Floats, levels: Sequence[int], floor: Floats) -> Codes:
-    """Say how numbers converge, as positions in `CLASSES`.
+    """Say how numbers converge, as positions in `CLASSES`; arguments as for `number_extrapolation.limit`.
 
     ``R`` is the last difference over the one before, of equally spaced levels: monotone for 0 < R < 1, oscillating for
     -1 < R < 0, diverging beyond.
-
-    Parameters
-    ----------
-    values, levels, floor
-        As `vibsim.convergence.number_extrapolation.limit` takes them.
     """
     found = np.full(values.shape[:-1], UNKNOWN, dtype=np.int8)
     if len(levels) < 3:
@@ -68,11 +54,8 @@ def classify(values: Floats, levels: Sequence[int], floor: Floats) -> Codes:
         # of levels that do not follow each other, per level
         a, b = levels[i + 1] - levels[i], levels[i + 2] - levels[i + 1]
         ratio = safe_ratio(second / b, first / a)
-        kind = np.select(
-            [ratio >= 1, ratio > 0, ratio <= -1, ratio < 0],
-            [DIVERGING, MONOTONE, SWINGING, OSCILLATING],
-            UNKNOWN,
-        )
+        masks = [ratio >= 1, ratio > 0, ratio <= -1, ratio < 0]
+        kind = np.select(masks, [DIVERGING, MONOTONE, SWINGING, OSCILLATING], UNKNOWN)
         found = np.where(clean, kind, found).astype(np.int8)
     return found
 
@@ -80,29 +63,18 @@ def classify(values: Floats, levels: Sequence[int], floor: Floats) -> Codes:
 def index(values: Floats, levels: Sequence[int], order: Floats, kinds: Codes) -> Floats:
     """Return the grid convergence index of the finest level, shape (...), in the unit of the numbers.
 
-    Parameters
-    ----------
-    values, levels
-        As `vibsim.convergence.number_extrapolation.limit` takes them.
-    order
-        Promised order, shape (...).
-    kinds
-        What `classify` returned.
-
-    Returns
-    -------
-    array
-        NaN with one level, and where a number does not exist.
+    It is NaN with one level, and where a number does not exist. `kinds` is what `classify` returned; the rest is as for
+    `number_extrapolation.limit`.
     """
     n = len(levels)
     if n == 1:
         return np.full(values.shape[:-1], np.nan)
-    promised = np.where(np.isfinite(order), order, ORDINARY_ORDER)
+    promised = np.where(np.isfinite(order), order, th.ORDINARY_ORDER)
     with np.errstate(all="ignore"):
         change = np.abs(values[..., -1] - values[..., -2])
         gap = levels[-1] - levels[-2]
         if n == 2:
-            return np.asarray(error_left(GCI_CAUTIOUS * change, gap_ratio(promised, gap)))
+            return np.asarray(error_left(th.GCI_CAUTIOUS * change, gap_ratio(promised, gap)))
         last = -np.diff(values[..., -3:], axis=-1)
         seen = order_of_ratio(safe_ratio(last[..., 0], last[..., 1]), levels[-3:])
         regular = of_order(change, gap, seen, promised)
@@ -115,55 +87,41 @@ def index(values: Floats, levels: Sequence[int], order: Floats, kinds: Codes) ->
 
 
 def of_order(change: Floats, gap: int, seen: Floats, promised: Floats) -> Floats:
-    """Return ``F |change|/(r^p - 1)`` of two levels that are `gap` levels apart.
-
-    Parameters
-    ----------
-    change
-        Size of the difference of the finest two levels.
-    seen, promised
-        Observed and promised order; NaN for one that is not known.
-    """
+    """Return ``F |change|/(r^p - 1)`` of two levels, from observed and promised order; NaN for one not known."""
     agrees = _agrees(seen, promised)
-    factor = np.where(agrees, GCI_TRUSTED, GCI_CAUTIOUS)
-    capped = np.clip(np.where(np.isfinite(seen), seen, promised), GCI_LEAST_ORDER, None)
+    factor = np.where(agrees, th.GCI_TRUSTED, th.GCI_CAUTIOUS)
+    capped = np.clip(np.where(np.isfinite(seen), seen, promised), th.GCI_LEAST_ORDER, None)
     p = np.where(agrees, promised, np.minimum(capped, promised))
     return np.asarray(error_left(factor * change, gap_ratio(p, gap)))
 
 
 def _agrees(seen: Floats, promised: Floats) -> Flags:
-    return np.asarray(np.abs(seen - promised) <= GCI_AGREES * promised)
+    return np.asarray(np.abs(seen - promised) <= th.GCI_AGREES * promised)
 
 
 def relative(index: Floats, value: Floats, scale: Floats) -> Floats:
-    """Return the index over the size of the number; NaN where the number is near zero.
-
-    Parameters
-    ----------
-    scale
-        Size that such a number has: of the solution, or of the number itself.
-    """
+    """Return the index over the size of the number; NaN where that is near zero beside the `scale` of such numbers."""
     size = np.abs(value)
-    usable = (size > index) & (size > GCI_NEAR_ZERO * scale)
+    usable = (size > index) & (size > th.GCI_NEAR_ZERO * scale)
     return np.where(usable, safe_ratio(*np.broadcast_arrays(index, size)), np.nan)
 
 
 def _range(values: Floats) -> Floats:
-    recent = values[..., -GCI_FITTED:]
-    return np.asarray(GCI_CAUTIOUS * (np.max(recent, axis=-1) - np.min(recent, axis=-1)))
+    recent = values[..., -th.GCI_FITTED :]
+    return np.asarray(th.GCI_CAUTIOUS * (np.max(recent, axis=-1) - np.min(recent, axis=-1)))
 
 
 def _fitted(values: Floats, levels: Sequence[int], promised: Floats) -> Floats:
     """Return the index of the best fit of ``u + c h^p``, p between `GCI_LEAST_ORDER` and the promised order."""
-    m = min(len(levels), GCI_FITTED)
+    m = min(len(levels), th.GCI_FITTED)
     u = values[..., -m:]
     h = np.exp2(-(np.array(levels[-m:], dtype=np.float64) - levels[-1]))
     mean = np.mean(u, axis=-1)
     least = np.full(mean.shape, np.inf)
     index = np.full(mean.shape, np.nan)
     typical = (np.max(u, axis=-1) - np.min(u, axis=-1)) / (m - 1)
-    for part in np.linspace(0.0, 1.0, GCI_EXPONENTS):
-        p = GCI_LEAST_ORDER + part * np.maximum(promised - GCI_LEAST_ORDER, 0.0)
+    for part in np.linspace(0.0, 1.0, th.GCI_EXPONENTS):
+        p = th.GCI_LEAST_ORDER + part * np.maximum(promised - th.GCI_LEAST_ORDER, 0.0)
         x = h ** p[..., None]
         away = x - np.mean(x, axis=-1)[..., None]
         slope = np.sum(away * (u - mean[..., None]), axis=-1) / np.sum(away * away, axis=-1)
@@ -173,11 +131,8 @@ def _fitted(values: Floats, levels: Sequence[int], promised: Floats) -> Floats:
         error = np.abs(slope) * x[..., -1]
         off = np.abs(rest[..., -1])
         good = sigma < typical
-        now = np.where(
-            good,
-            GCI_TRUSTED * error + sigma + off,
-            GCI_CAUTIOUS * sigma / typical * (error + sigma + off),
-        )
+        rough = th.GCI_CAUTIOUS * sigma / typical * (error + sigma + off)
+        now = np.where(good, th.GCI_TRUSTED * error + sigma + off, rough)
         better = sigma < least
         least, index = np.where(better, sigma, least), np.where(better, now, index)
     return np.where(typical > 0, index, 0.0 * typical)

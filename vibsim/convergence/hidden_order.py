@@ -22,16 +22,13 @@ from vibsim.core.array_types import Flags, Floats
 
 def is_promise_hidden(e: Evidence, t: Trend) -> Flags:
     """Say where levels show a higher order than the promised one, which may be there with a small coefficient."""
-    shape = t.order.shape
-    if e.promised is None or e.special is None or e.combined is None:
-        return np.zeros(shape, dtype=bool)
     with np.errstate(invalid="ignore"):
         shown = np.round(2.0 * t.order) / 2
         maybe = (t.count > 0) & np.isfinite(shown) & (shown > e.promised + HALF_SPACING)
         maybe &= e.special > e.promised + HALF_SPACING
     hidden = maybe.copy()
     last = t.last + 1
-    groups = np.stack([last, shown, np.broadcast_to(e.promised, shape)], axis=-1)
+    groups = np.stack([last, shown, e.promised], axis=-1)
     for pair, p, r in np.unique(groups[maybe], axis=0):
         rows = maybe & np.all(groups == (pair, p, r), axis=-1)
         hidden[rows] = ~(_most(e, rows, int(pair), float(p), float(r)) <= EXCLUDED)
@@ -40,7 +37,6 @@ def is_promise_hidden(e: Evidence, t: Trend) -> Flags:
 
 def _most(e: Evidence, rows: Flags, last: int, p: float, r: float) -> Floats:
     """Return the largest part of an error of h^p at a pair of levels that h^r can be, shape (rows,)."""
-    assert e.combined is not None
     size = pick(e.difference[rows], np.full(np.count_nonzero(rows), last))
     noise = floor_of_pairs(e)[rows]
     # the differences of h^p are steeper than those of h^r

@@ -5,128 +5,72 @@ Leading dimensions ``...`` are ladders (scheme, case); n is the number of levels
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from vibsim.convergence import thresholds as th
 from vibsim.convergence.differences import safe_ratio
-from vibsim.convergence.thresholds import (
-    ABOVE_ROUND_OFF,
-    BLOWN_UP,
-    EXACT_ACCURACY,
-    EXACT_DIFFERENCE,
-    MEASUREMENT_FACTOR,
-    ORDINARY_ORDER,
-    RESOLVED_DECAY,
-    VISIBLE_ERROR,
-)
 from vibsim.core.array_types import Flags, Floats, Integers
-from vibsim.core.vocabulary import TOLERANCE
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """The numbers of ladders that a verdict rests on."""
+    """The numbers of ladders; of shape (...) where no other is given. Norms are all of one kind."""
 
-    levels: tuple[int, ...]
-    """The n levels, strictly increasing."""
-    difference: Floats
-    """Norms of the differences, shape (..., n-1)."""
-    scatter: Floats
-    """Signed scatter of the triples in the same norm (`differences.scatter`), shape (..., n-2)."""
-    floor: Floats
-    """Predicted round-off at every level in the same norm, shape (..., n)."""
-    order: Floats
-    """The order p that is expected, infinite for what is to be exact, shape (...)."""
-    omega_dt: Floats
-    """w dt, shape (..., n)."""
-    size: Floats
-    """Norm of the solution, shape (...)."""
-    relative_floor: Floats
-    """Predicted round-off relative to the solution at the coarsest level, shape (...)."""
-    tolerance: float = TOLERANCE
-    """How far from p an order may be."""
-    error: Floats | None = None
-    """Norms of the true errors, shape (..., n); NaN where the exact solution is not known."""
-    failed: Flags | None = None
-    """Whether a member broke down, shape (..., n)."""
-    applicable: Flags | None = None
-    """Whether the quantity exists, shape (...)."""
-    stability_limit: Floats | None = None
-    """Largest stable w dt, infinite where there is no limit, shape (...)."""
-    span: Floats | None = None
-    """w T, the length of the run in units of the inverse frequency, shape (...); None counts as long."""
-    steps: float = math.nan
-    """Number of steps at the coarsest level."""
-    moved: Floats | None = None
-    """By which part of its size the solution changes behind the start, shape (...); NaN of one that vanishes."""
-    straight: Flags | None = None
-    """Whether it changes along a straight line there, as what creeps does, whatever its frequency, shape (...)."""
-    left_to_the_mesh: Floats | None = None
-    """The one power of an error that has no expansion beyond it, since events or corners of the force are left to the
-    mesh, shape (...); NaN where the error has an expansion."""
-    corner: Floats | None = None
-    """The highest power of an error that stays regular where a step has a corner of the force inside, shape (...); NaN
-    where none has."""
-    missed: Flags | None = None
-    """Whether the force has a pulse that no level sees, shape (...)."""
-    jumps: Flags | None = None
-    """Whether it jumps there, shape (...)."""
-    decay: Floats | None = None
-    """The largest rate at which damping takes a velocity away, times the step of the finest level, shape (...)."""
-    growth: Floats | None = None
-    """Largest position over the largest exact position, shape (..., n); NaN where not known."""
-    ceiling: Floats | None = None
-    """The most that round-off can be in any arithmetic, at every level in the same norm, shape (..., n)."""
-    numbers: Flags | None = None
-    """Whether the series are single numbers: no more than two points count, shape (...)."""
-    promised: Floats | None = None
-    """The order that the scheme promises, infinite or NaN where it promises none, shape (...); None for the expected
-    one."""
-    special: Floats | None = None
-    """The highest order that the scheme has in a special case; None for none but the promised one, shape (...)."""
-    combined: Callable[[Flags, int, Floats], Floats] | None = None
-    """Norms of weighted sums of differences: of ladders, from a pair on, with weights; None without series."""
-    error_scatter: Floats | None = None
-    """Signed scatter of the errors of successive levels, shape (..., n-1), of three levels; NaN where not known."""
-    blur: Floats | None = None
-    """How well the quantity itself is measured at every level, rounding apart, in the same norm, shape (..., n)."""
+    levels: tuple[int, ...]  # the n levels, strictly increasing
+    order: Floats  # the order p that is expected, infinite for what is to be exact
+    tolerance: float  # how far from p an order may be
+    difference: Floats  # norms of the differences, shape (..., n-1)
+    scatter: Floats  # signed scatter of the triples (`differences.scatters`), shape (..., n-2)
+    floor: Floats  # predicted round-off at every level, shape (..., n)
+    ceiling: Floats  # the most that round-off can be in any arithmetic, shape (..., n)
+    relative_floor: Floats  # predicted round-off over the solution at the coarsest level
+    size: Floats  # norm of the solution
+    error: Floats  # norms of the true errors, shape (..., n); NaN where they are not known
+    error_scatter: Floats  # scatter of the errors of three levels, shape (..., n-1); NaN elsewhere
+    blur: Floats  # how well the quantity is measured at every level, rounding apart, shape (..., n)
+    promised: Floats  # the order of the scheme, infinite or NaN where it promises none
+    special: Floats  # the highest order of the scheme in a special case
+    # norms of weighted sums of differences: of ladders, from a pair on, with weights
+    combined: Callable[[Flags, int, Floats], Floats]
+    numbers: Flags  # whether the series are single numbers: no more than two points count
+    failed: Flags  # whether a member broke down, shape (..., n)
+    applicable: Flags  # whether the quantity exists
+    omega_dt: Floats  # w dt, shape (..., n)
+    stability_limit: Floats  # largest stable w dt, infinite for none
+    span: Floats  # w T, the length of the run in units of the inverse frequency
+    steps: float  # number of steps at the coarsest level
+    moved: Floats  # which part of its size the solution changes by behind the start; NaN if it is 0
+    straight: Flags  # whether along a straight line, as what creeps does, whatever its frequency
+    # the one power of an error without an expansion, where events or corners of the force are left to the mesh, or NaN
+    left_to_the_mesh: Floats
+    corner: Floats  # the highest power that a corner of the force within a step leaves; else NaN
+    missed: Flags  # whether the force has a pulse that no level sees
+    jumps: Flags  # whether it jumps there
+    decay: Floats  # the largest rate at which damping takes a velocity away, times the finest step
+    growth: Floats  # largest position over the largest exact one, shape (..., n); NaN if not known
 
 
-def breakdown(e: Evidence, shape: tuple[int, ...]) -> tuple[Flags, Flags, Flags]:
+def breakdown(e: Evidence) -> tuple[Flags, Flags, Flags]:
     """Say of every level whether it broke down or is beyond the limit, and of every ladder whether it grows."""
-    none = np.zeros((*shape, len(e.levels)), dtype=bool)
-    broken = none if e.failed is None else none | e.failed
-    beyond = none
-    if e.stability_limit is not None:
-        # at the limit itself a scheme may still be stable, and w dt carries rounding
-        beyond = none | (e.omega_dt > e.stability_limit[..., None] * (1 + 1e-9))
-    if e.growth is None:
-        return broken, beyond, np.zeros(shape, dtype=bool)
-    last = e.growth[..., -1]
-    before = e.growth[..., -2] if len(e.levels) > 1 else last
-    growing = (last > BLOWN_UP) & ~(last < 0.5 * before)
+    # at the limit itself a scheme may still be stable, and w dt carries rounding
+    beyond = e.omega_dt > e.stability_limit[..., None] * (1 + 1e-9)
+    last, before = e.growth[..., -1], e.growth[..., -2:][..., 0]
+    growing = (last > th.BLOWN_UP) & ~(last < 0.5 * before)
     # long steps go on with a velocity that has gone, and with its rounding: as far as that on every level
-    growing &= ~(unresolved(e) & (last <= BLOWN_UP * before))
-    if e.missed is not None:
-        # levels that see a pulse differ from those that do not
-        growing &= ~e.missed
-    if e.corner is not None:
-        # a step that sees a jump at all sees it for its whole length
-        growing &= ~((e.corner == 1.0) & (before <= BLOWN_UP))
-    return broken, beyond, growing
+    growing &= ~(unresolved(e) & (last <= th.BLOWN_UP * before))
+    # levels that see a pulse differ from those that do not; a step that sees a jump sees it for its whole length
+    growing &= ~e.missed & ~((e.corner == 1.0) & (before <= th.BLOWN_UP))
+    return e.failed, beyond, growing
 
 
 def error_orders(e: Evidence) -> Floats:
     """Return the order of the true errors of every pair, shape (..., n-1); NaN where they are not known."""
-    if e.error is None:
-        return np.full(e.difference.shape, np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(
-            np.log2(safe_ratio(e.error[..., :-1], e.error[..., 1:])) / np.diff(np.array(e.levels))
-        )
+        fall = np.log2(safe_ratio(e.error[..., :-1], e.error[..., 1:]))
+    return np.asarray(fall / np.diff(np.array(e.levels)))
 
 
 def floor_of_pairs(e: Evidence) -> Floats:
@@ -136,12 +80,14 @@ def floor_of_pairs(e: Evidence) -> Floats:
 
 def at_round_off(e: Evidence) -> Flags:
     """Say where all differences may be round-off."""
-    return np.asarray(np.all(e.difference <= ABOVE_ROUND_OFF * floor_of_pairs(e), axis=-1))
+    return np.asarray(np.all(e.difference <= th.ABOVE_ROUND_OFF * floor_of_pairs(e), axis=-1))
 
 
 def truly_exact(e: Evidence) -> Flags:
-    """Say where all differences are round-off although an ordinary error would have been seen."""
-    return np.asarray(_agrees(e) & _would_show(e, _motion(e)))
+    """Say where all differences are round-off, tiny beside the solution, although an ordinary error would be seen."""
+    of_pairs = th.MEASUREMENT_FACTOR * (e.blur[..., :-1] + e.blur[..., 1:])
+    tiny = np.all(e.difference <= th.EXACT_DIFFERENCE * e.size[..., None] + of_pairs, axis=-1)
+    return np.asarray(at_round_off(e) & tiny & _would_show(e, _motion(e)))
 
 
 def at_rest(e: Evidence) -> Flags:
@@ -152,66 +98,42 @@ def at_rest(e: Evidence) -> Flags:
 
 
 def _motion(e: Evidence) -> Floats:
-    """Return by which part of its size a solution moves, at most 1, shape (...)."""
-    if e.moved is None:
-        return np.ones(e.order.shape)
     return np.asarray(np.minimum(np.nan_to_num(e.moved, nan=0.0), 1.0))
-
-
-def _agrees(e: Evidence) -> Flags:
-    """Say where the differences are round-off, and tiny beside the solution."""
-    blur = _blur(e)
-    of_pairs = MEASUREMENT_FACTOR * (blur[..., :-1] + blur[..., 1:])
-    tiny = np.all(e.difference <= EXACT_DIFFERENCE * e.size[..., None] + of_pairs, axis=-1)
-    return np.asarray(at_round_off(e) & tiny)
 
 
 def _would_show(e: Evidence, moved: Floats) -> Flags:
     """Say where an ordinary error of a solution that moves by so much of its size would have been seen."""
-    # what a short run has accumulated is smaller by (w T)^2
-    power = np.where(np.isinf(e.order), ORDINARY_ORDER, e.order)
-    if e.promised is not None:
-        # what a scheme of higher order leaves is smaller than an error of the order that is asked for
-        power = np.where(np.isinf(e.promised), power, np.fmax(power, e.promised))
+    power = np.where(np.isinf(e.order), th.ORDINARY_ORDER, e.order)
+    # what a scheme of higher order leaves is smaller than an error of the order that is asked for
+    power = np.where(np.isinf(e.promised), power, np.fmax(power, e.promised))
     p = e.omega_dt[..., 0]
     oscillates = np.isfinite(p) & (p > 0.0)
     # without oscillations the run itself is the time in which something happens
     rate = np.minimum(np.where(oscillates, p, 1.0 / e.steps), 1.0)
-    if e.straight is not None:
-        # what creeps does so at a rate of its own
-        rate = rate * np.where(e.straight, moved, 1.0)
-    share = moved
-    if e.span is not None:
-        short = np.where(oscillates, np.minimum(e.span, 1.0) ** 2, 1.0)
-        share = np.minimum(moved, short)
-    ordinary = share * rate**power
+    # what creeps does so at a rate of its own
+    rate = rate * np.where(e.straight, moved, 1.0)
+    # what a short run has accumulated is smaller by (w T)^2
+    short = np.where(oscillates, np.minimum(e.span, 1.0) ** 2, 1.0)
+    ordinary = np.minimum(moved, short) * rate**power
     # of what grew without bound nothing is said
     with np.errstate(invalid="ignore"):
-        visible = ordinary * e.size >= VISIBLE_ERROR * _blur(e)[..., 0]
-    return np.asarray((ordinary >= VISIBLE_ERROR * ABOVE_ROUND_OFF * e.relative_floor) & visible)
-
-
-def _blur(e: Evidence) -> Floats:
-    """Return how well a quantity itself is measured, shape (..., n)."""
-    return np.zeros((*e.order.shape, len(e.levels))) if e.blur is None else e.blur
+        visible = ordinary * e.size >= th.VISIBLE_ERROR * e.blur[..., 0]
+    seen = ordinary >= th.VISIBLE_ERROR * th.ABOVE_ROUND_OFF * e.relative_floor
+    return np.asarray(seen & visible)
 
 
 def unresolved(e: Evidence) -> Flags:
     """Say where a velocity is gone within one step of the finest level, so that no level shows how."""
-    if e.decay is None:
-        return np.zeros(e.order.shape, dtype=bool)
-    return np.asarray(e.decay > RESOLVED_DECAY)
+    return np.asarray(e.decay > th.RESOLVED_DECAY)
 
 
 def accuracy(e: Evidence) -> Floats:
-    """Return how well the finest error is known, shape (...)."""
-    return np.asarray(ABOVE_ROUND_OFF * e.floor[..., -1] + EXACT_ACCURACY * e.size)
+    """Return how well the finest error is known."""
+    return np.asarray(th.ABOVE_ROUND_OFF * e.floor[..., -1] + th.EXACT_ACCURACY * e.size)
 
 
 def far_from_exact(e: Evidence) -> Flags:
     """Say where the finest level is further from the exact solution than that is known."""
-    if e.error is None:
-        return np.zeros(e.order.shape, dtype=bool)
     return np.asarray(np.nan_to_num(e.error[..., -1], nan=0.0) > accuracy(e))
 
 

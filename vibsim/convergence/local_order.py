@@ -34,17 +34,7 @@ from vibsim.core.array_types import Floats, Integers
 
 
 def window_points(width: Floats, spacing: Floats, points: int) -> Integers:
-    """Return how many points the window of each member has, an odd number, shape (case,).
-
-    Parameters
-    ----------
-    width
-        Length of the window in time, shape (case,).
-    spacing
-        Distance between points, shape (case,) or (1,).
-    points
-        Number of points of the series.
-    """
+    """Return how many of the points of a series a window of a width in time has, an odd number, shape (case,)."""
     half = np.rint(0.5 * width / spacing)
     most = max((points - 1) // 2, LEAST_WINDOW // 2)
     return np.asarray(2 * np.clip(half, LEAST_WINDOW // 2, most).astype(np.int64) + 1)
@@ -63,9 +53,7 @@ def local_order(
     Parameters
     ----------
     first, second
-        Differences of the coarser and the finer pair, shape (scheme, case, t).
-    levels
-        The three levels.
+        Differences of the coarser and the finer pair of three levels, shape (scheme, case, t).
     floors
         Predicted round-off of the two differences at one point, shape (scheme, case).
     counts
@@ -76,9 +64,8 @@ def local_order(
     Returns
     -------
     tuple of array
-        Order, lower end, upper end, shape (scheme, case, t). All are NaN where the finer difference is, in the whole
-        window, below what may be round-off, or one of them vanishes or is not finite; an end is infinite where the
-        interval is unbounded.
+        Order, lower end, upper end, shape (scheme, case, t); an end is infinite where the interval is unbounded. All
+        are NaN where the finer difference is below what may be round-off in the whole window, or one vanishes.
     """
     inner = slice(None, -1) if end_included and first.shape[-1] > LEAST_WINDOW else slice(None)
     scale = _scale(first)

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vibsim.convergence import thresholds as th
 from vibsim.convergence.differences import order_of_ratio, safe_ratio
 from vibsim.convergence.extrapolation import (
     Scheme,
@@ -30,30 +31,6 @@ from vibsim.convergence.extrapolation import (
     steps_of,
     triangular_scheme,
 )
-from vibsim.convergence.thresholds import (
-    COLUMNS,
-    DECLINE,
-    FALL_ABOVE_ROUND_OFF,
-    HIGHEST_ORDER,
-    LEAST_SHARE,
-    LEAST_SHARE_OF_THREE,
-    NEAR_HALF,
-    NUMBER_SAFETY,
-    NUMBER_SAFETY_ALONE,
-    ORDER_ABOVE_ROUND_OFF,
-    ORDINARY_ORDER,
-    OTHER_ORDER,
-    RAGGED,
-    RATIO_AGREES,
-    RATIO_ALONE_AGREES,
-    RATIO_BEFORE_AGREES,
-    RATIO_OF_THREE,
-    ROUND_OFF_SAFETY,
-    SAFETY_OF_THREE,
-    SPREAD,
-    SPREAD_OF_THREE,
-    SPREAD_OF_TWO,
-)
 from vibsim.core.array_types import Flags, Floats, Integers
 
 
@@ -61,14 +38,10 @@ from vibsim.core.array_types import Flags, Floats, Integers
 class Limit:
     """The best values of some ladders; arrays of shape (...)."""
 
-    value: Floats
-    """The finest level where no extrapolation is believed."""
-    bound: Floats
-    """Bound of the error; NaN where nothing is known of it."""
-    first: Integers
-    """Place of the coarsest level that was used."""
-    last: Integers
-    """Place of the finest one."""
+    value: Floats  # the finest level where no extrapolation is believed
+    bound: Floats  # bound of the error; NaN where nothing is known of it
+    first: Integers  # place of the coarsest level that was used
+    last: Integers  # place of the finest one
 
 
 def limit(
@@ -78,27 +51,18 @@ def limit(
 
     Parameters
     ----------
-    values
-        The numbers at every level, shape (..., n); NaN where they do not exist.
-    levels
-        Their n levels, strictly increasing.
-    order
-        Promised order p, shape (...); where the levels show another one, that is taken.
-    even
-        Whether the next power is p + 2 rather than p + 1, shape (...).
-    floor
-        Predicted round-off at every level, in the unit of the numbers, shape (..., n).
+    values, floor
+        The numbers at n levels, NaN where they do not exist, and their predicted round-off, shape (..., n).
+    order, even
+        Promised order p, and whether the next power is p + 2 rather than p + 1, shape (...); where the levels show
+        another order, that is taken.
     """
     n = len(levels)
     finest = np.full(values.shape[:-1], n - 1)
     with np.errstate(all="ignore"):
         bound = _bound_of_finest(values, floor)
-        best = Limit(
-            values[..., -1].copy(),
-            np.where(np.isnan(bound), np.inf, bound),
-            finest,
-            finest.copy(),
-        )
+        unsure = np.where(np.isnan(bound), np.inf, bound)
+        best = Limit(values[..., -1].copy(), unsure, finest, finest.copy())
         if n > 2:
             p = _leading(observed_order(values, levels, floor), order)
             best = _extrapolated(values, levels, p, np.where(even, 2, 1), floor, best)
@@ -119,15 +83,15 @@ def triple_at(values: Floats, floor: Floats, i: int) -> tuple[tuple[Floats, Floa
     """Return the two differences of the triple that begins at place i, and whether they are above round-off."""
     with np.errstate(invalid="ignore"):
         first, second = (values[..., k] - values[..., k + 1] for k in (i, i + 1))
-        noise = ORDER_ABOVE_ROUND_OFF * (floor[..., i + 1] + floor[..., i + 2])
+        noise = th.ORDER_ABOVE_ROUND_OFF * (floor[..., i + 1] + floor[..., i + 2])
         return (first, second), (np.abs(second) > noise) & (np.abs(first) > noise)
 
 
 def _leading(seen: Floats, promised: Floats) -> Floats:
     """Return the order to extrapolate with: the promised one, or another one that the levels show."""
-    p = np.where(np.isfinite(promised), promised, ORDINARY_ORDER)
-    likely = np.clip(np.round(2.0 * seen) / 2, 0.5, HIGHEST_ORDER)
-    other = (np.abs(seen - p) > OTHER_ORDER) & (np.abs(seen - likely) <= NEAR_HALF)
+    p = np.where(np.isfinite(promised), promised, th.ORDINARY_ORDER)
+    likely = np.clip(np.round(2.0 * seen) / 2, 0.5, th.HIGHEST_ORDER)
+    other = (np.abs(seen - p) > th.OTHER_ORDER) & (np.abs(seen - likely) <= th.NEAR_HALF)
     return np.where(other, likely, p)
 
 
@@ -137,21 +101,21 @@ def _bound_of_finest(values: Floats, floor: Floats) -> Floats:
     if n == 1:
         return np.full(values.shape[:-1], np.nan)
     change = np.abs(np.diff(values, axis=-1))
-    noise = ROUND_OFF_SAFETY * floor[..., -1]
+    noise = th.ROUND_OFF_SAFETY * floor[..., -1]
     if n == 2:
-        return np.asarray(SPREAD_OF_TWO * change[..., 0] + noise)
+        return np.asarray(th.SPREAD_OF_TWO * change[..., 0] + noise)
     recent = values[..., -3:]
-    spread = SPREAD_OF_THREE if n == 3 else SPREAD
+    spread = th.SPREAD_OF_THREE if n == 3 else th.SPREAD
     bound = spread * (np.max(recent, axis=-1) - np.min(recent, axis=-1)) + noise
     falls = np.all(np.diff(change[..., -3:], axis=-1) < 0, axis=-1)
-    rounding = np.max(change[..., -2:], axis=-1) <= FALL_ABOVE_ROUND_OFF * floor[..., -1]
+    rounding = np.max(change[..., -2:], axis=-1) <= th.FALL_ABOVE_ROUND_OFF * floor[..., -1]
     found = np.where(falls | rounding, bound, np.nan)
-    if n < RAGGED:
+    if n < th.RAGGED:
         return found
     # an extremum over grid points falls raggedly, as the grid happens to lie
-    recent = values[..., -RAGGED:]
-    wide = SPREAD * (np.max(recent, axis=-1) - np.min(recent, axis=-1)) + noise
-    ragged = np.max(change[..., -2:], axis=-1) < DECLINE * np.max(change[..., :-2], axis=-1)
+    recent = values[..., -th.RAGGED :]
+    wide = th.SPREAD * (np.max(recent, axis=-1) - np.min(recent, axis=-1)) + noise
+    ragged = np.max(change[..., -2:], axis=-1) < th.DECLINE * np.max(change[..., :-2], axis=-1)
     return np.where(ragged, np.fmin(found, wide), found)
 
 
@@ -162,7 +126,7 @@ def _extrapolated(
     expansions = np.stack([p, np.broadcast_to(q, p.shape)], axis=-1)
     for order, step in np.unique(expansions[p > 0], axis=0).tolist():
         own = np.all(expansions == (order, step), axis=-1)
-        scheme = triangular_scheme(steps_of(levels), order, int(step), COLUMNS + 1)
+        scheme = triangular_scheme(steps_of(levels), order, int(step), th.COLUMNS + 1)
         found = _Rows(values[own], scheme, floor[own])
         rows = found.least(Limit(*(of[own] for of in vars(best).values())))
         for of, new in zip(vars(best).values(), vars(rows).values(), strict=True):
@@ -179,13 +143,13 @@ class _Rows:
         self.changes: list[list[Floats]] = []
         for i, entries in enumerate(scheme):
             before = self.entries[-1] if i else []
-            row, changes = next_row(entries[:COLUMNS], values[..., i], before)
+            row, changes = next_row(entries[: th.COLUMNS], values[..., i], before)
             self.entries.append(row)
             self.changes.append(changes)
         few = len(scheme) == 3
-        self.agrees_alone = RATIO_OF_THREE if few else RATIO_ALONE_AGREES
-        self.safety_alone = SAFETY_OF_THREE if few else NUMBER_SAFETY_ALONE
-        self.least_part = LEAST_SHARE_OF_THREE if few else LEAST_SHARE
+        self.agrees_alone = th.RATIO_OF_THREE if few else th.RATIO_ALONE_AGREES
+        self.safety_alone = th.SAFETY_OF_THREE if few else th.NUMBER_SAFETY_ALONE
+        self.least_part = th.LEAST_SHARE_OF_THREE if few else th.LEAST_SHARE
 
     def _apart(self, j: int, i: int) -> Floats:
         """Return how far the ratio of the changes of column j at rows i - 1 and i is from that of its power."""
@@ -197,9 +161,9 @@ class _Rows:
         if i < j + 2:
             return np.zeros(self.floor.shape[:-1], dtype=bool)
         alone = i == j + 2
-        agrees = self._apart(j, i) <= (self.agrees_alone if alone else RATIO_AGREES)
+        agrees = self._apart(j, i) <= (self.agrees_alone if alone else th.RATIO_AGREES)
         if not alone:
-            agrees &= self._apart(j, i - 1) <= RATIO_BEFORE_AGREES
+            agrees &= self._apart(j, i - 1) <= th.RATIO_BEFORE_AGREES
         return np.asarray(agrees)
 
     def _error(self, j: int, i: int) -> Floats:
@@ -210,7 +174,7 @@ class _Rows:
             change = np.maximum(change, self.least_part * taken)
         else:
             change = np.maximum(change, np.abs(self.changes[i - 1][j]) / fall)
-        error = (self.safety_alone if alone else NUMBER_SAFETY) * change
+        error = (self.safety_alone if alone else th.NUMBER_SAFETY) * change
         error = np.where(self._agrees(j, i), error_left(error, fall), error)
         for finer in self.entries[i + 1 :]:
             error = np.fmax(error, np.abs(self.entries[i][j] - finer[j]))
@@ -220,12 +184,11 @@ class _Rows:
         """Return the entry with the least bound, or what there is already."""
         for i in range(2, len(self.entries)):
             believed = np.ones(self.floor.shape[:-1], dtype=bool)
-            for j in range(1, min(i - 1, COLUMNS) + 1):
+            for j in range(1, min(i - 1, th.COLUMNS) + 1):
                 believed = believed & self._agrees(j - 1, i)
-                noise = self.scheme[i][j - 1].round_off(
-                    [self.floor[..., k] for k in range(i - j, i + 1)]
-                )
-                bound = self._error(j, i) + ROUND_OFF_SAFETY * noise
+                floors = [self.floor[..., k] for k in range(i - j, i + 1)]
+                noise = self.scheme[i][j - 1].round_off(floors)
+                bound = self._error(j, i) + th.ROUND_OFF_SAFETY * noise
                 take = believed & (bound < best.bound)
                 best = Limit(
                     np.where(take, self.entries[i][j], best.value),

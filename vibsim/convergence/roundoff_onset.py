@@ -17,76 +17,45 @@ from __future__ import annotations
 
 import numpy as np
 
-from vibsim.convergence.thresholds import (
-    ABOVE_ROUND_OFF,
-    AUDIBLE,
-    HALF_SPACING,
-    HEARD,
-    HEARD_IN_ERROR,
-    INCOHERENT,
-    LOG2,
-    PLATEAU,
-    QUIET,
-    ROUND_OFF_SAFETY,
-    SHOWS,
-    SINGLE_NUMBER,
-    STAYS,
-    STEEP,
-    TRIPLES_BEFORE,
-    UNRELATED_FIRST,
-)
+from vibsim.convergence import thresholds as th
+from vibsim.convergence.ladder_statistics import Evidence
 from vibsim.core.array_types import Flags, Floats
 
 
-def noise_share(difference: Floats, floor: Floats) -> Floats:
-    """Return floor over difference for the finer pair of every triple, shape (..., m).
-
-    Parameters
-    ----------
-    difference
-        Norms of the differences, shape (..., m+1).
-    floor
-        Round-off at every level, shape (..., m+2).
-    """
-    pairs = floor[..., 1:-1] + floor[..., 2:]
-    finer = difference[..., 1:]
-    return np.where(finer > 0, pairs / np.where(finer > 0, finer, 1.0), np.inf)
-
-
-def before_round_off(
-    orders: Floats,
-    scatter: Floats,
-    difference: Floats,
-    noise: Floats,
-    possible: Floats,
-    numbers: Flags | None = None,
-) -> Flags:
+def before_round_off(e: Evidence, orders: Floats) -> tuple[Flags, Floats]:
     """Say of every triple whether it stands before the first one that round-off spoils.
 
     Parameters
     ----------
-    orders, scatter
-        Local order and signed scatter of every triple, shape (..., m).
-    difference
-        Norms of the differences, shape (..., m+1).
-    noise, possible
-        Predicted and possible floor over the finer difference (`noise_share`), shape (..., m).
-    numbers
-        Where the series are single numbers, shape (...).
+    orders
+        Local order of every triple, shape (..., n-2).
+
+    Returns
+    -------
+    tuple of array
+        Shape (..., n-2); and how much of the finer difference of each triple the predicted round-off may be.
     """
-    incoherent = np.signbit(scatter) | (np.abs(scatter) > INCOHERENT) | np.isnan(scatter)
-    spoiled = _breaks_the_trend(orders, scatter, incoherent)
+    scatter, difference = e.scatter, e.difference
+    noise, possible = (
+        _share(difference[..., 1:], floor[..., 1:]) for floor in (e.floor, e.ceiling)
+    )
+    incoherent = np.signbit(scatter) | (np.abs(scatter) > th.INCOHERENT) | np.isnan(scatter)
     # what rises out of the floor again on a finer level was no floor
-    predicted = _from_here_on(noise) >= 1.0 / ABOVE_ROUND_OFF
-    spoiled &= predicted
+    predicted = _from_here_on(noise) >= 1.0 / th.ABOVE_ROUND_OFF
+    spoiled = _breaks_the_trend(orders, scatter, incoherent) & predicted
     onset = _onset(orders, scatter, incoherent)
-    share = possible / np.fmax(np.fmin(np.abs(scatter), 1.0), SINGLE_NUMBER)
-    spoiled |= onset & (_from_here_on(share) * ROUND_OFF_SAFETY >= 1.0)
+    share = possible / np.fmax(np.fmin(np.abs(scatter), 1.0), th.SINGLE_NUMBER)
+    spoiled |= onset & (_from_here_on(share) * th.ROUND_OFF_SAFETY >= 1.0)
     floor = _plateau(incoherent, difference) | _climbs(orders, scatter, incoherent)
-    spoiled[..., TRIPLES_BEFORE:] |= (onset & floor[..., None])[..., TRIPLES_BEFORE:]
-    if numbers is not None:
-        spoiled |= _below_a_flat_end(difference, orders) & numbers[..., None] & ~predicted
-    return ~np.logical_or.accumulate(spoiled, axis=-1)
+    spoiled[..., th.TRIPLES_BEFORE :] |= (onset & floor[..., None])[..., th.TRIPLES_BEFORE :]
+    spoiled |= _below_a_flat_end(difference, orders) & e.numbers[..., None] & ~predicted
+    return ~np.logical_or.accumulate(spoiled, axis=-1), noise
+
+
+def _share(finer: Floats, floor: Floats) -> Floats:
+    """Return the round-off of pairs of levels over their differences, infinite where these vanish."""
+    pairs = floor[..., :-1] + floor[..., 1:]
+    return np.where(finer > 0, pairs / np.where(finer > 0, finer, 1.0), np.inf)
 
 
 def _from_here_on(values: Floats) -> Floats:
@@ -104,15 +73,15 @@ def _breaks_the_trend(orders: Floats, scatter: Floats, incoherent: Flags) -> Fla
     """
     size = np.abs(scatter)
     breaks = np.isnan(orders) | np.isnan(scatter) | np.signbit(scatter)
-    breaks[..., 0] |= (size[..., 0] > UNRELATED_FIRST) | (orders[..., 0] < HALF_SPACING)
+    breaks[..., 0] |= (size[..., 0] > th.UNRELATED_FIRST) | (orders[..., 0] < th.HALF_SPACING)
     change = np.abs(np.diff(orders, axis=-1))
     for i in range(1, orders.shape[-1]):
-        usual = np.maximum(QUIET, change[..., i - 2]) if i > 1 else 5 * QUIET
-        worse = size[..., i] > np.maximum(AUDIBLE, size[..., i - 1])
-        by_noise = change[..., i - 1] <= SHOWS * size[..., i] / LOG2
+        usual = np.maximum(th.QUIET, change[..., i - 2]) if i > 1 else 5 * th.QUIET
+        worse = size[..., i] > np.maximum(th.AUDIBLE, size[..., i - 1])
+        by_noise = change[..., i - 1] <= th.SHOWS * size[..., i] / th.LOG2
         steep = size[..., i] > np.exp2(orders[..., i - 1] - 0.5) * size[..., i - 1]
         by_noise &= steep | incoherent[..., i]
-        number = np.maximum(size[..., i], size[..., i - 1]) < SINGLE_NUMBER
+        number = np.maximum(size[..., i], size[..., i - 1]) < th.SINGLE_NUMBER
         if i > 1:
             number &= change[..., i - 1] > np.exp2(orders[..., i - 1] - 0.5) * change[..., i - 2]
         by_noise |= number
@@ -127,23 +96,24 @@ def _onset(orders: Floats, scatter: Floats, incoherent: Flags) -> Flags:
     the triples on which the scatter rises to it. What follows must be incoherent.
     """
     size, count = np.abs(scatter), orders.shape[-1]
-    begins = incoherent.copy()
     to_the_end = np.logical_and.accumulate(incoherent[..., ::-1], axis=-1)[..., ::-1]
-    begins &= to_the_end
+    begins = to_the_end.copy()
     most = steepest(orders)
     for i in range(count - 1, 0, -1):
-        rises = (size[..., i] > AUDIBLE) & (size[..., i] > size[..., i - 1])
+        rises = (size[..., i] > th.AUDIBLE) & (size[..., i] > size[..., i - 1])
         steep = size[..., i] > most[..., i - 1] * size[..., i - 1]
-        follows = begins[..., i + 1] if i + 1 < count else np.ones(rises.shape, dtype=bool)
-        noisy_next = to_the_end[..., i + 1] if i + 1 < count else np.zeros(rises.shape, dtype=bool)
-        begins[..., i] |= rises & follows & (steep | noisy_next | begins[..., i])
+        if i + 1 < count:
+            # what is begun here must go on
+            rises &= begins[..., i + 1]
+            steep |= to_the_end[..., i + 1]
+        begins[..., i] |= rises & (steep | begins[..., i])
     return begins
 
 
 def steepest(orders: Floats) -> Floats:
     """Return the factor by which no lower power makes the scatter rise from one triple to the next."""
     with np.errstate(over="ignore", invalid="ignore"):
-        return np.asarray(STEEP * np.exp2(np.clip(orders - 0.5, 0.5, 64.0)))
+        return np.asarray(th.STEEP * np.exp2(np.clip(orders - 0.5, 0.5, 64.0)))
 
 
 def _climbs(orders: Floats, scatter: Floats, incoherent: Flags) -> Flags:
@@ -151,12 +121,12 @@ def _climbs(orders: Floats, scatter: Floats, incoherent: Flags) -> Flags:
 
     A floor does that, which a single bad level does not: its scatter is large at once.
     """
-    if orders.shape[-1] <= TRIPLES_BEFORE:
+    if orders.shape[-1] <= th.TRIPLES_BEFORE:
         return np.zeros(orders.shape[:-1], dtype=bool)
     size = np.abs(scatter)
     most = steepest(orders)
     with np.errstate(over="ignore", invalid="ignore"):
-        steep = (size[..., 1:] > most[..., :-1] * size[..., :-1]) & (size[..., 1:] > AUDIBLE)
+        steep = (size[..., 1:] > most[..., :-1] * size[..., :-1]) & (size[..., 1:] > th.AUDIBLE)
     return np.asarray(incoherent[..., -1] & np.any(steep[..., 1:] & steep[..., :-1], axis=-1))
 
 
@@ -173,23 +143,23 @@ def _below_a_flat_end(difference: Floats, orders: Floats) -> Flags:
     noise = np.zeros(difference.shape)
     with np.errstate(divide="ignore", invalid="ignore"):
         size = np.log2(difference)
-        for first in range(pairs - PLATEAU, TRIPLES_BEFORE - 1, -1):
-            flat = size[..., first] - size[..., -1] < HALF_SPACING * (pairs - 1 - first)
+        for first in range(pairs - th.PLATEAU, th.TRIPLES_BEFORE - 1, -1):
+            flat = size[..., first] - size[..., -1] < th.HALF_SPACING * (pairs - 1 - first)
             grown = difference[..., first : first + 1] * np.exp2(0.5 * (index - first))
             noise = np.where(flat[..., None], grown, noise)
-        heard = np.minimum(HEARD, HEARD_IN_ERROR / (np.exp2(np.clip(orders, 1.0, 16.0)) - 1))
+        heard = np.minimum(th.HEARD, th.HEARD_IN_ERROR / (np.exp2(np.clip(orders, 1.0, 16.0)) - 1))
         spoiled = ~(noise[..., 1:] <= heard * difference[..., 1:])
-    vouched = np.sum(np.logical_and.accumulate(~spoiled, axis=-1), axis=-1) >= TRIPLES_BEFORE
+    vouched = np.sum(np.logical_and.accumulate(~spoiled, axis=-1), axis=-1) >= th.TRIPLES_BEFORE
     return np.asarray(spoiled & vouched[..., None])
 
 
 def _plateau(incoherent: Flags, difference: Floats) -> Flags:
     """Say of every ladder whether its finest differences are unrelated and do not fall."""
-    if incoherent.shape[-1] < PLATEAU:
+    if incoherent.shape[-1] < th.PLATEAU:
         return np.zeros(incoherent.shape[:-1], dtype=bool)
-    last = difference[..., -PLATEAU:]
+    last = difference[..., -th.PLATEAU :]
     return np.asarray(
-        np.all(incoherent[..., -PLATEAU:], axis=-1)
-        & (last[..., -1] >= STAYS * last[..., 0])
+        np.all(incoherent[..., -th.PLATEAU :], axis=-1)
+        & (last[..., -1] >= th.STAYS * last[..., 0])
         & (last[..., -1] > 0)
     )

@@ -28,15 +28,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vibsim.convergence import thresholds as th
 from vibsim.convergence.extrapolation import Entry, error_left, next_row, triangular_scheme
-from vibsim.convergence.thresholds import (
-    FIRST_GAIN_SAFETY,
-    GAIN_SAFETY,
-    LARGEST_GAIN,
-    LEAST_FALL,
-    ROUND_OFF_SAFETY,
-    STATE_SAFETY,
-)
 
 LASTING = 2.0**-52
 """Relative error of what every level has in common: parameters, the step, the elementary functions."""
@@ -51,8 +44,7 @@ class Arithmetic:
     larger: Callable[[Any, Any], Any]
     smaller: Callable[[Any, Any], Any]
     choose: Callable[[Any, Any, Any], Any]
-    so_far: Callable[[Any], Any]
-    """The largest value up to each time; may change what it is given."""
+    so_far: Callable[[Any], Any]  # the largest value up to each time; may change what it is given
     holds_anywhere: Callable[[Any], Any]
 
 
@@ -93,21 +85,16 @@ ARRAYS = Arithmetic(np.fmax, np.fmin, np.where, _so_far, np.any)
 class Circumstances:
     """What is known of the members besides their levels; floats, or arrays that broadcast against (t, case)."""
 
-    rate: Any
-    """w: dv/w counts like du."""
-    size: Any
-    """Size of the solution over the whole time."""
-    limit: Any
-    """An estimated error beyond it is not believed."""
-    phase: Any
-    """w t."""
+    rate: Any  # w: dv/w counts like du
+    size: Any  # size of the solution over the whole time
+    limit: Any  # an estimated error beyond it is not believed
+    phase: Any  # w t
+    # ``1/(w end)^p``, which `Tableau.amplification` is to be multiplied with; 0 where disturbances do not grow
     response: Any
-    """``1/(w end)^p``, which `Tableau.amplification` is to be multiplied with; 0 where disturbances do not grow."""
-    noise: Any
-    """Round-off so far over its prediction relative to 1; at least `size`."""
+    noise: Any  # round-off so far over its prediction relative to 1; at least `size`
+    # part of the response to a lasting disturbance that is the response to one passing: ``max(1, w t)``, or 1 where the
+    # noise was not measured
     spread: Any
-    """Part of the response to a lasting disturbance that is the response to one passing: ``max(1, w t)``, or 1 where
-    the noise was not measured."""
 
 
 class Best(NamedTuple):
@@ -115,11 +102,11 @@ class Best(NamedTuple):
 
     position: Any
     velocity: Any
+    # bound of the error of the position, and over w of the velocity; infinite where nothing is known
     error: Any
-    """Bound of the error of the position, and over w of the velocity; infinite where nothing is known."""
+    # which entry: its row times the number of levels, plus its column. Where nothing is known of the error, the finest
+    # level; -1 where that has failed
     entry: Any
-    """Which entry: its row times the number of levels, plus its column. Where nothing is known of the error, the finest
-    level; -1 where that has failed."""
 
 
 Pair = tuple[Any, Any]
@@ -130,13 +117,11 @@ Pair = tuple[Any, Any]
 class Tableau:
     """What the steps of the levels say; one for every scheme with its options."""
 
-    entries: tuple[tuple[Entry, ...], ...]
-    """Row i holds the entries j = 1, ..., i."""
-    round_off: tuple[tuple[float, ...], ...]
-    """Of the same entries, relative to the solution."""
+    entries: tuple[tuple[Entry, ...], ...]  # row i holds the entries j = 1, ..., i
+    round_off: tuple[tuple[float, ...], ...]  # of the same entries, relative to the solution
+    # row i: times the change of its level and ``1/(w end)^p`` this is the response of the motion to a lasting relative
+    # disturbance of its equation: the scheme itself disturbs it by ``(w h)^p / (2 (p+1)!)``, for central differences
     amplification: tuple[float, ...]
-    """Row i: times the change of its level and ``1/(w end)^p`` this is the response of the motion to a lasting relative
-    disturbance of its equation: the scheme itself disturbs it by ``(w h)^p / (2 (p+1)!)``, for central differences."""
 
 
 @lru_cache(maxsize=256)
@@ -159,10 +144,8 @@ class _Row(NamedTuple):
 
     position: list[Any]
     velocity: list[Any]
-    changes: list[Any]
-    """From the row before, so far."""
-    bounds: list[Any]
-    """Bounds of the errors of truncation of columns 1, 2, ..."""
+    changes: list[Any]  # from the row before, so far
+    bounds: list[Any]  # bounds of the errors of truncation of columns 1, 2, ...
 
 
 def best_entry(
@@ -189,7 +172,7 @@ def best_entry(
                 ((i - 1) * len(levels) + j, (row.position[j], row.velocity[j]), bound + floor)
             )
         response = of.larger(table.amplification[i] * known.response * finer.changes[0], response)
-        noise = of.larger(response / known.spread, known.noise) * ROUND_OFF_SAFETY
+        noise = of.larger(response / known.spread, known.noise) * th.ROUND_OFF_SAFETY
         lasting = LASTING * (known.size * (1.0 + known.phase) + response)
         row = finer
     last = len(levels) - 1
@@ -233,17 +216,19 @@ def _next_row(
             trust = of.smaller(of.smaller(fall, 1.0 / fall), trust)
             seen = fall == fall
         if j or entry.change_fall:
-            left = error_left(change, of.larger(entry.fall * trust, LEAST_FALL))
+            left = error_left(change, of.larger(entry.fall * trust, th.LEAST_FALL))
         if j == 0 and entry.change_fall:
             left = of.choose(seen, left, change)
         if j > 1:
             gain = of.smaller(entry.coarser * lefts[-1] / lefts[-2], 1.0)
             left = of.larger(lefts[-1] * gain, left)
-        bound = of.choose(STATE_SAFETY * left > known.limit, math.inf, STATE_SAFETY * left)
+        bound = of.choose(th.STATE_SAFETY * left > known.limit, math.inf, th.STATE_SAFETY * left)
         if j:
-            safety = GAIN_SAFETY if len(entries) > 2 or entry.change_fall else FIRST_GAIN_SAFETY
+            safety = (
+                th.GAIN_SAFETY if len(entries) > 2 or entry.change_fall else th.FIRST_GAIN_SAFETY
+            )
             gain = safety * entry.coarser * left / (lefts[-1] * trust)
-            bound = bound * of.larger(of.smaller(gain, 1.0), LARGEST_GAIN)
+            bound = bound * of.larger(of.smaller(gain, 1.0), th.LARGEST_GAIN)
             bounds[-1] = of.larger(entry.factor * change, bounds[-1])
         lefts.append(left)
         bounds.append(bound / (trust * trust + _TINY))

@@ -14,7 +14,7 @@ The rules, in the order in which they apply (the first that applies decides):
 3. one triple left: the two difference series over time are the evidence, and must be proportional; beside them the true
    errors, where they are known;
 4. several left: the last two local orders or their limit, and what is left besides h^p, which must fade, or be too
-   small for a tenth of a lower power (`vibsim.convergence.settled_orders`);
+   small for a tenth of a lower power (`vibsim.convergence.asymptotic_range`);
 5. the order is stated with an interval where something is decided. PASS where it is within the tolerance, the series
    coincide, and it stands alone; ``order_low``, ``order_high`` where the interval excludes what is expected and holds
    an order that an expansion can have; else ``pre_asymptotic``, ``oscillating`` or ``round_off``;
@@ -27,16 +27,16 @@ The rules, in the order in which they apply (the first that applies decides):
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from vibsim.convergence import true_errors as errors
 from vibsim.convergence.asymptotic_range import trend
 from vibsim.convergence.classify import rules
 from vibsim.convergence.differences import order_of_ratio, safe_ratio
 from vibsim.convergence.ladder_statistics import Evidence, at_round_off, breakdown, error_orders
-from vibsim.convergence.true_errors import errors_vouch
-from vibsim.core.array_types import Codes, Flags, Floats, Integers
+from vibsim.core.array_types import Codes, Floats, Integers
 from vibsim.core.vocabulary import REASON_NAMES, REASONS, STATUSES
 
 
@@ -44,84 +44,66 @@ from vibsim.core.vocabulary import REASON_NAMES, REASONS, STATUSES
 class Judgement:
     """What was decided of every ladder; arrays of shape (...)."""
 
-    status: Codes
-    """Index into `vocabulary.STATUSES`."""
-    reason: Codes
-    """Index into `vocabulary.REASON_NAMES`."""
-    order: Floats
-    """The stated order; NaN where none is."""
-    low: Floats
-    """Lower end of its interval; NaN where nothing is decided."""
-    high: Floats
-    """Upper end of its interval."""
-    first: Integers
-    """Coarsest level that the order rests on; -1 where there is no order."""
-    last: Integers
-    """Finest level that the order rests on; -1 where there is no order."""
+    status: Codes  # index into `vocabulary.STATUSES`
+    reason: Codes  # index into `vocabulary.REASON_NAMES`
+    order: Floats  # the stated order; NaN where none is
+    low: Floats  # lower end of its interval; NaN where nothing is decided
+    high: Floats  # upper end of its interval
+    first: Integers  # coarsest level that the order rests on; -1 where there is no order
+    last: Integers  # finest level that the order rests on; -1 where there is no order
+    # the coarsest level that failed, or whose w dt is beyond the limit; -1 where there is none
     culprit: Integers
-    """The coarsest level that failed, or whose w dt is beyond the limit; -1 where there is none."""
-    orders: Floats = field(repr=False)
-    """Local order of every triple, shape (..., n-2)."""
+    orders: Floats = field(repr=False)  # local order of every triple, shape (..., n-2)
 
 
-def judge(evidence: Evidence) -> Judgement:
+def judge(e: Evidence) -> Judgement:
     """Decide on every ladder; see the head of this module for the rules."""
-    e = evidence
-    shape = e.difference.shape[:-1]
-    levels = np.array(e.levels, dtype=np.int64)
+    shape, levels = e.difference.shape[:-1], np.array(e.levels, dtype=np.int64)
     orders = local_orders(e.difference, e.levels)
-    broken, beyond, growing = breakdown(e, shape)
-    culprit = np.where(
-        np.any(broken | beyond, axis=-1), levels[np.argmax(broken | beyond, axis=-1)], -1
-    )
+    broken, beyond, growing = breakdown(e)
+    culprits = broken | beyond
+    fails = np.any(culprits, axis=-1)
     undefined = ~np.all(np.isfinite(e.difference), axis=-1)
     undefined |= ~np.all(np.isfinite(e.floor), axis=-1)
-    exists = np.ones(shape, dtype=bool) if e.applicable is None else e.applicable
-    sound = exists & ~undefined & ~np.any(broken | beyond, axis=-1) & ~growing
     cases = [
-        (~exists, "not_applicable"),
+        (~e.applicable, "not_applicable"),
         (np.any(beyond, axis=-1) | growing, "unstable"),
         (np.any(broken, axis=-1) | undefined, "non_finite"),
     ]
+    order, low, high = (np.full(shape, np.nan) for _ in range(3))
+    first, last = (np.full(shape, -1) for _ in range(2))
     if len(e.levels) < 3:
         cases.append((np.ones(shape, dtype=bool), "too_few_levels"))
-        nothing = np.full(shape, -1)
-        nan = np.full(shape, np.nan)
-        return _decide(cases, culprit, orders, nan, nan, nan, nothing, nothing)
-    of_errors, vouched = None, None
-    if len(e.levels) == 3:
-        of_errors = error_orders(e)[..., -1]
-        vouched = errors_vouch(e, np.round(2.0 * orders[..., 0]) / 2)
-    found = trend(
-        orders,
-        e.scatter,
-        e.difference,
-        e.floor,
-        e.tolerance,
-        ceiling=e.ceiling,
-        of_errors=of_errors,
-        vouched=vouched,
-        numbers=e.numbers,
-    )
-    read, lower = rules(e, found)
-    cases += read
-    found = replace(found, low=lower)
-    # the order of noise is none
-    stated = sound & (found.count > 0) & ~(np.isinf(e.order) & at_round_off(e))
-    order, low, high = (np.where(stated, x, np.nan) for x in (found.order, found.low, found.high))
-    judged = _decide(
-        cases,
-        culprit,
-        orders,
-        order,
-        low,
-        high,
-        np.where(stated, levels[found.first], -1),
-        np.where(stated, levels[found.last + 2], -1),
-    )
+    else:
+        of_errors, vouched = np.full(shape, np.nan), np.zeros(shape, dtype=bool)
+        if len(e.levels) == 3:
+            of_errors = error_orders(e)[..., -1]
+            vouched = errors.vouch(e, np.round(2.0 * orders[..., 0]) / 2)
+        found = trend(e, orders, of_errors, vouched)
+        read, lower = rules(e, found)
+        cases += read
+        # the order of noise is none
+        stated = e.applicable & ~undefined & ~fails & ~growing
+        stated &= (found.count > 0) & ~(np.isinf(e.order) & at_round_off(e))
+        order, low, high = (np.where(stated, x, np.nan) for x in (found.order, lower, found.high))
+        first, last = (np.where(stated, levels[x], -1) for x in (found.first, found.last + 2))
+    # without a rule that applies it is not yet asymptotic
+    codes = [REASON_NAMES.index(reason) for _, reason in cases]
+    reason = np.select([mask for mask, _ in cases], codes, REASON_NAMES.index("pre_asymptotic"))
+    of_reason = np.array([STATUSES.index(status) for status in REASONS.values()], dtype=np.int8)
     # a last estimate is no order of which one could say how surely it is known
-    guess = judged.status == STATUSES.index("INCONCLUSIVE")
-    return replace(judged, low=np.where(guess, np.nan, low), high=np.where(guess, np.nan, high))
+    guess = of_reason[reason] == STATUSES.index("INCONCLUSIVE")
+    return Judgement(
+        status=of_reason[reason],
+        reason=reason.astype(np.int8),
+        order=order,
+        low=np.where(guess, np.nan, low),
+        high=np.where(guess, np.nan, high),
+        first=first,
+        last=last,
+        culprit=np.where(fails, levels[np.argmax(culprits, axis=-1)], -1),
+        orders=orders,
+    )
 
 
 def local_orders(difference: Floats, levels: tuple[int, ...]) -> Floats:
@@ -131,22 +113,3 @@ def local_orders(difference: Floats, levels: tuple[int, ...]) -> Floats:
         for i in range(len(levels) - 2)
     ]
     return np.stack(orders, axis=-1) if orders else np.empty((*difference.shape[:-1], 0))
-
-
-def _decide(
-    cases: list[tuple[Flags, str]],
-    culprit: Integers,
-    orders: Floats,
-    order: Floats,
-    low: Floats,
-    high: Floats,
-    first: Integers,
-    last: Integers,
-) -> Judgement:
-    """Take the first rule that applies to each ladder; without one it is not yet asymptotic."""
-    codes = [REASON_NAMES.index(reason) for _, reason in cases]
-    reason = np.select([mask for mask, _ in cases], codes, REASON_NAMES.index("pre_asymptotic"))
-    of_reason = np.array([STATUSES.index(status) for status in REASONS.values()], dtype=np.int8)
-    return Judgement(
-        of_reason[reason], reason.astype(np.int8), order, low, high, first, last, culprit, orders
-    )

@@ -15,8 +15,7 @@ from pathlib import Path
 class VibsimError(Exception):
     """Base of every error that vibsim raises on purpose.
 
-    An error that takes more than its message hands on what it takes, and tells its message by ``__str__``: a copy, such
-    as the one that another process sends, is made of the same arguments again.
+    One that takes more than its message hands that on to ``Exception``: copies in other processes are made of it.
     """
 
 
@@ -44,13 +43,7 @@ class Fault:
 
 
 class InputError(VibsimError):
-    """Input that is refused: every fault that was found, at once.
-
-    Parameters
-    ----------
-    faults
-        At least one fault; they are reported in the order of file and line.
-    """
+    """Input that is refused: every fault that was found, at once, in the order of file and line."""
 
     def __init__(self, faults: Iterable[Fault]) -> None:
         self.faults: tuple[Fault, ...] = tuple(sorted(faults))
@@ -65,19 +58,10 @@ class SimulationError(VibsimError):
 
 
 class FileError(VibsimError):
-    """A stored file that must not be used.
-
-    Parameters
-    ----------
-    path
-        The file.
-    reason
-        What is wrong with it.
-    """
+    """A stored file that must not be used, and why."""
 
     def __init__(self, path: Path, reason: str) -> None:
-        self.path = path
-        self.reason = reason
+        self.path, self.reason = path, reason
         super().__init__(path, reason)
 
     def __str__(self) -> str:
@@ -93,15 +77,7 @@ class StaleFileError(FileError):
 
 
 def nearest(value: object, choices: Sequence[str]) -> str:
-    """Name the choice nearest to `value`, or list all of them.
-
-    Parameters
-    ----------
-    value
-        What the user wrote.
-    choices
-        What would have been right.
-    """
+    """Name the choice nearest to what a user wrote, or list all of them."""
     if not choices:
         return ""
     close = difflib.get_close_matches(str(value), choices, n=1, cutoff=0.6)

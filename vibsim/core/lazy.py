@@ -8,13 +8,7 @@ from typing import Any
 
 
 def loader(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
-    """Return the ``__getattr__`` of `package`.
-
-    Parameters
-    ----------
-    homes
-        Public name to the module, with its full name, in which it stands.
-    """
+    """Return the ``__getattr__`` of `package`; `homes` has the full name of the module of each public name."""
 
     def load(name: str) -> Any:
         if name not in homes:

@@ -24,13 +24,7 @@ def is_from_library(error: Exception) -> bool:
 
 
 def opened(path: Path) -> Any:
-    """Return the dataset of a file that is to be read.
-
-    Raises
-    ------
-    OSError
-        Where the library cannot read it.
-    """
+    """Return the dataset of a file that is to be read; OSError where the library cannot read it."""
     from netCDF4 import Dataset
 
     return Dataset(path, "r")
@@ -46,13 +40,7 @@ def variables(dataset: Any) -> Iterator[tuple[str, Any, str]]:
 
 
 def in_memory(content: bytes) -> Any:
-    """Return the dataset that the bytes of a file are.
-
-    Raises
-    ------
-    OSError
-        Where the library cannot read it.
-    """
+    """Return the dataset that the bytes of a file are; OSError where the library cannot read it."""
     from netCDF4 import Dataset
 
     return Dataset("table.nc", memory=content)

@@ -2,15 +2,19 @@
 
 It holds compiled kernels, references and plans, each kind in a folder of its own inside of ``$VIBSIM_CACHE_DIR``, else
 of ``vibsim`` in the user's cache folder. A seal tells a damaged entry from a whole one and says which entry it is, but
-anybody can make a seal. What keeps others out is the file system (`vibsim.core.ownership`): no one but the user, and
-root, can write to the folders or replace them. What cannot be kept is made again.
+anybody can make a seal. What keeps others out is the file system: no one but the user, and root, can write to the
+folders or replace them. A folder that others can write to is refused and not changed, since closing it afterwards would
+leave what they put there; a folder of ours that others can only read is closed to them. What cannot be kept is made
+again.
 """
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import hashlib
 import os
+import stat
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -19,7 +23,7 @@ from functools import cache
 from pathlib import Path
 from typing import TypeVar
 
-from vibsim.core import ownership, regular_files
+from vibsim.core import regular_files
 
 Thing = TypeVar("Thing")
 
@@ -33,6 +37,11 @@ _LOCKS = 2
 """Digits of a name that name a lock: 256 files, whatever the number of entries."""
 _SEAL = 32
 """Bytes of the SHA-256 behind the content."""
+_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
+_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+_MODE = 0o700
+_MOST_LINKS = 40
+"""Links that a path may lead through, as for the system."""
 
 
 def kept(
@@ -78,13 +87,7 @@ def kept(
 
 
 def place() -> Path:
-    """Return the folder of the cache, which need not be there.
-
-    Raises
-    ------
-    OSError
-        Where nothing names one.
-    """
+    """Return the folder of the cache, which need not be there; OSError where nothing names one."""
     if named := os.environ.get(VARIABLE):
         return Path(named).absolute()
     return general() / "vibsim"
@@ -115,7 +118,7 @@ def opened(kind: str) -> Folder | None:
 def _opened(place: Path, kind: str, user: int) -> Folder | None:
     """Open the folder once for each process and user."""
     with suppress(OSError):
-        return Folder(kind, ownership.inside(place, kind))
+        return Folder(kind, _inside(place, kind))
     return None
 
 
@@ -123,15 +126,7 @@ def _opened(place: Path, kind: str, user: int) -> Folder | None:
 def provided() -> Iterator[str]:
     """Give this process and its children a private cache; where the user has none, one that ends with this block.
 
-    Yields
-    ------
-    str
-        Why the user has none; empty where there is one.
-
-    Raises
-    ------
-    OSError
-        Where there is no folder for temporary files either.
+    Yields why the user has none, empty where there is one. OSError where there is no folder for temporary files either.
     """
     # every job imports this module, and only a run has use for it
     from tempfile import TemporaryDirectory
@@ -157,8 +152,8 @@ def _problem() -> str:
     """Say why the user has no private cache; empty where there is one that can be written."""
     try:
         for kind in KINDS:
-            os.close(ownership.inside(place(), kind))
-            ownership.check_writable(place() / kind)
+            os.close(_inside(place(), kind))
+            check(place() / kind, writable=True)
     except OSError as error:
         return f"{error.filename}: {error.strerror}"
     return ""
@@ -174,7 +169,7 @@ class Folder:
     def read(self, name: str) -> bytes | None:
         """Return the content of an entry; None where there is none, it is not as it was written, or not ours."""
         try:
-            found = ownership.file(name, os.O_RDONLY, self.descriptor)
+            found = _file(name, os.O_RDONLY, self.descriptor)
         except OSError:
             return None
         with os.fdopen(found, "rb") as file:
@@ -207,7 +202,7 @@ class Folder:
         lock = -1
         with suppress(OSError):
             flags = os.O_RDWR | os.O_CREAT
-            lock = ownership.file(f"lock_{name[:_LOCKS]}", flags, self.descriptor)
+            lock = _file(f"lock_{name[:_LOCKS]}", flags, self.descriptor)
             fcntl.flock(lock, fcntl.LOCK_EX)
         try:
             yield
@@ -236,3 +231,85 @@ class Folder:
             with suppress(OSError):
                 os.unlink(name, dir_fd=self.descriptor)
             total -= size
+
+
+def _inside(place: Path, name: str) -> int:
+    """Return the descriptor of folder `name` inside of `place`, both made where they are missing; see `check`."""
+    check(place)
+    outer = os.open(place, _FOLDER)
+    try:
+        with suppress(FileExistsError):
+            os.mkdir(name, _MODE, dir_fd=outer)
+        return _open_folder(place / name, outer)
+    finally:
+        os.close(outer)
+
+
+def check(place: Path, *, writable: bool = False) -> None:
+    """Make a folder where it is missing, and refuse one that others can write to, or could put another in its place.
+
+    Raises
+    ------
+    OSError
+        With the path and the reason, also where files cannot be made in it and it is to be `writable`.
+    """
+    for folder in (*reversed(place.parents), place):
+        with suppress(FileExistsError):
+            folder.mkdir(_MODE)
+    _check_way(place.parent)
+    os.close(_open_folder(place))
+    if writable and not os.access(place, os.W_OK | os.X_OK):
+        raise _refusal(place, "cannot be written")
+
+
+def _check_way(path: Path, links: int = 0) -> None:
+    """Refuse where one of the folders that lead to `path`, or a link among them, is another user's."""
+    for folder in (*reversed(path.parents), path):
+        about = folder.lstat()
+        if about.st_uid not in (0, os.geteuid()):
+            raise _refusal(folder, "belongs to another user")
+        if stat.S_ISLNK(about.st_mode):
+            if links == _MOST_LINKS:
+                raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
+            there = folder.parent / folder.readlink() / path.relative_to(folder)
+            return _check_way(there, links + 1)
+        # in a sticky folder nobody renames what is another's
+        if about.st_mode & _OTHERS_WRITE and not about.st_mode & stat.S_ISVTX:
+            raise _refusal(folder, "others can write to it")
+    return None
+
+
+def _open_folder(path: Path, outer: int | None = None) -> int:
+    """Open a folder of ours, relative to the descriptor `outer` where there is one, and close it to others there."""
+    try:
+        found = os.open(path.name if outer is not None else path, _FOLDER, dir_fd=outer)
+    except OSError as error:
+        reason = "is a link" if path.is_symlink() else error.strerror
+        raise OSError(error.errno, reason, str(path)) from None
+    about = os.fstat(found)
+    try:
+        if about.st_uid != os.geteuid():
+            raise _refusal(path, "belongs to another user")
+        if about.st_mode & _OTHERS_WRITE:
+            raise _refusal(path, "others can write to it")
+        # what others can read is no danger, and the folder that a user names keeps its mode
+        if outer is not None and stat.S_IMODE(about.st_mode) != _MODE:
+            os.fchmod(found, _MODE)
+    except OSError:
+        os.close(found)
+        raise
+    return found
+
+
+def _file(name: str, flags: int, folder: int) -> int:
+    """Return the descriptor of a file in an opened folder; OSError unless it is a regular one of ours alone."""
+    found = regular_files.descriptor(name, flags | os.O_NOFOLLOW, folder=folder)
+    about = os.fstat(found)
+    if about.st_uid == os.geteuid() and about.st_nlink == 1 and not about.st_mode & _OTHERS_WRITE:
+        return found
+    os.close(found)
+    raise _refusal(Path(name), "is not ours alone")
+
+
+def _refusal(path: Path, reason: str) -> OSError:
+    return OSError(errno.EPERM, reason, str(path))

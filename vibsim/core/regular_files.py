@@ -10,21 +10,10 @@ from typing import BinaryIO
 
 
 def descriptor(path: Path | str, flags: int, *, folder: int | None = None) -> int:
-    """Return the descriptor of a regular file.
+    """Return the descriptor of a regular file, relative to the descriptor of a folder where there is one.
 
-    Parameters
-    ----------
-    path
-        The file.
-    flags
-        As for `os.open`. A file that is made can be read by everybody and written by its owner alone.
-    folder
-        Descriptor of the folder that `path` is relative to.
-
-    Raises
-    ------
-    OSError
-        Where it cannot be opened, or is no regular file.
+    A file that is made can be read by everybody and written by its owner alone. OSError where it cannot be opened with
+    the `flags` of `os.open`, or is no regular file.
     """
     # without O_NONBLOCK, opening a pipe waits for its other end
     found = os.open(path, flags | os.O_NONBLOCK | os.O_CLOEXEC, 0o644, dir_fd=folder)
@@ -34,19 +23,22 @@ def descriptor(path: Path | str, flags: int, *, folder: int | None = None) -> in
     return found
 
 
-def own(path: Path, flags: int) -> int:
-    """Return the descriptor of a file that is to be written where it stands.
+def append(path: Path, line: bytes) -> None:
+    """Add a line to a file, in one write: processes that do so at the same time do not mix.
 
     Raises
     ------
     OSError
         Also where it is a link, or has another name: what is written would be written elsewhere.
     """
-    found = descriptor(path, flags | os.O_NOFOLLOW)
-    if os.fstat(found).st_nlink > 1:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    found = descriptor(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW)
+    try:
+        if os.fstat(found).st_nlink > 1:
+            raise OSError(errno.EMLINK, "a file with several names")
+        os.write(found, line)
+    finally:
         os.close(found)
-        raise OSError(errno.EMLINK, "a file with several names")
-    return found
 
 
 def reading(path: Path) -> BinaryIO:

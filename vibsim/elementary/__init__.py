@@ -15,18 +15,28 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from vibsim.elementary.circular import cos, cos_fast, sin, sin_fast
+from vibsim.elementary.circular import cos, cos_fast, sin, sin_fast, tan, tan_fast
 from vibsim.elementary.error_function import erf, erfc
+from vibsim.elementary.exact import (
+    absolute,
+    ceil,
+    floor,
+    heaviside,
+    larger,
+    mod,
+    mod_fast,
+    nearest,
+    sign,
+    smaller,
+    sqrt,
+    where,
+)
 from vibsim.elementary.exponential import exp, expm1
-from vibsim.elementary.hyperbolic import cosh, sinh, tanh
+from vibsim.elementary.hyperbolic import acosh, asinh, atanh, cosh, sinh, tanh
 from vibsim.elementary.inverse import acos, asin, atan, atan2, atan2_fast
-from vibsim.elementary.inverse_hyperbolic import acosh, asinh, atanh
 from vibsim.elementary.logarithm import log, log1p, log2, log10
 from vibsim.elementary.power import power, power_fast
 from vibsim.elementary.root import cbrt, hypot
-from vibsim.elementary.selection import absolute, heaviside, larger, sign, smaller, sqrt, where
-from vibsim.elementary.tangent import tan, tan_fast
-from vibsim.elementary.whole import ceil, floor, mod, mod_fast, nearest
 
 __all__ = ["ELEMENTARY", "Elementary"]
 
@@ -42,43 +52,22 @@ class Elementary:
     the range that it states and for NaN."""
 
 
+_WITH_BRANCHES: dict[str, tuple[Callable[..., float], Callable[..., float]]] = {
+    **{"atan2": (atan2, atan2_fast), "cos": (cos, cos_fast), "mod": (mod, mod_fast)},
+    **{"power": (power, power_fast), "sin": (sin, sin_fast), "tan": (tan, tan_fast)},
+}
+_WITHOUT: dict[str, Callable[..., float]] = {
+    **{"acos": acos, "acosh": acosh, "asin": asin, "asinh": asinh, "atan": atan, "atanh": atanh},
+    **{"cbrt": cbrt, "cosh": cosh, "erf": erf, "erfc": erfc, "exp": exp, "expm1": expm1},
+    **{"hypot": hypot, "log": log, "log10": log10, "log1p": log1p, "log2": log2},
+    **{"sinh": sinh, "sqrt": sqrt, "tanh": tanh},
+    **{"abs": absolute, "ceil": ceil, "floor": floor, "heaviside": heaviside, "max": larger},
+    **{"min": smaller, "round": nearest, "sign": sign, "where": where},
+}
 ELEMENTARY: Mapping[str, Elementary] = MappingProxyType(
     {
-        "abs": Elementary(absolute, absolute),
-        "acos": Elementary(acos, acos),
-        "acosh": Elementary(acosh, acosh),
-        "asin": Elementary(asin, asin),
-        "asinh": Elementary(asinh, asinh),
-        "atan": Elementary(atan, atan),
-        "atan2": Elementary(atan2, atan2_fast),
-        "atanh": Elementary(atanh, atanh),
-        "cbrt": Elementary(cbrt, cbrt),
-        "ceil": Elementary(ceil, ceil),
-        "cos": Elementary(cos, cos_fast),
-        "cosh": Elementary(cosh, cosh),
-        "erf": Elementary(erf, erf),
-        "erfc": Elementary(erfc, erfc),
-        "exp": Elementary(exp, exp),
-        "expm1": Elementary(expm1, expm1),
-        "floor": Elementary(floor, floor),
-        "heaviside": Elementary(heaviside, heaviside),
-        "hypot": Elementary(hypot, hypot),
-        "log": Elementary(log, log),
-        "log10": Elementary(log10, log10),
-        "log1p": Elementary(log1p, log1p),
-        "log2": Elementary(log2, log2),
-        "max": Elementary(larger, larger),
-        "min": Elementary(smaller, smaller),
-        "mod": Elementary(mod, mod_fast),
-        "power": Elementary(power, power_fast),
-        "round": Elementary(nearest, nearest),
-        "sign": Elementary(sign, sign),
-        "sin": Elementary(sin, sin_fast),
-        "sinh": Elementary(sinh, sinh),
-        "sqrt": Elementary(sqrt, sqrt),
-        "tan": Elementary(tan, tan_fast),
-        "tanh": Elementary(tanh, tanh),
-        "where": Elementary(where, where),
+        name: Elementary(*_WITH_BRANCHES.get(name) or (_WITHOUT[name],) * 2)
+        for name in sorted((*_WITH_BRANCHES, *_WITHOUT))
     }
 )
 """The functions that a formula may call, by the names that formulas use, and ``power``."""

@@ -1,4 +1,4 @@
-r"""Sine and cosine.
+r"""Sine, cosine and tangent.
 
 ``r = x - k pi`` with pi in three parts (Cody and Waite; k times a part of 35 bits is exact for \|k\| < 2^17), then
 ``r + r^3 P(r^2)`` on [-pi/2, pi/2], P of degree 7 (least squares with rounded coefficients, relative error 5e-19),
@@ -10,6 +10,8 @@ Sines and cosines are most of what a pendulum costs, and a force that is wrong b
 solution. Where a sine is only a step on the way (the tangent), and beyond 1e5, `sine_parts` gives it in two parts:
 ``r - r^3/6 + r^5 Q(r^2)``, Q of degree 6 (Remez, relative error 4e-19), the larger part of the cubic term exact.
 
+The tangent is the quotient of sine and cosine, both in two parts.
+
 Source: W. J. Cody and W. Waite, Software Manual for the Elementary Functions (1980), chapter 8.
 """
 
@@ -17,8 +19,8 @@ from __future__ import annotations
 
 import math
 
+from vibsim.elementary.doubled import nearest_whole, quotient
 from vibsim.elementary.reduction import HALF_PI, HALF_PI_REST, quarter_turns
-from vibsim.elementary.rounding import nearest_whole
 
 LARGEST_ANGLE = 1.0e5
 _NO_HALF_TURN = 3.14  # a little below pi: the nearest multiple is found from a rounded quotient
@@ -32,21 +34,16 @@ _TWELFTH_BIT = 1649267441664.0  # 1.5 * 2^40: adding and subtracting it leaves m
 _S3 = -1.0 / 6.0
 _S3_1 = float.fromhex("-0x1.5554p-3")
 _S3_2 = float.fromhex("-0x1.5555555555555p-19")
-_S5 = 0.008333333333333283
-_S7 = -0.000198412698412353
-_S9 = 2.755731921493914e-06
-_S11 = -2.5052107177645754e-08
-_S13 = 1.6058953403234195e-10
-_S15 = -7.643314997525792e-13
-_S17 = 2.724302774578837e-15
+_S5, _S7, _S9, _S11, _S13, _S15, _S17 = (
+    0.008333333333333283, -0.000198412698412353, 2.755731921493914e-06, -2.5052107177645754e-08,
+    1.6058953403234195e-10, -7.643314997525792e-13, 2.724302774578837e-15,
+)  # fmt: skip
 
-_SHORT_5 = 0.008333333333333196
-_SHORT_7 = -0.00019841269841207676
-_SHORT_9 = 2.7557319210712077e-06
-_SHORT_11 = -2.5052106827436554e-08
-_SHORT_13 = 1.6058937294379453e-10
-_SHORT_15 = -7.64292780231204e-13
-_SHORT_17 = 2.720508082623873e-15
+_SHORT_5, _SHORT_7, _SHORT_9, _SHORT_11, _SHORT_13, _SHORT_15, _SHORT_17 = (
+    0.008333333333333196, -0.00019841269841207676, 2.7557319210712077e-06,
+    -2.5052106827436554e-08, 1.6058937294379453e-10, -7.64292780231204e-13,
+    2.720508082623873e-15,
+)  # fmt: skip
 
 
 def sin(x: float) -> float:
@@ -167,3 +164,35 @@ def sine_far(y: float, quarters: int) -> tuple[float, float]:
         rest += ((HALF_PI - near) - abs(r)) + HALF_PI_REST
         r = near
     return sine_parts(sign * r, sign * rest)
+
+
+def tan(x: float) -> float:
+    """Return the tangent of `x` [rad], error below 1 unit in the last place; NaN for NaN and infinities."""
+    y = abs(x)
+    if y <= LARGEST_ANGLE:
+        return tangent_near(x) if x != 0.0 else x
+    if y < math.inf:
+        s, s_behind = sine_far(y, 0)
+        c, c_behind = sine_far(y, 1)
+        value = quotient(s, s_behind, c, c_behind)
+        return value if x > 0.0 else -value
+    return math.nan
+
+
+def tan_fast(x: float) -> float:
+    r"""Return `tan` for \|x\| <= 1e5, else NaN."""
+    value = tangent_near(x)
+    value = x if x == 0.0 else value
+    return value if abs(x) <= LARGEST_ANGLE else math.nan
+
+
+def tangent_near(x: float) -> float:
+    r"""Return the tangent for 0 < \|x\| <= 1e5."""
+    k = nearest_whole(x * PER_PI)
+    r, rest = reduced(x, k, 1.0)
+    s, s_behind = sine_parts(r, rest)
+    # both of r = x - k pi, whose signs differ from those of x alike for odd k
+    y = abs(r)
+    r, rest_c = reduced_half(y, 0.5, -1.0)
+    c, c_behind = sine_parts(r, rest_c - (rest if s > 0.0 else -rest))
+    return quotient(s, s_behind, c, c_behind)

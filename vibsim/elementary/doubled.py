@@ -1,4 +1,4 @@
-"""Sums and products with their rounding errors, without a fused multiply-add.
+"""Rounding without a call, and sums and products with their rounding errors, without a fused multiply-add.
 
 Source: T. J. Dekker, A floating-point technique for extending the available precision, Numerische Mathematik 18 (1971);
 J.-M. Muller et al., Handbook of Floating-Point Arithmetic, 2nd ed. (2018), sections 4.3 and 4.4.
@@ -9,6 +9,12 @@ from __future__ import annotations
 import math
 
 _SPLIT = 134217729.0  # 2^27 + 1
+_ROUND = 6755399441055744.0  # 1.5 * 2^52: there doubles are whole numbers
+
+
+def nearest_whole(x: float) -> float:
+    r"""Return the whole number nearest to `x`, the even one of two, for \|x\| <= 2^51."""
+    return (x + _ROUND) - _ROUND
 
 
 def two_product(a: float, b: float) -> tuple[float, float]:

@@ -10,9 +10,8 @@ Elementary Functions, 3rd ed. (2016), section 11.3.
 
 from __future__ import annotations
 
-from vibsim.elementary.doubled import fast_two_sum, two_product, two_sum
+from vibsim.elementary.doubled import fast_two_sum, nearest_whole, two_product, two_sum
 from vibsim.elementary.primitives import two_to
-from vibsim.elementary.rounding import nearest_whole
 
 _PER_LN_2 = float.fromhex("0x1.71547652b82fep+0")
 LN_2_1 = float.fromhex("0x1.62e42fefa2000p-1")
@@ -22,15 +21,11 @@ LN_2_3 = float.fromhex("0x1.f97b57a079a19p-103")
 
 _ALL_BUT_ONE = -40.0  # the exponential is lost beside 1
 
-_E3 = 0.16666666666666685
-_E4 = 0.0416666666666028
-_E5 = 0.008333333333314527
-_E6 = 0.0013888888927278214
-_E7 = 0.00019841269903775335
-_E8 = 2.480150806978095e-05
-_E9 = 2.755722712364467e-06
-_E10 = 2.762543121504282e-07
-_E11 = 2.5114707468091334e-08
+_E3, _E4, _E5, _E6, _E7, _E8, _E9, _E10, _E11 = (
+    0.16666666666666685, 0.0416666666666028, 0.008333333333314527, 0.0013888888927278214,
+    0.00019841269903775335, 2.480150806978095e-05, 2.755722712364467e-06, 2.762543121504282e-07,
+    2.5114707468091334e-08,
+)  # fmt: skip
 
 
 def exp(x: float) -> float:

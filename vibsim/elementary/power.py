@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import math
 
-from vibsim.elementary.doubled import two_product, two_sum
+from vibsim.elementary.doubled import nearest_whole, two_product, two_sum
 from vibsim.elementary.exponential import exp_parts, scaled, within
 from vibsim.elementary.logarithm import log_parts
-from vibsim.elementary.rounding import nearest_whole
 
 _LARGEST_DOUBLE = 1.7976931348623157e308
 _LARGEST_FAST_EXPONENT = 1.0e9

@@ -14,9 +14,8 @@ from __future__ import annotations
 
 import math
 
-from vibsim.elementary.doubled import root_parts, two_product, two_sum
+from vibsim.elementary.doubled import nearest_whole, root_parts, two_product, two_sum
 from vibsim.elementary.primitives import exponent_of, mantissa_of, two_to
-from vibsim.elementary.rounding import nearest_whole
 
 _SMALLEST_NORMAL = 2.2250738585072014e-308
 _LARGEST_DOUBLE = 1.7976931348623157e308
@@ -25,10 +24,9 @@ _THIRD = 1.0 / 3.0
 _NINTH = 1.0 / 9.0
 _FIVE_81STS = 5.0 / 81.0
 _SIXTEENTH_BIT = 103079215104.0  # 1.5 * 2^36: adding and subtracting it leaves multiples of 2^-16
-_ROOT_0 = 0.5412370328856352
-_ROOT_1 = 0.5782147247179539
-_ROOT_2 = -0.13724285601652703
-_ROOT_3 = 0.014646532187668952
+_ROOT_0, _ROOT_1, _ROOT_2, _ROOT_3 = (
+    0.5412370328856352, 0.5782147247179539, -0.13724285601652703, 0.014646532187668952,
+)  # fmt: skip
 _LONG = 2.0**500
 _SHORT = 2.0**-400
 _SHORTER = 2.0**-600

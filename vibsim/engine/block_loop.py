@@ -38,54 +38,7 @@ from vibsim.engine.gather import (
     note_events,
     note_extrema,
 )
-from vibsim.engine.kernel_stubs import (
-    ALIVE,
-    BOTTOM,
-    D2T,
-    DISSIPATED,
-    DRIVEN,
-    DT,
-    ENERGY,
-    EVENT,
-    EXTREMA,
-    FIRST_PARAMETER,
-    GATHER,
-    INTERIOR,
-    KEEP,
-    LARGEST_D2T,
-    PARAMETERS,
-    PENDING,
-    RATE,
-    SERIES,
-    SET,
-    SLOPE,
-    SLOPE_BEFORE,
-    STAGED,
-    STAGGERED,
-    STATES,
-    TWO_BEFORE,
-    VELOCITY,
-    WORK,
-    backward,
-    called,
-    energies,
-    energies_fast,
-    extrema_in,
-    kept_in,
-    parameters_in,
-    parameters_of,
-    powers,
-    powers_fast,
-    put_extrema,
-    put_states,
-    stages_of,
-    start,
-    states_in,
-    step,
-    step_end,
-    step_fast,
-    total,
-)
+from vibsim.engine.kernel_stubs import P, called, unbound
 
 LANES = 64
 """Members of a block."""
@@ -93,29 +46,34 @@ VECTOR = 8
 """Lanes of the widest vector instruction; fewer divide it."""
 
 ROWS = ("DT", "ENERGY", "BOTTOM", "VELOCITY", "TWO_BEFORE", "INTERIOR", "ALIVE", "EVENT", "EXTREMA")
-"""Rows behind the two sets, in their order. A kernel binds their numbers; from ``EXTREMA`` on stand the entries of
-`vibsim.engine.gather.Extrema`, from ``FIRST_PARAMETER`` on the parameters."""
+"""Rows behind the two sets: step, initial energy, multiple of a turn below, velocity at this point and two points
+before, largest deviation before this point, 1 for a lane that goes on, 1 for one with something to note, and from
+``EXTREMA`` on the entries of `vibsim.engine.gather.Extrema`; behind those, from ``FIRST_PARAMETER`` on, the
+parameters."""
 ROWS_BEHIND = (
-    "RATE",
-    "PENDING",
-    "LARGEST_D2T",
-    "SLOPE",
-    "SLOPE_BEFORE",
-    "DISSIPATED",
-    "DRIVEN",
+    *("RATE", "PENDING", "LARGEST_D2T", "SLOPE", "SLOPE_BEFORE", "DISSIPATED", "DRIVEN"),
     "FIRST_KEPT",
 )
-"""Rows behind the parameters; from the last one on stands what is kept from stage to stage."""
+"""Rows behind the parameters: where `D2T` is ``1/(2 dt)``, the deviation by ``[D_2t u]`` at this point and the largest
+one before; where peaks are found by that velocity (`STAGGERED`), it at this point and the one before; the sums of
+powers for `WORK`; and from ``FIRST_KEPT`` on what is kept from stage to stage."""
+
+# bound by the kernel (`vibsim.engine.kernel_stubs`); `SET` is the number of rows of a set
+D2T = GATHER = KEEP = SERIES = STAGED = STAGGERED = WORK = True
+ALIVE = BOTTOM = DISSIPATED = DRIVEN = DT = ENERGY = EVENT = EXTREMA = FIRST_PARAMETER = 1
+INTERIOR = LARGEST_D2T = PARAMETERS = PENDING = RATE = SET = SLOPE = SLOPE_BEFORE = STATES = 1
+TWO_BEFORE = VELOCITY = 1
+backward = energies = energies_fast = extrema_in = kept_in = parameters_in = unbound
+parameters_of = powers = powers_fast = put_extrema = put_states = stages_of = start = unbound
+states_in = step = step_end = step_fast = total = unbound
+
+Lane = tuple[int, int, int, int, int]
+"""First rows of the set before a step and of that behind it, the member, its lane, and the number of the step."""
 
 
 def set_of(states: int, with_peaks: bool) -> int:
     """Return how many rows a set has: the state, the position, the scheme's own velocity, the position before."""
     return states + (3 if with_peaks else 2)
-
-
-def n_rows(states: int, parameters: int, with_peaks: bool, kept: int) -> int:
-    """Return how many rows a kernel needs, `kept` of them from stage to stage (`vibsim.engine.stages`)."""
-    return row_numbers(states, parameters, with_peaks)["FIRST_KEPT"] + kept
 
 
 def row_numbers(states: int, parameters: int, with_peaks: bool) -> dict[str, int]:
@@ -150,14 +108,19 @@ def run(
     Parameters
     ----------
     rows
-        Scratch memory, shape (`n_rows` * `LANES`,).
+        Scratch memory: `LANES` numbers for each row.
     """
+    found = samples, stats, counts, kept
     for base in range(first, stop, LANES):
         width = min(LANES, stop - base)
         # whole vectors: the lanes behind the last member repeat it and are never written
         filled = (width + VECTOR - 1) // VECTOR * VECTOR
         for j in range(filled):
-            begin(parameters, table, initial, dt, base + min(j, width - 1), j, variant, turn, rows)
+            case = base + min(j, width - 1)
+            p = parameters_of(parameters, table, case)
+            for i in range(PARAMETERS):
+                rows[(FIRST_PARAMETER + i) * LANES + j] = parameters[case, i]
+            begin(rows, j, variant, initial[case, 0], initial[case, 1], dt[case], turn, p)
             rows[ALIVE * LANES + j] = 1.0 if j < width else 0.0
         for j in range(width):
             samples[0, base + j, 0] = initial[base + j, 0]
@@ -177,63 +140,32 @@ def run(
                 for j in range(filled):
                     rows[TWO_BEFORE * LANES + j] = rows[(new + STATES + 1) * LANES + j]
                     rows[INTERIOR * LANES + j] = rows[(EXTREMA + LARGEST_DEVIATION) * LANES + j]
-            bad = step_odd(rows, filled, n) if n & 1 else step_even(rows, filled, n)
-            if bad or is_last:
+            if step_lanes(rows, filled, n) or is_last:
                 for j in range(width):
                     if rows[ALIVE * LANES + j] != 0.0:
-                        mend(
-                            rows,
-                            old,
-                            new,
-                            base + j,
-                            j,
-                            n,
-                            is_last,
-                            end_rule,
-                            every,
-                            samples,
-                            stats,
-                            counts,
-                        )
-            if GATHER:
-                odd = n & 1
-                if gather_odd(rows, filled, n, turn) if odd else gather_even(rows, filled, n, turn):
+                        mend(rows, (old, new, base + j, j, n), is_last, end_rule, every, found)
+            if GATHER:  # noqa: SIM102
+                if gather_lanes(rows, filled, n, turn):
                     for j in range(width):
                         if rows[EVENT * LANES + j] != 0.0 and rows[ALIVE * LANES + j] != 0.0:
-                            note(rows, old, new, base + j, j, n, turn, stats, counts, kept)
+                            note(rows, (old, new, base + j, j, n), turn, found)
             if n == due:
                 for j in range(width):
                     if rows[ALIVE * LANES + j] != 0.0:
                         samples[0, base + j, sample] = rows[(new + STATES) * LANES + j]
                         samples[1, base + j, sample] = rows[VELOCITY * LANES + j]
                         if SERIES:
-                            take_series(rows, old, new, base + j, j, sample, samples)
+                            take_series(rows, (old, new, base + j, j, n), sample, samples)
                 sample += 1
                 due += every
         for j in range(width):
             if rows[ALIVE * LANES + j] != 0.0:
-                finish(rows, base + j, j, steps, every, samples, stats, counts)
+                finish(rows, base + j, j, steps, every, found)
 
 
 @called
-def begin(
-    parameters: Any,
-    table: Any,
-    initial: Any,
-    dt: Any,
-    case: int,
-    j: int,
-    variant: int,
-    turn: float,
-    rows: Any,
-) -> None:
-    """Put member `case` at t = 0 into lane j."""
-    h = float(dt[case])
-    p = parameters_of(parameters, table, case)
-    u = float(initial[case, 0])
-    v = float(initial[case, 1])
-    for i in range(PARAMETERS):
-        rows[(FIRST_PARAMETER + i) * LANES + j] = parameters[case, i]
+def begin(rows: Any, j: int, variant: int, u: float, v: float, h: float, turn: float, p: P) -> None:
+    """Put a member at t = 0 into lane j."""
     rows[DT * LANES + j] = h
     rows[ENERGY * LANES + j] = 0.0
     if GATHER:
@@ -257,14 +189,10 @@ def begin(
 
 
 @called
-def step_odd(rows: Any, filled: int, n: int) -> int:
-    """Take an odd step: with its sets as numbers the compiler sees that they are not the same."""
-    return step_block(rows, 0, SET, filled, n)
-
-
-@called
-def step_even(rows: Any, filled: int, n: int) -> int:
-    """Take an even step."""
+def step_lanes(rows: Any, filled: int, n: int) -> int:
+    """Take step n of every lane: with its sets as numbers the compiler sees that they are not the same."""
+    if n & 1:
+        return step_block(rows, 0, SET, filled, n)
     return step_block(rows, SET, 0, filled, n)
 
 
@@ -293,21 +221,9 @@ def step_block(rows: Any, old: int, new: int, filled: int, n: int) -> int:
 
 
 @called
-def mend(
-    rows: Any,
-    old: int,
-    new: int,
-    case: int,
-    j: int,
-    n: int,
-    is_last: bool,
-    end_rule: int,
-    every: int,
-    samples: Any,
-    stats: Any,
-    counts: Any,
-) -> None:
+def mend(rows: Any, lane: Lane, is_last: bool, end_rule: int, every: int, found: Any) -> None:
     """Take step n of a lane again where the fast one gave NaN; end the velocity; let a member that failed rest."""
+    old, new, case, j, n = lane
     h = rows[DT * LANES + j]
     state = states_in(rows, old, j)
     own = rows[(new + STATES + 1) * LANES + j]
@@ -324,7 +240,7 @@ def mend(
     if not abs(state[0]) + abs(v) < OVERFLOW:
         # of a member that failed, all points came before the last one
         rows[INTERIOR * LANES + j] = rows[(EXTREMA + LARGEST_DEVIATION) * LANES + j]
-        finish(rows, case, j, n - 1, every, samples, stats, counts)
+        finish(rows, case, j, n - 1, every, found)
         rows[ALIVE * LANES + j] = 0.0
         rows[VELOCITY * LANES + j] = 0.0
         for i in range(SET):
@@ -332,14 +248,10 @@ def mend(
 
 
 @called
-def gather_odd(rows: Any, filled: int, n: int, turn: float) -> int:
-    """Gather what an odd step has."""
-    return gather_block(rows, 0, SET, filled, n, turn)
-
-
-@called
-def gather_even(rows: Any, filled: int, n: int, turn: float) -> int:
-    """Gather what an even step has."""
+def gather_lanes(rows: Any, filled: int, n: int, turn: float) -> int:
+    """Gather what step n has, as `step_lanes` takes it."""
+    if n & 1:
+        return gather_block(rows, 0, SET, filled, n, turn)
     return gather_block(rows, SET, 0, filled, n, turn)
 
 
@@ -402,10 +314,9 @@ def deviation_d2t(rows: Any, old: int, new: int, j: int, n: int) -> float:
 
 
 @called
-def take_series(
-    rows: Any, old: int, new: int, case: int, j: int, sample: int, samples: Any
-) -> None:
+def take_series(rows: Any, lane: Lane, sample: int, samples: Any) -> None:
     """Write what samples have of a lane beside position and velocity."""
+    old, new, case, j, _ = lane
     samples[RUNNING_ROW, case, sample] = rows[(EXTREMA + LARGEST_DEVIATION) * LANES + j]
     if D2T:
         samples[VELOCITY_D2T_ROW, case, sample] = velocity_d2t(rows, old, new, j)
@@ -418,35 +329,24 @@ def take_series(
 
 
 @called
-def note(
-    rows: Any,
-    old: int,
-    new: int,
-    case: int,
-    j: int,
-    n: int,
-    turn: float,
-    stats: Any,
-    counts: Any,
-    kept: Any,
-) -> None:
+def note(rows: Any, lane: Lane, turn: float, found: Any) -> None:
     """Note the peak, trough or turn of a lane at step n, and an energy that no fast function could give."""
-    h = rows[DT * LANES + j]
+    _, stats, counts, kept = found
+    old, new, case, j, n = lane
+    h, p = rows[DT * LANES + j], parameters_in(rows, j)
     u, v = rows[(new + STATES) * LANES + j], rows[VELOCITY * LANES + j]
-    kinetic, potential = energies(u, v, n * h, parameters_in(rows, j))
+    kinetic, potential = energies(u, v, n * h, p)
     size = abs((kinetic + potential) - rows[ENERGY * LANES + j])
     if size > rows[(EXTREMA + LARGEST_DEVIATION) * LANES + j]:
         rows[(EXTREMA + LARGEST_DEVIATION) * LANES + j] = size
     if WORK:
-        taken, put = powers_fast(u, v, n * h, parameters_in(rows, j))
+        taken, put = powers_fast(u, v, n * h, p)
         if taken + put != taken + put:
-            taken, put = powers(u, v, n * h, parameters_in(rows, j))
+            taken, put = powers(u, v, n * h, p)
             rows[DISSIPATED * LANES + j] = rows[DISSIPATED * LANES + j] + taken
             rows[DRIVEN * LANES + j] = rows[DRIVEN * LANES + j] + put
     if D2T:
-        kinetic, potential = energies(
-            u, velocity_d2t(rows, old, new, j), n * h, parameters_in(rows, j)
-        )
+        kinetic, potential = energies(u, velocity_d2t(rows, old, new, j), n * h, p)
         rows[PENDING * LANES + j] = abs((kinetic + potential) - rows[ENERGY * LANES + j])
     if KEEP:
         behind, middle = rows[(old + STATES + 2) * LANES + j], rows[(old + STATES) * LANES + j]
@@ -457,37 +357,17 @@ def note(
     else:
         slope = rows[(new + STATES + 1) * LANES + j]
         slope_before = rows[(old + STATES + 1) * LANES + j]
-    rows[BOTTOM * LANES + j] = note_events(
-        stats,
-        counts,
-        case,
-        n * h,
-        h,
-        turn,
-        rows[BOTTOM * LANES + j],
-        rows[(old + STATES) * LANES + j],
-        slope_before,
-        u,
-        slope,
-    )
+    passed = (n * h, h, rows[(old + STATES) * LANES + j], slope_before, u, slope)
+    bottom = rows[BOTTOM * LANES + j]
+    rows[BOTTOM * LANES + j] = note_events(stats, counts, case, turn, bottom, passed)
 
 
 @called
-def finish(
-    rows: Any,
-    case: int,
-    j: int,
-    good: int,
-    every: int,
-    samples: Any,
-    stats: Any,
-    counts: Any,
-) -> None:
+def finish(rows: Any, case: int, j: int, good: int, every: int, found: Any) -> None:
     """Write what was gathered of a member that has arrived, or that failed after step `good`."""
+    samples, stats, counts, _ = found
     if GATHER:
-        note_extrema(
-            stats, case, 0, extrema_in(rows, j), rows[INTERIOR * LANES + j], rows[DT * LANES + j]
-        )
+        note_extrema(stats, case, 0, extrema_in(rows, j), rows[INTERIOR * LANES + j])
     if D2T:
         note_d2t(stats, samples, case, good, every, rows[LARGEST_D2T * LANES + j])
     counts[case, LAST_STEP] = good

@@ -19,9 +19,10 @@ from typing import Any, Literal
 
 from vibsim.core.errors import SimulationError
 from vibsim.elementary import ELEMENTARY
+from vibsim.engine import gather
 from vibsim.engine.text import Module, collect, definition, enter
 from vibsim.schemes import newton
-from vibsim.schemes.base import HANDED
+from vibsim.schemes.base import HANDED, Stepper, no_backward
 from vibsim.schemes.newton_system import solver
 
 Kind = Literal["number", "vector", "zero"] | tuple["Kind", ...]
@@ -73,11 +74,60 @@ def collect_system(
     return writer.result
 
 
-def put_norm(module: Module, count: int) -> None:
-    """Write the Euclidean norm of a vector."""
-    collect(module, ELEMENTARY["sqrt"].full, "sqrt", {})
-    squares = " + ".join(f"vector[{k}] * vector[{k}]" for k in range(count))
-    module.put(NORM, f"@compiled\ndef {NORM}(vector):\n    return sqrt({squares})")
+def put_scheme(module: Module, stepper: Stepper, count: int) -> None:
+    """Write start, step and velocities of a scheme for `count` coordinates, and what is gathered of each.
+
+    Raises
+    ------
+    SimulationError
+        Where a function of the scheme has no meaning for vectors.
+    """
+    state: Kind = NUMBER
+    if stepper.whole:
+        for name in ("start", "step"):
+            collect(module, getattr(stepper, name), name, {})
+    else:
+        name = "start" if stepper.scaling is None else "start_unscaled"
+        kinds = (NUMBER, VECTOR, VECTOR, NUMBER, NUMBER)
+        state = collect_system(module, stepper.start, name, kinds, count)
+        if stepper.scaling is not None:
+            scaled = ", ".join(f"v[{k}] * p[-1]" for k in range(count))
+            line = f"return start_unscaled(variant, u, ({scaled},), dt, p)"
+            module.define("start(variant, u, v, dt, p)", line)
+        found = collect_system(module, stepper.step, "step", (state, NUMBER, NUMBER, NUMBER), count)
+        if found != (state, VECTOR):
+            raise SimulationError("a step returns another state than the start")
+    backward = no_backward if stepper.whole else stepper.backward
+    collect_system(module, backward, "backward", (state, NUMBER), count, returns=VECTOR)
+    velocities = (NUMBER, VECTOR, VECTOR, VECTOR, VECTOR)
+    collect_system(module, gather.end_velocity, "end_velocity", velocities, count)
+    difference = gather.centred_difference
+    collect_system(module, difference, difference.__name__, (VECTOR, VECTOR, NUMBER), count)
+    put_moves(module, count)
+    for text in (gather.first_extrema, gather.next_extrema, gather.note_extrema):
+        collect(module, text, text.__name__, {})
+    further = range(1, count)
+    sizes = " + ".join(f"abs({name}[{k}])" for k in range(count) for name in ("u", "v"))
+    module.define("size_of(u, v)", f"return {sizes}")
+    first = ", ".join(f"first_extrema(u[{k}], v[{k}])" for k in further)
+    module.define("first_further(u, v)", f"return ({first},)")
+    ahead = ", ".join(f"next_extrema(further[{k - 1}], u[{k}], v[{k}], 0.0)" for k in further)
+    module.define("next_further(further, u, v)", f"return ({ahead},)")
+    notes = (
+        f"note_extrema(stats, case, {k * gather.N_STATS}, further[{k - 1}], 0.0)" for k in further
+    )
+    module.define("note_further(stats, case, further)", *notes)
+
+
+def put_moves(module: Module, count: int) -> None:
+    """Write what reads positions and velocities from arrays with a row of each."""
+    for head, place in (
+        ("initial_of(values, k)", "values[k, {}]"),
+        ("point_of(values, case, k)", "values[{}, case, k]"),
+    ):
+        rows = [f"float({place.format(row)})" for row in range(2 * count)]
+        halves = f"({', '.join(rows[:count])},), ({', '.join(rows[count:])},)"
+        module.define(head, f"return {halves}")
 
 
 class _Writer:
@@ -241,7 +291,9 @@ class _Writer:
         ]
         function = self.names.get(name)
         if name == "abs" and self.kind(arguments[0]) == VECTOR:
-            put_norm(self.module, self.count)
+            collect(self.module, ELEMENTARY["sqrt"].full, "sqrt", {})
+            squares = " + ".join(f"vector[{k}] * vector[{k}]" for k in range(self.count))
+            self.module.define(f"{NORM}(vector)", f"return sqrt({squares})")
             name = NORM
         elif function in _SOLVERS:
             text = solver(self.count, _SOLVERS[function][0])

@@ -15,42 +15,18 @@ import math
 from typing import Any
 
 from vibsim.engine.gather import N_STATS, note_turning
-from vibsim.engine.kernel_stubs import (
-    GATHER,
-    LOCATED,
-    WORK,
-    P,
-    State,
-    called,
-    first_mode,
-    guard,
-    guard_on_mesh,
-    landed,
-    lost,
-    mode_of,
-    powers,
-    settled,
-    spent,
-    start,
-    start_of,
-    step,
-    turning,
-    with_mode,
-)
+from vibsim.engine.kernel_stubs import P, State, called, unbound
 
-# Columns of `stats` behind those of `vibsim.engine.gather`.
-EVENT_COUNT = N_STATS
-FIRST_EVENT = N_STATS + 1
-LAST_EVENT = N_STATS + 2
-REST_TIME = N_STATS + 3
-HALTED = N_STATS + 4
-"""The mode before the body came to rest, and the grid point behind: it may leave the other way, which is a turn."""
-HALTED_GRID = N_STATS + 5
-LOST = N_STATS + 6
-"""What sliding or impacts have cost so far (`spent`, `lost`)."""
-DONE = N_STATS + 7
-"""Work of driving forces so far: their power has a corner at every event, so it is summed piece by piece."""
-N_STATS_EVENTS = N_STATS + 8
+# bound by the kernel (`vibsim.engine.kernel_stubs`)
+GATHER = LOCATED = WORK = True
+first_mode = guard = guard_on_mesh = landed = lost = mode_of = powers = settled = spent = unbound
+start = start_of = step = turning = with_mode = unbound
+
+# Columns of `stats` behind those of `vibsim.engine.gather`. HALTED and HALTED_GRID: the mode before the body came to
+# rest, and the grid point behind, since it may leave the other way, which is a turn. LOST: what sliding or impacts have
+# cost so far. DONE: work of driving forces so far, whose power has a corner at every event: summed piece by piece.
+EVENT_COUNT, FIRST_EVENT, LAST_EVENT, REST_TIME = range(N_STATS, N_STATS + 4)
+HALTED, HALTED_GRID, LOST, DONE, N_STATS_EVENTS = range(N_STATS + 4, N_STATS + 9)
 
 MOST_EVENTS = 256
 """Events of a step; a member with more comes to rest until the next grid point."""
@@ -75,21 +51,14 @@ def begun(stats: Any, case: int, u: float, v: float, p: P) -> P:
 
 @called
 def passed(
-    stats: Any,
-    counts: Any,
-    case: int,
-    variant: int,
-    n: int,
-    dt: float,
-    u: float,
-    v: float,
-    state: State,
-    p: P,
+    record: Any, variant: int, n: int, dt: float, u: float, v: float, state: State, p: P
 ) -> tuple[float, State, float, P, int]:
     """Return position, next state, velocity and parameters at step `n`, and how many events lie before it.
 
     Parameters
     ----------
+    record
+        `stats`, `counts` and the member.
     u, v
         Position and velocity at step n - 1.
     state
@@ -104,20 +73,19 @@ def passed(
     count = 0
     if LOCATED:
         if guard(ahead, own, t, p) < 0.0:
-            ahead, own, p, count = across(stats, counts, case, variant, n, dt, u, v, p)
+            ahead, own, p, count = across(record, variant, n, dt, u, v, p)
         elif GATHER:
-            note_piece(stats, case, variant, u, v, ahead, own, t - dt, dt, p)
+            note_piece(record, variant, (u, v, ahead, own, t - dt, dt), p)
     else:
         if GATHER:
-            note_piece(stats, case, variant, u, v, ahead, own, t - dt, dt, p)
+            note_piece(record, variant, (u, v, ahead, own, t - dt, dt), p)
         if guard_on_mesh(ahead, own, t, p) < 0.0:
             before, own_before = mode_of(p), own
             ahead, own, mode = settled(ahead, own, t, u, p)
             p = with_mode(p, mode, t)
             count = 1
             if GATHER:
-                stats[case, LOST] = stats[case, LOST] + lost(own_before, own)
-                note_event(stats, counts, case, t, t, ahead, before, mode)
+                note_event(record, t, t, ahead, before, mode, lost(own_before, own))
     if count > 0:
         p = with_mode(p, mode_of(p), t)
         following = anew(variant, ahead, own, dt, p)
@@ -126,15 +94,7 @@ def passed(
 
 @called
 def across(
-    stats: Any,
-    counts: Any,
-    case: int,
-    variant: int,
-    n: int,
-    dt: float,
-    u: float,
-    v: float,
-    p: P,
+    record: Any, variant: int, n: int, dt: float, u: float, v: float, p: P
 ) -> tuple[float, float, P, int]:
     """Return position, velocity and parameters at step `n` behind all events since step n - 1, and their number."""
     t, end = (n - 1) * dt, n * dt
@@ -143,22 +103,22 @@ def across(
         ahead, own = leap(variant, u, v, t, left, p)
         if not (left > 0.0 and guard(ahead, own, end, p) < 0.0):
             if GATHER:
-                note_piece(stats, case, variant, u, v, ahead, own, t, left, p)
+                note_piece(record, variant, (u, v, ahead, own, t, left), p)
             return ahead, own, p, count
         tau = landing(variant, u, v, t, left, p)
         ahead, own = leap(variant, u, v, t, tau, p)
         ahead, own = landed(ahead, own)
         if GATHER:
-            note_piece(stats, case, variant, u, v, ahead, own, t, tau, p)
+            note_piece(record, variant, (u, v, ahead, own, t, tau), p)
         # the last event of a step may lie on its end
         t = t + tau if tau < left else end
         before = mode_of(p)
         u, v, mode = settled(ahead, own, t, math.inf, p)
         p = with_mode(p, mode, t)
         if GATHER:
-            stats[case, LOST] = stats[case, LOST] + lost(own, v)
-            note_event(stats, counts, case, t, end, u, before, mode)
+            note_event(record, t, end, u, before, mode, lost(own, v))
     if GATHER:
+        stats, _, case = record
         stats[case, LOST] = stats[case, LOST] + lost(v, 0.0)
         stats[case, REST_TIME] = t
         stats[case, HALTED] = math.nan
@@ -166,27 +126,16 @@ def across(
 
 
 @called
-def note_piece(
-    stats: Any,
-    case: int,
-    variant: int,
-    u: float,
-    v: float,
-    ahead: float,
-    own: float,
-    t: float,
-    dt: float,
-    p: P,
-) -> None:
+def note_piece(record: Any, variant: int, piece: tuple[float, ...], p: P) -> None:
     """Add what a smooth piece costs, and the work of driving forces along it, by Simpson's rule.
 
     Parameters
     ----------
-    u, v
-        At its beginning, time `t`.
-    ahead, own
-        Position and velocity at its end.
+    piece
+        Position and velocity at its beginning, and at its end; time at its beginning, and its length.
     """
+    stats, _, case = record
+    u, v, ahead, own, t, dt = piece
     stats[case, LOST] = stats[case, LOST] + spent(u, ahead)
     if WORK:
         middle, speed = leap(variant, u, v, t, 0.5 * dt, p)
@@ -252,19 +201,14 @@ def landing(variant: int, u: float, v: float, t: float, left: float, p: P) -> fl
 
 @called
 def note_event(
-    stats: Any,
-    counts: Any,
-    case: int,
-    t: float,
-    grid: float,
-    u: float,
-    before: float,
-    after: float,
+    record: Any, t: float, grid: float, u: float, before: float, after: float, cost: float
 ) -> None:
     """Write the event at time `t`, where the member came to rest there, and the peak or trough that it is.
 
     A member that rests and then leaves the way it came has turned where it came to rest.
     """
+    stats, counts, case = record
+    stats[case, LOST] = stats[case, LOST] + cost
     since, point = t, grid
     if before == 0.0:
         since, point, before = stats[case, REST_TIME], stats[case, HALTED_GRID], stats[case, HALTED]

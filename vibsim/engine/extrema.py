@@ -19,19 +19,11 @@ from typing import Any
 from vibsim.engine.kernel_stubs import called
 
 # Rows of `kept` for peaks; those of troughs follow in the same order.
-TIME = 0
-HEIGHT = 1
-TIME_GRID = 2
-HEIGHT_GRID = 3
-OF_A_KIND = 4
-N_KEPT = 8
+TIME, HEIGHT, TIME_GRID, HEIGHT_GRID, OF_A_KIND = range(5)
+N_KEPT = 2 * OF_A_KIND
 
-# Columns of `counts`, behind those of `vibsim.engine.gather`.
-PEAK_COUNT = 3
-TROUGH_COUNT = 4
-PLATEAU_STEP = 5
-PLATEAU_SIDE = 6
-N_COUNTS_KEPT = 7
+# Columns of `counts`, behind those of `vibsim.engine.gather`; troughs are counted behind peaks.
+PEAK_COUNT, TROUGH_COUNT, PLATEAU_STEP, PLATEAU_SIDE, N_COUNTS_KEPT = range(3, 8)
 
 
 def is_turned(behind: float, middle: float, ahead: float) -> bool:
@@ -44,14 +36,7 @@ def is_turned(behind: float, middle: float, ahead: float) -> bool:
 
 @called
 def note_turned(
-    kept: Any,
-    counts: Any,
-    case: int,
-    n: int,
-    dt: float,
-    behind: float,
-    middle: float,
-    ahead: float,
+    kept: Any, counts: Any, case: int, n: int, dt: float, behind: float, middle: float, ahead: float
 ) -> None:
     """Write the extremum at step `n`, if there is one, or where a plateau begins there.
 
@@ -68,10 +53,11 @@ def note_turned(
         side = counts[case, PLATEAU_SIDE]
         first = counts[case, PLATEAU_STEP]
         counts[case, PLATEAU_SIDE] = 0
-        if side > 0 and ahead < middle:
-            note_level(kept, counts, case, PEAK_COUNT, 0, first, n, dt, middle, ahead)
-        if side < 0 and ahead > middle:
-            note_level(kept, counts, case, TROUGH_COUNT, OF_A_KIND, first, n, dt, middle, ahead)
+        if (side > 0 and ahead < middle) or (side < 0 and ahead > middle):
+            # of two points the parabola has a height
+            height = middle + (0.125 * (middle - ahead) if n - first == 1 else 0.0)
+            kind = 0 if side > 0 else 1
+            keep(kept, counts, case, kind, 0.5 * (first + n) * dt, height, first * dt, middle)
     elif ahead == middle:
         counts[case, PLATEAU_STEP] = n
         counts[case, PLATEAU_SIDE] = 1 if behind < middle else -1
@@ -79,46 +65,18 @@ def note_turned(
         left, right = middle - behind, middle - ahead
         share = 0.5 * ((left - right) / (left + right))
         time, height = (n + share) * dt, middle + 0.25 * (left - right) * share
-        if left > 0.0:
-            keep(kept, counts, case, PEAK_COUNT, 0, time, height, n * dt, middle)
-        else:
-            keep(kept, counts, case, TROUGH_COUNT, OF_A_KIND, time, height, n * dt, middle)
-
-
-def note_level(
-    kept: Any,
-    counts: Any,
-    case: int,
-    count: int,
-    row: int,
-    first: int,
-    last: int,
-    dt: float,
-    middle: float,
-    ahead: float,
-) -> None:
-    """Write the extremum of a plateau from step `first` to step `last`; of two points the parabola has a height."""
-    rise = 0.125 * (middle - ahead) if last - first == 1 else 0.0
-    time = 0.5 * (first + last) * dt
-    keep(kept, counts, case, count, row, time, middle + rise, first * dt, middle)
+        keep(kept, counts, case, 0 if left > 0.0 else 1, time, height, n * dt, middle)
 
 
 def keep(
-    kept: Any,
-    counts: Any,
-    case: int,
-    count: int,
-    row: int,
-    time: float,
-    height: float,
-    time_grid: float,
-    height_grid: float,
+    kept: Any, counts: Any, case: int, kind: int, t: float, u: float, t_grid: float, u_grid: float
 ) -> None:
-    """Count an extremum, and write it where there is room."""
-    place = counts[case, count]
+    """Count a peak (`kind` 0) or a trough (1), and write it where there is room."""
+    place = counts[case, PEAK_COUNT + kind]
     if place < kept.shape[2]:
-        kept[row + TIME, case, place] = time
-        kept[row + HEIGHT, case, place] = height
-        kept[row + TIME_GRID, case, place] = time_grid
-        kept[row + HEIGHT_GRID, case, place] = height_grid
-    counts[case, count] += 1
+        row = OF_A_KIND * kind
+        kept[row + TIME, case, place] = t
+        kept[row + HEIGHT, case, place] = u
+        kept[row + TIME_GRID, case, place] = t_grid
+        kept[row + HEIGHT_GRID, case, place] = u_grid
+    counts[case, PEAK_COUNT + kind] += 1

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from inspect import signature
+from typing import Any
 
 from vibsim import formula as expression
 from vibsim.core.errors import SimulationError
 from vibsim.elementary import ELEMENTARY
-from vibsim.engine.lookup import looked_up
 from vibsim.engine.text import Module, collect
 from vibsim.formula import Binary, Call, Compare, Expression, Name, Number
 from vibsim.models import Model
 from vibsim.models.base import Formula, parameter_names, tree
 from vibsim.models.events import Friction, Impact
-from vibsim.models.table import BEND, HEIGHT
+from vibsim.models.table import BEND, BENDS, HEADER, HEIGHT, HEIGHTS
 from vibsim.schemes.base import Stepper
 
 MOST_INLINE = 64
@@ -120,8 +121,7 @@ def put_energy_with(module: Module, model: Model) -> None:
     line = "kinetic = kinetic_energy(u, v, t, p)"
     if set(model.velocities) & set(expression.names_in(potential)):
         line = "kinetic, potential = energies(u, v, t, p)"
-    head = "@compiled\ndef energy_with(u, v, t, p, potential):"
-    module.put("energy_with", f"{head}\n    {line}\n    return kinetic + potential")
+    module.define("energy_with(u, v, t, p, potential)", line, "return kinetic + potential")
 
 
 def marked(model: Model) -> Callable[[Formula], Expression]:
@@ -157,6 +157,11 @@ def put_functions(
     """
     names = parameter_names(model)
     unpack = [f"{name}{_MARK} = p[{i}]" for i, name in enumerate(names)]
+    arguments = f"{model.position}, {model.velocity}, t, p"
+    if model.coordinates > 1:
+        arguments = "_u, _v, t, p"
+        values = ", ".join(f"_{name}[{k}]" for name in "uv" for k in range(model.coordinates))
+        unpack.insert(0, f"{', '.join((*model.positions, *model.velocities))} = {values}")
     for function, results in formulas.items():
         lines = list(unpack)
         if model.events is not None and function in ("acceleration", "slopes"):
@@ -169,16 +174,7 @@ def put_functions(
                 lines.append(f"{result} = {result} * p[{len(names) + n_between(model)}]")
         returned = ", ".join(results)
         lines.append(f"return ({returned},)" if always_tuple else f"return {returned}")
-        module.put(function + suffix, _head(model, function + suffix) + "\n    ".join(lines))
-
-
-def _head(model: Model, function: str) -> str:
-    """Return the first lines of a function, which name the states; several coordinates come as two tuples."""
-    if model.coordinates == 1:
-        return f"@compiled\ndef {function}({model.position}, {model.velocity}, t, p):\n    "
-    names = ", ".join((*model.positions, *model.velocities))
-    values = ", ".join(f"_{name}[{k}]" for name in ("u", "v") for k in range(model.coordinates))
-    return f"@compiled\ndef {function}(_u, _v, t, p):\n    {names} = {values}\n    "
+        module.define(f"{function}{suffix}({arguments})", *lines)
 
 
 def _looking_up(module: Module, model: Model, formulas: Iterable[Expression]) -> list[str]:
@@ -191,6 +187,29 @@ def _looking_up(module: Module, model: Model, formulas: Iterable[Expression]) ->
     return [*place, f"{HEIGHT}, {BEND} = looked_up(p[{len(model.parameters)}], _place)"]
 
 
+def looked_up(rows: Any, x: float) -> tuple[float, float]:
+    """Return height and second derivative of a table at the place x, which lies within it (`vibsim.models.table`).
+
+    The table is one array that all members share. It stands among the parameters of a member, behind its numbers, so
+    that no number of it is in the text of a kernel. A place lies between points of its own for every member, which
+    vector instructions cannot fetch together: such models are not stepped in blocks.
+
+    Parameters
+    ----------
+    rows
+        `vibsim.models.table.Table.rows`; behind its ends the last pieces go on.
+    """
+    spacing = float(rows[HEADER, 1])
+    way = (x - float(rows[HEADER, 0])) / spacing
+    i = min(max(math.floor(way), 0), rows.shape[1] - 2)
+    w = way - i
+    h_0, h_1 = float(rows[HEIGHTS, i]), float(rows[HEIGHTS, i + 1])
+    q_0, q_1 = float(rows[BENDS, i]), float(rows[BENDS, i + 1])
+    line = (1.0 - w) * h_0 + w * h_1
+    bow = w * (1.0 - w) * ((2.0 - w) * q_0 + (1.0 + w) * q_1)
+    return line - spacing * spacing / 6.0 * bow, (1.0 - w) * q_0 + w * q_1
+
+
 def put_parameters(module: Module, model: Model, more: int = 0, *, tabulated: bool = False) -> None:
     """Write what makes the parameters of a member a tuple, with `more` numbers and a table behind them."""
     first = len(model.parameters)
@@ -200,8 +219,7 @@ def put_parameters(module: Module, model: Model, more: int = 0, *, tabulated: bo
     values = ", ".join(places) or "0.0"
     if tabulated:
         values += f", parameters[case, {count}:]"
-    text = f"@compiled\ndef parameters_of(parameters, table, case):\n    return ({values},)"
-    module.put("parameters_of", text)
+    module.define("parameters_of(parameters, table, case)", f"return ({values},)")
 
 
 def _of_events(

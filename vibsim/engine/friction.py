@@ -6,7 +6,10 @@ these functions; they know the model by ``drive`` and ``limit``.
 
 from __future__ import annotations
 
-from vibsim.engine.kernel_stubs import P, drive, limit, mode_of
+from vibsim.engine.kernel_stubs import P, unbound
+
+# bound by the kernel (`vibsim.engine.kernel_stubs`)
+drive = limit = mode_of = unbound
 
 
 def slip(u: float, t: float, p: P) -> float:

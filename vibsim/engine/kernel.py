@@ -16,7 +16,7 @@ from typing import Any
 
 from vibsim.core.errors import SimulationError
 from vibsim.elementary import primitives
-from vibsim.engine import block_loop, friction, gather, impact, member_loop, observe, rows, system
+from vibsim.engine import block_loop, coordinates, friction, gather, impact, member_loop, rows
 from vibsim.engine.formulas import (
     marked,
     n_between,
@@ -43,15 +43,10 @@ def compiled(function):
 called = entry = compiled
 """
 
-_FULL_STEP = """\
-@compiled
-def step_fast(state, t, dt, p):
-    return step(state, t, dt, p)"""
-
 _STEPPING = "f2 f2 f2 f1 i i i i i i f f3 f2 i2 f3 f1"
-"""Arguments of `vibsim.engine.member_loop.run`, as `vibsim.engine.entry` writes them."""
+"""Arguments of `vibsim.engine.member_loop.run`, as `vibsim.native.linking.link` has them."""
 _OBSERVING = "f2 f2 f1 i i f3 f3"
-"""Arguments of `vibsim.engine.observe.run`."""
+"""Arguments of `vibsim.engine.member_loop.observe`."""
 
 
 @cache
@@ -81,32 +76,31 @@ def kernel(
     SimulationError
         Where the kernel cannot be compiled, or a model that has events or looks a table up is to be stepped in blocks.
     """
-    if lane == "blocks" and model.lookup is not None:
-        raise SimulationError(
-            f"{model.kind} looks a table up, at places of each member's own: no block of members does"
-        )
-    if lane == "blocks" and model.events is not None:
-        raise SimulationError(
-            f"{model.kind} has events, at times of each member's own: no block of members has them"
-        )
-    if lane == "blocks" and model.coordinates > 1:
-        raise SimulationError(f"{model.kind} has several coordinates: no block of members has them")
+    if lane == "blocks":
+        for reason, holds in (
+            ("looks a table up, at places of each member's own", model.lookup is not None),
+            ("has events, at times of each member's own", model.events is not None),
+            ("has several coordinates", model.coordinates > 1),
+        ):
+            if holds:
+                which = "has them" if "has" in reason else "does"
+                raise SimulationError(f"{model.kind} {reason}: no block of members {which}")
     text = source(model, stepper, lane, with_gathered, with_series, with_peaks)
     return _in_lane(text, lane, _STEPPING)
 
 
 @cache
 def observer(model: Model, formulas: tuple[Formula, ...], lane: str) -> Kernel:
-    """Return the function that works out formulas of samples (`vibsim.engine.observe.run`)."""
+    """Return the function that works out formulas of samples (`vibsim.engine.member_loop.observe`)."""
     count = model.coordinates
     module = _module(lane, {"SYSTEM": count > 1})
     if count > 1:
-        system.put_moves(module, count)
+        coordinates.put_moves(module, count)
     put = marked(model)
     results = {f"_value_{i}": put(formula) for i, formula in enumerate(formulas)}
     put_functions(module, model, "", {"observed": results}, always_tuple=True)
     put_parameters(module, model)
-    collect(module, observe.run, "kernel", {})
+    collect(module, member_loop.observe, "kernel", {})
     return _in_lane(module.text, lane, _OBSERVING)
 
 
@@ -150,22 +144,30 @@ def source(
     if again:
         put_energy_with(module, model)
     if count > 1:
-        system.put_scheme(module, stepper, count)
+        coordinates.put_scheme(module, stepper, count)
     else:
-        _put_scheme(module, model, stepper)
+        if stepper.scaling is None:
+            collect(module, stepper.start, "start", {})
+        else:
+            collect(module, stepper.start, "start_unscaled", {})
+            line = "return start_unscaled(variant, u, v * p[-1], dt, p)"
+            module.define("start(variant, u, v, dt, p)", line)
+        if model.events is not None:
+            _put_events(module, model, stepper)
+        collect(module, stepper.step, "step", {})
+        collect(module, stepper.backward, "backward", {})
     if lane == "blocks":
         put_formulas(module, model, "_fast", stepper, with_work=with_work)
         functions = (n for n, v in stepper.step.__globals__.items() if isinstance(v, FunctionType))
         renamed = {name: f"{name}_fast" for name in (*HANDED, *functions)}
         if stepper.implicit:
             # where an iteration ends is a comparison, which would hide the NaN of a fast function out of its range
-            module.put("step_fast", _FULL_STEP)
+            module.define("step_fast(state, t, dt, p)", "return step(state, t, dt, p)")
         elif settings["STAGED"]:
             rows.put_stages(module, stepper, renamed, settings)
         else:
             collect(module, stepper.step, "step_fast", renamed)
-        for name, text in rows.texts(states, parameters, settings).items():
-            module.put(name, text)
+        rows.put_rows(module, states, parameters, settings)
     collect(module, block_loop.run if lane == "blocks" else member_loop.run, "kernel", {})
     return module.text
 
@@ -181,48 +183,17 @@ def carried(stepper: Stepper, model: Model) -> int:
 def _put_events(module: Module, model: Model, stepper: Stepper) -> None:
     """Write what tells modes apart, and the events of the model."""
     first = len(model.parameters)
-    count = n_parameters(stepper, model) + n_between(model)
-    places = [f"p[{i}]" for i in range(count)]
+    places = [f"p[{i}]" for i in range(n_parameters(stepper, model) + n_between(model))]
     places[first : first + 2] = ["mode", "start"]
-    module.put("mode_of", f"@compiled\ndef mode_of(p):\n    return p[{first}]")
-    module.put("start_of", f"@compiled\ndef start_of(p):\n    return p[{first + 1}]")
-    text = f"@compiled\ndef with_mode(p, mode, start):\n    return ({', '.join(places)},)"
-    module.put("with_mode", text)
+    module.define("mode_of(p)", f"return p[{first}]")
+    module.define("start_of(p)", f"return p[{first + 1}]")
+    module.define("with_mode(p, mode, start)", f"return ({', '.join(places)},)")
     collect(module, stepper.step, "step", {})
     kind = friction if isinstance(model.events, Friction) else impact
-    for name in (
-        "first_mode",
-        "guard",
-        "guard_on_mesh",
-        "landed",
-        "settled",
-        "turning",
-        "spent",
-        "lost",
-    ):
+    for name in ("first_mode", "guard", "guard_on_mesh", "landed", "settled"):
         collect(module, getattr(kind, name), name, {})
-
-
-def _put_scheme(module: Module, model: Model, stepper: Stepper) -> None:
-    """Write start, step and one-sided velocity of a scheme, and the events of the model."""
-    _put_start(module, stepper)
-    if model.events is not None:
-        _put_events(module, model, stepper)
-    for name in ("step", "backward"):
-        collect(module, getattr(stepper, name), name, {})
-
-
-def _put_start(module: Module, stepper: Stepper) -> None:
-    """Write the start, for which `Stepper.scaling` multiplies the initial velocity."""
-    if stepper.scaling is None:
-        collect(module, stepper.start, "start", {})
-        return
-    collect(module, stepper.start, "start_unscaled", {})
-    module.put(
-        "start",
-        "@compiled\ndef start(variant, u, v, dt, p):\n"
-        "    return start_unscaled(variant, u, v * p[-1], dt, p)",
-    )
+    for name in ("turning", "spent", "lost"):
+        collect(module, getattr(kind, name), name, {})
 
 
 def _module(lane: str, settings: Mapping[str, object]) -> Module:

@@ -11,7 +11,6 @@ import hashlib
 from collections.abc import Callable
 
 from vibsim.core import private_cache
-from vibsim.engine.entry import bind
 
 Kernel = Callable[..., None]
 
@@ -25,7 +24,7 @@ def load(text: str, kinds: str) -> Kernel:
     Parameters
     ----------
     kinds
-        Kinds of its arguments (`vibsim.engine.entry`).
+        Kinds of its arguments (`vibsim.native.linking.link`).
 
     Raises
     ------
@@ -35,20 +34,15 @@ def load(text: str, kinds: str) -> Kernel:
     # what only plans, analyses or draws needs no LLVM
     from vibsim.native.linking import identity, link
 
-    key = "\n".join((text, kinds, identity()))
-    name = hashlib.sha256(key.encode()).hexdigest()
+    name = hashlib.sha256("\n".join((text, kinds, identity())).encode()).hexdigest()
 
     def make() -> bytes:
+        # what finds its kernel needs no compiler
+        from vibsim.native.machine import machine_code
+
         if folder := private_cache.opened("kernels"):
             folder.put(f"{name}.py", text.encode())
-        return _compile(text, kinds)
+        return machine_code(text, ENTRY, kinds)
 
     code = private_cache.kept("kernels", f"{name}.o", make, bytes, bytes)
-    return bind(link(code, ENTRY), kinds)
-
-
-def _compile(text: str, kinds: str) -> bytes:
-    # what finds its kernel needs no compiler
-    from vibsim.native.machine import machine_code
-
-    return machine_code(text, ENTRY, kinds)
+    return link(code, ENTRY, kinds)

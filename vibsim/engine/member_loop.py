@@ -33,30 +33,13 @@ from vibsim.engine.gather import (
     note_events,
     note_extrema,
 )
-from vibsim.engine.kernel_stubs import (
-    COORDINATES,
-    D2T,
-    EVENTS,
-    GATHER,
-    KEEP,
-    SERIES,
-    STAGGERED,
-    SYSTEM,
-    WORK,
-    backward,
-    energies,
-    energy_with,
-    first_further,
-    initial_of,
-    mode_of,
-    next_further,
-    note_further,
-    parameters_of,
-    powers,
-    size_of,
-    start,
-    step,
-)
+from vibsim.engine.kernel_stubs import unbound
+
+# bound by the kernel (`vibsim.engine.kernel_stubs`)
+D2T = EVENTS = GATHER = KEEP = SERIES = STAGGERED = SYSTEM = WORK = True
+COORDINATES = 1
+backward = energies = energy_with = first_further = initial_of = mode_of = next_further = unbound
+note_further = observed = parameters_of = point_of = powers = size_of = start = step = unbound
 
 
 def run(
@@ -84,7 +67,7 @@ def run(
     parameters, initial, dt
         Shapes (case, n_parameters), (case, state) with positions and then velocities, and (case,).
     table
-        What formulas look up (`vibsim.engine.lookup`), shape (row, point); empty where they do not.
+        What formulas look up (`vibsim.models.table`), shape (row, point); empty where they do not.
     steps, every
         Number of steps; a sample is stored at each multiple of `every`, which divides `steps`.
     variant
@@ -159,9 +142,8 @@ def run(
                 u_two_before = u_before
             u_before, q_before, w_two_before, w_before = u, q, w_before, w
             if EVENTS:
-                q, following, own, p, passes = passed(
-                    stats, counts, case, variant, n, h, q, w_before, state, p
-                )
+                record = stats, counts, case
+                q, following, own, p, passes = passed(record, variant, n, h, q, w_before, state, p)
                 last_event = n if passes > 0 else last_event
             else:
                 q = state[0]
@@ -200,9 +182,8 @@ def run(
                 if SYSTEM:
                     further = next_further(further, q, w)
                 if is_event(turn, bottom, slope_before, u, slope):
-                    bottom = note_events(
-                        stats, counts, case, t, h, turn, bottom, u_before, slope_before, u, slope
-                    )
+                    points = (t, h, u_before, slope_before, u, slope)
+                    bottom = note_events(stats, counts, case, turn, bottom, points)
             if WORK:
                 if EVENTS:
                     driven = stats[case, DONE]
@@ -245,9 +226,41 @@ def run(
         if GATHER:
             # of a member that failed, all points came before the last one
             interior = interior if good == steps else extrema[LARGEST_DEVIATION]
-            note_extrema(stats, case, 0, extrema, interior, h)
+            note_extrema(stats, case, 0, extrema, interior)
             if SYSTEM:
-                note_further(stats, case, further, h)
+                note_further(stats, case, further)
         if D2T:
             note_d2t(stats, samples, case, good, every, largest_d2t)
         counts[case, LAST_STEP] = good
+
+
+def observe(
+    parameters: Any, table: Any, dt: Any, every: int, first: int, samples: Any, found: Any
+) -> None:
+    """Fill `found` with formulas of stored samples, for as many members as it has from member `first` on.
+
+    Parameters
+    ----------
+    parameters
+        Shape (case, n_parameters).
+    table
+        What formulas look up, shape (row, point); empty where they do not.
+    dt, every
+        Step of each member, shape (case,), and steps between samples.
+    samples
+        All positions and all velocities, shape (state, case, n_samples).
+    found
+        A row of each formula, shape (formula, members, n_samples); NaN where the samples are.
+    """
+    for member in range(found.shape[1]):
+        case = first + member
+        p = parameters_of(parameters, table, case)
+        for k in range(found.shape[2]):
+            if SYSTEM:
+                u, v = point_of(samples, case, k)
+            else:
+                u = float(samples[0, case, k])
+                v = float(samples[1, case, k])
+            values = observed(u, v, (k * every) * float(dt[case]), p)
+            for i in range(found.shape[0]):
+                found[i, member, k] = values[i]

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vibsim.engine import events, extrema, gather
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from vibsim.core.array_types import Floats, Integers
+from vibsim.engine import gather
 
 
 @dataclass(frozen=True)
@@ -45,7 +41,7 @@ class Gathered:
 class Extrema:
     """Local extrema of the position (`vibsim.engine.extrema`); the first of each kind in order of time, NaN behind.
 
-    Arrays have the shape (case, extremum), the counts (case,).
+    Arrays have the shape (case, extremum), the counts (case,); in the order of the rows that kernels fill.
     """
 
     peak_time: Floats
@@ -121,17 +117,7 @@ class Trajectories:
         return np.asarray(self.states[len(self.states) // 2])
 
 
-def _columns(coordinates: int, position: Sequence[int], velocity: Sequence[int]) -> Integers:
-    """Return the columns of what is gathered of every state, shape (state, number)."""
-    firsts = gather.N_STATS * np.arange(coordinates)[:, None]
-    return np.concatenate([firsts + np.array(position), firsts + np.array(velocity)])
-
-
-_RANGES = (gather.POSITION_MIN, gather.POSITION_MAX), (gather.VELOCITY_MIN, gather.VELOCITY_MAX)
-_NORMS = (gather.POSITION_L1, gather.POSITION_L2), (gather.VELOCITY_L1, gather.VELOCITY_L2)
-
-
-def gathered_of(stats: Floats, counts: Integers, coordinates: int) -> Gathered:
+def gathered_of(stats: Floats, counts: Integers, dt: Floats, coordinates: int) -> Gathered:
     """Name what a kernel gathered: shapes (case, column of `vibsim.engine.gather`)."""
     peaks, turns = counts[:, gather.PEAKS] - 1, counts[:, gather.TURNS] - 1
     spinning = turns > 0
@@ -141,12 +127,21 @@ def gathered_of(stats: Floats, counts: Integers, coordinates: int) -> Gathered:
         span = np.where(intervals > 0, stats[:, last] - stats[:, first], np.nan)
         return np.asarray(span / np.maximum(intervals, 1))
 
+    def of_states(first: int) -> Floats:
+        """Return two columns of the position and two of the velocity of every coordinate, shape (case, state, 2)."""
+        columns = gather.N_STATS * np.arange(coordinates)[:, None] + first + np.arange(4)
+        found = stats[:, columns].reshape(len(stats), coordinates, 2, 2)
+        return found.swapaxes(1, 2).reshape(len(stats), 2 * coordinates, 2)
+
     of_turn = mean_time(gather.FIRST_TURN_TIME, gather.LAST_TURN_TIME, turns)
     of_peak = mean_time(gather.FIRST_PEAK_TIME, gather.LAST_PEAK_TIME, peaks)
     on_grid = mean_time(gather.FIRST_PEAK_TIME_GRID, gather.LAST_PEAK_TIME_GRID, peaks)
+    # l1 = dt sum |u|, l2 = sqrt(dt sum u^2) over every point from t = 0 on (B, section 4.4)
+    norms = dt[:, None, None] * of_states(gather.POSITION_SUM)
+    norms[..., 1] = np.sqrt(norms[..., 1])
     return Gathered(
-        ranges=stats[:, _columns(coordinates, *_RANGES)],
-        norms=stats[:, _columns(coordinates, *_NORMS)],
+        ranges=of_states(gather.POSITION_MIN),
+        norms=norms,
         deviation=stats[:, gather.DEVIATION],
         deviation_interior=stats[:, gather.DEVIATION_INTERIOR],
         period=np.where(spinning, of_turn, of_peak),
@@ -161,53 +156,24 @@ def gathered_of(stats: Floats, counts: Integers, coordinates: int) -> Gathered:
     )
 
 
-def events_of(stats: Floats) -> EventTimes:
-    """Name what a kernel gathered of events."""
-    return EventTimes(
-        event_count=stats[:, events.EVENT_COUNT],
-        first_event_time=stats[:, events.FIRST_EVENT],
-        last_event_time=stats[:, events.LAST_EVENT],
-        rest_time=stats[:, events.REST_TIME],
-    )
-
-
 def series_of(samples: Floats, coordinates: int, with_work: bool, with_events: bool) -> Series:
     """Name the rows of samples behind the states: shape (row, case, n_samples)."""
     rows = gather.sample_rows(coordinates)
+    # rows that a scheme has no use for are left out at the end
     nothing = np.broadcast_to(np.nan, samples.shape[1:])
-
-    def row(number: int) -> Floats:
-        return samples[number] if number < len(samples) else nothing
-
+    found = [*samples, *[nothing] * (rows["LOST_ROW"] + 1 - len(samples))]
     first = rows["VELOCITY_D2T_ROW"]
-    velocities = [row(first + i) for i in range(coordinates)]
+    velocities = found[first : first + coordinates]
     return Series(
-        deviation_running=row(rows["RUNNING_ROW"]),
+        deviation_running=found[rows["RUNNING_ROW"]],
         velocities_d2t=np.stack(velocities, 1) if coordinates > 1 else velocities[0][:, None],
-        deviation_d2t_running=_storable(row(rows["RUNNING_D2T_ROW"])),
-        dissipated=samples[rows["DISSIPATED_ROW"]] if with_work else None,
-        driven=samples[rows["DRIVEN_ROW"]] if with_work else None,
-        lost=samples[rows["LOST_ROW"]] if with_work and with_events else None,
+        deviation_d2t_running=_storable(found[rows["RUNNING_D2T_ROW"]]),
+        dissipated=found[rows["DISSIPATED_ROW"]] if with_work else None,
+        driven=found[rows["DRIVEN_ROW"]] if with_work else None,
+        lost=found[rows["LOST_ROW"]] if with_work and with_events else None,
     )
 
 
 def _storable(energy: Floats) -> Floats:
     """Return NaN for an energy that is too large: ``[D_2t u]`` may be so where neither point has failed."""
     return np.where(np.isfinite(energy), energy, np.nan)
-
-
-def extrema_of(kept: Floats, counts: Integers) -> Extrema:
-    """Name what a kernel kept of every peak and trough: shape (row, case, extremum)."""
-    trough = kept[extrema.OF_A_KIND :]
-    return Extrema(
-        peak_time=kept[extrema.TIME],
-        peak=kept[extrema.HEIGHT],
-        peak_time_grid=kept[extrema.TIME_GRID],
-        peak_grid=kept[extrema.HEIGHT_GRID],
-        trough_time=trough[extrema.TIME],
-        trough=trough[extrema.HEIGHT],
-        trough_time_grid=trough[extrema.TIME_GRID],
-        trough_grid=trough[extrema.HEIGHT_GRID],
-        peak_count=counts[:, extrema.PEAK_COUNT],
-        trough_count=counts[:, extrema.TROUGH_COUNT],
-    )

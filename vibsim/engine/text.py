@@ -47,6 +47,11 @@ class Module:
         if self.parts.setdefault(name, text) != text:
             raise SimulationError(f"{name} means two things in one kernel")
 
+    def define(self, head: str, *lines: str) -> None:
+        """Add a function with these lines, which becomes part of its callers."""
+        body = "\n    ".join(lines)
+        self.put(head.partition("(")[0], f"@compiled\ndef {head}:\n    {body}")
+
 
 def collect(
     module: Module,

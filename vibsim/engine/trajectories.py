@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vibsim.core.array_types import Floats
 from vibsim.engine import block_loop, events, extrema, gather, results
 from vibsim.engine.kernel import carried, kernel, observer
 from vibsim.engine.results import Trajectories
@@ -18,9 +16,6 @@ from vibsim.models import Model, has_budget
 from vibsim.models.base import Formula
 from vibsim.schemes import Scheme
 from vibsim.schemes.base import END_RULES, Options, Stepper
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 TASK = 16 * block_loop.LANES
 """Members that a thread takes at a time."""
@@ -87,106 +82,64 @@ def integrate(
     members, count = len(dt), model.coordinates
     _check_shapes(model, parameters, initial, members)
     stepper = scheme.stepper_for(model, options)
-    alone = stepper.implicit or model.events is not None or count > 1 or model.lookup is not None
+    has_events, has_work = model.events is not None, has_budget(model)
+    alone = stepper.implicit or has_events or count > 1 or model.lookup is not None
     lane = lane or lane_for(members, steps, implicit=alone)
     run = kernel(model, stepper, lane, with_gathered, with_series, n_extrema > 0)
-    has_events, has_work = model.events is not None, has_budget(model)
-    room = _Room.empty(
-        model,
-        members,
-        steps // every + 1,
-        rows=gather.n_sample_rows(
-            count,
-            with_series=with_series,
-            own_velocity=stepper.own_velocity,
-            with_work=has_work,
-            with_events=has_events,
-        ),
-        with_gathered=with_gathered,
-        n_extrema=n_extrema,
-    )
+
+    # what a kernel fills; numbers are NaN until they are known
+    rows = gather.sample_rows(count)
+    last_row = "RUNNING_D2T_ROW" if stepper.own_velocity else "RUNNING_ROW"
+    if has_work:
+        last_row = "LOST_ROW" if has_events else "DRIVEN_ROW"
+    n_rows = rows[last_row] + 1 if with_series else 2 * count
+    columns = events.N_STATS_EVENTS if has_events else count * gather.N_STATS
+    samples = np.full((n_rows, members, steps // every + 1), np.nan)
+    stats = np.full((members, columns if with_gathered else 0), np.nan)
+    n_counts = extrema.N_COUNTS_KEPT if n_extrema else gather.N_COUNTS
+    counts = np.zeros((members, n_counts), dtype=np.int64)
+    kept = np.full((extrema.N_KEPT, members if n_extrema else 0, n_extrema), np.nan)
+
     parameters = _scaled(model, stepper, parameters, dt)
-    arrays = (parameters, _table(model), initial, dt)
-    numbers = [np.ascontiguousarray(array, dtype=float) for array in arrays]
-    scratch = (
-        _scratch(model, stepper, parameters.shape[1], n_extrema > 0) if lane == "blocks" else 0
-    )
+    numbers = _contiguous(parameters, _table(model), initial, dt)
+    scratch = 0
+    if lane == "blocks":
+        states, n_kept = carried(stepper, model), len(kept_names(stepper.step))
+        number_of = block_loop.row_numbers(states, parameters.shape[1], n_extrema > 0)
+        scratch = (number_of["FIRST_KEPT"] + n_kept) * block_loop.LANES
     settings = steps, every, stepper.variant, END_RULES.index(stepper.end), model.turn or 0.0
 
     def task(first: int) -> None:
         stop = min(first + (TASK if threads > 1 else members), members)
-        run(*numbers, first, stop, *settings, *room.arrays, _aligned(scratch))
+        run(*numbers, first, stop, *settings, samples, stats, counts, kept, _aligned(scratch))
 
-    _share(task, range(0, members, TASK) if threads > 1 else range(1), threads)
-    series = results.series_of(room.samples, count, has_work, has_events) if with_series else None
+    if threads == 1:
+        task(0)
+    else:
+        # kernels let go of the interpreter
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(task, range(0, members, TASK)))
+    found = counts[:, [extrema.PEAK_COUNT, extrema.TROUGH_COUNT]].T if n_extrema else ()
+    of_events = stats[:, events.EVENT_COUNT : events.REST_TIME + 1].T
     return Trajectories(
-        states=room.samples[: 2 * count],
-        last_step=room.counts[:, gather.LAST_STEP],
-        gathered=results.gathered_of(room.stats, room.counts, count) if with_gathered else None,
-        series=series,
-        extrema=results.extrema_of(room.kept, room.counts) if n_extrema else None,
-        events=results.events_of(room.stats) if has_events and with_gathered else None,
+        states=samples[: 2 * count],
+        last_step=counts[:, gather.LAST_STEP],
+        gathered=results.gathered_of(stats, counts, numbers[3], count) if with_gathered else None,
+        series=results.series_of(samples, count, has_work, has_events) if with_series else None,
+        extrema=results.Extrema(*kept, *found) if n_extrema else None,
+        events=results.EventTimes(*of_events) if has_events and with_gathered else None,
     )
 
 
-@dataclass(frozen=True)
-class _Room:
-    """The arrays that a kernel fills."""
-
-    samples: Floats
-    """Shape (row, case, n_samples)."""
-    stats: Floats
-    """Shape (case, column)."""
-    counts: Integers
-    """Shape (case, column)."""
-    kept: Floats
-    """Shape (row, case, extremum)."""
-
-    @classmethod
-    def empty(
-        cls,
-        model: Model,
-        members: int,
-        n_samples: int,
-        *,
-        rows: int,
-        with_gathered: bool,
-        n_extrema: int,
-    ) -> _Room:
-        """Return room for what is asked for; numbers are NaN until they are known."""
-        of_events = model.events is not None
-        columns = events.N_STATS_EVENTS if of_events else model.coordinates * gather.N_STATS
-        n_counts = extrema.N_COUNTS_KEPT if n_extrema else gather.N_COUNTS
-        return cls(
-            samples=np.full((rows, members, n_samples), np.nan),
-            stats=np.full((members, columns if with_gathered else 0), np.nan),
-            counts=np.zeros((members, n_counts), dtype=np.int64),
-            kept=np.full((extrema.N_KEPT, members if n_extrema else 0, n_extrema), np.nan),
-        )
-
-    @property
-    def arrays(self) -> tuple[Floats, Floats, Integers, Floats]:
-        """In the order in which a kernel takes them."""
-        return self.samples, self.stats, self.counts, self.kept
-
-
 def _check_shapes(model: Model, parameters: Floats, initial: Floats, members: int) -> None:
+    known, wanted = len(model.parameters), (members, len(model.states))
     # what is tabulated stands behind the parameters
-    if parameters.shape[1] < len(model.parameters):
-        known = len(model.parameters)
+    if parameters.shape[1] < known:
         raise ValueError(f"{model.kind} has {known} parameters, not {parameters.shape[1]}")
-    if initial.shape != (members, len(model.states)):
-        wanted = (members, len(model.states))
+    if initial.shape != wanted:
         raise ValueError(
             f"initial values of {model.kind} have the shape {wanted}, not {initial.shape}"
         )
-
-
-def _scratch(model: Model, stepper: Stepper, n_parameters: int, with_peaks: bool) -> int:
-    """Return how many floats of scratch memory a block needs."""
-    n_kept = len(kept_names(stepper.step))
-    n_rows = block_loop.n_rows(carried(stepper, model), n_parameters, with_peaks, n_kept)
-    return n_rows * block_loop.LANES
 
 
 def _scaled(model: Model, stepper: Stepper, parameters: Floats, dt: Floats) -> Floats:
@@ -215,15 +168,8 @@ def _aligned(size: int) -> Floats:
     return room[first : first + size]
 
 
-def _share(task: Callable[[int], None], firsts: Iterable[int], threads: int) -> None:
-    """Do every task, on several threads where that is asked for; kernels let go of the interpreter."""
-    if threads == 1:
-        for first in firsts:
-            task(first)
-        return
-    with ThreadPoolExecutor(threads) as pool:
-        for _ in pool.map(task, firsts):
-            pass
+def _contiguous(*arrays: Floats) -> list[Floats]:
+    return [np.ascontiguousarray(array, dtype=float) for array in arrays]
 
 
 def energies(
@@ -265,9 +211,6 @@ def observed(
     """
     samples = np.ascontiguousarray(states)
     found = np.empty((len(formulas), *samples.shape[1:]))
-    numbers = (
-        np.ascontiguousarray(array, dtype=float) for array in (parameters, _table(model), dt)
-    )
     run = observer(model, formulas, "plain" if lane == "plain" else "scalar")
-    run(*numbers, every, 0, samples, found)
+    run(*_contiguous(parameters, _table(model), dt), every, 0, samples, found)
     return found

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from vibsim.experiment.data import ExperimentSpec
-    from vibsim.models import Model
 
 PLAIN_MEMBER_STEPS = 40_000
 """Member-steps of one scheme up to which plain Python takes less time than a compiled kernel takes to be loaded."""
@@ -196,13 +195,7 @@ def _packed(size: int, extrema: int) -> int:
 
 
 def analysis_memory(loads: Sequence[Load], members: int) -> int:
-    """Return the bytes that an analysis of `members` holds at its peak.
-
-    Parameters
-    ----------
-    loads
-        Of every level.
-    """
+    """Return the bytes that an analysis of `members` holds at its peak; `loads` are those of every level."""
     part = max(1, PART_SAMPLES // (loads[0].samples * loads[0].schemes))
     at_hand = min(members, PARTS * part)
     read = at_hand * sum(load.stored for load in loads)
@@ -213,66 +206,48 @@ def analysis_memory(loads: Sequence[Load], members: int) -> int:
 def analysis_disk(loads: Sequence[Load], members: int, is_lean: bool) -> int:
     """Return the bytes that an analysis of `members` writes, before they are compressed.
 
-    Parameters
-    ----------
-    loads
-        Of every level.
-    members
-        Their number.
-    is_lean
-        Whether series are left out.
+    `loads` are those of every level; `is_lean` tells whether series are left out.
     """
     once, each = COMPARED
-    size = once + each * len(loads)
+    size, file = once + each * len(loads), COMPARED_FILE
     if not is_lean:
         once, each = COMPARED_SERIES
         size += loads[0].samples * (once + each * len(loads))
         size += EXTREMUM * len(loads) * max(load.extrema for load in loads) + COMPARED_NUMBERS
-    file = COMPARED_FILE + (0 if is_lean else COMPARED_SERIES_FILE)
+        file += COMPARED_SERIES_FILE
     return loads[0].schemes * members * size + file
-
-
-def _alone(model: Model) -> float | None:
-    """Return what a step takes of a model whose members are stepped one by one (`vibsim.experiment.cost.work`)."""
-    if model.events is not None:
-        return EVENTFUL
-    return COUPLED if model.coordinates > 1 or model.lookup is not None else None
 
 
 def load_of(experiment: ExperimentSpec, level: int) -> Load:
     """Return what one member of `experiment` costs at `level`."""
-    from vibsim.experiment.storage import extrema_kept, is_bounded, stored_series, stride
+    from vibsim.experiment.storage import extrema_kept, is_bounded, sampling, stored_series
     from vibsim.models import has_solution
     from vibsim.schemes import SCHEMES
+    from vibsim.schemes.adaptive import seconds
 
     model, steps = experiment.model.definition, experiment.steps(level)
     lean = is_bounded(experiment)
-    trajectories = len(experiment.schemes) * experiment.members
-    every = stride(experiment.samples, experiment.steps(experiment.levels[0]), steps, trajectories)
+    # members of such a model are stepped one by one
+    alone = COUPLED if model.coordinates > 1 or model.lookup is not None else None
+    alone = EVENTFUL if model.events is not None else alone
     kinds = [SCHEMES[experiment.schemes[i].kind] for i in experiment.ladder]
-    works = [work(kind.force_evaluations, kind.explicit, _alone(model)) for kind in kinds]
+    works = [work(kind.force_evaluations, kind.explicit, alone) for kind in kinds]
+    # of a member that is not swept
+    turns = experiment.time.end * float(model.natural_frequency(experiment.model.parameters))
+    own = (
+        seconds(scheme.kind, float(scheme.options["tolerance"]), turns / (2.0 * math.pi))
+        for scheme in experiment.schemes
+        if scheme.adaptive
+    )
     return Load(
         schemes=len(experiment.schemes),
         steps=steps,
-        samples=steps // every + 1,
+        samples=steps // sampling(experiment, level) + 1,
         series=len(stored_series(experiment)),
         exact=len(model.states) if has_solution(model) and not lean else 0,
         work=sum(explicit for explicit, _ in works),
         iterated=sum(iterated for _, iterated in works),
-        extrema=0 if lean else extrema_kept(steps, trajectories),
+        extrema=0 if lean else extrema_kept(steps, experiment.trajectories),
         d2t=experiment.own_velocity or not lean,
-        own=_own_seconds(experiment),
-    )
-
-
-def _own_seconds(experiment: ExperimentSpec) -> float:
-    """Return the seconds that schemes which choose their own steps take of a member that is not swept."""
-    from vibsim.schemes.adaptive import seconds
-
-    model = experiment.model.definition
-    turns = experiment.time.end * float(model.natural_frequency(experiment.model.parameters))
-    return sum(
-        seconds(scheme.kind, float(scheme.options["tolerance"]), turns / (2.0 * math.pi))
-        for scheme in experiment.schemes
-        if scheme.adaptive
+        own=sum(own),
     )

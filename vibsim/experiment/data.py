@@ -6,7 +6,7 @@ What reads an experiment or makes another one of it stands above: see `vibsim.ex
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -152,20 +152,24 @@ class Sweep(Section):
         """Number of members."""
         return math.prod(axis.count for axis in self.axes)
 
+    @property
+    def _spans(self) -> Iterator[tuple[str, Any, Any]]:
+        for axis in self.axes:
+            yield from ((key, *span) for key, span in zip(axis.keys, axis.spans, strict=True))
 
-def end_varies(swept: Iterable[tuple[str, bool]], by_periods: bool) -> bool:
-    """Tell whether the end time differs between members.
+    def least_end(self, time: TimeSpec) -> float:
+        """Return the earliest end of a member, as far as the sweep gives it."""
+        ends = (float(low) for key, low, _ in self._spans if key == "time.end")
+        return min(ends, default=time.end)
 
-    Parameters
-    ----------
-    swept
-        Dotted keys of the sweep, each with whether its values differ.
-    by_periods
-        Whether the end is a number of natural periods: it then counts as different as soon as a parameter of the
-        model is.
-    """
-    keys = [key for key, differs in swept if differs]
-    return "time.end" in keys or (by_periods and any(key.startswith("model.") for key in keys))
+    def fixed_end(self, time: TimeSpec) -> float | None:
+        """Return the end that every member has, None where the end varies.
+
+        A number of natural periods counts as different as soon as a parameter of the model is.
+        """
+        differ = [key for key, low, high in self._spans if low != high]
+        by_model = time.periods is not None and any(key.startswith("model.") for key in differ)
+        return None if by_model or "time.end" in differ else self.least_end(time)
 
 
 class ExperimentSpec(Section):
@@ -212,9 +216,8 @@ class ExperimentSpec(Section):
         results hold no path of a machine, and are the same wherever they are made.
         """
         stem = self._file.stem if self._file else self.name
-        word = f"{self.collection}/{stem}"
-        if self.collection == ADHOC:
-            word = self._file.name if self._file else f"{self.name}.yaml"
+        file = self._file.name if self._file else f"{self.name}.yaml"
+        word = file if self.collection == ADHOC else f"{self.collection}/{stem}"
         return word if self.name == stem else f"{word}@{self.name.removeprefix(f'{stem}_case_')}"
 
     @property
@@ -223,11 +226,14 @@ class ExperimentSpec(Section):
         return self.sweep.count if self.sweep else 1
 
     @property
+    def trajectories(self) -> int:
+        """Number of schemes times number of members."""
+        return len(self.schemes) * self.members
+
+    @property
     def end_varies(self) -> bool:
         """Whether the end time differs between members, so that ``t`` is the fraction 0 to 1 of it."""
-        axes = self.sweep.axes if self.sweep else ()
-        swept = (pair for axis in axes for pair in zip(axis.keys, axis.varies, strict=True))
-        return end_varies(swept, self.time.periods is not None)
+        return self.sweep is not None and self.sweep.fixed_end(self.time) is None
 
     @property
     def written(self) -> tuple[Check, ...]:
@@ -250,13 +256,6 @@ class ExperimentSpec(Section):
     def quantities(self) -> tuple[str, ...]:
         """Names of every quantity that is kept as a series where storage is not bounded."""
         return quantities(self.model.definition, self.own_velocity)
-
-    def scheme_options(self, scheme: int) -> Mapping[str, str | float | bool]:
-        """Return the options of scheme number `scheme`, apart from those that are swept.
-
-        `vibsim.plan.option_groups` gives the options of each member.
-        """
-        return self.schemes[scheme].options
 
     def natural_end(self, parameters: Mapping[str, Any]) -> Any:
         """Return the end time of a member with these `parameters` (numbers or arrays), unless swept."""

@@ -7,22 +7,25 @@ from itertools import pairwise
 from typing import Any, TypeVar
 
 from vibsim.core.errors import Fault, InputError
-from vibsim.experiment.data import AnyExperiment, ExperimentSpec, SchemeSpec
+from vibsim.experiment.data import AnyExperiment, SchemeSpec, Sweep
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules import size_limits
-from vibsim.experiment.rules.check_places import Ladder
 from vibsim.experiment.rules.checks import check_published, finish_checks
 from vibsim.experiment.rules.members import update_tables
-from vibsim.experiment.rules.sweep import SweepAxes
-from vibsim.experiment.schema.checks import At, Check, ClaimCheck, ConvergesCheck, ValueCheck
+from vibsim.experiment.schema.checks import (
+    Check,
+    ClaimCheck,
+    ConvergesCheck,
+    PublishedAt,
+    ValueCheck,
+)
 from vibsim.experiment.schema.fields import MAX_LEVEL, FrozenDict
-from vibsim.experiment.schema.published import PublishedAt, PublishedTable, claims
+from vibsim.experiment.schema.published import PublishedTable, claims
 from vibsim.experiment.schema.sweep import as_option
 from vibsim.experiment.sweep_columns import columns
 from vibsim.experiment.yaml.parse import Source
-from vibsim.models import quantities
 
-AnyAt = TypeVar("AnyAt", At, PublishedAt)
+AnyAt = TypeVar("AnyAt", bound=PublishedAt)
 
 
 def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
@@ -42,8 +45,7 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
         name = str(experiment.file or experiment.name)
         rule = f"a case must be from 0 to {members - 1}"
         raise InputError([Fault(name, 0, "", str(case), rule, there)])
-    axes = experiment.sweep.axes if experiment.sweep else ()
-    swept = {key: column[0].item() for key, column in columns(axes, case, case + 1).items()}
+    swept = {key: column[0].item() for key, column in columns(experiment, case, case + 1).items()}
     parameters = _filled(swept, "model", experiment.model.parameters)
     # a term that is 0 for this member alone stays, and with it every bit
     model = experiment.model.model_copy(update={"parameters": parameters})
@@ -55,6 +57,11 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
     # where times are fractions of a member's end, they become times
     unit = end if experiment.end_varies else 1.0
     published = _published_of(experiment.published, case, unit)
+    ours = [check for check in experiment.written if check.measured.member in (None, case)]
+    checks: list[Check] = [_of_member(check, unit) for check in ours]
+    checks += claims(published, experiment.source)
+    positions = model.definition.positions if not checks else ()
+    checks += [ConvergesCheck(id=f"check_{i}", converges=u) for i, u in enumerate(positions, 1)]
     found = experiment.model_copy(
         update={
             "name": f"{experiment.name}_case_{case}",
@@ -63,7 +70,7 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
             "time": experiment.time.model_copy(update={"end": end}),
             "schemes": tuple(_scheme(swept, scheme) for scheme in experiment.schemes),
             "sweep": None,
-            "checks": _checks_of(experiment, published, case, unit),
+            "checks": tuple(checks),
             "published": published,
         }
     )
@@ -71,9 +78,8 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
 
 
 def _filled(swept: dict[str, Any], section: str, values: Mapping[str, Any]) -> FrozenDict:
-    return FrozenDict(
-        {name: swept.get(f"{section}.{name}", value) for name, value in values.items()}
-    )
+    own = ((name, swept.get(f"{section}.{name}", value)) for name, value in values.items())
+    return FrozenDict(own)
 
 
 def _scheme(swept: dict[str, Any], scheme: SchemeSpec) -> SchemeSpec:
@@ -85,36 +91,16 @@ def _scheme(swept: dict[str, Any], scheme: SchemeSpec) -> SchemeSpec:
 def _published_of(
     tables: Sequence[PublishedTable], case: int, unit: float
 ) -> tuple[PublishedTable, ...]:
-    """Return the rows of printed tables that speak of this member or of every one."""
     found = []
     for table in tables:
-        rows = tuple(
-            row.model_copy(update={"at": _at_of_member(row.at, unit)})
-            for row in table.rows
-            if row.at.case in (None, case)
-        )
+        ours = (row for row in table.rows if row.at.case in (None, case))
+        rows = tuple(row.model_copy(update={"at": _at_of_member(row.at, unit)}) for row in ours)
         if rows:
             found.append(table.model_copy(update={"rows": rows}))
     return tuple(found)
 
 
-def _checks_of(
-    experiment: ExperimentSpec, published: tuple[PublishedTable, ...], case: int, unit: float
-) -> tuple[Check, ...]:
-    """Return the checks that speak of this member or of every one."""
-    found = [
-        _of_member(check, unit)
-        for check in experiment.written
-        if check.measured.member in (None, case)
-    ]
-    found.extend(claims(published, experiment.source))
-    positions = experiment.model.definition.positions if not found else ()
-    found += [ConvergesCheck(id=f"check_{i}", converges=u) for i, u in enumerate(positions, 1)]
-    return tuple(found)
-
-
 def _of_member(check: Check, unit: float) -> Check:
-    """Return the check as it is of the member alone."""
     if isinstance(check, ClaimCheck):
         return check.model_copy(update={"that": _of_member(check.that, unit)})
     if isinstance(check, ValueCheck):
@@ -139,34 +125,29 @@ def with_levels(experiment: AnyExperiment, levels: Sequence[int]) -> AnyExperime
     rises = all(low < high for low, high in pairwise(levels))
     if not levels or not rises or not 0 <= levels[0] <= levels[-1] <= MAX_LEVEL:
         raise ValueError(f"{list(levels)} are not levels from 0 to {MAX_LEVEL} in increasing order")
-    model, time = experiment.model.definition, experiment.time
-    sweep_axes = SweepAxes(experiment.sweep.axes if experiment.sweep else ())
-    shape = size_limits.Shape(
-        base_steps=time.base_steps,
+    setting = size_limits.Setting(
+        model=experiment.model.definition,
+        time=experiment.time,
         levels=tuple(levels),
-        schemes=len(experiment.schemes),
-        members=experiment.members,
+        schemes=experiment.schemes,
+        names=tuple(scheme.name for scheme in experiment.schemes),
+        sweep=experiment.sweep or Sweep(axes=()),
         samples=experiment.samples,
-        variables=len(quantities(model)),
-        end=sweep_axes.least_end(time),
-        own_velocity=experiment.own_velocity,
     )
+    # the check of a claim has its id from the claim
+    without_id = {"id": ""}
+    written = [
+        check.model_copy(update={"that": check.that.model_copy(update=without_id)})
+        if isinstance(check, ClaimCheck)
+        else check
+        for check in experiment.written
+    ]
     report = Report(Source(str(experiment.file or experiment.name), {}))
-    size_limits.check(shape, report)
-    names = tuple(scheme.name for scheme in experiment.schemes)
-    end = sweep_axes.fixed_end(time)
-    ladder = Ladder(model, names, shape, time, end, sound=experiment.schemes)
-    finish_checks((_as_written(check) for check in experiment.written), ladder, report)
-    check_published(experiment.published, (), ladder, report)
+    size_limits.check(setting, report)
+    finish_checks(written, setting, report)
+    check_published(experiment.published, (), setting, report)
     report.raise_any()
-    found = experiment.model_copy(update={"levels": tuple(levels)})
+    found = experiment.model_copy(update={"levels": setting.levels})
     size_limits.check_files(found, report)
     report.raise_any()
     return update_tables(found)
-
-
-def _as_written(check: Check) -> Check:
-    """Return the check of a claim without the id that it has from the claim."""
-    if isinstance(check, ClaimCheck):
-        return check.model_copy(update={"that": check.that.model_copy(update={"id": ""})})
-    return check

@@ -21,12 +21,12 @@ class Experiment(ExperimentSpec):
     def from_yaml(
         cls, path: str | Path, *, collection: str | None = None, configs: Path | None = None
     ) -> Self:
-        """Read an experiment file.
+        """Read an experiment file, whose name without the ending is the experiment's.
 
         Parameters
         ----------
         path
-            A YAML file; its name without the ending is the experiment's.
+            A YAML file.
         collection
             Name of the collection; by default that of `vibsim.experiment.collection_of`.
         configs
@@ -45,13 +45,7 @@ class Experiment(ExperimentSpec):
     def from_dict(
         cls, data: Mapping[str, Any], *, name: str = "experiment", collection: str = ADHOC
     ) -> Self:
-        """Build an experiment from what a file would hold.
-
-        Raises
-        ------
-        InputError
-            With every fault of `data`.
-        """
+        """Build an experiment from what a file would hold; InputError with every fault of it."""
         from vibsim.experiment.reading import from_content
 
         return from_content(cls, data, name, collection)
@@ -78,12 +72,19 @@ def canonical(experiment: Experiment) -> dict[str, Any]:
     """
     data = experiment.model_dump(mode="json", exclude={"checks"})
     data["sweep"] = data["sweep"] and data["sweep"]["axes"]
-    data["checks"] = [_check(check) for check in experiment.checks]
+    data["checks"] = [_with_kind(check) for check in experiment.checks]
     for name in ("published", "units", "scaling"):
         if not getattr(experiment, name):
             del data[name]
     if not experiment.model.tables:
         del data["model"]["tables"]
+    return data
+
+
+def _with_kind(check: Check) -> dict[str, Any]:
+    data: dict[str, Any] = {"kind": check.kind, **check.model_dump(mode="json")}
+    if check.kind == "claim":
+        data["that"] = _with_kind(check.that)
     return data
 
 
@@ -109,13 +110,4 @@ def restore(content: Mapping[str, Any], file: Path | None = None) -> Experiment:
 
 def _without_kind(check: Mapping[str, Any]) -> dict[str, Any]:
     data = {key: value for key, value in check.items() if key != "kind"}
-    if "that" in data:
-        data["that"] = _without_kind(data["that"])
-    return data
-
-
-def _check(check: Check) -> dict[str, Any]:
-    data: dict[str, Any] = {"kind": check.kind, **check.model_dump(mode="json")}
-    if check.kind == "claim":
-        data["that"] = _check(check.that)
-    return data
+    return data | ({"that": _without_kind(data["that"])} if "that" in data else {})

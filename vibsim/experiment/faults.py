@@ -38,8 +38,6 @@ _FORMS = {
     "range": "must be [first, end, step]",
 }
 """How each rule for the values of a sweep is written."""
-_INTERVAL = "must be [least, largest]"
-_PAIR = "must be [scheme, another scheme or exact or discrete]"
 
 
 class Report:
@@ -65,9 +63,7 @@ class Report:
             return
         place = self.source.place(path)
         nested = place is not None and not place.text
-        line = (
-            self.line(path) if place is None else place.key_line if at_key or nested else place.line
-        )
+        line = place.line if place and not (at_key or nested) else self._line(path)
         written = place.text if place and place.text else "" if value is None else str(value)
         self.faults.add(Fault(self.source.file, line, dotted(path), shorten(written), rule, hint))
         if len(self.faults) == MAX_FAULTS:
@@ -81,7 +77,7 @@ class Report:
         self.add(path, rule, hint, value, at_key)
         self.faulty.add(path)
 
-    def line(self, path: Path_) -> int:
+    def _line(self, path: Path_) -> int:
         """Return the line of the nearest key above `path` that the file has, 0 without one."""
         for length in range(len(path), 0, -1):
             place = self.source.place(path[:length])
@@ -109,16 +105,18 @@ class Report:
         # the names of union members stand in no file
         named = (part for part in row["loc"] if not str(part).startswith("\0"))
         path: Path_ = (*above, *named)
+        if kind.startswith("union_tag"):
+            self._add_kind(path, row["input"])
+            return path
         context = row.get("ctx", {})
         message = row["msg"].replace("Input should", "must", 1)
         rule = _RULES.get(kind, "{msg}").format(**{**context, "msg": message})
         value = None if kind == "missing" else row["input"]
         hint = context.get("hint", "")
-        if kind == "values":
-            self._add_values(path, rule, value)
-            return path
-        if kind.startswith("union_tag"):
-            self._add_kind(path, value)
+        if kind == "values" and isinstance(value, dict) and value:
+            # the values of a key of the sweep are no list and follow no rule
+            for name in map(str, value):
+                self.add((*path, name), "unknown key", nearest(name, list(_FORMS)), at_key=True)
             return path
         if kind == "literal_error":
             hint = nearest(value, re.findall(r"'([^']*)'", context["expected"]))
@@ -129,26 +127,16 @@ class Report:
             self.add(path, rule, hint, value)
         return path
 
-    def _add_values(self, path: Path_, rule: str, value: object) -> None:
-        """Note that the values of a key of the sweep are no list and follow no rule."""
-        names = [str(name) for name in value] if isinstance(value, dict) else []
-        for name in names:
-            self.add((*path, name), "unknown key", nearest(name, list(_FORMS)), at_key=True)
-        if not names:
-            self.add(path, rule, value=value)
-
     def _add_kind(self, path: Path_, value: object) -> None:
         """Note that a model or a scheme has no kind that exists."""
         kinds = sorted(MODELS if path[0] == "model" else SCHEMES)
-        place = (*path, "kind")
         if not isinstance(value, dict):
             hint = f"e.g. {{kind: {kinds[0]}}}"
             self.add(path, "must be a mapping with the key kind", hint, value)
-        elif "kind" in value:
-            rule = f"unknown {path[0]}".rstrip("s")
-            self.add(place, rule, nearest(value["kind"], kinds), value["kind"])
-        else:
-            self.add(place, MISSING, nearest("", kinds))
+            return
+        rule = f"unknown {path[0]}".rstrip("s") if "kind" in value else MISSING
+        kind = value.get("kind")
+        self.add((*path, "kind"), rule, nearest(kind if "kind" in value else "", kinds), kind)
 
     def raise_any(self) -> None:
         """Raise `InputError` with every fault, if there is one."""
@@ -162,9 +150,10 @@ def _whole_list(path: Path_, rule: str) -> tuple[Path_, str]:
         if name in path:
             return path[: path.index(name) + 1], form
     if path[:3] == ("sweep", "sample", "over") and len(path) > 3:
-        return path[:4], _INTERVAL
+        return path[:4], "must be [least, largest]"
     if path[0] == "checks" and "equal" in path:
-        return path[: path.index("equal") + 1], _PAIR
+        rule = "must be [scheme, another scheme or exact or discrete]"
+        return path[: path.index("equal") + 1], rule
     return path, rule
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from itertools import pairwise
 from numbers import Integral, Real
 from pathlib import Path
@@ -13,24 +12,22 @@ from typing import Any
 
 from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.experiment.collection import collection_of
-from vibsim.experiment.data import AnyExperiment, ModelSpec, SchemeSpec, Sweep, TimeSpec
+from vibsim.experiment.data import AnyExperiment, ModelSpec, Sweep
 from vibsim.experiment.faults import MISSING, Report, shorten
 from vibsim.experiment.rules import members, size_limits, timing
 from vibsim.experiment.rules import schemes as scheme_rules
-from vibsim.experiment.rules.check_places import Ladder
 from vibsim.experiment.rules.checks import check_published, finish_checks
-from vibsim.experiment.rules.model import Equation
 from vibsim.experiment.rules.model import equation as read_equation
-from vibsim.experiment.rules.sweep import SweepAxes, read_sweep
+from vibsim.experiment.rules.scaling import Numbers, characteristic
+from vibsim.experiment.rules.sweep import read_sweep
 from vibsim.experiment.schema.checks import ConvergesCheck
 from vibsim.experiment.schema.document import Document, Every, LevelRange
 from vibsim.experiment.schema.fields import IDENTIFIER
 from vibsim.experiment.schema.model_and_schemes import scheme_names
 from vibsim.experiment.schema.published import claims
-from vibsim.experiment.units.scaling import Numbers, characteristic
 from vibsim.experiment.validation import read_document
 from vibsim.experiment.yaml.parse import MAX_DEPTH, Source, read
-from vibsim.models import MODELS, Model, quantities
+from vibsim.models import MODELS, Model
 
 MAX_NAME = 100
 MAX_REPEATS = 20
@@ -39,7 +36,6 @@ SAME_START = 1e-12
 """A state that is given and follows from the parameters agrees to this part of the largest one."""
 
 _PERIODIC = re.compile(rf"(.+)\1{{{MAX_REPEATS - 1}}}$")
-_NAME_RULE = "must consist of a to z, 0 to 9 and _"
 
 
 def from_file(
@@ -90,55 +86,59 @@ def build(
         _check_name(f"the name of the {what}, '{shorten(text)}',", text, report)
     document = read_document(source, report)
     swept = sorted(set(_keys(source.data.get("sweep"))))
-    of_kind = _model(source)
-    folder = file.parent if file else Path()
-    equation = read_equation(document.model, of_kind, swept, folder, report)
+    # a model section with a fault elsewhere still names its model
+    section = source.data.get("model")
+    named = section.get("kind") if isinstance(section, Mapping) else None
+    of_kind = MODELS.get(named) if isinstance(named, str) else None
+    equation = read_equation(
+        document.model, of_kind, swept, file.parent if file else Path(), report
+    )
     model, parameters = equation.model, equation.parameters
     levels = _levels(document, source, report)
-    schemes = scheme_rules.finish_schemes(document.schemes, model, report)
+    schemes = tuple(scheme_rules.finish_schemes(document.schemes, model, report))
+    knows_schemes = scheme_rules.are_known(document.schemes)
     time = timing.time_spec(document.time, model, parameters, report)
     initial = _initial(document.initial, model or of_kind, parameters, report)
-    sweep = _sweep(document, source, model, schemes, report)
-    if time is not None and sweep.is_whole:
-        _check_members(equation, time, sweep, report)
+    sweep, is_whole = Sweep(axes=()), True
+    if document.sweep is not None:
+        order = list(source.data["sweep"])
+        sweep, is_whole = read_sweep(document, order, model, schemes, not knows_schemes, report)
+    # something of it may be malformed and was left out
+    is_wellformed = not any(path[:1] == ("sweep",) for path in report.faulty)
+    if document.sweep is not None and is_whole and is_wellformed and not sweep.axes:
+        report.add(("sweep",), "must not be empty")
+    is_whole = is_whole and is_wellformed
+    if time is not None and is_whole and model is not None and parameters:
+        of_members = members.MemberNumbers(model, parameters, time, sweep.axes)
+        for table in equation.tables:
+            members.check_length(of_members, table, report)
+        members.check_jumps(of_members, equation.formulas, report)
     numbers = Numbers(parameters, initial, time)
     if document.scaled:
         numbers = characteristic(numbers, model, swept, report)
-        time = numbers.time
-    samples = document.samples.every if isinstance(document.samples, Every) else document.samples
-    shape = size_limits.Shape(
-        base_steps=time.base_steps if time else None,
-        levels=levels,
-        schemes=max(len(schemes), len(document.schemes)),
-        members=sweep.members,
-        samples=samples,
-        variables=len(quantities(model)) if model else 0,
-        end=sweep.least_end(time) if time else None,
-        own_velocity=(model is None or model.events is None)
-        and any(scheme.own_velocity for scheme in schemes),
-    )
-    size_limits.check(shape, report)
-    _check_output(document, model, levels, report)
-    ladder = Ladder(
+    setting = size_limits.Setting(
         model=model,
-        shape=shape,
-        schemes=tuple(dict.fromkeys(scheme_names(source.data.get("schemes")))),
-        sound=tuple(schemes),
-        # a faulty sweep may change the end: then nothing is said about times
-        time=time if sweep.is_whole else None,
-        end=sweep.fixed_end(time) if time else None,
+        time=numbers.time,
+        levels=levels,
+        schemes=schemes,
+        names=tuple(dict.fromkeys(scheme_names(source.data.get("schemes")))),
+        sweep=sweep,
+        knows_sweep=is_whole,
+        samples=document.samples.every if isinstance(document.samples, Every) else document.samples,
         by_tolerance=source.data.get("tolerance") is not None,
-        is_whole=scheme_rules.are_known(document.schemes),
+        knows_schemes=knows_schemes,
     )
+    size_limits.check(setting, report)
+    _check_output(document, model, levels, report)
     checks = document.checks
     if not checks and not document.published and model is not None:
         checks = [ConvergesCheck(converges=position) for position in model.positions]
     given_ids = [check.id if check is not None else "" for check in document.checks]
-    checks = finish_checks(checks, ladder, report)
-    check_published(document.published, given_ids, ladder, report)
+    checks = finish_checks(checks, setting, report)
+    check_published(document.published, given_ids, setting, report)
     report.raise_any()
     assert model is not None
-    assert time is not None
+    assert numbers.time is not None
     experiment = kind(
         collection=collection,
         name=name,
@@ -152,11 +152,11 @@ def build(
             terms=equation.terms,
         ),
         initial=dict(numbers.initial),
-        time=time,
+        time=numbers.time,
         levels=levels,
-        schemes=tuple(schemes),
-        sweep=Sweep(axes=sweep.axes) if sweep.axes else None,
-        samples=samples,
+        schemes=schemes,
+        sweep=sweep if sweep.axes else None,
+        samples=setting.samples,
         output=document.output,
         tolerance=document.tolerance,
         checks=(*checks, *claims(document.published, document.source)),
@@ -172,7 +172,7 @@ def build(
 
 def _check_name(what: str, text: str, report: Report) -> None:
     if not re.fullmatch(IDENTIFIER, text):
-        report.add((), f"{what} {_NAME_RULE}")
+        report.add((), f"{what} must consist of a to z, 0 to 9 and _")
     elif len(text) > MAX_NAME:
         report.add((), f"{what} must not be longer than {MAX_NAME} characters")
     elif _PERIODIC.search(text):
@@ -180,18 +180,10 @@ def _check_name(what: str, text: str, report: Report) -> None:
 
 
 def _keys(section: Any) -> Iterator[str]:
-    """Yield every key of a section, those inside of it too."""
     if isinstance(section, Mapping):
         for key, value in section.items():
             yield str(key)
             yield from _keys(value)
-
-
-def _model(source: Source) -> Model | None:
-    """Return the model; a model section with a fault elsewhere still names it."""
-    section = source.data.get("model")
-    kind = section.get("kind") if isinstance(section, Mapping) else None
-    return MODELS.get(kind) if isinstance(kind, str) else None
 
 
 def _levels(document: Any, source: Source, report: Report) -> tuple[int, ...]:
@@ -207,13 +199,12 @@ def _levels(document: Any, source: Source, report: Report) -> tuple[int, ...]:
             report.add(("levels", "to"), f"must be at least 'from', which is {section.from_}")
         return tuple(range(section.from_, section.to + 1))
     levels: tuple[int, ...] = section or ()
-    is_sound = True
-    for i, (low, high) in enumerate(pairwise(levels), 1):
-        if low >= high:
-            word = "must not be repeated" if low == high else "must be in increasing order"
-            report.add(("levels", i), f"levels {word}", value=high)
-            is_sound = False
-    return levels if is_sound else ()
+    falling = [i for i, (low, high) in enumerate(pairwise(levels), 1) if low >= high]
+    for i in falling:
+        is_same = levels[i] == levels[i - 1]
+        word = "must not be repeated" if is_same else "must be in increasing order"
+        report.add(("levels", i), f"levels {word}", value=levels[i])
+    return () if falling else levels
 
 
 def _initial(
@@ -237,38 +228,12 @@ def _initial(
     start = model.start(parameters) if model.start and parameters else {}
     size = max(map(abs, start.values()), default=0.0)
     for name, value in start.items():
-        if name in given and not math.isclose(
-            found[name], value, rel_tol=SAME_START, abs_tol=SAME_START * size
-        ):
+        near = math.isclose(found[name], value, rel_tol=SAME_START, abs_tol=SAME_START * size)
+        if name in given and not near:
             rule = f"must be {value:.15g}, where the motion starts, or be left out"
             report.add(("initial", name), rule)
         found[name] = float(value)
     return found
-
-
-def _sweep(
-    document: Any, source: Source, model: Model | None, schemes: list[SchemeSpec], report: Report
-) -> SweepAxes:
-    """Return the sweep; not whole where something of it is malformed and was left out."""
-    is_whole = not any(path[:1] == ("sweep",) for path in report.faulty)
-    if document.sweep is None:
-        return SweepAxes(is_whole=is_whole)
-    lacks_scheme = not scheme_rules.are_known(document.schemes)
-    order = list(source.data["sweep"])
-    found = read_sweep(document, order, model, schemes, lacks_scheme, report)
-    if is_whole and found.is_whole and not found.axes:
-        report.add(("sweep",), "must not be empty")
-    return found if is_whole else replace(found, is_whole=False)
-
-
-def _check_members(equation: Equation, time: TimeSpec, sweep: SweepAxes, report: Report) -> None:
-    """Check what must hold for every member: tables are long enough, and what is differentiated has no jumps."""
-    if equation.model is None or not equation.parameters:
-        return
-    numbers = members.MemberNumbers(equation.model, equation.parameters, time, sweep.axes, 0)
-    for name in equation.tables:
-        members.check_length(numbers, name, report)
-    members.check_jumps(numbers, equation.formulas, report)
 
 
 def _check_output(

@@ -9,10 +9,18 @@ SMALL = 200_000
 """Samples of one variable up to which ``samples: auto`` keeps every step of a level."""
 LARGE = 2**17
 """Samples of one variable above which ``samples: auto`` keeps fewer than the times of the coarsest level."""
-FEWEST = 16
+FEWEST_INTERVALS = 16
 """Intervals between the samples of a member that ``samples: auto`` always keeps."""
 LEAN = 2**18
 """Samples of one variable on the coarsest level above which an experiment is lean."""
+MOST_EXTREMA = 512
+"""Peaks, and troughs, that are kept of a scheme and member."""
+FEWEST_EXTREMA = 16
+"""As many are kept of however many members."""
+RUNNING = "_running_max"
+"""Behind the name of an energy deviation: its largest absolute value over every step so far."""
+_OF_PEAKS = "phase_error_slope"
+"""The value that is made of the first `FEWEST_EXTREMA` peaks, which are kept whatever else is."""
 
 
 def stride(samples: int | str, coarsest: int, steps: int, trajectories: int) -> int:
@@ -26,10 +34,8 @@ def stride(samples: int | str, coarsest: int, steps: int, trajectories: int) -> 
     ----------
     samples
         What the file asks for: ``auto``, ``common``, ``all``, or n, which divides `coarsest`, for every n-th step.
-    coarsest
-        Number of steps of the coarsest level.
-    steps
-        Number of steps of this level.
+    coarsest, steps
+        Number of steps of the coarsest level, and of this one.
     trajectories
         Number of schemes times number of members.
     """
@@ -37,51 +43,57 @@ def stride(samples: int | str, coarsest: int, steps: int, trajectories: int) -> 
         return samples
     if samples == "all" or (samples == "auto" and trajectories * (steps + 1) <= SMALL):
         return 1
-    thinning = _thinning(coarsest, trajectories) if samples == "auto" else 1
-    return steps // coarsest * thinning
-
-
-def _thinning(coarsest: int, trajectories: int) -> int:
-    """Return the least power of two that brings the samples down to `LARGE`, as far as the steps divide."""
+    # the least power of two that brings the samples down to `LARGE`, as far as the steps divide
     thinning = 1
     while (
-        trajectories * (coarsest // thinning + 1) > LARGE
+        samples == "auto"
+        and trajectories * (coarsest // thinning + 1) > LARGE
         and coarsest % (2 * thinning) == 0
-        and coarsest // (2 * thinning) >= FEWEST
+        and coarsest // (2 * thinning) >= FEWEST_INTERVALS
     ):
         thinning *= 2
-    return thinning
+    return steps // coarsest * thinning
 
 
 def is_lean(samples: int | str, coarsest: int, trajectories: int) -> bool:
     """Tell whether levels keep of the series only the states and the energy's deviation.
 
-    Parameters
-    ----------
-    samples, coarsest, trajectories
-        As for `stride`. Who asks for every step, or for every n-th, gets every series.
+    The parameters are as for `stride`. Who asks for every step, or for every n-th, gets every series.
     """
     return samples in ("auto", "common") and trajectories * (coarsest + 1) > LEAN
 
 
-RUNNING = "_running_max"
-"""Behind the name of an energy deviation: its largest absolute value over every step so far."""
-MOST_EXTREMA = 512
-"""Peaks, and troughs, that are kept of a scheme and member."""
-FEWEST_EXTREMA = 16
-"""As many are kept of however many members."""
+def extrema_kept(steps: int, trajectories: int) -> int:
+    """Return how many peaks, and how many troughs, a level with `steps` keeps of every scheme and member.
+
+    There cannot be more than half as many as steps. Among many `trajectories` (schemes times members) fewer are kept,
+    so that they take no more room than a series does (`SMALL`); all are counted.
+    """
+    kept = min(steps // 2 + 1, MOST_EXTREMA)
+    while kept > FEWEST_EXTREMA and kept * trajectories > SMALL:
+        kept = max(kept // 2, FEWEST_EXTREMA)
+    return kept
+
+
+def sampling(experiment: ExperimentSpec, level: int) -> int:
+    """Return the stride of the stored samples: every how many steps of `level` one is kept, the first and the last too.
+
+    All times of the coarsest level are among them unless the file asks for every n-th step of each level.
+    """
+    coarsest = experiment.steps(experiment.levels[0])
+    return stride(experiment.samples, coarsest, experiment.steps(level), experiment.trajectories)
+
+
+def is_bounded(experiment: ExperimentSpec) -> bool:
+    """Tell whether `experiment` is so large that its storage is bounded (`is_lean`)."""
+    coarsest = experiment.steps(experiment.levels[0])
+    return is_lean(experiment.samples, coarsest, experiment.trajectories)
 
 
 def asked(experiment: ExperimentSpec) -> tuple[str, ...]:
     """Name the quantities that the checks are about."""
     named = (check.measured.about for check in experiment.checks)
     return tuple(dict.fromkeys(name for name in named if name is not None))
-
-
-def is_bounded(experiment: ExperimentSpec) -> bool:
-    """Tell whether `experiment` is so large that its storage is bounded (`is_lean`)."""
-    trajectories = len(experiment.schemes) * experiment.members
-    return is_lean(experiment.samples, experiment.steps(experiment.levels[0]), trajectories)
 
 
 def lean_series(experiment: ExperimentSpec) -> tuple[str, ...]:
@@ -96,10 +108,15 @@ def lean_series(experiment: ExperimentSpec) -> tuple[str, ...]:
     return tuple(dict.fromkeys([*states, "energy_deviation", *more]))
 
 
-def running_series(experiment: ExperimentSpec) -> tuple[str, ...]:
-    """Name the running maxima that a level stores; where storage is bounded, those that a check asks for."""
-    known = [name for name in experiment.quantities if name.startswith("energy_deviation")]
+def stored_series(experiment: ExperimentSpec) -> tuple[str, ...]:
+    """Name every series that a level stores of each scheme and member.
+
+    Running maxima are among them; where storage is bounded, those that a check asks for.
+    """
+    running = [name for name in experiment.quantities if name.startswith("energy_deviation")]
+    names = experiment.quantities
     if is_bounded(experiment):
+        names = lean_series(experiment)
         checks = [check.measured for check in experiment.checks]
         wanted = {
             check.about
@@ -107,41 +124,11 @@ def running_series(experiment: ExperimentSpec) -> tuple[str, ...]:
             if check.kind == "conserves"
             or (check.kind == "value" and check.value.endswith("running_max"))
         }
-        known = [name for name in known if name in wanted]
-    return tuple(name + RUNNING for name in known)
-
-
-_OF_PEAKS = frozenset({"phase_error_slope"})
-"""Values that are made of the first `FEWEST_EXTREMA` peaks, which are kept whatever else is."""
+        running = [name for name in running if name in wanted]
+    return (*names, *(name + RUNNING for name in running))
 
 
 def asks_for_peaks(experiment: ExperimentSpec) -> bool:
     """Tell whether a check is about a number that is made of single peaks."""
     checks = [check.measured for check in experiment.checks]
-    return any(check.kind == "value" and check.value in _OF_PEAKS for check in checks)
-
-
-def stored_series(experiment: ExperimentSpec) -> tuple[str, ...]:
-    """Name every series that a level stores of each scheme and member."""
-    bounded = is_bounded(experiment)
-    names = lean_series(experiment) if bounded else experiment.quantities
-    return (*names, *running_series(experiment))
-
-
-def extrema_kept(steps: int, trajectories: int) -> int:
-    """Return how many peaks, and how many troughs, a level keeps of every scheme and member.
-
-    There cannot be more than half as many as steps. Among many members fewer are kept, so that they take no more room
-    than a series does (`SMALL`); all are counted.
-
-    Parameters
-    ----------
-    steps
-        Of the level.
-    trajectories
-        Number of schemes times number of members.
-    """
-    kept = min(steps // 2 + 1, MOST_EXTREMA)
-    while kept > FEWEST_EXTREMA and kept * trajectories > SMALL:
-        kept = max(kept // 2, FEWEST_EXTREMA)
-    return kept
+    return any(check.kind == "value" and check.value == _OF_PEAKS for check in checks)

@@ -8,22 +8,133 @@ of a latin hypercube) follow from their seed.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from decimal import Context, Decimal
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.experiment.schema.sweep import Axis, Draw, Linspace, Logspace, Values
+from vibsim.core.array_types import Floats, Integers
+from vibsim.experiment.schema.sweep import Axis, Draw, Linspace, Logspace, Values, as_option
 
-Floats = NDArray[np.float64]
+if TYPE_CHECKING:
+    from vibsim.experiment.data import ExperimentSpec
+
+Column = NDArray[Any]
+"""Values of one key, float64 or text."""
 _PER_COUNT = 4
 """Numbers that Philox gives at each value of its counter."""
+_DIGITS = 60
+"""Of the decimals in between: enough for the double next to the true value of any power that a double can hold."""
 
 
-def scatter(draw: Draw, start: int, stop: int) -> list[Floats]:
+def columns(experiment: ExperimentSpec, start: int, stop: int) -> dict[str, Column]:
+    """Return the swept values of members start..stop-1 by dotted key, each of shape (stop - start,).
+
+    They are float64 in the unit of the key, or text where the options of a scheme are swept; empty without a sweep.
+    """
+    return columns_of(experiment.sweep.axes, start, stop) if experiment.sweep else {}
+
+
+def option_groups(
+    experiment: ExperimentSpec, scheme: int, columns: Mapping[str, Column]
+) -> list[tuple[Mapping[str, str | float | bool], Integers]]:
+    """Return the options that members have of scheme number `scheme`; `columns` holds their swept values.
+
+    Every distinct set of options comes once, in the order in which members first have it, with the positions of those
+    members in `columns`, increasing. Without a sweep, it is the one set of the one member. A word is text, a number a
+    float, and a flag a bool.
+    """
+    base = experiment.schemes[scheme].options
+    size = len(next(iter(columns.values()))) if columns else 1
+    prefix = f"schemes.{experiment.schemes[scheme].name}."
+    swept = {name: columns[key] for name in base if (key := prefix + name) in columns}
+    if not swept:
+        return [(base, np.arange(size))]
+    kind = np.zeros(size, dtype=np.int64)
+    for column in swept.values():
+        distinct, place = np.unique(column, return_inverse=True)
+        # numbered anew for each key, so that the numbers stay small
+        kind = np.unique(kind * len(distinct) + place, return_inverse=True)[1]
+    order = np.argsort(kind, kind="stable")
+    members = np.split(order, np.flatnonzero(np.diff(kind[order])) + 1)
+    return [
+        ({**base, **{n: as_option(base[n], c[where[0]]) for n, c in swept.items()}}, where)
+        for where in sorted(members, key=lambda where: int(where[0]))
+    ]
+
+
+def columns_of(axes: Sequence[Axis], start: int, stop: int) -> dict[str, Column]:
+    """Return the values of members start..stop-1 of a grid by dotted key; the last axis varies fastest."""
+    found: dict[str, Column] = {}
+    member = np.arange(start, stop, dtype=np.int64)
+    inner = math.prod(axis.count for axis in axes)
+    for axis in axes:
+        inner //= axis.count
+        turn = member // inner
+        first, last = (int(turn[0]), int(turn[-1])) if len(turn) else (0, -1)
+        if last - first + 1 >= axis.count:
+            blocks, place = _block(axis, 0, axis.count), turn % axis.count
+        elif first % axis.count <= last % axis.count:
+            blocks, place = _block(axis, first % axis.count, last % axis.count + 1), turn - first
+        else:
+            # the range ends in the next turn of the axis
+            ends = (
+                _block(axis, first % axis.count, axis.count),
+                _block(axis, 0, last % axis.count + 1),
+            )
+            blocks, place = [np.concatenate(pair) for pair in zip(*ends, strict=True)], turn - first
+        found |= {key: block[place] for key, block in zip(axis.keys, blocks, strict=True)}
+    return found
+
+
+def _block(axis: Axis, start: int, stop: int) -> list[Column]:
+    if isinstance(axis.values, Draw):
+        return _scatter(axis.values, start, stop)
+    return [_part(values, start, stop) for values in axis.values]
+
+
+def _part(values: Values, start: int, stop: int) -> Column:
+    if isinstance(values, tuple):
+        return np.asarray(values)[start:stop]
+    if isinstance(values, Linspace):
+        return line(*values.linspace, start, stop)
+    if isinstance(values, Logspace):
+        return _power(*values.logspace, start, stop)
+    first, _, step = values.range
+    return first + np.arange(start, stop) * step
+
+
+def line(first: float, last: float, n: int, start: int = 0, stop: int | None = None) -> Floats:
+    """Return values of a line, ``first + (last - first)*i/(n - 1)``, with exact ends."""
+    i = np.arange(start, n if stop is None else stop)
+    found = first + (last - first) * i / (n - 1)
+    found[i == n - 1] = last
+    return found
+
+
+def _power(first: float, last: float, n: int, start: int, stop: int) -> Floats:
+    """Return values of a geometric line, ``first*(last/first)**(i/(n - 1))``, each rounded to the nearest double.
+
+    The powers are taken in decimals, whose ``ln`` and ``exp`` are rounded correctly on every machine; the ends come
+    out exact.
+    """
+    context = Context(prec=_DIGITS)
+    rise = context.divide(
+        context.subtract(context.ln(Decimal(last)), context.ln(Decimal(first))), Decimal(n - 1)
+    )
+    ratio = context.exp(rise)
+    value = context.multiply(Decimal(first), context.exp(context.multiply(rise, Decimal(start))))
+    found = np.empty(stop - start)
+    for i in range(stop - start):
+        found[i] = value
+        value = context.multiply(value, ratio)
+    return found
+
+
+def _scatter(draw: Draw, start: int, stop: int) -> list[Column]:
     """Return points number start..stop-1, the values of one key after the other, each of shape (stop - start,)."""
     keys = len(draw.over)
     if draw.method == "random":
@@ -48,7 +159,6 @@ def _random(seed: int, keys: int, start: int, stop: int) -> Floats:
 
 
 def _sobol(seed: int, keys: int, start: int, stop: int) -> Floats:
-    """Return points of the scrambled Sobol sequence, shape (stop - start, keys)."""
     from scipy.stats import qmc
 
     engine: Any = qmc.Sobol(keys, scramble=True, rng=seed)
@@ -67,91 +177,3 @@ def _latin_hypercube(seed: int, keys: int, n: int) -> Floats:
 
     points: Any = qmc.LatinHypercube(keys, rng=seed).random(n)
     return np.asarray(points)
-
-
-Column = NDArray[Any]
-"""Values of one key, float64 or text."""
-_DIGITS = 60
-"""Of the decimals in between: enough for the double next to the true value of any power that a double can hold."""
-
-
-def columns(axes: Sequence[Axis], start: int, stop: int) -> dict[str, Column]:
-    """Return the values of members start..stop-1 by dotted key, each of shape (stop - start,).
-
-    Parameters
-    ----------
-    axes
-        The axes of a grid, the last one fastest.
-    start, stop
-        Range of members, within the grid.
-    """
-    found: dict[str, Column] = {}
-    member = np.arange(start, stop, dtype=np.int64)
-    inner = math.prod(axis.count for axis in axes)
-    for axis in axes:
-        inner //= axis.count
-        found.update(_along(axis, inner, member))
-    return found
-
-
-def _along(axis: Axis, inner: int, member: NDArray[np.int64]) -> dict[str, Column]:
-    """Return the columns of one axis, on each value of which `inner` members follow each other."""
-    turn = member // inner
-    first, last = (int(turn[0]), int(turn[-1])) if len(turn) else (0, -1)
-    if last - first + 1 >= axis.count:
-        blocks, place = _block(axis, 0, axis.count), turn % axis.count
-    elif first % axis.count <= last % axis.count:
-        blocks, place = _block(axis, first % axis.count, last % axis.count + 1), turn - first
-    else:
-        # the range ends in the next turn of the axis
-        parts = _block(axis, first % axis.count, axis.count), _block(axis, 0, last % axis.count + 1)
-        blocks, place = [np.concatenate(pair) for pair in zip(*parts, strict=True)], turn - first
-    return {key: block[place] for key, block in zip(axis.keys, blocks, strict=True)}
-
-
-def _block(axis: Axis, start: int, stop: int) -> list[Column]:
-    """Return values number start..stop-1 along an axis, for every key."""
-    if isinstance(axis.values, Draw):
-        return scatter(axis.values, start, stop)
-    return [part(values, start, stop) for values in axis.values]
-
-
-def part(values: Values, start: int, stop: int) -> Column:
-    """Return values number start..stop-1 of one key."""
-    if isinstance(values, tuple):
-        return np.asarray(values)[start:stop]
-    if isinstance(values, Linspace):
-        return line(*values.linspace, start, stop)
-    if isinstance(values, Logspace):
-        return power(*values.logspace, start, stop)
-    first, _, step = values.range
-    return first + np.arange(start, stop) * step
-
-
-def line(
-    first: float, last: float, n: int, start: int = 0, stop: int | None = None
-) -> NDArray[np.float64]:
-    """Return values of a line, ``first + (last - first)*i/(n - 1)``, with exact ends."""
-    i = np.arange(start, n if stop is None else stop)
-    found = first + (last - first) * i / (n - 1)
-    found[i == n - 1] = last
-    return found
-
-
-def power(first: float, last: float, n: int, start: int, stop: int) -> NDArray[np.float64]:
-    """Return values of a geometric line, ``first*(last/first)**(i/(n - 1))``, each rounded to the nearest double.
-
-    The powers are taken in decimals, whose ``ln`` and ``exp`` are rounded correctly on every machine; the ends come
-    out exact.
-    """
-    context = Context(prec=_DIGITS)
-    rise = context.divide(
-        context.subtract(context.ln(Decimal(last)), context.ln(Decimal(first))), Decimal(n - 1)
-    )
-    ratio = context.exp(rise)
-    value = context.multiply(Decimal(first), context.exp(context.multiply(rise, Decimal(start))))
-    found = np.empty(stop - start)
-    for i in range(stop - start):
-        found[i] = value
-        value = context.multiply(value, ratio)
-    return found

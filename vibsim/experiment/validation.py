@@ -16,7 +16,7 @@ from pydantic import Discriminator, Tag, TypeAdapter, ValidationError
 from vibsim.experiment.faults import MISSING, Report
 from vibsim.experiment.schema.document import Document
 from vibsim.experiment.schema.fields import STAND_IN, Section
-from vibsim.experiment.units.convert import Units
+from vibsim.experiment.units import Units
 from vibsim.experiment.yaml.parse import Path_, Source
 
 _FAULTY: Any = object()
@@ -78,13 +78,7 @@ class _Reader:
         return kind.model_construct(**found)
 
     def value(self, path: Path_, written: Any, form: _Form, keeps_rest: bool) -> Any:
-        """Return a value of a `form`.
-
-        Parameters
-        ----------
-        keeps_rest
-            Whether of a list or a mapping with faulty entries the others are kept.
-        """
+        """Return a value of a `form`; `keeps_rest`: of a list or a mapping with faulty entries the others are kept."""
         if path in self.report.faulty:
             return _FAULTY
         form = form.of(written)
@@ -115,10 +109,9 @@ class _Reader:
                 return found
         if not (keeps_rest and refused):
             return _FAULTY
+        rest: Any = [STAND_IN if i in refused else value for i, value in enumerate(written)]
         if isinstance(written, Mapping):
-            rest: Any = {key: value for key, value in written.items() if key not in refused}
-        else:
-            rest = [STAND_IN if i in refused else value for i, value in enumerate(written)]
+            rest = {key: value for key, value in written.items() if key not in refused}
         try:
             return form.validator.validate_python(rest)
         except ValidationError:
@@ -126,10 +119,10 @@ class _Reader:
 
     def _as_printed(self, path: Path_, written: Any) -> Any:
         """Return a number of a printed table as text: its digits count, not its value."""
-        if path[0] != "published" or path[-1] != "printed" or isinstance(written, bool):
-            return written
-        place = self.source.place(path)
-        return place.text if place and isinstance(written, int | float) else written
+        is_number = isinstance(written, int | float) and not isinstance(written, bool)
+        is_printed = is_number and path[0] == "published" and path[-1] == "printed"
+        place = self.source.place(path) if is_printed else None
+        return place.text if place else written
 
 
 class _Form:

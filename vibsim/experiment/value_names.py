@@ -5,20 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal
+from typing import Any, Literal
 
 AtPart = Literal["t", "step", "level", "scheme", "case"]
-Which = Literal[
-    "series", "convergent", "states", "stored", "extremal", "deviation", "running", "none"
-]
-"""Which quantities a value is of: every one; those that are compared between levels; the states, of which least and
-largest value are gathered over every step; these and the energy deviations; the energy deviation alone, whose last
-point is gathered apart; the energy deviations, whose largest value so far is gathered; or none because the value
-belongs to the motion as a whole."""
-Exact = Literal["solution", "period"]
-Measure = Literal["none", "count", "quantity", "l1", "l2", "time", "frequency", "position"]
-"""What a number is measured in: a plain number; one that is counted; the unit of its quantity, times that of the time
-or its root in norms over time; the unit of the time, of an angle over it, or of the position."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +16,16 @@ class Value:
 
     name: str
     description: str
-    of: Which
-    """Which quantities it can be of."""
+    of: Literal[
+        "series", "convergent", "states", "stored", "extremal", "deviation", "running", "none"
+    ]
+    """Which quantities it can be of: every one; those that are compared between levels; the states, of which least and
+    largest value are gathered over every step; these and outputs; these and the energy deviations; the energy deviation
+    alone, whose last point is gathered apart; the energy deviations, whose largest value so far is gathered; or none
+    because the value belongs to the motion as a whole."""
+    measure: Literal["none", "count", "quantity", "l1", "l2", "time", "frequency", "position"]
+    """What it is measured in: a plain number; one that is counted; the unit of its quantity, times that of the time or
+    its root in norms over time; the unit of the time, of an angle over it, or of the position."""
     at: tuple[AtPart, ...] = ("level", "scheme", "case")
     """Which parts of ``at:`` it takes."""
     finer_levels: int = 0
@@ -38,7 +35,7 @@ class Value:
     solution."""
     needs_time: bool = False
     """Whether ``t`` or ``step`` must be given."""
-    needs_exact: Exact | None = None
+    needs_exact: Literal["solution", "period"] | None = None
     """What the model must know exactly."""
     needs_linear: bool = False
     """Whether it comes from the theory of linear models without damping."""
@@ -48,309 +45,98 @@ class Value:
     """Whether the acceleration must be worked out in exact numbers (`vibsim.theory.degrees`)."""
     needs_events: bool = False
     """Whether it exists only where the motion of the model is not smooth."""
-    measure: Measure = "none"
-    """What it is measured in."""
 
 
-_ANYWHERE: tuple[AtPart, ...] = ("t", "step", "level", "scheme", "case")
-_NO_LEVEL: tuple[AtPart, ...] = ("scheme", "case")
+_MARKS: Mapping[str, Mapping[str, Any]] = {
+    "anywhere": {"at": ("t", "step", "level", "scheme", "case")},
+    "all_levels": {"at": ("scheme", "case")},
+    "exact_motion": {"at": ("case",)},
+    "mesh": {"at": ("level", "case")},
+    "pair": {"finer_levels": 1},
+    "triple": {"finer_levels": 2},
+    "best": {"best": True},
+    "time": {"needs_time": True},
+    "solution": {"needs_exact": "solution"},
+    "period": {"needs_exact": "period"},
+    "linear": {"needs_linear": True},
+    "fixed_step": {"fixed_step": True},
+    "rational": {"needs_rational": True},
+    "events": {"needs_events": True},
+}
+"""Further fields of `Value`, by the words of the fourth column of the table."""
+_TABLE = """\
+end | series | quantity | anywhere best | value at the last time, or at `t` or `step`
+at | series | quantity | anywhere best time | value at the time `t` or after `step` steps
+min | stored | quantity | best | smallest value over every step; of an output, over the stored times
+max | stored | quantity | best | largest value over every step; of an output, over the stored times
+max_abs | extremal | quantity | best | largest absolute value over every step
+max_abs_interior | deviation | quantity | | the same without the last point
+max_abs_ratio | extremal | none | pair fixed_step | largest absolute value over every step, over that of the \
+next finer level
+max_abs_interior_ratio | deviation | none | pair fixed_step | the same without the last point
+running_max | running | quantity | anywhere | largest absolute value over every step up to `t` or `step`, or the end
+relative_running_max | running | none | anywhere | the same, over |E(0)|
+period | none | time | best | period, from interpolated peaks
+period_grid | none | time | | period, from peaks at grid points
+exact_period | none | time | exact_motion period | period of the exact solution
+period_error | none | none | best period | period over the exact period, less one
+frequency | none | frequency | best | angular frequency of the computed motion
+error_of_frequency | none | none | best period | angular frequency over that of the exact solution, less one
+predicted_frequency | none | frequency | linear fixed_step | angular frequency by the theory of the scheme
+phase_error_per_period | none | time | best period | time by which the peaks come early, per period; negative \
+where they come late
+predicted_phase_error | none | time | linear fixed_step | the same by the theory of the scheme
+phase_error_slope | none | time | period | slope of the time by which a peak comes early over the number of its period
+amplitude | none | position | best | half the height from the last trough to the last peak
+amplitude_error | none | none | best | last amplitude over the first one, less one
+growth_factor | none | none | best | last peak over the first peak
+growth_per_period | none | none | best | factor by which the amplitude grows in a period
+predicted_growth_per_period | none | none | linear fixed_step | the same by the theory of the scheme
+relative_energy_error | none | none | best | max |E(t) - E(0)| / |E(0)| over every step
+relative_energy_error_d2t | none | none | | the same with the centred difference of the position as velocity, \
+without the end points
+event_count | none | count | events | number of events, where the motion is not smooth
+first_event_time | none | time | events | time of the first event
+last_event_time | none | time | events | time of the last event
+rest_time | none | time | events | time from which the body was at rest to the end
+accepted_steps | none | count | | number of steps taken
+force_evaluations | none | count | | number of evaluations of the acceleration; of an implicit scheme those of \
+one iteration per step
+stability_limit | none | none | all_levels fixed_step | largest stable w dt of the scheme, infinite where there is none
+exact_degree | none | count | all_levels fixed_step rational | highest degree up to which the scheme reproduces \
+polynomials in t as solutions of the model, 8 at most
+error_l1 | convergent | l1 | best solution | L1 norm of the true error
+error_l2 | convergent | l2 | best solution | L2 norm of the true error
+error_linf | convergent | quantity | best solution | largest true error
+error_linf_interior | convergent | quantity | best solution | largest true error without the last point
+error_rate | states | none | pair solution fixed_step | log2 of the L2 norm of the true error over that of the \
+next finer level, each over its own stored points
+second_difference_fraction | none | none | mesh solution linear | [D_tD_t u] over u'' of the exact position at \
+the points of the level, least squares
+discrete_error | states | quantity | linear fixed_step | largest difference from the exact solution of the \
+scheme's own steps
+error_estimate_defect | convergent | none | pair solution fixed_step | max |estimate - true error| over max \
+|true error|
+observed_order | convergent | none | triple fixed_step | order of a triple of levels, L2 norm
+ratio | convergent | none | triple fixed_step | ratio of the differences of a triple, L2 norm
+coincidence | convergent | none | triple fixed_step | how well rescaled differences coincide
+richardson_error | convergent | quantity | all_levels fixed_step | largest error bound of the extrapolated solution
+"""
+"""Name, ``of``, ``measure``, further fields (`_MARKS`) and description of every value."""
 
-_SERIES = (
-    Value(
-        "end",
-        "value at the last time, or at `t` or `step`",
-        "series",
-        _ANYWHERE,
-        best=True,
-        measure="quantity",
-    ),
-    Value(
-        "at",
-        "value at the time `t` or after `step` steps",
-        "series",
-        _ANYWHERE,
-        best=True,
-        needs_time=True,
-        measure="quantity",
-    ),
-    Value(
-        "min",
-        "smallest value over every step; of an output, over the stored times",
-        "stored",
-        best=True,
-        measure="quantity",
-    ),
-    Value(
-        "max",
-        "largest value over every step; of an output, over the stored times",
-        "stored",
-        best=True,
-        measure="quantity",
-    ),
-    Value(
-        "max_abs",
-        "largest absolute value over every step",
-        "extremal",
-        best=True,
-        measure="quantity",
-    ),
-    Value("max_abs_interior", "the same without the last point", "deviation", measure="quantity"),
-    Value(
-        "max_abs_ratio",
-        "largest absolute value over every step, over that of the next finer level",
-        "extremal",
-        finer_levels=1,
-        fixed_step=True,
-    ),
-    Value(
-        "max_abs_interior_ratio",
-        "the same without the last point",
-        "deviation",
-        finer_levels=1,
-        fixed_step=True,
-    ),
-    Value(
-        "running_max",
-        "largest absolute value over every step up to `t` or `step`, or the end",
-        "running",
-        _ANYWHERE,
-        measure="quantity",
-    ),
-    Value("relative_running_max", "the same, over |E(0)|", "running", _ANYWHERE),
-)
-_OSCILLATION = (
-    Value("period", "period, from interpolated peaks", "none", best=True, measure="time"),
-    Value("period_grid", "period, from peaks at grid points", "none", measure="time"),
-    Value(
-        "exact_period",
-        "period of the exact solution",
-        "none",
-        ("case",),
-        needs_exact="period",
-        measure="time",
-    ),
-    Value(
-        "period_error",
-        "period over the exact period, less one",
-        "none",
-        needs_exact="period",
-        best=True,
-    ),
-    Value(
-        "frequency",
-        "angular frequency of the computed motion",
-        "none",
-        best=True,
-        measure="frequency",
-    ),
-    Value(
-        "error_of_frequency",
-        "angular frequency over that of the exact solution, less one",
-        "none",
-        needs_exact="period",
-        best=True,
-    ),
-    Value(
-        "predicted_frequency",
-        "angular frequency by the theory of the scheme",
-        "none",
-        needs_linear=True,
-        fixed_step=True,
-        measure="frequency",
-    ),
-    Value(
-        "phase_error_per_period",
-        "time by which the peaks come early, per period; negative where they come late",
-        "none",
-        needs_exact="period",
-        best=True,
-        measure="time",
-    ),
-    Value(
-        "predicted_phase_error",
-        "the same by the theory of the scheme",
-        "none",
-        needs_linear=True,
-        fixed_step=True,
-        measure="time",
-    ),
-    Value(
-        "phase_error_slope",
-        "slope of the time by which a peak comes early over the number of its period",
-        "none",
-        needs_exact="period",
-        measure="time",
-    ),
-    Value(
-        "amplitude",
-        "half the height from the last trough to the last peak",
-        "none",
-        best=True,
-        measure="position",
-    ),
-    Value("amplitude_error", "last amplitude over the first one, less one", "none", best=True),
-    Value("growth_factor", "last peak over the first peak", "none", best=True),
-    Value(
-        "growth_per_period", "factor by which the amplitude grows in a period", "none", best=True
-    ),
-    Value(
-        "predicted_growth_per_period",
-        "the same by the theory of the scheme",
-        "none",
-        needs_linear=True,
-        fixed_step=True,
-    ),
-)
-_ENERGY = (
-    Value("relative_energy_error", "max |E(t) - E(0)| / |E(0)| over every step", "none", best=True),
-    Value(
-        "relative_energy_error_d2t",
-        "the same with the centred difference of the position as velocity, without the end points",
-        "none",
-    ),
-)
-_EVENTS = (
-    Value(
-        "event_count",
-        "number of events, where the motion is not smooth",
-        "none",
-        needs_events=True,
-        measure="count",
-    ),
-    Value("first_event_time", "time of the first event", "none", needs_events=True, measure="time"),
-    Value("last_event_time", "time of the last event", "none", needs_events=True, measure="time"),
-    Value(
-        "rest_time",
-        "time from which the body was at rest to the end",
-        "none",
-        needs_events=True,
-        measure="time",
-    ),
-)
-_COST = (
-    Value("accepted_steps", "number of steps taken", "none", measure="count"),
-    Value(
-        "force_evaluations",
-        "number of evaluations of the acceleration; of an implicit scheme those of one iteration per step",
-        "none",
-        measure="count",
-    ),
-    Value(
-        "stability_limit",
-        "largest stable w dt of the scheme, infinite where there is none",
-        "none",
-        _NO_LEVEL,
-        fixed_step=True,
-    ),
-    Value(
-        "exact_degree",
-        "highest degree up to which the scheme reproduces polynomials in t as solutions of the model, 8 at most",
-        "none",
-        _NO_LEVEL,
-        fixed_step=True,
-        needs_rational=True,
-        measure="count",
-    ),
-)
-_ERRORS = (
-    Value(
-        "error_l1",
-        "L1 norm of the true error",
-        "convergent",
-        best=True,
-        needs_exact="solution",
-        measure="l1",
-    ),
-    Value(
-        "error_l2",
-        "L2 norm of the true error",
-        "convergent",
-        best=True,
-        needs_exact="solution",
-        measure="l2",
-    ),
-    Value(
-        "error_linf",
-        "largest true error",
-        "convergent",
-        best=True,
-        needs_exact="solution",
-        measure="quantity",
-    ),
-    Value(
-        "error_linf_interior",
-        "largest true error without the last point",
-        "convergent",
-        best=True,
-        needs_exact="solution",
-        measure="quantity",
-    ),
-    Value(
-        "error_rate",
-        "log2 of the L2 norm of the true error over that of the next finer level, each over its own stored points",
-        "states",
-        finer_levels=1,
-        needs_exact="solution",
-        fixed_step=True,
-    ),
-    Value(
-        "second_difference_fraction",
-        "[D_tD_t u] over u'' of the exact position at the points of the level, least squares",
-        "none",
-        ("level", "case"),
-        needs_exact="solution",
-        needs_linear=True,
-    ),
-    Value(
-        "discrete_error",
-        "largest difference from the exact solution of the scheme's own steps",
-        "states",
-        needs_linear=True,
-        fixed_step=True,
-        measure="quantity",
-    ),
-    Value(
-        "error_estimate_defect",
-        "max |estimate - true error| over max |true error|",
-        "convergent",
-        finer_levels=1,
-        needs_exact="solution",
-        fixed_step=True,
-    ),
-    Value(
-        "observed_order",
-        "order of a triple of levels, L2 norm",
-        "convergent",
-        finer_levels=2,
-        fixed_step=True,
-    ),
-    Value(
-        "ratio",
-        "ratio of the differences of a triple, L2 norm",
-        "convergent",
-        finer_levels=2,
-        fixed_step=True,
-    ),
-    Value(
-        "coincidence",
-        "how well rescaled differences coincide",
-        "convergent",
-        finer_levels=2,
-        fixed_step=True,
-    ),
-    Value(
-        "richardson_error",
-        "largest error bound of the extrapolated solution",
-        "convergent",
-        _NO_LEVEL,
-        fixed_step=True,
-        measure="quantity",
-    ),
-)
-_ROWS = (*_SERIES, *_OSCILLATION, *_ENERGY, *_EVENTS, *_COST, *_ERRORS)
 
-VALUES: Mapping[str, Value] = MappingProxyType({row.name: row for row in _ROWS})
+def _value(line: str) -> Value:
+    name, of, measure, marks, description = (cell.strip() for cell in line.split("|", 4))
+    fields: dict[str, Any] = {"of": of, "measure": measure}
+    for mark in marks.split():
+        fields |= _MARKS[mark]
+    return Value(name, description, **fields)
+
+
+VALUES: Mapping[str, Value] = MappingProxyType(
+    {row.name: row for row in map(_value, _TABLE.splitlines())}
+)
 """Every value name with its meaning, as `vibsim list checks` prints it."""
 
-HAVE_LIMITS = frozenset(row.name for row in _ROWS if row.best and row.of != "convergent")
+HAVE_LIMITS = frozenset(row.name for row in VALUES.values() if row.best and row.of != "convergent")
 """What ``level: best`` takes as the limit of the numbers of all levels; else it is of the extrapolated solution."""

@@ -6,29 +6,19 @@ allow-list of what it may hold: numbers, declared names, ``+ - * / **``, compari
 evaluated as Python.
 """
 
-from vibsim.formula.algebra import (
-    is_multiple,
-    is_smooth,
-    is_zero,
-    minus,
-    over,
-    plus,
-    put,
-    tidied,
-    times,
-)
-from vibsim.formula.arrays import values
-from vibsim.formula.derivative import ONE, ZERO, derivative
-from vibsim.formula.faults import MAX_DEPTH, ExpressionError
+from vibsim.formula.algebra import is_multiple, is_zero, minus, over, plus, tidied, times
+from vibsim.formula.arrays import bounds, values
+from vibsim.formula.derivative import derivative
 from vibsim.formula.integral import integral
-from vibsim.formula.intervals import bounds
-from vibsim.formula.parser import MAX_CHARACTERS, MAX_POWER, literal, parse
-from vibsim.formula.pulses import Pulses, hidden_pulses
-from vibsim.formula.render import constant, evaluate, to_formula, to_python, to_statements
+from vibsim.formula.jumps import Pulses, hidden_pulses
+from vibsim.formula.parser import MAX_CHARACTERS, MAX_DEPTH, ExpressionError, parse
+from vibsim.formula.render import constant, evaluate, to_formula, to_statements
 from vibsim.formula.switches import Switch, held
 from vibsim.formula.tree import (
     CONSTANTS,
     FUNCTIONS,
+    ONE,
+    ZERO,
     Binary,
     Call,
     Compare,
@@ -36,54 +26,18 @@ from vibsim.formula.tree import (
     Name,
     Negate,
     Number,
+    literal,
     names_in,
+    put,
     rebuilt,
     size,
     walk,
 )
 
 __all__ = [
-    "CONSTANTS",
-    "FUNCTIONS",
-    "MAX_CHARACTERS",
-    "MAX_DEPTH",
-    "MAX_POWER",
-    "ONE",
-    "ZERO",
-    "Binary",
-    "Call",
-    "Compare",
-    "Expression",
-    "ExpressionError",
-    "Name",
-    "Negate",
-    "Number",
-    "Pulses",
-    "Switch",
-    "bounds",
-    "constant",
-    "derivative",
-    "evaluate",
-    "held",
-    "hidden_pulses",
-    "integral",
-    "is_multiple",
-    "is_smooth",
-    "is_zero",
-    "literal",
-    "minus",
-    "names_in",
-    "over",
-    "parse",
-    "plus",
-    "put",
-    "rebuilt",
-    "size",
-    "tidied",
-    "times",
-    "to_formula",
-    "to_python",
-    "to_statements",
-    "values",
-    "walk",
-]
+    "CONSTANTS", "FUNCTIONS", "MAX_CHARACTERS", "MAX_DEPTH", "ONE", "ZERO", "Binary", "Call",
+    "Compare", "Expression", "ExpressionError", "Name", "Negate", "Number", "Pulses", "Switch",
+    "bounds", "constant", "derivative", "evaluate", "held", "hidden_pulses", "integral",
+    "is_multiple", "is_zero", "literal", "minus", "names_in", "over", "parse", "plus", "put",
+    "rebuilt", "size", "tidied", "times", "to_formula", "to_statements", "values", "walk",
+]  # fmt: skip

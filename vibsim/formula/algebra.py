@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from vibsim.formula.derivative import ONE, STEPS, ZERO
-from vibsim.formula.parser import literal
+from functools import cache
+
+from vibsim.formula.parser import parse
 from vibsim.formula.render import evaluate
 from vibsim.formula.tree import (
+    ONE,
+    STEPS,
+    ZERO,
     Binary,
     Call,
     Compare,
@@ -13,95 +17,12 @@ from vibsim.formula.tree import (
     Name,
     Negate,
     Number,
+    literal,
     names_in,
+    number,
     rebuilt,
     walk,
 )
-
-JUMPS = STEPS | {"mod"}
-"""Functions whose derivative is that between their jumps."""
-EDGES = JUMPS | {"abs", "max", "min", "where"}
-"""Functions with corners or jumps."""
-
-
-def put(node: Expression, name: str, what: Expression) -> Expression:
-    """Return a formula with another one in the place of a name."""
-    return rebuilt(node, lambda part: what if part == Name(name) else part)
-
-
-def tidied(node: Expression) -> Expression:
-    """Return a formula without sums with 0, products with 0 and 1, and operations on numbers alone.
-
-    Raises
-    ------
-    ExpressionError
-        Where numbers alone have no value: 1/0.
-    """
-    return rebuilt(node, _tidied_top)
-
-
-def _tidied_top(node: Expression) -> Expression:
-    match node:
-        case Binary("+", left, right):
-            found = plus(left, right)
-        case Binary("-", left, right):
-            found = minus(left, right)
-        case Binary("*", left, right):
-            found = times(left, right)
-        case Binary("/", left, right):
-            found = over(left, right)
-        case _:
-            found = node
-    if names_in(found) or isinstance(found, Number):
-        return found
-    value = evaluate(found, {})
-    return Negate(Number(-value)) if value < 0.0 else Number(value)
-
-
-def is_zero(node: Expression) -> bool:
-    """Tell whether a formula is the number 0."""
-    return node in (ZERO, Negate(ZERO))
-
-
-def is_multiple(node: Expression, slope: Expression, name: str) -> bool:
-    """Tell whether a formula with that derivative is a factor times `name`, whatever the parameters."""
-    # the derivative does not tell of a jump
-    jumps = (part for part in walk(node) if is_jump(part))
-    if name in names_in(slope) or any(name in names_in(part) for part in jumps):
-        return False
-    return _is_zero_with(node, name)
-
-
-def _is_zero_with(node: Expression, name: str) -> bool:
-    """Tell whether a formula is seen to be 0 where `name` is."""
-    match node:
-        case Number(value):
-            return value == 0.0
-        case Name(own):
-            return own == name
-        case Negate(operand) | Binary("/", operand, _):
-            return _is_zero_with(operand, name)
-        case Binary("*", left, right):
-            return _is_zero_with(left, name) or _is_zero_with(right, name)
-        case Binary("+" | "-", left, right) | Call("where", (_, left, right)):
-            return _is_zero_with(left, name) and _is_zero_with(right, name)
-        case Binary("**", base, exponent):
-            return (literal(exponent) or 0.0) > 0.0 and _is_zero_with(base, name)
-        case _:
-            return False
-
-
-def is_jump(node: Expression) -> bool:
-    """Tell whether the value jumps where an operand varies."""
-    return isinstance(node, Compare) or (isinstance(node, Call) and node.function in JUMPS)
-
-
-def is_smooth(node: Expression) -> bool:
-    """Tell whether nothing in a formula has a corner or a jump."""
-    return not any(
-        isinstance(part, Compare) or (isinstance(part, Call) and part.function in EDGES)
-        for part in walk(node)
-    )
 
 
 def times(left: Expression, right: Expression) -> Expression:
@@ -130,3 +51,105 @@ def minus(left: Expression, right: Expression) -> Expression:
     if right == ZERO:
         return left
     return Negate(right) if left == ZERO else Binary("-", left, right)
+
+
+@cache
+def _pattern(text: str, names: tuple[str, ...]) -> Expression:
+    return parse(text, names)
+
+
+def filled(text: str, **formulas: Expression) -> Expression:
+    """Return the formula of a text, with other formulas in the places of its names."""
+    return rebuilt(
+        _pattern(text, tuple(formulas)),
+        lambda node: formulas[node.name] if isinstance(node, Name) else node,
+    )
+
+
+def tidied(node: Expression) -> Expression:
+    """Return a formula without sums with 0, products with 0 and 1, and operations on numbers alone.
+
+    Raises
+    ------
+    ExpressionError
+        Where numbers alone have no value: 1/0.
+    """
+    operations = {"+": plus, "-": minus, "*": times, "/": over}
+
+    def tidy(part: Expression) -> Expression:
+        if isinstance(part, Binary) and part.operator in operations:
+            part = operations[part.operator](part.left, part.right)
+        if names_in(part) or isinstance(part, Number):
+            return part
+        return number(evaluate(part, {}))
+
+    return rebuilt(node, tidy)
+
+
+def is_zero(node: Expression) -> bool:
+    """Tell whether a formula is the number 0."""
+    return node in (ZERO, Negate(ZERO))
+
+
+def is_multiple(node: Expression, slope: Expression, name: str) -> bool:
+    """Tell whether a formula with that derivative is a factor times `name`, whatever the parameters."""
+
+    def vanishes(part: Expression) -> bool:
+        """Tell whether a part is seen to be 0 where `name` is."""
+        match part:
+            case Number(value):
+                return value == 0.0
+            case Name(own):
+                return own == name
+            case Negate(operand) | Binary("/", operand, _):
+                return vanishes(operand)
+            case Binary("*", left, right):
+                return vanishes(left) or vanishes(right)
+            case Binary("+" | "-", left, right) | Call("where", (_, left, right)):
+                return vanishes(left) and vanishes(right)
+            case Binary("**", base, exponent):
+                return (literal(exponent) or 0.0) > 0.0 and vanishes(base)
+        return False
+
+    # the derivative does not tell of a jump
+    jumps = (part for part in walk(node) if is_jump(part))
+    varies = name in names_in(slope) or any(name in names_in(part) for part in jumps)
+    return not varies and vanishes(node)
+
+
+def is_jump(node: Expression) -> bool:
+    """Tell whether the value jumps where an operand varies."""
+    return isinstance(node, Compare) or (
+        isinstance(node, Call) and node.function in STEPS | {"mod"}
+    )
+
+
+def slope_of(node: Expression, name: str, *, with_start: bool = True) -> Expression | None:
+    """Return the a of a formula ``a x + b``, or of ``a x`` alone; None where it is another one."""
+
+    def inner(part: Expression) -> Expression | None:
+        return slope_of(part, name, with_start=with_start)
+
+    match node:
+        case Name(own) if own == name:
+            return ONE
+        case Negate(operand):
+            found = inner(operand)
+            return None if found is None else Negate(found)
+        case Binary("+" | "-", left, right) if with_start and name not in names_in(right):
+            return inner(left)
+        case Binary("+" | "-" as symbol, left, right) if with_start and name not in names_in(left):
+            found = inner(right)
+            return Negate(found) if found is not None and symbol == "-" else found
+        case Binary("*", left, right) if name not in names_in(left):
+            return _scaled(left, inner(right))
+        case Binary("*", left, right) if name not in names_in(right) and not with_start:
+            return _scaled(right, inner(left))
+        case Binary("*" | "/" as symbol, left, right) if name not in names_in(right):
+            found = inner(left)
+            return None if found is None else Binary(symbol, found, right)
+    return None
+
+
+def _scaled(factor: Expression, found: Expression | None) -> Expression | None:
+    return factor if found == ONE else None if found is None else Binary("*", factor, found)

@@ -1,4 +1,9 @@
-"""Values of formulas for arrays, by numpy: for exact solutions and frequencies, not for steps."""
+"""Values of formulas for arrays, and bounds over intervals of names, by numpy: not for steps.
+
+Bounds say what lies between two samples and no sample shows: interval arithmetic, without rounding outward, because
+bounds say where to look, and values decide what is there. An operation that has no value somewhere in its intervals is
+unbounded.
+"""
 
 from __future__ import annotations
 
@@ -7,22 +12,16 @@ from importlib import import_module
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vibsim.formula.tree import Binary, Call, Compare, Expression, Name, Negate, Number
+from vibsim.core.array_types import Floats
+from vibsim.formula.tree import Binary, Call, Compare, Expression, Name, Negate, Number, literal
+
+Interval = tuple[Floats, Floats]
 
 _OPERATORS: Mapping[str, Callable[..., Any]] = {
-    "+": np.add,
-    "-": np.subtract,
-    "*": np.multiply,
-    "/": np.divide,
-    "**": np.power,
-    "<": np.less,
-    "<=": np.less_equal,
-    ">": np.greater,
-    ">=": np.greater_equal,
-    "==": np.equal,
-    "!=": np.not_equal,
+    **{"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power},
+    **{"<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal},
+    **{"==": np.equal, "!=": np.not_equal},
 }
 
 
@@ -36,25 +35,21 @@ _SAME_NAME = (
     *("log1p", "log2", "mod", "sign", "sin", "sinh", "sqrt", "tan", "tanh"),
 )
 _FUNCTIONS: Mapping[str, Callable[..., Any]] = {
-    "acos": np.arccos,
-    "acosh": np.arccosh,
-    "asin": np.arcsin,
-    "asinh": np.arcsinh,
-    "atan": np.arctan,
-    "atan2": np.arctan2,
-    "atanh": np.arctanh,
-    "erf": _by_scipy("erf"),
-    "erfc": _by_scipy("erfc"),
+    **{f"a{name}": getattr(np, f"arc{name}") for name in ("cos", "cosh", "sin", "sinh")},
+    **{f"a{name}": getattr(np, f"arc{name}") for name in ("tan", "tan2", "tanh")},
+    **{"erf": _by_scipy("erf"), "erfc": _by_scipy("erfc")},
+    **{"max": np.maximum, "min": np.minimum, "round": np.rint},
     "heaviside": lambda x: np.heaviside(x, 0.5),
-    "max": np.maximum,
-    "min": np.minimum,
-    "round": np.rint,
     "where": lambda condition, yes, no: np.where(condition != 0.0, yes, no),
     **{name: getattr(np, name) for name in _SAME_NAME},
 }
+FALLING = frozenset(("acos", "erfc"))
+EVEN = frozenset(("abs", "cosh"))
+TURNS = {"sin": 0.25, "cos": 0.0}
+"""Where the first maximum of a periodic function lies, in periods."""
 
 
-def values(expression: Expression, numbers: Mapping[str, Any]) -> NDArray[np.float64]:
+def values(expression: Expression, numbers: Mapping[str, Any]) -> Floats:
     """Return the values of a formula; NaN or infinite where it has none.
 
     Parameters
@@ -75,10 +70,161 @@ def _values(node: Expression, numbers: Mapping[str, Any]) -> Any:
             return np.asarray(numbers[name], dtype=np.float64)
         case Negate(operand):
             return np.negative(_values(operand, numbers))
-        case Binary(symbol, left, right):
-            return _OPERATORS[symbol](_values(left, numbers), _values(right, numbers))
-        case Compare(symbol, left, right):
+        case Binary(symbol, left, right) | Compare(symbol, left, right):
             found = _OPERATORS[symbol](_values(left, numbers), _values(right, numbers))
-            return np.where(found, 1.0, 0.0)
+            return found if isinstance(node, Binary) else np.where(found, 1.0, 0.0)
         case Call(function, arguments):
             return _FUNCTIONS[function](*(_values(argument, numbers) for argument in arguments))
+
+
+def bounds(expression: Expression, numbers: Mapping[str, Any]) -> Interval:
+    """Return the least and the largest value that a formula may have.
+
+    Parameters
+    ----------
+    numbers
+        Of every name its value, or a pair of its least and largest value; arrays that broadcast against each other.
+    """
+    with np.errstate(all="ignore"):
+        return _known(*_bounds(expression, numbers))
+
+
+def _known(low: Any, high: Any) -> Interval:
+    """Return bounds, without any where there is no value."""
+    unknown = np.isnan(low) | np.isnan(high)
+    return np.where(unknown, -np.inf, low), np.where(unknown, np.inf, high)
+
+
+def _bounds(node: Expression, numbers: Mapping[str, Any]) -> Interval:
+    match node:
+        case Number(value):
+            return np.asarray(value, dtype=float), np.asarray(value, dtype=float)
+        case Name(name):
+            found = numbers[name]
+            return found if isinstance(found, tuple) else (np.asarray(found), np.asarray(found))
+        case Negate(operand):
+            low, high = _bounds(operand, numbers)
+            return -high, -low
+        case Binary("**", base, exponent):
+            return _power(_bounds(base, numbers), _bounds(exponent, numbers), literal(exponent))
+        case Binary(symbol, left, right):
+            ends = _bounds(left, numbers), _bounds(right, numbers)
+            if symbol in "*/":
+                return _known(*(_times(*ends) if symbol == "*" else _over(*ends)))
+            return _known(*_corners(_OPERATORS[symbol], *ends))
+        case Compare(symbol, left, right):
+            return _compared(symbol, _bounds(left, numbers), _bounds(right, numbers))
+        case Call(function, arguments):
+            inner = [_bounds(argument, numbers) for argument in arguments]
+            return _known(*_called(function, inner))
+
+
+def _times(a: Interval, b: Interval) -> Interval:
+    # an end that is 0 bounds what is multiplied by it, however large that is
+    products = [np.nan_to_num(x * y, nan=0.0, posinf=np.inf, neginf=-np.inf) for x in a for y in b]
+    return np.minimum.reduce(products), np.maximum.reduce(products)
+
+
+def _over(a: Interval, b: Interval) -> Interval:
+    has_pole = (b[0] <= 0.0) & (b[1] >= 0.0)
+    low, high = _times(a, (1.0 / b[1], 1.0 / b[0]))
+    return np.where(has_pole, -np.inf, low), np.where(has_pole, np.inf, high)
+
+
+def _power(base: Interval, exponent: Interval, number: float | None) -> Interval:
+    if number is not None and number == round(number):
+        if number < 0:
+            return _over((np.ones(()), np.ones(())), _power(base, exponent, -number))
+        low, high = _sizes(base) if number % 2 == 0 else base
+        return low**number, high**number
+    low, high = _corners(np.power, base, exponent)
+    has_value = base[0] >= 0.0
+    return np.where(has_value, low, -np.inf), np.where(has_value, high, np.inf)
+
+
+def _corners(function: Callable[..., Any], a: Interval, b: Interval) -> Interval:
+    """Return the bounds of a function that is monotone in both arguments."""
+    found = [function(x, y) for x in a for y in b]
+    return np.minimum.reduce(found), np.maximum.reduce(found)
+
+
+def _sizes(a: Interval) -> Interval:
+    """Return the bounds of the absolute value."""
+    ends = np.abs(a[0]), np.abs(a[1])
+    has_zero = (a[0] <= 0.0) & (a[1] >= 0.0)
+    return np.where(has_zero, 0.0, np.minimum(*ends)), np.maximum(*ends)
+
+
+def _compared(symbol: str, a: Interval, b: Interval) -> Interval:
+    low, high = _corners(np.subtract, a, b)
+    sure = {
+        "<": (high < 0.0, low >= 0.0),
+        "<=": (high <= 0.0, low > 0.0),
+        ">": (low > 0.0, high <= 0.0),
+        ">=": (low >= 0.0, high < 0.0),
+        "==": ((low == 0.0) & (high == 0.0), (low > 0.0) | (high < 0.0)),
+        "!=": ((low > 0.0) | (high < 0.0), (low == 0.0) & (high == 0.0)),
+    }
+    is_true, is_false = sure[symbol]
+    return np.where(is_true, 1.0, 0.0), np.where(is_false, 0.0, 1.0)
+
+
+def _called(function: str, inner: list[Interval]) -> Interval:
+    match function:
+        case "min" | "max" | "hypot":
+            a, b = (_sizes(x) for x in inner) if function == "hypot" else inner
+            return _value(function, a[0], b[0]), _value(function, a[1], b[1])
+        case "atan2":
+            is_right = inner[1][0] > 0.0
+            low, high = _corners(np.arctan2, *inner)
+            return np.where(is_right, low, -np.pi), np.where(is_right, high, np.pi)
+        case "mod":
+            return _modulo(*inner)
+        case "where":
+            return _chosen(*inner)
+        case "sin" | "cos":
+            return _periodic(function, inner[0])
+        case "tan":
+            low, high = (_value("tan", x) for x in inner[0])
+            is_one = np.floor(inner[0][0] / np.pi - 0.5) == np.floor(inner[0][1] / np.pi - 0.5)
+            return np.where(is_one, low, -np.inf), np.where(is_one, high, np.inf)
+    ends = _sizes(inner[0]) if function in EVEN else inner[0]
+    low, high = (_value(function, x) for x in ends)
+    return (high, low) if function in FALLING else (low, high)
+
+
+def _value(function: str, *arguments: Floats) -> Floats:
+    names = [f"x{i}" for i in range(len(arguments))]
+    call = Call(function, tuple(Name(name) for name in names))
+    return values(call, dict(zip(names, arguments, strict=True)))
+
+
+def _periodic(function: str, x: Interval) -> Interval:
+    """Return the bounds of sine or cosine: 1 where a maximum lies between the ends, -1 where a minimum does."""
+    ends = [_value(function, end) for end in x]
+    turns = [end / (2.0 * np.pi) - TURNS[function] for end in x]
+    # an infinite end says nothing of where it is
+    wide = ~(turns[1] - turns[0] < 1.0)
+    top = wide | (np.ceil(turns[0]) <= np.floor(turns[1]))
+    bottom = wide | (np.ceil(turns[0] - 0.5) <= np.floor(turns[1] - 0.5))
+    return np.where(bottom, -1.0, np.minimum(*ends)), np.where(top, 1.0, np.maximum(*ends))
+
+
+def _modulo(x: Interval, y: Interval) -> Interval:
+    whole = [np.floor(end / y[0]) for end in x]
+    is_one = (whole[0] == whole[1]) & (y[0] == y[1])
+    low, high = (end - whole[0] * y[0] for end in x)
+    return (
+        np.where(is_one, np.minimum(low, high), np.minimum(y[0], 0.0)),
+        np.where(is_one, np.maximum(low, high), np.maximum(y[1], 0.0)),
+    )
+
+
+def _chosen(condition: Interval, yes: Interval, no: Interval) -> Interval:
+    never = (condition[0] == 0.0) & (condition[1] == 0.0)
+    always = (condition[0] > 0.0) | (condition[1] < 0.0)
+    low, high = np.minimum(yes[0], no[0]), np.maximum(yes[1], no[1])
+    return (
+        np.where(always, yes[0], np.where(never, no[0], low)),
+        np.where(always, yes[1], np.where(never, no[1], high)),
+    )

@@ -1,26 +1,24 @@
 """Integrals of formulas, as formulas: the potential energy of a spring.
 
 The integral is taken from 0, in forms that do not cancel there: a small energy has all its digits. A sum is integrated
-term by term; a term is a constant factor times a power of x, or a function of the table (`antiderivative`) of ``a x``.
-What has a corner or jumps is integrated for ``a x + b`` too, though the difference ``F(a x + b) - F(b)`` may cost a
-small energy some digits; what holds on one side of a place alone is integrated up to that place or from there. Anything
-else is integrated by Gauss and Legendre's rule between 0 and x, written out as a formula: right to round-off for a
-function that is smooth there, even if it has a corner at 0. Where a function has poles beside the real axis, as
+term by term; a term is a constant factor times a power of x, or a function of the table `SMOOTH` of ``a x``. What has a
+corner or jumps is integrated for ``a x + b`` too, though the difference ``F(a x + b) - F(b)`` may cost a small energy
+some digits; what holds on one side of a place alone is integrated up to that place or from there. Anything else is
+integrated by Gauss and Legendre's rule between 0 and x, written out as a formula: right to round-off for a function
+that is smooth there, even if it has a corner at 0. Where a function has poles beside the real axis, as
 ``x/sqrt(1 + x^2)`` at i, the rule is one over asinh(x): the way from 0 to 128 is then 5.5 long, and i still 1.6 away.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
+import math
+from functools import reduce
 
 import numpy as np
 
-from vibsim.formula.algebra import put
-from vibsim.formula.antiderivative import BROKEN, SMOOTH, of_mod, ramp, ramp_integral
-from vibsim.formula.linear import factor_of, slope_of, start_of
-from vibsim.formula.parser import literal
+from vibsim.formula.algebra import filled, slope_of
 from vibsim.formula.tree import (
+    ZERO,
     Binary,
     Call,
     Compare,
@@ -28,12 +26,13 @@ from vibsim.formula.tree import (
     Name,
     Negate,
     Number,
+    literal,
     names_in,
-    rebuilt,
+    number,
+    put,
     walk,
 )
 
-ZERO, ONE, TWO, HALF = Number(0.0), Number(1.0), Number(2.0), Number(0.5)
 POINTS = 24
 """Points of the rule: polynomials up to degree 47 are integrated exactly."""
 POLES = frozenset(
@@ -42,6 +41,48 @@ POLES = frozenset(
 """Functions that are singular beside the real axis."""
 MAX_CONDITIONS = 4
 """Most conditions inside one that decides of a part: each of them doubles the text of the integral."""
+
+# log(cosh(x)) overflows nowhere and has all its digits near 0: it is artanh(z) with z = y/(2 + y), y = sinh(x)**2
+_Z = "(sinh(x)**2/(2 + sinh(x)**2))"
+_ARTANH = reduce(lambda inner, k: f"1/{k} + {_Z}**2*({inner})", range(11, 0, -2), "1/13")
+_LOG_COSH_FAR = "abs(x) + log(0.5*(1 + exp(-(2*abs(x)))))"
+# e^x - 1 - x as a series, and what lies between erf and x erf
+_BEYOND_LINEAR = reduce(lambda inner, k: f"1 + x/{k}*({inner})", range(14, 2, -1), "1")
+_BELOW_ONE = f"-({1.0 / math.sqrt(math.pi)!r}*expm1(-x**2))"
+
+SMOOTH = {
+    "sin": "2*(sin(0.5*x)*sin(0.5*x))",
+    "cos": "sin(x)",
+    "exp": "2*(exp(0.5*x)*sinh(0.5*x))",
+    "expm1": f"where(abs(x) < 0.3, 0.5*x*x*({_BEYOND_LINEAR}), expm1(x) - x)",
+    "sinh": "2*(sinh(0.5*x)*sinh(0.5*x))",
+    "cosh": "sinh(x)",
+    "tanh": f"where(abs(x) < 0.3, {_Z}*({_ARTANH}), {_LOG_COSH_FAR})",
+    # x asinh(x) + 1 - sqrt(1 + x^2)
+    "asinh": "x*(asinh(x) - x/(1 + hypot(1, x)))",
+    # the second part is at most half of the first
+    "atan": "x*atan(x) - 0.5*log1p(x**2)",
+    # 1 - x^2 has its digits near 0 in one form, near 1 in another
+    "atanh": "x*atanh(x) + 0.5*where(abs(x) < 0.5, log1p(-x**2), log((1 - x)*(1 + x)))",
+    "cbrt": "0.75*x*cbrt(x)",
+    "erf": f"x*erf(x) - {_BELOW_ONE}",
+    "erfc": f"x*erfc(x) + {_BELOW_ONE}",
+}
+"""Antiderivatives that vanish at 0, of functions that are smooth or have their corner at 0."""
+RAMP = "max(x, 0)"
+BROKEN = {
+    "abs": "0.5*(x*abs(x))",
+    "ceil": "ceil(x)*(x - 0.5*(ceil(x) - 1))",
+    "floor": "floor(x)*(x - 0.5*(floor(x) + 1))",
+    "heaviside": RAMP,
+    "round": "round(x)*(x - 0.5*round(x))",
+    "sign": "abs(x)",
+}
+"""Of functions with a corner or jumps, which a rule of points does not integrate."""
+# with x = n period + m; in the periods beside 0 the second form would cancel
+_M = "mod(x, period)"
+_N = f"round((x - {_M})/period)"
+MOD = f"where(abs({_N} + 0.5) < 1, x*(0.5*x - {_N}*period), 0.5*({_N}*period*period + {_M}*{_M}))"
 
 
 def integral(node: Expression, name: str) -> Expression:
@@ -57,77 +98,71 @@ def has_rule(node: Expression, name: str) -> bool:
 
 def _found(node: Expression, name: str) -> Expression | None:
     """Return the integral by the rules; None where they give none."""
-    if name not in names_in(node):
+
+    def is_free(part: Expression) -> bool:
+        return name not in names_in(part)
+
+    def differ(left: Expression, right: Expression) -> bool:
+        """Whether only one of two formulas has the name, so that the slopes of a difference cannot cancel."""
+        return is_free(left) != is_free(right)
+
+    if is_free(node):
         return Binary("*", node, Name(name))
     match node:
         case Name():
-            return Binary("*", HALF, Binary("**", node, TWO))
+            return filled("0.5*x**2", x=node)
         case Negate(operand):
             inner = _found(operand, name)
             return None if inner is None else Negate(inner)
         case Binary("+" | "-" as symbol, left, right):
-            first, second = _found(left, name), _found(right, name)
-            return None if first is None or second is None else Binary(symbol, first, second)
-        case Binary("*", left, right) if name not in names_in(left):
-            inner = _found(right, name)
-            return None if inner is None else Binary("*", left, inner)
-        case Binary("*" | "/" as symbol, left, right) if name not in names_in(right):
-            inner = _found(left, name)
-            return None if inner is None else Binary(symbol, inner, right)
+            return _joined(symbol, _found(left, name), _found(right, name))
+        case Binary("*", left, right) if is_free(left):
+            return _joined("*", left, _found(right, name))
+        case Binary("*" | "/" as symbol, left, right) if is_free(right):
+            return _joined(symbol, _found(left, name), right)
         case Binary("**", Name() as base, exponent):
             power = literal(exponent)
             if power is None or power <= 0.0:
                 return None
-            raised = Binary("**", base, Number(power + 1.0))
-            return Binary("/", raised, Number(power + 1.0))
-        case Binary("**", base, exponent) if name not in names_in(base):
+            return filled("x**n/n", x=base, n=Number(power + 1.0))
+        case Binary("**", base, exponent) if is_free(base):
             # e**x
-            grown = Call("exp", (Binary("*", Call("log", (base,)), exponent),))
-            return _found(grown, name)
-        case Call(function, (argument,)) if function in SMOOTH:
-            factor = factor_of(argument, name)
-            return None if factor is None else Binary("/", SMOOTH[function](argument), factor)
-        case _:
-            return _of_broken(node, name)
-
-
-def _of_broken(node: Expression, name: str) -> Expression | None:
-    """Return the integral of what has a corner or jumps."""
-    match node:
-        case Call(function, (argument,)) if function in BROKEN:
-            return _of_linear(BROKEN[function], argument, name)
-        case Call("mod", (argument, period)) if name not in names_in(period):
-            return _of_linear(lambda x: of_mod(x, period), argument, name)
-        case Call("max" | "min" as function, (left, right)) if _is_in_one(left, right, name):
+            return _found(filled("exp(log(base)*x)", base=base, x=exponent), name)
+        case Call(function, (x,)) if function in SMOOTH:
+            return _joined("/", filled(SMOOTH[function], x=x), slope_of(x, name, with_start=False))
+        case Call(function, (x,)) if function in BROKEN:
+            return _of_linear(BROKEN[function], x, name)
+        case Call("mod", (x, period)) if is_free(period):
+            return _of_linear(MOD, x, name, period=period)
+        case Call("max" | "min" as function, (left, right)) if differ(left, right):
             # max(a, b) = b + max(a - b, 0), min(a, b) = a - max(a - b, 0)
             base, symbol = (right, "+") if function == "max" else (left, "-")
-            first = _found(base, name)
-            second = _of_linear(ramp_integral, Binary("-", left, right), name)
-            return None if first is None or second is None else Binary(symbol, first, second)
-        case Compare("<" | "<=", left, right) if _is_in_one(left, right, name):
-            return _of_linear(ramp, Binary("-", right, left), name)
-        case Compare(">" | ">=", left, right) if _is_in_one(left, right, name):
-            return _of_linear(ramp, Binary("-", left, right), name)
-        case Binary("**", Call("max", (argument, Number(0.0))), exponent):
-            more = Number((literal(exponent) or -1.0) + 1.0)
-            if more.value <= 1.0:
+            above = _of_linear("0.5*x*max(x, 0)", Binary("-", left, right), name)
+            return _joined(symbol, _found(base, name), above)
+        case Compare("<" | "<=", left, right) if differ(left, right):
+            return _of_linear(RAMP, Binary("-", right, left), name)
+        case Compare(">" | ">=", left, right) if differ(left, right):
+            return _of_linear(RAMP, Binary("-", left, right), name)
+        case Binary("**", Call("max", (x, Number(0.0))), exponent):
+            more = (literal(exponent) or -1.0) + 1.0
+            if more <= 1.0:
                 return None
-            return _of_linear(
-                lambda x: Binary("/", Binary("**", ramp(x), more), more), argument, name
-            )
-        case Call("where", (condition, yes, no)) if name not in names_in(condition):
+            return _of_linear("max(x, 0)**n/n", x, name, n=Number(more))
+        case Call("where", (condition, yes, no)) if is_free(condition):
             first, second = _found(yes, name), _found(no, name)
             if first is None or second is None:
                 return None
             return Call("where", (condition, first, second))
         case Call("where", (condition, yes, no)):
             first = _of_part(yes, condition, 1.0, name)
-            second = _of_part(no, condition, -1.0, name)
-            return None if first is None or second is None else Binary("+", first, second)
+            return _joined("+", first, _of_part(no, condition, -1.0, name))
         case Binary("*", left, right):
             return _of_part(left, right, 1.0, name) or _of_part(right, left, 1.0, name)
-        case _:
-            return None
+    return None
+
+
+def _joined(symbol: str, left: Expression | None, right: Expression | None) -> Expression | None:
+    return None if left is None or right is None else Binary(symbol, left, right)
 
 
 def _of_part(node: Expression, condition: Expression, side: float, name: str) -> Expression | None:
@@ -150,61 +185,42 @@ def _of_part(node: Expression, condition: Expression, side: float, name: str) ->
     whole = _found(node, name) if inside <= MAX_CONDITIONS else None
     if not slope or whole is None:
         return None
-    place = Binary("/", Negate(start_of(difference, name)), _number(slope))
+    place = Binary("/", Negate(put(difference, name, ZERO)), number(slope))
     function = "max" if slope * side > 0.0 else "min"
-
-    def up_to(end: Expression) -> Expression:
-        limit = Call(function, (end, place))
-        return rebuilt(whole, lambda part: limit if part == Name(name) else part)
-
-    return Binary("-", up_to(Name(name)), up_to(ZERO))
+    ends = (put(whole, name, Call(function, (end, place))) for end in (Name(name), ZERO))
+    return Binary("-", *ends)
 
 
-def _number(value: float) -> Expression:
-    return Number(value) if value >= 0.0 else Negate(Number(-value))
-
-
-def _is_in_one(left: Expression, right: Expression, name: str) -> bool:
-    """Whether only one of two formulas has the name, so that the slopes of a difference cannot cancel."""
-    return (name in names_in(left)) != (name in names_in(right))
-
-
-def _of_linear(
-    write: Callable[[Expression], Expression], argument: Expression, name: str
-) -> Expression | None:
+def _of_linear(text: str, x: Expression, name: str, **more: Expression) -> Expression | None:
     """Return the integral of a function of ``a x + b`` whose antiderivative is given; None for other arguments."""
-    factor = factor_of(argument, name)
-    if factor is not None:
-        return Binary("/", write(argument), factor)
-    factor = slope_of(argument, name)
+    found = filled(text, x=x, **more)
+    factor = slope_of(x, name, with_start=False)
     if factor is None:
-        return None
-    start = write(start_of(argument, name))
-    return Binary("/", Binary("-", write(argument), start), factor)
-
-
-@cache
-def _rule() -> tuple[tuple[float, float], ...]:
-    """Return places between 0 and 1 and their weights."""
-    x, weights = np.polynomial.legendre.leggauss(POINTS)
-    return tuple(zip((0.5 * (x + 1.0)).tolist(), (0.5 * weights).tolist(), strict=True))
+        factor = slope_of(x, name)
+        found = Binary("-", found, filled(text, x=put(x, name, ZERO), **more))
+    return _joined("/", found, factor)
 
 
 def _by_quadrature(node: Expression, name: str) -> Expression:
     """Write Gauss and Legendre's rule, over x itself or, where poles are near, over asinh(x)."""
-    if not _has_poles(node, name):
-        terms = [
-            _weighted(weight, put(node, name, Binary("*", Number(place), Name(name))))
-            for place, weight in _rule()
-        ]
-        return Binary("*", Name(name), _total(terms))
-    way = Call("asinh", (Name(name),))
-    terms = []
-    for place, weight in _rule():
+    x: Expression = Name(name)
+    way = Call("asinh", (x,)) if _has_poles(node, name) else x
+    terms: list[Expression] = []
+    places, weights = np.polynomial.legendre.leggauss(POINTS)
+    for place, weight in zip(
+        (0.5 * (places + 1.0)).tolist(), (0.5 * weights).tolist(), strict=True
+    ):
         y = Binary("*", Number(place), way)
-        force = put(node, name, Call("sinh", (y,)))
-        terms.append(_weighted(weight, Binary("*", force, Call("cosh", (y,)))))
-    return Binary("*", way, _total(terms))
+        force = put(node, name, y)
+        if way != x:
+            force = Binary("*", put(node, name, Call("sinh", (y,))), Call("cosh", (y,)))
+        terms.append(Binary("*", Number(weight), force))
+    # a sum in pairs, so that the tree stays flat
+    while len(terms) > 1:
+        odd = terms[len(terms) - len(terms) % 2 :]
+        pairs = zip(terms[::2], terms[1::2], strict=False)
+        terms = [*(Binary("+", left, right) for left, right in pairs), *odd]
+    return Binary("*", way, terms[0])
 
 
 def _has_poles(node: Expression, name: str) -> bool:
@@ -223,16 +239,3 @@ def _has_poles(node: Expression, name: str) -> bool:
         return False
 
     return any(may(part) for part in walk(node))
-
-
-def _weighted(weight: float, node: Expression) -> Expression:
-    return Binary("*", Number(weight), node)
-
-
-def _total(terms: list[Expression]) -> Expression:
-    """Write a sum in pairs, so that the tree stays flat."""
-    while len(terms) > 1:
-        ends = zip(terms[::2], terms[1::2], strict=False)
-        odd = terms[len(terms) - len(terms) % 2 :]
-        terms = [*(Binary("+", left, right) for left, right in ends), *odd]
-    return terms[0]

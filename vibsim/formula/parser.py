@@ -7,18 +7,9 @@ import math
 import re
 import warnings
 from collections.abc import Collection
+from dataclasses import dataclass
 
-from vibsim.core.errors import nearest
-from vibsim.formula.faults import (
-    INSTEAD,
-    MAX_DEPTH,
-    OTHER_NAMES,
-    REFUSED,
-    TOO_DEEP,
-    ExpressionError,
-    place_of_fault,
-    shorten,
-)
+from vibsim.core.errors import VibsimError, nearest
 from vibsim.formula.tree import (
     CONSTANTS,
     FUNCTIONS,
@@ -29,7 +20,7 @@ from vibsim.formula.tree import (
     Name,
     Negate,
     Number,
-    children,
+    literal,
     walk,
 )
 
@@ -37,23 +28,50 @@ MAX_CHARACTERS = 2000
 MAX_POWER = 1024
 """Largest whole exponent: it is written out as multiplications."""
 
-_BINARY: dict[type[ast.operator], str] = {
-    ast.Add: "+",
-    ast.Sub: "-",
-    ast.Mult: "*",
-    ast.Div: "/",
-    ast.Pow: "**",
-}
-_COMPARE: dict[type[ast.cmpop], str] = {
-    ast.Lt: "<",
-    ast.LtE: "<=",
-    ast.Gt: ">",
-    ast.GtE: ">=",
-    ast.Eq: "==",
-    ast.NotEq: "!=",
-}
+_BINARY = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
+_COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 _FOREIGN = re.compile(r"[^A-Za-z0-9_.+\-*/()<>=!, ]")
 _NUMBER = re.compile(r"(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+MAX_DEPTH = 100
+TOO_DEEP = f"must not nest deeper than {MAX_DEPTH} operations"
+_JOINED = re.compile(r"(?<![A-Za-z0-9_.])(\d+\.?\d*|\.\d+)(?=[A-Za-z_])(?![eE][+-]?\d)")
+"""A number that runs into a name: a forgotten ``*``."""
+_UNFINISHED = re.compile(r"([+\-*/<>=!,(]|\b(and|or|not|if|else))$")
+INSTEAD = {
+    **{"^": "** for a power", "%": "mod(x, y)", "&": "and", "|": "or", "\u03c0": "pi"},
+    **dict.fromkeys("\u00d7\u00b7\u22c5", "*"),
+    **dict.fromkeys("\u2212\u2013", "-"),
+    **{"\u00f7": "/", "\u00b2": "**2", "\u00b3": "**3"},
+}
+"""What to write for a character that is not allowed."""
+REFUSED: dict[type[ast.AST], str] = {
+    ast.Attribute: "attribute access is not allowed",
+    ast.Tuple: "a list of values is not allowed",
+    ast.Lambda: "'lambda' is not allowed",
+    ast.Starred: "'*' is not allowed before an argument",
+    ast.NamedExpr: "':=' is not allowed",
+    ast.FloorDiv: "'//' is not allowed; use floor(a/b)",
+}
+"""What is refused by its name."""
+OTHER_NAMES = {
+    **{f"arc{name}": f"a{name}" for name in ("cos", "cosh", "sin", "sinh", "tan", "tan2", "tanh")},
+    **{"Abs": "abs", "fabs": "abs", "ln": "log", "fmod": "mod", "rint": "round", "pow": "a**b"},
+    **{"step": "heaviside", "Heaviside": "heaviside"},
+    **{"maximum": "max", "minimum": "min", "power": "a**b", "sgn": "sign"},
+}
+"""What functions are called elsewhere."""
+
+
+class ExpressionError(VibsimError):
+    """A formula that is refused: where in its text (from 0), what is wrong or was expected there, and a hint."""
+
+    def __init__(self, text: str, position: int, rule: str, hint: str = "") -> None:
+        self.text, self.position, self.rule, self.hint = text, position, rule, hint
+        super().__init__(text, position, rule, hint)
+
+    def __str__(self) -> str:
+        where = f"formula '{shorten(self.text)}', character {self.position + 1}"
+        return ": ".join(part for part in (where, self.rule, self.hint) if part)
 
 
 def parse(text: str, names: Collection[str]) -> Expression:
@@ -78,24 +96,28 @@ def parse(text: str, names: Collection[str]) -> Expression:
     if foreign := _FOREIGN.search(plain):
         character = foreign.group()
         rule = f"character {character!r} is not allowed in a formula"
-        raise ExpressionError(text, foreign.start(), rule, INSTEAD.get(character, ""))
+        hint = f"write {INSTEAD[character]}" if character in INSTEAD else ""
+        raise ExpressionError(text, foreign.start(), rule, hint)
     if not plain.strip():
         raise ExpressionError(text, 0, "is empty; expected a number, a name or '('")
-    reader = _Reader(text, plain, frozenset(names))
+    reader = _Reader(text, plain.lstrip(), frozenset(names))
     return reader.convert(reader.tree(), 0)
 
 
+@dataclass(frozen=True)
 class _Reader:
     """One formula on its way from Python's tree to ours; remembers the text for messages."""
 
-    def __init__(self, text: str, plain: str, names: frozenset[str]) -> None:
-        self.text = text
-        self.names = names
-        self.body = plain.lstrip()
-        self.shift = len(plain) - len(self.body)
+    text: str
+    body: str
+    names: frozenset[str]
 
     def fault(self, node: ast.expr, rule: str, hint: str = "") -> ExpressionError:
         return self.at(node.col_offset, rule, hint)
+
+    def at(self, position: int, rule: str, hint: str = "") -> ExpressionError:
+        shift = len(self.text) - len(self.body)
+        return ExpressionError(self.text, position + shift, rule, hint)
 
     def tree(self) -> ast.expr:
         try:
@@ -106,9 +128,6 @@ class _Reader:
             raise self.at(*place_of_fault(self.body.rstrip(), error)) from None
         except (ValueError, RecursionError, MemoryError, Warning):
             raise ExpressionError(self.text, 0, "is not a formula, or nested too deeply") from None
-
-    def at(self, position: int, rule: str, hint: str = "") -> ExpressionError:
-        return ExpressionError(self.text, position + self.shift, rule, hint)
 
     def convert(self, node: ast.expr, depth: int) -> Expression:
         if depth >= MAX_DEPTH:
@@ -181,13 +200,13 @@ class _Reader:
                 hint = "join two comparisons with and"
                 raise self.fault(written, "a comparison within a chain of comparisons", hint)
         signs = [_COMPARE[type(operator)] for operator in node.ops]
-        return _paired("*", list(map(Compare, signs, sides[:-1], sides[1:])))
+        return _paired(list(map(Compare, signs, sides[:-1], sides[1:])), is_product=True)
 
     def joined(self, node: ast.BoolOp, depth: int) -> Expression:
         """Read ``and`` as a product, ``or`` as the largest."""
         below = depth + (len(node.values) - 1).bit_length()
         values = [self.condition(value, below) for value in node.values]
-        return _paired("*" if isinstance(node.op, ast.And) else "max", values)
+        return _paired(values, is_product=isinstance(node.op, ast.And))
 
     def condition(self, node: ast.expr, depth: int) -> Expression:
         """Read what is 1 or 0."""
@@ -215,22 +234,45 @@ class _Reader:
         return Call(function, tuple(self.convert(argument, depth + 1) for argument in node.args))
 
 
-def _paired(operation: str, terms: list[Expression]) -> Expression:
-    """Return terms joined in pairs, so that the tree stays flat: by ``*``, or a function of two arguments."""
+def _paired(terms: list[Expression], *, is_product: bool) -> Expression:
+    """Return terms joined in pairs by ``*`` or ``max``, so that the tree stays flat."""
     while len(terms) > 1:
-        pairs = zip(terms[::2], terms[1::2], strict=False)
         odd = terms[len(terms) - len(terms) % 2 :]
-        terms = [
-            Binary("*", *pair) if operation == "*" else Call(operation, pair) for pair in pairs
-        ] + odd
+        pairs = zip(terms[::2], terms[1::2], strict=False)
+        terms = [Binary("*", *pair) if is_product else Call("max", pair) for pair in pairs] + odd
     return terms[0]
 
 
-def literal(node: Expression) -> float | None:
-    """Return the value of a number with signs before it, None for anything else."""
-    if isinstance(node, Number):
-        return node.value
-    if isinstance(node, Negate):
-        value = literal(children(node)[0])
-        return None if value is None else -value
-    return None
+def shorten(text: str, length: int = 60) -> str:
+    """Return `text`, cut to `length` characters."""
+    return text if len(text) <= length else text[: length - 3] + "..."
+
+
+def place_of_fault(body: str, error: SyntaxError) -> tuple[int, str, str]:
+    """Return where a text is no formula, what was expected there, and a hint: Python's messages speak of programs."""
+    if joined := _JOINED.search(body):
+        hint = f"write {joined.group()}*{body[joined.end()]}..."
+        return joined.end(), "expected an operator", hint
+    lonely = unpaired(body)
+    if lonely is not None:
+        return lonely, "has a parenthesis without its partner", ""
+    if "too many nested" in str(error.msg):
+        return 0, TOO_DEEP, ""
+    # a text that is cut short is reported at its beginning, or past its end
+    if _UNFINISHED.search(body):
+        return len(body), "ends where a number, a name or '(' was expected", ""
+    position = min(max((error.offset or 1) - 1, 0), len(body) - 1)
+    return position, "expected an operator, a number, a name or a parenthesis here", ""
+
+
+def unpaired(text: str) -> int | None:
+    """Return where a parenthesis without its partner stands, None where there is none."""
+    opened: list[int] = []
+    for position, character in enumerate(text):
+        if character == "(":
+            opened.append(position)
+        elif character == ")" and not opened:
+            return position
+        elif character == ")":
+            opened.pop()
+    return opened[-1] if opened else None

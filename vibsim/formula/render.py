@@ -12,12 +12,19 @@ from collections.abc import Callable, Mapping
 from itertools import accumulate
 
 from vibsim.elementary import ELEMENTARY
-from vibsim.formula.faults import ExpressionError
-from vibsim.formula.parser import literal, parse
-from vibsim.formula.tree import FUNCTIONS, Binary, Call, Compare, Expression, Name, Negate, Number
+from vibsim.formula.parser import ExpressionError, parse
+from vibsim.formula.tree import (
+    FUNCTIONS,
+    Binary,
+    Call,
+    Compare,
+    Expression,
+    Name,
+    Negate,
+    Number,
+    literal,
+)
 
-MAX_SOURCE = 10_000
-"""Longest factor, in characters, that `to_python` repeats."""
 MAX_NESTING = 120
 """Parentheses in each other from which `to_statements` gives a part a name: Python reads 200, derivatives have more."""
 
@@ -60,12 +67,12 @@ def evaluate(expression: Expression, values: Mapping[str, float], text: str = ""
     try:
         return float(_value(expression, values))
     except ZeroDivisionError:
-        raise ExpressionError(text, 0, "has no finite value", "it divides by zero") from None
+        hint = "it divides by zero"
     except OverflowError:
-        raise ExpressionError(text, 0, "has no finite value", "it is too large") from None
+        hint = "it is too large"
     except (ValueError, TypeError):
         hint = "a function or power does not exist there"
-        raise ExpressionError(text, 0, "has no finite value", hint) from None
+    raise ExpressionError(text, 0, "has no finite value", hint)
 
 
 def _value(node: Expression, values: Mapping[str, float]) -> float:
@@ -153,87 +160,56 @@ def _within(node: Expression, least: int) -> str:
     return text if binding >= least else f"({text})"
 
 
-def to_python(expression: Expression) -> str:
-    """Write `expression` as one Python expression for the engine.
-
-    The text is fully parenthesised, so that the evaluation order is the formula's. It holds numbers, names,
-    ``+ - * /``, comparisons, and calls by name: of `FUNCTIONS`, and of ``power(base, exponent)`` where an exponent is
-    not a whole number. A whole power is squared and multiplied from the exponent's leading bit on: ``x**2`` is
-    ``(x * x)``, ``x**3`` is ``((x * x) * x)``, ``x**-2`` is ``(1.0 / (x * x))``. A factor is repeated as text: where
-    it is costly, use `to_statements`, which gives the same bits.
-
-    Raises
-    ------
-    ExpressionError
-        Where powers of powers would be written out at a length of more than `MAX_SOURCE` characters.
-    """
-    return _source(expression, _repeated)
-
-
 def to_statements(expression: Expression, result: str) -> list[str]:
-    """Write `expression` as assignments, the last one to `result`; every factor of a power is worked out once.
+    """Write `expression` as assignments of Python for the engine, the last one to `result`.
 
-    ``sin(x)**2`` becomes ``_1 = sin(x)`` and ``result = (_1 * _1)``. The operations and their order are those of
-    `to_python`; no name of a formula begins with ``_``.
+    Every operation has its parentheses, so that their order is the formula's. There are numbers, names, ``+ - * /``,
+    comparisons, and calls of `FUNCTIONS`, and of ``power(base, exponent)`` where an exponent is not a whole number. A
+    whole power is squared and multiplied from the exponent's leading bit on, and a factor of it is worked out once:
+    ``sin(x)**2`` becomes ``_1 = sin(x)`` and ``result = (_1 * _1)``. No name of a formula begins with ``_``.
     """
     lines: list[str] = []
 
     def named(source: str) -> str:
-        if _is_plain(source):
+        if source.isidentifier() or source.replace(".", "", 1).isdigit():
             return source
         lines.append(f"_{len(lines) + 1} = {source}")
         return f"_{len(lines)}"
 
-    last = _source(expression, named)
+    def power(base: Expression, exponent: Expression) -> str:
+        whole = literal(exponent)
+        if whole is None or not whole.is_integer():
+            return f"power({source(base)}, {source(exponent)})"
+        if whole == 0.0:
+            return "1.0"
+        factor = found = named(source(base))
+        for bit in bin(abs(int(whole)))[3:]:
+            half = named(found)
+            found = f"({half} * {half})"
+            if bit == "1":
+                found = f"({found} * {factor})"
+        return found if whole > 0.0 else f"(1.0 / {found})"
+
+    def source(node: Expression) -> str:
+        match node:
+            case Number(value):
+                found = repr(value)
+            case Name(name):
+                found = name
+            case Negate(operand):
+                found = f"(-{source(operand)})"
+            case Binary("**", base, exponent):
+                found = power(base, exponent)
+            case Binary(symbol, left, right) | Compare(symbol, left, right):
+                found = f"({source(left)} {symbol} {source(right)})"
+            case Call(function, arguments):
+                found = f"{function}({', '.join(map(source, arguments))})"
+        is_deep = found.count("(") > MAX_NESTING and _nesting(found) > MAX_NESTING
+        return named(found) if is_deep else found
+
+    last = source(expression)
     return [*lines, f"{result} = {last}"]
-
-
-def _source(node: Expression, share: Callable[[str], str]) -> str:
-    source = _source_of(node, share)
-    is_deep = source.count("(") > MAX_NESTING and _nesting(source) > MAX_NESTING
-    return share(source) if is_deep else source
 
 
 def _nesting(source: str) -> int:
     return max(accumulate((c == "(") - (c == ")") for c in source))
-
-
-def _source_of(node: Expression, share: Callable[[str], str]) -> str:
-    match node:
-        case Number(value):
-            return repr(value)
-        case Name(name):
-            return name
-        case Negate(operand):
-            return f"(-{_source(operand, share)})"
-        case Binary("**", base, exponent):
-            return _power_source(base, exponent, share)
-        case Binary(symbol, left, right) | Compare(symbol, left, right):
-            return f"({_source(left, share)} {symbol} {_source(right, share)})"
-        case Call(function, arguments):
-            return f"{function}({', '.join(_source(argument, share) for argument in arguments)})"
-
-
-def _power_source(base: Expression, exponent: Expression, share: Callable[[str], str]) -> str:
-    whole = literal(exponent)
-    if whole is None or not whole.is_integer():
-        return f"power({_source(base, share)}, {_source(exponent, share)})"
-    if whole == 0.0:
-        return "1.0"
-    factor = result = share(_source(base, share))
-    for bit in bin(abs(int(whole)))[3:]:
-        half = share(result)
-        result = f"({half} * {half})"
-        if bit == "1":
-            result = f"({result} * {factor})"
-    return result if whole > 0.0 else f"(1.0 / {result})"
-
-
-def _repeated(source: str) -> str:
-    if len(source) > MAX_SOURCE:
-        raise ExpressionError(source, 0, "powers of powers are too long to be written out")
-    return source
-
-
-def _is_plain(source: str) -> bool:
-    return source.isidentifier() or source.replace(".", "", 1).isdigit()

@@ -8,12 +8,12 @@ place where a mode changes: it is smooth there, if the functions in it are.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
-from vibsim.formula.algebra import is_zero
-from vibsim.formula.derivative import ONE, STEPS, TWO
+from vibsim.formula.algebra import filled, is_zero
 from vibsim.formula.tree import (
+    STEPS,
     Binary,
     Call,
     Compare,
@@ -24,8 +24,6 @@ from vibsim.formula.tree import (
     children,
     rebuilt,
 )
-
-HALF = Number(0.5)
 
 
 @dataclass(frozen=True)
@@ -38,11 +36,6 @@ class Switch:
     """Whether the mode changes at every whole number, not only at 0."""
     mode: str
     """Name of its mode; no user can write it."""
-
-
-def mode_name(index: int) -> str:
-    """Return the name of the mode of a switch."""
-    return f"_mode_{index}"
 
 
 def held(
@@ -60,14 +53,53 @@ def held(
     def mode(quantity: Expression, whole: bool = False) -> Name:
         key = quantity, whole
         if key not in found:
-            found[key] = Switch(quantity, whole, mode_name(len(found)))
+            found[key] = Switch(quantity, whole, f"_mode_{len(found)}")
         return Name(found[key].mode)
 
+    def sides(left: Expression, right: Expression) -> tuple[Expression, Expression]:
+        """Return what is 1 where `left` is larger than `right`, else 0, and the other way round."""
+        if is_zero(left) and not is_zero(right):
+            smaller, larger = sides(right, left)
+            return larger, smaller
+        side = mode(left if is_zero(right) else Binary("-", left, right))
+        return filled("side + 1", side=side), Negate(side)
+
     def change(node: Expression) -> Expression:
-        return _held(node, moving, mode)
+        """Return a node, whose operands are held already, without its corner or jump."""
+        match node:
+            case Compare("==" | "!=" as symbol, left, right) if moves("-", left, right):
+                # true, or false, at single moments only
+                return Number(float(symbol == "!="))
+            case Compare(symbol, left, right) if moves("-", left, right):
+                larger, smaller = sides(left, right)
+                return larger if symbol in (">", ">=") else smaller
+            case Call("min" | "max" as function, (x, y)) if moves("-", x, y):
+                larger, smaller = sides(x, y)
+                return Call("where", (larger, x, y) if function == "max" else (smaller, x, y))
+            case Call("mod", (x, y)) if moves("/", x, y):
+                return filled("x - mode*y", x=x, y=y, mode=mode(Binary("/", x, y), whole=True))
+            case Call(function, (x,)) if function in _HELD and varies(x, moving):
+                is_rounded = function in ("floor", "ceil", "round")
+                quantity = filled("x + 0.5", x=x) if function == "round" else x
+                return filled(_HELD[function], x=x, mode=mode(quantity, is_rounded))
+        return node
+
+    def moves(symbol: str, left: Expression, right: Expression) -> bool:
+        return varies(Binary(symbol, left, right), moving)
 
     made = tuple(rebuilt(formula, change) for formula in formulas)
     return made, tuple(found.values())
+
+
+_HELD = {
+    "abs": "(2*mode + 1)*x",
+    "sign": "2*mode + 1",
+    "heaviside": "mode + 1",
+    "floor": "mode",
+    "ceil": "mode + 1",
+    "round": "mode",
+}
+"""Functions of one argument x, with the mode of what they look at."""
 
 
 def varies(node: Expression, moving: Collection[str]) -> bool:
@@ -82,61 +114,3 @@ def varies(node: Expression, moving: Collection[str]) -> bool:
         case Call("where", (_, yes, no)):
             return varies(yes, moving) or varies(no, moving)
     return any(varies(child, moving) for child in children(node))
-
-
-def _held(node: Expression, moving: Collection[str], mode: Callable[..., Name]) -> Expression:
-    """Return a node, whose operands are held already, without its corner or jump."""
-    match node:
-        case Compare(symbol, left, right):
-            return _compared(node, symbol, left, right, moving, mode)
-        case Call("abs" | "sign" | "heaviside" as function, (x,)) if varies(x, moving):
-            return _of_sign(function, x, mode(x))
-        case Call("min" | "max" as function, (x, y)) if varies(Binary("-", x, y), moving):
-            larger, smaller = _sides(x, y, mode)
-            return Call("where", (larger, x, y) if function == "max" else (smaller, x, y))
-        case Call("floor", (x,)) if varies(x, moving):
-            return mode(x, whole=True)
-        case Call("ceil", (x,)) if varies(x, moving):
-            return Binary("+", mode(x, whole=True), ONE)
-        case Call("round", (x,)) if varies(x, moving):
-            return mode(Binary("+", x, HALF), whole=True)
-        case Call("mod", (x, y)) if varies(Binary("/", x, y), moving):
-            return Binary("-", x, Binary("*", mode(Binary("/", x, y), whole=True), y))
-    return node
-
-
-def _of_sign(function: str, x: Expression, mode: Name) -> Expression:
-    """Return ``abs``, ``sign`` or ``heaviside`` of x on one side of 0."""
-    above = Binary("+", mode, ONE)
-    if function == "heaviside":
-        return above
-    sign = Binary("+", Binary("*", TWO, mode), ONE)
-    return sign if function == "sign" else Binary("*", sign, x)
-
-
-def _sides(
-    left: Expression, right: Expression, mode: Callable[..., Name]
-) -> tuple[Expression, Expression]:
-    """Return what is 1 where `left` is larger than `right`, else 0, and the other way round."""
-    if is_zero(left) and not is_zero(right):
-        smaller, larger = _sides(right, left, mode)
-        return larger, smaller
-    side = mode(left if is_zero(right) else Binary("-", left, right))
-    return Binary("+", side, ONE), Negate(side)
-
-
-def _compared(
-    node: Expression,
-    symbol: str,
-    left: Expression,
-    right: Expression,
-    moving: Collection[str],
-    mode: Callable[..., Name],
-) -> Expression:
-    if not varies(Binary("-", left, right), moving):
-        return node
-    if symbol in ("==", "!="):
-        # true, or false, at single moments only
-        return Number(float(symbol == "!="))
-    larger, smaller = _sides(left, right, mode)
-    return larger if symbol in (">", ">=") else smaller

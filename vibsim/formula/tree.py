@@ -59,18 +59,35 @@ class Call:
 
 Expression = Number | Name | Negate | Binary | Compare | Call
 
+ZERO, ONE = Number(0.0), Number(1.0)
 CONSTANTS: Mapping[str, float] = {"pi": math.pi, "e": math.e}
 """Names that stand for a number wherever a formula does not declare them otherwise."""
 
-
 _ARGUMENTS = {"atan2": 2, "hypot": 2, "max": 2, "min": 2, "mod": 2, "where": 3}
-
 FUNCTIONS: Mapping[str, tuple[int, Callable[..., float]]] = {
     name: (_ARGUMENTS.get(name, 1), function.full)
     for name, function in ELEMENTARY.items()
     if name != "power"  # written ``**``
 }
 """Functions that a formula may call: number of arguments, and the value for constants."""
+STEPS = frozenset({"ceil", "floor", "heaviside", "round", "sign"})
+"""Functions that are constant but for jumps."""
+
+
+def number(value: float) -> Expression:
+    """Return a number of either sign."""
+    return Negate(Number(-value)) if value < 0.0 else Number(value)
+
+
+def literal(node: Expression) -> float | None:
+    """Return the value of a number with signs before it, None for anything else."""
+    match node:
+        case Number(value):
+            return value
+        case Negate(operand):
+            inner = literal(operand)
+            return None if inner is None else -inner
+    return None
 
 
 def children(node: Expression) -> tuple[Expression, ...]:
@@ -82,23 +99,25 @@ def children(node: Expression) -> tuple[Expression, ...]:
             return (left, right)
         case Call(_, arguments):
             return arguments
-        case _:
-            return ()
+    return ()
 
 
 def rebuilt(node: Expression, change: Callable[[Expression], Expression]) -> Expression:
     """Return the tree with `change` applied to every node, operands before what uses them."""
+    parts = [rebuilt(child, change) for child in children(node)]
     match node:
-        case Negate(operand):
-            return change(Negate(rebuilt(operand, change)))
-        case Binary(symbol, left, right):
-            return change(Binary(symbol, rebuilt(left, change), rebuilt(right, change)))
-        case Compare(symbol, left, right):
-            return change(Compare(symbol, rebuilt(left, change), rebuilt(right, change)))
-        case Call(function, arguments):
-            return change(Call(function, tuple(rebuilt(entry, change) for entry in arguments)))
-        case _:
-            return change(node)
+        case Negate():
+            return change(Negate(*parts))
+        case Binary(symbol) | Compare(symbol):
+            return change(type(node)(symbol, *parts))
+        case Call(function):
+            return change(Call(function, tuple(parts)))
+    return change(node)
+
+
+def put(node: Expression, name: str, what: Expression) -> Expression:
+    """Return a formula with another one in the place of a name."""
+    return rebuilt(node, lambda part: what if part == Name(name) else part)
 
 
 def walk(node: Expression) -> Iterator[Expression]:

@@ -31,23 +31,27 @@ from vibsim.core.array_types import Floats, Integers
 from vibsim.core.errors import Fault, InputError, VibsimError
 from vibsim.experiment.schema.fields import MAX_LEVEL
 from vibsim.ladder.solving import climb
-from vibsim.ladder.thresholds import (
-    LEAST_STEPS,
-    LONGEST,
-    MOST_STEPS,
-    PATIENCE,
-    PILOT,
-    PLAIN_STEPS,
-    SEARCHED,
-    TIMES,
-)
 from vibsim.simulation import Members, members
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
-
-NOT_SMOOTH = "the solutions of its levels do not approach each other as smooth ones would"
+PILOT = 16
+"""Members that are run."""
+SEARCHED = 2**16
+"""Up to so many members their extreme values are looked for."""
+LEAST_STEPS = 16
+"""Steps of the coarsest level that is tried."""
+TIMES = 32
+"""At so many times at most the pilot looks."""
+LONGEST = 12
+"""Levels of a ladder at most; more of them only add round-off."""
+MOST_STEPS = 2**27
+"""Steps that the pilot may take, all its members and levels together."""
+PATIENCE = 2
+"""After so many levels that do not halve the bound no finer one will."""
+PLAIN_STEPS = 2**18
+"""Up to so many steps of a level the pilot takes less time in plain Python than a new kernel takes to be compiled."""
 
 
 @dataclass(frozen=True)
@@ -55,12 +59,32 @@ class _Run:
     """One method, the members of the pilot that have it, and what was run of them."""
 
     method: Method
-    scheme: int
+    scheme: str
     start: Start
     case: Integers
     levels: list[Pair]
     noise: list[Floats | None]
     """Measured at each level, for the ladders that begin there."""
+
+    def add_level(self, steps: int, points: int) -> None:
+        """Run one level more, and look at so many times."""
+        lane = "plain" if steps * len(self.case) <= PLAIN_STEPS else None
+        level = level_at(self.method, self.start, steps, steps // points, lane=lane)
+        every = [steps // points]
+        noise = noise_of(self.method, self.start, [steps], every, [level], lane=lane)
+        self.levels.append(level)
+        self.noise.append(noise)
+
+    def bounds(self, steps: Sequence[int], points: int, levels: Sequence[Pair]) -> Floats:
+        """Return the largest bound of each member by the last levels; infinite without one."""
+        # the noise at the coarsest level that resolves the motion of each member
+        noise, *others = self.noise[-len(steps) :]
+        for finer in others:
+            if noise is not None and finer is not None:
+                noise = np.where(np.isnan(noise), finer, noise)
+        t = (np.arange(points + 1) / points)[:, None]
+        found = extrapolate_members(self.method, self.start, tuple(steps), t, levels, noise)
+        return _largest(found)
 
 
 @dataclass(frozen=True)
@@ -70,7 +94,7 @@ class _Trial:
     levels: tuple[int, ...]
     error: float
     """The largest bound of every state, time and member of the pilot."""
-    run: _Run
+    scheme: str
     case: int
     """Where it is the largest."""
 
@@ -96,38 +120,49 @@ def resolve(experiment: Experiment) -> Experiment:
     """
     if experiment.levels:
         return experiment
-    if experiment.tolerance is None:
+    tolerance = experiment.tolerance
+    if tolerance is None:
         raise VibsimError(f"{experiment.name} has neither levels nor a tolerance to choose them by")
     runs = _runs(experiment)
-    lowest, points = _sampling(experiment)
+    lowest = next(lv for lv in itertools.count() if experiment.steps(lv) >= LEAST_STEPS)
+    points = max(n for n in range(1, TIMES + 1) if experiment.steps(lowest) % n == 0)
+    tried = sum(len(run.case) for run in runs)
     least: _Trial | None = None
     mark, since, blamed = math.inf, 0, ""
     for level in range(lowest, MAX_LEVEL + 1):
-        if _cost(experiment, runs, lowest, level) > MOST_STEPS:
+        # each level is run twice
+        if 2 * tried * (experiment.steps(level + 1) - experiment.steps(lowest)) > MOST_STEPS:
             raise _refused(experiment, least, blamed or "finer levels take too many steps")
         for run in runs:
-            _add_level(run, experiment.steps(level), points)
+            run.add_level(experiment.steps(level), points)
         here = math.inf
         for count in range(2, min(level - lowest + 1, LONGEST) + 1):
             trial = _trial(experiment, runs, tuple(range(level - count + 1, level + 1)), points)
-            if trial.error <= experiment.tolerance and _is_enough(experiment, runs, trial.levels):
-                return experiment.with_levels(trial.levels)
+            if trial.error <= tolerance:
+                chosen = experiment.with_levels(trial.levels)
+                if _is_enough(chosen, runs, tolerance):
+                    return chosen
             here = min(here, trial.error)
             if least is None or trial.error < least.error or least.error == math.inf:
                 least = trial
         if here < math.inf:
-            blamed = blamed or _round_off(experiment, runs, level, points)
+            steps = experiment.steps(level - 1), experiment.steps(level)
+            blamed = blamed or _round_off(runs, steps, points, tolerance)
             mark, since = (here, 0) if here < 0.5 * mark else (mark, since + 1)
         if since == PATIENCE:
-            raise _refused(experiment, least, blamed or NOT_SMOOTH)
+            not_smooth = (
+                "the solutions of its levels do not approach each other as smooth ones would"
+            )
+            raise _refused(experiment, least, blamed or not_smooth)
     raise _refused(experiment, least, blamed or "there are no finer levels")
 
 
 def _runs(experiment: Experiment) -> list[_Run]:
     cases = pilot(experiment)
     group = _gathered(experiment, cases)
+    names = [scheme.name for scheme in experiment.schemes]
     return [
-        _Run(method, i, start_of(method, group, where), cases[where], [], [])
+        _Run(method, names[i], start_of(method, group, where), cases[where], [], [])
         for i in experiment.ladder
         for method, where in methods(experiment, i, group)
     ]
@@ -170,50 +205,16 @@ def _gathered(experiment: Experiment, cases: Integers) -> Members:
     )
 
 
-def _sampling(experiment: Experiment) -> tuple[int, int]:
-    """Return the coarsest level that is tried, and at how many times the pilot looks."""
-    lowest = next(lv for lv in itertools.count() if experiment.steps(lv) >= LEAST_STEPS)
-    steps = experiment.steps(lowest)
-    return lowest, max(n for n in range(1, TIMES + 1) if steps % n == 0)
-
-
-def _cost(experiment: Experiment, runs: Sequence[_Run], first: int, last: int) -> int:
-    """Return the steps of the pilot; each level is run twice."""
-    count = sum(len(run.case) for run in runs)
-    return 2 * count * (experiment.steps(last + 1) - experiment.steps(first))
-
-
-def _add_level(run: _Run, steps: int, points: int) -> None:
-    lane = "plain" if steps * len(run.case) <= PLAIN_STEPS else None
-    level = level_at(run.method, run.start, steps, steps // points, lane=lane)
-    noise = noise_of(run.method, run.start, [steps], [steps // points], [level], lane=lane)
-    run.levels.append(level)
-    run.noise.append(noise)
-
-
 def _trial(
     experiment: Experiment, runs: Sequence[_Run], levels: tuple[int, ...], points: int
 ) -> _Trial:
-    steps = tuple(experiment.steps(level) for level in levels)
-    t = (np.arange(points + 1) / points)[:, None]
+    steps = [experiment.steps(level) for level in levels]
     trials = []
     for run in runs:
-        pairs = run.levels[-len(levels) :]
-        noise = _first_known(run.noise[-len(levels) :])
-        found = extrapolate_members(run.method, run.start, steps, t, pairs, noise)
-        errors = _largest(found)
+        errors = run.bounds(steps, points, run.levels[-len(levels) :])
         worst = int(np.argmax(errors))
-        trials.append(_Trial(levels, float(errors[worst]), run, int(run.case[worst])))
+        trials.append(_Trial(levels, float(errors[worst]), run.scheme, int(run.case[worst])))
     return max(trials, key=lambda trial: trial.error)
-
-
-def _first_known(noise: Sequence[Floats | None]) -> Floats | None:
-    """Return what was measured at the coarsest level that resolves the motion of each member."""
-    found = noise[0]
-    for finer in noise[1:]:
-        if found is not None and finer is not None:
-            found = np.where(np.isnan(found), finer, found)
-    return found
 
 
 def _largest(found: Extrapolated) -> Floats:
@@ -221,26 +222,19 @@ def _largest(found: Extrapolated) -> Floats:
     return np.maximum(*found.largest_bounds())
 
 
-def _is_enough(experiment: Experiment, runs: Sequence[_Run], levels: tuple[int, ...]) -> bool:
-    """Tell whether a ladder reaches the tolerance at every time that would be stored."""
-    assert experiment.tolerance is not None
-    chosen = experiment.with_levels(levels)
-    steps = tuple(chosen.steps(level) for level in levels)
-    points = steps[0] // plan.sampling(chosen, levels[0])
+def _is_enough(chosen: Experiment, runs: Sequence[_Run], tolerance: float) -> bool:
+    """Tell whether an experiment reaches the tolerance at every time that would be stored."""
+    steps = tuple(chosen.steps(level) for level in chosen.levels)
+    points = steps[0] // plan.sampling(chosen, chosen.levels[0])
     found = (climb(run.method, run.start, steps, points) for run in runs)
-    return all(bool(np.all(_largest(one) <= experiment.tolerance)) for one in found)
+    return all(bool(np.all(_largest(one) <= tolerance)) for one in found)
 
 
-def _round_off(experiment: Experiment, runs: Sequence[_Run], level: int, points: int) -> str:
+def _round_off(runs: Sequence[_Run], steps: tuple[int, int], points: int, tolerance: float) -> str:
     """Tell whether round-off alone is too much for every ladder that ends here or later; empty where it is not."""
-    assert experiment.tolerance is not None
-    steps = experiment.steps(level - 1), experiment.steps(level)
-    t = (np.arange(points + 1) / points)[:, None]
     for run in runs:
         # levels without any difference leave round-off alone
-        same, noise = [run.levels[-1]] * 2, _first_known(run.noise[-2:])
-        floor = _largest(extrapolate_members(run.method, run.start, steps, t, same, noise))
-        if np.max(floor) > experiment.tolerance:
+        if np.max(run.bounds(steps, points, [run.levels[-1]] * 2)) > tolerance:
             return "round-off" + _remedy(run.method, steps[-1])
     return ""
 
@@ -260,18 +254,18 @@ def _remedy(method: Method, steps: int) -> str:
 
 
 def _refused(experiment: Experiment, least: _Trial | None, reason: str) -> InputError:
-    found = "no ladder has a bound at all"
-    if least is not None:
-        scheme = experiment.schemes[least.run.scheme].name
+    if least is None:
+        found = "no ladder has a bound at all"
+    elif least.error == math.inf:
+        found = (
+            f"no ladder has a bound for member {least.case} with scheme {least.scheme}: see it alone "
+            f"(@{least.case} and levels in place of the tolerance), or leave it out"
+        )
+    else:
         found = (
             f"the least bound is {least.error:.2g}, with levels {least.levels[0]} to {least.levels[-1]} "
-            f"(scheme {scheme}, member {least.case})"
+            f"(scheme {least.scheme}, member {least.case})"
         )
-        if least.error == math.inf:
-            found = (
-                f"no ladder has a bound for member {least.case} with scheme {scheme}: see it alone "
-                f"(@{least.case} and levels in place of the tolerance), or leave it out"
-            )
     rule = f"no ladder reaches it: {reason}"
     name = str(experiment.file or experiment.name)
     return InputError([Fault(name, 0, "tolerance", f"{experiment.tolerance:g}", rule, found)])

@@ -10,7 +10,6 @@ from vibsim.comparison.best_solution import in_order, methods, record_of, start_
 from vibsim.comparison.extrapolate_members import Extrapolated, joined
 from vibsim.ladder.choosing import resolve
 from vibsim.ladder.solving import climb
-from vibsim.ladder.thresholds import POINTS_AT_A_TIME
 from vibsim.simulation import Members, members
 from vibsim.simulation.level import coordinates
 
@@ -18,6 +17,9 @@ if TYPE_CHECKING:
     import xarray
 
     from vibsim.experiment import Experiment
+
+POINTS_AT_A_TIME = 2**18
+"""Points of one level that are held at a time."""
 
 
 def best(
@@ -53,31 +55,22 @@ def best(
     points = steps[0] // every
     size = max(POINTS_AT_A_TIME // (points + 1), 1)
     schemes = experiment.ladder
-    parts = []
-    for first in range(0, experiment.members, size):
-        group = members(experiment, first, min(first + size, experiment.members))
-        parts.append([climbed(experiment, i, group, steps, points, threads) for i in schemes])
-    rows = [joined([part[i] for part in parts]) for i in range(len(schemes))]
+
+    def climbed(scheme: int, group: Members) -> Extrapolated:
+        parts = []
+        for method, where in methods(experiment, scheme, group):
+            start = start_of(method, group, where)
+            parts.append((climb(method, start, steps, points, threads=threads), where))
+        return in_order(parts)
+
+    groups = [
+        members(experiment, first, min(first + size, experiment.members))
+        for first in range(0, experiment.members, size)
+    ]
+    rows = [joined([climbed(i, group) for group in groups]) for i in schemes]
     group = members(experiment, 0, experiment.members)
     names = [experiment.schemes[i].name for i in schemes]
     same_end = not experiment.end_varies
-    coords = coordinates(
-        experiment.model.definition, names, group, steps[0], every, same_end=same_end
-    )
+    model = experiment.model.definition
+    coords = coordinates(model, names, group, steps[0], every, same_end=same_end)
     return record_of(experiment, experiment.levels, coords, rows).to_xarray()
-
-
-def climbed(
-    experiment: Experiment,
-    scheme: int,
-    group: Members,
-    steps: tuple[int, ...],
-    points: int,
-    threads: int = 1,
-) -> Extrapolated:
-    """Run and extrapolate one scheme of an experiment at `points` equal times and t = 0, for some of its members."""
-    parts = []
-    for method, where in methods(experiment, scheme, group):
-        start = start_of(method, group, where)
-        parts.append((climb(method, start, steps, points, threads=threads), where))
-    return in_order(parts)

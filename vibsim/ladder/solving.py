@@ -17,7 +17,9 @@ from vibsim.comparison.member_method import Method, Start, rate_of
 from vibsim.convergence.state_extrapolation import FLOATS, Circumstances, Pair, best_entry
 from vibsim.convergence.thresholds import KNOWN_DIGIT
 from vibsim.core.array_types import Floats
-from vibsim.ladder.thresholds import LEAST_LOOKS
+
+LEAST_LOOKS = 16
+"""The coarsest level is looked at so many times at least, where rounding errors are measured."""
 
 
 def solve(

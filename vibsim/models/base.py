@@ -13,9 +13,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from vibsim.core.array_types import Floats
 from vibsim.formula import Expression, parse
 from vibsim.models.events import Events
 from vibsim.models.table import Lookup, Table
@@ -23,10 +21,13 @@ from vibsim.models.table import Lookup, Table
 if TYPE_CHECKING:
     from vibsim.models.shared.scales import Scales
 
-Floats = NDArray[np.float64]
 Numbers = Mapping[str, Any]
 """Values by name: floats, or arrays that broadcast against each other."""
 Formula = str | Expression
+
+ENERGIES = ("kinetic_energy", "potential_energy", "energy", "energy_deviation")
+BUDGET = ("dissipated_energy", "work_done", "energy_budget")
+"""What damping took, what driving forces put in, and ``E(t) - E(0)`` plus the one minus the other, which is 0."""
 
 
 @dataclass(frozen=True)
@@ -237,11 +238,6 @@ def natural_end(model: Model, periods: float, parameters: Numbers) -> Any:
     return periods * (2.0 * math.pi / model.natural_frequency(parameters))
 
 
-ENERGIES = ("kinetic_energy", "potential_energy", "energy", "energy_deviation")
-BUDGET = ("dissipated_energy", "work_done", "energy_budget")
-"""What damping took, what driving forces put in, and ``E(t) - E(0)`` plus the one minus the other, which is 0."""
-
-
 def has_budget(model: Model) -> bool:
     """Tell whether damping, driving forces, friction or impacts change the energy of a model by known amounts."""
     return model.dissipation is not None or model.driving is not None or model.events is not None
@@ -250,15 +246,15 @@ def has_budget(model: Model) -> bool:
 def quantities(model: Model, own_velocity: bool = False) -> tuple[str, ...]:
     """Name every quantity of `model` that is stored as a series.
 
-    Parameters
-    ----------
-    own_velocity
-        Whether some scheme has another velocity than the centred difference: then `centred` is stored as well.
+    With `own_velocity` some scheme has another velocity than the centred difference, and `centred` is stored as well.
     """
-    budget = BUDGET if has_budget(model) else ()
-    outputs = (output.name for output in model.outputs)
-    more = centred(model) if own_velocity else ()
-    return (*(state.name for state in model.states), *ENERGIES, *budget, *outputs, *more)
+    return (
+        *(state.name for state in model.states),
+        *ENERGIES,
+        *(BUDGET if has_budget(model) else ()),
+        *(output.name for output in model.outputs),
+        *(centred(model) if own_velocity else ()),
+    )
 
 
 def centred(model: Model) -> tuple[str, ...]:

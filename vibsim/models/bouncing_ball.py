@@ -16,14 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.models.base import Floats, Model, Numbers, Parameter, State
+from vibsim.core.array_types import Floats
+from vibsim.models.base import Model, Numbers, Parameter, State
 from vibsim.models.events import Impact
 from vibsim.models.shared.scales import Scales
-
-
-def natural_frequency(parameters: Numbers) -> Any:
-    """Return NaN: there are no small oscillations."""
-    return parameters["g"] * np.nan
 
 
 def first_impact(initial: Numbers, parameters: Numbers) -> tuple[Any, Any]:
@@ -60,11 +56,6 @@ def impact_time(number: Any, initial: Numbers, parameters: Numbers) -> Any:
         total = np.where(e < 1, e * -np.expm1(bounces * np.log(e)) / (1.0 - e), bounces)
     total = np.where((e == 0) | (number <= 1), 0.0, total)
     return np.where(number == 0, 0.0, time + flight * total)
-
-
-def rest_time(initial: Numbers, parameters: Numbers) -> Any:
-    """Return the time [s] from which the ball lies on the ground; infinite where it bounces for ever."""
-    return impact_time(last_impact(initial, parameters), initial, parameters)
 
 
 def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
@@ -109,12 +100,8 @@ BOUNCING_BALL = Model(
     parameters=(
         Parameter("g", 1.0, "m s-2", "acceleration of gravity", minimum=0.0, exclusive=True),
         Parameter("restitution", 0.8, "1", "coefficient of restitution", minimum=0.0, maximum=1.0),
-        Parameter(
-            "eps_h", 0.0, "m", "height of the ground where events are left to the mesh", minimum=0.0
-        ),
-        Parameter(
-            "eps_v", 1e-3, "m s-1", "speed after an impact at which the ball rests", minimum=0.0
-        ),
+        Parameter("eps_h", 0.0, "m", "height of the ground where events are left to the mesh", 0.0),
+        Parameter("eps_v", 1e-3, "m s-1", "speed after an impact at which the ball rests", 0.0),
     ),
     acceleration="-g",
     kinetic_energy="0.5*v**2",
@@ -122,7 +109,8 @@ BOUNCING_BALL = Model(
     energy_unit="m2 s-2",
     linear=False,
     conservative=False,
-    natural_frequency=natural_frequency,
+    # there are no small oscillations
+    natural_frequency=lambda parameters: parameters["g"] * np.nan,
     exact=exact,
     scales=Scales(
         time="where(h != 0, sqrt(h/g), abs(v)/g)",

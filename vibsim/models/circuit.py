@@ -59,18 +59,14 @@ def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
 def circuit(voltage: str, declared: tuple[str, ...], terms: frozenset[str]) -> Model:
     """Return the circuit, with a resistor where `terms` has ``R``."""
     parameters = (*PARAMETERS, *declared_parameters(declared))
-    names = ("t", *(row.name for row in parameters))
-    source = parse(voltage, names)
-    is_driven, has_resistor = not is_zero(source), "R" in terms
-    current, rate = Name("i"), Name("di_dt")
+    known = tuple(row.name for row in parameters)
 
     def read(text: str) -> Expression:
-        return parse(text, ("i", "di_dt", *names))
+        return parse(text, ("i", "di_dt", "t", *known))
 
-    drop = times(Name("L"), rate)
-    if has_resistor:
-        drop = parse("L*di_dt + R*i", ("i", "di_dt", *names))
-    capacitor = minus(source, drop)
+    source = parse(voltage, ("t", *known))
+    is_driven, has_resistor = not is_zero(source), "R" in terms
+    capacitor = minus(source, read("L*di_dt + R*i" if has_resistor else "L*di_dt"))
     forces = Forces(
         spring=read("1/C*i"),
         damping=read("R*di_dt") if has_resistor else ZERO,
@@ -92,7 +88,7 @@ def circuit(voltage: str, declared: tuple[str, ...], terms: frozenset[str]) -> M
         kinetic_energy="0.5*L*i**2",
         potential_energy=put(read("0.5*C*di_dt**2"), "di_dt", capacitor),
         dissipation="R*i**2" if has_resistor else None,
-        driving=times(source, current) if is_driven else None,
+        driving=times(source, Name("i")) if is_driven else None,
         conservative=not is_driven and not has_resistor,
         outputs=(
             Output("capacitor_voltage", "V", "voltage of the capacitor", capacitor),

@@ -28,18 +28,6 @@ PARAMETERS = (
     Parameter("gamma", 0.0, "m s-2", "amplitude of the driving force"),
     Parameter("omega", 1.0, "rad s-1", "angular frequency of the driving force", minimum=0.0),
 )
-SCALES = Scales(
-    time="1/sqrt(abs(alpha))",
-    position="sqrt(abs(alpha/beta))",
-    energy="(u_c/t_c)**2",
-    numbers=(
-        ("damping", "delta*t_c"),
-        ("force", "gamma*t_c**2/u_c"),
-        ("frequency", "omega*t_c"),
-    ),
-    parameters=(("alpha", "sign(alpha)"), ("beta", "sign(beta)")),
-)
-"""In them alpha and beta are 1 or -1."""
 TERMS = {"delta": "delta*v", "gamma": "gamma*cos(omega*t)"}
 
 
@@ -81,7 +69,18 @@ def duffing(terms: frozenset[str]) -> Model:
         source="Kovacic and Brennan, The Duffing Equation, chapter 2",
         equation=f"u'' + {left}alpha u + beta u^3 = {right}",
         natural_frequency=natural_frequency,
-        scales=lambda _: SCALES,
+        # in them alpha and beta are 1 or -1
+        scales=lambda _: Scales(
+            time="1/sqrt(abs(alpha))",
+            position="sqrt(abs(alpha/beta))",
+            energy="(u_c/t_c)**2",
+            numbers=(
+                ("damping", "delta*t_c"),
+                ("force", "gamma*t_c**2/u_c"),
+                ("frequency", "omega*t_c"),
+            ),
+            parameters=(("alpha", "sign(alpha)"), ("beta", "sign(beta)")),
+        ),
         optional=tuple(TERMS),
         variant=duffing,
         **more,

@@ -32,10 +32,10 @@ from typing import Any
 
 import numpy as np
 
+from vibsim.core.array_types import Floats
 from vibsim.formula import Name, parse, plus, times
 from vibsim.models.base import (
     Damping,
-    Floats,
     FormulaField,
     Model,
     Numbers,
@@ -44,7 +44,7 @@ from vibsim.models.base import (
     State,
     declared_parameters,
 )
-from vibsim.models.shared.harmonic import motion
+from vibsim.models.shared.linear_motion import motion
 from vibsim.models.shared.manufactured import Manufactured
 
 STATES = (

@@ -7,24 +7,9 @@ omega [rad s-1], energy [J]; with g = L = m = 1 all of them are dimensionless. T
 
 from __future__ import annotations
 
-from typing import Any
-
-from vibsim.models.base import Floats, Model, Numbers
+from vibsim.models.base import Model
 from vibsim.models.pendulum import PARAMETERS, SCALES, STATES, natural_frequency
-from vibsim.models.shared.harmonic import motion, period
-
-
-def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
-    """Return theta and omega of the harmonic oscillation at times `t` (A, section 1.3)."""
-    w = natural_frequency(parameters)
-    theta, omega = motion(t, w, initial["theta"], initial["omega"])
-    return {"theta": theta, "omega": omega}
-
-
-def exact_period(initial: Numbers, parameters: Numbers) -> Any:
-    """Return ``2 pi sqrt(L/g)``, whatever the amplitude; NaN at rest."""
-    return period(natural_frequency(parameters), initial["theta"], initial["omega"])
-
+from vibsim.models.shared.linear_motion import harmonic
 
 LINEAR_PENDULUM = Model(
     kind="linear_pendulum",
@@ -39,8 +24,6 @@ LINEAR_PENDULUM = Model(
     energy_unit="J",
     linear=True,
     conservative=True,
-    natural_frequency=natural_frequency,
-    exact=exact,
-    exact_period=exact_period,
     scales=SCALES,
+    **harmonic(STATES, natural_frequency),
 )

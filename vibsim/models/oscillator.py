@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from vibsim.core.array_types import Floats
 from vibsim.formula import (
     ONE,
     Compare,
@@ -35,9 +36,9 @@ from vibsim.formula import (
     to_formula,
     values,
 )
-from vibsim.models.base import Floats, FormulaField, Model, Numbers, Parameter, declared_parameters
+from vibsim.models.base import FormulaField, Model, Numbers, Parameter, declared_parameters
 from vibsim.models.events import Friction
-from vibsim.models.shared.dry_friction import friction_motion
+from vibsim.models.shared.linear_motion import friction_motion
 from vibsim.models.shared.manufactured import Manufactured
 from vibsim.models.shared.mechanical import Forces, mechanical
 
@@ -51,25 +52,17 @@ FORMULAS = (
         "spring", ("u",), "u", "force s(u) of the spring [N], positive where it pulls back"
     ),
     FormulaField(
-        "damping",
-        ("v",),
-        "0",
-        "damping force f(v) [N], positive where it opposes v > 0",
-        TERMS,
-        UNITS,
+        *("damping", ("v",), "0", "damping force f(v) [N], positive where it opposes v > 0"),
+        terms=TERMS,
+        term_units=UNITS,
     ),
     FormulaField("force", ("t",), "0", "driving force F(t) [N]"),
     FormulaField(
-        "exact",
-        ("t",),
-        "",
-        "exact solution u(t) [m], from which the force then follows",
+        *("exact", ("t",), "", "exact solution u(t) [m], from which the force then follows"),
         derivatives=2,
     ),
     FormulaField(
-        "potential",
-        ("u",),
-        "",
+        *("potential", ("u",), ""),
         "potential energy V(u) [J], where it cannot be found from the spring",
     ),
 )
@@ -84,29 +77,18 @@ class Written:
     with_mass: bool = True
     """Whether the mass is in the equation as a parameter; else it is the number 1."""
 
-    @property
-    def mass(self) -> Expression:
-        """The mass in the equation."""
-        return Name(MASS.name) if self.with_mass else ONE
-
-    @property
-    def is_coefficient_given(self) -> bool:
-        """Whether the damping is a term with the coefficient b."""
-        return self.formulas.get("damping") in TERMS.values() and "b" not in self.declared
-
-    @property
-    def has_friction(self) -> bool:
-        """Whether the damping is Coulomb friction."""
-        return self.is_coefficient_given and self.formulas["damping"] == TERMS[COULOMB]
+    @cached_property
+    def term(self) -> str:
+        """Kind of the damping where it is a term with the coefficient b; else empty."""
+        kinds = {text: kind for kind, text in TERMS.items()} if "b" not in self.declared else {}
+        return kinds.get(self.formulas.get("damping", ""), "")
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """Every parameter, in the order of the engine."""
         own = [MASS]
-        if self.is_coefficient_given:
-            kind = next(name for name, text in TERMS.items() if text == self.formulas["damping"])
-            words = f"coefficient of the {kind} damping"
-            least = 0.0 if kind == COULOMB else None
+        if kind := self.term:
+            words, least = f"coefficient of the {kind} damping", 0.0 if kind == COULOMB else None
             own.append(Parameter("b", 0.0, UNITS[kind], words, least, path=f"damping.{kind}"))
         return (*own, *declared_parameters(self.declared))
 
@@ -116,9 +98,10 @@ class Written:
         known = (*field.names, *(row.name for row in self.parameters))
         return parse(self.formulas.get(name, field.default), known)
 
-    def numbers(self, parameters: Numbers) -> dict[str, Any]:
-        """Return the values of the parameters by the names that formulas use."""
-        return {row.name: parameters[row.key] for row in self.parameters}
+    @property
+    def mass(self) -> Expression:
+        """The mass in the equation."""
+        return Name(MASS.name) if self.with_mass else ONE
 
     @cached_property
     def spring(self) -> Expression:
@@ -135,12 +118,8 @@ class Written:
         """The exact solution u(t), where it is written."""
         if "exact" not in self.formulas:
             return None
-        return Manufactured(
-            positions=(self.read("exact"),),
-            texts=(self.formulas["exact"],),
-            names=("u", "v"),
-            parameters=self.parameters,
-        )
+        texts = (self.formulas["exact"],)
+        return Manufactured((self.read("exact"),), texts, ("u", "v"), self.parameters)
 
     @cached_property
     def force(self) -> Expression:
@@ -164,27 +143,27 @@ def written(formulas: Mapping[str, str], declared: tuple[str, ...]) -> Model:
         Where a formula names something else than its field allows, or an exact solution has derivatives that are too
         long.
     """
-    return _written(tuple(sorted(formulas.items())), declared, True)
-
-
-def _variant(
-    formulas: tuple[tuple[str, str], ...], declared: tuple[str, ...], terms: frozenset[str]
-) -> Model:
-    return _written(formulas, declared, MASS.name in terms)
+    return oscillator(tuple(sorted(formulas.items())), declared, frozenset({MASS.name}))
 
 
 @cache
-def _written(
-    formulas: tuple[tuple[str, str], ...], declared: tuple[str, ...], with_mass: bool
+def oscillator(
+    formulas: tuple[tuple[str, str], ...], declared: tuple[str, ...], terms: frozenset[str]
 ) -> Model:
-    own = Written(dict(formulas), declared, with_mass)
+    """Return the model of formulas, with a mass in the equation where `terms` has ``m``."""
+    own = Written(dict(formulas), declared, MASS.name in terms)
     forces = Forces(
-        spring=own.read("spring"),
+        spring=own.spring,
         damping=own.damping,
         force=own.force,
         mass=own.mass,
         potential=own.read("potential") if "potential" in own.formulas else None,
     )
+    more: dict[str, Any] = {}
+    if own.term == COULOMB:
+        more = _friction(own, forces)
+    elif own.manufactured is not None:
+        more = {"exact": own.manufactured.exact, "start": own.manufactured.start}
     return mechanical(
         forces,
         own.parameters,
@@ -195,8 +174,8 @@ def _written(
         formulas=FORMULAS,
         written=written,
         optional=(MASS.name,),
-        variant=partial(_variant, formulas, declared),
-        **(_friction(own, forces) if own.has_friction else _manufactured(own)),
+        variant=partial(oscillator, formulas, declared),
+        **more,
     )
 
 
@@ -205,10 +184,9 @@ def _friction(own: Written, forces: Forces) -> dict[str, Any]:
 
     What it takes is summed along the path (`vibsim.engine.events`), so that it has no power of damping.
     """
-    drive = forces.over_mass(minus(forces.force, forces.spring))
 
     def held(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
-        numbers = own.numbers(parameters)
+        numbers = {row.name: parameters[row.key] for row in own.parameters}
         stiffness = values(forces.stiffness, numbers)
         w = np.sqrt(stiffness / numbers["m"])
         u, v = friction_motion(t, w, numbers["b"] / stiffness, initial["u"], initial["v"])
@@ -219,17 +197,11 @@ def _friction(own: Written, forces: Forces) -> dict[str, Any]:
         "dissipation": None,
         "exact": held if forces.is_linear and not forces.is_driven else None,
         "events": Friction(
-            drive=drive,
+            drive=forces.over_mass(minus(forces.force, forces.spring)),
             limit=forces.over_mass(Name("b")),
             cost=Name("b"),
         ),
     }
-
-
-def _manufactured(own: Written) -> dict[str, Any]:
-    """Return the exact solution that is written, and the start that it demands; nothing where there is none."""
-    motion = own.manufactured
-    return {} if motion is None else {"exact": motion.exact, "start": motion.start}
 
 
 def _equation(own: Written) -> str:
@@ -239,10 +211,9 @@ def _equation(own: Written) -> str:
         terms.append(_term(put(own.damping, "v", Name("u'"))))
     terms.append(_term(own.spring))
     sides = " + ".join(terms).replace("+ -", "- ")
-    told = f"{sides} = {to_formula(own.force)}" if own.manufactured is None else f"{sides} = F(t)"
-    if own.manufactured is not None:
-        told += f", with F such that u = {to_formula(own.read('exact'))}"
-    return told
+    if own.manufactured is None:
+        return f"{sides} = {to_formula(own.force)}"
+    return f"{sides} = F(t), with F such that u = {to_formula(own.read('exact'))}"
 
 
 def _term(node: Expression) -> str:

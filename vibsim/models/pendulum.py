@@ -11,7 +11,6 @@ With `drag`, the number alpha of (91), the drag force is ``-m L alpha |omega| om
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -58,22 +57,22 @@ def natural_frequency(parameters: Numbers) -> Any:
 @cache
 def pendulum(terms: frozenset[str]) -> Model:
     """Return the pendulum, with air resistance where `terms` has ``drag``."""
-    free: dict[str, Any] = {
+    is_dragged = "drag" in terms
+    form: dict[str, Any] = {
         "equation": "theta'' = -(g/L) sin(theta)",
         "acceleration": WEIGHT,
-        "conservative": True,
         "exact": pendulum_motion,
         "exact_period": pendulum_period,
         "outputs": (WIRE,),
     }
-    dragged: dict[str, Any] = {
-        "equation": DRAGGED,
-        "acceleration": f"-drag*abs(omega)*omega + ({WEIGHT})",
-        "conservative": False,
-        "damping": Damping("quadratic", "drag"),
-        "dissipation": "m*L**2*drag*abs(omega)*omega**2",
-        "outputs": (WIRE, AIR),
-    }
+    if is_dragged:
+        form = {
+            "equation": DRAGGED,
+            "acceleration": f"-drag*abs(omega)*omega + ({WEIGHT})",
+            "damping": Damping("quadratic", "drag"),
+            "dissipation": "m*L**2*drag*abs(omega)*omega**2",
+            "outputs": (WIRE, AIR),
+        }
     return Model(
         kind="pendulum",
         title="Nonlinear pendulum",
@@ -85,17 +84,18 @@ def pendulum(terms: frozenset[str]) -> Model:
         potential_energy="2.0*m*g*L*sin(0.5*theta)**2",
         energy_unit="J",
         linear=False,
+        conservative=not is_dragged,
         natural_frequency=natural_frequency,
-        turn=2 * math.pi,
+        turn=2 * np.pi,
         scales=replace(
             SCALES,
-            numbers=(("alpha", DRAG.name),) if DRAG.name in terms else (),
-            parameters=(*(SCALES.parameters or ()), (DRAG.name, DRAG.name)),
+            numbers=(("alpha", "drag"),) if is_dragged else (),
+            parameters=(*(SCALES.parameters or ()), ("drag", "drag")),
             outputs=((WIRE.name, "m*g"), (AIR.name, "m*g")),
         ),
-        optional=(DRAG.name,),
+        optional=("drag",),
         variant=pendulum,
-        **(dragged if DRAG.name in terms else free),
+        **form,
     )
 
 

@@ -7,94 +7,58 @@ theta [rad], omega [rad s-1], energy [J]. Without drag it is a simple pendulum o
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 
-from vibsim.models.base import Damping, Floats, Model, Numbers, Output, Parameter
+from vibsim.models.base import Damping, Model, Numbers, Output, Parameter
 from vibsim.models.pendulum import STATES
 from vibsim.models.shared.elliptic import pendulum_motion, pendulum_period
 from vibsim.models.shared.scales import Scales
 
+POSITIVE: dict[str, Any] = {"minimum": 0.0, "exclusive": True}
 PARAMETERS = (
-    Parameter(
-        "inertia", 1.0, "kg m2", "moment of inertia about the pivot", minimum=0.0, exclusive=True
-    ),
-    Parameter("m", 1.0, "kg", "mass of the body", minimum=0.0, exclusive=True),
-    Parameter("g", 1.0, "m s-2", "acceleration of gravity", minimum=0.0, exclusive=True),
-    Parameter(
-        "L", 1.0, "m", "distance of the centre of mass from the pivot", minimum=0.0, exclusive=True
-    ),
+    Parameter("inertia", 1.0, "kg m2", "moment of inertia about the pivot", **POSITIVE),
+    Parameter("m", 1.0, "kg", "mass of the body", **POSITIVE),
+    Parameter("g", 1.0, "m s-2", "acceleration of gravity", **POSITIVE),
+    Parameter("L", 1.0, "m", "distance of the centre of mass from the pivot", **POSITIVE),
     Parameter("drag", 0.0, "kg m2", "moment of the air resistance at omega = 1", minimum=0.0),
 )
 DRAGGED = "inertia theta'' + drag abs(theta') theta' + m g L sin(theta) = 0"
 WEIGHT = "-(m*g*L/inertia)*sin(theta)"
-PIVOT = Output(
-    "pivot_force", "N", "force along the rod in the pivot", "m*g*cos(theta) + m*L*omega**2"
-)
+FORCE = "m*g*cos(theta) + m*L*omega**2"
+PIVOT = Output("pivot_force", "N", "force along the rod in the pivot", FORCE)
 AIR = Output("drag_moment", "N m", "moment of the air resistance", "-drag*abs(omega)*omega")
-SCALES = Scales(
-    time="sqrt(inertia/(m*g*L))",
-    position="1",
-    energy="m*g*L",
-    numbers=(("kappa", "m*L**2/inertia"),),
-    parameters=(
-        ("inertia", "1"),
-        ("m", "m*L**2/inertia"),
-        ("g", "inertia/(m*L**2)"),
-        ("L", "1"),
-        ("drag", "drag/inertia"),
-    ),
-    outputs=(("pivot_force", "m*g"), ("drag_moment", "m*g*L")),
-)
-"""In them inertia and L are 1, and ``m = 1/g``."""
-ALPHA = ("alpha", "drag/inertia")
-
-
-def natural_frequency(parameters: Numbers) -> Any:
-    """Return the angular frequency of small oscillations, ``sqrt(m g L/I)`` [rad s-1]."""
-    p = parameters
-    return np.sqrt(p["m"] * p["g"] * p["L"] / p["inertia"])
 
 
 def _as_simple(parameters: Numbers) -> dict[str, Any]:
-    """Return the parameters of the simple pendulum that moves in the same way."""
+    """Return the parameters of the simple pendulum that moves in the same way without drag."""
     p = parameters
     return {"g": p["m"] * p["g"] * p["L"], "L": p["inertia"]}
-
-
-def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
-    """Return the exact theta and omega of the motion without drag, by those of the simple pendulum."""
-    return pendulum_motion(t, initial, _as_simple(parameters))
-
-
-def exact_period(initial: Numbers, parameters: Numbers) -> Any:
-    """Return the exact period without drag: of an oscillation, or of one turn."""
-    return pendulum_period(initial, _as_simple(parameters))
 
 
 @cache
 def physical_pendulum(terms: frozenset[str]) -> Model:
     """Return the physical pendulum, with air resistance where `terms` has ``drag``."""
-    free: dict[str, Any] = {
+    is_dragged = "drag" in terms
+    form: dict[str, Any] = {
         "equation": "inertia theta'' + m g L sin(theta) = 0",
         "acceleration": WEIGHT,
-        "conservative": True,
-        "exact": exact,
-        "exact_period": exact_period,
+        "exact": lambda t, initial, p: pendulum_motion(t, initial, _as_simple(p)),
+        "exact_period": lambda initial, p: pendulum_period(initial, _as_simple(p)),
         "outputs": (PIVOT,),
     }
-    dragged: dict[str, Any] = {
-        "equation": DRAGGED,
-        "acceleration": f"-(drag/inertia)*abs(omega)*omega + ({WEIGHT})",
-        "conservative": False,
-        "damping": Damping("quadratic", "drag/inertia"),
-        "dissipation": "drag*abs(omega)*omega**2",
-        "outputs": (PIVOT, AIR),
-    }
+    if is_dragged:
+        form = {
+            "equation": DRAGGED,
+            "acceleration": f"-(drag/inertia)*abs(omega)*omega + ({WEIGHT})",
+            "damping": Damping("quadratic", "drag/inertia"),
+            "dissipation": "drag*abs(omega)*omega**2",
+            "outputs": (PIVOT, AIR),
+        }
+    kappa, alpha = ("kappa", "m*L**2/inertia"), ("alpha", "drag/inertia")
     return Model(
         kind="physical_pendulum",
         title="Physical pendulum",
@@ -105,12 +69,27 @@ def physical_pendulum(terms: frozenset[str]) -> Model:
         potential_energy="2.0*m*g*L*sin(0.5*theta)**2",
         energy_unit="J",
         linear=False,
-        natural_frequency=natural_frequency,
-        turn=2 * math.pi,
-        scales=replace(SCALES, numbers=(*SCALES.numbers, ALPHA)) if "drag" in terms else SCALES,
+        conservative=not is_dragged,
+        natural_frequency=lambda p: np.sqrt(p["m"] * p["g"] * p["L"] / p["inertia"]),
+        turn=2 * np.pi,
+        # in them inertia and L are 1, and ``m = 1/g``
+        scales=Scales(
+            time="sqrt(inertia/(m*g*L))",
+            position="1",
+            energy="m*g*L",
+            numbers=(kappa, alpha) if is_dragged else (kappa,),
+            parameters=(
+                ("inertia", "1"),
+                ("m", "m*L**2/inertia"),
+                ("g", "inertia/(m*L**2)"),
+                ("L", "1"),
+                ("drag", "drag/inertia"),
+            ),
+            outputs=(("pivot_force", "m*g"), ("drag_moment", "m*g*L")),
+        ),
         optional=("drag",),
         variant=physical_pendulum,
-        **(dragged if "drag" in terms else free),
+        **form,
     )
 
 

@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.models.base import Floats, Model, Numbers, Parameter, State
+from vibsim.core.array_types import Floats
+from vibsim.models.base import Model, Numbers, Parameter, State
 from vibsim.models.events import Friction
-from vibsim.models.shared.dry_friction import friction_motion, sticking_time
+from vibsim.models.shared.linear_motion import friction_motion
 from vibsim.models.shared.scales import Scales
 
 _PULL = "where(alpha == 0, (k/m)*u, (k/m)/alpha*tanh(alpha*u))"
@@ -37,25 +38,14 @@ def natural_frequency(parameters: Numbers) -> Any:
     return np.sqrt(parameters["k"] / parameters["m"])
 
 
-def _hold(parameters: Numbers) -> Any:
-    """Return the largest distance at which the linear spring is held, ``mu m g/k`` [m]; NaN for another spring."""
-    p = parameters
-    return np.where(p["alpha"] == 0, p["mu"] * p["m"] * p["g"] / p["k"], np.nan)
-
-
 def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
     """Return u and v at times `t` for the linear spring, alpha = 0; NaN for any other."""
-    w, hold = natural_frequency(parameters), _hold(parameters)
-    u, v = friction_motion(t, w, hold, initial["u"], initial["v"])
-    is_known = ~np.isnan(hold)
-    return {"u": np.where(is_known, u, np.nan), "v": np.where(is_known, v, np.nan)}
-
-
-def rest_time(initial: Numbers, parameters: Numbers) -> Any:
-    """Return the time [s] from which the box sticks, for the linear spring; NaN for any other."""
-    hold = _hold(parameters)
-    found = sticking_time(natural_frequency(parameters), hold, initial["u"], initial["v"])
-    return np.where(np.isnan(hold), np.nan, found)
+    p = parameters
+    # the largest distance at which the spring is held
+    hold = np.where(p["alpha"] == 0, p["mu"] * p["m"] * p["g"] / p["k"], np.nan)
+    found = friction_motion(t, natural_frequency(p), hold, initial["u"], initial["v"])
+    u, v = (np.where(np.isnan(hold), np.nan, x) for x in found)
+    return {"u": u, "v": v}
 
 
 SLIDING_BOX = Model(
@@ -66,9 +56,7 @@ SLIDING_BOX = Model(
     states=(State("u", "m", "displacement"), State("v", "m s-1", "velocity")),
     parameters=(
         Parameter("m", 1.0, "kg", "mass", minimum=0.0, exclusive=True),
-        Parameter(
-            "k", 1.0, "N m-1", "stiffness of the spring at u = 0", minimum=0.0, exclusive=True
-        ),
+        Parameter("k", 1.0, "N m-1", "stiffness of the spring at u = 0", 0.0, exclusive=True),
         Parameter("alpha", 0.0, "m-1", "how early the spring yields; 0: linear", minimum=0.0),
         Parameter("mu", 0.1, "1", "friction coefficient", minimum=0.0),
         Parameter("g", 1.0, "m s-2", "acceleration of gravity", minimum=0.0, exclusive=True),

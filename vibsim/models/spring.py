@@ -9,35 +9,18 @@ Scaled by ``t_c = 2 pi/w`` it is the same model with ``w = 2 pi`` and initial po
 
 from __future__ import annotations
 
-from typing import Any
-
-from vibsim.models.base import Floats, Model, Numbers, Parameter, State
-from vibsim.models.shared.harmonic import motion, period
+from vibsim.models.base import Model, Parameter, State
+from vibsim.models.shared.linear_motion import harmonic
 from vibsim.models.shared.scales import Scales
 
-
-def natural_frequency(parameters: Numbers) -> Any:
-    """Return w [rad s-1]."""
-    return parameters["w"]
-
-
-def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
-    """Return u and v at times `t`: B, equation (2), with V sin(w t)/w added for an initial velocity V."""
-    u, v = motion(t, parameters["w"], initial["u"], initial["v"])
-    return {"u": u, "v": v}
-
-
-def exact_period(initial: Numbers, parameters: Numbers) -> Any:
-    """Return ``2 pi/w``; NaN at rest."""
-    return period(parameters["w"], initial["u"], initial["v"])
-
+STATES = (State("u", "m", "displacement"), State("v", "m s-1", "velocity"))
 
 SPRING = Model(
     kind="spring",
     title="Mass on a spring",
     source="vibration text, section 1.1",
     equation="u'' + w^2 u = 0",
-    states=(State("u", "m", "displacement"), State("v", "m s-1", "velocity")),
+    states=STATES,
     parameters=(Parameter("w", 1.0, "rad s-1", "angular frequency", minimum=0.0, exclusive=True),),
     acceleration="-w**2*u",
     kinetic_energy="0.5*v**2",
@@ -45,9 +28,6 @@ SPRING = Model(
     energy_unit="m2 s-2",
     linear=True,
     conservative=True,
-    natural_frequency=natural_frequency,
-    exact=exact,
-    exact_period=exact_period,
     # B, section 10.1; without an initial position the amplitude is V/w
     scales=Scales(
         time="1/w",
@@ -56,4 +36,5 @@ SPRING = Model(
         numbers=(("beta", "v/(w*u)"),),
         parameters=(("w", "1"),),
     ),
+    **harmonic(STATES, lambda parameters: parameters["w"]),
 )

@@ -31,7 +31,7 @@ from vibsim.models.base import FormulaField, Model, Output, Parameter, declared_
 from vibsim.models.shared.linear_scales import linear_scales
 from vibsim.models.shared.mechanical import Forces, mechanical
 from vibsim.models.shared.scales import Scales
-from vibsim.models.table import BEND, HEIGHT, Lookup, Table
+from vibsim.models.table import BEND, HEIGHT, Lookup
 
 PARAMETERS = (
     Parameter("m", 1.0, "kg", "mass of the body", minimum=0.0, exclusive=True),
@@ -78,21 +78,26 @@ def vehicle(
     """Return the vehicle, with a damper where `terms` has ``b``, and on the road of a table where there is one."""
     parameters = (*PARAMETERS, *declared_parameters(declared))
     known = tuple(row.name for row in parameters)
-    spring = parse(texts[0], ("u", *known))
-    road = parse(texts[1], ("x", *known))
-    bend, height = _of_table() if lookup else _of_formula(road)
+    spring, road = parse(texts[0], ("u", *known)), parse(texts[1], ("x", *known))
+    bend: Expression = put(derivative(derivative(road, "x"), "x"), "x", PLACE)
+    height: Expression = put(road, "x", PLACE)
+    told, more = f"h(x) = {to_formula(road)}", dict[str, Any]()
+    if lookup is not None:
+        bend, height, table = Name(BEND), Name(HEIGHT), lookup.table
+        told = f"h(x) from a table of {table.points} points, {table.spacing:g} m apart"
+        more = {"lookup": lookup, "exact": None}
     push = times(Number(-1.0), times(times(Name("m"), bend), parse("speed**2", known)))
-    forces = Forces(
-        spring=spring,
-        damping=parse("b*v", ("v", *known)) if "b" in terms else ZERO,
-        force=push,
-        mass=Name("m"),
-    )
-    of_table: dict[str, Any] = {"lookup": lookup, "exact": None}
+    damping = parse("b*v", ("v", *known)) if "b" in terms else ZERO
     damper = "b u' + " if "b" in terms else ""
-    told = f"h(x) = {to_formula(road)}" if lookup is None else _told(lookup.table)
+
+    def scales(forces: Forces) -> Scales | None:
+        # a table has numbers with units: there is no scaled equation with the same table
+        found = None if lookup else linear_scales(forces)
+        outputs = ("road_height", "u_c"), ("absolute_position", "u_c")
+        return found and replace(found, outputs=outputs)
+
     return mechanical(
-        forces,
+        Forces(spring, damping, push, mass=Name("m")),
         parameters,
         kind="vehicle",
         title="Vehicle on a bumpy road",
@@ -104,37 +109,15 @@ def vehicle(
         ),
         formulas=FORMULAS,
         written=written,
-        scales=_no_scales if lookup else _scales,
+        scales=scales,
         powers={"speed": (0, 1, -1)},
         optional=("b",),
         variant=lambda names: vehicle(texts, declared, names, lookup),
         with_table=lambda table, is_met: vehicle(
             texts, declared, terms, Lookup(table, PLACE, is_met)
         ),
-        **(of_table if lookup else {}),
+        **more,
     )
-
-
-def _of_formula(road: Expression) -> tuple[Expression, Expression]:
-    """Return second derivative and height of a road where the vehicle is."""
-    return put(derivative(derivative(road, "x"), "x"), "x", PLACE), put(road, "x", PLACE)
-
-
-def _of_table() -> tuple[Expression, Expression]:
-    return Name(BEND), Name(HEIGHT)
-
-
-def _told(table: Table) -> str:
-    return f"h(x) from a table of {table.points} points, {table.spacing:g} m apart"
-
-
-def _scales(forces: Forces) -> Scales | None:
-    found = linear_scales(forces)
-    return found and replace(found, outputs=(("road_height", "u_c"), ("absolute_position", "u_c")))
-
-
-def _no_scales(_: Forces) -> None:
-    """A table has numbers with units: there is no scaled equation with the same table."""
 
 
 VEHICLE = replace(written({}, ()), equation="m u'' + b u' + s(u) = -m h''(speed t) speed^2")

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from typing import Any
 
 from vibsim.formula import parse
 from vibsim.models.base import Model, Output, Parameter
@@ -31,26 +30,24 @@ PARAMETERS = (
 @cache
 def washing_machine(terms: frozenset[str]) -> Model:
     """Return the machine, with dampers where `terms` has ``b``."""
-    damped = "b" in terms
     names = ("u", "v", "t", *(row.name for row in PARAMETERS))
-    forces = Forces(
-        spring=parse("k*u", names),
-        damping=parse("b*v" if damped else "0", names),
-        force=parse("unbalance*speed**2*cos(speed*t)", names),
-        mass=parse("m", names),
-    )
-    transmitted, term = ("k*u + b*v", "b u' + ") if damped else ("k*u", "")
-    more: dict[str, Any] = {"optional": ("b",), "variant": washing_machine}
+    damping, floor, term = ("b*v", "k*u + b*v", "b u' + ") if "b" in terms else ("0", "k*u", "")
     return mechanical(
-        forces,
+        Forces(
+            spring=parse("k*u", names),
+            damping=parse(damping, names),
+            force=parse("unbalance*speed**2*cos(speed*t)", names),
+            mass=parse("m", names),
+        ),
         PARAMETERS,
         kind="washing_machine",
         title="Washing machine with an unbalance",
         source="vibration text, section 10.4",
         equation=f"m u'' + {term}k u = unbalance speed^2 cos(speed t)",
         scales=_scales,
-        outputs=(Output("floor_force", "N", "force on the floor beside the weight", transmitted),),
-        **more,
+        outputs=(Output("floor_force", "N", "force on the floor beside the weight", floor),),
+        optional=("b",),
+        variant=washing_machine,
     )
 
 

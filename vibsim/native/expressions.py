@@ -7,8 +7,9 @@ their entries.
 from __future__ import annotations
 
 import ast
-from collections.abc import Sequence
-from typing import Any, Protocol, cast
+from collections.abc import Callable, Sequence
+from functools import partial, reduce
+from typing import Any, cast
 
 from llvmlite import ir
 
@@ -27,33 +28,20 @@ from vibsim.native.kinds import (
     value_of,
     words_of,
 )
-from vibsim.native.source import arguments_of, assigned, given_at_the_top, refusal
+from vibsim.native.source import arguments_of, assigned, refusal
 
 _INT = ir.IntType(32)
 
 
-class Functions(Protocol):
-    """What an expression can call."""
-
-    def call(self, builder: ir.IRBuilder, name: str, arguments: Sequence[Value]) -> Value:
-        """Call a function; return its result."""
+Call = Callable[[ir.IRBuilder, str, Sequence[Value]], Value]
+"""Calls a function of the module by its name, and returns its result."""
 
 
 class Expressions:
-    """Variables and expressions of one function that is being written.
+    """Variables and expressions of one function that is being written, still empty."""
 
-    Parameters
-    ----------
-    functions
-        What it can call.
-    inference
-        The kinds within it.
-    function
-        What is written, still empty.
-    """
-
-    def __init__(self, functions: Functions, inference: Inference, function: ir.Function) -> None:
-        self.functions = functions
+    def __init__(self, call: Call, inference: Inference, function: ir.Function) -> None:
+        self.call = call
         self.inference = inference
         self.source = inference.source
         self.node = inference.function
@@ -71,7 +59,9 @@ class Expressions:
                 self.store(name, value)
             else:
                 self.values[name] = value
-        once = {name for name in given_at_the_top(self.node) if counts[name] == 1}
+        # in a branch or a loop it need not have its value
+        at_the_top = assigned(*(line for line in self.node.body if isinstance(line, ast.Assign)))
+        once = {name for name in at_the_top if counts[name] == 1}
         self.single = once - self.slots.keys()
         for name in sorted(counts.keys() - self.single - self.slots.keys()):
             self._make_slot(name)
@@ -111,27 +101,32 @@ class Expressions:
         return operations.turned(self.builder, self.number(node), TRUTH)
 
     def value(self, node: ast.expr) -> Value:
-        """Work out an expression.
-
-        Raises
-        ------
-        NativeError
-            Where it cannot be compiled.
-        """
+        """Work out an expression."""
         known = self.source.constant(node, self.inference.local)
         if known is not None:
             return _literal(known)
         match node:
-            case ast.Name(id=name):
-                return self._variable(node, name)
+            case ast.Name(id=name) if name in self.values:
+                return self.values[name]
+            case ast.Name(id=name) if name in self.slots:
+                words = [self.builder.load(slot) for slot in self.slots[name]]
+                return value_of(self.inference.variables[name], iter(words))
+            case ast.Name():
+                raise refusal(node, "it has no value here")
             case ast.Tuple(elts=parts):
                 return tuple([self.value(part) for part in parts])
-            case ast.BinOp():
-                return self._binary(node)
-            case ast.UnaryOp(op=op, operand=operand):
-                return self._unary(op, self.number(operand))
-            case ast.Compare():
-                return self._compare(node)
+            case ast.BinOp(left=left, op=op, right=right):
+                return self._binary(node, op, self.value(left), self.value(right))
+            case ast.UnaryOp(op=ast.Not(), operand=operand):
+                return Number(TRUTH, self.builder.not_(self.truth(operand)))
+            case ast.UnaryOp(operand=operand):
+                number = self.number(operand)
+                kind = number.kind if number.kind != TRUTH else WHOLE
+                return Number(kind, operations.negated(self.builder, number))
+            case ast.Compare(left=left, ops=ops, comparators=others):
+                sides = [self.number(part) for part in (left, *others)]
+                bits = map(partial(operations.compared, self.builder), ops, sides, sides[1:])
+                return Number(TRUTH, reduce(self.builder.and_, bits))
             case ast.BoolOp():
                 return self._bool(node)
             case ast.IfExp(test=test, body=body, orelse=orelse):
@@ -146,39 +141,12 @@ class Expressions:
                 return self._call(node, func, [self.value(value) for value in arguments])
         raise refusal(node, "this cannot be compiled")
 
-    def _variable(self, node: ast.Name, name: str) -> Value:
-        if name in self.values:
-            return self.values[name]
-        if name not in self.slots:
-            raise refusal(node, "it has no value here")
-        words = iter([self.builder.load(slot) for slot in self.slots[name]])
-        return value_of(self.inference.variables[name], words)
-
-    def _binary(self, node: ast.BinOp) -> Value:
-        left, right = self.value(node.left), self.value(node.right)
+    def _binary(self, node: ast.expr, op: ast.operator, left: Value, right: Value) -> Value:
         if isinstance(left, tuple) and isinstance(right, tuple):
             return left + right
-        kind = cast(str, operations.kind_of_binary(node, node.op, kind_of(left), kind_of(right)))
+        kind = cast(str, operations.kind_of_binary(node, op, kind_of(left), kind_of(right)))
         numbers = cast(Number, left), cast(Number, right)
-        return Number(kind, operations.binary(self.builder, node.op, kind, *numbers))
-
-    def _unary(self, op: ast.unaryop, value: Number) -> Value:
-        if isinstance(op, ast.Not):
-            word = operations.turned(self.builder, value, TRUTH)
-            return Number(TRUTH, self.builder.not_(word))
-        kind = value.kind if value.kind != TRUTH else WHOLE
-        return Number(kind, operations.negated(self.builder, value))
-
-    def _compare(self, node: ast.Compare) -> Value:
-        values = [self.number(part) for part in (node.left, *node.comparators)]
-        bits = [
-            operations.compared(self.builder, op, a, b)
-            for op, a, b in zip(node.ops, values, values[1:], strict=False)
-        ]
-        result = bits[0]
-        for bit in bits[1:]:
-            result = self.builder.and_(result, bit)
-        return Number(TRUTH, result)
+        return Number(kind, operations.binary(self.builder, op, kind, *numbers))
 
     def _bool(self, node: ast.BoolOp) -> Value:
         """Work out ``and`` or ``or``: what stands behind is worked out only where it decides."""
@@ -279,7 +247,7 @@ class Expressions:
 
     def _call(self, node: ast.Call, func: ast.expr, arguments: list[Value]) -> Value:
         if isinstance(func, ast.Name) and func.id in self.source.functions:
-            return self.functions.call(self.builder, func.id, arguments)
+            return self.call(self.builder, func.id, arguments)
         name = ast.unparse(func)
         kind = operations.kind_of_call(node, name, [kind_of(value) for value in arguments])
         return operations.call(self.builder, name, cast(str, kind), cast(list[Number], arguments))

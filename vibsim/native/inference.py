@@ -109,13 +109,7 @@ class Inference:
         return kind
 
     def kind(self, node: ast.expr) -> Kind:
-        """Return the kind of an expression.
-
-        Raises
-        ------
-        NativeError
-            Where it has none.
-        """
+        """Return the kind of an expression."""
         known = self.source.constant(node, self.local)
         if known is not None:
             return kind_of_constant(known)

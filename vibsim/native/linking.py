@@ -2,30 +2,61 @@
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from llvmlite import binding
 
+_TYPES = {"f": ctypes.c_double, "i": ctypes.c_int64}
 _KEPT: list[Any] = []
 """What must live as long as the code that is called."""
 
 
-def link(code: bytes, name: str) -> int:
-    """Load an object file and return where its function `name` stands."""
-    engine = _engine()
+def link(code: bytes, name: str, kinds: str) -> Callable[..., None]:
+    """Load an object file and return its function `name`, which lets go of the interpreter.
+
+    It takes numbers as they are, and arrays, C-contiguous with 64 bits an entry, as pointers and lengths.
+
+    Parameters
+    ----------
+    kinds
+        What it takes, as `vibsim.native.machine.machine_code` has it.
+    """
+    make_ready()
+    target = binding.Target.from_default_triple().create_target_machine()
+    engine = binding.create_mcjit_compiler(binding.parse_assembly(""), target)
     engine.add_object_file(binding.ObjectFileRef.from_data(code))
     engine.finalize_object()
     _KEPT.append(engine)
-    return int(engine.get_function_address(name))
+    words = kinds.split()
+    types: list[Any] = []
+    for word in words:
+        dims = int(word[1:] or 0)
+        types += [ctypes.c_void_p] + [ctypes.c_int64] * dims if dims else [_TYPES[word]]
+    function = ctypes.CFUNCTYPE(None, *types)(engine.get_function_address(name))
+
+    def call(*values: Any) -> None:
+        flat: list[Any] = []
+        for word, value in zip(words, values, strict=True):
+            if len(word) > 1:
+                flat += (_address(value), *value.shape)
+            else:
+                flat.append(value)
+        function(*flat)
+
+    return call
 
 
-def _engine() -> Any:
-    make_ready()
-    target = binding.Target.from_default_triple().create_target_machine()
-    return binding.create_mcjit_compiler(binding.parse_assembly(""), target)
+def _address(array: Any) -> int:
+    """Return where the data of an array stand, the quick way where it is open."""
+    try:
+        return ctypes.addressof(ctypes.c_char.from_buffer(array))
+    except (TypeError, ValueError):  # read-only, or empty
+        return int(array.__array_interface__["data"][0])
 
 
 @cache

@@ -14,7 +14,7 @@ from typing import cast
 from llvmlite import ir
 
 from vibsim.native import operations
-from vibsim.native.expressions import Expressions
+from vibsim.native.expressions import Call, Expressions
 from vibsim.native.inference import Inference, branches
 from vibsim.native.kinds import (
     NOTHING,
@@ -44,13 +44,7 @@ class Program:
     written: dict[tuple[str, tuple[Kind, ...]], ir.Function] = field(default_factory=dict)
 
     def function(self, name: str, arguments: tuple[Kind, ...]) -> tuple[ir.Function, Kind]:
-        """Return a function for arguments of these kinds, and the kind of its result.
-
-        Raises
-        ------
-        NativeError
-            Where its text cannot be compiled.
-        """
+        """Return a function for arguments of these kinds, and the kind of its result."""
         inference = Inference.of(self.source, self.known, name, arguments)
         result = cast(Kind, inference.result)
         key = (name, arguments)
@@ -66,7 +60,7 @@ class Program:
             if is_inline(inference.function):
                 function.attributes.add("alwaysinline")
             self.written[key] = function
-            _Statements(self, inference, function).write()
+            _Statements(self.call, inference, function).write()
         return self.written[key], result
 
     def call(self, builder: ir.IRBuilder, name: str, arguments: Sequence[Value]) -> Value:
@@ -90,8 +84,8 @@ def result_type(kind: Kind) -> ir.Type:
 class _Statements(Expressions):
     """One function that is being written, statement by statement."""
 
-    def __init__(self, functions: Program, inference: Inference, function: ir.Function) -> None:
-        super().__init__(functions, inference, function)
+    def __init__(self, call: Call, inference: Inference, function: ir.Function) -> None:
+        super().__init__(call, inference, function)
         self.ends: list[ir.Block] = []
         """Where ``break`` goes, innermost last."""
         self.repeats: list[ir.Block] = []

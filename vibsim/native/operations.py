@@ -22,13 +22,7 @@ _ORDERS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==",
 
 
 def kind_of_binary(node: ast.expr, op: ast.operator, left: Kind, right: Kind) -> Kind:
-    """Return the kind of ``left op right``.
-
-    Raises
-    ------
-    NativeError
-        Where there is no such operation.
-    """
+    """Return the kind of ``left op right``."""
     if isinstance(left, tuple) and isinstance(right, tuple) and isinstance(op, ast.Add):
         return left + right
     both = joined(left, right) if isinstance(left, str) and isinstance(right, str) else None
@@ -46,13 +40,7 @@ def kind_of_binary(node: ast.expr, op: ast.operator, left: Kind, right: Kind) ->
 
 
 def kind_of_unary(node: ast.expr, op: ast.unaryop, kind: Kind) -> Kind:
-    """Return the kind of ``op value``.
-
-    Raises
-    ------
-    NativeError
-        Where there is no such operation.
-    """
+    """Return the kind of ``op value``."""
     if isinstance(kind, str):
         if isinstance(op, ast.Not):
             return TRUTH
@@ -212,13 +200,7 @@ _CALLS: dict[str, tuple[int, str, Build]] = {
 
 
 def kind_of_call(node: ast.expr, name: str, arguments: Sequence[Kind]) -> Kind:
-    """Return the kind of what a library function gives.
-
-    Raises
-    ------
-    NativeError
-        Where there is no such function, or it does not take these arguments.
-    """
+    """Return the kind of what a library function gives."""
     if name not in _CALLS:
         raise refusal(node, f"there is no function {name}; there are {', '.join(_CALLS)}")
     count, kind, _ = _CALLS[name]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import math
+import operator
+from collections import Counter
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +16,7 @@ INLINE = "compiled"
 APART = ("called", "entry")
 """Decorators of functions that are compiled for themselves, where LLVM does not think better of it."""
 
+_OPERATIONS = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul}
 _NUMBERS = {"nan": math.nan, "inf": math.inf, "pi": math.pi, "e": math.e}
 
 
@@ -37,13 +40,7 @@ class Source:
 
     @classmethod
     def read(cls, text: str) -> Source:
-        """Read the text of a module: functions with one decorator each, numbers, and ``import math``.
-
-        Raises
-        ------
-        NativeError
-            Where something else stands there.
-        """
+        """Read the text of a module: functions with one decorator each, numbers, and ``import math``."""
         functions, constants = {}, {}
         for node in ast.parse(text).body:
             match node:
@@ -71,15 +68,8 @@ class Source:
                 return -value if isinstance(value, int | float) else None
             case ast.BinOp(left=left, op=ast.Add() | ast.Sub() | ast.Mult() as op, right=right):
                 a, b = self.constant(left, local), self.constant(right, local)
-                if not (isinstance(a, int) and isinstance(b, int)):
-                    return None
-                return (
-                    a + b
-                    if isinstance(op, ast.Add)
-                    else a - b
-                    if isinstance(op, ast.Sub)
-                    else a * b
-                )
+                if isinstance(a, int) and isinstance(b, int):
+                    return _OPERATIONS[type(op)](a, b)
         return None
 
 
@@ -91,13 +81,10 @@ def is_inline(function: ast.FunctionDef) -> bool:
     raise refusal(function, f"it has to be marked as one of {', '.join((INLINE, *APART))}")
 
 
-def assigned(function: ast.FunctionDef) -> dict[str, int]:
-    """Return how often each name is given a value in a function."""
-    count: dict[str, int] = {}
-    for node in ast.walk(function):
-        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-            count[node.id] = count.get(node.id, 0) + 1
-    return count
+def assigned(*body: ast.AST) -> Counter[str]:
+    """Return how often each name is given a value in some parts of the text."""
+    nodes = (node for part in body for node in ast.walk(part) if isinstance(node, ast.Name))
+    return Counter(node.id for node in nodes if isinstance(node.ctx, ast.Store))
 
 
 def arguments_of(function: ast.FunctionDef) -> list[str]:
@@ -106,17 +93,6 @@ def arguments_of(function: ast.FunctionDef) -> list[str]:
     if rest.defaults or rest.vararg or rest.kwarg or rest.kwonlyargs or rest.posonlyargs:
         raise refusal(function, "a function takes arguments by their places alone")
     return [argument.arg for argument in rest.args]
-
-
-def given_at_the_top(function: ast.FunctionDef) -> set[str]:
-    """Return names that are given values in statements which stand in no branch and no loop."""
-    return {
-        node.id
-        for statement in function.body
-        if isinstance(statement, ast.Assign)
-        for node in ast.walk(statement)
-        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
-    }
 
 
 def loaded(target: ast.expr) -> ast.expr:

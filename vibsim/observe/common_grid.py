@@ -1,4 +1,6 @@
-"""The coarsest common grid of several levels, found from whole numbers of steps.
+"""Whether level data belong together, and the coarsest common grid of several levels, from whole numbers of steps.
+
+A comparison of levels that are strangers would still give numbers, so they are refused.
 
 Sample k of a level is its step k*every, at the fraction k*every/steps of the whole time. Fractions are compared as
 whole numbers: comparing floating-point times would lose points, or pair wrong ones.
@@ -7,35 +9,42 @@ whole numbers: comparing floating-point times would lose points, or pair wrong o
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vibsim.convergence.differences import laid_out
 from vibsim.core.array_types import Floats
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record
+from vibsim.observe.thresholds import SAME_START
+
+if TYPE_CHECKING:
+    from vibsim.experiment import Experiment
+
+SAME_AT_EVERY_LEVEL = frozenset({"natural_frequency", "exact_period"})
+"""What the levels hold of every member and does not depend on the step."""
+MEASURED = ("period", "period_count", "first_peak", "last_peak")
+NEEDED = ("omega_dt", "natural_frequency", "status", "energy_initial", *MEASURED)
+"""What the analysis needs of every member at every level, besides the states and the extrema of the position."""
 
 
 @dataclass(frozen=True)
 class Grid:
     """The common sample times of a ladder of levels."""
 
-    levels: tuple[int, ...]
-    """Strictly increasing."""
-    steps: tuple[int, ...]
-    """Number of steps of every level."""
-    strides: tuple[int, ...]
-    """Distance between common points, in stored samples of each level."""
+    levels: tuple[int, ...]  # strictly increasing
+    steps: tuple[int, ...]  # number of steps of every level
+    strides: tuple[int, ...]  # distance between common points, in stored samples of each level
+    # common times, shape (t,); fractions of the end time where the end differs between members
     t: Floats
-    """Common times, shape (t,); fractions of the end time where the end differs between members."""
+    # step of every level, shape (level, case), with one case where all members have the same
     dt: Floats
-    """Step of every level, shape (level, case), with one case where all members have the same."""
-    apart: int
-    """Distance between common points, in steps of the coarsest level."""
-    end_included: bool
-    """Whether the last common point is the end of the time interval."""
+    apart: int  # distance between common points, in steps of the coarsest level
+    end_included: bool  # whether the last common point is the end of the time interval
 
     @property
     def spacing(self) -> Floats:
@@ -49,12 +58,7 @@ class Grid:
 
 
 def common_grid(records: Mapping[int, Record]) -> Grid:
-    """Find the common grid of the records of a ladder.
-
-    Parameters
-    ----------
-    records
-        Level Records by level, each with attributes ``steps`` and ``every``.
+    """Find the common grid of the records of a ladder, which have the attributes ``steps`` and ``every``.
 
     Raises
     ------
@@ -64,8 +68,8 @@ def common_grid(records: Mapping[int, Record]) -> Grid:
     if not records:
         raise VibsimError("analysis needs the data of at least one level")
     levels = tuple(sorted(records))
-    steps = tuple(_whole(records[level], "steps") for level in levels)
-    every = tuple(_whole(records[level], "every") for level in levels)
+    steps = tuple(whole(records[level], "steps") for level in levels)
+    every = tuple(whole(records[level], "every") for level in levels)
     unit = math.lcm(*steps)
     spacings = [e * (unit // n) for e, n in zip(every, steps, strict=True)]
     apart = math.lcm(*spacings)
@@ -86,18 +90,90 @@ def common_grid(records: Mapping[int, Record]) -> Grid:
 
 def take(grid: Grid, record: Record, name: str) -> Floats:
     """Return variable `name` of a level Record on the common grid, shape (..., t), time outermost in memory."""
-    stride = grid.strides[grid.levels.index(_whole(record, "level"))]
-    values = record[name][..., : (len(grid.t) - 1) * stride + 1 : stride]
-    return laid_out(values)
+    stride = grid.strides[grid.levels.index(whole(record, "level"))]
+    return laid_out(record[name][..., : (len(grid.t) - 1) * stride + 1 : stride])
 
 
-def _whole(record: Record, name: str) -> int:
+def whole(record: Record, name: str) -> int:
+    """Return a whole number among the attributes of a Record."""
     return int(np.asarray(record.attrs[name]).item())
 
 
 def _step(record: Record) -> Floats:
     """Return dt, shape (case,) where the end differs between members, else (1,)."""
-    t, every = record["t"], _whole(record, "every")
-    fraction = float(t[-1]) / ((np.size(t) - 1) * every)
+    t = record["t"]
+    fraction = float(t[-1]) / ((np.size(t) - 1) * whole(record, "every"))
     end = record["end"] if "end" in record else np.ones(1)
     return np.asarray(fraction * end, dtype=np.float64)
+
+
+def check_belonging(experiment: Experiment, records: Mapping[int, Record]) -> None:
+    """Refuse level Records that are not those of `experiment`, or not of one and the same problem.
+
+    Raises
+    ------
+    VibsimError
+        With every fault: a level that the experiment does not have, another model, other schemes, members, numbers of
+        steps, end times or parameters than the other levels or the experiment, other values at t = 0, a variable that
+        is missing.
+    """
+    faults = [
+        f"level {level}: {fault}"
+        for level, record in sorted(records.items())
+        for fault in _faults(experiment, level, record, records[max(records)])
+    ]
+    if faults:
+        raise VibsimError("levels that do not belong together:\n" + "\n".join(faults))
+
+
+def _faults(experiment: Experiment, level: int, record: Record, other: Record) -> Iterator[str]:
+    model = experiment.model.definition
+    if level not in experiment.levels:
+        yield f"the experiment has levels {list(experiment.levels)}"
+        return
+    steps = whole(record, "steps")
+    if steps != experiment.steps(level):
+        yield f"{steps} steps instead of {experiment.steps(level)}"
+    if str(record.attrs.get("model", model.kind)) != model.kind:
+        yield f"model {record.attrs['model']} instead of {model.kind}"
+    names = [scheme.name for scheme in experiment.schemes]
+    if record.words("scheme") != names:
+        yield f"schemes {record.words('scheme')} instead of {names}"
+        return
+    if not np.array_equal(record["case"], other["case"]):
+        yield "other members than the finest level"
+        return
+    position = model.position
+    needed = [state.name for state in model.states]
+    needed += [f"{position}_min", f"{position}_max", *NEEDED]
+    missing = [name for name in needed if name not in record]
+    if missing:
+        yield f"{', '.join(missing)} {'are' if len(missing) > 1 else 'is'} missing"
+        return
+    # what belongs to a member and not to a level: parameters, period, end time
+    constants = [name for name, variable in record.coords.items() if variable.dims == ("case",)]
+    for name in (*constants, *sorted(SAME_AT_EVERY_LEVEL & record.variables.keys())):
+        if name not in other or not _equal(record[name], other[name]):
+            yield f"{name} differs from the finest level's"
+    if not np.isclose(record["t"][-1], other["t"][-1], rtol=1e-12, atol=0.0):
+        yield f"it ends at {record['t'][-1]:g}, the finest level at {other['t'][-1]:g}"
+    for state in model.states:
+        yield from _start(record, other, state.name)
+
+
+def _equal(a: NDArray[Any], b: NDArray[Any]) -> bool:
+    return bool(np.array_equal(a, b, equal_nan=a.dtype.kind == b.dtype.kind == "f"))
+
+
+def _start(record: Record, other: Record, name: str) -> Iterator[str]:
+    compared = [(name, other, "the finest level's")]
+    if f"{name}_exact" in record:
+        compared.append((f"{name}_exact", record, "the exact solution's"))
+    own = np.asarray(record[name], dtype=np.float64)
+    for other_name, source, words in compared:
+        known = np.asarray(source[other_name], dtype=np.float64)
+        # a level that blows up is larger than the motion
+        largest = [np.fmax.reduce(np.abs(values), axis=-1) for values in (own, known)]
+        size = np.maximum(np.abs(known[..., 0]), np.fmin(*largest))
+        if np.any(np.abs(own[..., 0] - known[..., 0]) > SAME_START * size):
+            yield f"{name} at t = 0 differs from {words}"

@@ -25,21 +25,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibsim.convergence.differences import safe_ratio
+from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, solution_size
+from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.array_types import Codes, Flags, Floats
 from vibsim.core.vocabulary import DRIFTS
-from vibsim.observe.thresholds import (
-    CREEP,
-    LARGE_CHANGE,
-    LEAST_PER_PERIOD,
-    LEAST_PERIODS,
-    LEAST_SAMPLES,
-    NEAR_POWER,
-    SMALLEST_NORMAL,
-    STILL,
-    STILL_CREEPS,
-)
+from vibsim.formula import derivative, plus, values
+from vibsim.models.base import tree
+from vibsim.observe import thresholds as th
+from vibsim.observe.member_block import CENTRED, MemberBlock, energy_at_start, stored
+from vibsim.schemes import SCHEMES
+from vibsim.schemes.base import UNIT_ROUND_OFF, round_off
 
 NONE, BOUNDED, LINEAR, QUADRATIC, EXPONENTIAL, UNCLEAR = range(len(DRIFTS))
 """Index into `vocabulary.DRIFTS`."""
@@ -49,19 +45,87 @@ NONE, BOUNDED, LINEAR, QUADRATIC, EXPONENTIAL, UNCLEAR = range(len(DRIFTS))
 class Drift:
     """How the energy error of members grows; arrays of shape (scheme, case)."""
 
-    kind: Codes
-    """Index into `vocabulary.DRIFTS`."""
+    kind: Codes  # index into `vocabulary.DRIFTS`
+    # of a linear or quadratic drift the relative energy error per period, or per period squared; of an exponential one
+    # the change of ln E per period; 0 for none and bounded, NaN for unclear
     rate: Floats
-    """Of a linear or quadratic drift the relative energy error per period, or per period squared; of an exponential
-    one the change of ln E per period; 0 for none and bounded, NaN for unclear."""
-    power: Floats
-    """k; NaN where it cannot be told."""
-    largest: Floats
-    """M(T) over the energy at the start; NaN where that vanishes."""
-    means: Floats
-    """m3, m2 and m1, of M or of the range, in the unit of the energy, shape (scheme, case, 3)."""
-    round_off: Floats
-    """M(T) up to which the drift is ``none``, in the unit of the energy."""
+    power: Floats  # k; NaN where it cannot be told
+    largest: Floats  # M(T) over the energy at the start; NaN where that vanishes
+    means: Floats  # m3, m2 and m1, of M or of the range, as energies, shape (scheme, case, 3)
+    round_off: Floats  # M(T) up to which the drift is ``none``, in the unit of the energy
+
+
+def drift_at(block: MemberBlock, level: int, name: str = "energy_deviation") -> Drift:
+    """Find how an energy deviation grows at a level, with the suffix `CENTRED` or without.
+
+    NaN rows of its series are ``unclear``.
+    """
+    record, index = block.records[level], block.grid.levels.index(level)
+    initial = energy_at_start(record)
+    deviation = stored(record, name, (*block.shape, len(record["t"])))
+    # over every step so far; where storage is bounded, over the samples so far
+    if f"{name}_running_max" in record:
+        running = np.asarray(record[f"{name}_running_max"], dtype=float)
+    else:
+        running = np.abs(deviation)
+        if name.endswith(CENTRED):
+            running[..., [0, -1]] = 0.0
+        running = np.asarray(np.maximum.accumulate(running, axis=-1))
+    # of the energy itself, which has more digits where it decays
+    plain = name.replace("_deviation", "")
+    energy = record[plain] if plain in record else initial[..., None] + deviation
+    ratio = safe_ratio(*np.broadcast_arrays(energy, initial[..., None]))
+    if name.endswith(CENTRED):
+        ratio[..., 0] = 1.0
+    size = np.abs(initial) + solution_size([np.nan_to_num(deviation)])
+    # an energy without bound has a floor without bound
+    with np.errstate(over="ignore", invalid="ignore"):
+        grows = _conditioned(block, level, size)
+        # a motion that magnifies a disturbance shifts it in time, which leaves the energy as it is
+        floor = block.floor_of(name, size * grows / block.magnified)[..., index]
+        floor = np.maximum(floor, _of_steps(block, level) * size * grows)
+    # the tolerance of an adaptive scheme is an error that it makes, and no round-off
+    floor[block.adaptive] = SPACING_AT_ONE * size[block.adaptive]
+    w = np.asarray(record["natural_frequency"], dtype=float)
+    return drift_of(running, ratio, initial, floor, w * block.group.end / (2.0 * np.pi), deviation)
+
+
+def _conditioned(block: MemberBlock, level: int, size: Floats) -> Floats:
+    """Return the factor by which rounding of the states is felt by the energy of a size, at least 1, (scheme, case).
+
+    A conserved energy keeps every error dE that a rounded state dx makes: ``dE = sum of (dE/dx) dx``, with dx relative
+    to the size of x. Relative to the energy that is 2 of an oscillation about 0, which counts as 1, and much more where
+    positions are large beside the swing. An energy that is not conserved follows the motion, with what that magnifies.
+    """
+    model, record = block.model, block.records[level]
+    if not model.conservative:
+        return np.broadcast_to(block.magnified, size.shape)
+    states = {s.name: np.asarray(record[s.name], dtype=float) for s in model.states}
+    named = {row.name: block.group.parameters[row.key][:, None] for row in model.parameters}
+    energy = plus(tree(model, model.kinetic_energy), tree(model, model.potential_energy))
+    square = np.zeros(next(iter(states.values())).shape)
+    with np.errstate(all="ignore"):
+        for name, values_of in states.items():
+            slope = values(derivative(energy, name), {**named, **states, "t": 0.0})
+            square = square + (slope * largest(values_of)[..., None]) ** 2
+        felt = 0.5 * safe_ratio(np.sqrt(largest(square)), size)
+    return np.asarray(np.fmax(felt, 1.0))
+
+
+def _of_steps(block: MemberBlock, level: int) -> Floats:
+    """Return what rounding adds to the energy in proportion to the size of a step, shape (scheme, case).
+
+    It is relative to the energy, over `ABOVE_ROUND_OFF`.
+    Rounded coefficients make every step, of the size p = w dt, larger or smaller by the same: N p. Steps larger than a
+    radian are differences of numbers p^2 large, which are rounded otherwise each time: ``N^(1/2) p^2``. Centred
+    differences have a prediction of their own for each way of writing them.
+    """
+    kinds = [SCHEMES[scheme.kind] for scheme in block.experiment.schemes]
+    plain = np.array([kind.round_off is round_off for kind in kinds])
+    index = block.grid.levels.index(level)
+    p, steps = block.omega_dt[:, index], block.grid.steps[index]
+    size = th.STEPPED * UNIT_ROUND_OFF * (steps * p + steps**0.5 * p * p)
+    return np.where(plain[:, None], np.minimum(size, th.MOST_ROUNDED), 0.0) / ABOVE_ROUND_OFF
 
 
 def drift_of(
@@ -76,14 +140,10 @@ def drift_of(
 
     Parameters
     ----------
-    running
-        M, shape (scheme, case, t), evenly sampled from 0 to the end; NaN at the ends does not matter.
-    ratio
-        The energy over that at the start, of the same shape.
-    energy
-        The energy at the start, shape (scheme, case).
-    floor
-        Predicted round-off of the energy at the end, shape (scheme, case).
+    running, ratio
+        M, and the energy over that at the start, shape (scheme, case, t), evenly sampled from 0 to the end.
+    energy, floor
+        The energy at the start, and its predicted round-off at the end, shape (scheme, case).
     periods
         Length of the run in natural periods, shape (case,).
     deviation
@@ -98,23 +158,25 @@ def drift_of(
         rise, k = _rise(means)
         fall, k_log = _power(np.abs(change))
         last = change[..., -2]
-        gone = (np.abs(ratio * energy[..., None])[..., -2] < SMALLEST_NORMAL) & (
-            np.abs(energy) > SMALLEST_NORMAL
+        gone = (np.abs(ratio * energy[..., None])[..., -2] < th.SMALLEST_NORMAL) & (
+            np.abs(energy) > th.SMALLEST_NORMAL
         )
     size = np.where(np.isfinite(end) & (end > 0), end, 1.0)
     allowed = np.broadcast_to(ABOVE_ROUND_OFF * floor, end.shape)
     still = _is_still(rise, k, size)
     if deviation is not None:
         # M stands still until a drift has overtaken an oscillation to the other side, and is of no power then
-        widens = (still | ~_is_named(k)) & (samples >= LEAST_PER_PERIOD * periods)
+        widens = (still | ~(_is_near(k, 1) | _is_near(k, 2))) & (
+            samples >= th.LEAST_PER_PERIOD * periods
+        )
         of_range = _means(_range(deviation))
         widens &= ~_is_still(*_rise(of_range), size)
         means = np.where(widens[..., None], of_range, means)
         rise, k = _rise(means)
         still &= ~widens
     closer = ~(np.abs(k_log - 1.0) >= np.abs(k - 1.0))
-    exponential = (np.abs(last) > LARGE_CHANGE) & (np.abs(k_log - 1.0) <= NEAR_POWER) & closer
-    short = (periods < LEAST_PERIODS) | (samples < LEAST_SAMPLES)
+    exponential = (np.abs(last) > th.LARGE_CHANGE) & _is_near(k_log, 1) & closer
+    short = (periods < th.LEAST_PERIODS) | (samples < th.LEAST_SAMPLES)
     unknown = ~np.isfinite(end) | np.isnan(running[..., -2])
     rules = [
         (unknown, UNCLEAR),
@@ -123,8 +185,8 @@ def drift_of(
         (exponential, EXPONENTIAL),
         (gone, UNCLEAR),
         (still, BOUNDED),
-        (np.abs(k - 1.0) <= NEAR_POWER, LINEAR),
-        (np.abs(k - 2.0) <= NEAR_POWER, QUADRATIC),
+        (_is_near(k, 1), LINEAR),
+        (_is_near(k, 2), QUADRATIC),
     ]
     kind = np.select([mask for mask, _ in rules], [code for _, code in rules], UNCLEAR)
     relative = safe_ratio(rise, np.abs(energy))
@@ -133,7 +195,7 @@ def drift_of(
     per_period, per_square = safe_ratio(relative, first), safe_ratio(relative, second)
     of_log = safe_ratio(np.sign(last) * fall, first)
     for at in zip(*np.nonzero((kind == UNCLEAR) & gone & ~unknown & ~short), strict=True):
-        per_sample, k[at] = _decay(change[at], np.abs(ratio[at] * energy[at]) >= SMALLEST_NORMAL)
+        per_sample, k[at] = _decay(change[at], np.abs(ratio[at] * energy[at]) >= th.SMALLEST_NORMAL)
         if per_sample < 0:
             kind[at], of_log[at] = EXPONENTIAL, per_sample * samples / periods[at[-1]]
     zero = np.zeros(end.shape)
@@ -151,15 +213,14 @@ def drift_of(
     )
 
 
-def _is_named(k: Floats) -> Flags:
-    """Say where k is that of a linear or a quadratic drift."""
-    return np.asarray((np.abs(k - 1.0) <= NEAR_POWER) | (np.abs(k - 2.0) <= NEAR_POWER))
+def _is_near(k: Floats, power: int) -> Flags:
+    return np.asarray(np.abs(k - power) <= th.NEAR_POWER)
 
 
 def _is_still(rise: Floats, k: Floats, size: Floats) -> Flags:
     """Say where a largest value so far no longer grows, or creeps only."""
-    creeps = (rise <= STILL_CREEPS * size) & (k <= CREEP)
-    return np.asarray((rise <= STILL * size) | creeps)
+    creeps = (rise <= th.STILL_CREEPS * size) & (k <= th.CREEP)
+    return np.asarray((rise <= th.STILL * size) | creeps)
 
 
 def _range(deviation: Floats) -> Floats:
@@ -177,12 +238,12 @@ def _decay(change: Floats, is_normal: Flags) -> tuple[float, float]:
     Too few samples for a fit have their mean rate.
     """
     above = change[: np.flatnonzero(is_normal)[-1] + 1]
-    if len(above) <= LEAST_SAMPLES:
+    if len(above) <= th.LEAST_SAMPLES:
         return float(above[-1] / (len(above) - 1)) if len(above) > 1 else -np.inf, np.nan
     fall, k = _power(np.abs(above))
     n = len(above) - 1
     rise, _ = _power(np.arange(n + 1.0))
-    return float(-fall / rise) if abs(k - 1.0) <= NEAR_POWER else np.nan, float(k)
+    return float(-fall / rise) if abs(k - 1.0) <= th.NEAR_POWER else np.nan, float(k)
 
 
 def _power(values: Floats) -> tuple[Floats, Floats]:

@@ -23,10 +23,9 @@ from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import HIGHEST, NORMS, TYPICAL_NORM
 from vibsim.models import BUDGET, ENERGIES, Model
-from vibsim.observe.common_grid import Grid, common_grid, take
-from vibsim.observe.input_consistency import check_belonging
+from vibsim.observe.common_grid import Grid, check_belonging, common_grid, take
 from vibsim.observe.missed_pulses import Missed, missed_pulses
-from vibsim.observe.sensitivity import sensitivity
+from vibsim.observe.sensitivity import in_columns, sensitivity
 from vibsim.observe.stiffness import decay_rate, stiffest
 from vibsim.observe.thresholds import FEW_RADIANS
 from vibsim.schemes import SCHEMES
@@ -50,44 +49,30 @@ class MemberBlock:
     """Some members of an experiment, or all; s, c and l stand for schemes, cases and levels."""
 
     experiment: Experiment
-    records: Mapping[int, Record]
-    """Level Records."""
+    records: Mapping[int, Record]  # level Records
     grid: Grid
-    lean: bool
-    """Whether no series are kept."""
-    norms: tuple[str, ...]
-    """The norms that are kept."""
+    lean: bool  # whether no series are kept
+    norms: tuple[str, ...]  # the norms that are kept
     columns: Columns
+    # exact states on the common grid, shape (c, t); empty where they are not known
     exact: Mapping[str, Floats]
-    """Exact states on the common grid, shape (c, t); empty where they are not known."""
-    magnified: Floats
-    """Factor by which disturbances grow, shape (c,)."""
-    relative_floor: Floats
-    """Predicted round-off relative to the solution, shape (s, 1 or c, l)."""
+    magnified: Floats  # factor by which disturbances grow, shape (c,)
+    relative_floor: Floats  # predicted round-off relative to the solution, shape (s, 1 or c, l)
+    # round-off of storing relative to the solution, shape (l,): 0 for double precision, which the above knows
     stored_floor: Floats
-    """Round-off of storing relative to the solution, shape (l,): 0 for double precision, which the above knows."""
-    omega_dt: Floats
-    """w dt, shape (c, l)."""
-    fastest: Floats
-    """The same of the highest frequency, which a step has to resolve."""
-    decay: Floats
-    """The largest rate at which damping takes a velocity away, shape (s, c)."""
-    failed: Flags
-    """Whether a level broke down, shape (s, c, l)."""
-    group: Members
-    """The numbers of the members."""
-    stability_limit: Floats
-    """Largest stable w dt, infinite for none, shape (s, 1 or c)."""
-    adaptive: Flags
-    """Whether a scheme chooses its own steps and so has no levels, shape (s,)."""
+    omega_dt: Floats  # w dt, shape (c, l)
+    fastest: Floats  # the same of the highest frequency, which a step has to resolve
+    decay: Floats  # the largest rate at which damping takes a velocity away, shape (s, c)
+    failed: Flags  # whether a level broke down, shape (s, c, l)
+    group: Members  # the numbers of the members
+    stability_limit: Floats  # largest stable w dt, infinite for none, shape (s, 1 or c)
+    adaptive: Flags  # whether a scheme chooses its own steps and so has no levels, shape (s,)
+    # the power that is left of errors where the mesh decides what steps see, NaN elsewhere, shape (s, 1 or c)
     left_to_the_mesh: Floats
-    """The power that is left of errors where the mesh decides what steps see, NaN elsewhere, shape (s, 1 or c)."""
-    corners: Corners
-    """Where the force has its first corner within a step."""
-    missed: Missed
-    """Pulses of the force between the points of every level."""
+    corners: Corners  # where the force has its first corner within a step
+    missed: Missed  # pulses of the force between the points of every level
+    # largest position over that of the exact motion, shape (s, c, l); NaN where not known
     growth: Floats
-    """Largest position over that of the exact motion, shape (s, c, l); NaN where not known."""
 
     @property
     def model(self) -> Model:
@@ -114,19 +99,18 @@ class MemberBlock:
         if any(name not in self.records[level] for level in self.grid.levels):
             return [np.full((*self.shape, len(self.grid.t)), np.nan) for _ in self.grid.levels]
         found = [take(self.grid, self.records[level], name) for level in self.grid.levels]
-        return [self._closed(values) for values in found] if name.endswith(CENTRED) else found
+        if not name.endswith(CENTRED):
+            return found
+        found = [values.copy(order="K") for values in found]
+        for values in found:
+            exists = np.any(np.isfinite(values), axis=-1)
+            for place in self.ends():
+                values[..., place] = np.where(exists, 0.0, np.nan)
+        return found
 
     def ends(self) -> list[int]:
         """Return the places on the common grid of the first and the last step, as far as they are on it."""
         return [0, -1] if self.grid.end_included else [0]
-
-    def _closed(self, values: Floats) -> Floats:
-        """Return a series with 0 at `ends`, where it has a value anywhere."""
-        values = values.copy(order="K")
-        exists = np.any(np.isfinite(values), axis=-1)
-        for place in self.ends():
-            values[..., place] = np.where(exists, 0.0, np.nan)
-        return values
 
     def exact_of(self, name: str) -> Floats | None:
         """Return a quantity's exact values, which broadcast against (s, c, t); None where they are not known."""
@@ -153,17 +137,10 @@ class MemberBlock:
             return np.asarray(found * inside)
 
     def size(self, name: str, values: list[Floats], sizes: Mapping[str, Floats]) -> Floats:
-        """Return the size that round-off is relative to, shape (s, c).
+        """Return the size that round-off of a quantity is relative to, shape (s, c), from known sizes of others.
 
         What is left of an energy is known no better than the energy itself; a velocity is known no better than what
         the rounding of the position leaves of it over the run, or over a swing.
-
-        Parameters
-        ----------
-        name, values
-            A quantity at every level.
-        sizes
-            Sizes of the solutions that are known already.
         """
         plain = plain_name(name)
         if plain in ENERGIES:
@@ -184,8 +161,8 @@ class MemberBlock:
     def floor_of(self, name: str, size: Floats) -> Floats:
         """Return the predicted round-off of a quantity of a size, shape (s, c, l), or what its storing leaves of it.
 
-        A motion magnifies the former alone.
-        ``[D_2t u]`` divides the last digit of the position by dt: eps/(w dt) of the velocity's size.
+        A motion magnifies the former alone. ``[D_2t u]`` divides the last digit of the position by dt: eps/(w dt) of
+        the velocity's size.
         """
         relative = self.relative_floor
         if name.endswith(CENTRED):
@@ -207,13 +184,20 @@ def block_of(experiment: Experiment, records: Mapping[int, Record]) -> MemberBlo
     """
     grid = common_grid(records)
     check_belonging(experiment, records)
-    finest = records[grid.levels[-1]]
-    lean = any(record.attrs.get("storage") == "lean" for record in records.values())
-    columns, states = columns_of(finest), experiment.model.definition.states
+    rows = [records[level] for level in grid.levels]
+    model, finest = experiment.model.definition, rows[-1]
+    lean = any(record.attrs.get("storage") == "lean" for record in rows)
+    columns, states = columns_of(finest), [state.name for state in model.states]
     case = np.asarray(finest["case"], dtype=np.int64)
     group = members(experiment, int(case[0]), int(case[-1]) + 1)
     t = grid.times(group.end)
-    exact = _exact(experiment, t, group) if lean else _stored(experiment, grid, finest)
+    if not lean:
+        exact = {n: take(grid, finest, f"{n}_exact") for n in states if f"{n}_exact" in finest}
+    elif model.exact is None:
+        exact = {}
+    else:
+        found = model.exact(t, in_columns(group.initial), in_columns(group.parameters))
+        exact = {name: laid_out(values) for name, values in found.items()}
     return MemberBlock(
         experiment=experiment,
         records=records,
@@ -224,18 +208,18 @@ def block_of(experiment: Experiment, records: Mapping[int, Record]) -> MemberBlo
         exact=exact,
         magnified=sensitivity(experiment, t, group, exact if lean else None),
         relative_floor=relative_floors(experiment, grid.steps, columns),
-        stored_floor=stored_floor(records, grid.levels, [state.name for state in states]),
-        omega_dt=by_level([records[level]["omega_dt"] for level in grid.levels]),
-        fastest=_fastest(experiment.model.definition, records, grid, group, exact),
-        decay=decay_rate(experiment.model.definition, grid, finest, group, exact),
+        stored_floor=stored_floor(records, grid.levels, states),
+        omega_dt=by_level([row["omega_dt"] for row in rows]),
+        fastest=_fastest(model, rows, grid, group, exact),
+        decay=decay_rate(model, grid, finest, group, exact),
         group=group,
-        failed=by_level([records[level]["status"] for level in grid.levels]) != 0,
+        failed=by_level([row["status"] for row in rows]) != 0,
         stability_limit=stability_limits(experiment, columns),
         adaptive=np.array([SCHEMES[scheme.kind].adaptive for scheme in experiment.schemes]),
         left_to_the_mesh=left_to_the_mesh(experiment, columns),
-        corners=corners_of(experiment.model.definition, finest, group, grid.dt[0]),
-        missed=missed_pulses(experiment.model.definition, finest, group),
-        growth=_growth(experiment, grid, records, exact),
+        corners=corners_of(model, finest, group, grid.dt[0]),
+        missed=missed_pulses(model, finest, group),
+        growth=_growth(model, rows, grid, exact),
     )
 
 
@@ -244,30 +228,31 @@ def by_level(values: list[Floats]) -> Floats:
     return np.moveaxis(np.stack([np.asarray(row, dtype=np.float64) for row in values]), 0, -1)
 
 
+def stored(record: Record, name: str, shape: tuple[int, ...]) -> Floats:
+    """Return what a level holds, broadcast to a shape; NaN where it does not hold it."""
+    values = np.asarray(record[name], dtype=np.float64) if name in record else np.float64(np.nan)
+    return np.broadcast_to(values, shape)
+
+
 def fastest(record: Record) -> Floats:
     """Return the highest angular frequency of small oscillations times the step."""
     return np.asarray(record[HIGHEST if HIGHEST in record else "omega_dt"], dtype=np.float64)
 
 
-def _fastest(
-    model: Model,
-    records: Mapping[int, Record],
-    grid: Grid,
-    group: Members,
-    exact: Mapping[str, Floats],
-) -> Floats:
-    """Return the angular frequency that a step has to resolve times the step of every level, shape (case, level)."""
-    natural = by_level([fastest(records[level]) for level in grid.levels])
-    finest = records[grid.levels[-1]]
-    w = stiffest(model, grid, finest, group, exact)
-    own = np.asarray(finest["natural_frequency"], dtype=float)
-    steps = np.array(grid.steps, dtype=np.float64)
-    return np.where((w == own)[:, None], natural, (w * group.end)[:, None] / steps)
-
-
 def energy_at_start(record: Record) -> Floats:
     """Return the energy that members of a level start with, shape (scheme, case)."""
     return np.asarray(record["energy_initial"], dtype=np.float64)
+
+
+def _fastest(
+    model: Model, rows: list[Record], grid: Grid, group: Members, exact: Mapping[str, Floats]
+) -> Floats:
+    """Return the angular frequency that a step has to resolve times the step of every level, shape (case, level)."""
+    natural = by_level([fastest(row) for row in rows])
+    w = stiffest(model, grid, rows[-1], group, exact)
+    own = np.asarray(rows[-1]["natural_frequency"], dtype=float)
+    steps = np.array(grid.steps, dtype=np.float64)
+    return np.where((w == own)[:, None], natural, (w * group.end)[:, None] / steps)
 
 
 def _norms(experiment: Experiment) -> tuple[str, ...]:
@@ -282,44 +267,21 @@ def _norms(experiment: Experiment) -> tuple[str, ...]:
     return tuple(norm for norm in NORMS if norm in named)
 
 
-def _stored(experiment: Experiment, grid: Grid, finest: Record) -> dict[str, Floats]:
-    names = (state.name for state in experiment.model.definition.states)
-    return {n: take(grid, finest, f"{n}_exact") for n in names if f"{n}_exact" in finest}
-
-
-def _exact(experiment: Experiment, t: Floats, group: Members) -> dict[str, Floats]:
-    """Work the exact states out at times t, shape (c, t), once for all levels."""
-    model = experiment.model.definition
-    if model.exact is None:
-        return {}
-    initial, parameters = (
-        {name: values[:, None] for name, values in table.items()}
-        for table in (group.initial, group.parameters)
-    )
-    return {n: laid_out(values) for n, values in model.exact(t, initial, parameters).items()}
-
-
-def _growth(
-    experiment: Experiment, grid: Grid, records: Mapping[int, Record], exact: Mapping[str, Floats]
-) -> Floats:
+def _growth(model: Model, rows: list[Record], grid: Grid, exact: Mapping[str, Floats]) -> Floats:
     """Compare the largest position of every level with the largest exact one; NaN without an exact solution.
 
     Levels alone do not tell a growth that is the motion's own, as on the way to an escape. Where times that all levels
     have are few to a period, they may all lie where the exact motion passes through 0: the amplitude that its velocity
     has there counts as well.
     """
-    position = experiment.model.definition.position
-    low, high = (
-        by_level([records[level][f"{position}_{name}"] for level in grid.levels])
-        for name in ("min", "max")
-    )
-    most = np.maximum(np.abs(low), np.abs(high))
+    position = model.position
+    ends = [by_level([row[f"{position}_{end}"] for row in rows]) for end in ("min", "max")]
+    most = np.maximum(*(np.abs(end) for end in ends))
     if position not in exact:
         return np.full(most.shape, np.nan)
-    w = np.asarray(records[grid.levels[-1]]["natural_frequency"], dtype=np.float64)
-    velocity = experiment.model.definition.velocity
+    w = np.asarray(rows[-1]["natural_frequency"], dtype=np.float64)
     with np.errstate(all="ignore"):
-        swung = np.where(w * grid.dt[0] > FEW_RADIANS, largest(exact[velocity]) / w, 0.0)
+        swung = np.where(w * grid.dt[0] > FEW_RADIANS, largest(exact[model.velocity]) / w, 0.0)
     reference = np.fmax(largest(exact[position]), swung)[:, None]
     usable = np.isfinite(most) & (reference > 0)
     return np.where(usable, most, np.nan) / np.where(usable, reference, 1.0)

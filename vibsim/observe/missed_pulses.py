@@ -12,88 +12,64 @@ from vibsim.formula import Pulses
 from vibsim.models import Model
 from vibsim.observe.thresholds import MOST_GAPS
 from vibsim.simulation import Members
-from vibsim.simulation.reference.missed_pulses import pulses_of_force, varies_in_time
+from vibsim.simulation.reference.one_sided_forces import pulses_of_force, varies_in_time
 
-AROUND = np.arange(-2, 4)
-"""Points around a pulse."""
+AROUND = np.arange(-2, 4)  # points around a pulse
 
 
 @dataclass(frozen=True)
 class Missed:
-    """One pulse of every member whose force has any that no level sees, shape (case,)."""
+    """One pulse of every member whose force has any that no level sees, shape (case,); NaN where there is none."""
 
     time: Floats
-    """NaN where there is none, here and below."""
     width: Floats
-    jumps: Flags
-    """Whether the force jumps there, or has corners."""
+    jumps: Flags  # whether the force jumps there, or has corners
 
 
 def missed_pulses(model: Model, finest: Record, group: Members) -> Missed:
-    """Find a pulse of the force between the points of the finest level, whose points hold those of all others.
-
-    Parameters
-    ----------
-    finest
-        Record of the finest level.
-    group
-        Its members.
-    """
+    """Find a pulse of the force between the points of the finest level, whose points hold those of all others."""
     cases = len(group.end)
     if not varies_in_time(model):
         nothing = np.full(cases, np.nan)
         return Missed(nothing, nothing, np.zeros(cases, dtype=bool))
-    steps = int(np.asarray(finest.attrs["steps"]).item())
-    gaps = steps
+    states = np.stack([np.asarray(finest[state.name], dtype=float) for state in model.states])
+    # of the first scheme that is finite throughout
+    scheme = np.argmax(np.isfinite(states).all(axis=(0, -1)), axis=0)
+    samples = states.shape[-1] - 1
+    parameters = {
+        row.name: np.asarray(group.parameters[row.key], dtype=float) for row in model.parameters
+    }
+
+    def pulses(t: Floats, *, smooth: bool) -> Pulses:
+        """Find a pulse of every member between times of shape (case, gap + 1)."""
+        place = (t[:, :-1] / group.end[:, None] * samples).astype(np.int64)
+        at = states[:, scheme[:, None], np.arange(cases)[:, None], np.clip(place, 0, samples)]
+        return pulses_of_force(model, parameters, at, t, smooth=smooth)
+
+    gaps = steps = int(np.asarray(finest.attrs["steps"]).item())
     while cases * gaps > MOST_GAPS and gaps % 2 == 0:
         gaps //= 2
     t = np.arange(gaps + 1) * (group.end / gaps)[:, None]
-    every = _Forces(model, finest, group)
-    found = every.pulses(t, smooth=False)
-    if gaps < steps:
-        found = _confirmed(every, found, group.end / steps)
-    smooth = every.pulses(t, smooth=True) if np.isfinite(found.time).any() else found
-    return Missed(found.time, found.width, np.isfinite(found.time) & np.isnan(smooth.time))
-
-
-@dataclass(frozen=True)
-class _Forces:
-    """The forces on the motions of the finest level."""
-
-    model: Model
-    finest: Record
-    group: Members
-
-    def pulses(self, t: Floats, *, smooth: bool) -> Pulses:
-        """Find a pulse of every member between times of shape (case, gap + 1)."""
-        rows = [np.asarray(self.finest[state.name], dtype=float) for state in self.model.states]
-        states = np.stack(rows)
-        scheme = np.argmax(np.isfinite(states).all(axis=(0, -1)), axis=0)
-        own = np.arange(len(scheme))
-        samples = states.shape[-1] - 1
-        place = (t[:, :-1] / self.group.end[:, None] * samples).astype(np.int64)
-        at = states[:, scheme[:, None], own[:, None], np.clip(place, 0, samples)]
-        parameters = {
-            row.name: np.asarray(self.group.parameters[row.key], dtype=float)
-            for row in self.model.parameters
-        }
-        return pulses_of_force(self.model, parameters, at, t, smooth=smooth)
-
-
-def _confirmed(every: _Forces, found: Pulses, dt: Floats) -> Pulses:
-    """Return pulses that lie between points of the finest level, too."""
-    first = np.maximum(np.floor(np.nan_to_num(found.time) / dt) + AROUND[0], 0.0)
-    number = first[:, None] + (AROUND - AROUND[0])
-    near = every.pulses(number * dt[:, None], smooth=False)
+    found = pulses(t, smooth=False)
     is_there = np.isfinite(found.time)
-    return Pulses(np.where(is_there, near.time, np.nan), np.where(is_there, near.width, np.nan))
+    time, width = found.time, found.width
+    if gaps < steps:
+        # those that lie between points of the finest level, too
+        dt = group.end / steps
+        first = np.maximum(np.floor(np.nan_to_num(time) / dt) + AROUND[0], 0.0)
+        near = pulses((first[:, None] + (AROUND - AROUND[0])) * dt[:, None], smooth=False)
+        time, width = (np.where(is_there, x, np.nan) for x in (near.time, near.width))
+    is_there = np.isfinite(time)
+    is_smooth = np.isfinite(pulses(t, smooth=True).time) if is_there.any() else is_there
+    return Missed(time, width, is_there & ~is_smooth)
 
 
 def missed_variables(missed: Missed) -> dict[str, Variable]:
     """Return the pulses as variables of the convergence Record."""
-    dims = ("case",)
     words = "time of a pulse of the force between the points of every level"
     return {
-        "pulse_time": Variable(dims, missed.time, attributes(words, "s")),
-        "pulse_width": Variable(dims, missed.width, attributes("how long that pulse lasts", "s")),
+        "pulse_time": Variable(("case",), missed.time, attributes(words, "s")),
+        "pulse_width": Variable(
+            ("case",), missed.width, attributes("how long that pulse lasts", "s")
+        ),
     }

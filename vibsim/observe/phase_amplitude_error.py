@@ -29,18 +29,17 @@ from vibsim.models.shared.phase_amplitude_names import (
 )
 from vibsim.observe.member_block import MemberBlock
 from vibsim.observe.oscillation import period_scale
-from vibsim.observe.quintic_interpolant import template
-from vibsim.observe.thresholds import MOST_UNASKED
-from vibsim.observe.waveform_fit import shift, strides
+from vibsim.observe.thresholds import MOST_UNASKED, WINDOW_POINTS
+from vibsim.observe.waveform_fit import shift, strides, template
 
 if TYPE_CHECKING:
     from vibsim.comparison.quantity_comparison import Comparison
 
 
-LONG_NAMES = {
-    PHASE: "time by which {} is early",
-    AMPLITUDE: "part by which the amplitude of {} is too large",
-}
+PARTS = (
+    (PHASE, "time by which {} is early", "s"),
+    (AMPLITUDE, "part by which the amplitude of {} is too large", "1"),
+)
 
 Make = Callable[..., "Comparison"]
 
@@ -77,25 +76,26 @@ def parts_of_errors(
     """
     parts: dict[str, Comparison] = {}
     for position in dict.fromkeys(map(whole_of, names)):
-        told, floors, known = _told(block, found, position)
-        between = _blur(block, told)
-        for k, end in enumerate((PHASE, AMPLITUDE)):
+        told, scales, known = _told(block, found, position)
+        blurs = _blur(block, [time for time, _ in told])
+        # the true value of a part, where that of the motion is known
+        exact = np.where(known, 0.0, np.nan)[None, :, None] if known.any() else None
+        for k, (end, words, units) in enumerate(PARTS):
             name = position + end
             if name not in names:
                 continue
-            scale = floors[k]
+            noise = MEASUREMENT_FACTOR / ABOVE_ROUND_OFF * blurs[k]
             parts[name] = make(
                 block=block,
                 name=name,
-                long_name=LONG_NAMES[end].format(found[position].long_name),
-                units="s" if end == PHASE else "1",
-                values=[row[k] for row in told],
-                exact=_nothing(known, told[0][k].shape) if known.any() else None,
+                long_name=words.format(found[position].long_name),
+                units=units,
+                values=[level[k] for level in told],
+                exact=None if exact is None else np.broadcast_to(exact, (1, *told[0][k].shape[1:])),
                 order=_order(block, name),
-                floor=block.floor_of(name, scale)
-                + MEASUREMENT_FACTOR / ABOVE_ROUND_OFF * between[k],
-                scale=scale,
-                blur=between[k],
+                floor=block.floor_of(name, scales[k]) + noise,
+                scale=scales[k],
+                blur=blurs[k],
             )
     return parts
 
@@ -124,55 +124,38 @@ def _order(block: MemberBlock, name: str) -> Floats:
 
 def _told(
     block: MemberBlock, found: Mapping[str, Comparison], position: str
-) -> tuple[list[tuple[Floats, Floats]], tuple[Floats, Floats], Flags]:
+) -> tuple[list[Floats], tuple[Floats, Floats], Flags]:
     """Return phase and amplitude at every level, the sizes their round-off is relative to, and if the truth is known.
 
-    Shapes (scheme, case, t), (scheme, case) and (case,).
+    Shapes (2, scheme, case, t), (scheme, case) and (case,).
     """
-    place = block.model.positions.index(position)
-    states = [*block.model.positions, *block.model.velocities]
-    shape = (*block.shape, len(block.grid.t))
-    known = np.all([_is_known(found[name], shape) for name in states], axis=0)
-    truth = {name: _truth(found[name], known, shape) for name in states}
-    speed = block.model.velocities[place]
-    push = _push(block, place, truth)
-    period = np.broadcast_to(period_scale(block), block.shape)
-    spacing = np.broadcast_to(block.grid.spacing, block.shape)
-    u, v, a = (_rows(x) for x in (truth[position], truth[speed], push))
-    of = template(u, v, a, spacing.ravel())
-    stride = strides(period.ravel(), spacing.ravel(), shape[-1])
+    model, grid = block.model, block.grid
+    place = model.positions.index(position)
+    speed = model.velocities[place]
+    shape = (*block.shape, len(grid.t))
+    states = [found[name] for name in (*model.positions, *model.velocities)]
+    known = np.ones(shape[1], dtype=bool)
+    for q in states:
+        known &= q.exact is not None and np.isfinite(np.broadcast_to(q.exact, shape)).all((0, 2))
+    truth = {q.name: _truth(q, known, shape) for q in states}
+    numbers = {row.name: block.group.parameters[row.key][:, None] for row in model.parameters}
+    times = grid.times(block.group.end)
+    push = values(tree(model, model.accelerations[place]), {**numbers, **truth, "t": times})
+    u, v, a = (_rows(x) for x in (truth[position], truth[speed], np.broadcast_to(push, shape)))
+    period = np.broadcast_to(period_scale(block), block.shape).ravel()
+    spacing = np.broadcast_to(grid.spacing, block.shape).ravel()
+    of, stride = template(u, v, a, spacing), strides(period, spacing, shape[-1])
     told = []
-    for level in range(len(block.grid.levels)):
+    for level in range(len(grid.levels)):
         moved, moving = (_rows(found[name].values[level]) for name in (position, speed))
-        one = shift(moved, moving, of, period.ravel(), stride)
-        told.append((one.time.reshape(shape), one.factor.reshape(shape)))
-    _all_or_none(told)
+        told.append(shift(moved, moving, of, period, stride).reshape(2, *shape))
+    # what is missing at one level is taken out of all
+    every = np.all([np.isfinite(time).all(axis=-1) for time, _ in told], axis=0)
+    for parts in told:
+        parts[:, ~every] = np.nan
     rest, fastest = (_least(x, stride).reshape(block.shape) for x in (u, v))
     scale = found[position].scale
     return told, (scale / fastest, scale / rest), known
-
-
-def _blur(block: MemberBlock, told: list[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
-    """Return what phase and amplitude are off by between samples of the true motion, shape (scheme, case, level).
-
-    The quintic between two samples is off by ``(s (h - s))^3/720`` times the sixth derivative, s behind the one of them
-    (`vibsim.observe.quintic_interpolant`). That is known, and no order of magnitude as round-off is.
-    """
-    w = (2.0 * np.pi / np.broadcast_to(period_scale(block), block.shape))[..., None]
-    h = np.broadcast_to(block.grid.spacing, block.shape)[..., None]
-    off = []
-    for time, _ in told:
-        behind = np.mod(np.where(np.isfinite(time), time, 0.0), h)
-        off.append(np.max((w * behind) * (w * (h - behind)), axis=-1))
-    amplitude = np.stack(off, axis=-1) ** 3 / 720.0
-    return amplitude / w, amplitude
-
-
-def _is_known(q: Comparison, shape: tuple[int, ...]) -> Flags:
-    """Tell of which members the true values of a state are known, shape (case,)."""
-    if q.exact is None:
-        return np.zeros(shape[1], dtype=bool)
-    return np.asarray(np.isfinite(np.broadcast_to(q.exact, shape)).all(axis=(0, 2)))
 
 
 def _truth(q: Comparison, known: Flags, shape: tuple[int, ...]) -> Floats:
@@ -183,39 +166,33 @@ def _truth(q: Comparison, known: Flags, shape: tuple[int, ...]) -> Floats:
     return best if q.exact is None else np.where(known[:, None], q.exact, best)
 
 
-def _nothing(known: Flags, shape: tuple[int, ...]) -> Floats:
-    """Return 0, the true value of a part, of members whose truth is known, and NaN of others; shape (1, case, t)."""
-    return np.broadcast_to(np.where(known, 0.0, np.nan)[None, :, None], (1, *shape[1:]))
+def _blur(block: MemberBlock, times: list[Floats]) -> tuple[Floats, Floats]:
+    """Return what phase and amplitude are off by between samples of the true motion, shape (scheme, case, level).
+
+    The quintic between two samples is off by ``(s (h - s))^3/720`` times the sixth derivative, s behind the one of them
+    (`vibsim.observe.waveform_fit`). That is known, and no order of magnitude as round-off is.
+    """
+    w = (2.0 * np.pi / np.broadcast_to(period_scale(block), block.shape))[..., None]
+    h = np.broadcast_to(block.grid.spacing, block.shape)[..., None]
+    off = []
+    for time in times:
+        behind = np.mod(np.where(np.isfinite(time), time, 0.0), h)
+        off.append(np.max((w * behind) * (w * (h - behind)), axis=-1))
+    amplitude = np.stack(off, axis=-1) ** 3 / 720.0
+    return amplitude / w, amplitude
 
 
-def _rows(values: Floats) -> Floats:
-    return np.ascontiguousarray(values.reshape(-1, values.shape[-1]))
+def _rows(series: Floats) -> Floats:
+    return np.ascontiguousarray(series.reshape(-1, series.shape[-1]))
 
 
-def _push(block: MemberBlock, place: int, truth: Mapping[str, Floats]) -> Floats:
-    """Return the acceleration of a coordinate along a motion, shape (scheme, case, t)."""
-    model = block.model
-    parameters = {row.name: block.group.parameters[row.key][:, None] for row in model.parameters}
-    numbers = {**parameters, **truth, "t": block.grid.times(block.group.end)}
-    shape = next(iter(truth.values())).shape
-    return np.broadcast_to(values(tree(model, model.accelerations[place]), numbers), shape)
-
-
-def _all_or_none(told: list[tuple[Floats, Floats]]) -> None:
-    """Take a scheme and member out of all levels where a part of it is missing at one."""
-    every = np.all([np.isfinite(time).all(axis=-1) for time, _ in told], axis=0)
-    for pair in told:
-        for values_ in pair:
-            values_[~every] = np.nan
-
-
-def _least(values: Floats, stride: Integers) -> Floats:
+def _least(series: Floats, stride: Integers) -> Floats:
     """Return the smallest of the largest values within pieces as long as a window, shape (r,)."""
-    found = np.full(len(values), np.nan)
-    points = values.shape[-1]
+    found = np.full(len(series), np.nan)
+    points = series.shape[-1]
     for row in np.flatnonzero(stride > 0).tolist():
-        length = min(int(stride[row]) * 16, points)
+        length = min(int(stride[row]) * (WINDOW_POINTS - 1), points)
         pieces = points // length
-        size = np.abs(values[row, : pieces * length]).reshape(pieces, length)
+        size = np.abs(series[row, : pieces * length]).reshape(pieces, length)
         found[row] = np.min(np.max(size, axis=-1))
     return np.where(found > 0, found, np.nan)

@@ -19,30 +19,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from vibsim.core.array_types import Flags, Floats
-from vibsim.observe.thresholds import (
-    FADES,
-    LEAST_LEFT,
-    LEAST_STEPS,
-    RECURRENCE_ROUNDING,
-    RESIDUAL,
-    SINGULAR,
-)
+from vibsim.observe import thresholds as th
 
 
 @dataclass(frozen=True)
 class Motion:
     """What was found; arrays of shape (...), NaN where a run is no such recurrence."""
 
-    log_growth: Floats
-    """Logarithm of the growth factor of the amplitude per step."""
-    angle: Floats
-    """Numerical frequency times dt, from 0 to pi."""
+    log_growth: Floats  # logarithm of the growth factor of the amplitude per step
+    angle: Floats  # numerical frequency times dt, from 0 to pi
 
 
 def fitted(position: Floats) -> Motion:
     """Fit the recurrence to positions at every step, shape (..., N+1)."""
     steps = position.shape[-1] - 1
-    if steps < LEAST_STEPS:
+    if steps < th.LEAST_STEPS:
         missing = np.full(position.shape[:-1], np.nan)
         return Motion(missing, missing)
     half = position[..., steps // 2 :]
@@ -61,7 +52,7 @@ def fitted(position: Floats) -> Motion:
         square = np.sum(apart * apart, axis=-1)
         by_slope = np.sum(apart * rest, axis=-1) / square
         by_level = by_level - by_slope * share
-        is_plane = square > SINGULAR * np.sum(slope * slope, axis=-1)
+        is_plane = square > th.SINGULAR * np.sum(slope * slope, axis=-1)
         both = is_plane & _is_small(rest - by_slope[..., None] * apart)
         # x - 1 = z solves z^2 - (by_slope + by_level) z - by_level = 0
         log_growth, angle = _roots(by_slope + by_level, by_level)
@@ -77,11 +68,11 @@ def fitted(position: Floats) -> Motion:
 def _is_small(left: Floats) -> Flags:
     """Say where what is left is rounding, and no parasitic root that is on its way out."""
     whole = _mean_square(left)
-    found = whole < RECURRENCE_ROUNDING**2
+    found = whole < th.RECURRENCE_ROUNDING**2
     middle = left.shape[-1] // 2
-    if middle >= LEAST_LEFT:
-        stays = _mean_square(left[..., :middle]) < FADES**2 * _mean_square(left[..., middle:])
-        found |= stays & (whole < RESIDUAL**2)
+    if middle >= th.LEAST_LEFT:
+        stays = _mean_square(left[..., :middle]) < th.FADES**2 * _mean_square(left[..., middle:])
+        found |= stays & (whole < th.RESIDUAL**2)
     return found
 
 

@@ -16,6 +16,7 @@ tells, gives the response at every time to every disturbance at every other:
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -45,16 +46,13 @@ def sensitivity(
     ----------
     t
         Times, shape (case, t).
-    group
-        The members.
     known
         The exact solution at these times, where it has been worked out.
     """
     model = experiment.model.definition
     if model.exact is None:
         return np.ones(len(t))
-    parameters = {name: values[:, None] for name, values in group.parameters.items()}
-    initial = {name: values[:, None] for name, values in group.initial.items()}
+    parameters, initial = in_columns(group.parameters), in_columns(group.initial)
     if not model.conservative or model.coordinates > 1:
         return _tried(model, t, initial, parameters)
     found, doubtful = _linear(model, t, initial, parameters, known)
@@ -62,6 +60,11 @@ def sensitivity(
         rows = ({k: v[doubtful] for k, v in table.items()} for table in (initial, parameters))
         found[doubtful] = _tried(model, t[doubtful], *rows)
     return found
+
+
+def in_columns(table: Mapping[str, Floats]) -> States:
+    """Return numbers of members in the shape (case, 1), beside which times stand."""
+    return {name: values[:, None] for name, values in table.items()}
 
 
 def _solve(model: Model, t: Floats, initial: States, parameters: States) -> list[Floats]:
@@ -72,19 +75,12 @@ def _solve(model: Model, t: Floats, initial: States, parameters: States) -> list
 
 
 def _linear(
-    model: Model,
-    t: Floats,
-    initial: States,
-    parameters: States,
-    known: States | None,
+    model: Model, t: Floats, initial: States, parameters: States, known: States | None
 ) -> tuple[Floats, Flags]:
     """Return the factor by the formulas at the head, and where a start is next to an equilibrium."""
     w = np.asarray(model.natural_frequency(parameters), dtype=np.float64)
-    u, v = (
-        [known[state.name] for state in model.states]
-        if known
-        else _solve(model, t, initial, parameters)
-    )
+    names = [state.name for state in model.states]
+    u, v = [known[n] for n in names] if known else _solve(model, t, initial, parameters)
     instant = INSTANT / w
     ahead = _solve(model, t + instant, initial, parameters)[1]
     f = [w * v, (ahead - v) / instant]
@@ -98,10 +94,7 @@ def _linear(
     doubtful = ~(slope > NEAR_REST * size)
     push = DISTURBANCE * size / np.where(doubtful, 1.0, slope)
     pushes = [(push * part[:, 0])[:, None] for part in (across[0] / w, across[1])]
-    moved = {
-        state.name: initial[state.name] + part
-        for state, part in zip(model.states, pushes, strict=True)
-    }
+    moved = {n: initial[n] + part for n, part in zip(names, pushes, strict=True)}
     change = [x - y for x, y in zip(_solve(model, t, moved, parameters), (u, v), strict=True)]
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         along = (f[0] * (w * change[0]) + f[1] * change[1]) / square
@@ -111,24 +104,23 @@ def _linear(
     return np.clip(found, 1.0, 2.0 / DISTURBANCE), doubtful
 
 
+def _places(t: Floats) -> range:
+    """Return the places in time at which a disturbance is tried."""
+    last = t.shape[-1] - 1
+    return range(0, last, max(last // PLACES, 1))
+
+
 def _largest_response(
     f: list[Floats], ahead: list[Floats], across: list[Floats], late: Floats, sizes: list[Floats]
 ) -> Floats:
     """Return the largest later response to a disturbance of one state on the way, shape (case,).
 
-    Parameters
-    ----------
-    f, across, late
-        The motion f, the gradient n of the energy, and C, shape (case, t).
-    ahead
-        ``n/|n|^2``.
-    sizes
-        Size of every state, shape (case,).
+    f, the gradient n of the energy (`across`), ``n/|n|^2`` (`ahead`) and C (`late`) have the shape (case, t), the sizes
+    of the states the shape (case,).
     """
-    last = late.shape[-1] - 1
     found = np.ones(len(late))
     scaled = [(x / s[:, None], y / s[:, None]) for x, y, s in zip(f, ahead, sizes, strict=True)]
-    for place in range(0, last, max(last // PLACES, 1)):
+    for place in _places(late):
         delay = late[:, place:] - late[:, place, None]
         square = f[0][:, place] ** 2 + f[1][:, place] ** 2
         for i, size in enumerate(sizes):
@@ -146,27 +138,18 @@ def _tried(model: Model, t: Floats, initial: States, parameters: States) -> Floa
     assert model.exact is not None
     exact = model.exact(t, initial, parameters)
     size = {name: np.max(np.abs(values), axis=-1, keepdims=True) for name, values in exact.items()}
-    last = t.shape[-1] - 1
-    places = range(0, last, max(last // PLACES, 1)) if model.conservative else [0]
     found = np.ones(len(t))
-    for place in places:
+    for place in _places(t) if model.conservative else [0]:
         rest = t[:, place:] - t[:, place : place + 1]
         state = {name: values[:, place : place + 1] for name, values in exact.items()}
-        found = np.maximum(found, _response(model, rest, state, parameters, size))
-    return found
-
-
-def _response(model: Model, t: Floats, state: States, parameters: States, size: States) -> Floats:
-    """Return the largest response to a disturbance of `state`, shape (case,)."""
-    assert model.exact is not None
-    undisturbed = model.exact(t, state, parameters)
-    found = np.ones(len(t))
-    for name, value in state.items():
-        moved = model.exact(t, {**state, name: value + DISTURBANCE * size[name]}, parameters)
-        for other, whole in size.items():
-            change = np.max(np.abs(moved[other] - undisturbed[other]), axis=-1)
-            unit = DISTURBANCE * whole[:, 0]
-            response = np.divide(change, unit, out=np.ones_like(change), where=unit > 0)
-            # where the exact solution is not known, nothing is told
-            found = np.fmax(found, response)
+        undisturbed = model.exact(rest, state, parameters)
+        for name, value in state.items():
+            pushed = {**state, name: value + DISTURBANCE * size[name]}
+            moved = model.exact(rest, pushed, parameters)
+            for other, whole in size.items():
+                change = np.max(np.abs(moved[other] - undisturbed[other]), axis=-1)
+                unit = DISTURBANCE * whole[:, 0]
+                response = np.divide(change, unit, out=np.ones_like(change), where=unit > 0)
+                # where the exact solution is not known, nothing is told
+                found = np.fmax(found, response)
     return found

@@ -6,6 +6,8 @@ takes its place: ``w^2 = mean of -da/du``, NaN where it does not pull back in th
 
 Damping takes velocities away at the rate ``-da/dv``. Where that is large for a moment only, an implicit scheme with
 long steps keeps what should have gone within it: the largest rate along the motion counts.
+
+The motion is that of the finest level at the common times; exact states, of shape (case, t), take its place.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ import numpy as np
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.formula import derivative, names_in, values
-from vibsim.models.base import Model, tree
+from vibsim.models.base import Formula, Model, tree
 from vibsim.observe.common_grid import Grid, take
 from vibsim.observe.thresholds import A_WHILE
 from vibsim.simulation import Members
@@ -31,19 +33,17 @@ def applies(model: Model) -> bool:
 def stiffest(
     model: Model, grid: Grid, finest: Record, group: Members, exact: Mapping[str, Floats]
 ) -> Floats:
-    """Return the angular frequency that a step has to resolve, shape (case,).
-
-    Parameters
-    ----------
-    finest
-        Record of the finest level: the motion of the first scheme which did not break down, at the common times.
-    exact
-        The exact states at these times, shape (case, t); they take its place where they are known.
-    """
+    """Return the angular frequency that a step has to resolve, shape (case,); by the first scheme that is sound."""
     natural = np.asarray(finest["natural_frequency"], dtype=np.float64)
     if not applies(model):
         return natural
-    stiffness = _along(model, grid, finest, group, exact)
+    sound = np.argmin(np.asarray(finest["status"]) != 0, axis=0)
+    states = {}
+    for state in model.states:
+        own = take(grid, finest, state.name)[sound, np.arange(len(sound))]
+        known = np.asarray(exact.get(state.name, own))
+        states[state.name] = np.where(np.isfinite(known).all(axis=-1, keepdims=True), known, own)
+    stiffness = _fall(model, model.acceleration, model.position, states, grid, group)
     known = np.isfinite(stiffness)
     count = np.maximum(np.count_nonzero(known, axis=-1), 1)
     with np.errstate(all="ignore"):
@@ -51,22 +51,6 @@ def stiffest(
         mean = np.sum(np.where(known, stiffness, 0.0), axis=-1) / count
         of_motion = np.sqrt(np.where(mean > 0.0, mean, np.nan))
     return np.where((natural > 0.0) & (usual >= A_WHILE * count), natural, of_motion)
-
-
-def _along(
-    model: Model, grid: Grid, finest: Record, group: Members, exact: Mapping[str, Floats]
-) -> Floats:
-    """Return ``-da/du`` along the motion, shape (case, t)."""
-    sound = np.argmin(np.asarray(finest["status"]) != 0, axis=0)
-    states = {}
-    for state in model.states:
-        own = take(grid, finest, state.name)[sound, np.arange(len(sound))]
-        known = np.asarray(exact.get(state.name, own))
-        states[state.name] = np.where(np.isfinite(known).all(axis=-1, keepdims=True), known, own)
-    t = grid.times(group.end)
-    numbers = {row.name: group.parameters[row.key][:, None] for row in model.parameters}
-    pull = derivative(tree(model, model.acceleration), model.position)
-    return np.broadcast_to(-values(pull, {**numbers, **states, "t": t}), t.shape)
 
 
 def is_damped(model: Model) -> bool:
@@ -78,30 +62,33 @@ def is_damped(model: Model) -> bool:
 def decay_rate(
     model: Model, grid: Grid, finest: Record, group: Members, exact: Mapping[str, Floats]
 ) -> Floats:
-    """Return the largest rate at which the force takes a velocity away, 0 for none, shape (scheme, case).
-
-    Parameters
-    ----------
-    finest
-        Record of the finest level: the motion, at the common times.
-    exact
-        The exact states at these times, shape (case, t); they take its place where they are known.
-    """
+    """Return the largest rate at which the force takes a velocity away, 0 for none, shape (scheme, case)."""
+    fastest = np.zeros(np.shape(finest["status"]))
     if not is_damped(model):
-        return np.zeros(np.shape(finest["status"]))
+        return fastest
     states = {}
     for state in model.states:
         own = take(grid, finest, state.name)
         known = np.asarray(exact.get(state.name, own))
         states[state.name] = np.where(np.isfinite(known), known, own)
-    numbers = {row.name: group.parameters[row.key][:, None] for row in model.parameters}
-    shape = np.shape(next(iter(states.values())))
-    fastest = np.zeros(shape[:-1])
     with np.errstate(all="ignore"):
         for row, velocity in zip(model.accelerations, model.velocities, strict=True):
-            rate = derivative(tree(model, row), velocity)
-            found = -values(rate, {**numbers, **states, "t": grid.times(group.end)})
-            found = np.broadcast_to(found, shape)
-            largest = np.max(np.where(np.isfinite(found), found, 0.0), axis=-1)
+            rate = _fall(model, row, velocity, states, grid, group)
+            largest = np.max(np.where(np.isfinite(rate), rate, 0.0), axis=-1)
             fastest = np.maximum(fastest, largest)
     return fastest
+
+
+def _fall(
+    model: Model,
+    acceleration: Formula,
+    state: str,
+    states: Mapping[str, Floats],
+    grid: Grid,
+    group: Members,
+) -> Floats:
+    """Return minus the derivative of an acceleration by a state along a motion, of the shape of its states."""
+    numbers = {row.name: group.parameters[row.key][:, None] for row in model.parameters}
+    slope = derivative(tree(model, acceleration), state)
+    found = -values(slope, {**numbers, **states, "t": grid.times(group.end)})
+    return np.broadcast_to(found, np.shape(states[state]))

@@ -11,107 +11,80 @@ import math
 
 import numpy as np
 
-# Levels that belong together
+# ---- Levels that belong together
 
+# Levels start from the same values, to this part of the state's size: above the rounding of an exact solution.
+# [convention]
 SAME_START = 1e-9
-"""Levels start from the same values, to this part of the state's size: far above the rounding of an exact solution.
-[convention]"""
 
-# The size of a motion
+# ---- The size of a motion
 
+# Common times further apart, in units of 1/w, may miss the turns of a motion: the largest by an eighth. [derived]
 FEW_RADIANS = 0.5
-"""Common times further apart, in units of 1/w, may miss the turns of a motion: the largest by more than an eighth.
-[derived]"""
-PIECES_OF_TIME = 8
-"""A motion without a period is looked at in so many parts of its whole time. [convention]"""
+PIECES_OF_TIME = 8  # a motion without a period is looked at in so many parts [convention]
+# Part of the time for which the motion is at least a quarter as stiff as at 0, half the frequency, where 0 counts.
+# [convention]
 A_WHILE = 0.1
-"""Part of the time for which the motion is at least a quarter as stiff as at 0, half the frequency, where 0 counts.
-[convention]"""
 
-# Disturbances
+# ---- Disturbances
 
+# Relative disturbance of a state: above the rounding of an exact solution, below what bends most responses. [derived]
 DISTURBANCE = 1e-12
-"""Relative disturbance of a state: above the rounding of an exact solution, below what bends most responses.
-[derived]"""
-PLACES = 8
-"""At so many times along the run a disturbance is tried. [convention]"""
-INSTANT = 1e-6
-"""A time in units of 1/w over which the motion is straight. [convention]"""
+PLACES = 8  # at so many times along the run a disturbance is tried [convention]
+INSTANT = 1e-6  # a time in units of 1/w over which the motion is straight [convention]
+# A start whose motion is so much slower than w times its size is next to an equilibrium: there C is so large that what
+# is left of a difference between two of its values is the rounding of the disturbed solution. [convention]
 NEAR_REST = 1e-3
-"""A start whose motion is so much slower than w times its size is next to an equilibrium: there C is so large that what
-is left of a difference between two of its values is the rounding of the disturbed solution. [convention]"""
 
-# Pulses
+# ---- Pulses
 
+# Gaps between points that are looked at; of larger runs wider ones, and then those around a pulse. [convention]
 MOST_GAPS = 2**21
-"""Gaps between points that are looked at; of longer and larger runs wider ones, and then those around a pulse.
-[convention]"""
 
-# Energy drift
+# ---- Energy drift
 
-LEAST_PERIODS = 4.0
-"""The energy error of a vibration repeats every half period, which T/8 is then. [derived]"""
-LEAST_SAMPLES = 32
-"""Samples on [0, T], four of them on the shortest window. [derived]"""
+LEAST_PERIODS = 4.0  # T/8 is then half a period, by which the energy error repeats [derived]
+LEAST_SAMPLES = 32  # samples on [0, T], four of them on the shortest window [derived]
+# Samples in a period that see its extrema to 2 %: the range of fewer says nothing. [derived]
 LEAST_PER_PERIOD = 16.0
-"""Samples in a period that see its extrema to 2 %: the range of fewer says nothing. [derived]"""
-STILL = 0.01
-"""Rise of M from one window to the next, as a part of itself, that is none. [checked]"""
-STILL_CREEPS = 0.2
-"""Largest rise of a maximum that is found more exactly with time only. [checked]"""
-CREEP = -0.5
-"""Largest k of such a rise. [checked]"""
-NEAR_POWER = 0.25
-"""How far k may be from 1 or 2: a quarter of what separates them. [derived]"""
+STILL = 0.01  # rise of M from one window to the next, as a part of itself, that is none [checked]
+STILL_CREEPS = 0.2  # largest rise of a maximum that is found more exactly with time only [checked]
+CREEP = -0.5  # largest k of such a rise [checked]
+NEAR_POWER = 0.25  # distance of k from 1 or 2: a quarter of what separates them [derived]
+# ln(E/E(0)) beyond which exponential and linear growth differ in k by more than rounding: by about 0.1 at 0.2.
+# [derived]
 LARGE_CHANGE = 0.2
-"""ln(E/E(0)) beyond which exponential and linear growth differ in k by more than rounding: by about 0.1 at 0.2.
-[derived]"""
-SMALLEST_NORMAL = float(np.finfo(np.float64).tiny)
-"""The smallest normal number: what is below has lost digits. [derived]"""
+SMALLEST_NORMAL = float(np.finfo(np.float64).tiny)  # what is below has lost digits [derived]
+# How often ``N p + N^(1/2) p^2`` round-offs may be in the energy of a scheme that keeps it: 1.02 was seen. [checked]
 STEPPED = 4.0
-"""How often ``N p + N^(1/2) p^2`` round-offs may be in the energy of a scheme that keeps it: 1.02 at most was seen.
-[checked]"""
+# Part of the energy above which a deviation is never called rounding, however large the step. [convention]
 MOST_ROUNDED = 1e-3
-"""Part of the energy above which a deviation is never called rounding, however large the step. [convention]"""
 
-# The recurrence of a linear oscillation
+# ---- The recurrence of a linear oscillation
 
-LEAST_STEPS = 8
-"""Fewer steps leave too little behind the start. [convention]"""
+LEAST_STEPS = 8  # fewer steps leave too little behind the start [convention]
+# Of the part of the differences that is no multiple of the positions, squared: below, there is one root. [derived]
 SINGULAR = 1e-24
-"""Of the part of the differences that is no multiple of the positions, squared: below, only one root is in the run.
-[derived]"""
+# Root mean square of what is left of the weighted steps when only rounding is: at most 2^-45 up to w dt = 30. [checked]
 RECURRENCE_ROUNDING = 2.0**-44
-"""Root mean square of what is left of the weighted steps when only rounding is: at most 2^-45 up to w dt = 30.
-[checked]"""
+# The same for larger steps, whose rounding errors are some w^2 dt^2 large: above, there is no recurrence. [checked]
 RESIDUAL = 1e-11
-"""The same for larger steps, whose rounding errors are some w^2 dt^2 large: above, the run is no such recurrence.
-[checked]"""
+# What is left of a parasitic root is so many times larger early in the window than late; rounding is not. [checked]
 FADES = 4.0
-"""What is left of a parasitic root is so many times larger early in the window than late; rounding is the same.
-[checked]"""
-LEAST_LEFT = 16
-"""Steps in each half of the window of which that can be told. [convention]"""
+LEAST_LEFT = 16  # steps in each half of the window of which that can be told [convention]
 
-# Phase and amplitude
+# ---- Phase and amplitude
 
+# Samples of all schemes, members and levels up to which the parts are looked at without being asked for. [convention]
 MOST_UNASKED = 2**14
-"""Samples of all schemes, members and levels up to which the parts are looked at without being asked for.
-[convention]"""
-HALF_WINDOW = 8
-"""Points of a window on each side of its centre. [convention]"""
+HALF_WINDOW = 8  # points of a window on each side of its centre [convention]
 WINDOW_POINTS = 2 * HALF_WINDOW + 1
-"""Points of a window. [convention]"""
-LEAST_PER_SHIFT = 6
-"""Points in a period, at least, for a shift to be seen. [checked]"""
-SHORTEST_RUN = 0.6
-"""Part of a period that a run must last. [checked]"""
+LEAST_PER_SHIFT = 6  # points in a period, at least, for a shift to be seen [checked]
+SHORTEST_RUN = 0.6  # part of a period that a run must last [checked]
+# Rounds of Newton's method by the largest shift that is met, in radians: each doubles the right digits. [checked]
 ROUNDS = ((0.02, 4), (0.5, 6), (math.inf, 10))
-"""Rounds of Newton's method by the largest shift that is met, in radians: each doubles the number of right digits.
-[checked]"""
+# Part of a radian, and of the amplitude, by which the last round may still have moved anything. [checked]
 LAST_ROUND_MOVES = 1e-6
-"""Part of a radian, and of the amplitude, by which the last round may still have moved anything. [checked]"""
-LARGE_SHIFT = ROUNDS[1][0]
-"""Shifts beyond this part of a radian are read from the phase plane first. [checked]"""
+LARGE_SHIFT = ROUNDS[1][0]  # shifts beyond it, in radians, are read from the phase plane [checked]
+# Part of a cell by which a shifted point may lie beyond the ends of the template. [convention]
 BEYOND_THE_ENDS = 0.5
-"""Part of a cell by which a shifted point may lie beyond the ends of the template. [convention]"""

@@ -14,6 +14,12 @@ wrong of the place around which it swings.
 
 A shift that is not small is first read from the phase plane: the time at which U has the angle ``atan2(-v, w u)`` that
 the computed motion has now.
+
+Between its samples U is a quintic, ``c0 + c1 y + ... + c5 y^5`` with y from 0 to 1, which has the position, the
+velocity and the acceleration of both points (Hermite interpolation). Near a point its error is ``|y|^3 h^6/720`` of the
+sixth derivative: it vanishes with the distance from the point, so that a small shift in time costs no accuracy.
+
+Each row r has its own scheme and member.
 """
 
 from __future__ import annotations
@@ -25,60 +31,67 @@ from dataclasses import dataclass
 import numpy as np
 
 from vibsim.convergence.differences import total
-from vibsim.core.array_types import Flags, Floats, Integers
-from vibsim.observe.quintic_interpolant import Template
-from vibsim.observe.thresholds import (
-    BEYOND_THE_ENDS,
-    HALF_WINDOW,
-    LARGE_SHIFT,
-    LAST_ROUND_MOVES,
-    LEAST_PER_SHIFT,
-    ROUNDS,
-    SHORTEST_RUN,
-    WINDOW_POINTS,
-)
+from vibsim.core.array_types import Floats, Integers
+from vibsim.observe import thresholds as th
 
-PIECE = 2**18
-"""Numbers of one kind that are worked on at a time."""
+PIECE = 2**18  # numbers of one kind that are worked on at a time
 
 
 @dataclass(frozen=True)
-class Shift:
-    """Shape (r, t); a row is NaN throughout where it could not be found at some time."""
+class Template:
+    """Motions that others are compared with."""
 
-    time: Floats
-    """By which the computed motion is early."""
-    factor: Floats
-    """Of the amplitude, less one."""
+    position: Floats  # shape (r, t)
+    velocity: Floats  # shape (r, t)
+    spacing: Floats  # distance between points, shape (r,)
+    coefficients: Floats  # of the cell behind each point but the last, shape (6, r, t-1)
+
+    def at(self, place: Floats) -> tuple[Floats, Floats]:
+        """Return position and velocity at places in units of the spacing, shape (..., r, n), also beyond the ends."""
+        cells = self.coefficients.shape[-1]
+        cell = np.clip(np.floor(np.nan_to_num(place)), 0, cells - 1)
+        y = place - cell
+        flat = cell.astype(np.int64) + cells * np.arange(len(self.spacing))[:, None]
+        c = [row.ravel().take(flat) for row in self.coefficients]
+        position = c[0] + y * (c[1] + y * (c[2] + y * (c[3] + y * (c[4] + y * c[5]))))
+        slope = c[1] + y * (2 * c[2] + y * (3 * c[3] + y * (4 * c[4] + y * (5 * c[5]))))
+        return position, slope / self.spacing[:, None]
+
+
+def template(position: Floats, velocity: Floats, acceleration: Floats, spacing: Floats) -> Template:
+    """Return the motion with these samples, shape (r, t), at a distance of shape (r,)."""
+    h = spacing[:, None]
+    v, a = h * velocity, h * h * acceleration
+    u0, u1 = position[:, :-1], position[:, 1:]
+    v0, v1, a0, a1 = v[:, :-1], v[:, 1:], a[:, :-1], a[:, 1:]
+    rise = u1 - u0
+    coefficients = [
+        u0,
+        v0,
+        0.5 * a0,
+        10 * rise - 6 * v0 - 4 * v1 - 1.5 * a0 + 0.5 * a1,
+        -15 * rise + 8 * v0 + 7 * v1 + 1.5 * a0 - a1,
+        6 * rise - 3 * v0 - 3 * v1 - 0.5 * a0 + 0.5 * a1,
+    ]
+    return Template(position, velocity, spacing, np.stack(coefficients))
 
 
 def strides(period: Floats, spacing: Floats, points: int) -> Integers:
     """Return the distance between the points of a window, shape (r,); 0 where the run or the samples are too few.
 
-    Parameters
-    ----------
-    period
-        Of the motion, shape (r,).
-    spacing
-        Distance between the samples, shape (r,).
-    points
-        Number of samples.
+    The motion has a period, and samples at a distance, of shape (r,).
     """
     samples = period / spacing
-    wanted = np.ceil(samples / (2 * HALF_WINDOW))
-    most = (points - 1) // (2 * HALF_WINDOW)
-    found = np.clip(wanted, 1, max(most, 1))
-    usable = (
-        (samples >= LEAST_PER_SHIFT)
-        & (most >= 1)
-        & (found * 2 * HALF_WINDOW >= SHORTEST_RUN * samples)
-    )
+    most = (points - 1) // (2 * th.HALF_WINDOW)
+    found = np.clip(np.ceil(samples / (2 * th.HALF_WINDOW)), 1, max(most, 1))
+    usable = (samples >= th.LEAST_PER_SHIFT) & (most >= 1)
+    usable &= found * 2 * th.HALF_WINDOW >= th.SHORTEST_RUN * samples
     return np.where(usable, found, 0).astype(np.int64)
 
 
 def shift(
     position: Floats, velocity: Floats, of: Template, period: Floats, stride: Integers
-) -> Shift:
+) -> Floats:
     """Tell shift and factor of computed motions apart.
 
     Parameters
@@ -89,6 +102,12 @@ def shift(
         The motion that it should be.
     period, stride
         Shape (r,); see `strides`.
+
+    Returns
+    -------
+    array
+        The time by which the motion is early, and the factor of its amplitude less one, shape (2, r, t); NaN throughout
+        for a row in which one of them could not be found at some time.
     """
     found = np.full((2, *position.shape), np.nan)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -96,33 +115,26 @@ def shift(
         kept = (stride > 0) & np.isfinite(position).all(axis=-1)
         kept &= np.isfinite(of.position).all(axis=-1) & np.isfinite(of.velocity).all(axis=-1)
         least = 0.0
-        for most, rounds in ROUNDS:
+        for most, rounds in th.ROUNDS:
             rows = np.flatnonzero(kept & (largest >= least) & (largest < most))
             least = most
-            for chosen, at in _pieces(rows, position.shape[-1]):
-                part = _rows(of, chosen)
-                mine = position[chosen], guess[chosen], part, period[chosen], stride[chosen]
-                found[:, chosen[:, None], at] = _fitted(*mine, at, rounds)
+            for r, at in _pieces(rows, position.shape[-1]):
+                part = Template(
+                    of.position[r], of.velocity[r], of.spacing[r], of.coefficients[:, r]
+                )
+                mine = position[r], guess[r], part, period[r], stride[r]
+                found[:, r[:, None], at] = _fitted(*mine, at, rounds)
         found[:, ~np.isfinite(found).all(axis=(0, 2))] = np.nan
-    return Shift(found[0], found[1])
+    return found
 
 
 def _pieces(rows: Integers, points: int) -> Iterator[tuple[Integers, Integers]]:
     """Yield rows and samples that are worked on together."""
-    piece = max(PIECE // WINDOW_POINTS, 1)
+    piece = max(PIECE // th.WINDOW_POINTS, 1)
     step = max(piece // points, 1)
     for first in range(0, len(rows), step):
         for start in range(0, points, piece):
             yield rows[first : first + step], np.arange(start, min(start + piece, points))
-
-
-def _rows(of: Template, chosen: Integers) -> Template:
-    return Template(
-        of.position[chosen],
-        of.velocity[chosen],
-        of.spacing[chosen],
-        of.coefficients[:, chosen],
-    )
 
 
 def _fitted(
@@ -135,25 +147,30 @@ def _fitted(
     rounds: int,
 ) -> Floats:
     """Return shift and factor at the samples `at`, shape (2, r, len(at)); windows lie along the first dimension."""
-    last = position.shape[-1] - 1
-    low, high = _inside(guess, of.spacing)
-    high = np.maximum(high - 2 * HALF_WINDOW * stride, low)
-    first = np.clip(at - HALF_WINDOW * stride[:, None], low[:, None], high[:, None])
-    centre = first + HALF_WINDOW * stride[:, None]
-    places = first + stride[:, None] * np.arange(WINDOW_POINTS)[:, None, None]
+    last, half = position.shape[-1] - 1, th.HALF_WINDOW
+    # windows begin where a guessed shift leaves their samples within the template
+    moved = np.arange(last + 1) + guess / of.spacing[:, None]
+    inside = (moved >= 0) & (moved <= last)
+    low = np.argmax(inside, axis=-1)
+    high = np.maximum(last - np.argmax(inside[:, ::-1], axis=-1) - 2 * half * stride, low)
+    first = np.clip(at - half * stride[:, None], low[:, None], high[:, None])
+    centre = first + half * stride[:, None]
+    places = first + stride[:, None] * np.arange(th.WINDOW_POINTS)[:, None, None]
     rows = np.arange(len(position))[:, None]
-    u, still = position[rows, places], ~_turns(of.velocity[rows, places])
-    s = ((np.arange(WINDOW_POINTS) - HALF_WINDOW) / HALF_WINDOW)[:, None, None]
+    u, speed = position[rows, places], of.velocity[rows, places]
+    # only a motion that turns within a window oscillates
+    turns = (np.min(speed, axis=0) < 0) & (np.max(speed, axis=0) > 0)
+    s = ((np.arange(th.WINDOW_POINTS) - half) / half)[:, None, None]
     radian, h = period[:, None] / (2 * math.pi), of.spacing[:, None]
     phi, slope = guess[rows, centre], np.zeros(centre.shape)
     rise, offset = (np.zeros(centre.shape) for _ in range(2))
     alpha = 0.5 * np.log(_spread(u) / _spread(of.position[rows, places]))
-    moved = np.full(centre.shape, np.inf)
+    moves = np.full(centre.shape, np.inf)
     for _ in range(rounds):
         where = places + (phi + slope * s) / h
         there, speed = of.at(where)
         beyond = np.maximum(-where, where - last)
-        weight = np.clip((BEYOND_THE_ENDS - beyond) / (0.5 * BEYOND_THE_ENDS), 0.0, 1.0)
+        weight = np.clip((th.BEYOND_THE_ENDS - beyond) / (0.5 * th.BEYOND_THE_ENDS), 0.0, 1.0)
         left = (u - offset) * np.exp(-alpha - rise * s) - there
         speed = speed * radian
         by = _solved([np.ones(u.shape), there, s * there, speed, s * speed], left, weight)
@@ -162,28 +179,15 @@ def _fitted(
         offset = offset + by[0] * np.exp(alpha)
         alpha, rise = alpha + np.log1p(gain), rise + by[2] / (1.0 + gain)
         phi, slope = phi + by[3] * radian, slope + by[4] * radian
-        moved = np.maximum(np.abs(by[1]) + np.abs(by[2]), np.abs(by[3]) + np.abs(by[4]))
-    away = (at - centre) / (HALF_WINDOW * stride[:, None])
+        moves = np.maximum(np.abs(by[1]) + np.abs(by[2]), np.abs(by[3]) + np.abs(by[4]))
+    away = (at - centre) / (half * stride[:, None])
     found = np.stack([phi + slope * away, np.expm1(alpha + rise * away)])
-    return np.where(still | ~(moved < LAST_ROUND_MOVES), np.nan, found)
-
-
-def _inside(guess: Floats, spacing: Floats) -> tuple[Integers, Integers]:
-    """Return the first and the last sample that a guessed shift leaves within the template, each of shape (r,)."""
-    last = guess.shape[-1] - 1
-    moved = np.arange(last + 1) + guess / spacing[:, None]
-    inside = (moved >= 0) & (moved <= last)
-    return np.argmax(inside, axis=-1), last - np.argmax(inside[:, ::-1], axis=-1)
-
-
-def _turns(velocity: Floats) -> Flags:
-    """Say where the motion turns within a window: only then it oscillates."""
-    return np.asarray((np.min(velocity, axis=0) < 0) & (np.max(velocity, axis=0) > 0))
+    return np.where(turns & (moves < th.LAST_ROUND_MOVES), found, np.nan)
 
 
 def _spread(values: Floats) -> Floats:
     """Return the sum of squares around the mean over a window, shape (r, t)."""
-    rest = values - _sum(values) / WINDOW_POINTS
+    rest = values - _sum(values) / th.WINDOW_POINTS
     return _sum(rest * rest)
 
 
@@ -199,12 +203,9 @@ def _solved(basis: list[Floats], left: Floats, weight: Floats) -> list[Floats]:
     """
     n = len(basis)
     weighted = [weight * row for row in basis]
-    matrix = [
-        [_sum(weighted[i] * basis[j]) if j >= i else None for j in range(n)] for i in range(n)
-    ]
-    a: list[list[Floats]] = [
-        [np.asarray(matrix[min(i, j)][max(i, j)]) for j in range(n)] for i in range(n)
-    ]
+    a: list[list[Floats]] = [[] for _ in basis]
+    for i in range(n):
+        a[i] = [a[j][i] if j < i else _sum(weighted[i] * basis[j]) for j in range(n)]
     b = [_sum(row * left) for row in weighted]
     for k in range(n):
         for i in range(k + 1, n):
@@ -236,8 +237,8 @@ def _guess(
     found = np.zeros(position.shape)
     largest = np.nan_to_num(np.max(np.abs(turned - target), axis=-1))
     monotone = np.min(np.diff(target, axis=-1), axis=-1) > 0
-    times = of.times
-    for row in np.flatnonzero((largest > LARGE_SHIFT) & monotone).tolist():
+    for row in np.flatnonzero((largest > th.LARGE_SHIFT) & monotone).tolist():
+        times = of.spacing[row] * np.arange(position.shape[-1])
         late = np.maximum(turned[row] - target[row, -1], 0.0) / w[row]
-        found[row] = np.interp(turned[row], target[row], times[row]) + late - times[row]
+        found[row] = np.interp(turned[row], target[row], times) + late - times
     return found, largest

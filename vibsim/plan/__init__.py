@@ -1,14 +1,20 @@
 """What there is to do: members, levels, shards, names, digests and costs; no arrays, no netCDF.
 
-Loading a plan that is cached imports neither numpy nor the validation library: Snakemake asks for the
-plans of all experiments each time it starts.
+Loading a plan that is cached imports neither numpy nor the validation library: Snakemake asks for the plans of all
+experiments each time it starts.
 """
 
+from typing import TYPE_CHECKING
+
+from vibsim.core.lazy import loader
 from vibsim.plan.cache import load, load_all
-from vibsim.plan.cases import columns, option_groups, sampling
 from vibsim.plan.choose import Choice, checkout, choose, experiments
 from vibsim.plan.jobs import Batch, LevelJob, Plan, ShardJob
 from vibsim.plan.workflow_names import Names
+
+if TYPE_CHECKING:
+    from vibsim.experiment.storage import sampling
+    from vibsim.experiment.sweep_columns import columns, option_groups
 
 __all__ = [
     "Batch",
@@ -26,3 +32,12 @@ __all__ = [
     "option_groups",
     "sampling",
 ]
+
+__getattr__ = loader(
+    __name__,
+    {
+        "columns": "vibsim.experiment.sweep_columns",
+        "option_groups": "vibsim.experiment.sweep_columns",
+        "sampling": "vibsim.experiment.storage",
+    },
+)

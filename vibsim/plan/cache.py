@@ -45,9 +45,12 @@ def load(choice: Choice, resolve: Resolver | None = None, *, cached: bool = Fals
     InputError
         When the file is refused.
     """
-    key = _key(choice) if cached else ""
-    if not key:
-        return _built(choice, resolve)
+    word = str(choice.file) if choice.case is None else f"{choice.file}@{choice.case}"
+
+    def build() -> Plan:
+        from vibsim.plan.build import build
+
+        return replace(build(_experiment(choice, resolve)), file=word)
 
     def dump(plan: Plan) -> bytes | None:
         # a file that changed while it was read is not kept under the digest of the old bytes
@@ -56,18 +59,13 @@ def load(choice: Choice, resolve: Resolver | None = None, *, cached: bool = Fals
 
     def kept(content: bytes) -> Plan | None:
         try:
-            plan = from_json(content.decode(), _word(choice), choice.key)
+            plan = from_json(content.decode(), word, choice.key)
         except (ValueError, RecursionError):
             return None
         return plan if _has_inputs(plan, choice) else None
 
-    return private_cache.kept("plans", key, lambda: _built(choice, resolve), dump, kept)
-
-
-def _built(choice: Choice, resolve: Resolver | None) -> Plan:
-    from vibsim.plan.build import build
-
-    return replace(build(_experiment(choice, resolve)), file=_word(choice))
+    key = _key(choice) if cached else ""
+    return private_cache.kept("plans", key, build, dump, kept) if key else build()
 
 
 def _experiment(choice: Choice, resolve: Resolver | None) -> Experiment:
@@ -113,16 +111,9 @@ def _key(choice: Choice) -> str:
         content = read_bytes(choice.file)
     except InputError:
         return ""
-    libraries = versions(NUMERICAL + DRAWING)
-    parts = (
-        choice.collection,
-        choice.name,
-        str(choice.case),
-        code_digest.everything(),
-        repr(libraries),
-        content,
-    )
-    return _sha256(b"\0".join(p if isinstance(p, bytes) else p.encode() for p in parts))
+    libraries = repr(versions(NUMERICAL + DRAWING))
+    words = (choice.collection, choice.name, str(choice.case), code_digest.everything(), libraries)
+    return _sha256(b"\0".join([*(word.encode() for word in words), content]))
 
 
 def _has_inputs(plan: Plan, choice: Choice) -> bool:
@@ -135,11 +126,6 @@ def _has_inputs(plan: Plan, choice: Choice) -> bool:
         if _sha256(content) != digest:
             return False
     return True
-
-
-def _word(choice: Choice) -> str:
-    """Return how the experiment is named on the command line of a job."""
-    return str(choice.file) if choice.case is None else f"{choice.file}@{choice.case}"
 
 
 def _sha256(content: bytes) -> str:

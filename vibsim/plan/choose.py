@@ -36,13 +36,7 @@ class Choice:
 
 
 def checkout() -> Path:
-    """Return the folder with the Snakefile and the experiments that come with vibsim.
-
-    Raises
-    ------
-    VibsimError
-        When the package was installed without it.
-    """
+    """Return the folder with the Snakefile and the experiments that come with vibsim; VibsimError without one."""
     folder = find_checkout()
     if folder is None:
         raise VibsimError("no Snakefile beside the package nor here: vibsim runs from its checkout")
@@ -55,21 +49,11 @@ def experiments(root: Path) -> list[Choice]:
 
 
 def choose(words: Sequence[str], root: Path) -> list[Choice]:
-    """Find the experiments that `words` name.
+    """Find the experiments that `words` name, each once, in the order named.
 
-    Parameters
-    ----------
-    words
-        Files, names of experiments (``name`` or ``collection/name``) or collections; none of them
-        means the default collections. A file or a name followed by ``@`` and a number means that
-        member of the sweep alone.
-    root
-        The checkout.
-
-    Returns
-    -------
-    list
-        Each experiment once, in the order named.
+    Words are files, names of experiments (``name`` or ``collection/name``) or collections; none of them means the
+    default collections. A file or a name followed by ``@`` and a number means that member of the sweep alone. The
+    experiments of the checkout `root` are known by name.
 
     Raises
     ------
@@ -99,7 +83,7 @@ Found = tuple[list[Choice], tuple[str, str] | None]
 def _find_member(word: str, known: list[Choice], root: Path) -> Found:
     """Find what `word` names, which may be one member of a sweep."""
     name, at, case = word.rpartition("@")
-    if not at or _is_file(word):
+    if not at or word.endswith(ENDINGS):
         return _find(word, known, root)
     if not (case.isascii() and case.isdigit() and len(case) <= MAX_DIGITS):
         return [], ("a member is named by @ and its number, from 0", f"e.g. {name}@0")
@@ -109,17 +93,12 @@ def _find_member(word: str, known: list[Choice], root: Path) -> Found:
     return [replace(choice, case=int(case)) for choice in found], rule
 
 
-def _is_file(word: str) -> bool:
-    return word.endswith(ENDINGS)
-
-
 def _find(word: str, known: list[Choice], root: Path) -> Found:
-    if _is_file(word):
+    if word.endswith(ENDINGS):
         return [_choice(Path(word), root)], None
-    if found := [c for c in known if c.collection == word]:
-        return found, None
-    found = [c for c in known if word in (c.key, c.name)]
-    if len(found) > 1:
+    of_collection = [choice for choice in known if choice.collection == word]
+    found = of_collection or [choice for choice in known if word in (choice.key, choice.name)]
+    if len(found) > 1 and not of_collection:
         return [], ("is the name of several experiments", "choose from " + _list(found))
     if found:
         return found, None

@@ -6,7 +6,7 @@ package counts with its ``__init__``, with what this uses itself, and with the m
 
 Two things are no part of it, because what comes out of them is in every digest itself: the making of plans
 (`_PLANNING`), whose outcome a job compares with the digest that it was given, before it starts; and the lists of all
-models and schemes (`_LISTS`), of which a job uses its own entries (`vibsim.plan.build.code_of`). What only describes
+models and schemes (`_LISTS`), of which a job uses its own entries (`vibsim.plan.build`). What only describes
 types runs nothing.
 """
 
@@ -16,7 +16,7 @@ import ast
 import hashlib
 import importlib
 from collections.abc import Iterable, Iterator
-from functools import cache, lru_cache
+from functools import cache
 from pathlib import Path
 
 import vibsim
@@ -37,10 +37,10 @@ _PLANNING = (
 """From what a user writes to a plan; no job runs any of it once it has its plan (a test traces that)."""
 
 
-@lru_cache
+@cache
 def everything() -> str:
     """Return the digest of the whole package: of every file in it that is not made by Python."""
-    return _digest(p for p in PACKAGE.rglob("*") if p.is_file() and "__pycache__" not in p.parts)
+    return of_folder("vibsim")
 
 
 def used_by(*names: str) -> str:

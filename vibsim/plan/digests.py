@@ -7,8 +7,6 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from vibsim.plan.cases import columns
-
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
@@ -38,6 +36,8 @@ def values_digest(experiment: Experiment, start: int, stop: int) -> str:
     """Return the SHA-256 of the swept keys and their values for members start..stop-1; empty without a sweep."""
     if experiment.sweep is None:
         return ""
+    from vibsim.experiment.sweep_columns import columns
+
     digest = hashlib.sha256()
     for key, values in columns(experiment, start, stop).items():
         words = values.dtype.kind == "U"

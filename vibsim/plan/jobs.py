@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -188,14 +187,7 @@ def to_json(plan: Plan) -> str:
 
 
 def from_json(text: str, file: str, key: str) -> Plan:
-    """Read what `to_json` wrote.
-
-    Parameters
-    ----------
-    file
-        Where the experiment was read.
-    key
-        The name of the experiment.
+    """Read what `to_json` wrote for the experiment named `key`, which was read at `file`.
 
     Raises
     ------
@@ -203,28 +195,18 @@ def from_json(text: str, file: str, key: str) -> Plan:
         Where it is no plan of that experiment: names and digests go into commands, and paths are written to.
     """
     plan = replace(typed(Plan, json.loads(text)), file=file)
-    if plan.key != key or not all(map(_DIGEST.fullmatch, _digests(plan))):
+    digests = [plan.analysis, plan.report, *([plan.extrapolation] if plan.extrapolation else [])]
+    digests += [shard.digest for shard in plan.shards] + [batch.digest for batch in plan.batches]
+    if plan.key != key or not all(map(_DIGEST.fullmatch, digests)):
         raise ValueError(f"{plan.key:.100}: not a plan of {key}")
+    is_swept = plan.content.get("sweep") is not None
     for level in plan.levels:
-        _check_shards(level, key, is_swept=plan.content.get("sweep") is not None)
+        count = len(level.shards) if is_swept else 1
+        wanted = [(k, shard_path(key, level.level, k if is_swept else None)) for k in range(count)]
+        if [(shard.index, shard.path) for shard in level.shards] != wanted:
+            raise ValueError(f"{key}, level {level.level}: other files than its own")
     shards = {level.level: len(level.shards) for level in plan.levels}
     for batch in plan.batches:
         if any(not 0 <= batch.shard < shards.get(level, 0) for level in batch.levels):
             raise ValueError(f"{plan.key}: a job for files that no level has")
     return plan
-
-
-def _digests(plan: Plan) -> Iterator[str]:
-    yield from (plan.analysis, plan.report)
-    if plan.extrapolation:
-        yield plan.extrapolation
-    yield from (shard.digest for shard in plan.shards)
-    yield from (batch.digest for batch in plan.batches)
-
-
-def _check_shards(level: LevelJob, key: str, *, is_swept: bool) -> None:
-    """Refuse other files than those that key, level and number give."""
-    count = len(level.shards) if is_swept else 1
-    wanted = [(k, shard_path(key, level.level, k if is_swept else None)) for k in range(count)]
-    if [(shard.index, shard.path) for shard in level.shards] != wanted:
-        raise ValueError(f"{key}, level {level.level}: other files than its own")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, count
 from pathlib import Path
@@ -82,6 +82,15 @@ class Simulation:
         return self.plan.file
 
 
+def _of_plan(field: str) -> Callable[[Names, Any], str]:
+
+    def ask(self: Names, wildcards: Any) -> str:
+        found: str = getattr(self.plans[wildcards.experiment], field)
+        return found
+
+    return ask
+
+
 @dataclass(frozen=True)
 class Names:
     """The plans of the chosen experiments, asked by wildcard."""
@@ -132,9 +141,9 @@ class Names:
         """Regular expression for the experiments with an extrapolated solution; it may match nothing."""
         return "|".join(re.escape(key) for key, plan in self.plans.items() if plan.best) or "(?!)"
 
-    def extrapolation_digest(self, wildcards: Any) -> str:
-        """Return the digest of an extrapolation."""
-        return self.plans[wildcards.experiment].extrapolation
+    analysis_digest = _of_plan("analysis")
+    extrapolation_digest = _of_plan("extrapolation")
+    report_digest = _of_plan("report")
 
     def analysis_threads(self, wildcards: Any) -> int:
         """Return the threads of an analysis."""
@@ -143,14 +152,6 @@ class Names:
     def analysis_memory(self, wildcards: Any) -> int:
         """Return the megabytes of an analysis."""
         return -(-self.plans[wildcards.experiment].analysis_memory // 10**6)
-
-    def analysis_digest(self, wildcards: Any) -> str:
-        """Return the digest of an analysis."""
-        return self.plans[wildcards.experiment].analysis
-
-    def report_digest(self, wildcards: Any) -> str:
-        """Return the digest of a report."""
-        return self.plans[wildcards.experiment].report
 
     @property
     def files(self) -> list[str]:
@@ -162,13 +163,8 @@ class Names:
         """What the index shows: the chosen experiments, and the others found among the results."""
         chosen = {path for plan in self.plans.values() for path in (plan.summary, plan.page)}
         shown = (self.results.glob(f"*/*/{name}") for name in ("summary.json", "report.html"))
-        found = {
-            path.relative_to(self.results).as_posix()
-            for paths in shown
-            for path in paths
-            if path.is_file()
-        }
-        return sorted(chosen | found)
+        files = (path for paths in shown for path in paths if path.is_file())
+        return sorted(chosen | {path.relative_to(self.results).as_posix() for path in files})
 
     @property
     def index_digest(self) -> str:

@@ -9,12 +9,10 @@ from vibsim.schemes.adaptive import ADAPTIVE
 from vibsim.schemes.base import AnyOption, Flag, NumberOption, Option, Options, Scheme, Stepper
 from vibsim.schemes.central import CENTRED
 from vibsim.schemes.composition import COMPOSITIONS
-from vibsim.schemes.gauss import GAUSS4
-from vibsim.schemes.implicit import IMPLICIT
+from vibsim.schemes.implicit import GAUSS4, IMPLICIT
 from vibsim.schemes.multistep import ADAMS_BASHFORTH
 from vibsim.schemes.newmark import NEWMARK
-from vibsim.schemes.nystrom import RKN4
-from vibsim.schemes.runge_kutta import RUNGE_KUTTA
+from vibsim.schemes.runge_kutta import RKN4, RUNGE_KUTTA
 
 SCHEMES: Mapping[str, Scheme] = MappingProxyType(
     {

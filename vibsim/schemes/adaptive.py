@@ -14,7 +14,7 @@ import math
 
 from vibsim.core.errors import SimulationError
 from vibsim.schemes.base import NumberOption, Options, Scheme, Stepper
-from vibsim.schemes.orders import Orders
+from vibsim.schemes.orders import Orders, same_orders
 
 LEAST_RELATIVE = 100 * 2.0**-52
 """Relative tolerance that SciPy does not go below, 2.2e-14; a smaller one acts on the absolute tolerance alone."""
@@ -48,28 +48,13 @@ def seconds(kind: str, tolerance: float, periods: float) -> float:
     return float(START_SECONDS + periods * steps * (1e-8 / tolerance) ** power * cost)
 
 
-_NO_ORDERS = Orders(
-    position=math.nan,
-    velocity=math.nan,
-    energy=math.nan,
-    energy_linear=math.nan,
-    velocity_d2t=math.nan,
-    energy_d2t=math.nan,
-    energy_d2t_linear=math.nan,
-)
-
-
 def _own_steps(options: Options) -> Stepper:
     raise SimulationError("an adaptive scheme takes its own steps, and has no step of a given size")
 
 
 def _no_orders(options: Options) -> Orders:
-    return _NO_ORDERS
-
-
-def _tolerated(options: Options, steps: int) -> float:
-    """Return the error below which nothing is promised: the tolerance, whatever the level."""
-    return float(options["tolerance"])
+    names = ("velocity_d2t", "energy_d2t", "energy_d2t_linear")
+    return same_orders(math.nan, **dict.fromkeys(names, math.nan))
 
 
 def _scheme(
@@ -86,7 +71,8 @@ def _scheme(
         start="none: it chooses its first step and every other one",
         explicit=explicit,
         options=(TOLERANCE,),
-        round_off=_tolerated,
+        # the error below which nothing is promised, whatever the level
+        round_off=lambda options, steps: float(options["tolerance"]),
         adaptive=True,
     )
 

@@ -14,9 +14,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from vibsim.core.array_types import Floats
 from vibsim.models.base import BUDGET, Model
 from vibsim.models.events import TREATMENTS
 from vibsim.schemes.orders import Beginning, Orders, depends_on_velocity
@@ -117,7 +115,7 @@ class Stepper:
     """Whether the velocity belongs to another time than the position: peaks are then found by ``[D_2t u]``."""
     implicit: bool = False
     """Whether a step solves an equation, for which it may ask for `slopes`."""
-    scaling: Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], ...]] | None = None
+    scaling: Callable[[Floats], tuple[Floats, ...]] | None = None
     """Factors of the acceleration and of the initial velocity that enters the start, from ``w dt``; None for 1."""
     events: str = ""
     """How it treats events, one of `EVENTS`; empty for a smooth model."""
@@ -158,16 +156,6 @@ ORDER_AT_CORNERS = 2.0
 """Order that is left where the slope of the force jumps within a step, and of a sum of its power over such steps."""
 
 
-def never(quantity: str, model: Model, options: Options) -> bool:
-    """Say that no error has every second power only."""
-    return False
-
-
-def always(quantity: str, model: Model, options: Options) -> bool:
-    """Say that every error has every second power only: of a symmetric scheme with a symmetric start and velocity."""
-    return True
-
-
 def round_off(options: Options, steps: int) -> float:
     """Return the predicted round-off of a scheme that adds a small increment at each step: eps N^(1/2)."""
     return float(UNIT_ROUND_OFF * steps**0.5)
@@ -200,9 +188,9 @@ class Scheme:
     """The arithmetic that the options ask for; the same functions for the same options."""
     orders: Callable[[Options], Orders]
     """Orders that the scheme promises with these options."""
-    force_evaluations: int
+    force_evaluations: int = 1
     """Evaluations of the acceleration per step; of an implicit scheme, per iteration."""
-    start: str
+    start: str = "none: a one-step method"
     """What is needed for the first step, in words."""
     explicit: bool = True
     symplectic: bool = False
@@ -213,8 +201,9 @@ class Scheme:
     damped: tuple[tuple[str, Callable[[Options], Stepper]], ...] = ()
     """Kinds of damping (`vibsim.models.base.Damping`) that it has a treatment of its own for, and the arithmetic."""
     options: tuple[AnyOption, ...] = ()
-    even_powers: Callable[[str, Model, Options], bool] = never
-    """Whether the error of a quantity expands in h^p, h^(p+2), ... rather than h^p, h^(p+1), ..."""
+    even_powers: bool | Callable[[str, Model, Options], bool] = False
+    """Whether the error of a quantity expands in h^p, h^(p+2), ... rather than h^p, h^(p+1), ...: of every quantity
+    where the scheme, its start and its velocity are symmetric."""
     round_off: Callable[[Options, int], float] = round_off
     """Predicted round-off after a number of steps, relative to the solution (order of magnitude)."""
     adaptive: bool = False
@@ -290,8 +279,10 @@ class Scheme:
 
         It does not where an event divides a step, or a corner of the force.
         """
-        is_smooth = model.events is None and self._sees_corners(model)
-        return is_smooth and self.even_powers(quantity, model, options)
+        if model.events is not None or not self._sees_corners(model):
+            return False
+        even = self.even_powers
+        return even if isinstance(even, bool) else even(quantity, model, options)
 
     def _sees_corners(self, model: Model) -> bool:
         """Tell whether every step has a smooth force: between two corners, and without a look back across one."""

@@ -14,20 +14,30 @@ One scheme written three ways, algebraically equal, with different round-off:
 The first step follows from the centred difference ``(u^1 - u^(-1))/(2 dt) = V`` and the scheme at n = 0 (`centred`), or
 from three terms of the Taylor polynomial (`taylor`, B, exercise 5): ``u^1 = u^0 + dt V + dt^2 a^0/2`` either way.
 
-Source: pendulum lecture (A), equations (7)-(11) and section 3; vibration text (B), equations (7)-(8) and section 2.1.
-Compensated summation: E. Hairer, C. Lubich and G. Wanner, Geometric Numerical Integration, section VIII.5.
+Damping. With the increments ``d = u^n - u^(n-1)`` and ``e = u^(n+1) - u^n``, a damping rate c over the mass, and a the
+acceleration without damping at n, every step of ``u'' + D(u') = a(u, t)`` is ``e = d + kick``:
+
+- undamped: ``kick = dt^2 a``;
+- linear damping, exactly centred, ``D = c (d + e)/(2 dt)``: ``kick = (dt^2 a - c dt d)/(1 + c dt/2)``;
+- quadratic damping by the geometric mean, ``D = c |d| e/dt^2``: ``kick = (dt^2 a - c |d| d)/(1 + c |d|)``;
+- quadratic damping, exactly centred, ``D = c |s| s/(4 dt^2)`` with ``s = d + e``: s solves a quadratic equation, and
+  has the sign of ``r = 2 d + dt^2 a``, so ``s = 2 r/(1 + sqrt(1 + c |r|))`` and ``kick = dt^2 a - c |s| s/4``;
+- any damping at the backward difference, ``D(d/dt)``: ``kick = dt^2 a(u^n, d/dt, t^n)`` with D in a.
+
+Source: pendulum lecture (A), equations (7)-(11) and section 3; vibration text (B), equations (7)-(8), (64) and (71),
+sections 2.1 and 8.2, and exercise 16. Compensated summation: E. Hairer, C. Lubich and G. Wanner, Geometric Numerical
+Integration, section VIII.5.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from vibsim.core.array_types import Floats
+from vibsim.elementary import ELEMENTARY
 from vibsim.models.base import Model
 from vibsim.schemes.base import (
     UNIT_ROUND_OFF,
@@ -40,16 +50,8 @@ from vibsim.schemes.base import (
     Scheme,
     Stepper,
 )
-from vibsim.schemes.central_steps import (
-    BACKWARD,
-    GEOMETRIC,
-    LINEAR,
-    ROOT,
-    UNDAMPED,
-    Treatment,
-    step,
-)
-from vibsim.schemes.orders import Orders, depends_on_velocity
+from vibsim.schemes.code_generation import written
+from vibsim.schemes.orders import Orders, depends_on_velocity, same_orders
 
 
 def start_three_term(
@@ -112,20 +114,104 @@ def with_rests(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
     return u(t), increment, nothing, nothing
 
 
-def backward_compensated(state: tuple[float, float, float, float], dt: float) -> float:
-    """Return ``(u^n - u^(n-1))/dt``."""
-    return state[1] / dt
+@dataclass(frozen=True)
+class Treatment:
+    """How a step takes the damping: the text of its kick."""
+
+    kick: str
+    """Formula of the kick, from ``push``, which is ``dt^2 a``, and ``d``."""
+    lines: tuple[str, ...] = ()
+    """Assignments before it."""
+    velocity: str = "0.0"
+    """The velocity at which the acceleration is taken: at rest it has no damping."""
 
 
-_ENDINGS: dict[str, tuple[Any, Any, Any]] = {
-    "compensated": (start_compensated, backward_compensated, with_rests),
-    "increment": (start_increment, backward_increment, with_increment),
-    "three_term": (start_three_term, backward_three_term, with_point_behind),
+_RATE = "rate = damping_rate(u, 0.0, t, p)"
+UNDAMPED = Treatment("push")
+LINEAR = Treatment("(push - rate * dt * d) / (1.0 + 0.5 * dt * rate)", (_RATE,))
+GEOMETRIC = Treatment("(push - share * d) / (1.0 + share)", (_RATE, "share = rate * abs(d)"))
+ROOT = Treatment(
+    "(push - 0.25 * rate * abs(both) * both)",
+    (
+        _RATE,
+        "reach = 2.0 * d + push",
+        "both = 2.0 * reach / (1.0 + sqrt(1.0 + rate * abs(reach)))",
+    ),
+)
+BACKWARD = Treatment("push", velocity="d / dt")
+
+_COMPENSATED = '''
+def step_compensated(state, t, dt, p, {handed}):
+    """Return u^(n+1), its increment, their rounding errors, and the velocity at n."""
+    u, d, u_rest, d_rest = state
+    push = (dt * dt) * acceleration(u, {velocity}, t, p)
+{lines}    kick = {kick} + d_rest
+    d_ahead = d + kick
+    part = d_ahead - d
+    d_rest_ahead = (d - (d_ahead - part)) + (kick - part)
+    # the rest of d belongs to u as well, but only in the sum that u keeps
+    drift = d_ahead + u_rest
+    ahead = u + drift
+    part_of_u = ahead - u
+    u_rest_ahead = (u - (ahead - part_of_u)) + (drift - part_of_u)
+    return (ahead, d_ahead, u_rest_ahead, d_rest_ahead), (d + d_ahead) * (0.5 / dt)
+'''
+_INCREMENT = '''
+def step_increment(state, t, dt, p, {handed}):
+    """Return u^(n+1), its increment and the velocity at n."""
+    u, d = state
+    push = (dt * dt) * acceleration(u, {velocity}, t, p)
+{lines}    d_ahead = d + {kick}
+    return (u + d_ahead, d_ahead), (d + d_ahead) * (0.5 / dt)
+'''
+_THREE_TERM = '''
+def step_three_term(state, t, dt, p, {handed}):
+    """Return u^(n+1), u^n and the velocity at n: A (9)."""
+    u, behind = state
+{increment}    push = (dt * dt) * acceleration(u, {velocity}, t, p)
+{lines}    ahead = 2.0 * u - behind + {kick}
+    return (ahead, u), (ahead - behind) * (0.5 / dt)
+'''
+
+
+@dataclass(frozen=True)
+class Arithmetic:
+    """A way of writing the scheme."""
+
+    start: Callable[..., Any]
+    text: str
+    """Of the step, without its treatment of the damping."""
+    backward: Callable[..., float]
+    carried: Callable[..., Any]
+    growth: float
+    """Power of the number of steps by which round-off grows."""
+
+
+ARITHMETICS = {
+    "compensated": Arithmetic(start_compensated, _COMPENSATED, backward_increment, with_rests, 0.0),
+    "increment": Arithmetic(start_increment, _INCREMENT, backward_increment, with_increment, 0.5),
+    "three_term": Arithmetic(
+        start_three_term, _THREE_TERM, backward_three_term, with_point_behind, 1.5
+    ),
 }
-"""Start, one-sided velocity and state of every arithmetic; its step is that of `vibsim.schemes.central_steps`."""
 
 
-def corrected(p: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+@cache
+def _step(arithmetic: str, treatment: Treatment) -> Callable[..., Any]:
+    """Return the step of an arithmetic (`vibsim.schemes.base.Stepper.step`) with a treatment of the damping."""
+    lines = "".join(f"    {line}\n" for line in treatment.lines)
+    text = ARITHMETICS[arithmetic].text.format(
+        handed="acceleration, damping_rate" if "damping_rate" in lines else "acceleration",
+        velocity=treatment.velocity,
+        kick=treatment.kick,
+        lines=lines,
+        increment="" if treatment is UNDAMPED else "    d = u - behind\n",
+    )
+    functions = {"sqrt": ELEMENTARY["sqrt"].full} if "sqrt" in lines else {}
+    return written(text.lstrip("\n"), functions=functions)
+
+
+def corrected(p: Floats) -> tuple[Floats, Floats]:
     """Return the factors of force and initial velocity that make the scheme oscillate at w, from ``p = w dt``.
 
     The numerical frequency is that of ``sin(w~ dt/2) = w dt/2``, too high by ``p^2/24`` (B, equation (19)); exercise 3
@@ -137,10 +223,7 @@ def corrected(p: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.f
     return slower * slower, 1.0 - p * p / 6.0
 
 
-_STARTS = ("centred", "taylor", "first_order")
 _ENDS = {"extrapolate": "extrapolate", "backward": "backward", "kick": "own"}
-
-_GROWTH = {"compensated": 0.0, "increment": 0.5, "three_term": 1.5}
 
 
 def stepper(options: Options, treatment: Treatment = UNDAMPED) -> Stepper:
@@ -150,16 +233,16 @@ def stepper(options: Options, treatment: Treatment = UNDAMPED) -> Stepper:
     without damping ``(u^(N+1) - u^(N-1))/(2 dt) = (u^N - u^(N-1))/dt + dt a^N/2``.
     """
     arithmetic = str(options["arithmetic"])
-    start, backward, carried = _ENDINGS[arithmetic]
+    chosen = ARITHMETICS[arithmetic]
     return Stepper(
-        start,
-        step(arithmetic, treatment),
-        backward,
+        chosen.start,
+        _step(arithmetic, treatment),
+        chosen.backward,
         variant=int(options["start"] == "first_order"),
         end=_ENDS[str(options["end_velocity"])],
         own_velocity=False,
         scaling=corrected if options.get("frequency_correction") else None,
-        carried=carried,
+        carried=chosen.carried,
     )
 
 
@@ -168,15 +251,12 @@ def orders(options: Options) -> Orders:
 
     That holds for the start `first_order` too: it breaks the promise, and the verdict says so.
     """
-    position_linear = 4.0 if options["frequency_correction"] else None
-    return Orders(
-        position=2, velocity=2, energy=2, energy_linear=2, position_linear=position_linear
-    )
+    return same_orders(2, position_linear=4.0 if options.get("frequency_correction") else None)
 
 
 def round_off(options: Options, steps: int) -> float:
     """Return the predicted round-off after `steps` steps, relative to the solution."""
-    return float(UNIT_ROUND_OFF * steps ** _GROWTH[str(options["arithmetic"])])
+    return float(UNIT_ROUND_OFF * steps ** ARITHMETICS[str(options["arithmetic"])].growth)
 
 
 def even_powers(quantity: str, model: Model, options: Options) -> bool:
@@ -208,7 +288,7 @@ def _damped(quadratic: Treatment) -> tuple[tuple[str, Callable[[Options], Steppe
 _OPTIONS = (
     Option(
         "start",
-        _STARTS,
+        ("centred", "taylor", "first_order"),
         "formula of the first step: from the centred difference of u'(0), A (11); from a Taylor polynomial, which "
         "gives the same (B, exercise 5); or without its dt^2 term",
     ),
@@ -220,7 +300,7 @@ _OPTIONS = (
     ),
     Option(
         "arithmetic",
-        tuple(_ENDINGS),
+        tuple(ARITHMETICS),
         "how the scheme is written: equal in exact arithmetic, different in round-off",
     ),
 )
@@ -241,24 +321,12 @@ CENTRAL = Scheme(
     orders=orders,
     round_off=round_off,
     even_powers=even_powers,
-    force_evaluations=1,
     start="u^1, by one of the formulas of the option `start`",
     symplectic=True,
     symmetric=True,
     velocity_forces=False,
     damped=_damped(GEOMETRIC),
 )
-
-
-def orders_of_second(options: Options) -> Orders:
-    """Return 2, with the damping centred as well."""
-    return Orders(position=2, velocity=2, energy=2, energy_linear=2)
-
-
-def orders_of_backward(options: Options) -> Orders:
-    """Return 2, and 1 where there is a damping, which is taken half a step too early."""
-    first = Orders(position=1, velocity=1, energy=1, energy_linear=1)
-    return replace(orders_of_second(options), velocity_dependent=first)
 
 
 def even_without_damping(quantity: str, model: Model, options: Options) -> bool:
@@ -272,7 +340,6 @@ CENTRAL_QUADRATIC_ROOT = replace(
     title="Centred differences, quadratic damping centred as well",
     source="vibration text, section 8.2",
     options=_OPTIONS,
-    orders=orders_of_second,
     damped=_damped(ROOT),
 )
 CENTRAL_BACKWARD_DAMPING = replace(
@@ -282,7 +349,8 @@ CENTRAL_BACKWARD_DAMPING = replace(
     source="vibration text, exercise 16",
     options=_OPTIONS,
     stepper=partial(stepper, treatment=BACKWARD),
-    orders=orders_of_backward,
+    # the damping is taken half a step too early
+    orders=lambda options: same_orders(2, velocity_dependent=same_orders(1)),
     even_powers=even_without_damping,
     velocity_forces=True,
     damped=(),

@@ -1,4 +1,4 @@
-"""Functions written out from data: a tableau or coefficients become the text of a step.
+"""Functions written out from data: a tableau or coefficients become the text of a step, a step the text of its start.
 
 The text is kept where Python looks for source (`linecache`), so that the engine, a traceback and a debugger read it
 as they read any other function.
@@ -10,6 +10,7 @@ its text uses, and the theory reads the formulas themselves, to be exact (`exact
 from __future__ import annotations
 
 import hashlib
+import inspect
 import linecache
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
@@ -17,12 +18,11 @@ from types import FunctionType
 from typing import Any
 
 from vibsim.formula import constant
+from vibsim.schemes.base import HANDED, Function, Stepper, position_and_velocity
 
 
 def written(
-    text: str,
-    formulas: Mapping[str, str] | None = None,
-    functions: Mapping[str, Any] | None = None,
+    text: str, formulas: Mapping[str, str] | None = None, functions: Mapping[str, Any] | None = None
 ) -> FunctionType:
     """Return the function that `text` defines; the same one for the same text.
 
@@ -41,9 +41,7 @@ def written(
 
 @cache
 def _written(
-    text: str,
-    formulas: tuple[tuple[str, str], ...],
-    functions: tuple[tuple[str, Any], ...],
+    text: str, formulas: tuple[tuple[str, str], ...], functions: tuple[tuple[str, Any], ...]
 ) -> FunctionType:
     values = {name: constant(formula) for name, formula in formulas}
     digest = hashlib.sha256(f"{text}{formulas}".encode()).hexdigest()[:16]
@@ -81,3 +79,32 @@ _FORMULAS: dict[FunctionType, Mapping[str, str]] = {}
 def exact_names(function: Callable[..., Any]) -> Mapping[str, str]:
     """Return the formulas of the numbers that a function uses by name; none for one that was not written here."""
     return _FORMULAS.get(function, {}) if isinstance(function, FunctionType) else {}
+
+
+def with_acceleration(u: Function, v: Function, a: Function, t: Any, dt: Any) -> Any:
+    """Return ``(u, v, a)``."""
+    return u(t), v(t), a(t)
+
+
+def self_starting(
+    step: Callable[..., Any], *, implicit: bool = False, carries_acceleration: bool = False
+) -> Stepper:
+    """Return the arithmetic of a one-step method, whose velocity is its own, from its step (`Stepper.step`).
+
+    Parameters
+    ----------
+    carries_acceleration
+        Whether the state is (u, v, a) rather than (u, v), as a step begins with the acceleration that the last one
+        ended with.
+    """
+    asked = [name for name in HANDED if name in inspect.signature(step).parameters]
+    rest = ", ".join(["dt", "p", *asked])
+    state = "u, v, acceleration(u, v, 0.0, p)" if carries_acceleration else "u, v"
+    start = written(
+        f"def start_one_step(variant, u, v, {rest}):\n"
+        f"    following, velocity = {step.__name__}(({state}), 0.0, {rest})\n"
+        "    return following\n",
+        functions={step.__name__: step},
+    )
+    carried = with_acceleration if carries_acceleration else position_and_velocity
+    return Stepper(start, step, implicit=implicit, carried=carried)

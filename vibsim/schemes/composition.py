@@ -29,18 +29,9 @@ from functools import cache
 from typing import Any
 
 from vibsim.models.base import Model
-from vibsim.schemes.base import (
-    Acceleration,
-    Function,
-    Option,
-    Options,
-    Scheme,
-    Stepper,
-    always,
-)
-from vibsim.schemes.code_generation import written
-from vibsim.schemes.one_step import self_starting
-from vibsim.schemes.orders import Orders, depends_on_velocity
+from vibsim.schemes.base import Acceleration, Function, Option, Options, Scheme, Stepper
+from vibsim.schemes.code_generation import self_starting, written
+from vibsim.schemes.orders import depends_on_velocity, same_orders
 
 KICK, DRIFT = "kick", "drift"
 Substeps = tuple[tuple[str, str], ...]
@@ -102,22 +93,20 @@ def _composed(
     """Return the declaration of a symmetric composition."""
 
     @cache
-    def arithmetic() -> Stepper:
+    def stepper() -> Stepper:
         step, carries = substep_function(substeps), carries_acceleration(substeps)
         return replace(self_starting(step, carries_acceleration=carries), own_velocity=own_velocity)
 
-    orders = Orders(position=order, velocity=order, energy=order, energy_linear=order)
     kicks = sum(name == KICK for name, _ in substeps)
     return Scheme(
         kind=kind,
         title=title,
         source=source,
         family="symplectic",
-        stepper=lambda options: arithmetic(),
-        orders=lambda options: orders,
-        even_powers=always,
+        stepper=lambda options: stepper(),
+        orders=lambda options: same_orders(order),
+        even_powers=True,
         force_evaluations=kicks - carries_acceleration(substeps),
-        start="none: a one-step method",
         symplectic=True,
         symmetric=True,
         velocity_forces=False,
@@ -212,35 +201,19 @@ def with_slope_ahead(u: Function, v: Function, a: Function, t: Any, dt: Any) -> 
 
 _STARTS = ("first_order", "centred")
 
-_DRAGGED = Orders(position=1, velocity=1, energy=1, energy_linear=1)
-_PLAIN = Orders(
-    position=1,
-    velocity=1,
-    energy=1,
-    energy_linear=1,
+_PLAIN = same_orders(
+    1,
     # the errors stand at the head of this module
-    from_rest=Orders(
-        position=1,
-        velocity=2,
-        energy=1,
-        energy_linear=1,
-        velocity_d2t=1,
-        energy_d2t=2,
-        energy_d2t_linear=2,
-    ),
-    from_balance=Orders(
-        position=2, velocity=1, energy=1, energy_linear=1, energy_d2t=2, energy_d2t_linear=2
-    ),
+    from_rest=same_orders(1, velocity=2, velocity_d2t=1, energy_d2t=2, energy_d2t_linear=2),
+    from_balance=same_orders(1, position=2, energy_d2t=2, energy_d2t_linear=2),
 )
-_CENTRED = Orders(
+_CENTRED = same_orders(
+    1,
     position=2,
-    velocity=1,
-    energy=1,
-    energy_linear=1,
     energy_d2t=2,
     energy_d2t_linear=2,
     # the old velocity is half a step behind the place where the force is taken
-    velocity_dependent=_DRAGGED,
+    velocity_dependent=same_orders(1),
 )
 
 
@@ -288,7 +261,6 @@ def _euler_cromer(
         stepper=stepper,
         orders=lambda options: _CENTRED if _is_centred(options) else _PLAIN,
         even_powers=_even_powers,
-        force_evaluations=1,
         start="plain initial values, or the formula of the option `start`",
         symplectic=True,
         velocity_forces=velocity_forces,

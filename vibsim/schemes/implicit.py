@@ -1,4 +1,4 @@
-r"""Backward Euler, Crank-Nicolson and BDF2 for ``u' = v``, ``v' = a(u, v, t)``.
+r"""Backward Euler, Crank-Nicolson, BDF2 and the Gauss method with two stages for ``u' = v``, ``v' = a(u, v, t)``.
 
 Each step leaves one equation for the acceleration at the next point, solved by Newton's method to round-off
 (`vibsim.schemes.newton`). On ``u'' + w^2 u = 0``, with p = w dt, a step multiplies the energy by ``1/(1 + p^2)``
@@ -8,8 +8,16 @@ Crank-Nicolson is the trapezoidal rule, ``(u^(n+1) - 2 u^n + u^(n-1))/dt^2 = (a^
 Newmark's scheme with beta = 1/4 and gamma = 1/2. Not to be confused with the implicit midpoint rule, to which the
 text's program gives the same name: they differ by a change of variables, and agree on a linear force.
 
+The Gauss method is of order 4, symplectic and symmetric: ``V_i = v + dt sum_j a_ij A_j`` and
+``U_i = u + dt sum_j a_ij V_j`` with ``A_i = a(U_i, V_i, t + c_i dt)``. Together
+``U_i = u + c_i dt v + dt^2 sum_j (a^2)_ij A_j``: the two stage accelerations are the unknowns of each step. On
+``u'' + w^2 u = 0`` a step is ``(1 + z/2 + z^2/12)/(1 - z/2 + z^2/12)``, the Pade approximation of ``exp z`` at z = i p,
+of modulus 1: the energy is kept exactly and no step is too large.
+
 Source: vibration text (B), sections 5.2 and 5.3, equations (29)-(42); E. Hairer and G. Wanner, Solving Ordinary
-Differential Equations II, section V.1 (BDF2).
+Differential Equations II, section V.1 (BDF2). Gauss: E. Hairer, C. Lubich and G. Wanner, Geometric Numerical
+Integration, sections II.1.3 and IV.2.1; E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential
+Equations I, table II.7.3 (Hammer and Hollingsworth).
 """
 
 from __future__ import annotations
@@ -17,18 +25,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from vibsim.schemes.base import (
-    Acceleration,
-    Function,
-    Options,
-    Scheme,
-    Slopes,
-    Stepper,
-    always,
-)
-from vibsim.schemes.newton import solved
-from vibsim.schemes.one_step import self_starting
-from vibsim.schemes.orders import Orders
+from vibsim.schemes.base import Acceleration, Function, Scheme, Slopes, Stepper
+from vibsim.schemes.code_generation import self_starting, written
+from vibsim.schemes.newton import solved, solved_together
+from vibsim.schemes.orders import same_orders
 
 Two = tuple[float, float]
 Four = tuple[float, float, float, float]
@@ -87,32 +87,52 @@ def step_bdf2(
     return (u + (drift + part * ahead), ahead, u, v), v
 
 
-_BACKWARD_EULER = self_starting(step_backward_euler, implicit=True)
-_CRANK_NICOLSON = self_starting(step_crank_nicolson, implicit=True)
-_BDF2 = Stepper(start_bdf2, step_bdf2, implicit=True, carried=with_points_behind)
+_GAUSS_FORMULAS = {
+    "C_1": "1/2 - sqrt(3)/6",
+    "C_2": "1/2 + sqrt(3)/6",
+    # the matrix a, its square S, and D = b^T a; b is (1/2, 1/2)
+    "A_11": "1/4",
+    "A_12": "1/4 - sqrt(3)/6",
+    "A_21": "1/4 + sqrt(3)/6",
+    "A_22": "1/4",
+    "S_11": "1/24",
+    "S_12": "1/8 - sqrt(3)/12",
+    "S_21": "1/8 + sqrt(3)/12",
+    "S_22": "1/24",
+    "D_1": "1/4 + sqrt(3)/12",
+    "D_2": "1/4 - sqrt(3)/12",
+}
 
+_GAUSS_STEP = """\
+def step_gauss(state, t, dt, p, acceleration, slopes):
+    u, v = state
+    now = acceleration(u, v, t, p)
+    square = dt * dt
+    a_1, a_2 = solved_together(
+        now, now,
+        (u + C_1 * dt * v, u + C_2 * dt * v),
+        (S_11 * square, S_12 * square, S_21 * square, S_22 * square),
+        (v, v), (A_11 * dt, A_12 * dt, A_21 * dt, A_22 * dt),
+        (t + C_1 * dt, t + C_2 * dt), p, acceleration, slopes,
+    )
+    return (u + dt * (v + dt * (D_1 * a_1 + D_2 * a_2)), v + dt * (0.5 * (a_1 + a_2))), v
+"""
 
-def _backward_euler(options: Options) -> Stepper:
-    return _BACKWARD_EULER
-
-
-def _crank_nicolson(options: Options) -> Stepper:
-    return _CRANK_NICOLSON
-
-
-def _bdf2(options: Options) -> Stepper:
-    return _BDF2
-
+_GAUSS = written(_GAUSS_STEP, _GAUSS_FORMULAS, {"solved_together": solved_together})
+_STEPPERS = {
+    "backward_euler": self_starting(step_backward_euler, implicit=True),
+    "crank_nicolson": self_starting(step_crank_nicolson, implicit=True),
+    "bdf2": Stepper(start_bdf2, step_bdf2, implicit=True, carried=with_points_behind),
+    "gauss4": self_starting(_GAUSS, implicit=True),
+}
 
 BACKWARD_EULER = Scheme(
     kind="backward_euler",
     title="Backward Euler",
     source="vibration text, sections 5.2 and 5.6",
     family="implicit one-step",
-    stepper=_backward_euler,
-    orders=lambda options: Orders(position=1, velocity=1, energy=1, energy_linear=1),
-    force_evaluations=1,
-    start="none: a one-step method",
+    stepper=lambda options: _STEPPERS["backward_euler"],
+    orders=lambda options: same_orders(1),
     explicit=False,
 )
 CRANK_NICOLSON = Scheme(
@@ -120,13 +140,9 @@ CRANK_NICOLSON = Scheme(
     title="Crank-Nicolson (trapezoidal rule)",
     source="vibration text, section 5.3, equations (33)-(42)",
     family="implicit one-step",
-    stepper=_crank_nicolson,
-    orders=lambda options: Orders(
-        position=2, velocity=2, energy=2, energy_linear=math.inf, energy_d2t_linear=2
-    ),
-    even_powers=always,
-    force_evaluations=1,
-    start="none: a one-step method",
+    stepper=lambda options: _STEPPERS["crank_nicolson"],
+    orders=lambda options: same_orders(2, energy_linear=math.inf, energy_d2t_linear=2),
+    even_powers=True,
     explicit=False,
     symmetric=True,
 )
@@ -135,13 +151,23 @@ BDF2 = Scheme(
     title="Backward differentiation formula of order 2",
     source="vibration text, exercise 12 (Backward2Step); Hairer and Wanner II, section V.1",
     family="multistep",
-    stepper=_bdf2,
-    orders=lambda options: Orders(
-        position=2, velocity=2, energy=2, energy_linear=3, energy_d2t_linear=2
-    ),
-    force_evaluations=1,
+    stepper=lambda options: _STEPPERS["bdf2"],
+    orders=lambda options: same_orders(2, energy_linear=3, energy_d2t_linear=2),
     start="u^1 and v^1, by one step of Crank-Nicolson",
     explicit=False,
+)
+GAUSS4 = Scheme(
+    kind="gauss4",
+    title="Gauss method with two stages (order 4)",
+    source="Hairer, Lubich and Wanner, sections II.1.3 and IV.2.1",
+    family="implicit Runge-Kutta",
+    stepper=lambda options: _STEPPERS["gauss4"],
+    orders=lambda options: same_orders(4, energy_linear=math.inf, energy_d2t_linear=2),
+    even_powers=True,
+    force_evaluations=2,
+    explicit=False,
+    symplectic=True,
+    symmetric=True,
 )
 
 IMPLICIT = (BACKWARD_EULER, CRANK_NICOLSON, BDF2)

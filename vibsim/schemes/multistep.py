@@ -18,12 +18,11 @@ Source: E. Hairer, S. P. Norsett and G. Wanner, Solving Ordinary Differential Eq
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
 from typing import Any
 
-from vibsim.schemes.base import Acceleration, Function, Options, Scheme, Stepper
+from vibsim.schemes.base import Acceleration, Function, Scheme, Stepper
 from vibsim.schemes.code_generation import weighted, written
-from vibsim.schemes.orders import Orders
+from vibsim.schemes.orders import Orders, same_orders
 from vibsim.schemes.runge_kutta import HEUN, RK3
 
 heun_step = HEUN.stepper({}).step
@@ -71,7 +70,6 @@ def start_three(
     return u_1, v_1, v, a_0, v_before, a_before
 
 
-@cache
 def with_slopes_behind(points: int) -> Callable[..., Any]:
     """Return what gives u and v at t, then v and a at so many points behind, the latest first."""
 
@@ -90,19 +88,14 @@ def _scheme(
     start_in_words: str,
     orders: Orders,
 ) -> Scheme:
-    def stepper(options: Options) -> Stepper:
-        return Stepper(
-            start, adams_bashforth(weights), carried=with_slopes_behind(len(weights) - 1)
-        )
-
+    carried = with_slopes_behind(len(weights) - 1)
     return Scheme(
         kind=kind,
         title=title,
         source="Hairer, Norsett and Wanner I, section III.1",
         family="multistep",
-        stepper=stepper,
+        stepper=lambda options: Stepper(start, adams_bashforth(weights), carried=carried),
         orders=lambda options: orders,
-        force_evaluations=1,
         start=start_in_words,
     )
 
@@ -113,7 +106,7 @@ AB2 = _scheme(
     ("3/2", "-1/2"),
     start_two,
     "u^1 by Heun's method",
-    Orders(position=2, velocity=2, energy=2, energy_linear=3),
+    same_orders(2, energy_linear=3),
 )
 AB3 = _scheme(
     "ab3",
@@ -121,7 +114,7 @@ AB3 = _scheme(
     ("23/12", "-4/3", "5/12"),
     start_three,
     "u^1 and u^2 by Kutta's third-order method",
-    Orders(position=3, velocity=3, energy=3, energy_linear=3),
+    same_orders(3),
 )
 
 ADAMS_BASHFORTH = (AB2, AB3)

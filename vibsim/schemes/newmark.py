@@ -29,12 +29,10 @@ from __future__ import annotations
 import math
 from functools import cache
 
-from vibsim.models.base import Model
 from vibsim.schemes.base import NumberOption, Options, Scheme, Stepper
-from vibsim.schemes.code_generation import written
+from vibsim.schemes.code_generation import with_acceleration, written
 from vibsim.schemes.newton import solved
-from vibsim.schemes.one_step import with_acceleration
-from vibsim.schemes.orders import Orders
+from vibsim.schemes.orders import Orders, same_orders
 
 _STEP = """\
 def step_newmark(state, t, dt, p, acceleration, slopes):
@@ -108,11 +106,8 @@ def _is_centred(options: Options) -> bool:
 
 def _newmark_orders(options: Options) -> Orders:
     if not _is_centred(options):
-        return Orders(position=1, velocity=1, energy=1, energy_linear=1)
-    energy_linear = math.inf if options["beta"] == 0.25 else 2.0
-    return Orders(
-        position=2, velocity=2, energy=2, energy_linear=energy_linear, energy_d2t_linear=2
-    )
+        return same_orders(1)
+    return _second_order(math.inf if options["beta"] == 0.25 else 2.0)
 
 
 def _damps(options: Options) -> bool:
@@ -121,20 +116,11 @@ def _damps(options: Options) -> bool:
 
 
 def _averaged_orders(options: Options) -> Orders:
-    energy_linear = 2.0 if _damps(options) else math.inf
-    return Orders(
-        position=2, velocity=2, energy=2, energy_linear=energy_linear, energy_d2t_linear=2
-    )
+    return _second_order(2.0 if _damps(options) else math.inf)
 
 
-def _newmark_even_powers(quantity: str, model: Model, options: Options) -> bool:
-    """Tell whether the scheme is symmetric, which it is with gamma = 1/2 for any beta."""
-    return _is_centred(options)
-
-
-def _averaged_even_powers(quantity: str, model: Model, options: Options) -> bool:
-    """Tell whether nothing is damped, and the scheme symmetric."""
-    return not _damps(options)
+def _second_order(energy_linear: float) -> Orders:
+    return same_orders(2, energy_linear=energy_linear, energy_d2t_linear=2)
 
 
 NEWMARK_BETA = Scheme(
@@ -156,8 +142,8 @@ NEWMARK_BETA = Scheme(
     ),
     stepper=_newmark,
     orders=_newmark_orders,
-    even_powers=_newmark_even_powers,
-    force_evaluations=1,
+    # symmetric with gamma = 1/2 for any beta
+    even_powers=lambda quantity, model, options: _is_centred(options),
     start="a^0, from the equation of motion",
     explicit=False,
     symmetric=True,
@@ -174,8 +160,7 @@ HHT = Scheme(
     ),
     stepper=_hht,
     orders=_averaged_orders,
-    even_powers=_averaged_even_powers,
-    force_evaluations=1,
+    even_powers=lambda quantity, model, options: not _damps(options),
     start="a^0, from the equation of motion",
     explicit=False,
 )
@@ -191,8 +176,7 @@ GENERALIZED_ALPHA = Scheme(
     ),
     stepper=_generalized_alpha,
     orders=_averaged_orders,
-    even_powers=_averaged_even_powers,
-    force_evaluations=1,
+    even_powers=lambda quantity, model, options: not _damps(options),
     start="a^0, from the equation of motion",
     explicit=False,
 )

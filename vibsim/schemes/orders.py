@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Literal
+from typing import Any, Literal
 
 from vibsim.formula import names_in
 from vibsim.models.base import BUDGET, Model, tree
@@ -12,8 +12,6 @@ from vibsim.models.events import Friction
 
 ORDER_OF_WORK = 4.0
 """Order of the sum by which the work of forces is found (`vibsim.simulation.derived`)."""
-
-
 Beginning = Literal["any", "rest", "balance"]
 """How a smooth motion begins whose forces do not depend on the velocity: at rest, where they do not depend on time
 either; with no acceleration; or in any other way."""
@@ -122,3 +120,9 @@ class Orders:
             "energy_d2t": energy_d2t,
             "energy_deviation_d2t": energy_d2t,
         }.get(quantity, energy)
+
+
+def same_orders(order: float, **others: Any) -> Orders:
+    """Return one order for position, velocity and energy, but for what is named."""
+    names = ("position", "velocity", "energy", "energy_linear")
+    return Orders(**{**dict.fromkeys(names, order), **others})

@@ -26,18 +26,16 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vibsim.core.array_types import Floats, Integers
 from vibsim.engine import Trajectories
 from vibsim.engine import integrate as gather_over
 from vibsim.engine.gather import OVERFLOW
 from vibsim.engine.kernel import kernel
 from vibsim.experiment.cost import PLAIN_MEMBER_STEPS
 from vibsim.models import Model
-from vibsim.schemes.base import Acceleration, CarriedState, Options, Scheme, Stepper
+from vibsim.schemes.base import Options, Scheme, Stepper
 from vibsim.schemes.code_generation import written
-
-Floats = NDArray[np.float64]
 
 MOST_STEPS = 2**20
 """Steps after which a run is given up, as one that fails: some minutes of work."""
@@ -88,11 +86,6 @@ class Run:
     """Evaluations of the acceleration, with those for the error estimates and for the dense output."""
     states: int = 2
 
-    @property
-    def accepted_steps(self) -> int:
-        """Number of accepted steps."""
-        return len(self.pieces)
-
     def at(self, t: Floats) -> Floats:
         """Return the states at ascending times, shape (state, n_t); NaN behind the last step."""
         found = np.full((self.states, len(t)), np.nan)
@@ -104,30 +97,12 @@ class Run:
         return found
 
 
-def start_tabulated(
-    variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
-) -> CarriedState:
-    """Return the first point behind the start, and its number."""
-    return float(p[-1][2]), 1.0
-
-
-def step_tabulated(
-    state: CarriedState, t: float, dt: float, p: Any, acceleration: Acceleration
-) -> tuple[CarriedState, float]:
-    """Return the next point of the table ``u_0, v_0, u_1, v_1, ...`` and the velocity at this one."""
-    n = int(state[1])
-    return (float(p[-1][2 * n + 2]), state[1] + 1.0), float(p[-1][2 * n + 1])
-
-
-TABULATED = Stepper(start=start_tabulated, step=step_tabulated, own_velocity=False, tabulated=True)
-"""Steps along a table of points that stands behind the parameters, and ends with one more point."""
-
-
 @cache
 def along_a_table(coordinates: int) -> Stepper:
-    """Return what goes along a table of points: of several coordinates all positions, then all velocities of each."""
-    if coordinates == 1:
-        return TABULATED
+    """Return steps along a table of points, which stands behind the parameters and ends with one more point.
+
+    A point has all positions and then all velocities. A step gives the next point and the velocity at this one.
+    """
     place = ", ".join(f"float(p[-1][first + {k}])" for k in range(coordinates))
     speed = ", ".join(f"float(p[-1][first + {k}])" for k in range(coordinates, 2 * coordinates))
     behind = place.replace("first", f"first + {2 * coordinates}")
@@ -141,10 +116,16 @@ def along_a_table(coordinates: int) -> Stepper:
         f"    first = {2 * coordinates} * int(state[1])\n"
         f"    return (({behind}), state[1] + 1.0), ({speed})\n"
     )
-    return replace(TABULATED, start=written(start), step=written(step), whole=True)
+    return Stepper(
+        start=written(start),
+        step=written(step),
+        own_velocity=False,
+        tabulated=True,
+        whole=coordinates > 1,
+    )
 
 
-def pieces(where: NDArray[np.int64], steps: int) -> Iterator[NDArray[np.int64]]:
+def pieces(where: Integers, steps: int) -> Iterator[Integers]:
     """Yield as many members at a time as `integrate` may hold the points of."""
     size = max(PIECE // (steps + 1), 1)
     for first in range(0, len(where), size):
@@ -160,10 +141,7 @@ def integrate(
     dt: Floats,
     steps: int,
     every: int,
-    *,
-    threads: int = 1,
-    with_series: bool = False,
-    n_extrema: int = 0,
+    **more: Any,
 ) -> Trajectories:
     """Integrate every member, and gather over the points of a level; see `vibsim.engine.integrate`.
 
@@ -187,7 +165,7 @@ def integrate(
         for first in range(1, steps + 1, PIECE):
             n = np.arange(first, min(first + PIECE, steps + 1))
             table[i, n] = run.at(n * dt[i]).T
-        done[:, i] = run.accepted_steps, run.force_evaluations
+        done[:, i] = len(run.pieces), run.force_evaluations
     found = gather_over(
         model,
         replace(scheme, stepper=lambda options: along_a_table(model.coordinates), damped=()),
@@ -198,9 +176,7 @@ def integrate(
         steps,
         every,
         lane="plain" if members * steps <= PLAIN_MEMBER_STEPS else "scalar",
-        threads=threads,
-        with_series=with_series,
-        n_extrema=n_extrema,
+        **more,
     )
     assert found.gathered is not None
     counts = replace(found.gathered, accepted_steps=done[0], force_evaluations=done[1])
@@ -214,21 +190,33 @@ def solved(problem: Problem) -> Run:
     """Return the run of a problem: that of another level, where it is still kept."""
     run = _kept.pop(problem, None) or solve(problem)
     _kept[problem] = run
-    total = sum(other.accepted_steps for other in _kept.values())
+    total = sum(len(other.pieces) for other in _kept.values())
     while total > KEPT_STEPS and len(_kept) > 1:
-        total -= _kept.popitem(last=False)[1].accepted_steps
+        total -= len(_kept.popitem(last=False)[1].pieces)
     return run
 
 
 def solve(problem: Problem) -> Run:
     """Integrate a problem to its end, or as far as it goes."""
+    from scipy import integrate as scipy_integrate
+
     right, jacobian, count = _right_hand_side(problem)
+    more = {} if problem.kind == "dop853" else {"jac": jacobian}
     times: list[float] = [0.0]
     found: list[Any] = []
     # what overflows or is no number is a result; LSODA warns why it stops, and all of them of small tolerances
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
-        solver = _solver(problem, right, jacobian)
+        solver = getattr(scipy_integrate, CLASSES[problem.kind])(
+            right,
+            0.0,
+            problem.initial,
+            problem.end,
+            # SciPy takes its least one where this is less, and warns
+            rtol=problem.tolerance,
+            atol=problem.tolerance * np.array(problem.scale),
+            **more,
+        )
         # a first step that is no number would be tried for ever
         going = math.isfinite(getattr(solver, "h_abs", 0.0))
         while going and solver.status == "running" and len(found) < MOST_STEPS:
@@ -239,23 +227,6 @@ def solve(problem: Problem) -> Run:
                 found.append(solver.dense_output())
                 times.append(float(solver.t))
     return Run(times, found, count(), len(problem.initial))
-
-
-def _solver(problem: Problem, right: Any, jacobian: Any) -> Any:
-    """Return SciPy's solver, at the start."""
-    from scipy import integrate as scipy_integrate
-
-    more = {} if problem.kind == "dop853" else {"jac": jacobian}
-    return getattr(scipy_integrate, CLASSES[problem.kind])(
-        right,
-        0.0,
-        problem.initial,
-        problem.end,
-        # SciPy takes its least one where this is less, and warns
-        rtol=problem.tolerance,
-        atol=problem.tolerance * np.array(problem.scale),
-        **more,
-    )
 
 
 def _right_hand_side(

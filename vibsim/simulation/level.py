@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable
+from collections.abc import Collection, Container, Iterable
+from dataclasses import replace
 from itertools import chain, count
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim import plan
+from vibsim.core.array_types import Floats, Integers
 from vibsim.core.record import Attribute, Record, Variable, attributes
 from vibsim.core.vocabulary import HIGHEST
+from vibsim.engine import EventTimes, Extrema, Gathered, Trajectories
 from vibsim.experiment.storage import (
     RUNNING,
     asks_for_peaks,
@@ -19,13 +21,12 @@ from vibsim.experiment.storage import (
     is_bounded,
     stored_series,
 )
-from vibsim.models import BUDGET, ENERGIES, Model, State, centred, has_budget, has_solution
+from vibsim.models import BUDGET, ENERGIES, Model, centred, has_budget, has_solution
 from vibsim.simulation.derived import derived
-from vibsim.simulation.gathered import event_times, extrema, gathered, of_own_steps
 from vibsim.simulation.members import Members, members
 from vibsim.simulation.reference.solve import method, reference
 from vibsim.simulation.scaled import in_scales
-from vibsim.simulation.solution import Solution, has_adaptive, solve
+from vibsim.simulation.solution import has_adaptive, solve
 
 if TYPE_CHECKING:
     import xarray
@@ -33,6 +34,9 @@ if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
 SERIES = ("scheme", "case", "t")
+OUTCOME = SERIES[:2]
+STATUS = ("ok", "non_finite")
+"""Meaning of the variable ``status``."""
 MOST_REFERENCES = 1024
 """Of more members no reference is computed where the exact solution is not known."""
 
@@ -44,13 +48,14 @@ _ENERGY_WORDS = {
     "energy_d2t": "total mechanical energy with [D_2t u] as velocity",
     "energy_deviation_d2t": "deviation of the total energy with [D_2t u] as velocity from its initial value",
 }
-
-
 _BUDGET_WORDS = (
     "energy that damping took since t = 0",
     "work of driving forces since t = 0",
     "deviation of the total energy plus what damping took minus the work of driving forces",
 )
+
+Row = tuple[str, Any, str, str]
+"""Name of a variable, its values, what they are in words, and their unit."""
 
 
 def simulate(experiment: Experiment, level: int, *, threads: int = 1) -> xarray.Dataset:
@@ -93,25 +98,40 @@ def simulate_record(
     steps, every = experiment.steps(level), plan.sampling(experiment, level)
     is_lean, wanted = is_bounded(experiment), stored_series(experiment)
     kept = extrema_kept(steps, len(experiment.schemes) * experiment.members)
-    solution = solve(
+    of_states = {state.name for state in model.states}.union(ENERGIES)
+    of_states |= {output.name for output in model.outputs}
+    found = solve(
         experiment,
         group,
         steps,
         every,
-        threads,
-        with_series=not _of_states(model).issuperset(wanted),
+        threads=threads,
+        with_series=not of_states.issuperset(wanted),
         n_extrema=0 if is_lean and not asks_for_peaks(experiment) else kept,
     )
-    with_d2t = experiment.own_velocity or not is_lean
-    names = [scheme.name for scheme in experiment.schemes]
+    run = found.gathered
+    assert run is not None
+    rows = [*_ranges(model, run), *_peaks(model, run), *_ends(found, group.end, steps)]
+    if experiment.own_velocity or not is_lean:
+        words = "largest absolute deviation of the energy with [D_2t u] as velocity, over every inner step"
+        name = "energy_deviation_d2t_max_abs"
+        rows.append((name, run.deviation_d2t, words, model.energy_unit))
+    outcomes = _table(OUTCOME, rows)
+    status = outcomes["status"]
+    flags: dict[str, Any] = {
+        "flag_values": np.arange(len(STATUS), dtype=np.int8),
+        "flag_meanings": " ".join(STATUS),
+    }
+    outcomes["status"] = replace(status, attrs={**status.attrs, **flags})
+    number = np.arange(0, steps + 1, every, dtype=np.int64)
     variables = {
-        **_series(model, group, solution, steps, every, wanted),
-        **({} if is_lean else _exact(experiment, group, steps, every)),
-        **gathered(model, solution.gathered, solution.last_step, group, steps, with_d2t=with_d2t),
-        **(extrema(model, solution.extrema) if solution.extrema else {}),
-        **(event_times(solution.events) if solution.events else {}),
-        **(of_own_steps(solution.gathered) if has_adaptive(experiment) else {}),
-        **_constants(model, group, steps),
+        **_series(model, group, found, steps, every, wanted),
+        **({} if is_lean else _exact(experiment, group, number, steps)),
+        **outcomes,
+        **(_extrema(model, found.extrema) if found.extrema else {}),
+        **(_table(OUTCOME, _events(found.events)) if found.events else {}),
+        **(_table(OUTCOME, _own_steps(run)) if has_adaptive(experiment) else {}),
+        **_table(("case",), _constants(model, group, steps)),
     }
     attrs: dict[str, Attribute] = {
         "model": model.kind,
@@ -120,34 +140,10 @@ def simulate_record(
         "every": every,
         "storage": "lean" if is_lean else "series",
     }
+    names = [scheme.name for scheme in experiment.schemes]
     coords = coordinates(model, names, group, steps, every, same_end=not experiment.end_varies)
-    coords["level"] = Variable((), np.array(level, dtype=np.int16), attributes("level", "1"))
+    coords |= _table((), [("level", np.array(level, dtype=np.int16), "level", "1")])
     return in_scales(Record(coords, variables, attrs), experiment)
-
-
-def _of_states(model: Model) -> set[str]:
-    """Name the series that follow from the states at the samples alone."""
-    outputs = (output.name for output in model.outputs)
-    return {*(state.name for state in model.states), *ENERGIES, *outputs}
-
-
-def _derived_words(model: Model) -> dict[str, dict[str, Any]]:
-    """Return the attributes of every series that is worked out of the states."""
-    words = dict(_ENERGY_WORDS)
-    if has_budget(model):
-        words |= zip(BUDGET, _BUDGET_WORDS, strict=True)
-    energies = {name: attributes(told, model.energy_unit) for name, told in words.items()}
-    return energies | {row.name: attributes(row.long_name, row.unit) for row in model.outputs}
-
-
-def _units(model: Model) -> dict[str, str]:
-    """Return the unit of every number that can be swept, by dotted key."""
-    states = {f"initial.{state.name}": state.unit for state in model.states}
-    return states | {f"model.{p.key}": p.unit for p in model.parameters} | {"time.end": "s"}
-
-
-def _numbers(steps: int, every: int) -> NDArray[np.int64]:
-    return np.arange(0, steps + 1, every, dtype=np.int64)
 
 
 def coordinates(
@@ -161,26 +157,21 @@ def coordinates(
         Names of the schemes.
     group
         The members; each swept key becomes a coordinate of them.
-    steps, every
-        Number of steps, and the stride of the samples.
     same_end
         Whether all members of the experiment end at the same time, so that ``t`` is a time and no fraction of the end.
     """
-    number = _numbers(steps, every)
+    number = np.arange(0, steps + 1, every, dtype=np.int64)
     t = number * (group.end[0] / steps) if same_end else number / steps
-    words = "time" if same_end else "time as a fraction of the end time"
+    words = ("time", "s") if same_end else ("time as a fraction of the end time", "1")
     coords = {
-        "scheme": Variable(("scheme",), np.array(schemes), attributes("name of the scheme", "1")),
-        "case": Variable(
-            ("case",), group.index, attributes("index of the member of the sweep", "1")
-        ),
-        "t": Variable(
-            ("t",), np.asarray(t, dtype=float), attributes(words, "s" if same_end else "1")
-        ),
+        **_table(("scheme",), [("scheme", np.array(schemes), "name of the scheme", "1")]),
+        **_table(("case",), [("case", group.index, "index of the member of the sweep", "1")]),
+        **_table(("t",), [("t", np.asarray(t, dtype=float), *words)]),
     }
     if not same_end:
-        coords["end"] = Variable(("case",), group.end, attributes("end time of the member", "s"))
-    units = _units(model)
+        coords |= _table(("case",), [("end", group.end, "end time of the member", "s")])
+    units = {f"initial.{state.name}": state.unit for state in model.states}
+    units |= {f"model.{p.key}": p.unit for p in model.parameters} | {"time.end": "s"}
     for key, values in group.columns.items():
         attrs = attributes(f"swept value of {key}", units.get(key, "1"), sweep_key=key)
         coords[_plain_name(key, coords)] = Variable(("case",), values, attrs)
@@ -193,68 +184,73 @@ def _plain_name(key: str, taken: Container[str]) -> str:
     return next(n for n in chain([name], (f"{name}_{i}" for i in count(2))) if n not in taken)
 
 
+def _table(dims: tuple[str, ...], rows: Iterable[Row]) -> dict[str, Variable]:
+    return {
+        name: Variable(dims, values, attributes(words, unit)) for name, values, words, unit in rows
+    }
+
+
 def _series(
     model: Model,
     group: Members,
-    solution: Solution,
+    found: Trajectories,
     steps: int,
     every: int,
-    wanted: Iterable[str],
+    wanted: Collection[str],
 ) -> dict[str, Variable]:
-    names = list(wanted)
-    table = {
-        state.name: Variable(SERIES, solution.states[:, k], _of(state))
+    unit = model.energy_unit
+    rows: list[Row] = [
+        (state.name, found.states[:, k], state.long_name, state.unit)
         for k, state in enumerate(model.states)
-    }
-    if solution.series is not None:
+    ]
+    if found.series is not None:
         velocities = model.states[model.coordinates :]
         for k, (name, velocity) in enumerate(zip(centred(model), velocities, strict=False)):
             words = f"{velocity.long_name} by [D_2t u], the centred difference of the position"
-            values = solution.series.velocities_d2t[:, :, k]
-            table[name] = Variable(SERIES, values, attributes(words, velocity.unit))
+            rows.append((name, found.series.velocities_d2t[:, :, k], words, velocity.unit))
         for name, values in (
-            ("energy_deviation", solution.series.deviation_running),
-            ("energy_deviation_d2t", solution.series.deviation_d2t_running),
+            ("energy_deviation", found.series.deviation_running),
+            ("energy_deviation_d2t", found.series.deviation_d2t_running),
         ):
             words = f"largest absolute {_ENERGY_WORDS[name]}, over every step so far"
-            attrs = attributes(words, model.energy_unit)
-            table[name + RUNNING] = Variable(SERIES, values, attrs)
-        table = {name: variable for name, variable in table.items() if name in names}
-    told = _derived_words(model)
-    worked_out = [name for name in told if name in names]
-    found = derived(model, group, solution, steps, every, worked_out)
-    for name in worked_out:
-        table[name] = Variable(SERIES, found[name], told[name])
-    attrs = attributes("total mechanical energy at t = 0", model.energy_unit)
-    table["energy_initial"] = Variable(("scheme", "case"), found["energy_initial"], attrs)
-    return table
+            rows.append((name + RUNNING, values, words, unit))
+        rows = [row for row in rows if row[0] in wanted]
+    words_of = dict(_ENERGY_WORDS)
+    if has_budget(model):
+        words_of |= zip(BUDGET, _BUDGET_WORDS, strict=True)
+    told = [(name, words, unit) for name, words in words_of.items()]
+    told += [(row.name, row.long_name, row.unit) for row in model.outputs]
+    told = [row for row in told if row[0] in wanted]
+    values_of = derived(model, group, found, steps, every, [name for name, _, _ in told])
+    rows += [(name, values_of[name], words, own_unit) for name, words, own_unit in told]
+    start = values_of["energy_initial"]
+    return {
+        **_table(SERIES, rows),
+        **_table(OUTCOME, [("energy_initial", start, "total mechanical energy at t = 0", unit)]),
+    }
 
 
-def _of(state: State) -> dict[str, Any]:
-    return attributes(state.long_name, state.unit)
-
-
-def _exact(experiment: Experiment, group: Members, steps: int, every: int) -> dict[str, Variable]:
+def _exact(
+    experiment: Experiment, group: Members, number: Integers, steps: int
+) -> dict[str, Variable]:
     """Return the exact states, or a reference for them where they are not known."""
     model = experiment.model.definition
     if model.exact is None:
         few = has_solution(model) and experiment.members <= MOST_REFERENCES
-        return _computed(model, group, _numbers(steps, every) / steps) if few else {}
-    t = _numbers(steps, every) * (group.end / steps)[:, None]
+        return _computed(model, group, number / steps) if few else {}
     exact = model.exact(
-        t,
+        number * (group.end / steps)[:, None],
         {name: values[:, None] for name, values in group.initial.items()},
         {name: values[:, None] for name, values in group.parameters.items()},
     )
-    return {
-        f"{state.name}_exact": Variable(
-            ("case", "t"), exact[state.name], attributes(f"exact {state.long_name}", state.unit)
-        )
-        for state in model.states
-    }
+    rows = (
+        (f"{row.name}_exact", exact[row.name], f"exact {row.long_name}", row.unit)
+        for row in model.states
+    )
+    return _table(("case", "t"), rows)
 
 
-def _computed(model: Model, group: Members, fraction: NDArray[np.float64]) -> dict[str, Variable]:
+def _computed(model: Model, group: Members, fraction: Floats) -> dict[str, Variable]:
     """Return reference solutions with the bounds of their errors; nothing where no member has one."""
     with np.errstate(all="ignore"):
         series, bounds = reference(model, group, fraction)
@@ -270,25 +266,86 @@ def _computed(model: Model, group: Members, fraction: NDArray[np.float64]) -> di
     return table
 
 
-def _constants(model: Model, group: Members, steps: int) -> dict[str, Variable]:
+def _constants(model: Model, group: Members, steps: int) -> Iterable[Row]:
     frequency = np.broadcast_to(model.natural_frequency(group.parameters), group.end.shape)
-    table = {
-        "natural_frequency": (
-            frequency,
-            attributes("angular frequency of small oscillations", "rad s-1"),
-        ),
-        "omega_dt": (
-            frequency * (group.end / steps),
-            attributes("angular frequency of small oscillations times the time step", "1"),
-        ),
-    }
+    words = "angular frequency of small oscillations"
+    yield "natural_frequency", frequency, words, "rad s-1"
+    yield "omega_dt", frequency * (group.end / steps), f"{words} times the time step", "1"
     if model.highest_frequency is not None:
         highest = np.broadcast_to(model.highest_frequency(group.parameters), group.end.shape)
-        table[HIGHEST] = (
-            highest * (group.end / steps),
-            attributes("highest angular frequency of small oscillations times the time step", "1"),
-        )
+        yield HIGHEST, highest * (group.end / steps), f"highest {words} times the time step", "1"
     if model.exact_period is not None:
         period = model.exact_period(group.initial, group.parameters)
-        table["exact_period"] = (np.asarray(period, dtype=float), attributes("exact period", "s"))
-    return {name: Variable(("case",), values, attrs) for name, (values, attrs) in table.items()}
+        yield "exact_period", np.asarray(period, dtype=float), "exact period", "s"
+
+
+def _ranges(model: Model, run: Gathered) -> Iterable[Row]:
+    """Yield what was gathered of states and energies over every step; arrays of shape (scheme, case)."""
+    for k, state in enumerate(model.states):
+        for i, (end, words) in enumerate((("min", "least"), ("max", "largest"))):
+            told = f"{words} {state.long_name} over every step"
+            yield f"{state.name}_{end}", run.ranges[..., k, i], told, state.unit
+        # units of half a second are none that udunits knows
+        for i, (norm, time) in enumerate((("l1", "s"), ("l2", "the square root of s"))):
+            told = f"{norm} norm of the {state.long_name} over every step (times {time})"
+            yield f"{state.name}_{norm}", run.norms[..., k, i], told, state.unit
+    words, unit = "largest absolute energy deviation over every step", model.energy_unit
+    yield "energy_deviation_max_abs", run.deviation, words, unit
+    name = "energy_deviation_max_abs_interior"
+    yield name, run.deviation_interior, f"{words} but the last point", unit
+
+
+def _peaks(model: Model, run: Gathered) -> Iterable[Row]:
+    unit, mean = model.states[0].unit, "mean period over every step"
+    height = "half the height between the last peak and the last trough, interpolated"
+    yield "amplitude", 0.5 * np.abs(run.last_peak - run.last_trough), height, unit
+    yield "first_peak", run.first_peak, "height of the first peak, interpolated", unit
+    yield "last_peak", run.last_peak, "height of the last peak, interpolated", unit
+    words = f"{mean}, interpolated (time of a turn for a member that goes over the top)"
+    yield "period", run.period, words, "s"
+    yield "period_grid", run.period_grid, f"{mean}, between peaks at grid points", "s"
+    yield "period_count", run.period_count, "number of periods in the mean", "1"
+
+
+def _ends(found: Trajectories, end: Floats, steps: int) -> Iterable[Row]:
+    failed = found.last_step < steps
+    yield "status", failed.astype(np.int8), "what became of the member", "1"
+    yield "last_step", found.last_step, "last step with finite values", "1"
+    time = np.where(failed, (found.last_step + 1) * end / steps, np.nan)
+    yield "failure_time", time, "time of the first value that is not finite or too large", "s"
+
+
+def _extrema(model: Model, found: Extrema) -> dict[str, Variable]:
+    """Return the local extrema of the position, and how many there are (vibration text, section 3.5)."""
+    unit, parabola = model.states[0].unit, "on the parabola through three points"
+    table: dict[str, Variable] = {}
+    for kind in ("peak", "trough"):
+        rows = (
+            (f"{kind}_time", f"time of the {kind}s, {parabola}", "s"),
+            (kind, f"height of the {kind}s, {parabola}", unit),
+            (f"{kind}_time_grid", f"time of the {kind}s at grid points", "s"),
+            (f"{kind}_grid", f"height of the {kind}s at grid points", unit),
+        )
+        table |= _table(
+            (*OUTCOME, "extremum"), ((row[0], getattr(found, row[0]), *row[1:]) for row in rows)
+        )
+        name, words = f"{kind}_count", f"number of {kind}s, those that are not kept among them"
+        table |= _table(OUTCOME, [(name, getattr(found, name), words, "1")])
+    return table
+
+
+def _events(found: EventTimes) -> Iterable[Row]:
+    words = "number of events, where the motion is not smooth"
+    yield "event_count", found.event_count, words, "1"
+    yield "first_event_time", found.first_event_time, "time of the first event", "s"
+    yield "last_event_time", found.last_event_time, "time of the last event", "s"
+    words = "time from which the member was at rest to the end"
+    yield "rest_time", found.rest_time, words, "s"
+
+
+def _own_steps(run: Gathered) -> Iterable[Row]:
+    """Yield what adaptive schemes did of their own; NaN where steps are fixed."""
+    words = "of an adaptive scheme, whatever the level"
+    yield "accepted_steps", run.accepted_steps, f"accepted steps {words}", "1"
+    evaluations = f"evaluations of the acceleration {words}, with those for its dense output"
+    yield "force_evaluations_total", run.force_evaluations, evaluations, "1"

@@ -10,18 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim import plan
+from vibsim.core.array_types import Floats, Integers
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Members:
     """The numbers of members start..stop-1; every array has shape (case,)."""
 
-    index: NDArray[np.int64]
+    index: Integers
     columns: Mapping[str, NDArray[Any]]
     """Swept values by dotted key: numbers, or words for options of schemes."""
     parameters: Mapping[str, Floats]
@@ -37,13 +36,7 @@ def members(experiment: Experiment, start: int, stop: int) -> Members:
     if experiment.end_varies and "time.end" not in columns:
         # the end is a number of natural periods, and each member has its own
         end = np.asarray(experiment.natural_end(parameters), dtype=float)
-    return Members(
-        index=np.arange(start, stop, dtype=np.int64),
-        columns=columns,
-        parameters=parameters,
-        initial=initial,
-        end=end,
-    )
+    return Members(np.arange(start, stop, dtype=np.int64), columns, parameters, initial, end)
 
 
 def numbers_of(

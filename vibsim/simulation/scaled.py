@@ -11,7 +11,6 @@ from vibsim.core.record import Record, Variable
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
-
 TIMELESS = "time_units"
 """Attribute of a Record whose times have no unit although it is no scaled one."""
 
@@ -23,14 +22,15 @@ def in_scales(record: Record, experiment: Experiment) -> Record:
     """
     model = experiment.model.definition
     if experiment.scaling is None:
-        return _timeless(record) if model.dimensionless else record
-    units = {state.name: state.unit for state in model.states}
-    units |= {output.name: output.unit for output in model.outputs}
+        timed = ("s", "rad s-1")
+        return _plain(record, {TIMELESS: "1"}, timed) if model.dimensionless else record
+    units = {row.name: row.unit for row in model.states}
+    units |= {row.name: row.unit for row in model.outputs}
     units |= {"t": "s", "energy": model.energy_unit}
-    attrs: dict[str, Any] = dict(record.attrs)
+    attrs: dict[str, Any] = {}
     for name, scale in experiment.scaling.scales.items():
         attrs |= {f"scale_{name}": scale, f"scale_{name}_units": units[name]}
-    return Record(_plain(record.coords), _plain(record.variables), attrs)
+    return _plain(record, attrs)
 
 
 def has_time_unit(record: Record) -> bool:
@@ -38,19 +38,16 @@ def has_time_unit(record: Record) -> bool:
     return not {"scale_t", TIMELESS} & record.attrs.keys()
 
 
-def _timeless(record: Record) -> Record:
-    timed = ("s", "rad s-1")
-    attrs = {**record.attrs, TIMELESS: "1"}
-    return Record(_plain(record.coords, timed), _plain(record.variables, timed), attrs)
+def _plain(record: Record, attrs: Mapping[str, Any], units: Container[str] | None = None) -> Record:
+    """Return a record with more attributes, and unit 1 in place of any other, or of some units."""
 
+    def plain(row: Variable) -> Variable:
+        if "units" not in row.attrs or (units is not None and row.attrs["units"] not in units):
+            return row
+        return replace(row, attrs={**row.attrs, "units": "1"})
 
-def _plain(
-    table: Mapping[str, Variable], units: Container[str] | None = None
-) -> dict[str, Variable]:
-    """Return the variables with unit 1 in place of their own: of any, or of some units."""
-    return {
-        name: replace(row, attrs={**row.attrs, "units": "1"})
-        if "units" in row.attrs and (units is None or row.attrs["units"] in units)
-        else row
-        for name, row in table.items()
-    }
+    coords, variables = (
+        {name: plain(row) for name, row in table.items()}
+        for table in (record.coords, record.variables)
+    )
+    return Record(coords, variables, {**record.attrs, **attrs})

@@ -13,25 +13,15 @@ from vibsim.core.lazy import loader
 
 if TYPE_CHECKING:
     from vibsim.store.atomic import replacing, write_bytes, write_text
-    from vibsim.store.level import Level, open_level
-    from vibsim.store.reading import check, read
-    from vibsim.store.shards import join
+    from vibsim.store.reading import Level, check, join, open_level, read
     from vibsim.store.summary import read_json, write_json
     from vibsim.store.writing import write, write_parts
 
-_HOME = {
-    "Level": "level",
-    "check": "reading",
-    "join": "shards",
-    "open_level": "level",
-    "read": "reading",
-    "read_json": "summary",
-    "replacing": "atomic",
-    "write": "writing",
-    "write_bytes": "atomic",
-    "write_json": "summary",
-    "write_parts": "writing",
-    "write_text": "atomic",
+_NAMES = {
+    "atomic": ("replacing", "write_bytes", "write_text"),
+    "reading": ("Level", "check", "join", "open_level", "read"),
+    "summary": ("read_json", "write_json"),
+    "writing": ("write", "write_parts"),
 }
 
 __all__ = [
@@ -49,5 +39,6 @@ __all__ = [
     "write_text",
 ]
 
-
-__getattr__ = loader(__name__, {name: f"vibsim.store.{home}" for name, home in _HOME.items()})
+__getattr__ = loader(
+    __name__, {name: f"vibsim.store.{home}" for home, names in _NAMES.items() for name in names}
+)

@@ -19,17 +19,9 @@ _BLOCK, _MARGIN = 2**16, 2**22
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give a temporary path to write to; rename it to `path` when the block ends well.
+    """Give a temporary path to write to; rename it to `path`, whose folder is made, when the block ends well.
 
-    Parameters
-    ----------
-    path
-        The target; its folder is created where it is missing.
-
-    Yields
-    ------
-    Path
-        A name of its own in the same folder, so that writers of one target do not meet.
+    It is a name of its own in the same folder, so that writers of one target do not meet.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     _remove_stale(path)
@@ -66,11 +58,6 @@ def check_room(path: Path, size: int) -> None:
 
     Libraries keep the cause to themselves. It is found by writing: at the end that the file was to have, which shows a
     limit of its size, and some more behind what there is, which shows a full disk. The file is of no use afterwards.
-
-    Raises
-    ------
-    OSError
-        With the cause.
     """
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT, 0o644)
     try:

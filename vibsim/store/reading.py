@@ -1,9 +1,15 @@
-"""Records from netCDF files: checked before the library is given a single bit, read whole or by ranges of members."""
+"""Records from netCDF files: checked before the library is given a single bit, read whole or by ranges of members.
+
+All files of one level are read as one, whatever members are in which.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from bisect import bisect_right
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -34,32 +40,24 @@ def read(path: Path, *, digest: str | None = None) -> Record:
         When the file is whole but another job's.
     """
     seal.check(path)
-    with opened(path, digest) as dataset, naming(path):
-        return read_record(dataset)
+    with _opened(path, digest) as dataset, _naming(path):
+        return _record(dataset)
 
 
 def check(path: Path, *, digest: str | None = None) -> None:
     """Raise what `read` would, without keeping anything of the file in memory."""
     seal.check(path)
-    with opened(path, digest):
+    with _opened(path, digest):
         pass
 
 
 @contextmanager
-def opened(path: Path, digest: str | None) -> Iterator[Any]:
-    """Open a file whose seal was checked.
-
-    Raises
-    ------
-    DamagedFileError
-        When the netCDF library cannot read it.
-    StaleFileError
-        When it is another job's.
-    """
-    with naming(path):
+def _opened(path: Path, digest: str | None) -> Iterator[Any]:
+    """Open a file whose seal was checked; raise what `read` does."""
+    with _naming(path):
         dataset = netcdf.opened(path)
     try:
-        with naming(path):
+        with _naming(path):
             dataset.set_auto_maskandscale(False)
             dataset.set_auto_chartostring(False)
             form, job = (getattr(dataset, name, None) for name in ("vibsim_format", "digest"))
@@ -70,7 +68,7 @@ def opened(path: Path, digest: str | None) -> Iterator[Any]:
 
 
 @contextmanager
-def naming(path: Path) -> Iterator[None]:
+def _naming(path: Path) -> Iterator[None]:
     """Turn errors of the netCDF library into one that names the file."""
     try:
         yield
@@ -78,20 +76,10 @@ def naming(path: Path) -> Iterator[None]:
         raise DamagedFileError(path, f"the netCDF library cannot read it: {error}") from error
 
 
-def read_record(
+def _record(
     dataset: Any, cases: slice = slice(None), names: Collection[str] | None = None
 ) -> Record:
-    """Return what an opened file holds.
-
-    Parameters
-    ----------
-    dataset
-        See `opened`.
-    cases
-        Members wanted.
-    names
-        Variables wanted, None for all; coordinates are always there.
-    """
+    """Return what an opened file holds of some members; `names` are the variables wanted, None for all."""
     tables: tuple[dict[str, Variable], dict[str, Variable]] = ({}, {})
     auxiliary = _auxiliary(dataset)
     for name, variable, group in netcdf.variables(dataset):
@@ -135,3 +123,108 @@ def _texts(values: NDArray[Any]) -> NDArray[Any]:
     width = values.shape[-1]
     joined = np.ascontiguousarray(values).view(f"S{width}").reshape(values.shape[:-1])
     return np.char.decode(joined, "utf-8").astype(f"U{width}")
+
+
+@dataclass
+class Level:
+    """The files of a level, in the order of their members; one is open at a time."""
+
+    files: Sequence[tuple[Path, str | None]]
+    borders: Sequence[int]
+    """First member of each file, and the number of all members."""
+    _open: ExitStack = field(default_factory=ExitStack)
+    _number: int = -1
+    _dataset: Any = None
+
+    @property
+    def cases(self) -> int:
+        """Number of members."""
+        return self.borders[-1]
+
+    def read(
+        self, start: int = 0, stop: int | None = None, names: Collection[str] | None = None
+    ) -> Record:
+        """Return members start..stop-1, all by default, with the variables `names`; coordinates are always there."""
+        last = self.cases if stop is None else stop
+        first, final = self._file_of(start), self._file_of(max(start, last - 1))
+        parts = []
+        for number in range(first, final + 1):
+            border = self.borders[number]
+            end = min(last, self.borders[number + 1])
+            wanted = slice(max(start, border) - border, end - border)
+            with _naming(self.files[number][0]):
+                parts.append(_record(self._dataset_of(number), wanted, names))
+        return join(parts)
+
+    def _file_of(self, member: int) -> int:
+        return min(bisect_right(self.borders, member), len(self.files)) - 1
+
+    def _dataset_of(self, number: int) -> Any:
+        if number != self._number:
+            self.close()
+            self._dataset = self._open.enter_context(_opened(*self.files[number]))
+            self._number = number
+        return self._dataset
+
+    def close(self) -> None:
+        """Close the file that is open."""
+        self._open.close()
+        self._number, self._dataset = -1, None
+
+
+@contextmanager
+def open_level(files: Sequence[tuple[Path, str | None]]) -> Iterator[Level]:
+    """Open the files of a level, whose seals were checked before (`vibsim.store.check`).
+
+    Parameters
+    ----------
+    files
+        Path and digest of each, in the order of their members; a file of its own is a level as well.
+
+    Raises
+    ------
+    DamagedFileError, StaleFileError
+        When a file cannot be read, or is another job's.
+    """
+    sizes = []
+    for path, digest in files:
+        with _opened(path, digest) as dataset:
+            sizes.append(len(dataset.dimensions["case"]))
+    level = Level(files, [0, *accumulate(sizes)])
+    try:
+        yield level
+    finally:
+        level.close()
+
+
+def join(records: Sequence[Record]) -> Record:
+    """Return one record of the shards of a level, in the order of their members: side by side along ``case``.
+
+    Raises
+    ------
+    ValueError
+        When they do not belong together: they have other variables, schemes or times.
+    """
+    if len(records) == 1:
+        return records[0]
+    coords = _join([record.coords for record in records])
+    variables = _join([record.variables for record in records])
+    return Record(coords, variables, records[0].attrs)
+
+
+def _join(tables: Sequence[Mapping[str, Variable]]) -> dict[str, Variable]:
+    if any(list(table) != list(tables[0]) for table in tables):
+        raise ValueError("shards of one level hold different variables")
+    return {name: _join_one(name, [table[name] for table in tables]) for name in tables[0]}
+
+
+def _join_one(name: str, parts: Sequence[Variable]) -> Variable:
+    first = parts[0]
+    if any(part.dims != first.dims for part in parts):
+        raise ValueError(f"{name}: shards of one level have different dimensions")
+    if "case" in first.dims:
+        values = np.concatenate([part.values for part in parts], axis=first.dims.index("case"))
+        return Variable(first.dims, values, first.attrs)
+    if any(not np.array_equal(part.values, first.values) for part in parts):
+        raise ValueError(f"{name}: shards of one level differ where they must agree")
+    return first

@@ -21,6 +21,7 @@ _MARK = b"\nvibsim-sha256:"
 LENGTH = len(_MARK) + 64 + 1
 """Size of the seal in bytes."""
 _BLOCK = 1 << 20
+_UNSEALED = "it does not end with a seal: truncated, or not vibsim's"
 
 
 def _seal(path: Path, size: int) -> bytes:
@@ -51,7 +52,7 @@ def stored_digest(path: Path) -> str:
         file.seek(max(path.stat().st_size - LENGTH, 0))
         found = file.read()
     if not found.startswith(_MARK):
-        raise DamagedFileError(path, "it does not end with a seal: truncated, or not vibsim's")
+        raise DamagedFileError(path, _UNSEALED)
     return found[len(_MARK) :].decode().rstrip("\n")
 
 
@@ -61,8 +62,7 @@ def check(path: Path) -> None:
     Raises
     ------
     DamagedFileError
-        When there is no such file, when it has no seal, or when a single bit differs from
-        what was sealed.
+        When there is no such file, it has no seal, or a single bit differs from what was sealed.
     """
     try:
         size = path.stat().st_size - LENGTH
@@ -76,27 +76,16 @@ def check(path: Path) -> None:
         return
     if found.startswith(_MARK):
         raise DamagedFileError(path, "its bytes are not those that were written")
-    raise DamagedFileError(path, "it does not end with a seal: truncated, or not vibsim's")
+    raise DamagedFileError(path, _UNSEALED)
 
 
 def check_job(path: Path, form: Any, digest: str, wanted: str | None) -> None:
-    """Compare what a whole file says of its format and its job with what is wanted.
-
-    Parameters
-    ----------
-    path
-        The file, for the message.
-    form
-        Its ``vibsim_format``, None where it has none.
-    digest
-        Digest of the job that made it.
-    wanted
-        Digest of the job whose result is wanted; None takes any.
+    """Compare what a whole file says of its format (None: nothing) and its job with the digest that is wanted.
 
     Raises
     ------
     StaleFileError
-        When the file is of another format or another job's.
+        When the file is of another format or another job's; a wanted None takes any.
     """
     if form != FORMAT:
         raise StaleFileError(path, f"it is not in vibsim format {FORMAT}")

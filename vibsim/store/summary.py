@@ -16,16 +16,9 @@ from vibsim.store.atomic import write_text
 
 
 def write_json(path: Path, content: Mapping[str, Any], *, digest: str) -> None:
-    """Write `content` to `path` in one step.
+    """Write `content` to `path` in one step, with the digest of the job that made it.
 
-    Parameters
-    ----------
-    path
-        The target.
-    content
-        JSON-able; numbers that JSON lacks (NaN, infinities) become null.
-    digest
-        Digest of the job that made it.
+    Numbers that JSON lacks (NaN, infinities) become null.
     """
     whole = {"vibsim_format": FORMAT, **content, "digest": digest}
     whole.pop("integrity", None)
@@ -37,12 +30,8 @@ def read_json(path: Path, *, digest: str | None = None, name: str | None = None)
 
     Parameters
     ----------
-    path
-        The file.
-    digest
-        Digest of the job whose result is wanted; None takes any.
-    name
-        Collection and name of the experiment whose summary is wanted, with a slash between; None takes any.
+    digest, name
+        Digest of the job, and ``collection/name`` of the experiment, whose summary is wanted; None takes any.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Records as netCDF files: CF conventions, no clock time, the same bytes for the same content.
 
 Series of files of a moderate size are compressed, which saves about half of the space. Everything else is contiguous
-and uncompressed: compression takes ten times as long as writing, which only small data are worth (`_is_packed`). Each
+and uncompressed: compression takes ten times as long as writing, which only small data are worth. Each
 file says which job made it (``digest``) and from what (``provenance``), and ends with a seal over all its bytes.
 """
 
@@ -36,28 +36,9 @@ _OURS = (
 
 
 def write(path: Path, record: Record, *, digest: str, provenance: Mapping[str, Any]) -> None:
-    """Write `record` to the netCDF file `path`, in one step.
-
-    Parameters
-    ----------
-    path
-        The target; the old file stays until the new one is whole.
-    record
-        What to store. Each variable needs a ``long_name``, each but texts and flags also
-        ``units``; the attributes need a ``title``.
-    digest
-        Digest of the job that made the record.
-    provenance
-        What the job used, JSON-able.
-
-    Raises
-    ------
-    ValueError
-        When a name, a unit or the title is missing, or when values have no netCDF type.
-    """
-    write_parts(
-        path, [record], cases=record.sizes.get("case", 0), digest=digest, provenance=provenance
-    )
+    """Write `record` to the netCDF file `path`, in one step; see `write_parts`."""
+    cases = record.sizes.get("case", 0)
+    write_parts(path, [record], cases=cases, digest=digest, provenance=provenance)
 
 
 def write_parts(
@@ -68,27 +49,29 @@ def write_parts(
     digest: str,
     provenance: Mapping[str, Any],
 ) -> None:
-    """Write `parts`, consecutive ranges of members, to one netCDF file, in one step; see `write`.
+    """Write `parts`, consecutive ranges of members, to one netCDF file, in one step.
 
-    The bytes are those that `write` makes of everything at once, whatever the parts.
+    The bytes are those of everything at once, whatever the parts. The old file stays until the new one is whole.
 
     Parameters
     ----------
-    path
-        The target.
     parts
         In the order of their members; asked for one by one. All have the same variables with the same dimensions and
         types. What has no dimension ``case`` is taken from the last part, so that it may be found on the way; the
-        attributes are taken from the first. Texts along ``case`` come in a type that is wide enough for all of them.
+        attributes, which need a ``title``, are taken from the first. Each variable needs a ``long_name``, each but
+        texts and flags also ``units``. Texts along ``case`` come in a type that is wide enough for all of them.
     cases
         Number of members of all parts.
-    digest, provenance
-        As for `write`.
+    digest
+        Digest of the job that made them.
+    provenance
+        What the job used, JSON-able.
 
     Raises
     ------
     ValueError
-        As `write`, and where the parts do not belong together or are not `cases` members.
+        When a name, a unit or the title is missing, when values have no netCDF type, and where the parts do not belong
+        together or are not `cases` members.
     OSError
         Where the file cannot be written, with the cause.
     """
@@ -101,11 +84,13 @@ def write_parts(
                 for number, part in enumerate(parts):
                     if number == 0:
                         _define(dataset, path.name, part, cases, digest, provenance)
-                    start = _put_cases(dataset, part, start)
+                    stop = start + part.sizes.get("case", 0)
+                    _put_all(dataset, part, slice(start, stop))
+                    start = stop
                 if part is None or start != cases:
                     text = f"{path.name}: {start} members where {cases} are to be written"
                     raise ValueError(text)
-                _put_shared(dataset, part)
+                _put_all(dataset, part, None)
         except (OSError, RuntimeError) as error:
             # what raised it may be a part that is worked out here
             if netcdf.is_from_library(error):
@@ -114,22 +99,27 @@ def write_parts(
         seal.attach(temporary)
 
 
+def _rows(record: Record) -> dict[str, Variable]:
+    return {**record.coords, **record.variables}
+
+
 def _size(part: Record | None, cases: int) -> int:
     """Return how many bytes the values take in a file like `part` of `cases` members, at least about."""
     if part is None:
         return 0
     share = cases / max(part.sizes.get("case", cases), 1)
-    values = [*part.coords.values(), *part.variables.values()]
     return sum(
-        round(np.asarray(one.values).nbytes * (share if "case" in one.dims else 1))
-        for one in values
+        round(np.asarray(row.values).nbytes * (share if "case" in row.dims else 1))
+        for row in _rows(part).values()
     )
 
 
 def _global_attributes(
     record: Record, digest: str, provenance: Mapping[str, Any]
 ) -> dict[str, Attribute]:
-    leftover = _leftover(record)
+    # the auxiliary coordinates that belong to no data variable
+    used = {c for n, v in record.variables.items() for c in _auxiliary(record, n, v)}
+    leftover = [n for n, v in record.coords.items() if (n,) != v.dims and n not in used]
     return {
         "Conventions": CONVENTIONS,
         **{name: _plain(value) for name, value in record.attrs.items() if name not in _OURS},
@@ -153,12 +143,6 @@ def _auxiliary(record: Record, name: str, variable: Variable) -> list[str]:
     ]
 
 
-def _leftover(record: Record) -> list[str]:
-    """Name the auxiliary coordinates that belong to no data variable."""
-    used = {c for n, v in record.variables.items() for c in _auxiliary(record, n, v)}
-    return [n for n, v in record.coords.items() if (n,) != v.dims and n not in used]
-
-
 def _define(
     dataset: Any,
     name: str,
@@ -173,14 +157,10 @@ def _define(
     dataset.setncatts(_global_attributes(record, digest, provenance))
     for dim, size in record.sizes.items():
         dataset.createDimension(dim, cases if dim == "case" else size)
-    packed = _is_packed(record, cases)
-    for key, variable in (*record.coords.items(), *record.variables.items()):
+    # what is large is compressed, but not where storage is lean, which many members share
+    packed = record.attrs.get("storage") != "lean" and _size(record, cases) <= PACKED_UP_TO
+    for key, variable in _rows(record).items():
         _define_variable(dataset, key, variable, _auxiliary(record, key, variable), packed)
-
-
-def _is_packed(record: Record, cases: int) -> bool:
-    """Tell whether what is large in a file is compressed: not where storage is lean, which many members share."""
-    return record.attrs.get("storage") != "lean" and _size(record, cases) <= PACKED_UP_TO
 
 
 def _define_variable(
@@ -231,31 +211,18 @@ def _storage(
     }
 
 
-def _put_cases(dataset: Any, part: Record, start: int) -> int:
-    """Write everything along ``case`` for the members from `start` on; return where they stop."""
-    table = {**part.coords, **part.variables}
+def _put_all(dataset: Any, part: Record, cases: slice | None) -> None:
+    """Write everything along ``case`` for some members; None: what all members share."""
+    table = _rows(part)
     if set(table) != {name for name, _, _ in netcdf.variables(dataset)}:
         raise ValueError("parts of one file hold different variables")
-    stop = start + part.sizes.get("case", 0)
     for name, variable in table.items():
-        if "case" in variable.dims:
-            _put(dataset[_path(name, variable)], name, variable, slice(start, stop))
-    return stop
+        if ("case" in variable.dims) == (cases is not None):
+            path = f"{variable.group}/{name}" if variable.group else name
+            _put(dataset[path], name, variable, cases)
 
 
-def _put_shared(dataset: Any, part: Record) -> None:
-    """Write everything that all members share."""
-    for name, variable in (*part.coords.items(), *part.variables.items()):
-        if "case" not in variable.dims:
-            _put(dataset[_path(name, variable)], name, variable, slice(None))
-
-
-def _path(name: str, variable: Variable) -> str:
-    """Return the path of a variable in a file."""
-    return f"{variable.group}/{name}" if variable.group else name
-
-
-def _put(target: Any, name: str, variable: Variable, cases: slice) -> None:
+def _put(target: Any, name: str, variable: Variable, cases: slice | None) -> None:
     values = np.asarray(variable.values)
     dims = target.dimensions
     if values.dtype.kind in "UO":

@@ -1,13 +1,15 @@
-r"""The step of a scheme on ``u'' + w^2 u = 0``, applied to unit vectors: any scheme, any kind of number.
+r"""The step of a scheme on ``u'' + g w u' + w^2 u = 0``, applied to unit vectors: any scheme, any kind of number.
 
-Time is counted in steps, so that dt = 1 and the acceleration is ``-p^2 u`` with ``p = w dt``; velocities are ``v dt``.
-The functions of the scheme itself run, on numbers that have ``+ - * /``, ``abs`` and comparisons: twice the precision
-(`vibsim.theory.doubled`), bounds of rounding (`vibsim.theory.rounding`), or functions of p
-(`vibsim.theory.symbolic`). Coefficients that are formulas enter as formulas, not as the floats they were rounded to.
+Time is counted in steps, so that dt = 1 and the acceleration is ``-p^2 u - g p v`` with ``p = w dt``; velocities are
+``v dt``. The functions of the scheme itself run, on numbers that have ``+ - * /``: twice the precision
+(`vibsim.theory.doubled`), bounds of rounding (`vibsim.theory.rounding`), series in p (`vibsim.theory.laurent`), or
+functions of p (`vibsim.theory.symbolic`). Coefficients that are formulas enter as formulas, not as the floats they were
+rounded to.
 """
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal, localcontext
@@ -23,10 +25,13 @@ from vibsim.schemes.code_generation import exact_names
 
 Reader = Callable[[str], Any]
 """Makes a number of the formula of a coefficient."""
+Substitutes = Mapping[Callable[..., Any], Callable[..., Any]]
+"""What runs in place of functions that a step calls."""
 
 _DIGITS = 60
 _ROOT = ELEMENTARY["sqrt"].full
 """The one elementary function that steps call; no coefficients are in it."""
+_NONE: Substitutes = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -44,7 +49,7 @@ class UnitSteps:
 
 
 @lru_cache(maxsize=256)
-def carried(stepper: Stepper) -> int:
+def _carried(stepper: Stepper) -> int:
     """Return how many numbers make a state."""
     start = handed(stepper.start, lambda u, v, t, q: 0.0, lambda u, v, t, q: (0.0, 0.0))
     return len(start(stepper.variant, 0.0, 0.0, 1.0, ()))
@@ -55,8 +60,10 @@ def unit_steps(
     p: Any,
     zero: Any,
     read: Reader,
-    square: Any = None,
     *,
+    square: Any = None,
+    damping: Any = None,
+    substitutes: Substitutes = _NONE,
     with_start: bool = True,
 ) -> UnitSteps:
     """Return what a step and the start make of unit vectors.
@@ -67,27 +74,29 @@ def unit_steps(
         ``w dt``, in the kind of number that is wanted.
     zero
         Nothing, of that kind and shape.
-    read
-        Makes such a number of a formula.
     square
         ``p^2``, where it is more than the product.
+    damping
+        g, of that kind; None for none.
     with_start
         Whether the start is wanted too.
     """
     one = zero + 1.0
     force, push = stepper.scaling(p) if stepper.scaling else (one, one)
     stiffness = (p * p if square is None else square) * force
+    rate = 0.0 if damping is None else damping * p
 
     def acceleration(u: Any, v: Any, t: Any, q: Any) -> Any:
-        return -(stiffness * u)
+        return -(stiffness * u) if damping is None else -(stiffness * u + rate * force * v)
 
     def slopes(u: Any, v: Any, t: Any, q: Any) -> tuple[Any, Any]:
         return -stiffness, zero
 
     def bound(function: Callable[..., Any]) -> Callable[..., Any]:
-        return handed(rebound(function, read), acceleration, slopes)
+        own = rebound(function, read, substitutes)
+        return handed(own, acceleration, slopes, lambda u, v, t, q: rate)
 
-    size = range(carried(stepper))
+    size = range(_carried(stepper))
     units = [tuple(one if i == j else zero for i in size) for j in size]
     step = bound(stepper.step)
     steps = [step(unit, zero, one, ()) for unit in units]
@@ -105,19 +114,11 @@ def unit_steps(
 
 
 def rebound(
-    function: Callable[..., Any],
-    read: Reader,
-    others: Mapping[Callable[..., Any], Callable[..., Any]] = MappingProxyType({}),
+    function: Callable[..., Any], read: Reader, substitutes: Substitutes = _NONE
 ) -> Callable[..., Any]:
-    """Return a function whose named coefficients are numbers made by `read`, in all that it calls as well.
-
-    Parameters
-    ----------
-    others
-        What takes the place of functions that it calls.
-    """
-    if function in others:
-        return others[function]
+    """Return a function whose named coefficients are numbers made by `read`, in all that it calls as well."""
+    if function in substitutes:
+        return substitutes[function]
     if not isinstance(function, FunctionType):
         return function
     formulas = exact_names(function)
@@ -126,7 +127,7 @@ def rebound(
         if name in formulas:
             known[name] = read(formulas[name])
         elif isinstance(known.get(name), FunctionType):
-            known[name] = rebound(known[name], read, others)
+            known[name] = rebound(known[name], read, substitutes)
     copy = FunctionType(
         function.__code__, known, function.__name__, function.__defaults__, function.__closure__
     )
@@ -145,17 +146,45 @@ def reads(stepper: Stepper) -> set[str]:
 @lru_cache(maxsize=1024)
 def decimal(formula: str) -> Decimal:
     """Return the value of a formula to 60 digits."""
+
+    def quotient(value: Fraction) -> Decimal:
+        return Decimal(value.numerator) / Decimal(value.denominator)
+
     with localcontext() as context:
         context.prec = _DIGITS
-        value: Decimal = exact(formula, _quotient, lambda x, y: x**y)
+        value: Decimal = exact(formula, quotient, lambda x, y: x ** quotient(y))
         return +value
 
 
-def _quotient(value: Fraction) -> Decimal:
-    return Decimal(value.numerator) / Decimal(value.denominator)
+def exact(
+    formula: str, number: Callable[[Fraction], Any], power: Callable[[Any, Fraction], Any]
+) -> Any:
+    """Return the value of a coefficient in numbers of any kind, as `value_of`.
+
+    Raises
+    ------
+    ValueError
+        Where the formula has more in it than ``+ - * / **`` and ``sqrt``.
+    """
+    try:
+        return value_of(parse(formula, ()), number, power, {})
+    except ValueError:
+        raise ValueError(
+            f"coefficient {formula} is not algebraic, so theory cannot be exact"
+        ) from None
 
 
-def exact(formula: str, number: Callable[[Fraction], Any], power: Callable[[Any, Any], Any]) -> Any:
+_OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = MappingProxyType(
+    {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
+)
+
+
+def value_of(
+    node: Expression,
+    number: Callable[[Fraction], Any],
+    power: Callable[[Any, Fraction], Any],
+    names: Mapping[str, Any],
+) -> Any:
     """Return the value of a formula in numbers of any kind.
 
     Parameters
@@ -163,36 +192,32 @@ def exact(formula: str, number: Callable[[Fraction], Any], power: Callable[[Any,
     number
         Makes such a number of a fraction. A decimal of the formula stands for itself, not for the nearest float.
     power
-        Raises one to another.
+        Raises one to a power, which is a constant of the formula.
+    names
+        Numbers for the names of the formula.
 
     Raises
     ------
     ValueError
-        Where the formula has more in it than ``+ - * / **`` and ``sqrt``.
+        Where the formula has more in it than ``+ - * / **``, ``sqrt`` and ``abs``.
     """
 
     def value(node: Expression) -> Any:
         match node:
-            case Number(number_value):
-                return number(Fraction(repr(float(number_value))))
+            case Number(constant):
+                return number(Fraction(repr(float(constant))))
+            case Name(name) if name in names:
+                return names[name]
             case Negate(operand):
                 return -value(operand)
-            case Binary("+", left, right):
-                return value(left) + value(right)
-            case Binary("-", left, right):
-                return value(left) - value(right)
-            case Binary("*", left, right):
-                return value(left) * value(right)
-            case Binary("/", left, right):
-                return value(left) / value(right)
-            case Binary("**", left, right):
-                return power(value(left), value(right))
+            case Binary("**", base, exponent):
+                return power(value(base), value_of(exponent, Fraction, operator.pow, {}))
+            case Binary(sign, left, right) if sign in _OPERATORS:
+                return _OPERATORS[sign](value(left), value(right))
             case Call("sqrt", (operand,)):
-                return power(value(operand), number(Fraction(1, 2)))
-            case Call() | Name():
-                raise ValueError(
-                    f"coefficient {formula} is not algebraic, so theory cannot be exact"
-                )
-        raise ValueError(f"coefficient {formula} is no formula of numbers")
+                return power(value(operand), Fraction(1, 2))
+            case Call("abs", (operand,)):
+                return abs(value(operand))
+        raise ValueError("a formula with more than + - * /, powers, roots and abs")
 
-    return value(parse(formula, ()))
+    return value(node)

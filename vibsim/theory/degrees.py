@@ -24,8 +24,14 @@ from typing import Any
 from vibsim.models.base import Model
 from vibsim.schemes.base import Stepper
 from vibsim.theory.laurent import Laurent
-from vibsim.theory.polynomial import Course, Forces, numbers, symbols
-from vibsim.theory.rational import is_rational, restoring
+from vibsim.theory.polynomial import (
+    Course,
+    Forces,
+    is_rational,
+    restoring,
+    with_numbers,
+    with_symbols,
+)
 
 HIGHEST = 8
 """Degree at which the search ends."""
@@ -90,7 +96,13 @@ def reproduces(stepper: Stepper, model: Model, degree: int) -> bool:
         Where the formulas of the model are no rational ones (`applies`).
     """
     _refuse(model)
-    return _follows(Course(stepper, model, degree, numbers(stepper, model, degree, KNOWN)))
+    course = with_numbers(stepper, model, degree, KNOWN)
+    state, t = course.start(), course.dt
+    for _ in range(STEPS):
+        if (state[0] - course.solution(0, t)).leading is not None:
+            return False
+        state, t = course.step(state, t), t + course.dt
+    return True
 
 
 @lru_cache(maxsize=256)
@@ -104,19 +116,13 @@ def exact_degree(stepper: Stepper, model: Model) -> int:
 def miss(stepper: Stepper, model: Model, degree: int) -> Miss:
     """Return what the first step and every further one are off by, on polynomials of a degree."""
     _refuse(model)
-    course = Course(stepper, model, degree, numbers(stepper, model, degree, KNOWN))
+    course = with_numbers(stepper, model, degree, KNOWN)
     first, step = (_residual(course, off) for off in (_first, _step))
-    return Miss(degree, first, step, _cause(course) if step is not None else "")
-
-
-def _follows(course: Course) -> bool:
-    """Tell whether the computed positions lie on the polynomial."""
-    state, t = course.start(), course.dt
-    for _ in range(STEPS):
-        if (state[0] - course.solution(0, t)).leading is not None:
-            return False
-        state, t = course.step(state, t), t + course.dt
-    return True
+    if step is None:
+        return Miss(degree, first, step, "")
+    acting = (forces for forces in Forces if _is_off(_step(replace(course, forces=forces))))
+    cause = next((CAUSES[forces] for forces in acting), "")
+    return Miss(degree, first, step, cause)
 
 
 Off = Callable[[Course], tuple[Laurent, ...]]
@@ -129,27 +135,39 @@ def _first(course: Course) -> tuple[Laurent, ...]:
 
 def _step(course: Course) -> tuple[Laurent, ...]:
     """Return what a step from the polynomial at time t is off by."""
-    t = course.setting.named("t")
+    t = course.names["t"]
     return _less(course.step(course.state(t), t), course.state(t + course.dt))
+
+
+def _less(state: tuple[Any, ...], exact: tuple[Any, ...]) -> tuple[Laurent, ...]:
+    return tuple(a - b for a, b in zip(state, exact, strict=True))
+
+
+def _is_off(state: tuple[Laurent, ...]) -> bool:
+    return any(x.leading is not None for x in state)
 
 
 def _residual(course: Course, off: Off) -> Residual | None:
     """Return the first term of the first number of a state that is off; its power from a point, the rest in symbols."""
-    found = ((i, x, _power(x)) for i, x in enumerate(off(course)))
-    index, number, power = next((row for row in found if row[2] is not None), (0, None, None))
-    if number is None or power is None:
-        return None
-    known = power + 1 + (KNOWN - number.end)
-    setting = symbols(course.stepper, course.model, course.degree, known)
-    exact = off(replace(course, setting=setting))[index].at(power)
-    return Residual(OF[min(index, 2)], power, _readable(exact))
+    for index, number in enumerate(off(course)):
+        # terms that are no rounding of a scheme's coefficients
+        powers = (
+            k
+            for k in range(number.first, number.end)
+            if abs(number.field.value(number.at(k))) > ROUNDED
+        )
+        power = next(powers, None)
+        if power is not None:
+            known = power + 1 + (KNOWN - number.end)
+            symbolic = with_symbols(course.stepper, course.model, course.degree, known)
+            return Residual(OF[min(index, 2)], power, _readable(off(symbolic)[index].at(power)))
+    return None
 
 
-def _power(number: Laurent) -> int | None:
-    """Return the power of the first term that is no rounding of a scheme's coefficients."""
-    value = number.field.value
-    powers = range(number.first, number.end)
-    return next((k for k in powers if abs(value(number.at(k))) > ROUNDED), None)
+def _readable(element: Any) -> Any:
+    from sympy import factor
+
+    return factor(element.as_expr())
 
 
 def fitted_force(stepper: Stepper, model: Model, degree: int) -> Any:
@@ -167,42 +185,15 @@ def fitted_force(stepper: Stepper, model: Model, degree: int) -> Any:
     ValueError
         Where no such force does it.
     """
-    _refuse(model)
-    course = Course(stepper, model, degree, symbols(stepper, model, degree, KNOWN))
-    one = course.setting.field.constant(1.0)
-    before, ahead = (_step(replace(course, fitted=x))[0] for x in (one - one, one))
-    fitted = -before / (ahead - before)
-    fits = replace(course, fitted=fitted)
-    if any(x.leading is not None for x in (*_first(course), *_step(fits))) or _ends_late(fitted):
-        raise ValueError(f"no force at the inner points makes degree {degree} exact")
-    return _polynomial(fitted)
-
-
-def _ends_late(number: Laurent) -> bool:
-    """Tell whether a series goes on in the second half of what is known of it."""
-    half = [number.at(k) for k in range(number.end // 2, number.end)]
-    return any(half)
-
-
-def _polynomial(number: Laurent) -> Any:
     from sympy import Symbol
 
-    dt = Symbol("dt")
-    return sum(number.at(k).as_expr() * dt**k for k in range(number.first, number.end))
-
-
-def _readable(element: Any) -> Any:
-    from sympy import factor
-
-    return factor(element.as_expr())
-
-
-def _less(state: tuple[Any, ...], exact: tuple[Any, ...]) -> tuple[Laurent, ...]:
-    return tuple(a - b for a, b in zip(state, exact, strict=True))
-
-
-def _cause(course: Course) -> str:
-    for forces in Forces:
-        if any(x.leading is not None for x in _step(replace(course, forces=forces))):
-            return CAUSES[forces]
-    return ""
+    _refuse(model)
+    course = with_symbols(stepper, model, degree, KNOWN)
+    before, ahead = (_step(replace(course, fitted=x))[0] for x in (0.0, 1.0))
+    fitted = -before / (ahead - before)
+    fits = not _is_off((*_first(course), *_step(replace(course, fitted=fitted))))
+    # it must not go on in the second half of what is known of it
+    if not fits or any(fitted.at(k) for k in range(fitted.end // 2, fitted.end)):
+        raise ValueError(f"no force at the inner points makes degree {degree} exact")
+    powers = range(fitted.first, fitted.end)
+    return sum(fitted.at(k).as_expr() * Symbol("dt") ** k for k in powers)

@@ -17,9 +17,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from vibsim.core.array_types import Floats
 
 
 def second_difference(u: ArrayLike, dt: Any) -> Floats:

@@ -9,25 +9,23 @@ by D. E. Knuth, The Art of Computer Programming, volume 2, section 4.2.2.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from vibsim.core.array_types import Floats
+from vibsim.theory.arithmetic import Arithmetic
 
 _SPLITTER = 2.0**27 + 1.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Doubled:
-    """An array of numbers ``high + low``, for the arithmetic of the step of a scheme.
-
-    A comparison answers for the array as a whole: ``>`` and ``>=`` whether any number is larger, ``<`` and ``<=``
-    whether every one is smaller. A loop that goes on while a correction is large goes on until none is.
-    """
+class Doubled(Arithmetic):
+    """An array of numbers ``high + low``."""
 
     high: Floats
     low: Floats
@@ -44,66 +42,56 @@ class Doubled:
     def __neg__(self) -> Doubled:
         return Doubled(-self.high, -self.low)
 
-    def __pos__(self) -> Doubled:
-        return self
-
-    def __sub__(self, other: Any) -> Doubled:
-        return self + -doubled(other)
-
-    def __rsub__(self, other: Any) -> Doubled:
-        return doubled(other) + -self
-
     def __mul__(self, other: Any) -> Doubled:
         b = doubled(other)
-        product, rest = _two_product(self.high, b.high)
-        return Doubled(*_fast_two_sum(product, rest + (self.high * b.low + self.low * b.high)))
+        total, rest = _two_product(self.high, b.high)
+        return Doubled(*_fast_two_sum(total, rest + (self.high * b.low + self.low * b.high)))
 
     def __truediv__(self, other: Any) -> Doubled:
         b = doubled(other)
         first = self.high / b.high
-        rest = self - b * first
+        rest: Doubled = self - b * first
         second = rest.high / b.high
         rest = rest - b * second
         return Doubled(*_fast_two_sum(first, second)) + rest.high / b.high
 
-    def __rtruediv__(self, other: Any) -> Doubled:
-        return doubled(other) / self
-
-    __radd__ = __add__
-    __rmul__ = __mul__
+    def __matmul__(self, other: Doubled) -> Doubled:
+        """Return the product of matrices, shapes (..., i, k) and (..., k, j)."""
+        total = self[..., :, 0, None] * other[..., None, 0, :]
+        for k in range(1, self.shape[-1]):
+            total = total + self[..., :, k, None] * other[..., None, k, :]
+        return total
 
     def __abs__(self) -> Doubled:
         sign = np.where(self.high < 0, -1.0, 1.0)
-        return Doubled(self.high * sign, self.low * sign)
-
-    def __gt__(self, other: Any) -> bool:
-        return bool(np.any((self - other).high > 0))
-
-    def __ge__(self, other: Any) -> bool:
-        return bool(np.any((self - other).high >= 0))
-
-    def __lt__(self, other: Any) -> bool:
-        return bool(np.all((self - other).high < 0))
-
-    def __le__(self, other: Any) -> bool:
-        return bool(np.all((self - other).high <= 0))
+        return self.mapped(lambda x: x * sign)
 
     def __getitem__(self, index: Any) -> Doubled:
         return Doubled(self.high[index], self.low[index])
+
+    @staticmethod
+    def lift(other: Any) -> Doubled:
+        """Return a number of any kind that `doubled` takes."""
+        return doubled(other)
+
+    @property
+    def nearest(self) -> Floats:
+        """The larger parts, which have the signs of the numbers."""
+        return self.high
+
+    @property
+    def rounded(self) -> Floats:
+        """The nearest floats."""
+        return self.high + self.low
 
     @property
     def shape(self) -> tuple[int, ...]:
         """The shape of the array."""
         return self.high.shape
 
-    def swapped(self) -> Doubled:
-        """Return an array of matrices with rows for columns."""
-        return Doubled(np.swapaxes(self.high, -1, -2), np.swapaxes(self.low, -1, -2))
-
-    @property
-    def rounded(self) -> Floats:
-        """The nearest floats."""
-        return self.high + self.low
+    def mapped(self, function: Callable[[Floats], Any]) -> Doubled:
+        """Return what a function that rounds nothing makes of both parts."""
+        return Doubled(function(self.high), function(self.low))
 
 
 def doubled(value: Any) -> Doubled:
@@ -122,21 +110,14 @@ def product(a: ArrayLike, b: ArrayLike) -> Doubled:
     return Doubled(*_two_product(np.asarray(a, dtype=float), np.asarray(b, dtype=float)))
 
 
-def stacked(numbers: Any, shape: tuple[int, ...]) -> Doubled:
-    """Return numbers as one array with an axis for them behind those of `shape`."""
+def stacked(numbers: Sequence[Any], shape: tuple[int, ...], axis: int = -1) -> Doubled:
+    """Return numbers as one array, each broadcast to a shape, with an axis for them."""
     parts = [doubled(number) for number in numbers]
+    highs, lows = [part.high for part in parts], [part.low for part in parts]
     return Doubled(
-        np.stack([np.broadcast_to(part.high, shape) for part in parts], axis=-1),
-        np.stack([np.broadcast_to(part.low, shape) for part in parts], axis=-1),
+        np.stack([np.broadcast_to(x, shape) for x in highs], axis=axis),
+        np.stack([np.broadcast_to(x, shape) for x in lows], axis=axis),
     )
-
-
-def matmul(a: Doubled, b: Doubled) -> Doubled:
-    """Return the product of matrices, shapes (..., i, k) and (..., k, j)."""
-    total = a[..., :, 0, None] * b[..., None, 0, :]
-    for k in range(1, a.shape[-1]):
-        total = total + a[..., :, k, None] * b[..., None, k, :]
-    return total
 
 
 def root(x: Doubled) -> Doubled:
@@ -144,8 +125,8 @@ def root(x: Doubled) -> Doubled:
     positive = x.high > 0
     first = np.sqrt(np.where(positive, x.high, 1.0))
     rest = x - product(first, first)
-    better = doubled(first) + rest.high / (2.0 * first)
-    return Doubled(np.where(positive, better.high, 0.0), np.where(positive, better.low, 0.0))
+    better: Doubled = doubled(first) + rest.high / (2.0 * first)
+    return better.mapped(lambda part: np.where(positive, part, 0.0))
 
 
 def _two_sum(a: Floats, b: Floats) -> tuple[Floats, Floats]:

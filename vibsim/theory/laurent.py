@@ -1,54 +1,72 @@
-r"""Series in the time step dt with exact coefficients, as numbers that the step of a scheme can run on.
+r"""Series in the time step with exact coefficients, as numbers that the step of a scheme can run on.
 
-``c_k dt^k + c_(k+1) dt^(k+1) + ...`` from any whole k, also below 0, with coefficients in a field of SymPy: rational
+``c_k h^k + c_(k+1) h^(k+1) + ...`` from any whole k, also below 0, with coefficients in a domain of SymPy: rational
 numbers, those with roots, or quotients of polynomials in symbols. A series knows how far it is known, and no operation
 claims more. Of a comparison only a sign is asked, for which `Field.value` gives the first coefficient at one point.
+SymPy is imported on first use.
+
+The equation of an implicit step is solved by what Newton's method stands for: ``x = a(u + d_u x, v + d_v x, t)`` is put
+into itself until x stays. The factors d_u and d_v begin with h, or the force does, so that every turn settles one more
+power, and the series is the one solution near the present acceleration.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import lru_cache
 from typing import Any
 
-from vibsim.theory import series
+from vibsim.elementary import ELEMENTARY
+from vibsim.schemes.base import Stepper
+from vibsim.schemes.newton import solved, solved_together
+from vibsim.theory.arithmetic import Arithmetic
+from vibsim.theory.basis import exact, reads
+
+HALF = Fraction(1, 2)
 
 
 @dataclass(frozen=True, eq=False)
 class Field:
     """Where coefficients lie."""
 
-    number: Callable[[Fraction], Any]
-    """Makes an element of a fraction."""
-    value: Callable[[Any], float]
-    """The value of an element, of one with symbols at one point."""
+    domain: Any
+    """Of SymPy."""
     known: int
-    """Power of dt from which on every series is cut off."""
+    """Power of h from which on every series is cut off."""
+    at_point: Callable[[Any], float] | None = None
+    """The value of an element with symbols, at one point."""
 
-    @cached_property
-    def zero(self) -> Any:
-        """The element 0."""
-        return self.number(Fraction(0))
+    def number(self, fraction: Fraction) -> Any:
+        """Return the element that a fraction is."""
+        return self.domain.convert(fraction.numerator) / self.domain.convert(fraction.denominator)
+
+    def value(self, element: Any) -> float:
+        """Return the value of an element, of one with symbols at one point."""
+        return (self.at_point or self._float)(element)
 
     def series(self, element: Any, power: int = 0) -> Laurent:
-        """Return ``element dt^power``, known as far as series are."""
-        zeros = [self.zero] * (self.known - power - 1)
-        return Laurent(self, power, [element, *zeros])
+        """Return ``element h^power``, known as far as series are."""
+        return Laurent(self, power, [element, *[self.domain.zero] * (self.known - power - 1)])
 
-    def constant(self, number: Any) -> Laurent:
+    def constant(self, number: float | Fraction) -> Laurent:
         """Return a number of a step's text; a float is the decimal that it was written as."""
-        return self.series(self.number(Fraction(repr(float(number)))))
+        is_exact = isinstance(number, Fraction)
+        return self.series(self.number(Fraction(number if is_exact else repr(float(number)))))
+
+    def _float(self, element: Any) -> float:
+        return float(self.domain.to_sympy(element))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Laurent:
+class Laurent(Arithmetic):
     """A series; the number of its coefficients says how far it is known."""
 
     field: Field
     first: int
-    """Power of dt that the first coefficient belongs to."""
+    """Power of h that the first coefficient belongs to."""
     coefficients: Sequence[Any]
 
     @property
@@ -62,30 +80,37 @@ class Laurent:
         found = ((self.first + k, c) for k, c in enumerate(self.coefficients) if c)
         return next(found, None)
 
+    @property
+    def nearest(self) -> float:
+        """A number with the sign of the series for small h."""
+        return 0.0 if self.leading is None else self.field.value(self.leading[1])
+
     def at(self, power: int) -> Any:
         """Return the coefficient of a known power."""
         index = power - self.first
-        return self.coefficients[index] if index >= 0 else self.field.zero
+        return self.coefficients[index] if index >= 0 else self.field.domain.zero
+
+    def lift(self, other: Any) -> Laurent:
+        """Return a number as a series."""
+        return other if isinstance(other, Laurent) else self.field.constant(other)
+
+    def shifted(self, power: int) -> Laurent:
+        """Return the series times a power of h."""
+        return Laurent(self.field, self.first + power, self.coefficients)
 
     def __add__(self, other: Any) -> Laurent:
-        given = self._same(other)
+        given = self.lift(other)
         first, end = min(self.first, given.first), min(self.end, given.end)
         return Laurent(self.field, first, [self.at(k) + given.at(k) for k in range(first, end)])
 
     def __neg__(self) -> Laurent:
         return Laurent(self.field, self.first, [-c for c in self.coefficients])
 
-    def __sub__(self, other: Any) -> Laurent:
-        return self + -self._same(other)
-
-    def __rsub__(self, other: Any) -> Laurent:
-        return self._same(other) - self
-
     def __mul__(self, other: Any) -> Laurent:
-        given = self._same(other)
+        given = self.lift(other)
         first = self.first + given.first
         length = min(len(self.coefficients), len(given.coefficients), self.field.known - first)
-        product = [self.field.zero] * length
+        product = [self.field.domain.zero] * length
         for i, a in enumerate(self.coefficients[:length]):
             for j, b in enumerate(given.coefficients[: length - i] if a else ()):
                 if b:
@@ -93,50 +118,107 @@ class Laurent:
         return Laurent(self.field, first, product)
 
     def __truediv__(self, other: Any) -> Laurent:
-        return self * self._same(other)._inverse()
+        divisor = self.lift(other)
+        if divisor.leading is None:
+            raise ZeroDivisionError("a series divided by one of which no term is known")
+        power, zero = divisor.leading[0], self.field.domain.zero
+        b = [divisor.at(k) for k in range(power, divisor.end)]
+        inverse = [self.field.domain.one / b[0]]
+        for k in range(1, len(b)):
+            known = sum((inverse[i] * b[k - i] for i in range(k) if b[k - i]), zero)
+            inverse.append(-known / b[0])
+        return self * Laurent(self.field, -power, inverse)
 
-    def __rtruediv__(self, other: Any) -> Laurent:
-        return self._same(other) / self
-
-    __radd__ = __add__
-    __rmul__ = __mul__
-
-    def __pow__(self, exponent: int) -> Laurent:
-        result = self._same(1.0)
-        for _ in range(exponent):
-            result = result * self
-        return result
-
-    def __abs__(self) -> Laurent:
-        return -self if self._sign() < 0.0 else self
-
-    def root(self) -> Laurent:
-        """Return the square root of a series that begins with 1.
+    def __pow__(self, exponent: int | Fraction) -> Laurent:
+        """Return a power, whole or of a series that begins with 1, by Miller's recurrence.
 
         Raises
         ------
         ValueError
-            Where it begins with something else.
+            Where the power is not whole, and the series begins with something else.
         """
-        one = self.field.number(Fraction(1))
-        if self.leading != (0, one):
+        if exponent >= 0 and exponent == int(exponent):
+            return math.prod([self] * int(exponent), start=self.lift(1.0))
+        domain = self.field.domain
+        if self.leading != (0, domain.one):
             raise ValueError("the root of a series is taken where it begins with 1")
-        known = [self.at(k) for k in range(self.end)]
-        half = self.field.number(Fraction(1, 2))
-        return Laurent(self.field, 0, series.power(known, half))
+        a, e = [self.at(k) for k in range(self.end)], self.field.number(Fraction(exponent))
+        result = [domain.one]
+        for k in range(1, len(a)):
+            terms = (
+                (e * j - domain.one * (k - j)) * a[j] * result[k - j]
+                for j in range(1, k + 1)
+                if a[j]
+            )
+            result.append(sum(terms, domain.zero) / k)
+        return Laurent(self.field, 0, result)
 
-    def _sign(self) -> float:
-        leading = self.leading
-        return 0.0 if leading is None else self.field.value(leading[1])
+    def __abs__(self) -> Laurent:
+        return -self if self.nearest < 0.0 else self
 
-    def _same(self, other: Any) -> Laurent:
-        return other if isinstance(other, Laurent) else self.field.constant(other)
+    def logarithm(self) -> Laurent:
+        """Return the logarithm of a series that begins with 1, from ``a L' = a'``."""
+        slope = Laurent(self.field, 0, [self.at(k) * k for k in range(1, self.end)]) / self
+        return Laurent(self.field, 1, [c / k for k, c in enumerate(slope.coefficients, 1)])
 
-    def _inverse(self) -> Laurent:
-        leading = self.leading
-        if leading is None:
-            raise ZeroDivisionError("a series divided by one of which no term is known")
-        power, length = leading[0], self.end - leading[0]
-        divisor = [self.at(power + k) for k in range(length)]
-        one = [self.field.number(Fraction(1)), *[self.field.zero] * (length - 1)]
-        return Laurent(self.field, -power, series.over(one, divisor))
+    def square_of_angle(self) -> Laurent:
+        """Return the square of an angle with this cosine, 1 at h = 0: ``sum 2 (2 y)^k/(k^2 C(2k, k))``, y = 1 - cos."""
+        y: Laurent = 1.0 - self
+        power, total, k = y, y * 2.0, 1
+        while power.leading is not None:
+            k, power = k + 1, power * y
+            total = total + power * Fraction(2 ** (k + 1), k * k * math.comb(2 * k, k))
+        return total
+
+
+@lru_cache(maxsize=64)
+def coefficients(stepper: Stepper) -> tuple[Any, Mapping[str, Any]]:
+    """Return the least domain with all coefficients of a scheme, and the element of it that each formula is.
+
+    Raises
+    ------
+    ValueError
+        Where a coefficient is not algebraic.
+    """
+    from sympy import QQ, Pow, Rational
+
+    def power(base: Any, exponent: Fraction) -> Any:
+        return base ** Rational(exponent)
+
+    expressions = {formula: exact(formula, Rational, power) for formula in reads(stepper)}
+    roots = sorted({power for value in expressions.values() for power in value.atoms(Pow)}, key=str)
+    domain = QQ.algebraic_field(*roots) if roots else QQ
+    return domain, {
+        formula: domain.from_sympy(value.expand()) for formula, value in expressions.items()
+    }
+
+
+def _solved(
+    x: Any, u: Any, d_u: Any, v: Any, d_v: Any, t: Any, p: Any, acceleration: Any, slopes: Any
+) -> Any:
+    """Return what `vibsim.schemes.newton.solved` does, as a series."""
+    while True:
+        before, x = x, acceleration(u + d_u * x, v + d_v * x, t, p)
+        if (x - before).leading is None:
+            return x
+
+
+def _solved_together(
+    x: Any, y: Any, u: Any, d_u: Any, v: Any, d_v: Any, t: Any, p: Any, acceleration: Any, slopes: Any
+) -> Any:  # fmt: skip
+    """Return what `vibsim.schemes.newton.solved_together` does, as series."""
+    while True:
+        before = x, y
+        u_1, u_2 = u[0] + (d_u[0] * x + d_u[1] * y), u[1] + (d_u[2] * x + d_u[3] * y)
+        v_1, v_2 = v[0] + (d_v[0] * x + d_v[1] * y), v[1] + (d_v[2] * x + d_v[3] * y)
+        x, y = acceleration(u_1, v_1, t[0], p), acceleration(u_2, v_2, t[1], p)
+        if all((a - b).leading is None for a, b in zip(before, (x, y), strict=True)):
+            return x, y
+
+
+SUBSTITUTES: Mapping[Callable[..., Any], Callable[..., Any]] = {
+    solved: _solved,
+    solved_together: _solved_together,
+    ELEMENTARY["sqrt"].full: lambda x: x**HALF,
+}
+"""What runs on series in place of functions that only run on floats."""

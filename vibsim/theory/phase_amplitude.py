@@ -1,6 +1,13 @@
 r"""Orders of the phase and of the amplitude of a scheme's error on ``u'' + g u' + u = 0``, from its step and its start.
 
-The exact motion is ``Re(B exp(lambda t))``, what is computed ``Re(B~ exp(lambda~ t))`` (`vibsim.theory.modes`), so that
+Time is counted in units of ``1/w``, so that ``h = w dt`` and ``g = c/w`` for a damping rate c. The functions of the
+scheme itself run on series in h with exact coefficients (`vibsim.theory.laurent`). Of the eigenvalues of its step two
+tend to ``exp(lambda h)``, ``lambda = -g/2 +- i w_d``; they are the roots of ``x^2 - T x + D``. The part of the start
+that lies in their plane, the principal part y, is all that is left of a solution once parasitic parts have died out:
+
+    y(t) = Re(B~ exp(lambda~ t)),      lambda~ = s~ +- i w~,   D = exp(2 s~ h),   T = 2 exp(s~ h) cos(w~ h)
+
+The exact motion is ``Re(B exp(lambda t))``, so that
 
     L(t)  =  (lambda~ - lambda) t + log(B~/B),      phi  =  Im L/w_d,      alpha  =  Re L + (g/2) phi
 
@@ -12,50 +19,151 @@ every power of h that is known (twice as many as any scheme has) is exact: its o
 
 Initial values count as what they are: the first power of h whose coefficient is not 0 *for them* is the order.
 
-Source: vibration text (B), sections 4.4, 5.6 and 7.1 with `errata`; exercises 10 and 17.
+Source: vibration text (B), sections 4.1-4.4, 5.6 and 7.1 with `errata`; exercises 10 and 17.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vibsim.core.array_types import Floats
 from vibsim.schemes.base import Stepper
-from vibsim.theory import series
+from vibsim.theory.arithmetic import bairstow, by_quadratic, characteristic
+from vibsim.theory.basis import unit_steps
 from vibsim.theory.degrees import ROUNDED
-from vibsim.theory.modes import Mode, principal_mode
-from vibsim.theory.series import Series
-
-Floats = NDArray[np.float64]
+from vibsim.theory.laurent import HALF, SUBSTITUTES, Field, Laurent, coefficients
 
 CRITICAL = 2.0
 """The damping rate over w from which on nothing oscillates."""
+KNOWN = 14
+"""Power of h from which on nothing is known; quotients by powers of h lose some of them."""
+
+Pair = NDArray[Any]
+"""Two series: what belongs to ``u_0`` and to V in something linear in the initial values."""
 
 
 @dataclass(frozen=True, eq=False)
-class Terms:
-    """Coefficients of h^k; those of quadratic forms belong to ``u_0^2``, ``u_0 V`` and ``V^2``."""
+class Principal:
+    """A step and its quadratic factor with the principal roots, as series in h."""
 
-    phase_rate: Floats
-    """Of ``(w~ - w_d)/w_d``, shape (k,)."""
-    amplitude_rate: Floats
-    """Of ``s~ - s + (g/2) (w~ - w_d)/w_d``, shape (k,)."""
-    turned: Floats
-    """Of ``w_d Im(B~ B*)``, shape (3, k)."""
-    along: Floats
-    """Of ``Re(B~ B*)``, shape (3, k)."""
-    grown: Floats
-    """Of ``|B~|^2 - |B|^2``, shape (3, k)."""
-    size: Floats
-    """``|B|^2``, shape (3,)."""
-    gone: Floats
-    """Of the position at t = 0 less ``y(0)``, for ``u_0`` and V, shape (2, k)."""
+    matrix: NDArray[Any]
+    """Shape (s, s)."""
+    starts: NDArray[Any]
+    """State 1 from the position 1, and from the velocity 1 (in units of w) at the start, shape (2, s)."""
+    polynomial: list[Laurent]
+    """The characteristic polynomial, the highest power first, without the roots that are 0 for every h."""
+    trace: Laurent
+    determinant: Laurent
+
+    @property
+    def square(self) -> Laurent:
+        """The square of ``w~ h``."""
+        return (self.trace * HALF * self.determinant**-HALF).square_of_angle()
+
+
+def principal(stepper: Stepper, damping: float, known: int) -> Principal:
+    """Return a step on ``u'' + g u' + u = 0`` in series that are known up to a power of h.
+
+    The factor is ``(x - 1)^2`` at h = 0, where the quotient has no root 1 in a scheme that converges: so it exists and
+    is unique (Hensel), and Bairstow's method doubles the powers that are right.
+    """
+    domain, elements = coefficients(stepper)
+    field = Field(domain, known)
+    zero, h = field.constant(0.0), field.series(domain.one, 1)
+    units = unit_steps(
+        stepper,
+        h,
+        zero,
+        lambda formula: field.series(elements[formula]),
+        damping=field.constant(damping),
+        substitutes=SUBSTITUTES,
+    )
+    matrix = np.array([[zero + x for x in column] for column in units.step], dtype=object).T
+    polynomial = [c[0] for c in characteristic(matrix[None])]
+    while len(polynomial) > 3 and polynomial[-1].leading is None:
+        polynomial.pop()
+    trace, determinant = field.constant(2.0), field.constant(1.0)
+    up = down = trace
+    while up.leading is not None or down.leading is not None:
+        up, down = bairstow(polynomial, trace, determinant)
+        trace, determinant = trace + up, determinant - down
+    # a velocity of 1 is h in a step
+    starts = [[(zero + x).shifted(k) for x in state] for k, state in enumerate(units.start)]
+    return Principal(matrix, np.array(starts, dtype=object), polynomial, trace, determinant)
+
+
+@dataclass(frozen=True, eq=False)
+class Mode:
+    """The principal mode of a scheme, and how the start excites it, as series in h."""
+
+    rate: Laurent
+    """``s~``, the rate of growth."""
+    frequency: Laurent
+    """``w~/w_d``."""
+    position: Pair
+    """``y(0)`` where the position is 1 at the start, and where the velocity is (in units of w)."""
+    slope: Pair
+    """``y'(0) - s~ y(0)`` of both."""
+
+
+@lru_cache(maxsize=1024)
+def principal_mode(stepper: Stepper, damping: float) -> Mode:
+    """Return the principal mode of a scheme.
+
+    Parameters
+    ----------
+    stepper
+        The arithmetic of the scheme on a model with or without linear damping (`Scheme.stepper_for`).
+    damping
+        ``g = c/w``, the damping rate over the frequency; below 2, so that the motion oscillates.
+    """
+    step = principal(stepper, damping, KNOWN)
+    square, decay = step.square, step.determinant**-HALF
+    cosine = step.trace * HALF * decay
+    sinc, power = square.lift(1.0), square
+    for k in range(1, KNOWN // 2 + 1):
+        sinc, power = sinc + power * Fraction((-1) ** k, math.factorial(2 * k + 1)), power * square
+    firsts = [_first_two(step, start) for start in step.starts]
+    # what is left of y_1 without growth and turning, over sin(w~ h)/(w~ h) h
+    slopes = [((one * decay - nought * cosine) / sinc).shifted(-1) for nought, one in firsts]
+    half = Fraction(repr(damping)) / 2
+    return Mode(
+        (step.determinant.logarithm() * HALF).shifted(-1),
+        (square.shifted(-2) / (1 - half * half)) ** HALF,
+        np.array([nought for nought, _ in firsts], dtype=object),
+        np.array(slopes, dtype=object),
+    )
+
+
+def _first_two(step: Principal, start: NDArray[Any]) -> tuple[Laurent, Laurent]:
+    """Return ``y_0`` and ``y_1``, the positions of the principal part of a solution at the first two steps.
+
+    With the characteristic polynomial ``(x^2 - T x + D) q(x)``, q of the matrix takes a state into the plane of the
+    principal roots, and a first-degree polynomial, the inverse of q modulo the quadratic, takes it to its place there.
+    """
+    t, d = step.trace, step.determinant
+    rest = by_quadratic(step.polynomial, t, d)[:-2]
+    state = start * rest[0]
+    for coefficient in rest[1:]:
+        state = step.matrix @ state + start * coefficient
+    *_, by_x, left = by_quadratic([t.lift(0.0), *rest], t, d)
+    beside = left - t * by_x
+    turned = by_x * t + beside
+    bottom = beside * turned + by_x * by_x * d
+    images = [state]
+    for _ in range(2):
+        images.append(step.matrix @ images[-1])
+    one, two = ((turned * a[0] - by_x * b[0]) / bottom for a, b in pairwise(images))
+    return (t * one - two) / d, one
 
 
 def part_orders(
@@ -82,7 +190,7 @@ def part_orders(
     terms = _terms(stepper, float(damping))
     at_start = _at_start(terms, damping, np.where(moving, start, 1.0))
     gone = _order(np.tensordot(start, terms.gone, axes=(0, 0)))
-    rates = (terms.phase_rate, terms.amplitude_rate)
+    rates = (terms.phase_rate[0], terms.amplitude_rate[0])
     phase, amplitude = (
         np.where(moving, np.minimum(np.minimum(_order(rate), gone), own), np.nan)
         for rate, own in zip(rates, at_start, strict=True)
@@ -96,96 +204,90 @@ def _order(coefficients: Floats) -> Floats:
     return np.where(found.any(axis=-1), np.argmax(found, axis=-1), np.inf)
 
 
-def _at_start(terms: Terms, damping: float, start: Floats) -> tuple[Floats, Floats]:
-    """Return the orders of ``phi(0)`` and ``alpha(0)``, for initial values of shape (2, ...)."""
-    u, v = start
-    forms = np.stack([u * u, u * v, v * v], axis=-1)
-    size = (forms @ terms.size)[..., None]
-    turned, along, grown = (
-        list(np.moveaxis(forms @ rows / size, -1, 0))
-        for rows in (terms.turned, terms.along, terms.grown)
-    )
-    frequency = 1.0 - 0.25 * damping * damping
-    ratio = series.over(turned, along)
-    # phi = atan(x/w_d)/w_d with x the ratio, and alpha = log(1 + y)/2 + (g/2) phi
-    phase = _summed(ratio, lambda k: (-1.0) ** (k // 2) / (k * frequency ** ((k + 1) // 2)), 2)
-    growth = _summed(grown, lambda k: 0.5 * (-1.0) ** (k - 1) / k, 1)
-    amplitude = [a + 0.5 * damping * b for a, b in zip(growth, phase, strict=True)]
-    return _order(np.stack(phase, axis=-1)), _order(np.stack(amplitude, axis=-1))
+@dataclass(frozen=True, eq=False)
+class _Terms:
+    """Coefficients of h^k; those of quadratic forms belong to ``u_0^2``, ``u_0 V`` and ``V^2``."""
 
-
-def _summed(x: Series, factor: Any, stride: int) -> Series:
-    """Return ``sum factor(k) x^k`` over k = 1, 1 + stride, ... of a series x that begins with h."""
-    total = [value * 0.0 for value in x]
-    power, step = x, x
-    for _ in range(1, stride):
-        step = series.times(step, x)
-    for k in range(1, len(x), stride):
-        total = [a + factor(k) * b for a, b in zip(total, power, strict=True)]
-        power = series.times(power, step)
-    return total
+    phase_rate: Floats
+    """Of ``(w~ - w_d)/w_d``, shape (1, k)."""
+    amplitude_rate: Floats
+    """Of ``s~ - s + (g/2) (w~ - w_d)/w_d``, shape (1, k)."""
+    turned: Floats
+    """Of ``w_d Im(B~ B*)``, shape (3, k)."""
+    along: Floats
+    """Of ``Re(B~ B*)``, shape (3, k)."""
+    grown: Floats
+    """Of ``|B~|^2 - |B|^2``, shape (3, k)."""
+    size: Floats
+    """Of ``|B|^2``, shape (3, k)."""
+    gone: Floats
+    """Of the position at t = 0 less ``y(0)``, for ``u_0`` and V, shape (2, k)."""
 
 
 @lru_cache(maxsize=1024)
-def _terms(stepper: Stepper, damping: float) -> Terms:
+def _terms(stepper: Stepper, damping: float) -> _Terms:
     """Work the coefficients out in exact numbers, and round them once."""
     mode = principal_mode(stepper, damping)
-    number = mode.field.number
-    half = number(Fraction(repr(damping))) * number(Fraction(1, 2))
-    right = number(Fraction(1)) - half * half
-    nothing = [mode.field.zero] * len(mode.rate)
-    one = [number(Fraction(1)), *nothing[1:]]
+    half = Fraction(repr(damping)) / 2
+    right = 1 - half * half
+    one, zero = mode.rate.lift(1.0), mode.rate.lift(0.0)
     # B = u_0 - i G/w_d with G = V + (g/2) u_0, and B~ = y(0) - i G~/w~
-    exact = [one, nothing], [[value * half for value in one], one]
-    slower = series.over(one, mode.frequency)
-    slopes = [series.times(row, slower) for row in mode.slope]
-    over = [[x / right for x in row] for row in slopes]
-    turned = _minus(_form(mode.position, exact[1]), _form(slopes, exact[0]))
-    along = _plus(_form(mode.position, exact[0]), _form(over, exact[1]))
-    later = _plus(_form(mode.position, mode.position), _form(over, slopes))
-    size = _plus(
-        _form(exact[0], exact[0]), _form([[x / right for x in row] for row in exact[1]], exact[1])
-    )
-    faster = [a - b for a, b in zip(mode.frequency, one, strict=True)]
-    rate = [a + b * half for a, b in zip(mode.rate, faster, strict=True)]
-    rate[0] = rate[0] + half
-    gone = [_less(a, b) for a, b in zip(exact[0], mode.position, strict=True)]
-    return Terms(
-        phase_rate=_floats(mode, faster),
-        amplitude_rate=_floats(mode, rate),
-        turned=_rows(mode, turned),
-        along=_rows(mode, along),
-        grown=_rows(mode, _minus(later, size)),
-        size=_rows(mode, size)[:, 0],
-        gone=_rows(mode, gone),
-    )
+    position, slope = (np.array(pair, dtype=object) for pair in ((one, zero), (one * half, one)))
+    slopes = mode.slope / mode.frequency
+    later = _form(mode.position, mode.position) + _form(slopes / right, slopes)
+    size = _form(position, position) + _form(slope / right, slope)
+    faster = mode.frequency - 1.0
+    rows = {
+        "phase_rate": [faster],
+        "amplitude_rate": [mode.rate + faster * half + half],
+        "turned": _form(mode.position, slope) - _form(slopes, position),
+        "along": _form(mode.position, position) + _form(slopes / right, slope),
+        "grown": later - size,
+        "size": size,
+        "gone": position - mode.position,
+    }
+    known = min(series.end for row in rows.values() for series in row)
+    floats = {
+        name: np.array([[x.field.value(x.at(k)) for k in range(known)] for x in row])
+        for name, row in rows.items()
+    }
+    return _Terms(**floats)
 
 
-Pair = Sequence[Series]
-"""Coefficients of ``u_0`` and V in something linear in the initial values."""
-
-
-def _form(a: Pair, b: Pair) -> list[Series]:
+def _form(a: Pair, b: Pair) -> NDArray[Any]:
     """Return the product of two numbers that are linear in the initial values, as a quadratic form."""
-    mixed = zip(series.times(a[0], b[1]), series.times(a[1], b[0]), strict=True)
-    return [series.times(a[0], b[0]), [x + y for x, y in mixed], series.times(a[1], b[1])]
+    return np.array([a[0] * b[0], a[0] * b[1] + a[1] * b[0], a[1] * b[1]], dtype=object)
 
 
-def _less(a: Series, b: Series) -> Series:
-    return [x - y for x, y in zip(a, b, strict=True)]
+def _at_start(terms: _Terms, damping: float, start: Floats) -> tuple[Floats, Floats]:
+    """Return the orders of ``phi(0)`` and ``alpha(0)``, for initial values of shape (2, ...)."""
+    u, v = start
+    forms = np.stack([u * u, u * v, v * v], axis=-1)
+    size = (forms @ terms.size)[..., :1]
+    turned, along, grown = (
+        forms @ rows / size for rows in (terms.turned, terms.along, terms.grown)
+    )
+    frequency = 1.0 - 0.25 * damping * damping
+    ratio = np.zeros_like(turned)
+    for k in range(ratio.shape[-1]):
+        known = np.sum(ratio[..., :k] * along[..., k:0:-1], axis=-1)
+        ratio[..., k] = (turned[..., k] - known) / along[..., 0]
+    # phi = atan(x/w_d)/w_d with x the ratio, and alpha = log(1 + y)/2 + (g/2) phi
+    phase = _summed(ratio, lambda k: (-1.0) ** (k // 2) / (k * frequency ** ((k + 1) // 2)), 2)
+    growth = _summed(grown, lambda k: 0.5 * (-1.0) ** (k - 1) / k, 1)
+    return _order(phase), _order(growth + 0.5 * damping * phase)
 
 
-def _minus(a: Sequence[Series], b: Sequence[Series]) -> list[Series]:
-    return [_less(x, y) for x, y in zip(a, b, strict=True)]
+def _summed(x: Floats, factor: Callable[[int], float], stride: int) -> Floats:
+    """Return ``sum factor(k) x^k`` over k = 1, 1 + stride, ... of a series x that begins with h, powers last."""
 
+    def times(a: Floats, b: Floats) -> Floats:
+        columns = [np.sum(a[..., : k + 1] * b[..., k::-1], axis=-1) for k in range(x.shape[-1])]
+        return np.stack(columns, axis=-1)
 
-def _plus(a: Sequence[Series], b: Sequence[Series]) -> list[Series]:
-    return [[x + y for x, y in zip(p, q, strict=True)] for p, q in zip(a, b, strict=True)]
-
-
-def _floats(mode: Mode, row: Series) -> Floats:
-    return np.array([mode.field.value(x) for x in row])
-
-
-def _rows(mode: Mode, rows: Sequence[Series]) -> Floats:
-    return np.array([_floats(mode, row) for row in rows])
+    total, power = np.zeros_like(x), x
+    for k in range(1, x.shape[-1], stride):
+        total = total + factor(k) * power
+        for _ in range(stride):
+            power = times(power, x)
+    return total

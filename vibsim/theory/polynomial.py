@@ -4,37 +4,101 @@ To the acceleration ``a(u, v, t)`` of a model the force is added that makes u_e 
 ``u_e''(t) - a(u_e(t), u_e'(t), t)``. All numbers are series in dt (`vibsim.theory.laurent`), with a coefficient for
 every c_k, every parameter of the formula and the time t, or with values for all of them.
 
-The equation of an implicit step is solved by what Newton's method stands for: ``x = a(u + d_u x, v + d_v x, t)`` is put
-into itself until x stays. The factors d_u and d_v begin with dt, so that every turn settles one more power, and the
-series is the one solution near the present acceleration. Square roots are series likewise.
-
 Source: vibration text (B), sections 2.2 and 8.5, problem 1 and exercise 9.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import operator
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from fractions import Fraction
+from functools import cache
+from math import perm
 from typing import Any
 
-from vibsim.elementary import ELEMENTARY
-from vibsim.formula import Expression, names_in
+from vibsim.formula import (
+    ZERO,
+    Binary,
+    Call,
+    Expression,
+    Name,
+    Negate,
+    Number,
+    literal,
+    minus,
+    names_in,
+    over,
+    plus,
+    times,
+)
 from vibsim.models.base import Model, tree
 from vibsim.schemes.base import Stepper, handed
-from vibsim.schemes.newton import solved, solved_together
-from vibsim.theory.basis import rebound
-from vibsim.theory.exact import coefficients
-from vibsim.theory.laurent import Field, Laurent
-from vibsim.theory.rational import (
-    COEFFICIENTS,
-    FREQUENCY,
-    in_series,
-    names_of,
-    restoring,
-    symbol,
-)
+from vibsim.theory.basis import rebound, value_of
+from vibsim.theory.laurent import SUBSTITUTES, Field, Laurent, coefficients
+
+_COEFFICIENTS, _FREQUENCY = "c", "w"
+"""Letters of the symbols c_0, c_1, ..., and of w_0, the natural frequency, for schemes that are corrected by it."""
+
+
+@cache
+def restoring(model: Model) -> Expression:
+    """Return the acceleration without the terms that name no state: the force for the polynomial cancels them."""
+    states = {state.name for state in model.states}
+
+    def is_constant(node: Expression) -> bool:
+        return states.isdisjoint(names_in(node))
+
+    def kept(node: Expression) -> Expression:
+        match node:
+            case _ if is_constant(node):
+                return ZERO
+            case Negate(operand):
+                return Negate(kept(operand))
+            case Binary("+" | "-" as sign, left, right):
+                return (plus if sign == "+" else minus)(kept(left), kept(right))
+            case Binary("*", left, right) if is_constant(left):
+                return times(left, kept(right))
+            case Binary("*", left, right) if is_constant(right):
+                return times(kept(left), right)
+            case Binary("/", left, right) if is_constant(right):
+                return over(kept(left), right)
+        return node
+
+    return kept(tree(model, model.acceleration))
+
+
+def is_rational(node: Expression) -> bool:
+    """Tell whether a formula has ``+ - * /``, whole powers and absolute values only."""
+    match node:
+        case Number() | Name():
+            return True
+        case Negate(operand) | Call("abs", (operand,)):
+            return is_rational(operand)
+        case Binary("**", base, exponent):
+            power = literal(exponent)
+            return power is not None and power >= 0.0 and power.is_integer() and is_rational(base)
+        case Binary(_, left, right):
+            return is_rational(left) and is_rational(right)
+    return False
+
+
+@cache
+def _symbol(model: Model, letter: str, k: int) -> str:
+    """Return ``letter_k``, with the letter as often as it takes to be no name of the model: ``cc_0`` beside a c_0."""
+    taken = names_in(restoring(model))
+    while any(name.startswith(f"{letter}_") for name in taken):
+        letter += letter[0]
+    return f"{letter}_{k}"
+
+
+def _names(model: Model, degree: int) -> tuple[str, ...]:
+    """Name everything that a residual may depend on, but dt."""
+    states = {state.name for state in model.states}
+    own = [name for name in names_in(restoring(model)) if name not in states and name != "t"]
+    of_solution = (_symbol(model, _COEFFICIENTS, k) for k in range(degree + 1))
+    return ("t", *of_solution, *own, _symbol(model, _FREQUENCY, 0))
 
 
 class Forces(IntEnum):
@@ -47,46 +111,32 @@ class Forces(IntEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Setting:
-    """A field of numbers, and the elements of it that stand for names."""
-
-    field: Field
-    numbers: Mapping[str, Any]
-    """Elements for those of `names_of`."""
-    read: Callable[[str], Any]
-    """Makes an element of the formula of a scheme's coefficient."""
-
-    def named(self, name: str) -> Laurent:
-        """Return what stands for a name."""
-        return self.field.series(self.numbers[name])
-
-
-@dataclass(frozen=True, eq=False)
 class Course:
     """A scheme on a model, with a polynomial as its solution."""
 
     stepper: Stepper
     model: Model
     degree: int
-    setting: Setting
+    field: Field
+    names: Mapping[str, Laurent]
+    """What stands for t, the coefficients of the polynomial, the parameters and the natural frequency."""
+    read: Callable[[str], Laurent]
+    """What stands for the formula of a scheme's coefficient."""
     forces: Forces = Forces.ALL
-    fitted: Laurent | None = None
+    fitted: Any = 0.0
     """What is added to the acceleration in steps, but not in the start."""
 
     @property
     def dt(self) -> Laurent:
         """The time step."""
-        field = self.setting.field
-        return field.series(field.number(Fraction(1)), 1)
+        return self.field.series(self.field.domain.one, 1)
 
     def solution(self, derivative: int, t: Any) -> Any:
         """Return a derivative of the polynomial at time t."""
-        result = self.setting.field.constant(0.0)
+        result = self.field.constant(0.0)
         for k in range(self.degree, derivative - 1, -1):
-            factor = 1
-            for j in range(derivative):
-                factor *= k - j
-            result = result * t + self.setting.named(self._symbol(COEFFICIENTS, k)) * float(factor)
+            coefficient = self.names[_symbol(self.model, _COEFFICIENTS, k)]
+            result = result * t + coefficient * float(perm(k, derivative))
         return result
 
     def state(self, t: Any) -> tuple[Any, ...]:
@@ -96,150 +146,87 @@ class Course:
 
     def start(self) -> tuple[Any, ...]:
         """Return the state at step 1, from the polynomial's position and velocity at t = 0."""
-        zero = self.setting.field.constant(0.0)
+        zero = self.field.constant(0.0)
         u, v = (self.solution(k, zero) for k in (0, 1))
         _, push = self._scaling()
-        function = self._ready(self.stepper.start, None)
+        function = self._bound(self.stepper.start, 0.0)
         return tuple(function(self.stepper.variant, u, v * push, self.dt, ()))
 
     def step(self, state: tuple[Any, ...], t: Any) -> tuple[Any, ...]:
         """Return the state one step after time t."""
-        following, _ = self._ready(self.stepper.step, self.fitted)(state, t, self.dt, ())
+        following, _ = self._bound(self.stepper.step, self.fitted)(state, t, self.dt, ())
         return tuple(following)
 
-    def _ready(self, function: Callable[..., Any], more: Laurent | None) -> Callable[..., Any]:
+    def _bound(self, function: Callable[..., Any], more: Any) -> Callable[..., Any]:
         """Return a function of the scheme on series, handed the forces."""
-        own = rebound(function, self._coefficient, SUBSTITUTES)
         force, _ = self._scaling()
+        damping = self.model.damping if self.forces is Forces.ALL else None
+        rate = self._value(tree(self.model, damping.rate), {}) if damping else 0.0
 
         def acceleration(u: Any, v: Any, t: Any, p: Any) -> Any:
             exact = self._of_model(self.solution(0, t), self.solution(1, t), t)
-            total = self._of_model(u, v, t) + (self.solution(2, t) - exact)
-            return (total if more is None else total + more) * force
+            return (self._of_model(u, v, t) + (self.solution(2, t) - exact) + more) * force
 
         def slopes(u: Any, v: Any, t: Any, p: Any) -> Any:
             raise ValueError("what solves the equation of a step by series asks for no slopes")
 
-        def rate(u: Any, v: Any, t: Any, p: Any) -> Any:
-            damping = self.model.damping
-            is_damped = damping is not None and self.forces is Forces.ALL
-            return self._value(tree(self.model, damping.rate), {}) if damping and is_damped else 0.0
-
-        return handed(own, acceleration, slopes, rate)
+        own = rebound(function, self.read, SUBSTITUTES)
+        return handed(own, acceleration, slopes, lambda u, v, t, p: rate)
 
     def _of_model(self, u: Any, v: Any, t: Any) -> Any:
         if self.forces is Forces.NONE:
-            return self.setting.field.constant(0.0)
+            return self.field.constant(0.0)
         position, velocity = (state.name for state in self.model.states)
         speed = v if self.forces is Forces.ALL else 0.0
         return self._value(restoring(self.model), {position: u, velocity: speed, "t": t})
 
     def _value(self, node: Expression, given: Mapping[str, Any]) -> Any:
-        field = self.setting.field
-        rest = {n: self.setting.named(n) for n in names_in(node) if n not in given}
-        exact = {n: x if isinstance(x, Laurent) else field.constant(x) for n, x in given.items()}
-        return in_series(node, {**rest, **exact}, field)
-
-    def _coefficient(self, formula: str) -> Laurent:
-        return self.setting.field.series(self.setting.read(formula))
+        exact = {name: self.dt.lift(x) for name, x in given.items()}
+        return value_of(node, self.field.constant, operator.pow, {**self.names, **exact})
 
     def _scaling(self) -> tuple[Any, Any]:
-        scaling: Callable[[Any], tuple[Any, ...]] | None = self.stepper.scaling
-        if scaling is None:
+        if self.stepper.scaling is None:
             return 1.0, 1.0
-        force, push = scaling(self.setting.named(self._symbol(FREQUENCY, 0)) * self.dt)
+        p: Any = self.names[_symbol(self.model, _FREQUENCY, 0)] * self.dt
+        force, push = self.stepper.scaling(p)
         return force, push
 
-    def _symbol(self, letter: str, k: int) -> str:
-        return symbol(self.model, letter, k)
 
-
-def _solved(
-    x: Any, u: Any, d_u: Any, v: Any, d_v: Any, t: Any, p: Any, acceleration: Any, slopes: Any
-) -> Any:
-    """Return what `vibsim.schemes.newton.solved` does, as a series."""
-    while True:
-        before, x = x, acceleration(u + d_u * x, v + d_v * x, t, p)
-        if (x - before).leading is None:
-            return x
-
-
-def _solved_together(
-    x: Any,
-    y: Any,
-    u: Any,
-    d_u: Any,
-    v: Any,
-    d_v: Any,
-    t: Any,
-    p: Any,
-    acceleration: Any,
-    slopes: Any,
-) -> Any:
-    """Return what `vibsim.schemes.newton.solved_together` does, as series."""
-    while True:
-        before = x, y
-        places = (
-            (
-                u[i] + (d_u[2 * i] * x + d_u[2 * i + 1] * y),
-                v[i] + (d_v[2 * i] * x + d_v[2 * i + 1] * y),
-            )
-            for i in range(2)
-        )
-        x, y = (acceleration(*place, time, p) for place, time in zip(places, t, strict=True))
-        if all((a - b).leading is None for a, b in zip(before, (x, y), strict=True)):
-            return x, y
-
-
-SUBSTITUTES: Mapping[Callable[..., Any], Callable[..., Any]] = {
-    solved: _solved,
-    solved_together: _solved_together,
-    ELEMENTARY["sqrt"].full: Laurent.root,
-}
-"""What runs on series in place of functions that only run on floats."""
-
-
-def sample(names: Iterable[str]) -> dict[str, Fraction]:
+def _samples(model: Model, degree: int) -> dict[str, Fraction]:
     """Return a positive value for each name, none of them a simple ratio of the others."""
     primes = (7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71, 73, 79, 83, 89, 97)
     return {
         name: Fraction(primes[i % 22], primes[(i + 5) % 22] + i // 22)
-        for i, name in enumerate(names)
+        for i, name in enumerate(_names(model, degree))
     }
 
 
-def numbers(stepper: Stepper, model: Model, degree: int, known: int) -> Setting:
-    """Return a setting in which every name has a value (`sample`)."""
+def with_numbers(stepper: Stepper, model: Model, degree: int, known: int) -> Course:
+    """Return a course on which every name has a value, known up to a power of dt."""
     domain, elements = coefficients(stepper)
-
-    def number(fraction: Fraction) -> Any:
-        return domain.convert(fraction.numerator) / domain.convert(fraction.denominator)
-
-    field = Field(number, lambda x: float(domain.to_sympy(x)), known)
-    values = {name: number(x) for name, x in sample(names_of(model, degree)).items()}
-    return Setting(field, values, elements.__getitem__)
+    field = Field(domain, known)
+    names = {name: field.constant(x) for name, x in _samples(model, degree).items()}
+    return Course(stepper, model, degree, field, names, lambda f: field.series(elements[f]))
 
 
-def symbols(stepper: Stepper, model: Model, degree: int, known: int) -> Setting:
-    """Return a setting in which every name is a symbol; signs are those of `numbers`."""
+def with_symbols(stepper: Stepper, model: Model, degree: int, known: int) -> Course:
+    """Return a course on which every name is a symbol; signs are those of `with_numbers`."""
     from sympy import field as fractions_of
 
     domain, elements = coefficients(stepper)
-    names = names_of(model, degree)
-    fractions, *generators = fractions_of(names, domain)
+    samples = _samples(model, degree)
+    fractions, *generators = fractions_of(tuple(samples), domain)
+    values = list(zip(fractions.ring.gens, samples.values(), strict=True))
 
-    def number(fraction: Fraction) -> Any:
-        return fractions.ground_new(
-            domain.convert(fraction.numerator) / domain.convert(fraction.denominator)
-        )
-
-    values = list(zip(fractions.ring.gens, sample(names).values(), strict=True))
-
-    def value(element: Any) -> float:
+    def at_samples(element: Any) -> float:
         parts = (part.evaluate(values) for part in (element.numer, element.denom))
         above, below = (float(domain.to_sympy(domain.convert(part))) for part in parts)
         return above / below
 
-    field = Field(number, value, known)
-    named = dict(zip(names, generators, strict=True))
-    return Setting(field, named, lambda formula: fractions.ground_new(elements[formula]))
+    field = Field(fractions.to_domain(), known, at_samples)
+    names = {name: field.series(x) for name, x in zip(samples, generators, strict=True)}
+
+    def read(formula: str) -> Laurent:
+        return field.series(fractions.ground_new(elements[formula]))
+
+    return Course(stepper, model, degree, field, names, read)

@@ -13,20 +13,21 @@ Numerical Algorithms, section 3.3.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vibsim.core.array_types import Floats, Integers
 from vibsim.schemes.base import UNIT_ROUND_OFF, Stepper
-from vibsim.theory.amplification import matrices
+from vibsim.theory.arithmetic import Arithmetic
 from vibsim.theory.basis import decimal, unit_steps
-from vibsim.theory.discrete import Scaled, applied, scaled
-from vibsim.theory.doubled import Doubled, doubled, product
-
-Floats = NDArray[np.float64]
+from vibsim.theory.discrete import Scaled, applied, first_state, position, scaled, transposed
+from vibsim.theory.doubled import Doubled, product
+from vibsim.theory.roots import amplification
 
 SQUARE = 8.0
 """Roundings in ``w^2`` and ``dt``, which a model works out from parameters of its own."""
@@ -34,73 +35,44 @@ _POINTS = 24
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Bounded:
-    """An array of numbers and bounds of their rounding errors, in units of the round-off.
+class Bounded(Arithmetic):
+    """An array of numbers and bounds of their rounding errors, in units of the round-off."""
 
-    Comparisons answer for the array as a whole, as those of `vibsim.theory.doubled.Doubled`.
-    """
-
-    value: Floats
+    nearest: Floats
     error: Floats
 
     __array_ufunc__ = None
 
+    @staticmethod
+    def lift(other: Any) -> Bounded:
+        """Return numbers without a rounding error."""
+        if isinstance(other, Bounded):
+            return other
+        number = np.asarray(other, dtype=float)
+        return Bounded(number, np.zeros_like(number))
+
     def __add__(self, other: Any) -> Bounded:
-        b = _bounded(other)
-        value = self.value + b.value
+        b = self.lift(other)
+        value = self.nearest + b.nearest
         return Bounded(value, self.error + b.error + np.abs(value))
 
     def __neg__(self) -> Bounded:
-        return Bounded(-self.value, self.error)
-
-    def __pos__(self) -> Bounded:
-        return self
-
-    def __sub__(self, other: Any) -> Bounded:
-        return self + -_bounded(other)
-
-    def __rsub__(self, other: Any) -> Bounded:
-        return _bounded(other) + -self
+        return Bounded(-self.nearest, self.error)
 
     def __mul__(self, other: Any) -> Bounded:
-        b = _bounded(other)
-        value = self.value * b.value
-        error = np.abs(self.value) * b.error + np.abs(b.value) * self.error
+        b = self.lift(other)
+        value = self.nearest * b.nearest
+        error = np.abs(self.nearest) * b.error + np.abs(b.nearest) * self.error
         return Bounded(value, error + np.abs(value))
 
     def __truediv__(self, other: Any) -> Bounded:
-        b = _bounded(other)
-        value = self.value / b.value
-        error = (self.error + np.abs(value) * b.error) / np.abs(b.value)
+        b = self.lift(other)
+        value = self.nearest / b.nearest
+        error = (self.error + np.abs(value) * b.error) / np.abs(b.nearest)
         return Bounded(value, error + np.abs(value))
 
-    def __rtruediv__(self, other: Any) -> Bounded:
-        return _bounded(other) / self
-
-    __radd__ = __add__
-    __rmul__ = __mul__
-
     def __abs__(self) -> Bounded:
-        return Bounded(np.abs(self.value), self.error)
-
-    def __gt__(self, other: Any) -> bool:
-        return bool(np.any(self.value > _bounded(other).value))
-
-    def __ge__(self, other: Any) -> bool:
-        return bool(np.any(self.value >= _bounded(other).value))
-
-    def __lt__(self, other: Any) -> bool:
-        return bool(np.all(self.value < _bounded(other).value))
-
-    def __le__(self, other: Any) -> bool:
-        return bool(np.all(self.value <= _bounded(other).value))
-
-
-def _bounded(value: Any) -> Bounded:
-    if isinstance(value, Bounded):
-        return value
-    number = np.asarray(value, dtype=float)
-    return Bounded(number, np.zeros_like(number))
+        return Bounded(np.abs(self.nearest), self.error)
 
 
 def _coefficient(formula: str) -> Bounded:
@@ -136,33 +108,30 @@ def _bounds(
 ) -> tuple[Floats, Floats]:
     """Return the bounds for arrays of shape (case,): the largest of the terms of the sum, as often as it has terms."""
     p = product(w, dt)
-    exact, rounded = matrices(stepper, p), _roundings(stepper, p.rounded)
-    initial = np.abs(np.stack([u_0, v_0 * dt], axis=-1))
-    begin = exact.start[..., 0] * u_0[:, None] + exact.start[..., 1] * product(v_0, dt)[:, None]
+    exact = amplification(stepper, p)
+    step, reading, start = _roundings(stepper, p.rounded)
     points = _points(steps)
-    sizes = _sizes(applied(exact.matrix, scaled(begin, 1), points))
-    at_start = np.einsum("csi,ci->cs", rounded.start, initial)
-    in_steps = np.einsum("csj,ckj->cks", rounded.step, sizes)
+    first = scaled(first_state(exact, dt, u_0, v_0), 1)
+    sizes = _sizes(applied(exact.matrix, first, points))
+    at_start = np.einsum("csi,ci->cs", start, np.abs(np.stack([u_0, v_0 * dt], axis=-1)))
+    in_steps = np.einsum("csj,ckj->cks", step, sizes)
     is_before_end = points[:, None] + points <= steps
-    turned = exact.matrix.swapped()
 
     def reached(row: Doubled) -> Floats:
-        reach = _sizes(applied(turned, scaled(row, 1), points))
+        reach = _sizes(applied(transposed(exact.matrix), scaled(row, 1), points))
         once = np.einsum("cds,cs->cd", reach, at_start).max(axis=1)
         each = np.einsum("cds,cks->cdk", reach, in_steps)
         largest = np.where(is_before_end, _or_infinite(each), 0.0).max(axis=(1, 2))
         return np.asarray(_or_infinite(once) + steps * largest)
 
-    position = np.zeros(exact.velocity.shape)
-    position[:, 0] = 1.0
-    reading = np.einsum("cks,cs->ck", sizes, rounded.velocity).max(axis=1)
-    velocity = reached(exact.velocity) + reading
+    of_reading = np.einsum("cks,cs->ck", sizes, reading).max(axis=1)
+    velocity = reached(exact.velocity) + of_reading
     if exact.backward is not None:
         velocity = np.maximum(velocity, reached(exact.backward) + 2.0 * sizes[..., 0].max(axis=1))
     if stepper.end == "extrapolate":
         # 2 v^(N-1) - v^(N-2)
-        velocity = 3.0 * velocity + 4.0 * reading
-    return UNIT_ROUND_OFF * reached(doubled(position)), UNIT_ROUND_OFF * velocity / dt
+        velocity = 3.0 * velocity + 4.0 * of_reading
+    return UNIT_ROUND_OFF * reached(position(exact)), UNIT_ROUND_OFF * velocity / dt
 
 
 def _or_infinite(size: Floats) -> Floats:
@@ -170,37 +139,28 @@ def _or_infinite(size: Floats) -> Floats:
     return np.where(np.isnan(size), np.inf, size)
 
 
-def _points(steps: int) -> NDArray[np.int64]:
+def _points(steps: int) -> Integers:
     """Return numbers from 0 to `steps` - 1 at which powers are looked at, close together at first."""
     last = max(steps - 1, 0)
-    evenly = np.linspace(0, last, _POINTS)
     close = np.geomspace(1, last, _POINTS) if last else [0]
-    return np.unique(np.round(np.concatenate([evenly, close])).astype(np.int64))
+    both = np.concatenate([np.linspace(0, last, _POINTS), close])
+    return np.unique(np.round(both).astype(np.int64))
 
 
 def _sizes(states: Scaled) -> Floats:
     return np.abs(np.ldexp(states.number.rounded, states.exponent[..., None]))
 
 
-@dataclass(frozen=True)
-class _Roundings:
-    """Bounds of what is rounded in making unit vectors a state, a velocity and a start; the shapes of `Matrices`."""
+def _roundings(stepper: Stepper, p: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return bounds of what is rounded in a step, a velocity and a start; the shapes of `Amplification`."""
+    zero, square = Bounded.lift(np.zeros_like(p)), Bounded(p * p, SQUARE * p * p)
+    units = unit_steps(stepper, Bounded(p, p), zero, _coefficient, square=square)
 
-    step: Floats
-    velocity: Floats
-    start: Floats
-
-
-def _roundings(stepper: Stepper, p: Floats) -> _Roundings:
-    zero = Bounded(np.zeros_like(p), np.zeros_like(p))
-    square = Bounded(p * p, SQUARE * p * p)
-    units = unit_steps(stepper, Bounded(p, p), zero, _coefficient, square)
-
-    def errors(numbers: Any) -> Floats:
-        parts = [np.broadcast_to(_bounded(number).error, p.shape) for number in numbers]
+    def errors(numbers: Sequence[Any]) -> Floats:
+        parts = [np.broadcast_to(Bounded.lift(number).error, p.shape) for number in numbers]
         return np.stack(parts, axis=-1)
 
-    def matrix(columns: Any) -> Floats:
-        return np.stack([errors(column) for column in columns], axis=-1)
-
-    return _Roundings(matrix(units.step), errors(units.velocity), matrix(units.start))
+    step, start = (
+        np.stack([errors(c) for c in columns], axis=-1) for columns in (units.step, units.start)
+    )
+    return step, errors(units.velocity), start

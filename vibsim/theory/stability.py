@@ -9,12 +9,10 @@ from collections.abc import Callable
 from functools import lru_cache, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vibsim.core.array_types import Flags, Floats
 from vibsim.schemes.base import Options, Scheme, Stepper
 from vibsim.theory.roots import GRID, roots
-
-Floats = NDArray[np.float64]
 
 _PARTS = 65
 _ROUNDS = 9
@@ -40,7 +38,7 @@ def stability_limit(scheme: Scheme, options: Options) -> float:
     return _limit(scheme.stepper(options))
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=1024)
 def _limit(stepper: Stepper) -> float:
     grid = np.concatenate([GRID, _FAR])
     growing = np.flatnonzero(_grows(stepper, grid))
@@ -56,7 +54,7 @@ def _limit(stepper: Stepper) -> float:
     return _first(lambda p: ~(_largest(stepper, p) <= 0.0), low, high)
 
 
-def _first(grows: Callable[[Floats], NDArray[np.bool_]], low: float, high: float) -> float:
+def _first(grows: Callable[[Floats], Flags], low: float, high: float) -> float:
     """Return the last point before growth begins, between one without and one with growth."""
     for _ in range(_ROUNDS):
         points = np.linspace(low, high, _PARTS)
@@ -72,7 +70,7 @@ def _largest(stepper: Stepper, p: Floats) -> Floats:
         return np.maximum(found.log_growth, np.log(found.parasitic))
 
 
-def _grows(stepper: Stepper, p: Floats) -> NDArray[np.bool_]:
+def _grows(stepper: Stepper, p: Floats) -> Flags:
     """Say where a root is beyond the unit circle by more than rounding in twice the precision."""
     found = roots(stepper, p)
     rounding = 1e-28 * (1.0 + p * p)

@@ -8,12 +8,18 @@ Source: vibration text (B), equations (18)-(20), sections 5.6 and 7.2, exercises
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from vibsim.schemes.base import Stepper
-from vibsim.theory import series
-from vibsim.theory.exact import Exact, exact_steps
+from vibsim.schemes.newton import solved, solved_together
+from vibsim.theory.arithmetic import characteristic as characteristic_of
+from vibsim.theory.basis import unit_steps
+from vibsim.theory.laurent import HALF, Laurent, coefficients
+from vibsim.theory.phase_amplitude import Principal, principal
 
 TERMS = 4
 """Terms of a series, in even powers of p, unless told."""
@@ -29,45 +35,36 @@ def symbol(name: str) -> Any:
 
 
 def matrix(stepper: Stepper) -> Any:
-    """Return the matrix of a step: `vibsim.theory.Amplification.matrix` as a function of p."""
-    from sympy import Matrix
-
-    return Matrix([[_expression(entry) for entry in row] for row in _rows(stepper)])
+    """Return the matrix of a step, `vibsim.theory.Amplification.matrix`, as a function of p."""
+    return _expressions(_matrices(stepper)[0])
 
 
 def start(stepper: Stepper) -> Any:
     """Return the matrix of the start, on ``(u_0, v_0 dt)``."""
-    from sympy import Matrix
-
-    columns = exact_steps(stepper).start
-    return Matrix(
-        [[_expression(_element(stepper, x)) for x in row] for row in zip(*columns, strict=True)]
-    )
+    return _expressions(_matrices(stepper)[1])
 
 
 def characteristic(stepper: Stepper) -> Any:
     """Return the characteristic polynomial in x; its roots are the amplification factors A of B, section 4.1."""
-    x = symbol("x")
-    coefficients = _characteristic(stepper)
-    degree = len(coefficients) - 1
-    return sum(_expression(value) * x ** (degree - k) for k, value in enumerate(coefficients))
+    result: Any = 1
+    for value in characteristic_of(_matrices(stepper)[0][None])[1:]:
+        result = result * symbol("x") + _expression(value[0])
+    return result.expand()
 
 
 def growth_series(stepper: Stepper, terms: int = TERMS) -> Any:
     """Return the growth of the amplitude per step as a polynomial in p, the first terms of its series."""
-    _, determinant = _principal(stepper, terms)
-    return _polynomial(stepper, series.power(determinant, _half(stepper)))
+    return _polynomial(_principal(stepper, terms).determinant ** HALF, terms)
 
 
 def frequency_series(stepper: Stepper, terms: int = TERMS) -> Any:
     """Return ``w~/w`` likewise: ``1 + p^2/24 + ...`` of the centred scheme, B (19)."""
-    return _polynomial(stepper, _ratio(stepper, terms))
+    return _polynomial(_principal(stepper, terms).square.shifted(-2) ** HALF, terms)
 
 
 def phase_error_series(stepper: Stepper, terms: int = TERMS) -> Any:
     """Return ``(P - P~)/P = 1 - w/w~``, the part of a period by which peaks come early in each, likewise."""
-    late = series.power(_ratio(stepper, terms), -_half(stepper) * 2)
-    return _polynomial(stepper, [late[0] - late[0], *(-value for value in late[1:])])
+    return _polynomial(1.0 - _principal(stepper, terms).square.shifted(-2) ** -HALF, terms)
 
 
 def solution(stepper: Stepper) -> Any:
@@ -82,26 +79,17 @@ def solution(stepper: Stepper) -> Any:
     """
     from sympy import acos, cos, sin, sqrt
 
-    coefficients, field = _characteristic(stepper), _field(stepper)
-    first = exact_steps(stepper).start
-    row = _rows(stepper)[0]
-    columns = [[_element(stepper, x) for x in column] for column in first]
-    second = [
-        sum((a * b for a, b in zip(row, column, strict=True)), field.zero) for column in columns
-    ]
-    trace, determinant = -coefficients[1], coefficients[2]
-    before = [field.one, field.zero]
-    gaps = [
-        two - trace * one[0] + determinant * nought
-        for two, one, nought in zip(second, columns, before, strict=True)
-    ]
-    if any(coefficients[3:]) or any(gaps):
+    step, first = _matrices(stepper)
+    polynomial = [value[0] for value in characteristic_of(step[None])]
+    trace, determinant = -polynomial[1], polynomial[2]
+    # u^2 - T u^1 + D u^0 for u_0 = 1 and for v_0 dt = 1
+    gaps = (step @ first)[0] - first[0] * trace + np.array([1, 0], dtype=object) * determinant
+    if any(polynomial[3:]) or any(gaps):
         raise ValueError("a scheme with parasitic roots has no solution with two terms")
-    n, p = symbol("n"), symbol("p")
+    n, begin, push = symbol("n"), symbol("I"), symbol("V") / symbol("w") * symbol("p")
     r = sqrt(_expression(determinant))
     angle = acos(_expression(trace) / (2 * r))
-    begin, push = symbol("I"), symbol("V") / symbol("w") * p
-    one = _expression(columns[0][0]) * begin + _expression(columns[1][0]) * push
+    one = _expression(first[0, 0]) * begin + _expression(first[0, 1]) * push
     return r**n * (
         begin * cos(n * angle) + (one / r - begin * cos(angle)) * sin(n * angle) / sin(angle)
     )
@@ -124,89 +112,60 @@ def taylor(expression: Any, degree: int) -> Any:
     return expression.series(symbol("p"), 0, degree + 1).removeO()
 
 
-def _element(stepper: Stepper, number: Any) -> Any:
-    """Return the function of p that a number is; a step may write a plain 0 into its state."""
-    field = _field(stepper)
-    return (
-        number.element
-        if isinstance(number, Exact)
-        else field.ground_new(field.domain.convert(int(number)))
+@lru_cache(maxsize=64)
+def _matrices(stepper: Stepper) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the matrices of step and start, whose entries are functions of p in a field of fractions of SymPy."""
+    from sympy import field
+
+    domain, elements = coefficients(stepper)
+    fractions, p = field("p", domain)
+    units = unit_steps(
+        stepper,
+        p,
+        fractions.zero,
+        lambda formula: fractions.ground_new(elements[formula]),
+        substitutes={solved: _solved, solved_together: _solved_together},
     )
+    step, first = (
+        np.array([[fractions.one * x for x in column] for column in columns], dtype=object).T
+        for columns in (units.step, units.start)
+    )
+    return step, first
 
 
-def _field(stepper: Stepper) -> Any:
-    """Return the field of fractions of SymPy that the numbers of a scheme lie in."""
-    return exact_steps(stepper).start[0][0].element.field
+def _solved(
+    x: Any, u: Any, d_u: Any, v: Any, d_v: Any, t: Any, p: Any, acceleration: Any, slopes: Any
+) -> Any:
+    """Return what `vibsim.schemes.newton.solved` does, of a linear force."""
+    by_u, by_v = slopes(u, v, t, p)
+    return acceleration(u, v, t, p) / (1.0 - (d_u * by_u + d_v * by_v))
 
 
-def _rows(stepper: Stepper) -> list[list[Any]]:
-    columns = exact_steps(stepper).step
-    return [[_element(stepper, entry) for entry in row] for row in zip(*columns, strict=True)]
+def _solved_together(
+    x: Any, y: Any, u: Any, d_u: Any, v: Any, d_v: Any, t: Any, p: Any, acceleration: Any, slopes: Any
+) -> Any:  # fmt: skip
+    """Return what `vibsim.schemes.newton.solved_together` does, of a linear force."""
+    one, two = (acceleration(u[i], v[i], t[i], p) for i in range(2))
+    by_u, by_v = slopes(u[0], v[0], t[0], p)
+    a, b, c, d = (by_u * i + by_v * j for i, j in zip(d_u, d_v, strict=True))
+    bottom = (1.0 - a) * (1.0 - d) - b * c
+    return (one * (1.0 - d) + b * two) / bottom, (two * (1.0 - a) + c * one) / bottom
 
 
 def _expression(element: Any) -> Any:
     return element.as_expr(symbol("p"))
 
 
-def _characteristic(stepper: Stepper) -> list[Any]:
-    """Return the coefficients of the characteristic polynomial, the highest power first, by Leverrier's method."""
-    rows = _rows(stepper)
-    size = range(len(rows))
-    field = _field(stepper)
-    coefficients = [field.one]
-    product = rows
-    for k in range(1, len(rows) + 1):
-        trace = sum((product[i][i] for i in size), field.zero)
-        coefficients.append(-trace / k)
-        shifted = [
-            [product[i][j] + (coefficients[-1] if i == j else field.zero) for j in size]
-            for i in size
-        ]
-        product = [
-            [sum((rows[i][m] * shifted[m][j] for m in size), field.zero) for j in size]
-            for i in size
-        ]
-    return coefficients
+def _expressions(entries: NDArray[Any]) -> Any:
+    from sympy import Matrix
+
+    return Matrix([[_expression(entry) for entry in row] for row in entries])
 
 
-def _principal(stepper: Stepper, terms: int) -> tuple[series.Series, series.Series]:
-    """Return trace and determinant of the principal pair as series in p^2."""
-    coefficients = _characteristic(stepper)
-    while len(coefficients) > 3 and not coefficients[-1]:
-        coefficients.pop()
-    return series.principal([_in_squares(value, terms) for value in coefficients])
+def _principal(stepper: Stepper, terms: int) -> Principal:
+    return principal(stepper, 0.0, 2 * terms + 2)
 
 
-def _in_squares(element: Any, terms: int) -> series.Series:
-    """Return the series of a function of p^2 at 0."""
-    domain = element.field.domain
-
-    def listed(polynomial: Any) -> series.Series:
-        return [
-            polynomial.coeff(polynomial.ring.gens[0] ** (2 * k)) if k else polynomial.coeff(1)
-            for k in range(terms)
-        ]
-
-    above, below = (
-        [domain.convert(value) for value in listed(part)] for part in (element.numer, element.denom)
-    )
-    return series.over(above, below)
-
-
-def _ratio(stepper: Stepper, terms: int) -> series.Series:
-    """Return w~/w as a series in p^2."""
-    trace, determinant = _principal(stepper, terms + 1)
-    half = _half(stepper)
-    cosine = series.times([value * half for value in trace], series.power(determinant, -half))
-    return series.power(series.square_of_angle(cosine)[1:], half)
-
-
-def _half(stepper: Stepper) -> Any:
-    domain = _field(stepper).domain
-    return domain.one / domain.convert(2)
-
-
-def _polynomial(stepper: Stepper, coefficients: Sequence[Any]) -> Any:
-    domain = _field(stepper).domain
-    p = symbol("p")
-    return sum(domain.to_sympy(value) * p ** (2 * k) for k, value in enumerate(coefficients))
+def _polynomial(series: Laurent, terms: int) -> Any:
+    p, read = symbol("p"), series.field.domain.to_sympy
+    return sum(read(series.at(2 * k)) * p ** (2 * k) for k in range(terms))

@@ -6,8 +6,7 @@ from argparse import Namespace
 from typing import TYPE_CHECKING
 
 from vibsim.cli import made_files
-from vibsim.cli.jobs.common import check_digest, one_plan, provenance, titled
-from vibsim.cli.jobs.levels import open_levels
+from vibsim.cli.jobs.common import check_digest, one_plan, open_levels, provenance, titled
 from vibsim.plan.digests import analysed
 
 if TYPE_CHECKING:

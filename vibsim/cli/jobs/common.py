@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import sys
 from argparse import Namespace
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import vibsim
 from vibsim.cli import results_folder
 from vibsim.cli.chosen_plans import resolve
-from vibsim.cli.jobs.deleted import delete
 from vibsim.core.errors import Fault, FileError, InputError, VibsimError
 from vibsim.plan import Plan, checkout, choose, load
 
@@ -75,7 +76,7 @@ def read_all(
             problems.append(str(error))
             if options.discard:
                 try:
-                    delete(error, results)
+                    results_folder.delete(error, results)
                 except VibsimError as obstacle:
                     problems.append(str(obstacle))
     if problems:
@@ -93,3 +94,27 @@ def provenance(plan: Plan, uses: dict[str, Any]) -> dict[str, Any]:
     python = ".".join(map(str, sys.version_info[:3]))
     versions = {"vibsim": vibsim.__version__, "python": python, **plan.versions}
     return {"experiment": uses, "versions": versions}
+
+
+@contextmanager
+def open_levels(
+    plan: Plan, options: Namespace, results: Path
+) -> Iterator[dict[int, Callable[[int, int], Record]]]:
+    """Check all level files, and open them; yield what reads a range of members of each level.
+
+    Raises
+    ------
+    VibsimError
+        Where files are damaged or another job's.
+    """
+    from vibsim import store
+
+    checks = {shard.path: partial(store.check, digest=shard.digest) for shard in plan.shards}
+    read_all(options, results, checks)
+    with ExitStack() as stack:
+        yield {
+            level.level: stack.enter_context(
+                store.open_level([(results / shard.path, shard.digest) for shard in level.shards])
+            ).read
+            for level in plan.levels
+        }

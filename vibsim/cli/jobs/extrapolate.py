@@ -5,8 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 
 from vibsim.cli import made_files
-from vibsim.cli.jobs.common import check_digest, one_plan, provenance, refusal, titled
-from vibsim.cli.jobs.levels import open_levels
+from vibsim.cli.jobs.common import check_digest, one_plan, open_levels, provenance, refusal, titled
 from vibsim.plan.digests import extrapolated
 
 PART_BYTES = 64 * 10**6

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from vibsim.cli import made_files
@@ -28,11 +29,19 @@ def simulate(options: Namespace) -> int:
             raise refusal("--out", options.out, "is one file, and several levels are several")
         _make(plan, options.level[0], jobs[0], options.out, options.threads)
         return 0
-    failed = [
-        problem
-        for level, job in zip(options.level, jobs, strict=True)
-        if (problem := _try(plan, level, job, results, options.threads))
-    ]
+    failed = []
+    for level, job in zip(options.level, jobs, strict=True):
+        path = results / job.path
+        if is_made(path, job):
+            print(f"{job.path}: is up to date", flush=True)
+            continue
+        try:
+            _make(plan, level, job, path, options.threads)
+            made_files.add(results, plan.key, [job.path.removeprefix(f"{plan.key}/")])
+        except VibsimError as error:
+            failed.append(str(error))
+        except Exception as error:
+            failed.append(f"{_named(plan, level, job)}: {sentence(error)}")
     if failed:
         raise VibsimError("\n".join(failed))
     return 0
@@ -49,33 +58,15 @@ def _jobs(plan: Plan, levels: Sequence[int], shard: int) -> list[ShardJob]:
     return [plan.level(level).shards[shard] for level in levels]
 
 
-def _try(plan: Plan, level: int, job: ShardJob, results: Path, threads: int) -> str:
-    """Make a file unless it is there; return what went wrong, for the end of the log."""
-    path = results / job.path
-    if is_made(path, job):
-        print(f"{job.path}: is up to date", flush=True)
-        return ""
-    try:
-        _make(plan, level, job, path, threads)
-        made_files.add(results, plan.key, [job.path.removeprefix(f"{plan.key}/")])
-    except VibsimError as error:
-        return str(error)
-    except Exception as error:
-        return f"{_named(plan, level, job)}: {sentence(error)}"
-    return ""
-
-
 def is_made(path: Path, job: ShardJob) -> bool:
     """Tell whether a file is whole and that of `job`."""
     from vibsim import store
 
-    if not path.exists():
-        return False
-    try:
-        store.check(path, digest=job.digest)
-    except FileError:
-        return False
-    return True
+    with suppress(FileError):
+        if path.exists():
+            store.check(path, digest=job.digest)
+            return True
+    return False
 
 
 def _make(plan: Plan, level: int, job: ShardJob, path: Path, threads: int) -> None:
@@ -93,12 +84,11 @@ def _make(plan: Plan, level: int, job: ShardJob, path: Path, threads: int) -> No
     # Should the process be killed, its log ends with what it was at.
     print(_named(plan, level, job), flush=True)
     experiment = plan.experiment
-    keys = list(experiment.sweep.keys) if experiment.sweep else []
     uses = {
         **simulated(plan.content),
         "level": level,
         "cases": [job.start, job.stop],
-        "swept": keys,
+        "swept": list(experiment.sweep.keys) if experiment.sweep else [],
         "values": values_digest(experiment, job.start, job.stop),
     }
     try:

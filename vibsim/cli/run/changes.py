@@ -21,21 +21,14 @@ _OVER_ALL = ("index.html", "summary.csv")
 _SEALED = (".nc", ".json")
 """Files that say themselves whether they are whole."""
 _LEVEL = re.compile(r"level_\d{2,}")
-_FILE = re.compile(r"level_\d{2,}\.nc|best\.nc")
-_SHARD = re.compile(r"shard_\d{4,}\.nc")
+_NAMED = re.compile(r"level_\d{2,}(?:/shard_\d{4,})?\.nc|best\.nc")
 
 
 def changed(plans: Sequence[Plan], results: Path, *, every: bool) -> list[FileError]:
     """Return the files to be made again; what only was copied or touched gets its time back.
 
-    Parameters
-    ----------
-    plans
-        The experiments.
-    results
-        The results folder, whose lock is held.
-    every
-        Compare every file with its digest, not only those whose size, time or inode differs.
+    The lock of `results` is held. With `every`, files are compared with their digests also where size, time and inode
+    are as they were.
     """
     found: list[FileError] = []
     for plan in plans:
@@ -52,16 +45,13 @@ def _changed(results: Path, key: str, own: Iterable[str], every: bool) -> Iterat
     page = folder / "report.html"
     if page.exists() and page.name not in bad:
         for name in filter(lambda name: name.startswith(BESIDE), known):
-            if problem := _problem(folder, name, now, every) or _missing(folder / name):
-                # A report is made as a whole.
-                bad[page.name] = f"its file {name}: {problem}"
+            problem = _problem(folder, name, now, every)
+            if problem or not (folder / name).exists():
+                # a report is made as a whole
+                bad[page.name] = f"its file {name}: {problem or 'is missing'}"
     yield from (DamagedFileError(folder / name, problem) for name, problem in bad.items())
     if now != known:
         made_files.replace(results, key, now)
-
-
-def _missing(path: Path) -> str:
-    return "" if path.exists() else "is missing"
 
 
 def _problem(folder: Path, name: str, entries: dict[str, Entry], every: bool) -> str:
@@ -88,16 +78,11 @@ def _problem(folder: Path, name: str, entries: dict[str, Entry], every: bool) ->
         return "its bytes are not those that were written"
     else:
         entries[name] = known._replace(inode=status.st_ino)
-        _give_back(path, status, known.time)
+        if status.st_mtime_ns != known.time:
+            # Where it cannot be set, only time is lost: Snakemake makes anew what seems older than its input.
+            with suppress(OSError):
+                os.utime(path, ns=(status.st_atime_ns, known.time), follow_symlinks=False)
     return ""
-
-
-def _give_back(path: Path, status: os.stat_result, time: int) -> None:
-    """Set the time at which the file was made: what follows from it is as old as it was, too."""
-    if status.st_mtime_ns != time:
-        # Where it cannot be set, only time is lost: Snakemake makes anew what seems older than its input.
-        with suppress(OSError):
-            os.utime(path, ns=(status.st_atime_ns, time), follow_symlinks=False)
 
 
 def settle(plans: Sequence[Plan], results: Path, outputs: Iterable[str]) -> None:
@@ -105,39 +90,29 @@ def settle(plans: Sequence[Plan], results: Path, outputs: Iterable[str]) -> None
     fresh = set(outputs)
     for key in (*(plan.key for plan in plans), made_files.INDEX):
         known = made_files.load(results, key)
-        now = {name: _settled(results, key, name, known[name], fresh) for name in known}
+        now = dict(known)
+        for name, entry in known.items():
+            path = Path(key, name).as_posix()
+            if path in fresh:
+                with suppress(OSError):
+                    status = (results / path).lstat()
+                    if (status.st_size, status.st_ino) == (entry.size, entry.inode):
+                        now[name] = entry._replace(time=status.st_mtime_ns)
         if now != known:
             made_files.replace(results, key, now)
-
-
-def _settled(results: Path, key: str, name: str, known: Entry, fresh: set[str]) -> Entry:
-    path = Path(key, name).as_posix()
-    if path not in fresh:
-        return known
-    try:
-        status = (results / path).lstat()
-    except OSError:
-        return known
-    same = (status.st_size, status.st_ino) == (known.size, known.inode)
-    return known._replace(time=status.st_mtime_ns) if same else known
 
 
 def leftovers(plans: Sequence[Plan], results: Path) -> list[Path]:
     """Return the files under names that vibsim gives, and that these experiments have not; links are nobody's."""
     wanted = {results / path for plan in plans for path in plan.files}
-    found = (path for plan in plans for path in _found(results / plan.key))
-    return [path for path in found if path not in wanted]
-
-
-def _found(folder: Path) -> Iterator[Path]:
-    for path in sorted(folder.iterdir()) if folder.is_dir() else ():
-        if path.is_symlink():
-            continue
-        if path.is_file() and _FILE.fullmatch(path.name):
-            yield path
-        elif path.is_dir() and _LEVEL.fullmatch(path.name):
-            shards = sorted(path.iterdir())
-            yield from (p for p in shards if _SHARD.fullmatch(p.name) and not p.is_symlink())
+    found = []
+    for folder in (results / plan.key for plan in plans):
+        for path in sorted([*folder.glob("*.nc"), *folder.glob("level_*/*.nc")]):
+            is_own = path.is_file() and not path.is_symlink() and not path.parent.is_symlink()
+            name = path.relative_to(folder).as_posix()
+            if is_own and path not in wanted and _NAMED.fullmatch(name):
+                found.append(path)
+    return found
 
 
 def remove(path: Path) -> None:

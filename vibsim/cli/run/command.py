@@ -16,11 +16,10 @@ from tempfile import TemporaryDirectory
 
 from vibsim.cli import failure, resources, results_folder
 from vibsim.cli.chosen_plans import plans_of
-from vibsim.cli.jobs import deleted
 from vibsim.cli.jobs.common import chosen_results
 from vibsim.cli.jobs.simulate import is_made
-from vibsim.cli.run import changes, lock, outcome, snakemake, sources, supervise
-from vibsim.cli.run.progress import Job, Progress
+from vibsim.cli.run import changes, lock, outcome, snakemake, supervise
+from vibsim.cli.run.snakemake import Job, Progress
 from vibsim.core import private_cache
 from vibsim.core.errors import VibsimError
 from vibsim.plan import Plan
@@ -49,9 +48,9 @@ def _run(options: Namespace) -> int:
     if options.dry_run:
         return _dry_run(plans, results, arguments, options)
     held = lock.hold(results)
-    sources.claim(plans, results)
+    lock.claim(plans, results)
     progress = Progress()
-    deleted.take(results)
+    results_folder.deleted(results)
     _clear(plans, results, options.verify)
     jobs: list[Job] = []
     for _ in range(_STAGES):
@@ -70,7 +69,7 @@ def _run(options: Namespace) -> int:
 def _clear(plans: Sequence[Plan], results: Path, every: bool) -> None:
     """Delete what is no longer as it was made, and remove what no experiment asks for any more."""
     for error in changes.changed(plans, results, every=every):
-        deleted.delete(error, results)
+        results_folder.delete(error, results)
     _tell_deleted(results)
     for path in changes.leftovers(plans, results):
         changes.remove(path)
@@ -79,7 +78,7 @@ def _clear(plans: Sequence[Plan], results: Path, every: bool) -> None:
 
 def _tell_deleted(results: Path) -> bool:
     """Say what was deleted; tell whether anything was."""
-    notes = deleted.take(results)
+    notes = results_folder.deleted(results)
     for note in notes:
         print(f"vibsim: deleted, to be made again: {note}", file=sys.stderr)
     return bool(notes)
@@ -100,7 +99,7 @@ def _dry_run(plans: Sequence[Plan], results: Path, arguments: list[str], options
         if not results.exists():
             results = Path(stack.enter_context(TemporaryDirectory(prefix="vibsim-")))
         held = lock.hold(results)
-        sources.claim(plans, results, dry_run=True)
+        lock.claim(plans, results, dry_run=True)
         bad = changes.changed(plans, results, every=options.verify)
         for error in bad:
             print(f"vibsim: would be deleted and made again: {error}", file=sys.stderr)
@@ -147,22 +146,21 @@ def _show(
     worked: bool,
 ) -> int:
     _check(ended)
-    failures = [
-        outcome.Failure(
-            str(job),
-            str(results / job.log),
-            # a job on a full disk cannot say so in its log
-            outcome.tail(results / job.log) or resources.obstacle(results),
-        )
-        for job in ended.failed
-    ]
+    failures = []
+    for job in ended.failed:
+        log = results / job.log
+        # a job on a full disk cannot say so in its log
+        end = outcome.tail(log) or resources.obstacle(results)
+        failures.append(outcome.Failure(str(job), str(log), end))
     has_index = not failures or _write_index(results)
     if options.json:
         print(outcome.as_json(findings, failures, results))
     else:
         if not worked:
             print("nothing to do: all results are up to date\n")
-        print(*outcome.as_text(findings, failures, _columns()), sep="\n")
+        # what goes to a file is not cut
+        columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else 10_000
+        print(*outcome.as_text(findings, failures, columns), sep="\n")
         if has_index:
             print(f"report: {results / 'index.html'}")
     return 0 if outcome.status(findings, failures) == "PASS" else 1
@@ -173,8 +171,3 @@ def _write_index(results: Path) -> bool:
     command = [sys.executable, "-P", "-m", "vibsim", "report", "--results", str(results)]
     ended = subprocess.run(command, check=False, env=os.environ | supervise.environment())
     return ended.returncode == 0
-
-
-def _columns() -> int:
-    """Return the width of the terminal; what goes to a file is not cut."""
-    return shutil.get_terminal_size().columns if sys.stdout.isatty() else 10_000

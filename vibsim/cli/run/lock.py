@@ -1,20 +1,33 @@
-"""One run at a time in a results folder.
+"""Whose a results folder is: that of one run at a time, and under each name the results of one file.
 
 The lock belongs to open descriptors and so vanishes with the last process that holds it, however it ends.
 A run hands its descriptor to Snakemake: should the run alone be killed, its orphan still holds the folder.
+
+Two files of one name cannot have the same results. A file is the same under every spelling of its path, and where it
+was moved or copied together with the results. One that is no longer at its place gives its name to another.
 """
 
 from __future__ import annotations
 
 import errno
 import fcntl
+import json
 import os
 import sys
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from vibsim.cli.run import supervise
 from vibsim.core import regular_files
-from vibsim.core.errors import VibsimError
+from vibsim.core.errors import Fault, InputError, VibsimError
+from vibsim.experiment.collection import ADHOC
+from vibsim.plan import Plan
+from vibsim.store.atomic import write_text
+
+Source = tuple[str, str]
+"""The file by its real path, and by its path from the results folder; one member of a sweep with its number."""
 
 _INHERITED = "VIBSIM_LOCK"
 _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
@@ -72,3 +85,57 @@ def inherited(descriptor: int) -> dict[str, str]:
 def _identity(descriptor: int) -> str:
     status = os.fstat(descriptor)
     return f"{status.st_dev}:{status.st_ino}"
+
+
+def claim(plans: Sequence[Plan], results: Path, *, dry_run: bool = False) -> None:
+    """Refuse the results of other files; put down whose the results are from now on, unless in a dry run.
+
+    Raises
+    ------
+    InputError
+        With both files of every name that is taken.
+    """
+    record = results / ".vibsim/sources.json"
+    known = _load(record)
+    own = {plan.key: _source(plan, results) for plan in plans if plan.collection == ADHOC}
+    faults = []
+    for plan in plans:
+        first = known.get(plan.key)
+        if plan.key not in own or first is None or set(first) & set(own[plan.key]):
+            continue
+        if Path(_file(first[0])).exists():
+            rule = f"{results / plan.key} has the results of another file of this name, {first[0]}"
+            hint = "rename one of the two files, or choose another folder with --results"
+            faults.append(Fault(plan.file, 0, "", "", rule, hint))
+    if faults:
+        raise InputError(faults)
+    now = known | own
+    if now != known and not dry_run:
+        # Results on a read-only medium keep what they have.
+        with suppress(OSError):
+            write_text(record, json.dumps(now, indent=1) + "\n")
+
+
+def _source(plan: Plan, results: Path) -> Source:
+    file = os.path.realpath(_file(plan.file))
+    member = plan.file.removeprefix(_file(plan.file))
+    return file + member, os.path.relpath(file, os.path.realpath(results)) + member
+
+
+def _file(word: str) -> str:
+    """Return the file in a word that may name one member of it."""
+    name, at, case = word.rpartition("@")
+    return name if at and case.isdigit() else word
+
+
+def _load(record: Path) -> dict[str, Source]:
+    try:
+        data: Any = json.loads(record.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return {}
+    known = {}
+    for key, found in data.items() if isinstance(data, dict) else ():
+        match found:
+            case [str(file), str(relative)] if file and relative:
+                known[key] = file, relative
+    return known

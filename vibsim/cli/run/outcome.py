@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from vibsim.cli.jobs import deleted
+from vibsim.cli import results_folder
 from vibsim.core.errors import FileError
 from vibsim.core.vocabulary import FORMAT, worst
 from vibsim.plan import Plan
@@ -49,7 +49,7 @@ def collect(plan: Plan, results: Path) -> Finding:
     try:
         return Finding(plan, read_json(path, digest=plan.analysis, name=plan.key), "")
     except FileError as error:
-        deleted.delete(error, results)
+        results_folder.delete(error, results)
         return Finding(plan, None, f"summary.json: {error.reason}")
 
 

@@ -1,10 +1,11 @@
-"""Start Snakemake and follow it."""
+"""Start Snakemake and follow it: its jobs, how far it is, and how it ended."""
 
 from __future__ import annotations
 
 import json
 import os
 import pwd
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,8 +17,7 @@ from typing import Any, BinaryIO
 
 from vibsim.cli import results_folder
 from vibsim.cli.run import lock, supervise
-from vibsim.cli.run.progress import Job, Progress
-from vibsim.core import ownership, private_cache
+from vibsim.core import private_cache
 from vibsim.core.errors import VibsimError
 from vibsim.plan import Plan, checkout
 from vibsim.store import write_text
@@ -27,6 +27,81 @@ _SEARCH_PATHS = (
     *("BASH_ENV", "HDF5_PLUGIN_PATH", "MPLCONFIGDIR"),
 )
 """Variables with folders and files that code is loaded from."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A job that Snakemake started, or would start."""
+
+    rule: str
+    outputs: tuple[str, ...]
+    """The files that it makes, from the results folder."""
+    log: str
+    reason: str
+    """Why it is to run."""
+
+    @property
+    def simulates(self) -> bool:
+        """Whether it makes level files."""
+        return self.rule.startswith("simulate")
+
+    @property
+    def folder(self) -> str:
+        """Folder of the experiment, empty for the index."""
+        parts = self.outputs[0].split("/")
+        return "/".join(parts[:2]) if len(parts) > 2 else ""
+
+    def __str__(self) -> str:
+        """Say what it does: ``simulate pendulum_lab/convergence level_06.nc to level_09.nc``."""
+        if not self.folder:
+            return self.rule
+        if not self.simulates:
+            return f"{self.rule} {self.folder}"
+        names = [path.removeprefix(f"{self.folder}/") for path in self.outputs]
+        return f"simulate {self.folder} " + " to ".join(dict.fromkeys((names[0], names[-1])))
+
+
+class Progress:
+    """Tells on stderr how far a run is: in one line that is rewritten, or plain lines where the output is kept."""
+
+    def __init__(self) -> None:
+        self.is_terminal = sys.stderr.isatty()
+        self.done = 0
+        self.started = 0
+        self.total = 0
+        self.current = ""
+
+    def count(self, done: int, total: int) -> None:
+        """Take how many jobs are done of how many, both with the target of all, which is no job."""
+        self.total = total - 1
+        self.done = min(done, self.total)
+        if not done:
+            self.started = 0
+        self._show()
+
+    def start(self, job: Job) -> None:
+        """Take a job that has started."""
+        self.current = str(job)
+        self.started += 1
+        if not self.is_terminal:
+            count = f"{self.started} of {self.total}: " if self.total else ""
+            print(f"{count}{self.current}", file=sys.stderr, flush=True)
+        self._show()
+
+    def clear(self) -> None:
+        """Remove the line."""
+        if self.is_terminal:
+            self._rewrite("")
+
+    def _show(self) -> None:
+        if self.is_terminal:
+            count = f"{self.done} of {self.total}: " if self.total else ""
+            self._rewrite(f"{count}{self.current}")
+
+    def _rewrite(self, text: str) -> None:
+        width = shutil.get_terminal_size().columns - 1
+        sys.stderr.write(f"\r\033[K{text[:width]}")
+        sys.stderr.flush()
 
 
 @dataclass
@@ -69,12 +144,8 @@ def run(
 
     Parameters
     ----------
-    plans
-        The experiments.
-    results
-        The results folder, whose lock is held.
-    held
-        Descriptor of the lock, which Snakemake inherits.
+    results, held
+        The results folder, and the descriptor of its lock, which Snakemake inherits.
     arguments
         Further arguments for Snakemake.
     progress
@@ -187,19 +258,13 @@ def _environment() -> dict[str, str]:
             found[name] = os.pathsep.join(map(os.path.abspath, value.split(os.pathsep)))
     try:
         caches = private_cache.general()
-        ownership.check(caches)
-        ownership.check_writable(caches)
+        private_cache.check(caches, writable=True)
     except OSError:
         caches = private_cache.place()
         found["MPLCONFIGDIR"] = str(caches / "matplotlib")
-    return found | _of_unknown_user() | {"XDG_CACHE_HOME": str(caches)}
-
-
-def _of_unknown_user() -> dict[str, str]:
-    """Return a home and a name for a user whom the system does not know: without them Snakemake does not start."""
     try:
         pwd.getpwuid(os.getuid())
     except KeyError:
-        # nothing is kept there: the caches have places of their own
-        return {"HOME": str(private_cache.place()), "USER": str(os.getuid())}
-    return {}
+        # Snakemake does not start without a home and a name; nothing is kept there: the caches have places of their own
+        found |= {"HOME": str(private_cache.place()), "USER": str(os.getuid())}
+    return found | {"XDG_CACHE_HOME": str(caches)}

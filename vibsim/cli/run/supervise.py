@@ -41,15 +41,7 @@ class Interrupted(KeyboardInterrupt):
 def supervised(work: Work) -> int:
     """Return the exit status of `work`, which ends when this process is told to, or is killed.
 
-    Parameters
-    ----------
-    work
-        The command. It may raise `Interrupted`.
-
-    Returns
-    -------
-    int
-        That of the command; 128 and the number of the signal that ended it.
+    It is that of the command, which may raise `Interrupted`, or 128 and the number of the signal that ended it.
     """
     if parent := os.environ.pop(_PARENT, ""):
         return _as_child(int(parent), work)

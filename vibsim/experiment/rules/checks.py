@@ -1,15 +1,15 @@
-"""What checks and printed tables must be besides well-formed: they name what the experiment has."""
+"""What checks and printed tables must be besides well-formed: they name what the model and the schemes have."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import count
 from typing import Any
 
 from vibsim.core.errors import nearest
 from vibsim.core.vocabulary import BY_TOLERANCE, REASONS
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules.check_places import (
-    Ladder,
     Scope,
     check_case,
     check_level,
@@ -18,21 +18,7 @@ from vibsim.experiment.rules.check_places import (
     known_scheme,
     known_schemes,
 )
-from vibsim.experiment.rules.quantities import (
-    ENERGIES,
-    allowed,
-    check_value,
-    has_formal_order,
-    has_quantity,
-    is_comparable,
-    known_by_theory,
-    known_error_part,
-    known_exactly,
-    known_quantity,
-    known_value,
-    one_of,
-    plain,
-)
+from vibsim.experiment.rules.size_limits import Setting
 from vibsim.experiment.schema.checks import (
     SOLUTIONS,
     Check,
@@ -45,39 +31,42 @@ from vibsim.experiment.schema.checks import (
     ValueCheck,
 )
 from vibsim.experiment.schema.published import row_at, row_id
-from vibsim.models.shared.phase_amplitude_names import is_error_part
+from vibsim.experiment.value_names import VALUES, Value
+from vibsim.models import BUDGET, centred, has_budget, has_solution
+from vibsim.models.shared.free import why_not_free
+from vibsim.models.shared.phase_amplitude_names import (
+    error_parts,
+    has_error_parts,
+    is_error_part,
+)
+
+ENERGIES = ("energy", "energy_deviation")
+"""The energies that are known exactly where they are conserved."""
 
 
 def check_published(
-    tables: Iterable[Any], taken: Iterable[str], ladder: Ladder, report: Report
+    tables: Sequence[Any], taken: Iterable[str], setting: Setting, report: Report
 ) -> None:
-    """Note every fault of printed tables (None stands for a malformed one, or row).
-
-    Parameters
-    ----------
-    taken
-        The ids of the checks, in their order in the file.
-    """
-    listed = list(tables)
+    """Note every fault of printed tables (None stands for a malformed one, or row); `taken`: the ids of the checks."""
     own = {
         row_id(i, j)
-        for i, table in enumerate(listed, 1)
+        for i, table in enumerate(tables, 1)
         for j in range(1, 1 + len(table.rows if table else ()))
     }
     for i, id_ in enumerate(taken):
         if id_ in own:
             report.add(("checks", i, "id"), "is the id of a row of published", value=id_)
-    for i, table in enumerate(listed):
+    for i, table in enumerate(tables):
         if table is not None:
-            _published_table(table, Scope(("published", i), ladder, report))
+            _published_table(table, Scope(("published", i), setting, report))
 
 
 def _published_table(table: Any, scope: Scope) -> None:
     rows = [(row, scope.at("rows", j)) for j, row in enumerate(table.rows) if row is not None]
-    row = None if table.value is None else known_value(table.value, scope.at("value"))
+    row = None if table.value is None else _known_value(table.value, scope.at("value"))
     if row is not None and not scope.at("quantity").is_faulty:
         best = any(printed.level == "best" for printed, _ in rows)
-        check_value(row, table.quantity, best, scope)
+        _check_value(row, table.quantity, best, scope)
     for j, name in enumerate(table.beside):
         _beside(name, table, table.beside[:j], scope.at("beside", j))
     for printed, place in rows:
@@ -86,34 +75,31 @@ def _published_table(table: Any, scope: Scope) -> None:
         else:
             check_scheme_and_case(row_at(printed), place)
         if table.quantity is not None:
-            has_quantity(table.quantity, [(printed.scheme, place.at("scheme"))])
+            _has_quantity(table.quantity, [(printed.scheme, place.at("scheme"))])
 
 
 def _beside(name: str, table: Any, before: tuple[str, ...], scope: Scope) -> None:
     """Check a further value, which is of the quantity of the table where it is of one."""
-    row = known_value(name, scope)
+    row = _known_value(name, scope)
     if name in before:
         scope.refuse("a value must not be repeated", value=name)
     if row is None:
         return
-    choices = allowed(row, scope.ladder)
+    choices = _allowed(row, scope.setting)
     if choices and table.quantity not in choices:
         rule = f"{row.name} is not known of the quantity of this table"
         scope.refuse(rule, "it is of " + ", ".join(choices), row.name)
-    is_comparable(row, table.quantity, scope)
+    _is_comparable(row, table.quantity, scope)
 
 
-def finish_checks(checks: Iterable[Any], ladder: Ladder, report: Report) -> tuple[Any, ...]:
+def finish_checks(checks: Sequence[Any], setting: Setting, report: Report) -> tuple[Any, ...]:
     """Note every fault of the checks (None stands for a malformed one); give an id to those without."""
-    listed = list(checks)
-    ids = _ids(listed, report)
-    if ladder.by_tolerance:
-        _check_own(listed, report)
+    ids = _ids(checks, setting.by_tolerance, report)
     finished = []
-    for i, check in enumerate(listed):
+    for i, check in enumerate(checks):
         if check is None:
             continue
-        _check(check, Scope(("checks", i), ladder, report))
+        _check(check, Scope(("checks", i), setting, report))
         update: dict[str, Any] = {"id": ids[i]}
         if isinstance(check, ClaimCheck):
             update["that"] = check.that.model_copy(update={"id": ids[i]})
@@ -121,30 +107,20 @@ def finish_checks(checks: Iterable[Any], ladder: Ladder, report: Report) -> tupl
     return tuple(finished)
 
 
-def _ids(checks: list[Any], report: Report) -> list[str]:
+def _ids(checks: Sequence[Any], by_tolerance: bool, report: Report) -> list[str]:
     """Return the id of every check; a generated one is its place in the file."""
+    ids = [check.id if check is not None else "" for check in checks]
     given: dict[str, int] = {}
-    for i, check in enumerate(checks):
-        if check is not None and check.id and given.setdefault(check.id, i) != i:
-            report.add(("checks", i, "id"), "two checks have one id", value=check.id)
-    ids = []
-    for i, check in enumerate(checks):
-        name = check.id if check is not None else ""
-        number = i + 1
-        while not name:
-            candidate = f"check_{number}"
-            name = candidate if candidate not in given else ""
-            number += len(checks)
-        ids.append(name)
-    return ids
-
-
-def _check_own(checks: list[Any], report: Report) -> None:
-    """Refuse the name of the verdict that every experiment with a tolerance has."""
-    for i, check in enumerate(checks):
-        if check is not None and check.id == BY_TOLERANCE:
+    for i, id_ in enumerate(ids):
+        if id_ and given.setdefault(id_, i) != i:
+            report.add(("checks", i, "id"), "two checks have one id", value=id_)
+        if id_ == BY_TOLERANCE and by_tolerance:
             rule = "is the id of the verdict on the tolerance itself"
-            report.add(("checks", i, "id"), rule, value=check.id)
+            report.add(("checks", i, "id"), rule, value=id_)
+    for i, id_ in enumerate(ids):
+        free = (f"check_{number}" for number in count(i + 1, len(ids)))
+        ids[i] = id_ or next(name for name in free if name not in given)
+    return ids
 
 
 def _check(check: Check, scope: Scope) -> None:
@@ -152,40 +128,67 @@ def _check(check: Check, scope: Scope) -> None:
         scope = scope.at("that")
         if check.that.id:
             scope.at("id").refuse("the id belongs to the claim", at_key=True)
-    match check.measured:
-        case ConvergesCheck() as inner:
+    inner = check.measured
+    if isinstance(inner, StableCheck | ConservesCheck | EqualCheck):
+        check_level(inner.level, scope.at("level"))
+        check_case(inner.case, scope.at("case"))
+    if not isinstance(inner, ValueCheck | EqualCheck):
+        known_schemes(inner.schemes, scope.at("schemes"))
+    match inner:
+        case ConvergesCheck():
             _converges(inner, scope)
-        case ValueCheck() as inner:
+        case ValueCheck():
             _value(inner, scope)
-        case StableCheck() as inner:
-            known_schemes(inner.schemes, scope.at("schemes"))
-            _level_and_case(inner, scope)
-        case ConservesCheck() as inner:
-            _conserves(inner, scope)
-        case EqualCheck() as inner:
+        case ConservesCheck():
+            _quantity_of_schemes(inner.conserves, "conserves", inner.schemes, scope)
+            model = scope.setting.model
+            if model is not None and not model.conservative:
+                scope.refuse(f"the energy of {model.kind} is not conserved")
+        case EqualCheck():
             _equal(inner, scope)
-
-
-def _level_and_case(check: StableCheck | ConservesCheck | EqualCheck, scope: Scope) -> None:
-    check_level(check.level, scope.at("level"))
-    check_case(check.case, scope.at("case"))
 
 
 def _quantity_of_schemes(name: str, key: str, schemes: Sequence[str] | None, scope: Scope) -> None:
     """Check that the quantity under a key of a check exists, and that the schemes which the check names have it."""
-    if known_quantity(name, scope.at(key)):
+    if _is_quantity(name, scope.setting.quantities, scope.at(key)):
         places = ((scheme, scope.at("schemes", i)) for i, scheme in enumerate(schemes or ()))
-        has_quantity(name, places)
+        _has_quantity(name, places)
 
 
 def _converges(check: ConvergesCheck, scope: Scope) -> None:
-    known_schemes(check.schemes, scope.at("schemes"))
     if is_error_part(check.converges):
-        known_error_part(check.converges, scope.at("converges"))
-        has_formal_order(check, scope)
+        _known_error_part(check.converges, scope.at("converges"))
+        _has_formal_order(check, scope)
     else:
         _quantity_of_schemes(check.converges, "converges", check.schemes, scope)
     _expect(check.expect, scope.at("expect"))
+
+
+def _known_error_part(name: str, scope: Scope) -> None:
+    model = scope.setting.model
+    if model is None or name in error_parts(model):
+        return
+    if has_error_parts(model):
+        scope.refuse("unknown quantity", nearest(name, error_parts(model)), name)
+        return
+    what = "events" if model.events is not None else "a force with corners"
+    rule = f"does not exist: {model.kind} has {what}, and only a smooth motion has a phase and an amplitude"
+    scope.refuse(rule, f"ask for {model.position}", name)
+
+
+def _has_formal_order(check: ConvergesCheck, scope: Scope) -> None:
+    """Check that the order of a part of an error is given as a number where theory knows none."""
+    model = scope.setting.model
+    if model is None or check.order != "scheme" or check.converges not in error_parts(model):
+        return
+    reason = why_not_free(model)
+    if reason:
+        rule = (
+            f"theory knows the order of {check.converges} on linear models without forces in time only, and "
+            f"{model.kind} {reason}"
+        )
+        place = scope.at("order" if "order" in check.model_fields_set else "converges")
+        place.refuse(rule, "give `order:` as a number")
 
 
 def _expect(expect: Expect, scope: Scope) -> None:
@@ -193,8 +196,7 @@ def _expect(expect: Expect, scope: Scope) -> None:
     if reason is None:
         return
     if reason not in REASONS:
-        hint = nearest(reason, list(REASONS))
-        scope.at("reason").refuse("unknown reason", hint, reason)
+        scope.at("reason").refuse("unknown reason", nearest(reason, list(REASONS)), reason)
     elif REASONS[reason] != expect.status and not scope.at("status").is_faulty:
         rule = f"reason of status {REASONS[reason]}, but the status is {expect.status}"
         choices = [name for name, status in REASONS.items() if status == expect.status]
@@ -204,13 +206,13 @@ def _expect(expect: Expect, scope: Scope) -> None:
 def _value(check: ValueCheck, scope: Scope) -> None:
     _comparison(check, scope)
     place = scope.at("at")
-    row = known_value(check.value, scope.at("value"))
+    row = _known_value(check.value, scope.at("value"))
     if row is None:
         check_scheme_and_case(check.at, place)
         return
-    check_value(row, check.quantity, check.at.level == "best", scope)
+    _check_value(row, check.quantity, check.at.level == "best", scope)
     if check.quantity is not None and check.at.scheme is not None:
-        has_quantity(check.quantity, [(check.at.scheme, place.at("scheme"))])
+        _has_quantity(check.quantity, [(check.at.scheme, place.at("scheme"))])
     check_place(check.at, row, place)
 
 
@@ -227,17 +229,7 @@ def _comparison(check: ValueCheck, scope: Scope) -> None:
             scope.at(name).refuse("is used with equals only", at_key=True)
 
 
-def _conserves(check: ConservesCheck, scope: Scope) -> None:
-    known_schemes(check.schemes, scope.at("schemes"))
-    _quantity_of_schemes(check.conserves, "conserves", check.schemes, scope)
-    model = scope.ladder.model
-    if model is not None and not model.conservative:
-        scope.refuse(f"the energy of {model.kind} is not conserved")
-    _level_and_case(check, scope)
-
-
 def _equal(check: EqualCheck, scope: Scope) -> None:
-    _level_and_case(check, scope)
     if scope.at("equal").is_faulty:
         return
     first, second = scope.at("equal", 0), scope.at("equal", 1)
@@ -252,23 +244,150 @@ def _equal(check: EqualCheck, scope: Scope) -> None:
         if check.first == check.second:
             second.refuse("must be another one than the first", value=check.second)
     if _compared_quantity(check, scope.at("quantity")):
-        has_quantity(check.quantity, named)
+        _has_quantity(check.quantity, named)
         if check.second == "exact":
-            known_exactly(check.quantity, check.second, second)
+            _known_exactly(check.quantity, check.second, second)
         elif check.second == "discrete":
-            known_by_theory(check.second, second)
-    if check.second == "discrete" and check.first in scope.ladder.adaptive:
+            _known_by_theory(check.second, second)
+    if check.second == "discrete" and check.first in scope.setting.adaptive:
         first.refuse("has no steps of its own that theory could know", value=check.first)
 
 
 def _compared_quantity(check: EqualCheck, scope: Scope) -> bool:
     """Check that a quantity exists, of the schemes or of the solution that a scheme is compared with."""
-    model = scope.ladder.model
+    model = scope.setting.model
     if check.second not in SOLUTIONS or model is None:
-        return known_quantity(check.quantity, scope)
+        return _is_quantity(check.quantity, scope.setting.quantities, scope)
     choices = tuple(state.name for state in model.states)
     if check.second == "exact":
         choices += ENERGIES
-        if plain(check.quantity) in choices and scope.ladder.own_velocity:
+        if _plain(check.quantity) in choices and scope.setting.own_velocity:
             choices += (check.quantity,)
-    return one_of(check.quantity, choices, scope, check.second)
+    return _is_quantity(check.quantity, choices, scope, check.second)
+
+
+def _is_quantity(name: str, choices: tuple[str, ...], scope: Scope, what: str = "") -> bool:
+    """Check that a quantity is one of `choices`, those of `what`; say so where it exists, but not there."""
+    model = scope.setting.model
+    if not choices or name in choices:
+        return True
+    if model is not None and name in centred(model) and not scope.setting.own_velocity:
+        rule = "exists only where a scheme has another velocity than the centred difference"
+        if model.events is not None:
+            rule = "does not exist: across an event the centred difference is no velocity"
+        scope.refuse(rule, f"ask for {_plain(name)}", name)
+        return False
+    known = name in scope.setting.quantities
+    rule = f"{what} is not known of this quantity" if known else "unknown quantity"
+    hint = "choose from " + ", ".join(choices) if known else nearest(name, choices)
+    scope.refuse(rule, hint, name)
+    return False
+
+
+def _plain(name: str) -> str:
+    return name.removesuffix("_d2t")
+
+
+def _has_quantity(name: str, schemes: Iterable[tuple[str, Scope]]) -> None:
+    for scheme, scope in schemes:
+        setting = scope.setting
+        if setting.model is None or name not in centred(setting.model) or not setting.own_velocity:
+            return
+        if scheme in setting.names and scheme not in setting.own:
+            hint = f"choose from {', '.join(setting.own)}" if setting.own else ""
+            scope.refuse(f"has no {name} beside its {_plain(name)}", hint, scheme)
+
+
+def _known_value(name: str, scope: Scope) -> Value | None:
+    row = VALUES.get(name)
+    if row is None:
+        scope.refuse("unknown value", nearest(name, list(VALUES)), name)
+    return row
+
+
+def _check_value(row: Value, quantity: str | None, best: bool, scope: Scope) -> None:
+    """Check of which quantity a value (`best`: of the extrapolated solution) is, and what it is compared with.
+
+    The scope is that of the mapping with the keys ``value`` and ``quantity``.
+    """
+    place = scope.at("quantity")
+    choices = _allowed(row, scope.setting, best)
+    if row.of == "none":
+        if quantity is not None:
+            rule = f"{row.name} is of the motion as a whole and takes no quantity"
+            place.refuse(rule, at_key=True)
+    elif quantity is None:
+        rule = f"required key is missing: {row.name} is of a quantity"
+        place.refuse(rule, "choose from " + ", ".join(choices))
+    else:
+        _is_quantity(quantity, choices, place, row.name)
+    _is_comparable(row, quantity, scope.at("value"))
+
+
+def _is_comparable(row: Value, quantity: str | None, scope: Scope) -> None:
+    model = scope.setting.model
+    if model is None:
+        return
+    if row.needs_exact == "period" and model.exact_period is None:
+        scope.refuse(f"the exact period of {model.kind} is not known", value=row.name)
+    if row.needs_exact == "solution":
+        _known_exactly(quantity, row.name, scope)
+    if row.needs_events and model.events is None:
+        scope.refuse(f"{model.kind} has no events: its motion is smooth", value=row.name)
+    if row.needs_rational:
+        from vibsim.theory.degrees import applies
+
+        if not applies(model):
+            rule = (
+                "is known of one coordinate without events, with an acceleration of + - * /, whole powers and abs; "
+                f"that of {model.kind} here is another one"
+            )
+            scope.refuse(rule, value=row.name)
+    if row.needs_linear:
+        _known_by_theory(row.name, scope)
+
+
+def _known_exactly(quantity: str | None, value: str, scope: Scope) -> None:
+    """Check that the model knows the exact solution of a quantity, with which `value` is compared."""
+    model = scope.setting.model
+    if model is None:
+        return
+    # the energy is known where it is conserved or the motion is known; the budget is 0 always
+    name = _plain(quantity or "")
+    taken, done, budget = BUDGET
+    is_solved = has_solution(model) and name not in (taken, done)
+    if not (is_solved or name == budget or (model.conservative and name in ENERGIES)):
+        of = (*(ENERGIES if model.conservative else ()), *((budget,) if has_budget(model) else ()))
+        hint = f"{' and '.join(of)} {'is' if len(of) == 1 else 'are'}" if of else ""
+        rule = f"the exact {quantity or 'solution'} of {model.kind} is not known"
+        scope.refuse(rule, hint, value)
+
+
+def _known_by_theory(value: str, scope: Scope) -> None:
+    """Check that the theory of schemes, which is that of linear models without damping, knows the model."""
+    model = scope.setting.model
+    if model is not None and not (model.linear and model.conservative):
+        rule = f"{value} is known of linear models without damping only, not of {model.kind}"
+        scope.refuse(rule, value=value)
+
+
+def _allowed(row: Value, setting: Setting, best: bool = False) -> tuple[str, ...]:
+    """Name the quantities that `row` can be of; `best`: of the extrapolated solution."""
+    model = setting.model
+    if model is None or row.of == "none":
+        return ()
+    states = tuple(state.name for state in model.states)
+    more = centred(model) if setting.own_velocity else ()
+    deviations = ("energy_deviation", *more[2:])
+    choices = {
+        "states": states,
+        "stored": (*states, *(output.name for output in model.outputs)),
+        "deviation": deviations[:1],
+        "running": deviations,
+        "extremal": (*states, *deviations),
+    }
+    if row.of in choices:
+        return choices[row.of]
+    if best:
+        return (*states, *ENERGIES, *more)
+    return (*setting.quantities, *(error_parts(model) if row.of == "convergent" else ()))

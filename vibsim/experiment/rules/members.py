@@ -6,26 +6,22 @@ case: V' vanishes before and behind it, and the current would stay 0.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vibsim.experiment.data import AnyExperiment, ModelSpec, TableSpec, TimeSpec
+from vibsim.core.array_types import Floats
+from vibsim.experiment.data import AnyExperiment, TimeSpec
 from vibsim.experiment.faults import Report
-from vibsim.experiment.schema.fields import TABLE, FrozenDict, Section
+from vibsim.experiment.schema.fields import TABLE, FrozenDict
 from vibsim.experiment.schema.sweep import Axis
-from vibsim.experiment.sweep_columns import columns
-from vibsim.experiment.tables.file import TableError, read
+from vibsim.experiment.sweep_columns import columns_of
 from vibsim.formula import Expression, derivative, parse, put, size, values
 from vibsim.formula.jumps import first_jump
 from vibsim.models import FormulaField, Model, natural_end, tree
-from vibsim.models.table import Table
-
-Floats = NDArray[np.float64]
 
 CHUNK = 2**16
 """Members that are looked at together."""
@@ -33,39 +29,17 @@ SLACK = 1e-6
 """What is no difference between two places, in spacings of the table or in steps: rounding."""
 LISTED = 3
 """Most swept numbers of a member that a message names."""
-
-
-def table_of(row: FormulaField, section: Section, folder: Path, report: Report) -> TableSpec | None:
-    """Return the table that stands in place of a formula; None, and a fault, where it cannot be had.
-
-    Parameters
-    ----------
-    section
-        As pydantic read it: the path, and the names of the columns.
-    folder
-        That of the experiment file.
-    """
-    assert row.table is not None
-    written: str = getattr(section, TABLE)
-    names = (getattr(section, row.table[0]), getattr(section, row.table[1]))
-    if Path(written).is_absolute():
-        rule = "must be a path relative to the folder of the experiment file"
-        report.add(("model", row.name, TABLE), rule, value=written)
-        return None
-    try:
-        table, content = read(folder / written, row.table, names)
-    except TableError as error:
-        value = written if error.key == TABLE else names[row.table.index(error.key)]
-        report.add(("model", row.name, error.key), error.rule, error.hint, value)
-        return None
-    return _spec(table, written, names, content)
-
-
-def _spec(table: Table, file: str, names: tuple[str, str], content: str) -> TableSpec:
-    place, value = names
-    spec = TableSpec(file=file, place=place, value=value, numbers=table.digest)
-    spec.hold(table, content)
-    return spec
+MEMBERS = 64
+"""Members of a sweep that are looked at for jumps, evenly spread: a jump is hardly ever there for single ones."""
+WORK = 2**14
+"""Operations of all these members together: of a long formula, fewer members are looked at."""
+WORDS = {1: "derivative", 2: "second derivative"}
+HINTS = {
+    "voltage": "write a steep ramp, V0*(1 + tanh((t - t1)/0.001))/2 say, or begin behind the jump, "
+    "with di_dt larger by it over L",
+    "road": "round it off, or give it as a table, whose spacing does that",
+}
+OTHERS = "write a solution whose value and slope have no jumps"
 
 
 @dataclass(frozen=True)
@@ -76,8 +50,6 @@ class MemberNumbers:
     parameters: Mapping[str, float]
     time: TimeSpec
     axes: Sequence[Axis]
-    level: int
-    """The coarsest one."""
 
     def members(self) -> Iterator[tuple[dict[str, Any], Floats]]:
         """Yield parts of the members that differ in what matters: their swept numbers, and their ends."""
@@ -85,23 +57,22 @@ class MemberNumbers:
         for start in range(0, count, CHUNK):
             yield self._part(start, min(start + CHUNK, count))
 
-    def some(self, most: int) -> Iterator[tuple[dict[str, Any], float]]:
-        """Yield the parameters and the ends of at most so many of these members, evenly spread over them."""
+    def some(self, most: int) -> Iterator[tuple[dict[str, float], float]]:
+        """Yield the parameters by name and the ends of at most so many of these members, evenly spread over them."""
         count = self._count()
         for i in sorted({k * (count - 1) // max(most - 1, 1) for k in range(most)}):
             found, end = self._part(i, i + 1)
-            numbers = self._parameters(found)
-            yield {key: float(np.ravel(x)[0]) for key, x in numbers.items()}, float(end[0])
+            numbers = self._by_name(found)
+            yield {name: float(np.ravel(x)[0]) for name, x in numbers.items()}, float(end[0])
 
     def _axes(self) -> list[Axis]:
         return [axis for axis in self.axes if any(map(_matters, axis.keys))]
 
     def _count(self) -> int:
-        return int(np.prod([axis.count for axis in self._axes()], dtype=object))
+        return math.prod(axis.count for axis in self._axes())
 
     def _part(self, start: int, stop: int) -> tuple[dict[str, Any], Floats]:
-        """Return what differs in members start..stop-1, and their ends."""
-        found = {k: v for k, v in columns(self._axes(), start, stop).items() if _matters(k)}
+        found = {k: v for k, v in columns_of(self._axes(), start, stop).items() if _matters(k)}
         end = found.get("time.end", np.full(stop - start, self.time.end))
         if self.time.periods is not None:
             own = natural_end(self.model, self.time.periods, self._parameters(found))
@@ -111,13 +82,15 @@ class MemberNumbers:
     def place(self, found: Mapping[str, Any], t: Floats) -> Floats:
         """Return the places at times t, of members with some numbers swept."""
         assert self.model.lookup is not None
-        given = self._parameters(found)
-        numbers = {row.name: given[row.key] for row in self.model.parameters}
         formula = tree(self.model, self.model.lookup.place)
-        return np.broadcast_to(values(formula, {**numbers, "t": t}), t.shape)
+        return np.broadcast_to(values(formula, {**self._by_name(found), "t": t}), t.shape)
 
     def _parameters(self, found: Mapping[str, Any]) -> dict[str, Any]:
         return {key: found.get(f"model.{key}", x) for key, x in self.parameters.items()}
+
+    def _by_name(self, found: Mapping[str, Any]) -> dict[str, Any]:
+        given = self._parameters(found)
+        return {row.name: given[row.key] for row in self.model.parameters}
 
 
 def _matters(key: str) -> bool:
@@ -143,62 +116,37 @@ def check_length(numbers: MemberNumbers, name: str, report: Report) -> None:
         report.add(("model", name, TABLE), f"{rule}{f' ({who})' if who else ''}", hint)
 
 
-def is_met(numbers: MemberNumbers) -> bool:
-    """Tell whether a step of every member ends at every point of the table, at every level.
+def _is_met(numbers: MemberNumbers, level: int) -> bool:
+    """Tell whether a step of every member ends at every point of the table, at every level from the coarsest one on.
 
     It does where the way of a step at the coarsest level is a whole part of the spacing, and the table has a point at
     the start.
     """
     assert numbers.model.lookup is not None
-    table, steps = numbers.model.lookup.table, numbers.time.base_steps << numbers.level
+    table, steps = numbers.model.lookup.table, numbers.time.base_steps << level
     for found, end in numbers.members():
         way = numbers.place(found, end / steps)
         with np.errstate(divide="ignore", invalid="ignore"):
             per_spacing, start = table.spacing / way, table.first / way
             rest = table.points * np.abs(per_spacing - np.round(per_spacing))
-            misses = (per_spacing < 0.5) | ~(rest <= SLACK) | ~(_rest(start) <= SLACK)
+            misses = ~(rest <= SLACK) | ~(np.abs(start - np.round(start)) <= SLACK)
         # who does not move meets no corner
-        if np.any(misses & (way != 0.0)):
+        if np.any((misses | (per_spacing < 0.5)) & (way != 0.0)):
             return False
     return True
 
 
-def _rest(x: Floats) -> Floats:
-    return np.abs(x - np.round(x))
-
-
 def update_tables(experiment: AnyExperiment) -> AnyExperiment:
     """Return `experiment` with what its tables say of its steps, whose members or levels were others before."""
-    if not experiment.model.tables:
-        return experiment
     model = experiment.model
-    numbers = MemberNumbers(
-        model.definition,
-        model.parameters,
-        experiment.time,
-        experiment.sweep.axes if experiment.sweep else (),
-        experiment.levels[0] if experiment.levels else 0,
-    )
-    return experiment.model_copy(update={"model": _with_met(model, is_met(numbers))})
-
-
-def _with_met(model: ModelSpec, met: bool) -> ModelSpec:
-    """Return a model whose tables say whether their points are met."""
-    tables = {name: spec.model_copy(update={"is_met": met}) for name, spec in model.tables.items()}
-    return model.model_copy(update={"tables": FrozenDict(tables)})
-
-
-MEMBERS = 64
-"""Members of a sweep that are looked at, evenly spread: a jump is hardly ever there for single ones."""
-WORK = 2**14
-"""Operations of all these members together: of a long formula, fewer members are looked at."""
-WORDS = {1: "derivative", 2: "second derivative"}
-HINTS = {
-    "voltage": "write a steep ramp, V0*(1 + tanh((t - t1)/0.001))/2 say, or begin behind the jump, "
-    "with di_dt larger by it over L",
-    "road": "round it off, or give it as a table, whose spacing does that",
-}
-OTHERS = "write a solution whose value and slope have no jumps"
+    if not model.tables:
+        return experiment
+    axes = experiment.sweep.axes if experiment.sweep else ()
+    numbers = MemberNumbers(model.definition, model.parameters, experiment.time, axes)
+    met = {"is_met": _is_met(numbers, experiment.levels[0] if experiment.levels else 0)}
+    tables = {name: spec.model_copy(update=met) for name, spec in model.tables.items()}
+    model = model.model_copy(update={"tables": FrozenDict(tables)})
+    return experiment.model_copy(update={"model": model})
 
 
 def check_jumps(members: MemberNumbers, formulas: Mapping[str, str], report: Report) -> None:
@@ -227,8 +175,7 @@ def _check_jumps(row: FormulaField, text: str, members: MemberNumbers, report: R
 def _jump(formula: Expression, members: MemberNumbers, along: Expression) -> float | None:
     """Return the place of a jump of some member; None where none is found."""
     most = max(1, min(MEMBERS, WORK // size(formula, WORK)))
-    for parameters, end in members.some(most):
-        numbers = {row.name: parameters[row.key] for row in members.model.parameters}
+    for numbers, end in members.some(most):
         at = first_jump(formula, numbers, end)
         if at is not None:
             # halving ends beside 0, not at it

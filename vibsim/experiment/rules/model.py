@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from vibsim.core.array_types import Floats
 from vibsim.experiment.data import TableSpec
 from vibsim.experiment.faults import Report
-from vibsim.experiment.rules.members import table_of
 from vibsim.experiment.schema.fields import DECLARED, TABLE, Section
 from vibsim.experiment.schema.model_and_schemes import name_fault
-from vibsim.experiment.tables.file import ENDINGS
+from vibsim.experiment.tables.file import ENDINGS, TableError, read
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import (
     MAX_CHARACTERS,
@@ -33,7 +33,6 @@ from vibsim.formula import (
 )
 from vibsim.formula.integral import has_rule
 from vibsim.models import FormulaField, Model, tree
-from vibsim.models.base import Floats
 from vibsim.models.oscillator import COULOMB
 
 NONE = "none"
@@ -75,7 +74,13 @@ def equation(
     folder
         Where the paths of tables begin.
     """
-    found = _equation(section, model, folder, report)
+    if section is None or model is None:
+        # what follows from formulas is known only with all of them
+        return Equation(model if model is not None and model.written is None else None)
+    parameters = {row.name: getattr(section, row.name) for row in model.parameters}
+    found = Equation(model, parameters)
+    if model.written is not None:
+        found = _written(section, model, parameters, folder, report)
     if found.model is None or found.model.variant is None or not found.parameters:
         return found
     neutral = {row.name: row.neutral for row in found.model.parameters}
@@ -87,13 +92,10 @@ def equation(
     return replace(found, model=found.model.variant(frozenset(terms)), terms=terms)
 
 
-def _equation(section: Any, model: Model | None, folder: Path, report: Report) -> Equation:
-    if section is None or model is None:
-        # what follows from formulas is known only with all of them
-        return Equation(model if model is not None and model.written is None else None)
-    parameters = {row.name: getattr(section, row.name) for row in model.parameters}
-    if model.written is None:
-        return Equation(model, parameters)
+def _written(
+    section: Any, model: Model, parameters: dict[str, float], folder: Path, report: Report
+) -> Equation:
+    assert model.written is not None
     declared = _declared(section, model, report)
     texts: dict[str, str] = {}
     tables: dict[str, TableSpec] = {}
@@ -101,10 +103,10 @@ def _equation(section: Any, model: Model | None, folder: Path, report: Report) -
         value = getattr(section, row.name)
         path: Path_ = ("model", row.name)
         if isinstance(value, Section) and row.table is not None:
-            table = table_of(row, value, folder, report)
+            table = _table(row, row.table, value, folder, report)
             tables |= {row.name: table} if table is not None else {}
         elif isinstance(value, Section):
-            texts |= _term(row, value, declared, parameters, report)
+            texts |= _term(row, value, parameters, report)
         elif value is None and row.name in section.model_fields_set:
             report.add(path, "must be a formula, or a number", "leave the key out", at_key=True)
         elif value == NONE and row.terms and NONE not in declared:
@@ -120,6 +122,7 @@ def _equation(section: Any, model: Model | None, folder: Path, report: Report) -
     if any(fault.key.split(".")[0] == "model" for fault in report.faults):
         return Equation(None)
     parameters |= {f"{DECLARED}.{name}": value for name, value in declared.items()}
+    exact = next((name for name in texts if name.startswith("exact")), "exact")
     try:
         found = model.written(texts, tuple(declared))
         for spec in tables.values():
@@ -127,15 +130,19 @@ def _equation(section: Any, model: Model | None, folder: Path, report: Report) -
             found = found.with_table(spec.table, False)
         _check_length(found)
     except ExpressionError as error:
-        name = _at_fault(texts, error)
+        # an error without a text speaks of the longest formula
+        longest = max(texts, key=lambda name: len(texts[name]), default="kind")
+        name = exact if error.text else longest
         report.add(("model", name), error.rule, error.hint, texts.get(name, error.text))
         return Equation(None)
-    parameters = _of_the_equation(section, found, parameters, report)
-    start = found.start(parameters) if found.start else {}
-    for name, value in start.items():
+    keys = {row.key for row in found.parameters}
+    for name in sorted(section.model_fields_set & (parameters.keys() - keys)):
+        rule = "has no meaning beside an exact solution, on which the motion starts"
+        report.add(("model", name), rule, "leave it out", parameters[name], at_key=True)
+    parameters = {key: value for key, value in parameters.items() if key in keys}
+    for name, value in (found.start(parameters) if found.start else {}).items():
         if not np.isfinite(value):
             rule = f"must have a finite value at t = 0, where {name} is {value:g}"
-            exact = _exact_of(texts)
             report.add(("model", exact), rule, value=texts.get(exact))
             return Equation(None)
     if any(row.name == "spring" for row in model.formulas):
@@ -143,53 +150,44 @@ def _equation(section: Any, model: Model | None, folder: Path, report: Report) -
     return Equation(found, parameters, texts, tables)
 
 
-def _exact_of(texts: Mapping[str, str]) -> str:
-    """Return the field of the exact solution that is written, the first one of several."""
-    return next((name for name in texts if name.startswith("exact")), "exact")
+def _table(
+    row: FormulaField, keys: tuple[str, str], section: Section, folder: Path, report: Report
+) -> TableSpec | None:
+    """Return the table that stands in place of a formula; None, and a fault, where it cannot be had.
 
-
-def _at_fault(texts: Mapping[str, str], error: ExpressionError) -> str:
-    """Return the field of which an error speaks: that of its text, or the longest one where it has none."""
-    if error.text:
-        return _exact_of(texts)
-    return max(texts, key=lambda name: len(texts[name]), default="kind")
+    The section holds the path, from `folder`, and under `keys` the names of the columns of places and values.
+    """
+    written: str = getattr(section, TABLE)
+    place, value = (getattr(section, key) for key in keys)
+    if Path(written).is_absolute():
+        rule = "must be a path relative to the folder of the experiment file"
+        report.add(("model", row.name, TABLE), rule, value=written)
+        return None
+    try:
+        table, content = read(folder / written, keys, (place, value))
+    except TableError as error:
+        shown = written if error.key == TABLE else getattr(section, error.key)
+        report.add(("model", row.name, error.key), error.rule, error.hint, shown)
+        return None
+    spec = TableSpec(file=written, place=place, value=value, numbers=table.digest)
+    spec.hold(table, content)
+    return spec
 
 
 def _check_length(model: Model) -> None:
-    """Refuse an equation that would take long to compile: each call of a function is a page of machine code.
-
-    Raises
-    ------
-    ExpressionError
-        Where its accelerations, their slopes, and the energies have more than `MAX_NODES` operations and names.
-    """
+    """Refuse an equation that would take long to compile: each call of a function is a page of machine code."""
     accelerations = [tree(model, formula) for formula in model.accelerations]
     states = (*model.positions, *model.velocities)
     slopes = [derivative(formula, name) for formula in accelerations for name in states]
     energies = [tree(model, formula) for formula in (model.kinetic_energy, model.potential_energy)]
-    if (
-        sum(size(formula, MAX_NODES) for formula in (*accelerations, *slopes, *energies))
-        <= MAX_NODES
-    ):
-        return
-    rule = f"the equation that follows, with its slopes and energies, has more than {MAX_NODES} operations"
-    hint = "write a simpler formula, or the energy as `potential` where the model has that"
-    raise ExpressionError("", 0, rule, hint)
-
-
-def _of_the_equation(
-    section: Any, found: Model, parameters: Mapping[str, float], report: Report
-) -> dict[str, float]:
-    """Return the parameters that the model of some formulas has, and refuse others that are given."""
-    keys = {row.key for row in found.parameters}
-    for name in sorted(section.model_fields_set & (parameters.keys() - keys)):
-        rule = "has no meaning beside an exact solution, on which the motion starts"
-        report.add(("model", name), rule, "leave it out", parameters[name], at_key=True)
-    return {key: value for key, value in parameters.items() if key in keys}
+    formulas = (*accelerations, *slopes, *energies)
+    if sum(size(formula, MAX_NODES) for formula in formulas) > MAX_NODES:
+        rule = f"the equation that follows, with its slopes and energies, has more than {MAX_NODES} operations"
+        hint = "write a simpler formula, or the energy as `potential` where the model has that"
+        raise ExpressionError("", 0, rule, hint)
 
 
 def _declared(section: Any, model: Model, report: Report) -> dict[str, float]:
-    """Return the declared parameters with names that can be used."""
     taken = {state.name: f"the {state.long_name}" for state in model.states}
     taken |= {"t": "the time"}
     taken |= {row.name: f"the {row.description} of the model" for row in model.parameters}
@@ -206,11 +204,7 @@ def _declared(section: Any, model: Model, report: Report) -> dict[str, float]:
 
 
 def _term(
-    row: FormulaField,
-    value: Section,
-    declared: Mapping[str, float],
-    parameters: dict[str, float],
-    report: Report,
+    row: FormulaField, value: Section, parameters: dict[str, float], report: Report
 ) -> dict[str, str]:
     """Return the formula of ``{word: coefficient}``, and put the coefficient among the parameters."""
     given = {word: getattr(value, word) for word in row.terms if getattr(value, word) is not None}

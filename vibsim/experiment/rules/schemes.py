@@ -28,9 +28,10 @@ def finish_schemes(
             report.add(("schemes", i), "unknown scheme", hint, section)
         elif section is not None:
             several = _specs(section, model)
-            _check_events(section, i, model, report)
             found.extend(several)
-            _check_forces(several[0], i, model, report)
+            if model is not None:
+                _check_events(section, i, model, report)
+                _check_forces(several[0].kind, i, model, report)
             _check_names(several, i, first, report)
     if are_known(sections) and all(spec.adaptive for spec in found):
         rule = "at least one scheme must take equal steps, on the levels that are compared"
@@ -39,17 +40,13 @@ def finish_schemes(
 
 
 def _specs(section: Any, model: Model | None) -> list[SchemeSpec]:
-    """Return the schemes that a sound entry stands for on a model."""
-    if isinstance(section, str):
-        rows = SCHEMES[section].options_on(model)
-        defaults = {row.name: row.default for row in rows}
-        return [SchemeSpec(name=section, kind=section, options=defaults)]
-    kind, name = section.kind, section.label or section.kind
-    rows = SCHEMES[kind].options_on(model)
-    given = {row.name: getattr(section, row.name) for row in rows}
-    options = {
-        row.name: row.default if given[row.name] is None else given[row.name] for row in rows
-    }
+    kind = section if isinstance(section, str) else section.kind
+    options: dict[str, Any] = {row.name: row.default for row in SCHEMES[kind].options_on(model)}
+    name = kind
+    if not isinstance(section, str):
+        name = section.label or kind
+        given = {key: getattr(section, key) for key in options}
+        options |= {key: value for key, value in given.items() if value is not None}
     several = options.get(TOLERANCE)
     if not isinstance(several, tuple):
         return [SchemeSpec(name=name, kind=kind, options=options)]
@@ -72,28 +69,26 @@ def _check_names(several: list[SchemeSpec], i: int, first: dict[str, int], repor
             report.add(("schemes", i), rule, "give one of them a label")
 
 
-def _check_forces(spec: SchemeSpec, i: int, model: Model | None, report: Report) -> None:
+def _check_forces(kind: str, i: int, model: Model, report: Report) -> None:
     """Refuse a scheme that cannot treat the forces of the model."""
-    if model is None or SCHEMES[spec.kind].treats(model):
+    if SCHEMES[kind].treats(model):
         return
-    able = [kind for kind, scheme in SCHEMES.items() if scheme.treats(model)]
-    if model.events is not None and SCHEMES[spec.kind].adaptive:
-        rule = f"cannot treat {model.kind}: it takes its own steps across events, where the motion is not smooth"
-        report.add(("schemes", i), rule, "choose from " + ", ".join(able), spec.kind)
-        return
+    able = [other for other, scheme in SCHEMES.items() if scheme.treats(model)]
     rule = f"cannot treat {model.kind}, whose acceleration depends on {model.velocity}"
-    damped = [kind for kind, _ in SCHEMES[spec.kind].damped if not kind.startswith(VECTOR)]
-    if damped:
+    damped = [other for other, _ in SCHEMES[kind].damped if not other.startswith(VECTOR)]
+    if model.events is not None and SCHEMES[kind].adaptive:
+        rule = f"cannot treat {model.kind}: it takes its own steps across events, where the motion is not smooth"
+    elif damped:
         rule += f" otherwise than by {' or '.join(damped)} damping"
     hint = "choose from " + ", ".join(able) if able else "no scheme can"
-    report.add(("schemes", i), rule, hint, spec.kind)
+    report.add(("schemes", i), rule, hint, kind)
 
 
-def _check_events(section: Any, i: int, model: Model | None, report: Report) -> None:
+def _check_events(section: Any, i: int, model: Model, report: Report) -> None:
     """Refuse a treatment of events where there are none."""
     given = None if isinstance(section, str) else getattr(section, EVENTS.name, None)
-    is_known = model is not None and not any(f.key.split(".")[0] == "model" for f in report.faults)
-    if given is None or model is None or not is_known or model.events is not None:
+    is_unsure = any(fault.key.split(".")[0] == "model" for fault in report.faults)
+    if given is None or is_unsure or model.events is not None:
         return
     able = [kind for kind, other in MODELS.items() if other.events is not None]
     hint = f"models with events are {', '.join(able)}, and oscillator with damping: {{coulomb: c}}"

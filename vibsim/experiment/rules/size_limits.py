@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from vibsim.experiment.cost import Load, load_of
-from vibsim.experiment.data import ExperimentSpec
+from vibsim.experiment.data import ExperimentSpec, SchemeSpec, Sweep, TimeSpec
 from vibsim.experiment.faults import Report
 from vibsim.experiment.storage import extrema_kept, is_lean, stride
+from vibsim.models import Model, quantities
 
 MAX_MEMBERS = 10**7
 MAX_MEMBER_STEPS = 2**40
@@ -18,109 +20,126 @@ MAX_DISK = 2**40
 """Bytes of the files of all levels."""
 MAX_FILES = 10_000
 """Files of all levels, each made by a job or a part of one: with more the workflow is busy with itself."""
+MIN_DT = 1e-100
+"""Smallest time step: its square and what is divided by that must not leave the range of floats."""
 
-_FEWEST = 6
+_SMALLEST_MODEL = 6
 """Series of the smallest model: two states and the energies."""
-_STATES = 2
-_RUNNING = 1
-"""Running maxima: that of the energy deviation."""
 _D2T = 4
 """Series with the centred difference as velocity: itself, two energies, and a running maximum."""
 _LEAN = 3
 """Series that a lean experiment keeps: two states and the energy deviation, and what else a check is about."""
-MIN_DT = 1e-100
-"""Smallest time step: its square and what is divided by that must not leave the range of floats."""
 
 
 @dataclass(frozen=True)
-class Shape:
-    """The counts of an experiment; None or empty where a section is faulty."""
+class Setting:
+    """What an experiment consists of; None or empty where a section is faulty, and then nothing is said about it."""
 
-    base_steps: int | None
+    model: Model | None
+    time: TimeSpec | None
     levels: tuple[int, ...]
-    schemes: int
-    members: int | None
+    schemes: tuple[SchemeSpec, ...]
+    """Those without a fault."""
+    names: tuple[str, ...]
+    """The names of the schemes as written, right or wrong."""
+    sweep: Sweep
+    """Its axes without a fault."""
     samples: int | str
-    variables: int
-    """Quantities of the model that are kept as series; 0 where the model is unknown."""
-    end: float | None
-    own_velocity: bool = False
-    """Whether a scheme has another velocity than the centred difference, which is then kept beside it."""
+    knows_sweep: bool = True
+    """Whether the whole sweep is known."""
+    by_tolerance: bool = False
+    """Whether the levels are still to be chosen, so that none of them can be named."""
+    knows_schemes: bool = True
+    """Whether every scheme is known; where one is not, it may be of any kind."""
 
-    def steps(self, level: int) -> int | None:
-        """Return the number of steps at `level`."""
-        return None if self.base_steps is None else self.base_steps * 2**level
+    def steps(self, level: int) -> int:
+        """Return the number of steps at `level`; 1 at level 0 where the time is not known."""
+        return (self.time.base_steps if self.time else 1) << level
 
     @property
     def trajectories(self) -> int:
-        """Number of schemes times number of members, where they are known."""
-        return max(self.schemes, 1) * (self.members or 1)
+        """Number of schemes times number of members, as far as they are known."""
+        return self.scheme_count * (self.members or 1)
+
+    @property
+    def members(self) -> int | None:
+        """Number of members, 1 without a sweep; None where it cannot be told."""
+        return self.sweep.count if self.knows_sweep else None
+
+    @property
+    def scheme_count(self) -> int:
+        """Number of schemes, at least 1."""
+        return max(len(self.schemes), len(self.names), 1)
+
+    @cached_property
+    def adaptive(self) -> tuple[str, ...]:
+        """Names of the schemes that choose their own steps."""
+        return tuple(scheme.name for scheme in self.schemes if scheme.adaptive)
+
+    @cached_property
+    def own(self) -> tuple[str, ...]:
+        """Names of the schemes with another velocity than the centred difference."""
+        return tuple(scheme.name for scheme in self.schemes if scheme.own_velocity)
+
+    @property
+    def own_velocity(self) -> bool:
+        """Whether some scheme has, or may have, another velocity than the centred difference."""
+        return bool(self.own) or not self.knows_schemes
+
+    @cached_property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of every quantity that is kept over time."""
+        return () if self.model is None else quantities(self.model, self.own_velocity)
 
     def stride(self, level: int) -> int:
-        """Return n where every n-th step of `level` is stored; levels and steps must be known."""
-        coarsest = self.steps(self.levels[0]) or 1
-        return stride(self.samples, coarsest, self.steps(level) or 1, self.trajectories)
+        """Return n where every n-th step of `level` is stored; there must be levels."""
+        coarsest = self.steps(self.levels[0])
+        return stride(self.samples, coarsest, self.steps(level), self.trajectories)
 
     def load(self, level: int) -> Load:
-        """Return what `level` asks of a job; levels and steps must be known."""
-        steps, coarsest = self.steps(level) or 1, self.steps(self.levels[0]) or 1
-        kept = steps // self.stride(level) + 1
-        series = max(self.variables, _FEWEST)
-        schemes = max(self.schemes, 1)
-        if is_lean(self.samples, coarsest, self.trajectories):
-            return Load(schemes, steps, kept, _LEAN, d2t=self.own_velocity)
-        return Load(
-            schemes,
-            steps,
-            kept,
-            series + _RUNNING + (_D2T if self.own_velocity else 0),
-            exact=_STATES,
-            extrema=extrema_kept(steps, self.trajectories),
-            d2t=True,
-        )
+        """Return what `level` asks of a job."""
+        steps, d2t = self.steps(level), bool(self.own)
+        if self.model is not None and self.model.events is not None:
+            d2t = False
+        samples = steps // self.stride(level) + 1
+        if is_lean(self.samples, self.steps(self.levels[0]), self.trajectories):
+            return Load(self.scheme_count, steps, samples, _LEAN, d2t=d2t)
+        known = len(quantities(self.model)) if self.model else 0
+        # with the running maximum of the energy deviation
+        series = max(known, _SMALLEST_MODEL) + 1 + (_D2T if d2t else 0)
+        extrema = extrema_kept(steps, self.trajectories)
+        return Load(self.scheme_count, steps, samples, series, exact=2, extrema=extrema, d2t=True)
 
 
-def check(shape: Shape, report: Report) -> None:
-    """Note every limit that `shape` exceeds."""
-    members = shape.members or 1
+def check(setting: Setting, report: Report) -> None:
+    """Note every limit that counts exceed."""
+    members = setting.members or 1
     if members > MAX_MEMBERS:
         rule = f"must not have more than {MAX_MEMBERS} members, has {members}"
         report.add(("sweep",), rule, at_key=True)
-    if shape.base_steps is None or not shape.levels:
+    if setting.time is None or not setting.levels:
         return
-    coarsest = shape.base_steps * 2 ** shape.levels[0]
+    coarsest, finest = setting.steps(setting.levels[0]), setting.steps(setting.levels[-1])
     if coarsest < 2:
         rule = f"the coarsest level must have at least 2 steps, has {coarsest}"
         report.add(("levels",), rule, "begin at a higher level, or give more base_steps")
-    if isinstance(shape.samples, int) and coarsest % shape.samples:
+    if isinstance(setting.samples, int) and coarsest % setting.samples:
         rule = f"must divide the {coarsest} steps of the coarsest level"
-        report.add(("samples", "every"), rule, value=shape.samples)
-    finest = shape.base_steps << shape.levels[-1]
-    if shape.end is not None and shape.end / min(finest, MAX_MEMBER_STEPS) < MIN_DT:
+        report.add(("samples", "every"), rule, value=setting.samples)
+    if setting.sweep.least_end(setting.time) / min(finest, MAX_MEMBER_STEPS) < MIN_DT:
         report.add(("time",), f"the time step must not be less than {MIN_DT:g}", at_key=True)
-    if _check_steps(shape, shape.base_steps, members, report):
-        _check_storage(shape, members, report)
-
-
-def _check_steps(shape: Shape, base_steps: int, members: int, report: Report) -> bool:
-    """Tell whether the steps are not too many; numbers beyond are too large to go on with."""
-    steps = base_steps * sum(1 << level for level in shape.levels)
-    total = steps * members * max(shape.schemes, 1)
+    total = sum(map(setting.steps, setting.levels)) * setting.trajectories
     if total > MAX_MEMBER_STEPS:
         rule = f"the experiment must not take more than {MAX_MEMBER_STEPS} steps, it takes {total}"
         report.add(("levels",), rule, "steps of every level, scheme and member together")
-    return total <= MAX_MEMBER_STEPS
-
-
-def _check_storage(shape: Shape, members: int, report: Report) -> None:
-    """Refuse what cannot be held, kept or named; one member is the least that a job can make."""
-    loads = [shape.load(level) for level in shape.levels]
+        return
+    loads = [setting.load(level) for level in setting.levels]
     hint = "store fewer samples, or begin at a lower level"
-    memory = max(load.memory(1) for load in loads)
+    # one member is the least that a job can make
+    memory, disk = max(load.memory(1) for load in loads), sum(load.disk(members) for load in loads)
     if memory > MAX_MEMORY:
         rule = f"one member at one level must not take more than {MAX_MEMORY} bytes of memory, it takes {memory}"
         report.add(("levels",), rule, hint, at_key=True)
-    disk = sum(load.disk(members) for load in loads)
     if disk > MAX_DISK:
         rule = f"the files must not take more than {MAX_DISK} bytes, they take {disk}"
         report.add(("levels",), rule, hint, at_key=True)
@@ -128,11 +147,9 @@ def _check_storage(shape: Shape, members: int, report: Report) -> None:
 
 def check_files(experiment: ExperimentSpec, report: Report) -> None:
     """Note where the files of all levels are too many."""
-    loads = [load_of(experiment, level) for level in experiment.levels]
-    files = [load.shards(experiment.members) for load in loads]
-    if sum(files) <= MAX_FILES:
-        return
-    rule = f"the levels must not have more than {MAX_FILES} files, they have {sum(files)}"
-    finest = f"{files[-1]} of them are of level {experiment.levels[-1]}"
-    hint = f"{finest}: leave levels out, or take fewer members"
-    report.add(("levels",), rule, hint, at_key=True)
+    files = [load_of(experiment, level).shards(experiment.members) for level in experiment.levels]
+    if sum(files) > MAX_FILES:
+        rule = f"the levels must not have more than {MAX_FILES} files, they have {sum(files)}"
+        finest = f"{files[-1]} of them are of level {experiment.levels[-1]}"
+        hint = f"{finest}: leave levels out, or take fewer members"
+        report.add(("levels",), rule, hint, at_key=True)

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from pydantic_core import PydanticCustomError
 
 from vibsim.core.errors import nearest
-from vibsim.experiment.data import SchemeSpec, TimeSpec, end_varies
+from vibsim.experiment.data import SchemeSpec, Sweep
 from vibsim.experiment.faults import Report
-from vibsim.experiment.schema.fields import TABLE, number
+from vibsim.experiment.schema.fields import TABLE, number, refused
 from vibsim.experiment.schema.sweep import (
     FLAGS,
     Axis,
     Draw,
-    Linspace,
     Logspace,
     Range,
     Rule,
@@ -35,39 +34,9 @@ MAX_HYPERCUBE = 10**6
 MAX_RANGE = 2.0**53
 """Values of a range, at most: beyond it, their numbers are no floats."""
 _STEPS = "step counts cannot be swept: every member has the same steps"
-_LEVELS = "levels cannot be swept: they are what is compared"
 _FIXED = {
     f"time.{name}": _STEPS for name in ("base_steps", "base_dt", "steps_per_period", "periods")
 }
-
-
-@dataclass(frozen=True)
-class SweepAxes:
-    """The sweep of an experiment, or what of it is sound."""
-
-    axes: tuple[Axis, ...] = ()
-    is_whole: bool = True
-    """Whether nothing is left out because of a fault."""
-
-    @property
-    def members(self) -> int | None:
-        """Number of members, 1 without a sweep; None where it cannot be told."""
-        return math.prod(axis.count for axis in self.axes) if self.is_whole else None
-
-    def least_end(self, time: TimeSpec) -> float:
-        """Return the earliest end of a member, as far as the sweep gives it."""
-        return min(
-            (float(low) for key, low, _ in self._spans() if key == "time.end"), default=time.end
-        )
-
-    def fixed_end(self, time: TimeSpec) -> float | None:
-        """Return the end that every member has, None where the end varies."""
-        swept = ((key, low != high) for key, low, high in self._spans())
-        return None if end_varies(swept, time.periods is not None) else self.least_end(time)
-
-    def _spans(self) -> Iterator[tuple[str, float | str, float | str]]:
-        for axis in self.axes:
-            yield from ((key, *span) for key, span in zip(axis.keys, axis.spans, strict=True))
 
 
 @dataclass(frozen=True)
@@ -83,19 +52,29 @@ class Target:
     is_flag: bool = False
     """Whether it takes true and false."""
 
+    def entry(self, value: Any) -> float | str:
+        """Return an entry of a list of its values; PydanticCustomError where it is none."""
+        if self.choices:
+            if not isinstance(value, str) or value not in self.choices:
+                raise refused("unknown choice", nearest(str(value), self.choices))
+            return value
+        if self.is_flag:
+            if not isinstance(value, bool):
+                raise refused("must be true or false")
+            return FLAGS[value]
+        return number(value)
+
 
 def targets(model: Model | None, schemes: Sequence[SchemeSpec]) -> dict[str, Target]:
     """Return everything that can be swept, by dotted key."""
     found: dict[str, Target] = {}
     if model is not None:
         for state in model.states if model.start is None else ():
-            least = -math.inf if state.minimum is None else state.minimum
-            found[f"initial.{state.name}"] = Target(least)
+            found[f"initial.{state.name}"] = Target(_or(state.minimum, -math.inf))
         for row in model.parameters:
-            least = -math.inf if row.minimum is None else row.minimum
-            most = math.inf if row.maximum is None else row.maximum
-            found[f"model.{row.key}"] = Target(least, most, exclusive=row.exclusive)
-    found["time.end"] = Target(least=0.0, exclusive=True)
+            least, most = _or(row.minimum, -math.inf), _or(row.maximum, math.inf)
+            found[f"model.{row.key}"] = Target(least, most, row.exclusive)
+    found["time.end"] = Target(0.0, exclusive=True)
     for scheme in schemes:
         for option in SCHEMES[scheme.kind].options_on(model):
             target = Target(is_flag=True)
@@ -105,6 +84,10 @@ def targets(model: Model | None, schemes: Sequence[SchemeSpec]) -> dict[str, Tar
                 target = Target(option.least, option.most)
             found[f"schemes.{scheme.name}.{option.name}"] = target
     return found
+
+
+def _or(bound: float | None, default: float) -> float:
+    return default if bound is None else bound
 
 
 def _table_keys(model: Model) -> set[str]:
@@ -120,15 +103,10 @@ def read_sweep(
     schemes: Sequence[SchemeSpec],
     lacks_scheme: bool,
     report: Report,
-) -> SweepAxes:
-    """Check the sweep of a document.
+) -> tuple[Sweep, bool]:
+    """Return what is sound of the sweep of a document, whose keys stand in some `order`, and whether that is all.
 
-    Parameters
-    ----------
-    order
-        Its keys as the file has them.
-    lacks_scheme
-        Whether a scheme is at fault, so that nothing is said about options of unknown schemes.
+    Where a scheme is at fault (`lacks_scheme`), nothing is said about options of unknown schemes.
     """
     reader = _SweepReader(document.time, model, targets(model, schemes), lacks_scheme, report)
     section = document.sweep
@@ -139,10 +117,9 @@ def read_sweep(
         elif key == "sample" and section.sample is not None:
             found.append(reader.scattered(section.sample))
         elif key in section.single:
-            values = reader.values(key, section.single[key], ("sweep", key))
-            found.append(None if values is None else _axis((key,), (values,)))
+            found.append(reader.alone(key, section.single[key]))
     sound = tuple(axis for axis in found if axis is not None)
-    return SweepAxes(sound, len(sound) == len(found))
+    return Sweep.model_construct(axes=sound), len(sound) == len(found)
 
 
 def _axis(keys: tuple[str, ...], values: tuple[Values, ...] | Draw) -> Axis:
@@ -166,9 +143,14 @@ class _SweepReader:
         self.first: dict[str, Path_] = {}
         """Where each key is swept first."""
 
+    def alone(self, key: str, written: Written) -> Axis | None:
+        """Return a key that moves alone."""
+        values = self._values(key, written, ("sweep", key))
+        return None if values is None else _axis((key,), (values,))
+
     def zipped(self, section: Mapping[str, Written]) -> Axis | None:
         """Return keys that move together."""
-        rows = {key: self.values(key, row, ("sweep", "zip", key)) for key, row in section.items()}
+        rows = {key: self._values(key, row, ("sweep", "zip", key)) for key, row in section.items()}
         values = {key: row for key, row in rows.items() if row is not None}
         counts = {key: count_of(row) for key, row in values.items()}
         first = next(iter(counts), "")
@@ -189,11 +171,9 @@ class _SweepReader:
             hint = "sobol and random have no such limit"
             self.report.add(("sweep", "sample", "n"), rule, hint, section.n)
             return None
-        if not all(sound):
-            return None
         bounds = tuple(section.over.values())
         draw = Draw(method=section.method, n=section.n, seed=section.seed, over=bounds)
-        return _axis(tuple(section.over), draw)
+        return _axis(tuple(section.over), draw) if all(sound) else None
 
     def _is_interval(self, key: str, low: float, high: float) -> bool:
         path: Path_ = ("sweep", "sample", "over", key)
@@ -211,19 +191,23 @@ class _SweepReader:
             return False
         return self._has_difference(low, high, path) and self._is_within((low, high), target, path)
 
-    def values(self, key: str, written: Written, path: Path_) -> Values | None:
-        """Return the values of one key."""
+    def _values(self, key: str, written: Written, path: Path_) -> Values | None:
         target = self._target(key, path)
         if target is None:
             return None
-        if target.choices:
-            return self._words(written, target.choices, path)
-        if target.is_flag:
-            return self._flags(written, path)
         if isinstance(written, tuple):
-            numbers = self._numbers(written, path)
-            is_sound = numbers is not None and self._is_within(numbers, target, path)
-            return numbers if is_sound else None
+            found = self._entries(written, target, path)
+            is_number = not (target.choices or target.is_flag)
+            is_sound = not is_number or found is None or self._is_within(found, target, path)
+            return found if is_sound else None
+        if target.choices:
+            self.report.add(
+                path, "must be a list of words", "choose from " + ", ".join(target.choices)
+            )
+            return None
+        if target.is_flag:
+            self.report.add(path, "must be a list of true and false")
+            return None
         path = (*path, next(iter(type(written).model_fields)))
         is_sound = self._gives_values(written, path) and self._is_within(written.ends, target, path)
         return written if is_sound else None
@@ -236,95 +220,57 @@ class _SweepReader:
         if first != path:
             rule = f"is swept twice, first {f'in {first[1]}' if len(first) > 2 else 'on its own'}"
         elif key in _FIXED or key.split(".")[0] == "levels":
-            rule = _FIXED.get(key, _LEVELS)
+            rule = _FIXED.get(key, "levels cannot be swept: they are what is compared")
         elif key == "time.end" and time is not None and (time.end is None or time.base_dt):
             rule = "the end can be swept only where time has an end, and base_steps if anything"
-        elif target is None and model is not None and key in _table_keys(model):
+        elif target is not None:
+            return target
+        elif model is not None and key in _table_keys(model):
             rule = "cannot be swept: every member has the same formula, or the same table"
             example = next(key for key in self.targets if key.startswith("model."))
             hint = f"sweep a parameter, such as {example}"
-        elif target is None:
-            if model is not None and not (self.lacks_scheme and key.startswith("schemes.")):
-                alike = [name for name in self.targets if name.lower() == key.lower()]
-                rule, hint = "cannot be swept", nearest(key, alike or list(self.targets))
-        else:
-            return target
+        elif model is not None and not (self.lacks_scheme and key.startswith("schemes.")):
+            alike = [name for name in self.targets if name.lower() == key.lower()]
+            rule, hint = "cannot be swept", nearest(key, alike or list(self.targets))
         if rule:
             self.report.add(path, rule, hint, at_key=True)
         return None
 
-    def _words(
-        self, written: Written, choices: tuple[str, ...], path: Path_
-    ) -> tuple[str, ...] | None:
-        """Return the words of an option."""
-        if not isinstance(written, tuple):
-            self.report.add(path, "must be a list of words", "choose from " + ", ".join(choices))
-            return None
-        words = [word for word in written if isinstance(word, str) and word in choices]
-        for i, word in enumerate(written):
-            if not isinstance(word, str) or word not in choices:
-                hint = nearest(str(word), choices)
-                self.report.add((*path, i), "unknown choice", hint, word)
-        return tuple(words) if len(words) == len(written) else None
-
-    def _flags(self, written: Written, path: Path_) -> tuple[str, ...] | None:
-        """Return flags as words (`FLAGS`)."""
-        if not isinstance(written, tuple):
-            self.report.add(path, "must be a list of true and false")
-            return None
-        for i, value in enumerate(written):
-            if not isinstance(value, bool):
-                self.report.add((*path, i), "must be true or false", value=value)
-        found = tuple(FLAGS[value] for value in written if isinstance(value, bool))
-        return found if len(found) == len(written) else None
-
-    def _numbers(
-        self, written: tuple[bool | float | str, ...], path: Path_
-    ) -> tuple[float, ...] | None:
-        """Return a list of numbers, some of them written as formulas."""
-        found: list[float] = []
+    def _entries(self, written: tuple[Any, ...], target: Target, path: Path_) -> Any:
+        """Return the entries of a list: numbers, some of them written as formulas, or words, or flags (`FLAGS`)."""
+        found: list[Any] = []
         for i, value in enumerate(written):
             try:
-                found.append(value if isinstance(value, float) else number(value))
+                found.append(target.entry(value))
             except PydanticCustomError as error:
                 hint = (error.context or {}).get("hint", "")
                 self.report.add((*path, i), error.message(), hint, value)
         return tuple(found) if len(found) == len(written) else None
 
     def _gives_values(self, rule: Rule, path: Path_) -> bool:
-        """Check that a rule gives values."""
+        low, high, number = rule.numbers
+        faults: list[tuple[int, str, str, Any]] = []
         if isinstance(rule, Range):
-            return self._leads(*rule.range, path)
-        low, high, count = rule.linspace if isinstance(rule, Linspace) else rule.logspace
-        is_sound = self._has_difference(low, high, path)
-        if count < 2:
+            if number == 0.0:
+                faults.append((2, "the step must not be 0", "", number))
+            elif low != high and (low < high) != (number > 0.0):
+                text = f"the step must lead from {low:g} to {high:g}"
+                faults.append((2, text, f"{-number:g}", number))
+            elif math.isfinite(high - low) and not (high - low) / number < MAX_RANGE:
+                faults.append((2, f"the step gives more than {MAX_RANGE:g} values", "", number))
+        elif number < 2:
             text = f"{path[-1]} needs at least 2 values"
-            self.report.add((*path, 2), text, "give a single value as a list")
-            is_sound = False
+            faults.append((2, text, "give a single value as a list", None))
         for i, end in enumerate((low, high) if isinstance(rule, Logspace) else ()):
             if end <= 0.0:
                 hint = "the ends are values, not exponents"
-                self.report.add((*path, i), "must be greater than 0 for logspace", hint, end)
-                is_sound = False
-        return is_sound
-
-    def _leads(self, first: float, last: float, step: float, path: Path_) -> bool:
-        """Check that the step of a range leads from its first value to its end."""
-        rule = hint = ""
-        if step == 0.0:
-            rule = "the step must not be 0"
-        elif (last > first and step < 0.0) or (last < first and step > 0.0):
-            rule, hint = f"the step must lead from {first:g} to {last:g}", f"{-step:g}"
-        elif not self._has_difference(first, last, path):
-            return False
-        elif not (last - first) / step < MAX_RANGE:
-            rule = f"the step gives more than {MAX_RANGE:g} values"
-        if rule:
-            self.report.add((*path, 2), rule, hint, step)
-        return not rule
+                faults.append((i, "must be greater than 0 for logspace", hint, end))
+        for i, text, hint, value in faults:
+            self.report.add((*path, i), text, hint, value)
+        is_faulty_step = isinstance(rule, Range) and bool(faults)
+        return (is_faulty_step or self._has_difference(low, high, path)) and not faults
 
     def _has_difference(self, low: float, high: float, path: Path_) -> bool:
-        """Check that two ends have a finite difference."""
         is_finite = math.isfinite(high - low)
         if not is_finite:
             rule = f"is too far from {low:g}: the difference has no finite value"

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from vibsim.experiment.data import TimeSpec
-from vibsim.experiment.faults import Report
+from vibsim.experiment.faults import MISSING, Report
 from vibsim.experiment.schema.document import TimeSection
 from vibsim.models import Model, natural_end
 
@@ -23,56 +23,36 @@ def time_spec(
     """Return the end and the steps at level 0; None where they cannot be told."""
     if section is None:
         return None
-    given = [name for name in TimeSection.model_fields if getattr(section, name) is not None]
-    if "end" in given:
-        return _by_end(section, given, report)
-    if "periods" in given or "steps_per_period" in given:
-        return _by_periods(section, given, model, parameters, report)
-    report.add(("time", "end"), "required key is missing", "or periods and steps_per_period")
-    return None
-
-
-def _by_end(section: TimeSection, given: list[str], report: Report) -> TimeSpec | None:
-    for name in ("periods", "steps_per_period"):
-        if name in given:
-            report.add(("time", name), "must not be given together with end", at_key=True)
-    if "base_steps" in given and "base_dt" in given:
-        report.add(("time", "base_dt"), "must not be given together with base_steps", at_key=True)
-        return None
-    assert section.end is not None
-    steps = section.base_steps or 1
-    if section.base_dt is not None:
-        found = whole(section.end / section.base_dt)
-        if found is None:
-            ratio = f"end/base_dt is {section.end / section.base_dt:.15g}"
-            report.add(("time", "base_dt"), "end must be a whole number of base_dt", ratio)
+    given = {name for name in TimeSection.model_fields if getattr(section, name) is not None}
+    by_periods = ("periods", "steps_per_period")
+    if section.end is not None:
+        _refuse(given & set(by_periods), "must not be given together with end", report)
+        if {"base_steps", "base_dt"} <= given:
+            _refuse({"base_dt"}, "must not be given together with base_steps", report)
             return None
-        steps = found
-    return TimeSpec(end=section.end, base_steps=steps)
-
-
-def _by_periods(
-    section: TimeSection,
-    given: list[str],
-    model: Model | None,
-    parameters: Mapping[str, float],
-    report: Report,
-) -> TimeSpec | None:
-    for name in ("base_steps", "base_dt"):
-        if name in given:
-            report.add(("time", name), "must not be given together with periods", at_key=True)
-    for name in ("periods", "steps_per_period"):
+        steps: int | None = section.base_steps or 1
+        if section.base_dt is not None:
+            ratio = section.end / section.base_dt
+            steps = _whole(ratio)
+            if steps is None:
+                hint = f"end/base_dt is {ratio:.15g}"
+                report.add(("time", "base_dt"), "end must be a whole number of base_dt", hint)
+        return None if steps is None else TimeSpec(end=section.end, base_steps=steps)
+    if not given & set(by_periods):
+        report.add(("time", "end"), MISSING, "or periods and steps_per_period")
+        return None
+    _refuse(given & {"base_steps", "base_dt"}, "must not be given together with periods", report)
+    for name in by_periods:
         if name not in given:
-            report.add(("time", name), "required key is missing", "periods and steps_per_period")
+            report.add(("time", name), MISSING, "periods and steps_per_period")
     if section.periods is None or section.steps_per_period is None:
         return None
     product = section.periods * section.steps_per_period
-    steps = whole(product)
+    steps = _whole(product)
     if steps is None:
         rule = "periods*steps_per_period must be a whole number"
         report.add(("time", "steps_per_period"), rule, f"it is {product:.15g}")
-        return None
-    if model is None or not parameters:
+    if steps is None or model is None or not parameters:
         return None
     end = float(natural_end(model, section.periods, parameters))
     if not (math.isfinite(end) and end > 0.0):
@@ -81,7 +61,12 @@ def _by_periods(
     return TimeSpec(end=end, base_steps=steps, periods=section.periods)
 
 
-def whole(value: float) -> int | None:
+def _refuse(names: set[str], rule: str, report: Report) -> None:
+    for name in names:
+        report.add(("time", name), rule, at_key=True)
+
+
+def _whole(value: float) -> int | None:
     """Return the whole number, at least 1, that `value` is to `WHOLE`; None where there is none."""
     if not math.isfinite(value):
         return None

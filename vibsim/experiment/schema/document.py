@@ -4,21 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Annotated, Any, Literal, Union
+from typing import Annotated, Any, Literal
 
-from pydantic import (
-    ConfigDict,
-    Discriminator,
-    Field,
-    StrictBool,
-    Tag,
-    WithJsonSchema,
-)
+from pydantic import ConfigDict, Discriminator, Field, StrictBool, WithJsonSchema
 from pydantic.json_schema import GenerateJsonSchema
 
 from vibsim.experiment.schema.checks import Check
 from vibsim.experiment.schema.fields import (
-    BY_SHAPE,
     MAX_ENTRIES,
     MAX_LEVEL,
     Count,
@@ -29,8 +21,10 @@ from vibsim.experiment.schema.fields import (
     Positive,
     Section,
     Text,
+    by_shape,
     short,
     tag,
+    tagged,
 )
 from vibsim.experiment.schema.model_and_schemes import model_section, scheme_section
 from vibsim.experiment.schema.published import PublishedTable
@@ -40,27 +34,26 @@ from vibsim.schemes import SCHEMES
 
 
 def _kind(value: Any) -> str | None:
+    if isinstance(value, str):
+        return tag("name")
     kind = value.get("kind") if isinstance(value, Mapping) else getattr(value, "kind", None)
     return tag(kind) if isinstance(kind, str) else None
-
-
-def _scheme_tag(value: Any) -> str | None:
-    return tag("name") if isinstance(value, str) else _kind(value)
-
-
-def _by_kind(sections: Mapping[str, type[Section]], more: tuple[Any, ...] = ()) -> Any:
-    return Union[(*more, *(Annotated[s, Tag(tag(kind))] for kind, s in sections.items()))]
 
 
 _SCHEME_NAME = Annotated[
     str,
     Field(json_schema_extra={"enum": sorted(SCHEMES)}, description="A scheme with its defaults."),
-    Tag(tag("name")),
 ]
-MODEL_SECTIONS = {kind: model_section(model) for kind, model in MODELS.items()}
-SCHEME_SECTIONS = {kind: scheme_section(scheme) for kind, scheme in SCHEMES.items()}
-AnyModel: Any = Annotated[_by_kind(MODEL_SECTIONS), Discriminator(_kind)]
-AnyScheme: Any = Annotated[_by_kind(SCHEME_SECTIONS, (_SCHEME_NAME,)), Discriminator(_scheme_tag)]
+_SCHEME_SECTIONS = {kind: scheme_section(scheme) for kind, scheme in SCHEMES.items()}
+AnyModel: Any = tagged(
+    {kind: model_section(model) for kind, model in MODELS.items()}, Discriminator(_kind)
+)
+AnyScheme: Any = tagged({"name": _SCHEME_NAME, **_SCHEME_SECTIONS}, Discriminator(_kind))
+
+
+def _without(*keys: str) -> dict[str, Any]:
+    """Describe a mapping that has none of some keys, or not all of those that are joined by blanks."""
+    return {"not": {"anyOf": [{"required": key.split()} for key in keys]}}
 
 
 class TimeSection(Section):
@@ -69,26 +62,10 @@ class TimeSection(Section):
     model_config = ConfigDict(
         json_schema_extra={
             "oneOf": [
-                {
-                    "required": ["end"],
-                    "not": {
-                        "anyOf": [
-                            {"required": ["periods"]},
-                            {"required": ["steps_per_period"]},
-                            {"required": ["base_steps", "base_dt"]},
-                        ]
-                    },
-                },
-                {
-                    "required": ["periods", "steps_per_period"],
-                    "not": {
-                        "anyOf": [
-                            {"required": ["end"]},
-                            {"required": ["base_steps"]},
-                            {"required": ["base_dt"]},
-                        ]
-                    },
-                },
+                {"required": ["end"]}
+                | _without("periods", "steps_per_period", "base_steps base_dt"),
+                {"required": ["periods", "steps_per_period"]}
+                | _without("end", "base_steps", "base_dt"),
             ]
         }
     )
@@ -121,16 +98,9 @@ class Every(Section):
     """n; it must divide the number of steps of the coarsest level, whose stored times are those of the comparison."""
 
 
-Levels = Annotated[
-    Annotated[LevelRange, Tag(tag("mapping"))]
-    | Annotated[tuple[Level, ...], Field(min_length=1), short(MAX_LEVEL + 1), Tag(tag("other"))],
-    BY_SHAPE,
-]
-Samples = Annotated[
-    Annotated[Every, Tag(tag("mapping"))]
-    | Annotated[Literal["auto", "common", "all"], Tag(tag("other"))],
-    BY_SHAPE,
-]
+_LevelList = Annotated[tuple[Level, ...], Field(min_length=1), short(MAX_LEVEL + 1)]
+Levels: Any = by_shape(LevelRange, _LevelList)
+Samples: Any = by_shape(Every, Literal["auto", "common", "all"])
 
 
 def _initial_schema() -> dict[str, Any]:

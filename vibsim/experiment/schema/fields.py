@@ -8,7 +8,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from functools import reduce
 from numbers import Integral, Real
+from operator import or_
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import (
@@ -19,6 +21,7 @@ from pydantic import (
     Discriminator,
     Field,
     GetJsonSchemaHandler,
+    Tag,
 )
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
@@ -34,10 +37,6 @@ MAX_FORMULAS = 1000
 """Values of one list that are not plain numbers."""
 MAX_ENTRIES = 1000
 """Schemes or checks of one experiment."""
-NO_UNIT = {
-    "rule": "must be a number without a unit: only model, initial, time and a sweep of these take units",
-    "hint": "write the number alone, in the unit of the table of models (of a scaled run: over its scale)",
-}
 DECLARED = "parameters"
 """The key of the section ``model`` under which a file declares the names of its formulas."""
 TABLE = "table"
@@ -96,17 +95,29 @@ class FrozenDict(dict[str, Any]):
         return self
 
 
+def refused(rule: str, hint: str = "") -> PydanticCustomError:
+    """Return the error of a value that breaks a rule."""
+    return PydanticCustomError("refused", "{rule}", {"rule": rule, "hint": hint})
+
+
 def tag(name: str) -> str:
     """Mark the name of a union's member, so that it can be told from a key in the place of a fault."""
     return f"\0{name}"
 
 
-def _shape(value: Any) -> str:
-    return tag("mapping") if isinstance(value, Mapping | Section) else tag("other")
+def tagged(members: Mapping[str, Any], which: Discriminator) -> Any:
+    """Return the union of `members`, of which `which` chooses one by its name."""
+    kinds: Any = (Annotated[kind, Tag(tag(name))] for name, kind in members.items())
+    return Annotated[reduce(or_, kinds), which]
 
 
-BY_SHAPE = Discriminator(_shape)
-"""Chooses the member of a union that is tagged ``mapping``, or that tagged ``other``."""
+def by_shape(mapping: Any, other: Any) -> Any:
+    """Return the union of a type that is written as a mapping, and another one that is not."""
+
+    def shape(value: Any) -> str:
+        return tag("mapping") if isinstance(value, Mapping | Section) else tag("other")
+
+    return tagged({"mapping": mapping, "other": other}, Discriminator(shape))
 
 
 def number(value: Any) -> float:
@@ -115,32 +126,29 @@ def number(value: Any) -> float:
         try:
             return constant(value)
         except ExpressionError as error:
-            if split(value) is not None:
-                raise PydanticCustomError("unit", "{rule}", NO_UNIT) from None
-            rule = f"must be {FORMULA_NOTE} ({error.rule})"
-            raise PydanticCustomError(
-                "number", "{rule}", {"rule": rule, "hint": error.hint}
-            ) from None
+            if split(value) is None:
+                raise refused(f"must be {FORMULA_NOTE} ({error.rule})", error.hint) from None
+        raise refused(
+            "must be a number without a unit: only model, initial, time and a sweep of these take units",
+            "write the number alone, in the unit of the table of models (of a scaled run: over its scale)",
+        )
     if isinstance(value, bool) or not isinstance(value, Real):
-        raise PydanticCustomError("number", f"must be {FORMULA_NOTE}")
+        raise refused(f"must be {FORMULA_NOTE}")
     try:
         result = float(value)
     except OverflowError:
         result = math.inf
     if not math.isfinite(result):
-        raise PydanticCustomError("finite", "must be a finite number")
+        raise refused("must be a finite number")
     return result
 
 
 def whole(value: Any) -> int:
     """Return `value` as an int; ``6.0`` is 6."""
-    if isinstance(value, bool):
-        raise PydanticCustomError("whole", "must be a whole number")
-    if isinstance(value, Integral):
-        return int(value)
-    if isinstance(value, float) and value.is_integer():
-        return int(value)
-    raise PydanticCustomError("whole", "must be a whole number")
+    is_whole = isinstance(value, Integral) or (isinstance(value, float) and value.is_integer())
+    if isinstance(value, bool) or not is_whole:
+        raise refused("must be a whole number")
+    return int(value)
 
 
 def short(limit: int) -> BeforeValidator:
@@ -148,8 +156,7 @@ def short(limit: int) -> BeforeValidator:
 
     def check(values: Any) -> Any:
         if isinstance(values, list | tuple) and len(values) > limit:
-            rule = f"must not have more than {limit} entries, has {len(values)}"
-            raise PydanticCustomError("long", "{rule}", {"rule": rule})
+            raise refused(f"must not have more than {limit} entries, has {len(values)}")
         return values
 
     return BeforeValidator(check)
@@ -160,8 +167,7 @@ def plain(values: Any) -> Any:
     if isinstance(values, list | tuple):
         others = sum(not isinstance(value, int | float) for value in values)
         if others > MAX_FORMULAS:
-            rule = f"must not hold more than {MAX_FORMULAS} formulas, holds {others}"
-            raise PydanticCustomError("formulas", "{rule}", {"rule": rule})
+            raise refused(f"must not hold more than {MAX_FORMULAS} formulas, holds {others}")
     return values
 
 
@@ -169,14 +175,13 @@ def _printable(text: str) -> str:
     """Refuse what no page and no figure can show: XML 1.0 (2008), section 2.2, and the controls."""
     found = _CONTROL.search(text)
     if found:
-        rule = f"must not hold control characters, holds U+{ord(found.group()):04X}"
-        raise PydanticCustomError("control", "{rule}", {"rule": rule})
+        raise refused(f"must not hold control characters, holds U+{ord(found.group()):04X}")
     return text
 
 
 def _one_line(text: str) -> str:
     if len(text.splitlines()) > 1 or set("\t\r\n") & set(text):
-        raise PydanticCustomError("line", "must be on one line, without tabs")
+        raise refused("must be on one line, without tabs")
     return text
 
 
@@ -195,23 +200,20 @@ class _Formula:
         return result
 
 
-FORMULA = _Formula()
-Number = Annotated[float, FORMULA]
-Positive = Annotated[float, Field(gt=0), FORMULA]
-Fraction = Annotated[float, Field(gt=0, lt=1), FORMULA]
-NonNegative = Annotated[float, Field(ge=0), FORMULA]
-Whole = Annotated[int, BeforeValidator(whole)]
-Level = Annotated[int, Field(ge=0, le=MAX_LEVEL), BeforeValidator(whole)]
-Count = Annotated[int, Field(ge=1), BeforeValidator(whole)]
-Index = Annotated[int, Field(ge=0), BeforeValidator(whole)]
-Identifier = Annotated[str, Field(pattern=IDENTIFIER)]
-
-
 def _no_default(schema: dict[str, Any]) -> None:
     """Leave the default out of the schema: an empty id stands for a generated one."""
     schema.pop("default", None)
 
 
+FORMULA = _Formula()
+Number = Annotated[float, FORMULA]
+Positive = Annotated[float, Field(gt=0), FORMULA]
+Fraction = Annotated[float, Field(gt=0, lt=1), FORMULA]
+NonNegative = Annotated[float, Field(ge=0), FORMULA]
+Level = Annotated[int, Field(ge=0, le=MAX_LEVEL), BeforeValidator(whole)]
+Count = Annotated[int, Field(ge=1), BeforeValidator(whole)]
+Index = Annotated[int, Field(ge=0), BeforeValidator(whole)]
+Identifier = Annotated[str, Field(pattern=IDENTIFIER)]
 GivenId = Annotated[Identifier, Field(json_schema_extra=_no_default)]
 """The id of a check; empty where the file gives none."""
 Text = Annotated[str, Field(min_length=1), AfterValidator(_printable)]

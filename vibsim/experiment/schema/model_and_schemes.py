@@ -19,14 +19,12 @@ from pydantic import (
     Field,
     StrictBool,
     StringConstraints,
-    Tag,
     WithJsonSchema,
     create_model,
 )
 from pydantic_core import PydanticCustomError
 
 from vibsim.experiment.schema.fields import (
-    BY_SHAPE,
     FORMULA,
     TABLE,
     Line,
@@ -34,9 +32,12 @@ from vibsim.experiment.schema.fields import (
     Number,
     Section,
     Text,
+    by_shape,
     number,
+    refused,
     short,
     tag,
+    tagged,
 )
 from vibsim.experiment.schema.sweep import tolerance_name
 from vibsim.formula import FUNCTIONS
@@ -49,8 +50,7 @@ TOLERANCE = "tolerance"
 MAX_TOLERANCES = 100
 
 
-def class_name(kind: str) -> str:
-    """Return the name of the class that describes a `kind`."""
+def _class_name(kind: str) -> str:
     return kind.title().replace("_", "")
 
 
@@ -66,14 +66,11 @@ def scheme_section(scheme: Scheme) -> type[Section]:
         fields[option.name] = (_type(option, scheme), row)
     if not scheme.adaptive:
         words = f"{EVENTS.description}; on models with events only, {EVENTS.default} when left out"
-        fields[EVENTS.name] = (
-            Literal[EVENTS.choices] | None,
-            Field(default=None, description=words),
-        )
+        treatment = Field(default=None, description=words)
+        fields[EVENTS.name] = (Literal[EVENTS.choices] | None, treatment)
     doc = f"{scheme.title} ({scheme.source})."
-    return create_model(
-        f"{class_name(scheme.kind)}Scheme", __base__=MadeSection, __doc__=doc, **fields
-    )
+    name = f"{_class_name(scheme.kind)}Scheme"
+    return create_model(name, __base__=MadeSection, __doc__=doc, **fields)
 
 
 def _type(option: AnyOption, scheme: Scheme) -> Any:
@@ -84,22 +81,14 @@ def _type(option: AnyOption, scheme: Scheme) -> Any:
     ends = {"ge": option.least, "le": option.most}
     bounds: dict[str, Any] = {name: end for name, end in ends.items() if math.isfinite(end)}
     value: Any = Annotated[float, Field(**bounds), FORMULA]
-    if not has_tolerances(scheme, option):
+    if not scheme.adaptive or option.name != TOLERANCE or not isinstance(option, NumberOption):
         return value
     several = Annotated[tuple[value, ...], Field(min_length=1), short(MAX_TOLERANCES)]
-    return Annotated[
-        Annotated[value, Tag(tag("one"))] | Annotated[several, Tag(tag("several"))],
-        Discriminator(_one_or_several),
-    ]
+    return tagged({"one": value, "several": several}, Discriminator(_one_or_several))
 
 
 def _one_or_several(value: Any) -> str:
     return tag("several") if isinstance(value, list | tuple) else tag("one")
-
-
-def has_tolerances(scheme: Scheme, option: AnyOption) -> bool:
-    """Tell whether an option of a scheme may be a list of tolerances."""
-    return scheme.adaptive and option.name == TOLERANCE and isinstance(option, NumberOption)
 
 
 def scheme_names(data: Any) -> Iterator[str]:
@@ -128,7 +117,7 @@ def _as_text(value: Any) -> Any:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return repr(value)
     if not isinstance(value, str):
-        raise PydanticCustomError("formula", "must be a formula, or a number")
+        raise refused("must be a formula, or a number")
     return value
 
 
@@ -142,8 +131,7 @@ FormulaText = Annotated[
 
 def _declared(names: Mapping[str, float]) -> Mapping[str, float]:
     if len(names) > MAX_DECLARED:
-        rule = f"must not have more than {MAX_DECLARED} parameters, has {len(names)}"
-        raise PydanticCustomError("long", "{rule}", {"rule": rule})
+        raise refused(f"must not have more than {MAX_DECLARED} parameters, has {len(names)}")
     return names
 
 
@@ -168,37 +156,23 @@ def name_fault(name: str, taken: Mapping[str, str]) -> str:
 
 
 def _formula_type(model: Model, field: FormulaField) -> Any:
+    """Return what may stand for a formula: text, and beside it ``{word: coefficient}`` or ``{table: file}``."""
+    name = f"{_class_name(model.kind)}{_class_name(field.name)}"
+    fields: dict[str, Any] = {}
     if field.table is not None:
-        section = _table_section(model, field, field.table)
-    elif field.terms:
-        fields: dict[str, Any] = {
-            word: (
-                Annotated[float, FORMULA] | None,
-                Field(default=None, description=f"b of {text}"),
-            )
-            for word, text in field.terms.items()
-        }
-        name = f"{class_name(model.kind)}{class_name(field.name)}"
-        section = create_model(name, __base__=MadeSection, **fields)
-    else:
+        name += "Table"
+        words = f"path of a table, relative to this file: {field.description}; a .csv or a .nc file"
+        fields[TABLE] = (Text, Field(description=words))
+        # the keys for the columns are their names by default
+        for key, what in zip(field.table, ("places", "values"), strict=True):
+            words = f"name of the column of {what} in the table, or of the variable"
+            fields[key] = (Text, Field(default=key, description=words))
+    for word, text in () if field.table else field.terms.items():
+        value = Annotated[float, FORMULA] | None
+        fields[word] = (value, Field(default=None, description=f"b of {text}"))
+    if not fields:
         return FormulaText
-    return Annotated[
-        Annotated[FormulaText, Tag(tag("other"))] | Annotated[section, Tag(tag("mapping"))],
-        BY_SHAPE,
-    ]
-
-
-def _table_section(model: Model, field: FormulaField, names: tuple[str, str]) -> type[Section]:
-    """Return the class of ``{table: file}``; `names` are the keys for the columns, and their names by default."""
-    words = f"path of a table, relative to this file: {field.description}"
-    fields: dict[str, Any] = {
-        TABLE: (Text, Field(description=f"{words}; a .csv or a .nc file")),
-    }
-    for name, what in zip(names, ("places", "values"), strict=True):
-        told = f"name of the column of {what} in the table, or of the variable"
-        fields[name] = (Text, Field(default=name, description=told))
-    title = f"{class_name(model.kind)}{class_name(field.name)}Table"
-    return create_model(title, __base__=MadeSection, **fields)
+    return by_shape(create_model(name, __base__=MadeSection, **fields), FormulaText)
 
 
 def model_section(model: Model) -> type[Section]:
@@ -225,4 +199,4 @@ def model_section(model: Model) -> type[Section]:
         words = "names that the formulas use, with their values"
         fields["parameters"] = (Declared, Field(default={}, description=words))
     doc = f"{model.title}: {model.equation} ({model.source})."
-    return create_model(class_name(model.kind), __base__=MadeSection, __doc__=doc, **fields)
+    return create_model(_class_name(model.kind), __base__=MadeSection, __doc__=doc, **fields)

@@ -5,30 +5,25 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
 from decimal import Decimal
 from types import MappingProxyType
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import BeforeValidator, Field, StrictBool, WithJsonSchema
-from pydantic_core import PydanticCustomError
 
-from vibsim.experiment.schema.checks import At, ClaimCheck, LevelOrBest, ValueCheck
-from vibsim.experiment.schema.fields import MAX_ENTRIES, Index, Number, Section, Text, short
+from vibsim.experiment.schema.checks import At, ClaimCheck, LevelOrBest, PublishedAt, ValueCheck
+from vibsim.experiment.schema.fields import MAX_ENTRIES, Section, Text, refused, short
 
 _POWER = r"(?:\s*(?:[x*·×]|\\cdot)?\s*10\s*\^\s*(?:\{\s*([-+]?\d{1,3})\s*\}|([-+]?\d{1,3}))|[eE]([-+]?\d{1,3}))"
 _PRINTED = re.compile(rf"\s*([-+]?(?:\d+\.?\d*|\.\d+)){_POWER}?\s*", re.ASCII)
 _MAX_LENGTH = 60
-RULE = "must be a number as printed, such as 1.120e8, 1.120 10^8 or 4.93"
 
 
-@dataclass(frozen=True)
-class PrintedNumber:
-    """What a printed number says."""
+class PrintedNumber(NamedTuple):
+    """What a printed number says, and half a unit of its last digit."""
 
     number: float
     half_unit: float
-    """Half a unit of its last digit."""
 
 
 def read_printed(text: str) -> PrintedNumber | None:
@@ -49,24 +44,13 @@ def _as_text(value: Any) -> str:
     """Return a number as text; in a file its digits are those written (`vibsim.experiment.validation`)."""
     text = repr(value) if isinstance(value, int | float) and not isinstance(value, bool) else value
     if not isinstance(text, str) or read_printed(text) is None:
-        raise PydanticCustomError("printed", RULE)
+        raise refused("must be a number as printed, such as 1.120e8, 1.120 10^8 or 4.93")
     return text
 
 
 PrintedText = Annotated[
     str, BeforeValidator(_as_text), WithJsonSchema({"type": ["number", "string"]})
 ]
-
-
-class PublishedAt(Section):
-    """Where else a printed number is taken, beside its scheme and level."""
-
-    t: Number | None = None
-    """A stored sample time; where the end differs between members, the fraction 0 to 1 of it."""
-    step: Index | None = None
-    """A stored step of the level, from 0."""
-    case: Index | None = None
-    """Index of a member of the sweep, from 0."""
 
 
 class PublishedRow(Section):
@@ -86,18 +70,11 @@ class PublishedRow(Section):
     """What a reader of the report should know of it, such as why it does not agree."""
 
     @property
-    def number(self) -> float:
-        """The printed number."""
+    def meaning(self) -> PrintedNumber:
+        """The printed number, and half a unit of its last digit."""
         found = read_printed(self.printed)
         assert found is not None
-        return found.number
-
-    @property
-    def half_unit(self) -> float:
-        """Half a unit of the last printed digit."""
-        found = read_printed(self.printed)
-        assert found is not None
-        return found.half_unit
+        return found
 
 
 class PublishedTable(Section):
@@ -126,8 +103,7 @@ def row_id(table: int, row: int) -> str:
 
 def row_at(row: PublishedRow) -> At:
     """Return where the number of a row is taken."""
-    at = row.at
-    return At(scheme=row.scheme, level=row.level, t=at.t, step=at.step, case=at.case)
+    return At(scheme=row.scheme, level=row.level, **dict(row.at))
 
 
 def claims(tables: Iterable[PublishedTable], source: str | None) -> tuple[ClaimCheck, ...]:
@@ -140,28 +116,25 @@ def claims(tables: Iterable[PublishedTable], source: str | None) -> tuple[ClaimC
 
 
 def _claim(table: PublishedTable, row: PublishedRow, id_: str, source: str | None) -> ClaimCheck:
-    that = ValueCheck(
-        id=id_,
-        value=table.value,
-        quantity=table.quantity,
-        at=row_at(row),
-        equals=row.number,
-        atol=row.half_unit,
-    )
-    return ClaimCheck(
-        id=id_,
-        claim=_statement(table, row),
-        source=table.source or source,
-        that=that,
-        holds=row.holds,
-        note=row.note,
-    )
-
-
-def _statement(table: PublishedTable, row: PublishedRow) -> str:
+    number, half_unit = row.meaning
     places = [f"scheme {row.scheme}"]
     if row.level is not None:
         places.append("extrapolated" if row.level == "best" else f"level {row.level}")
     given = row.at.model_dump(exclude_none=True)
     places += [f"{name} {value:g}" for name, value in given.items()]
-    return f"{table.title}: {', '.join(places)}: {row.printed}"
+    that = ValueCheck(
+        id=id_,
+        value=table.value,
+        quantity=table.quantity,
+        at=row_at(row),
+        equals=number,
+        atol=half_unit,
+    )
+    return ClaimCheck(
+        id=id_,
+        claim=f"{table.title}: {', '.join(places)}: {row.printed}",
+        source=table.source or source,
+        that=that,
+        holds=row.holds,
+        note=row.note,
+    )

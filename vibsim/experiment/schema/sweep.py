@@ -9,19 +9,21 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import (
-    BeforeValidator,
-    ConfigDict,
-    Discriminator,
-    Field,
-    StrictBool,
-    Tag,
-    WithJsonSchema,
+from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, StrictBool, WithJsonSchema
+
+from vibsim.experiment.schema.fields import (
+    Count,
+    Number,
+    Section,
+    Text,
+    number,
+    plain,
+    tag,
+    tagged,
+    whole,
 )
-
-from vibsim.experiment.schema.fields import Count, Number, Section, Text, number, plain, tag, whole
 from vibsim.schemes import SCHEMES, NumberOption, Option
 from vibsim.schemes.base import EVENTS
 
@@ -50,41 +52,41 @@ Method = Literal["latin_hypercube", "sobol", "random"]
 Interval = tuple[Number, Number]
 
 
-class Linspace(Section):
+class _Spaced(Section):
+    """A first value, a last one, and how many there are."""
+
+    @property
+    def numbers(self) -> tuple[Any, ...]:
+        """The list of three numbers that the rule consists of."""
+        found: tuple[Any, ...] = next(iter(self.__dict__.values()))
+        return found
+
+    @property
+    def count(self) -> int:
+        """Number of values."""
+        return int(self.numbers[2])
+
+    @property
+    def ends(self) -> tuple[float, ...]:
+        """The first and the last value; every other one lies between them."""
+        return self.numbers[:2]
+
+
+class Linspace(_Spaced):
     """Equally spaced values."""
 
     linspace: tuple[Number, Number, Count]
     """First value a, last value b (both included), and how many: a + (b - a)*i/(n - 1)."""
 
-    @property
-    def count(self) -> int:
-        """Number of values."""
-        return self.linspace[2]
 
-    @property
-    def ends(self) -> tuple[float, ...]:
-        """The first and the last value; every other one lies between them."""
-        return self.linspace[:2]
-
-
-class Logspace(Section):
+class Logspace(_Spaced):
     """Geometrically spaced values."""
 
     logspace: tuple[Number, Number, Count]
     """First value a, last value b (both included, not their exponents), and how many: a*(b/a)**(i/(n - 1))."""
 
-    @property
-    def count(self) -> int:
-        """Number of values."""
-        return self.logspace[2]
 
-    @property
-    def ends(self) -> tuple[float, ...]:
-        """The first and the last value; every other one lies between them."""
-        return self.logspace[:2]
-
-
-class Range(Section):
+class Range(_Spaced):
     """Values at a fixed distance."""
 
     range: tuple[Number, Number, Number]
@@ -139,27 +141,17 @@ class Axis(Section):
         return self.values.n if isinstance(self.values, Draw) else count_of(self.values[0])
 
     @property
-    def varies(self) -> tuple[bool, ...]:
-        """Whether the values of every key differ; scattered ones do, whatever is drawn."""
-        return tuple(low != high for low, high in self.spans)
-
-    @property
     def spans(self) -> tuple[tuple[Entry, Entry], ...]:
         """Least and largest value of every key."""
         if isinstance(self.values, Draw):
             return self.values.over
-        return tuple(map(span_of, self.values))
+        ends: list[Any] = [v if isinstance(v, tuple) else v.ends for v in self.values]
+        return tuple((min(values), max(values)) for values in ends)
 
 
 def count_of(values: Values) -> int:
     """Return the number of values."""
     return len(values) if isinstance(values, tuple) else values.count
-
-
-def span_of(values: Values) -> tuple[Entry, Entry]:
-    """Return the least and the largest value."""
-    ends: Any = values if isinstance(values, tuple) else values.ends
-    return (min(ends), max(ends))
 
 
 LIST_RULE = "must be a list, or a mapping with one of " + ", ".join(RULES)
@@ -186,13 +178,13 @@ _Entry = Annotated[
 _List = Annotated[tuple[_Entry, ...], Field(min_length=1), BeforeValidator(plain)]
 Written = tuple[bool | float | str, ...] | Linspace | Logspace | Range
 """Values of one key as written: text is an option word or a formula, a truth value a flag, which its key tells."""
-_Values = Annotated[
-    Annotated[Linspace, Tag(tag("linspace"))]
-    | Annotated[Logspace, Tag(tag("logspace"))]
-    | Annotated[Range, Tag(tag("range"))]
-    | Annotated[_List, Tag(tag("list"))],
-    Discriminator(_which, custom_error_type="values", custom_error_message=LIST_RULE),
-]
+if TYPE_CHECKING:
+    _Values = Written
+else:
+    _Values = tagged(
+        {**RULES, "list": _List},
+        Discriminator(_which, custom_error_type="values", custom_error_message=LIST_RULE),
+    )
 
 
 class Sample(Section):

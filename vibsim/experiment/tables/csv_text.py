@@ -12,12 +12,12 @@ import csv
 import re
 from array import array
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from io import BytesIO, TextIOWrapper
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
+
+from vibsim.core.array_types import Floats, Integers
 
 MOST_LINES = 2**21
 """Lines of a text, the empty ones and the comments too."""
@@ -31,7 +31,7 @@ _DECIMAL_COMMA = re.compile(r"[+-]?([0-9]+,[0-9]*|,[0-9]+)([eE][+-]?[0-9]+)?")
 _THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2}(,[0-9]{3})+")
 _GROUPED = re.compile(r"[+-]?[0-9]{1,3}([.,' \u00a0\u202f][0-9]{3})+([.,][0-9]*)?")
 _NUMERIC = re.compile(r"[-+0-9.,eE' \u00a0\u202f]{1,40}")
-_WRITE = "write 1.5, or separate the cells by semicolons"
+_POINTS = "write all numbers with points"
 
 
 class CsvError(ValueError):
@@ -55,35 +55,59 @@ class CsvError(ValueError):
         super().__init__(f"line {line}: {rule}" if line else rule)
 
 
-@dataclass(frozen=True)
-class Header:
-    """The first line of a text."""
+class _Rows:
+    """The cells of every line of a text that counts; `line` is the number of the last one."""
 
-    names: list[str]
-    """Of all columns."""
-    is_of_numbers: bool
-    """Whether two cells at least of the line below are numbers: else the text may be no table, and is not shown."""
+    def __init__(self, content: bytes) -> None:
+        # counted first: each line costs more than a look at its bytes
+        if max(content.count(b"\n"), content.count(b"\r")) > MOST_LINES:
+            raise CsvError(f"must not have more than {MOST_LINES} lines")
+        try:
+            content.decode("utf-8")
+        except UnicodeDecodeError as error:
+            line = content.count(b"\n", 0, error.start) + 1
+            raise CsvError(f"must be UTF-8 text, but line {line} is none") from None
+        self.line = 0
+        lines = self._lines(TextIOWrapper(BytesIO(content), encoding="utf-8-sig", newline=None))
+        head = next(lines, "")
+        if not head:
+            raise CsvError("must not be empty")
+        plain = _QUOTED.sub("", head)
+        self.separator = next((separator for separator in SEPARATORS if separator in plain), ",")
+        self.reader = csv.reader(
+            chain([head], lines), delimiter=self.separator, skipinitialspace=True
+        )
+
+    def _lines(self, stream: TextIOWrapper) -> Iterator[str]:
+        for self.line, line in enumerate(stream, 1):
+            if len(line) > MOST_CHARACTERS:
+                rule = f"must not be longer than {MOST_CHARACTERS} characters"
+                raise CsvError(rule, line=self.line)
+            text = line.lstrip()
+            if text and text[0] != "#":
+                yield line
+
+    def __iter__(self) -> Iterator[list[str]]:
+        try:
+            for taken, row in enumerate(self.reader, 1):
+                if self.reader.line_num > taken:
+                    raise CsvError("a quoted cell must end on its line", line=self.line)
+                yield row
+        except csv.Error:
+            raise CsvError("its quotes cannot be read", line=self.line) from None
 
 
-@dataclass(frozen=True)
-class Numbers:
-    """Columns of a text, as numbers."""
-
-    columns: tuple[NDArray[np.float64], ...]
-    """Those that were chosen, of equal length."""
-    lines: NDArray[np.int64]
-    """Line of every row, from 1."""
-
-
-def read(content: bytes, choose: Callable[[Header], Sequence[int]], most: int) -> Numbers:
-    """Return columns of a text.
+def read(
+    content: bytes, choose: Callable[[list[str], bool], Sequence[int]], most: int
+) -> tuple[list[Floats], Integers]:
+    """Return columns of the bytes of a file, of equal length, and the line of every row, from 1.
 
     Parameters
     ----------
-    content
-        The bytes of a file.
     choose
-        Returns the numbers of the columns that are to be read, from 0; the others may hold anything.
+        Returns the numbers of the columns that are to be read, from 0; the others may hold anything. It gets the names
+        of all columns, and whether two cells at least of the line below are numbers: else the text may be no table, and
+        is not shown.
     most
         Number of rows that are read at most.
 
@@ -92,93 +116,31 @@ def read(content: bytes, choose: Callable[[Header], Sequence[int]], most: int) -
     CsvError
         Where it is no table of numbers in these columns.
     """
-    lines = _Lines(content)
-    separator = _separator(lines.head)
-    rows = _rows(lines, separator)
+    source = _Rows(content)
+    rows = iter(source)
     names = [name.strip() for name in next(rows)]
     if len(names) > 1 and not names[-1]:
         names.pop()
     first = next(rows, [])
-    header = Header(names, sum(map(_is_number, first)) > 1)
-    marks = _Marks(separator)
-    chosen = [(i, names[i], array("d")) for i in choose(header)]
-    numbers = array("q")
+    marks = _Marks(source.separator)
+    chosen = [(i, names[i], array("d")) for i in choose(names, sum(map(_is_number, first)) > 1)]
+    lines = array("q")
     for row in chain([first] if first else [], rows):
         if len(row) != len(names):
-            _check_width(row, names, separator, lines.number)
-        if len(numbers) == most:
+            _check_width(row, names, source)
+        if len(lines) == most:
             raise CsvError(f"must not have more than {most} points")
         for i, name, column in chosen:
-            column.append(marks.number(row[i], name, lines.number, is_first=not numbers))
-        numbers.append(lines.number)
+            column.append(marks.number(row[i], name, source.line, is_first=not lines))
+        lines.append(source.line)
     marks.finish()
-    columns = tuple(np.array(column, dtype=np.float64) for _, _, column in chosen)
-    return Numbers(columns, np.array(numbers, dtype=np.int64))
+    columns = [np.array(column, dtype=np.float64) for _, _, column in chosen]
+    return columns, np.array(lines, dtype=np.int64)
 
 
-class _Lines:
-    """The lines of a text that count, one by one; `number` is that of the last one."""
-
-    def __init__(self, content: bytes) -> None:
-        # counted first: each line costs more than a look at its bytes
-        if max(content.count(b"\n"), content.count(b"\r")) > MOST_LINES:
-            raise CsvError(f"must not have more than {MOST_LINES} lines")
-        self.content = content
-        self.number = 0
-        self.lines = self._read()
-        self.head = next(self.lines, "")
-        if not self.head:
-            raise CsvError("must not be empty")
-
-    def _read(self) -> Iterator[str]:
-        stream = TextIOWrapper(BytesIO(self.content), encoding="utf-8-sig", newline=None)
-        try:
-            for number, line in enumerate(stream, 1):
-                self.number = number
-                if len(line) > MOST_CHARACTERS:
-                    rule = f"must not be longer than {MOST_CHARACTERS} characters"
-                    raise CsvError(rule, line=number)
-                text = line.lstrip()
-                if text and text[0] != "#":
-                    yield line
-        except UnicodeDecodeError:
-            raise CsvError(f"must be UTF-8 text, but line {self._foreign()} is none") from None
-
-    def _foreign(self) -> int:
-        """Return the first line that is not UTF-8: a stream only knows the place within what it has read last."""
-        try:
-            self.content.decode("utf-8")
-        except UnicodeDecodeError as error:
-            return self.content.count(b"\n", 0, error.start) + 1
-        return 1
-
-
-def _separator(head: str) -> str:
-    plain = _QUOTED.sub("", head)
-    return next((separator for separator in SEPARATORS if separator in plain), ",")
-
-
-def _rows(lines: _Lines, separator: str) -> Iterator[list[str]]:
-    """Yield the cells of every line."""
-    cells = chain([lines.head], lines.lines)
-    reader = csv.reader(cells, delimiter=separator, skipinitialspace=True)
-    taken = 0
-    while True:
-        try:
-            row = next(reader, None)
-        except csv.Error:
-            raise CsvError("its quotes cannot be read", line=lines.number) from None
-        if row is None:
-            return
-        taken += 1
-        if reader.line_num > taken:
-            raise CsvError("a quoted cell must end on its line", line=lines.number)
-        yield row
-
-
-def _check_width(row: list[str], names: list[str], separator: str, line: int) -> None:
+def _check_width(row: list[str], names: list[str], source: _Rows) -> None:
     """Refuse a row with another number of cells than there are columns, but for a separator at its end."""
-    found, wanted = len(row), len(names)
+    found, wanted, separator = len(row), len(names), source.separator
     if found == wanted + 1 and not row[-1].strip():
         return
     cells = "1 cell" if found == 1 else f"{found} cells"
@@ -186,10 +148,11 @@ def _check_width(row: list[str], names: list[str], separator: str, line: int) ->
     rule = f"has {cells} between {SEPARATORS[separator]}, and the table has {wanted} {word}"
     hint = ""
     if separator == "," and found > wanted:
-        hint = f"a number with a decimal comma is two cells: {_WRITE}"
+        write = "write 1.5, or separate the cells by semicolons"
+        hint = f"a number with a decimal comma is two cells: {write}"
     elif wanted == 1:
         hint = f"separate cells by {', '.join(SEPARATORS.values())}"
-    raise CsvError(rule, hint, line)
+    raise CsvError(rule, hint, source.line)
 
 
 class _Marks:
@@ -204,44 +167,34 @@ class _Marks:
 
     def number(self, cell: str, column: str, line: int, *, is_first: bool) -> float:
         """Return the number in a cell."""
+        text, is_plain = cell.strip(), "_" not in cell and cell.isascii()
         try:
-            value = float(cell)
+            value = float(cell) if is_plain else None
         except ValueError:
-            return self._other(cell.strip(), column, line, is_first)
-        if "_" in cell or not cell.isascii():
-            return self._other(cell.strip(), column, line, is_first)
-        if "." in cell:
-            self.points = self.points or line
-            if self.commas:
-                self._refuse_both(line, column, cell)
-        return value
-
-    def _other(self, text: str, column: str, line: int, is_first: bool) -> float:
-        """Return the number in a cell that has a decimal comma, or none."""
-        if _DECIMAL_COMMA.fullmatch(text):
+            value = None
+        if value is not None:
+            self.points = self.points or (line if "." in cell else 0)
+        elif _DECIMAL_COMMA.fullmatch(text):
             self.commas = self.commas or line
             self.clear = self.clear or not _THOUSANDS.fullmatch(text)
-            if self.points:
-                self._refuse_both(line, column, text)
-            return float(text.replace(",", "."))
-        rule, hint = "is no number" if text else "is empty", ""
-        if _GROUPED.fullmatch(text):
-            hint = "write it without separators of thousands"
-        elif text and is_first:
-            hint = "a row of units must begin with #"
-        raise CsvError(rule, hint, line, column, text)
-
-    def _refuse_both(self, line: int, column: str, cell: str) -> None:
-        rule = (
-            f"decimal points (line {self.points}) and decimal commas (line {self.commas or line})"
-        )
-        raise CsvError(f"the table has {rule}", "write all numbers with points", 0, column, cell)
+            value = float(text.replace(",", "."))
+        else:
+            rule, hint = "is no number" if text else "is empty", ""
+            if _GROUPED.fullmatch(text):
+                hint = "write it without separators of thousands"
+            elif text and is_first:
+                hint = "a row of units must begin with #"
+            raise CsvError(rule, hint, line, column, text)
+        if self.points and self.commas:
+            lines = f"decimal points (line {self.points}) and decimal commas (line {self.commas})"
+            raise CsvError(f"the table has {lines}", _POINTS, 0, column, cell)
+        return value
 
     def finish(self) -> None:
         """Refuse a table whose commas may all separate thousands."""
         if self.commas and not self.clear and self.separator != ";":
             rule = "the comma may be a decimal mark or separate thousands"
-            raise CsvError(rule, "write all numbers with points", self.commas)
+            raise CsvError(rule, _POINTS, self.commas)
 
 
 def _is_number(cell: str) -> bool:

@@ -6,23 +6,20 @@ A CSV file is UTF-8 text (`vibsim.experiment.tables.csv_text`). A netCDF file ha
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibsim.core import netcdf
+from vibsim.core.array_types import Floats, Integers
 from vibsim.core.errors import Fault, InputError, nearest
-from vibsim.experiment.data import ExperimentSpec, TableSpec
+from vibsim.experiment.data import ExperimentSpec
 from vibsim.experiment.schema.fields import TABLE
 from vibsim.experiment.tables import csv_text
 from vibsim.experiment.yaml.file_content import MOST_BYTES, content_of
-from vibsim.models import MODELS, FormulaField
+from vibsim.models import MODELS
 from vibsim.models.table import FEWEST, Table
-
-Floats = NDArray[np.float64]
 
 ENDINGS = (".csv", ".nc")
 MOST_POINTS = 2**20
@@ -51,13 +48,12 @@ class TableError(ValueError):
         super().__init__(rule)
 
 
-@dataclass(frozen=True)
-class Columns:
+class _Columns(NamedTuple):
     """The two columns of a file, and how its points are counted in messages."""
 
     place: Floats
     value: Floats
-    lines: NDArray[np.int64]
+    lines: Integers
     """Line of every point in a text, else its index from 0."""
     word: str
     """``line`` or ``index``."""
@@ -91,23 +87,22 @@ def read(path: Path, keys: tuple[str, str], names: tuple[str, str]) -> tuple[Tab
 
 def _content(path: Path) -> bytes:
     if path.suffix.lower() not in ENDINGS:
-        raise TableError("table", f"the name of a table must end with {' or '.join(ENDINGS)}")
+        raise TableError(TABLE, f"the name of a table must end with {' or '.join(ENDINGS)}")
     if path.is_dir():
-        raise TableError("table", "is a folder, and must be a file")
+        raise TableError(TABLE, "is a folder, and must be a file")
     try:
         content = content_of(path, MOST_BYTES)
     except FileNotFoundError:
-        raise TableError("table", "there is no such file", _alike(path)) from None
+        raise TableError(TABLE, "there is no such file", _alike(path)) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise TableError("table", f"cannot be read ({reason})") from None
+        raise TableError(TABLE, f"cannot be read ({reason})") from None
     if len(content) > MOST_BYTES:
-        raise TableError("table", f"must not be larger than {MOST_BYTES >> 20} MiB")
+        raise TableError(TABLE, f"must not be larger than {MOST_BYTES >> 20} MiB")
     return content
 
 
 def _alike(path: Path) -> str:
-    """Name the nearest table beside a file that is missing."""
     try:
         beside = [p.name for p in path.parent.iterdir() if p.suffix.lower() in ENDINGS]
     except (OSError, ValueError):
@@ -119,30 +114,24 @@ def _alike(path: Path) -> str:
     return hint if is_close else f"there are {len(beside)} tables in that folder"
 
 
-def _from_text(content: bytes, keys: tuple[str, str], names: tuple[str, str]) -> Columns:
-    def choose(header: csv_text.Header) -> list[int]:
-        return [
-            _found(header.names, name, key, "column", is_told=header.is_of_numbers)
-            for key, name in zip(keys, names, strict=True)
-        ]
+def _from_text(content: bytes, keys: tuple[str, str], names: tuple[str, str]) -> _Columns:
+    def choose(known: list[str], is_told: bool) -> list[int]:
+        pairs = zip(keys, names, strict=True)
+        return [_found(known, name, key, "column", is_told=is_told) for key, name in pairs]
 
     try:
-        found = csv_text.read(content, choose, MOST_POINTS)
+        (place, value), lines = csv_text.read(content, choose, MOST_POINTS)
     except csv_text.CsvError as error:
-        raise TableError("table", _told(error), error.hint) from None
-    _check_count(len(found.lines))
-    place, value = found.columns
-    return Columns(place, value, found.lines, "line")
-
-
-def _told(error: csv_text.CsvError) -> str:
-    """Return the rule, with the cell where that may be shown: the file may be anything that a link leads to."""
-    if not error.line:
-        return error.rule
-    cell = f"'{error.cell}' " if error.cell and csv_text.is_shown(error.cell) else ""
-    place = f", in column '{error.column}'" if error.column else ""
-    what = "" if cell or not error.column else "the cell "
-    return f"line {error.line}: {cell}{what}{error.rule}{place}"
+        rule = error.rule
+        if error.line:
+            # the file may be anything that a link leads to
+            cell = f"'{error.cell}' " if error.cell and csv_text.is_shown(error.cell) else ""
+            column = f", in column '{error.column}'" if error.column else ""
+            what = "" if cell or not error.column else "the cell "
+            rule = f"line {error.line}: {cell}{what}{error.rule}{column}"
+        raise TableError(TABLE, rule, error.hint) from None
+    _check_count(len(lines))
+    return _Columns(place, value, lines, "line")
 
 
 def _found(names: list[str], name: str, key: str, word: str, *, is_told: bool = True) -> int:
@@ -157,18 +146,18 @@ def _found(names: list[str], name: str, key: str, word: str, *, is_told: bool = 
     return names.index(name)
 
 
-def _from_netcdf(content: bytes, keys: tuple[str, str], names: tuple[str, str]) -> Columns:
+def _from_netcdf(content: bytes, keys: tuple[str, str], names: tuple[str, str]) -> _Columns:
     try:
         with netcdf.in_memory(content) as dataset:
             found = [_variable(dataset, *pair) for pair in zip(keys, names, strict=True)]
     except (OSError, RuntimeError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise TableError("table", f"the netCDF library cannot read it ({reason})") from None
+        raise TableError(TABLE, f"the netCDF library cannot read it ({reason})") from None
     place, value = found
     if len(place) != len(value):
         rule = f"'{names[0]}' has {len(place)} points, '{names[1]}' has {len(value)}"
-        raise TableError("table", f"both variables must be of one dimension: {rule}")
-    return Columns(place, value, np.arange(len(place)), "index")
+        raise TableError(TABLE, f"both variables must be of one dimension: {rule}")
+    return _Columns(place, value, np.arange(len(place)), "index")
 
 
 def _variable(dataset: Any, key: str, name: str) -> Floats:
@@ -190,53 +179,43 @@ def _variable(dataset: Any, key: str, name: str) -> Floats:
 
 def _check_count(points: int) -> None:
     if points < FEWEST:
-        raise TableError("table", f"must have at least {FEWEST} points, has {points}")
+        raise TableError(TABLE, f"must have at least {FEWEST} points, has {points}")
     if points > MOST_POINTS:
-        raise TableError("table", f"must not have more than {MOST_POINTS} points, has {points}")
+        raise TableError(TABLE, f"must not have more than {MOST_POINTS} points, has {points}")
 
 
-def _table(columns: Columns, names: tuple[str, str]) -> Table:
-    """Return the table of two columns that can be one."""
+def _table(columns: _Columns, names: tuple[str, str]) -> Table:
     x, h = columns.place, columns.value
     for name, values in zip(names, (x, h), strict=True):
         wrong = np.flatnonzero(~np.isfinite(values))
         if len(wrong):
             rule = f"{columns.at(wrong[0])}: '{name}' is {values[wrong[0]]:g}, and must be finite"
-            raise TableError("table", rule)
+            raise TableError(TABLE, rule)
     falling = np.flatnonzero(np.diff(x) <= 0.0)
     if len(falling):
         i = int(falling[0])
         rule = f"'{names[0]}' must increase, but is {x[i]:.10g} and then {x[i + 1]:.10g}"
-        raise TableError("table", f"{columns.at(i + 1)}: {rule}")
+        raise TableError(TABLE, f"{columns.at(i + 1)}: {rule}")
     spacing = float(x[-1] - x[0]) / (len(x) - 1)
     if not 0.0 < spacing < np.inf:
-        raise TableError("table", f"'{names[0]}' must span a finite length")
-    _check_spacing(columns, names[0])
+        raise TableError(TABLE, f"'{names[0]}' must span a finite length")
+    gaps, even = np.diff(x), x[0] + np.arange(len(x)) * spacing
+    usual = float(np.median(gaps))
+    if np.any(np.abs(x - even) > EVEN * usual):
+        # where places leave the spacing that most of them have
+        odd = np.flatnonzero(np.abs(gaps - usual) > EVEN * usual)
+        i = min(int(odd[0] if len(odd) else np.argmax(np.abs(x - even))), len(gaps) - 1)
+        rule = f"'{names[0]}' must be equally spaced, but is {gaps[i]:.10g} further than the point before"
+        hint = f"the others are {usual:.10g} apart"
+        raise TableError(TABLE, f"{columns.at(i + 1)}: {rule}", hint)
     if x[0] > EVEN * spacing:
         rule = f"'{names[0]}' must begin at 0 or below, where the motion starts; it begins at {x[0]:.10g}"
-        raise TableError("table", rule)
+        raise TableError(TABLE, rule)
     table = Table(float(x[0]), spacing, h)
     with np.errstate(all="ignore"):
         if not np.isfinite(table.rows).all():
-            raise TableError("table", "its second differences are too large to be numbers")
+            raise TableError(TABLE, "its second differences are too large to be numbers")
     return table
-
-
-def _check_spacing(columns: Columns, name: str) -> None:
-    """Refuse places that are not equally spaced, and say where they leave the spacing that most of them have."""
-    x = columns.place
-    gaps = np.diff(x)
-    spacing = float(np.median(gaps))
-    even = x[0] + np.arange(len(x)) * ((x[-1] - x[0]) / (len(x) - 1))
-    if np.all(np.abs(x - even) <= EVEN * spacing):
-        return
-    odd = np.flatnonzero(np.abs(gaps - spacing) > EVEN * spacing)
-    i = int(odd[0]) if len(odd) else int(np.argmax(np.abs(x - even)))
-    i = min(i, len(gaps) - 1)
-    rule = f"'{name}' must be equally spaced, but is {gaps[i]:.10g} further than the point before"
-    raise TableError(
-        "table", f"{columns.at(i + 1)}: {rule}", f"the others are {spacing:.10g} apart"
-    )
 
 
 def attach(experiment: ExperimentSpec) -> None:
@@ -248,24 +227,14 @@ def attach(experiment: ExperimentSpec) -> None:
         Where one cannot be read, or has other numbers than it had.
     """
     folder = experiment.file.parent if experiment.file else Path()
+    keys = {row.name: row.table or ("", "") for row in MODELS[experiment.model.kind].formulas}
     for name, spec in experiment.model.tables.items():
-        keys = next(row.table for row in _fields(experiment) if row.name == name)
         try:
-            table, content = read(folder / spec.file, keys or ("", ""), (spec.place, spec.value))
+            table, content = read(folder / spec.file, keys[name], (spec.place, spec.value))
+            if table.digest != spec.numbers:
+                rule = "has other numbers than when the experiment was read"
+                raise TableError(TABLE, rule, "run the experiment again")
         except TableError as error:
-            raise _changed(experiment, name, spec, error.rule, error.hint) from None
-        if table.digest != spec.numbers:
-            rule = "has other numbers than when the experiment was read"
-            raise _changed(experiment, name, spec, rule, "run the experiment again")
+            file, key = str(experiment.file or experiment.name), f"model.{name}.{TABLE}"
+            raise InputError([Fault(file, 0, key, spec.file, error.rule, error.hint)]) from None
         spec.hold(table, content)
-
-
-def _fields(experiment: ExperimentSpec) -> tuple[FormulaField, ...]:
-    return MODELS[experiment.model.kind].formulas
-
-
-def _changed(
-    experiment: ExperimentSpec, name: str, spec: TableSpec, rule: str, hint: str
-) -> InputError:
-    file = str(experiment.file or experiment.name)
-    return InputError([Fault(file, 0, f"model.{name}.{TABLE}", spec.file, rule, hint)])

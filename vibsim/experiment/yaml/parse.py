@@ -1,13 +1,13 @@
 """Read YAML into plain data that remembers its lines.
 
-The tree is built from the parser's events with an explicit stack, so that no input can exhaust Python's: a small file
-can be deep, and a few aliases can stand for billions of nodes.
+The tree is built from the parser's events, and its depth and size are bounded on the way: a small file can be deep, and
+a few aliases can stand for billions of nodes.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -31,14 +31,13 @@ _NOT_PRINTABLE = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U0001
 """What YAML 1.2.2, section 5.1, does not allow in a file."""
 
 _INVALID = "is not valid YAML"
-_FOREIGN = "is no experiment: it has none of the keys {}"
 _TAB = re.compile(" *\t")
 _Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 @dataclass(slots=True)
 class Node:
-    """A node of the file, built event by event."""
+    """A node of the file."""
 
     value: Any
     line: int
@@ -49,10 +48,6 @@ class Node:
     keys: dict[Any, int] | None = None
     """Line of every key of a mapping."""
     children: dict[Any, Node] | None = None
-    key: str = ""
-    """The present key of a mapping."""
-    is_due: bool = False
-    """Whether the value of the present key comes next."""
 
 
 @dataclass(frozen=True)
@@ -89,13 +84,7 @@ class Source:
 
 
 def read(path: Path, keys: Collection[str] = ()) -> Source:
-    """Read the file at `path`: see `parse`.
-
-    Raises
-    ------
-    InputError
-        Where there is no such file, or it is no YAML of the allowed kind.
-    """
+    """Read the file at `path`; InputError where there is none, or it is no YAML of the allowed kind: see `parse`."""
     return parse(read_bytes(path), str(path), keys)
 
 
@@ -119,197 +108,155 @@ def parse(content: bytes, file: str, keys: Collection[str] = ()) -> Source:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise _refusal(file, line, "", "must be UTF-8 text") from None
+        raise InputError([Fault(file, line, "", "", "must be UTF-8 text")]) from None
     if foreign := _NOT_PRINTABLE.search(text):
         line = text.count("\n", 0, foreign.start()) + 1
-        character = f"character U+{ord(foreign.group()):04X}"
-        raise _refusal(file, line, "", "must be plain text", f"it holds {character}")
-    builder = _Builder(file)
+        hint = f"it holds character U+{ord(foreign.group()):04X}"
+        raise InputError([Fault(file, line, "", "", "must be plain text", hint)])
+    reader = _Reader(file, text)
     try:
-        for event in _events(text):
-            builder.take(event)
-        source = builder.source()
+        source = reader.source()
         if not keys or source.data.keys() & set(keys):
             return source
-        builder.faults.clear()
-        raise _refusal(file, 0, "", _FOREIGN.format(", ".join(keys)))
+        rule = f"is no experiment: it has none of the keys {', '.join(keys)}"
+        raise InputError([Fault(file, 0, "", "", rule)])
     except InputError as error:
         faults = error.faults
     except yaml.MarkedYAMLError as error:
         faults = (_syntax(error, text, file),)
     except (yaml.YAMLError, ValueError) as error:
         faults = (Fault(file, 0, "", "", _INVALID, str(error).partition("\n")[0]),)
-    found = {*builder.faults, *faults}
-    if keys and not builder.keys & set(keys):
+    finally:
+        reader.loader.dispose()
+    found = {*reader.faults, *faults}
+    if keys and not set(reader.top.keys or () if reader.top else ()) & set(keys):
         found = {replace(fault, key="", value="") for fault in faults}
     raise InputError(found)
 
 
 def _syntax(error: yaml.MarkedYAMLError, text: str, file: str) -> Fault:
     mark: Any = error.problem_mark or error.context_mark
-    if mark is None:
-        return Fault(file, 0, "", "", _INVALID, str(error.problem or error.context or ""))
-    found = text.splitlines()[mark.line : mark.line + 1]
-    if found and _TAB.match(found[0]):
-        rule = "tabs are not allowed for indentation"
-        return Fault(file, mark.line + 1, "", "", f"{_INVALID}: {rule}", "use spaces")
-    return Fault(file, mark.line + 1, "", "", _INVALID, str(error.problem or error.context or ""))
+    problem, line = str(error.problem or error.context or ""), mark.line + 1 if mark else 0
+    if _TAB.match("".join(text.splitlines()[line - 1 : line])):
+        rule = f"{_INVALID}: tabs are not allowed for indentation"
+        return Fault(file, line, "", "", rule, "use spaces")
+    return Fault(file, line, "", "", _INVALID, problem)
 
 
-def _events(text: str) -> Iterator[Any]:
-    loader = _Loader(text)
-    try:
-        while loader.check_event():
-            yield loader.get_event()
-    finally:
-        loader.dispose()
+class _Reader:
+    """Builds the nodes of one document from the parser's events; no deeper than `MAX_DEPTH`."""
 
-
-def _line(event: Any) -> int:
-    return int(event.start_mark.line) + 1
-
-
-def _refusal(
-    file: str, line: int, key: str, rule: str, hint: str = "", value: str = ""
-) -> InputError:
-    return InputError([Fault(file, line, key, value, rule, hint)])
-
-
-class _Builder:
-    """Takes the events of one document in turn."""
-
-    def __init__(self, file: str) -> None:
-        self.file = file
-        self.stack: list[Node] = []
+    def __init__(self, file: str, text: str) -> None:
+        self.file, self.loader = file, _Loader(text)
         self.anchors: dict[str, Node] = {}
         self.top: Node | None = None
-        self.documents = 0
         self.aliases = 0
         self.faults: list[Fault] = []
 
-    @property
-    def keys(self) -> set[str]:
-        """Keys at the top of the document, as far as it was read."""
-        return set(self.top.keys or ()) if self.top else set()
+    def source(self) -> Source:
+        while not self.loader.check_event(yaml.DocumentStartEvent, yaml.StreamEndEvent):
+            self.loader.get_event()
+        if self.loader.check_event(yaml.DocumentStartEvent):
+            self.loader.get_event()
+            self.top = self.node((), 0)
+            self.loader.get_event()
+            if self.loader.check_event(yaml.DocumentStartEvent):
+                raise self.refuse(self.loader.get_event(), (), "must hold one YAML document only")
+        self.loader.get_event()
+        if self.top is None or not isinstance(self.top.value, dict):
+            line = self.top.line if self.top else 0
+            rule = "must be a mapping of keys to values"
+            raise InputError([Fault(self.file, line, "", "", rule)])
+        return Source(self.file, self.top.value, self.top, tuple(self.faults))
 
-    def refuse(self, event: Any, rule: str, value: str = "", hint: str = "") -> InputError:
-        return _refusal(self.file, _line(event), self.where(), rule, hint, value)
-
-    def where(self) -> str:
-        """Name the place of the next value."""
-        parents = (n.key if n.keys is not None else len(n.value) - 1 for n in self.stack[:-1])
-        return dotted((*parents, *map(position, self.stack[-1:])))
-
-    def take(self, event: Any) -> None:
-        match event:
-            case yaml.DocumentStartEvent():
-                self.documents += 1
-                if self.documents > 1:
-                    raise self.refuse(event, "must hold one YAML document only")
-            case yaml.AliasEvent():
-                self.add(event, self.alias(event))
-            case yaml.ScalarEvent():
-                self.check(event)
-                self.check_number(event)
-                value = event.value if event.style else resolve(event.value)
-                self.add(event, Node(value, _line(event), event.value))
-            case yaml.CollectionStartEvent():
-                self.start(event)
-            case yaml.CollectionEndEvent():
-                node = self.stack.pop()
-                node.is_open = False
-                self.grow(event, node.size)
-
-    def check(self, event: Any) -> None:
+    def node(self, path: Path_, depth: int, *, is_key: bool = False) -> Node:
+        """Read the node at `path` (of a key: the mapping), inside so many others."""
+        event = self.loader.get_event()
+        if is_key and not isinstance(event, yaml.ScalarEvent):
+            raise self.refuse(event, path, "a key must be plain text")
+        if isinstance(event, yaml.AliasEvent):
+            return self.alias(event, path)
         if event.tag is not None:
             rule = "YAML tags are not allowed"
-            self.note(Fault(self.file, _line(event), self.where(), event.tag[:60], rule))
+            self.note(Fault(self.file, _line(event), dotted(path), event.tag[:60], rule))
+        if isinstance(event, yaml.ScalarEvent):
+            if not event.style and not is_key and is_ambiguous(event.value):
+                rule = "a number must not begin with 0, which some read as octal"
+                hint = "leave the 0 out; octal numbers are written 0o10"
+                raise self.refuse(event, path, rule, event.value[:60], hint)
+            value = event.value if event.style else resolve(event.value)
+            node = Node(value, _line(event), event.value)
+        else:
+            if depth >= MAX_DEPTH:
+                raise self.refuse(event, path, f"must not nest deeper than {MAX_DEPTH} levels")
+            node = Node([], _line(event), is_open=True, children={})
+        if event.anchor is not None:
+            self.anchors[event.anchor] = node
+        if not path and not is_key:
+            self.top = node
+        if isinstance(event, yaml.MappingStartEvent):
+            self.mapping(node, path, depth + 1)
+        elif isinstance(event, yaml.SequenceStartEvent):
+            while not self.loader.check_event(yaml.SequenceEndEvent):
+                place = len(node.value)
+                self.keep(node, place, self.node((*path, place), depth + 1), path)
+            self.loader.get_event()
+        node.is_open = False
+        return node
 
-    def check_number(self, event: Any) -> None:
-        is_key = bool(self.stack) and self.stack[-1].keys is not None and not self.stack[-1].is_due
-        if not event.style and not is_key and is_ambiguous(event.value):
-            rule = "a number must not begin with 0, which some read as octal"
-            hint = "leave the 0 out; octal numbers are written 0o10"
-            raise self.refuse(event, rule, event.value[:60], hint)
+    def mapping(self, node: Node, path: Path_, depth: int) -> None:
+        node.value, node.keys = {}, {}
+        while not self.loader.check_event(yaml.MappingEndEvent):
+            key = self.node(path, depth, is_key=True)
+            self.grow(node, key, path)
+            if key.text in node.keys:
+                rule = f"duplicate key, first on line {node.keys[key.text]}"
+                self.note(Fault(self.file, key.line, dotted((*path, key.text)), "", rule))
+            else:
+                node.keys[key.text] = key.line
+            self.keep(node, key.text, self.node((*path, key.text), depth), path)
+        self.loader.get_event()
+
+    def keep(self, parent: Node, place: str | int, node: Node, path: Path_) -> None:
+        """Put a node into its parent; of two values of one key the first counts."""
+        self.grow(parent, node, path)
+        assert parent.children is not None
+        parent.children.setdefault(place, node)
+        if isinstance(place, int):
+            parent.value.append(node.value)
+        else:
+            parent.value.setdefault(place, node.value)
+
+    def grow(self, parent: Node, node: Node, path: Path_) -> None:
+        parent.size += node.size
+        if parent.size > MAX_NODES:
+            rule = f"must not hold more than {MAX_NODES} values"
+            raise InputError([Fault(self.file, node.line, dotted(path), "", rule)])
+
+    def alias(self, event: Any, path: Path_) -> Node:
+        self.aliases += 1
+        if self.aliases > MAX_ALIASES:
+            raise self.refuse(event, path, f"must not have more than {MAX_ALIASES} aliases")
+        node = self.anchors.get(event.anchor)
+        if node is None or node.is_open:
+            rule = "an alias must name a finished anchor before it"
+            raise self.refuse(event, path, rule, f"*{event.anchor}")
+        return node
+
+    def refuse(
+        self, event: Any, path: Path_, rule: str, value: str = "", hint: str = ""
+    ) -> InputError:
+        return InputError([Fault(self.file, _line(event), dotted(path), value, rule, hint)])
 
     def note(self, fault: Fault) -> None:
         """Keep a fault that does not hinder reading on; its node counts as if it were sound."""
         self.faults.append(fault)
         if len(self.faults) >= MAX_FAULTS:
-            raise _refusal(self.file, 0, "", "has more faults than are listed")
-
-    def start(self, event: Any) -> None:
-        self.check(event)
-        if len(self.stack) >= MAX_DEPTH:
-            raise self.refuse(event, f"must not nest deeper than {MAX_DEPTH} levels")
-        node = Node([], _line(event), is_open=True, children={})
-        if isinstance(event, yaml.MappingStartEvent):
-            node.value, node.keys = {}, {}
-        self.add(event, node)
-        self.stack.append(node)
-
-    def alias(self, event: Any) -> Node:
-        self.aliases += 1
-        if self.aliases > MAX_ALIASES:
-            raise self.refuse(event, f"must not have more than {MAX_ALIASES} aliases")
-        node = self.anchors.get(event.anchor)
-        if node is None or node.is_open:
-            rule = "an alias must name a finished anchor before it"
-            raise self.refuse(event, rule, f"*{event.anchor}")
-        return node
-
-    def grow(self, event: Any, size: int) -> None:
-        total = (self.stack[-1].size if self.stack else 0) + size
-        if total > MAX_NODES:
-            raise self.refuse(event, f"must not hold more than {MAX_NODES} values")
-        if self.stack:
-            self.stack[-1].size = total
-
-    def add(self, event: Any, node: Node) -> None:
-        if not isinstance(event, yaml.AliasEvent) and event.anchor is not None:
-            self.anchors[event.anchor] = node
-        if not node.is_open:
-            self.grow(event, node.size)
-        if not self.stack:
-            self.top = node
-            return
-        parent = self.stack[-1]
-        if parent.keys is not None and not parent.is_due:
-            self.add_key(event, parent, node)
-            return
-        place = position(parent)
-        # of two values of one key the first counts
-        if parent.children is not None:
-            parent.children.setdefault(place, node)
-        if parent.keys is None:
-            parent.value.append(node.value)
-        else:
-            parent.value.setdefault(place, node.value)
-            parent.is_due = False
-
-    def add_key(self, event: Any, parent: Node, node: Node) -> None:
-        if not isinstance(event, yaml.ScalarEvent):
-            raise self.refuse(event, "a key must be plain text")
-        parent.key, parent.is_due = str(event.value), True
-        keys = parent.keys if parent.keys is not None else {}
-        if parent.key in keys:
-            rule = f"duplicate key, first on line {keys[parent.key]}"
-            self.note(Fault(self.file, node.line, self.where(), "", rule))
-        else:
-            keys[parent.key] = node.line
-
-    def source(self) -> Source:
-        if self.top is None or not isinstance(self.top.value, dict):
-            line = self.top.line if self.top else 0
-            raise _refusal(self.file, line, "", "must be a mapping of keys to values")
-        return Source(self.file, self.top.value, self.top, tuple(self.faults))
+            raise InputError([Fault(self.file, 0, "", "", "has more faults than are listed")])
 
 
-def position(node: Node) -> str | int:
-    """Return the key or the list position of the value that comes next in `node`."""
-    if node.keys is None:
-        return len(node.value)
-    return node.key if node.is_due else ""
+def _line(event: Any) -> int:
+    return int(event.start_mark.line) + 1
 
 
 def dotted(path: Path_) -> str:

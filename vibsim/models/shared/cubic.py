@@ -21,9 +21,9 @@ from typing import Any
 
 import numpy as np
 
-from vibsim.models.base import Floats
+from vibsim.core.array_types import Floats
 from vibsim.models.shared.elliptic import agm_quarter_period, jacobi
-from vibsim.models.shared.harmonic import damped_motion
+from vibsim.models.shared.linear_motion import damped_motion
 
 CN, DN, SN, LINEAR, ESCAPES, REST = range(6)
 
@@ -85,29 +85,25 @@ def motion(t: Any, alpha: Any, beta: Any, u_0: Any, v_0: Any) -> tuple[Floats, F
     return found[0].reshape(shape), found[1].reshape(shape)
 
 
-def _functions(t: Floats, rate: Floats, complement: Floats) -> tuple[Floats, ...]:
-    """Return sn, cn, dn at ``rate t``, shape (rows, n), and m."""
+def _added(
+    t: Floats, rate: Floats, complement: Floats, s: Floats, c: Floats, d: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Return sn, cn and dn at ``rate t`` behind a phase where they are s, c and d, shape (rows, n)."""
     sn, cn, dn, _ = jacobi(rate[:, None] * t, complement[:, None])
-    return sn, cn, dn, (1.0 - complement)[:, None]
-
-
-def _below(complement: Floats, s: Floats, c: Floats, cn: Floats) -> Floats:
-    """Return the denominator ``1 - m s^2 sn^2`` of the theorems of addition, as a sum of what is not negative."""
-    beyond = complement[:, None]
-    return np.asarray(beyond + (1.0 - beyond) * (c * c + (s * cn) ** 2))
+    m = (1.0 - complement)[:, None]
+    # 1 - m s^2 sn^2, as a sum of what is not negative
+    below = complement[:, None] + m * (c * c + (s * cn) ** 2)
+    sine, cosine = s * cn * dn + sn * c * d, c * cn - s * sn * d * dn
+    return sine / below, cosine / below, (d * dn - m * s * sn * c * cn) / below
 
 
 def _cn(
     t: Floats, size: Floats, rate: Floats, complement: Floats, u: Floats, v: Floats
 ) -> tuple[Floats, Floats]:
-    sn, cn, dn, m = _functions(t, rate, complement)
     c = np.clip(u / size, -1.0, 1.0)[:, None]
-    d = np.sqrt(complement[:, None] + m * c * c)
+    d = np.sqrt(complement[:, None] + (1.0 - complement)[:, None] * c * c)
     s = -(v / (size * rate))[:, None] / d
-    below = _below(complement, s, c, cn)
-    cosine = (c * cn - s * sn * d * dn) / below
-    sine = (s * cn * dn + sn * c * d) / below
-    delta = (d * dn - m * s * sn * c * cn) / below
+    sine, cosine, delta = _added(t, rate, complement, s, c, d)
     return size[:, None] * cosine, -(size * rate)[:, None] * sine * delta
 
 
@@ -121,7 +117,6 @@ def _dn(
     slope: Floats,
     beta: Floats,
 ) -> tuple[Floats, Floats]:
-    sn, cn, dn, m = _functions(t, rate, complement)
     side = np.copysign(size, u)[:, None]
     d = np.clip(u[:, None] / side, 0.0, 1.0)
     # slope = S cos(2 phi) and sqrt(2 beta) |v| = S sin(2 phi), where sn = sin(phi): from d = u/A neither sn near the
@@ -132,24 +127,17 @@ def _dn(
     small = 0.5 * swing / (both * large)
     s = np.where(slope > 0.0, small, large)[:, None]
     c = np.copysign(np.where(slope > 0.0, large, small), -v * u)[:, None]
-    below = _below(complement, s, c, cn)
-    delta = (d * dn - m * s * sn * c * cn) / below
-    sine = (s * cn * dn + sn * c * d) / below
-    cosine = (c * cn - s * sn * d * dn) / below
-    return side * delta, -side * rate[:, None] * m * sine * cosine
+    sine, cosine, delta = _added(t, rate, complement, s, c, d)
+    return side * delta, -side * rate[:, None] * (1.0 - complement)[:, None] * sine * cosine
 
 
 def _sn(
     t: Floats, size: Floats, rate: Floats, complement: Floats, u: Floats, v: Floats
 ) -> tuple[Floats, Floats]:
-    sn, cn, dn, m = _functions(t, rate, complement)
     s = np.clip(u / size, -1.0, 1.0)[:, None]
-    d = np.sqrt(complement[:, None] + m * (1.0 - s) * (1.0 + s))
+    d = np.sqrt(complement[:, None] + (1.0 - complement)[:, None] * (1.0 - s) * (1.0 + s))
     c = (v / (size * rate))[:, None] / d
-    below = _below(complement, s, c, cn)
-    sine = (s * cn * dn + sn * c * d) / below
-    cosine = (c * cn - s * sn * d * dn) / below
-    delta = (d * dn - m * s * sn * c * cn) / below
+    sine, cosine, delta = _added(t, rate, complement, s, c, d)
     return size[:, None] * sine, (size * rate)[:, None] * cosine * delta
 
 

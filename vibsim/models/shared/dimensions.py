@@ -25,10 +25,10 @@ from vibsim.formula import (
     Number,
     literal,
     over,
+    parse,
     times,
     to_formula,
 )
-from vibsim.formula.parser import parse
 
 Powers = tuple[int, int, int]
 """Of mass, position and time."""
@@ -43,33 +43,23 @@ class DimensionError(ValueError):
     """Terms of one sum cannot have the same dimension."""
 
 
-@dataclass(frozen=True)
-class Dimension:
-    """A sum over unknown dimensions with factors, and a known one."""
-
-    unknown: Mapping[str, Fraction] = field(default_factory=dict)
-    known: tuple[Fraction, ...] = (Fraction(0),) * 3
-
-    def plus(self, other: Dimension, factor: Fraction = Fraction(1)) -> Dimension:
-        """Return the dimension of the product with a power of another."""
-        names = {**self.unknown, **other.unknown}
-        unknown = {
-            name: total
-            for name in names
-            if (
-                total := self.unknown.get(name, Fraction(0))
-                + factor * other.unknown.get(name, Fraction(0))
-            )
-        }
-        pairs = zip(self.known, other.known, strict=True)
-        return Dimension(unknown, tuple(a + factor * b for a, b in pairs))
+Dimension = Mapping[str, Fraction]
+"""Powers of `BASES` and of dimensions that are unknown, each by the name of a parameter."""
+BASES = ("@mass", "@position", "@time")
+NONE: Dimension = {}
 
 
-NONE = Dimension()
+def _product(left: Dimension, right: Dimension, power: Fraction = Fraction(1)) -> Dimension:
+    """Return the dimension of a product with a power of another."""
+    sums = {
+        name: left.get(name, Fraction(0)) + power * right.get(name, Fraction(0))
+        for name in {**left, **right}
+    }
+    return {name: total for name, total in sums.items() if total}
 
 
 def _known(powers: Powers) -> Dimension:
-    return Dimension({}, tuple(map(Fraction, powers)))
+    return dict(zip(BASES, map(Fraction, powers), strict=True))
 
 
 @dataclass
@@ -83,11 +73,10 @@ class Equations:
 
     def reduced(self, found: Dimension) -> Dimension:
         """Return a dimension in the unknowns that are left."""
-        for name, factor in found.unknown.items():
+        for name, power in found.items():
             if name in self.solved:
-                without = {other: f for other, f in found.unknown.items() if other != name}
-                rest = Dimension(without, found.known).plus(self.solved[name], factor)
-                return self.reduced(rest)
+                rest = {other: p for other, p in found.items() if other != name}
+                return self.reduced(_product(rest, self.solved[name], power))
         return found
 
     def equal(self, left: Dimension, right: Dimension, node: Expression) -> None:
@@ -98,30 +87,33 @@ class Equations:
         DimensionError
             Where they cannot be.
         """
-        rest = self.reduced(left.plus(right, Fraction(-1)))
-        if not rest.unknown:
-            if any(rest.known):
-                raise DimensionError(to_formula(node))
-            return
-        name, factor = next(iter(rest.unknown.items()))
-        others = Dimension({key: f for key, f in rest.unknown.items() if key != name}, rest.known)
-        self.solved[name] = NONE.plus(others, -1 / factor)
-        for key, value in self.solved.items():
-            self.solved[key] = self.reduced(value)
+        rest = dict(self.reduced(_product(left, right, Fraction(-1))))
+        name = next((name for name in rest if name not in BASES), None)
+        if name is not None:
+            power = rest.pop(name)
+            self.solved[name] = _product(NONE, rest, -1 / power)
+            for key, value in self.solved.items():
+                self.solved[key] = self.reduced(value)
+        elif rest:
+            raise DimensionError(to_formula(node))
 
     def of(self, node: Expression) -> Dimension:
         """Return the dimension of a formula, and demand what it needs to have one."""
         match node:
             case Number(value):
-                return NONE if value else self.any()
+                if value:
+                    return NONE
+                # the number 0 has a dimension of its own: it fits any
+                self.fresh += 1
+                return {f"@{self.fresh}": Fraction(1)}
             case Name(name):
-                return self.known.get(name, Dimension({name: Fraction(1)}))
+                return self.known.get(name, {name: Fraction(1)})
             case Negate(operand):
                 return self.of(operand)
             case Binary("*", left, right):
-                return self.of(left).plus(self.of(right))
+                return _product(self.of(left), self.of(right))
             case Binary("/", left, right):
-                return self.of(left).plus(self.of(right), Fraction(-1))
+                return _product(self.of(left), self.of(right), Fraction(-1))
             case Binary("**", base, exponent):
                 return self._power(node, base, exponent)
             case Binary(_, left, right):
@@ -133,7 +125,7 @@ class Equations:
                 self.of(condition)
                 return self._alike(tuple(choices), node)
             case Call("sqrt" | "cbrt" as root, (argument,)):
-                return NONE.plus(self.of(argument), Fraction(1, 2 if root == "sqrt" else 3))
+                return _product(NONE, self.of(argument), Fraction(1, 2 if root == "sqrt" else 3))
             case Call(function, arguments) if function in ALIKE | FREE:
                 found = self._alike(arguments, node)
                 return found if function in ALIKE else NONE
@@ -142,11 +134,6 @@ class Equations:
                     self.equal(self.of(argument), NONE, node)
                 return NONE
         raise AssertionError(node)
-
-    def any(self) -> Dimension:
-        """Return a dimension of its own, for the number 0: it fits any."""
-        self.fresh += 1
-        return Dimension({f"@{self.fresh}": Fraction(1)})
 
     def _alike(self, terms: tuple[Expression, ...], node: Expression) -> Dimension:
         first, *others = (self.of(term) for term in terms)
@@ -157,7 +144,7 @@ class Equations:
     def _power(self, node: Expression, base: Expression, exponent: Expression) -> Dimension:
         inner, number = self.of(base), literal(exponent)
         if number is not None:
-            return NONE.plus(inner, Fraction(number))
+            return _product(NONE, inner, Fraction(number))
         self.equal(self.of(exponent), NONE, node)
         self.equal(inner, NONE, node)
         return NONE
@@ -187,7 +174,10 @@ def powers(
     for formula in formulas:
         equations.equal(equations.of(formula), _known(FORCE), formula)
     found = (equations.reduced(equations.of(Name(name))) for name in names)
-    return {name: dimension.known for name, dimension in zip(names, found, strict=True)}
+    return {
+        name: tuple(dimension.get(base, Fraction(0)) for base in BASES)
+        for name, dimension in zip(names, found, strict=True)
+    }
 
 
 def over_scales(
@@ -196,16 +186,11 @@ def over_scales(
     """Return a parameter over powers of the scales of mass, position and time."""
     found: Expression = Name(name)
     for scale, exponent in zip(scales, power, strict=True):
-        size = abs(exponent)
-        factor = scale if size == 1 else _raised(scale, size)
-        if exponent > 0:
-            found = over(found, factor)
-        elif exponent < 0:
-            found = times(found, factor)
+        factor, size = scale, abs(exponent)
+        if size.denominator != 1:
+            factor = Binary("**", scale, parse(f"{size.numerator}/{size.denominator}", ()))
+        elif size != 1:
+            factor = Binary("**", scale, Number(float(size)))
+        if exponent:
+            found = (over if exponent > 0 else times)(found, factor)
     return found
-
-
-def _raised(scale: Expression, exponent: Fraction) -> Expression:
-    if exponent.denominator == 1:
-        return Binary("**", scale, Number(float(exponent)))
-    return Binary("**", scale, parse(f"{exponent.numerator}/{exponent.denominator}", ()))

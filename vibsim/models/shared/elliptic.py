@@ -21,9 +21,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vibsim.models.base import Floats, Numbers
+from vibsim.core.array_types import Flags, Floats
+from vibsim.models.base import Numbers
 
 _MEANS = ((0.1, 5), (1e-5, 6), (1e-11, 7), (1e-30, 8), (0.0, 12))
 """Steps of the arithmetic-geometric mean that bring 1 and sqrt(x) together to the last digit, for x from each bound on.
@@ -35,7 +35,7 @@ _DUPLICATIONS = 12
 """They bring the arguments of R_F together to 1 %, for a ratio of 1e-300 between them; the sixth power is left out."""
 
 
-def _classes(complement: Floats) -> Iterator[tuple[NDArray[np.bool_] | slice, int]]:
+def _classes(complement: Floats) -> Iterator[tuple[Flags | slice, int]]:
     """Yield which entries need how many steps of the mean; entries that are 0 belong to none."""
     below = np.inf
     for bound, steps in _MEANS:
@@ -48,13 +48,7 @@ def _classes(complement: Floats) -> Iterator[tuple[NDArray[np.bool_] | slice, in
 
 
 def agm_quarter_period(complement: Floats) -> Floats:
-    """Return the complete elliptic integral K of the first kind.
-
-    Parameters
-    ----------
-    complement
-        ``1 - m``, from 0 to 1, any shape; K is infinite at 0.
-    """
+    """Return the complete elliptic integral K of the first kind from ``1 - m`` of any shape; infinite at 0."""
     flat = np.ravel(complement)
     quarter = np.where(np.isnan(flat), np.nan, np.inf)
     for chosen, steps in _classes(flat):
@@ -93,15 +87,7 @@ def _incomplete(sin: Floats, cos: Floats, complement: Floats) -> Floats:
 
 
 def jacobi(u: Floats, complement: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return sn, cn, dn and the amplitude am of `u`.
-
-    Parameters
-    ----------
-    u
-        Argument, any shape.
-    complement
-        ``1 - m``, from 0 to 1, of a shape that broadcasts against `u`.
-    """
+    """Return sn, cn, dn and the amplitude am of `u`, from `complement` ``1 - m`` that broadcasts against it."""
     u = np.asarray(u, dtype=float)
     each = np.broadcast_to(complement, u.shape)
     sn, cn, dn, turns = (x.reshape(u.shape) for x in _reduced(u.reshape(-1, 1), each.reshape(-1)))
@@ -117,30 +103,19 @@ def _sign(half_turns: Floats) -> Floats:
 def _reduced(u: Floats, complement: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Return sn, cn, dn of `u` less whole half periods 2 K, and their number.
 
-    Parameters
-    ----------
-    u
-        Shape (rows, n).
-    complement
-        Shape (rows,): what depends on it alone is computed once for a row.
+    The shape of `u` is (rows, n), that of `complement` (rows,): what depends on it alone is computed once for a row.
     """
-    sn, cn, dn, turns = (np.full_like(u, np.nan) for _ in range(4))
-    parts = [
-        (chosen, _general(u[chosen], complement[chosen], n)) for chosen, n in _classes(complement)
-    ]
+    found = np.full((4, *u.shape), np.nan)
+    for chosen, steps in _classes(complement):
+        found[:, chosen] = _general(u[chosen], complement[chosen], steps)
     separatrix = complement == 0.0
     if separatrix.any():
-        parts.append((separatrix, _limit(u[separatrix])))
-    for chosen, values in parts:
-        for target, value in zip((sn, cn, dn, turns), values, strict=True):
-            target[chosen] = value
+        # K is infinite, and there is no half period
+        at = u[separatrix]
+        sech = 1.0 / np.cosh(np.clip(at, -700.0, 700.0))
+        found[:, separatrix] = np.tanh(at), sech, sech, np.zeros_like(at)
+    sn, cn, dn, turns = found
     return sn, cn, dn, turns
-
-
-def _limit(u: Floats) -> tuple[Floats, ...]:
-    """Return sn, cn, dn on the separatrix, where K is infinite, and no half period."""
-    sech = 1.0 / np.cosh(np.clip(u, -700.0, 700.0))
-    return np.tanh(u), sech, sech, np.zeros_like(u)
 
 
 def _general(u: Floats, complement: Floats, steps: int) -> tuple[Floats, ...]:
@@ -163,14 +138,11 @@ def _general(u: Floats, complement: Floats, steps: int) -> tuple[Floats, ...]:
         dn = (root + ratio) / (mean + ratio)
         ratio = c / mean
     sn = np.copysign(1.0 / np.sqrt(c * c + 1.0), sin)
+    found = [sn, c * sn, dn]
     if small.any():
-        return (
-            np.where(small, u, sn),
-            np.where(small, 1.0, c * sn),
-            np.where(small, 1.0, dn),
-            half_turns,
-        )
-    return sn, c * sn, dn, half_turns
+        one = np.ones_like(u)
+        found = [np.where(small, x, y) for x, y in zip((u, one, one), found, strict=True)]
+    return (*found, half_turns)
 
 
 def _energy(initial: Numbers, parameters: Numbers) -> tuple[Floats, ...]:
@@ -186,20 +158,10 @@ def _energy(initial: Numbers, parameters: Numbers) -> tuple[Floats, ...]:
 
 
 def pendulum_motion(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
-    """Return the exact theta [rad] and omega [rad per unit of time] of the pendulum.
+    """Return the exact theta [rad] and omega [rad per unit of time] at times `t`, shape (..., n_t).
 
-    Parameters
-    ----------
-    t
-        Times, shape (..., n_t).
-    initial
-        ``theta`` and ``omega`` at t = 0, shape (..., 1) or ().
-    parameters
-        ``g`` and ``L``, shape (..., 1) or ().
-
-    Notes
-    -----
-    The rounding error is about ``(1 + w t)`` units in the last place, times the sensitivity to the initial values.
+    ``theta`` and ``omega`` at t = 0, ``g`` and ``L`` have the shape (..., 1) or (). The rounding error is about
+    ``(1 + w t)`` units in the last place, times the sensitivity to the initial values.
     """
     start = _energy(initial, parameters)
     t = np.asarray(t, dtype=float)
@@ -219,37 +181,23 @@ def pendulum_motion(t: Floats, initial: Numbers, parameters: Numbers) -> dict[st
     return {"theta": theta.reshape(shape), "omega": omega.reshape(shape)}
 
 
-def _libration(
-    t: Floats,
-    w: Floats,
-    k: Floats,
-    sine: Floats,
-    cosine: Floats,
-    speed: Floats,
-    complement: Floats,
-) -> tuple[Floats, Floats]:
+def _libration(t: Floats, *start: Floats) -> tuple[Floats, Floats]:
     """Return theta and omega, shape (rows, n), of rows that swing."""
+    w, k, sine, _, speed, complement = start
     size = np.where(k == 0.0, 1.0, k)
-    start = _incomplete(sine / size, speed / size, complement)
-    sn, cn, dn, half = _reduced(w[:, None] * t + start[:, None], complement)
+    phase = _incomplete(sine / size, speed / size, complement)
+    sn, cn, dn, half = _reduced(w[:, None] * t + phase[:, None], complement)
     sign = _sign(half)
     return 2.0 * np.arctan2(k[:, None] * (sign * sn), dn), (2.0 * w * k)[:, None] * (sign * cn)
 
 
-def _rotation(
-    t: Floats,
-    w: Floats,
-    k: Floats,
-    sine: Floats,
-    cosine: Floats,
-    speed: Floats,
-    complement: Floats,
-) -> tuple[Floats, Floats]:
+def _rotation(t: Floats, *start: Floats) -> tuple[Floats, Floats]:
     """Return theta and omega, shape (rows, n), of rows that go over the top."""
+    w, k, sine, cosine, speed, complement = start
     sign = np.copysign(1.0, speed)
     inverse = -complement / (k * k)  # 1 - 1/k^2
-    start = _incomplete(sign * sine, cosine, inverse)
-    sn, cn, dn, half = _reduced((w * k)[:, None] * t + start[:, None], inverse)
+    phase = _incomplete(sign * sine, cosine, inverse)
+    sn, cn, dn, half = _reduced((w * k)[:, None] * t + phase[:, None], inverse)
     amplitude = np.arctan2(sn, cn) + np.pi * half
     return (2.0 * sign)[:, None] * amplitude, (2.0 * sign * w * k)[:, None] * dn
 

@@ -11,8 +11,9 @@ from functools import cache
 
 import numpy as np
 
+from vibsim.core.array_types import Floats
 from vibsim.formula import ZERO, derivative, names_in, put, values
-from vibsim.models.base import Floats, Model, Numbers, tree
+from vibsim.models.base import Model, Numbers, tree
 
 
 @dataclass(frozen=True)

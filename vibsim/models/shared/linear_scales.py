@@ -54,15 +54,14 @@ def linear_scales(forces: Forces) -> Scales | None:
         size: Expression = Call("where", (Compare("!=", u, ZERO), _size(u), times(_size(v), T_C)))
     else:
         size = over(_size(driven[0]), k)
-    numbers: list[tuple[str, Formula]] = []
+    numbers: dict[str, Formula] = {}
     if forces.known_damping is not None:
         kind, b = forces.known_damping
-        scale = T_C if kind == "linear" else X_C
-        numbers.append(("beta", over(times(b, scale), times(TWO, m))))
+        numbers["beta"] = over(times(b, T_C if kind == "linear" else X_C), times(TWO, m))
     if driven is not None:
-        numbers.append(("gamma", times(driven[1], T_C)))
+        numbers["gamma"] = times(driven[1], T_C)
     energy = times(k, Binary("**", X_C, TWO))
-    return Scales(_time_scale(m, k), size, energy, tuple(numbers))
+    return Scales(_time_scale(m, k), size, energy, tuple(numbers.items()))
 
 
 def _time_scale(mass: Expression, stiffness: Expression) -> Expression:
@@ -86,12 +85,8 @@ def with_scaled_run(
 ) -> Scales:
     """Return the scales with the parameters of the scaled equation, or why there are none.
 
-    Parameters
-    ----------
-    scales
-        Its parameters, where it has any, are taken as they are.
-    given
-        The powers of mass, position and time that some parameters have; those of the others follow from the forces.
+    Parameters that `scales` has are taken as they are. `given` are the powers of mass, position and time that some
+    parameters have; those of the others follow from the forces.
     """
     known = {forces.position: (0, 1, 0), forces.velocity: (0, 1, -1), "t": (0, 0, 1), **given}
     known |= dict.fromkeys(names_in(forces.mass), (1, 0, 0))

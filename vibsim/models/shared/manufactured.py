@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from vibsim.core.array_types import Floats
 from vibsim.formula import Expression, ExpressionError, derivative, minus, put, size, values
-from vibsim.models.base import Floats, Numbers, Parameter
+from vibsim.models.base import Numbers, Parameter
 
 MAX_NODES = 20_000
 """Longest force of an exact solution, in operations and names."""

@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
+from vibsim.core.array_types import Floats
 from vibsim.formula import (
     ONE,
     ZERO,
@@ -32,10 +33,14 @@ from vibsim.formula import (
     times,
     values,
 )
-from vibsim.models.base import Damping, Floats, Model, Numbers, Parameter, State
+from vibsim.models.base import Damping, Model, Numbers, Parameter, State
 from vibsim.models.shared.dimensions import Powers
-from vibsim.models.shared.forced import exponentials, forced_motion, is_sum_of_exponentials
-from vibsim.models.shared.harmonic import period
+from vibsim.models.shared.linear_motion import (
+    exponentials,
+    forced_motion,
+    is_sum_of_exponentials,
+    period,
+)
 from vibsim.models.shared.linear_scales import linear_scales, with_scaled_run
 from vibsim.models.shared.scales import Scales
 
@@ -79,7 +84,7 @@ class Forces:
         return not is_zero(self.force)
 
     @cached_property
-    def known_damping(self) -> tuple[str, Expression] | None:
+    def known_damping(self) -> tuple[Literal["linear", "quadratic"], Expression] | None:
         """Kind and coefficient of the damping force, where it is linear or quadratic; None where it is another one."""
         return damping_of(self.damping, self.velocity) if self.is_damped else None
 
@@ -97,12 +102,6 @@ def mechanical(
     forces: Forces,
     parameters: tuple[Parameter, ...],
     *,
-    states: tuple[State, State] = STATES,
-    energy_unit: str = "J",
-    kind: str,
-    title: str,
-    source: str,
-    equation: str,
     scales: Callable[[Forces], Scales | None] = linear_scales,
     powers: Mapping[str, Powers] | None = None,
     **more: Any,
@@ -120,56 +119,14 @@ def mechanical(
     more
         Whatever else `Model` has: it takes the place of what follows from the forces.
     """
-    known = forces.known_damping
-    acceleration = forces.over_mass(minus(minus(forces.force, forces.damping), forces.spring))
     velocity = Name(forces.velocity)
-    kinetic = times(times(Number(0.5), forces.mass), Binary("**", velocity, Number(2.0)))
-    numbers = _by_name(parameters)
-    natural_frequency = _natural_frequency(forces, numbers)
     own = scales(forces)
     is_free = not forces.is_driven and not forces.is_damped
-    facts: dict[str, Any] = {
-        "potential_energy": forces.potential or integral(forces.spring, forces.position),
-        "kinetic_energy": kinetic,
-        "linear": forces.is_linear,
-        "conservative": is_free,
-        "natural_frequency": natural_frequency,
-        "dissipation": times(forces.damping, velocity) if forces.is_damped else None,
-        "driving": times(forces.force, velocity) if forces.is_driven else None,
-        "exact": linear_motion(forces, numbers),
-        "scales": own and with_scaled_run(own, forces, parameters, powers or {}),
-        "exact_period": _period(forces, natural_frequency)
-        if is_free and forces.is_linear
-        else None,
-    }
-    if known is not None:
-        word, rate = known
-        facts["damping"] = Damping(
-            kind="linear" if word == "linear" else "quadratic",
-            rate=forces.over_mass(rate),
-        )
-    return Model(
-        kind=kind,
-        title=title,
-        source=source,
-        equation=equation,
-        states=states,
-        parameters=parameters,
-        acceleration=acceleration,
-        energy_unit=energy_unit,
-        **(facts | more),
-    )
-
-
-def _by_name(parameters: tuple[Parameter, ...]) -> Callable[[Numbers], dict[str, Any]]:
-    """Return what gives the values of the parameters by the names that formulas use."""
     keys = {row.name: row.key for row in parameters}
-    return lambda given: {name: given[key] for name, key in keys.items()}
 
+    def numbers(given: Numbers) -> dict[str, Any]:
+        return {name: given[key] for name, key in keys.items()}
 
-def _natural_frequency(
-    forces: Forces, numbers: Callable[[Numbers], dict[str, Any]]
-) -> Callable[[Numbers], Any]:
     def natural_frequency(parameters: Numbers) -> Any:
         """Return ``sqrt(s'(0)/m)`` [rad s-1]; NaN where the spring has no slope at 0, or none that pulls back."""
         named = numbers(parameters)
@@ -180,26 +137,42 @@ def _natural_frequency(
         # of numbers alone it is one number, whatever the shape of the parameters
         return np.broadcast_to(found, np.broadcast_shapes(*(np.shape(x) for x in named.values())))
 
-    return natural_frequency
+    def exact_period(initial: Numbers, p: Numbers) -> Any:
+        start = initial[forces.position], initial[forces.velocity]
+        return period(natural_frequency(p), *start)
+
+    facts: dict[str, Any] = {
+        "states": STATES,
+        "parameters": parameters,
+        "acceleration": forces.over_mass(minus(minus(forces.force, forces.damping), forces.spring)),
+        "potential_energy": forces.potential or integral(forces.spring, forces.position),
+        "kinetic_energy": times(
+            times(Number(0.5), forces.mass), Binary("**", velocity, Number(2.0))
+        ),
+        "energy_unit": "J",
+        "linear": forces.is_linear,
+        "conservative": is_free,
+        "natural_frequency": natural_frequency,
+        "dissipation": times(forces.damping, velocity) if forces.is_damped else None,
+        "driving": times(forces.force, velocity) if forces.is_driven else None,
+        "exact": _linear_motion(forces, numbers),
+        "scales": own and with_scaled_run(own, forces, parameters, powers or {}),
+        "exact_period": exact_period if is_free and forces.is_linear else None,
+    }
+    if forces.known_damping is not None:
+        kind, rate = forces.known_damping
+        facts["damping"] = Damping(kind, forces.over_mass(rate))
+    return Model(**(facts | more))
 
 
-def _period(
-    forces: Forces, natural_frequency: Callable[[Numbers], Any]
-) -> Callable[[Numbers, Numbers], Any]:
-    return lambda initial, p: period(
-        natural_frequency(p), initial[forces.position], initial[forces.velocity]
-    )
-
-
-def linear_motion(
+def _linear_motion(
     forces: Forces, numbers: Callable[[Numbers], dict[str, Any]]
 ) -> Callable[[Floats, Numbers, Numbers], dict[str, Floats]] | None:
     """Return the exact solution of linear forces, driven by exponentials if at all (exercise 11); None otherwise."""
-    known = forces.known_damping
+    kind, rate = forces.known_damping or ("", ZERO)
     is_solvable = forces.is_linear and is_sum_of_exponentials(forces.force)
-    if not is_solvable or (forces.is_damped and (known is None or known[0] != "linear")):
+    if not is_solvable or (forces.is_damped and kind != "linear"):
         return None
-    rate = known[1] if known is not None else ZERO
 
     def motion(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
         named = numbers(parameters)
@@ -214,7 +187,9 @@ def linear_motion(
     return motion
 
 
-def damping_of(node: Expression, velocity: str = "v") -> tuple[str, Expression] | None:
+def damping_of(
+    node: Expression, velocity: str = "v"
+) -> tuple[Literal["linear", "quadratic"], Expression] | None:
     """Return kind and coefficient of a linear or a quadratic damping force; None for any other one."""
     slope = derivative(node, velocity)
     if is_multiple(node, slope, velocity):

@@ -65,29 +65,26 @@ def scales(model: Model, parameters: Numbers, initial: Numbers) -> tuple[Charact
     if own is None:
         return ()
     numbers = _numbers(model, own, parameters, initial)
-    energy = _value(model, own.energy, numbers)
     x, v = model.states
     with np.errstate(all="ignore"):
         speed = numbers[X_C.name] / numbers[T_C.name]
-    over, size = f"{x.name}_c/t_c", numbers[X_C.name]
     formulas = dict(own.outputs)
-    outputs = (
-        Characteristic(
-            row.name,
-            row.long_name,
-            _text(model, formula),
-            row.unit,
-            _value(model, formula, numbers),
-        )
+    rows = [("energy", "energy", own.energy, model.energy_unit)]
+    rows += [
+        (row.name, row.long_name, formulas[row.name], row.unit)
         for row in model.outputs
-        if (formula := formulas.get(row.name)) is not None
-    )
+        if row.name in formulas
+    ]
     return (
         Characteristic("t", "time", _text(model, own.time), "s", numbers[T_C.name]),
-        Characteristic(x.name, x.long_name, _text(model, own.position), x.unit, size),
-        Characteristic(v.name, v.long_name, over, v.unit, speed),
-        Characteristic("energy", "energy", _text(model, own.energy), model.energy_unit, energy),
-        *outputs,
+        Characteristic(x.name, x.long_name, _text(model, own.position), x.unit, numbers[X_C.name]),
+        Characteristic(v.name, v.long_name, f"{x.name}_c/t_c", v.unit, speed),
+        *(
+            Characteristic(
+                name, words, _text(model, formula), unit, _value(model, formula, numbers)
+            )
+            for name, words, formula, unit in rows
+        ),
     )
 
 

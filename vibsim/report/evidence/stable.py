@@ -1,6 +1,6 @@
 """The picture of stability: w dt beside the limit of the scheme, the size of the solution, and its growth, by level.
 
-The rules are those of `vibsim.checks.growth`: unstable is w dt beyond the limit, or a solution that has
+The rules are those of `vibsim.checks.stable`: unstable is w dt beyond the limit, or a solution that has
 grown beyond `BLOWN_UP` times the exact one without the next finer level halving that.
 """
 
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibsim.checks.growth import LIMIT_ROUNDING
+from vibsim.checks.stable import LIMIT_ROUNDING
 from vibsim.convergence.thresholds import BLOWN_UP
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record

@@ -11,10 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vibsim.checks.fields import name_of
-from vibsim.checks.value import criteria
-from vibsim.checks.value.by_level import own_levels
-from vibsim.checks.value.units import unit_of
-from vibsim.checks.words.value import what
+from vibsim.checks.value import SAMPLED, own_levels, unit_of, what
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report import style
@@ -75,7 +72,7 @@ def _beside_border(row: ByLevel, check: ValueCheck, title: str, bar: Floats) -> 
 def _spoken(check: ValueCheck) -> str:
     """Return the name of a number as a title has it."""
     told = what(check, words.PAGE)
-    if check.value in criteria.SAMPLED or (check.at.t is None and check.at.step is None):
+    if check.value in SAMPLED or (check.at.t is None and check.at.step is None):
         return told
     return f"{told} up to {f't = {check.at.t:g}' if check.at.t is not None else f'step {check.at.step}'}"
 

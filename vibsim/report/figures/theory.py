@@ -147,9 +147,9 @@ def _theory(experiment: Experiment, s: int, grid: Floats) -> tuple[Floats, Float
     scheme = SCHEMES[spec.kind]
     if varied or scheme.adaptive:
         return None
-    stepper = scheme.stepper(experiment.scheme_options(s))
+    stepper = scheme.stepper(experiment.schemes[s].options)
     with np.errstate(all="ignore"):
-        growth = np.expm1(theory.log_growth(stepper, grid) * (2.0 * np.pi / grid))
+        growth = np.expm1(theory.roots(stepper, grid).log_growth * (2.0 * np.pi / grid))
         phase = theory.phase_error_per_period(stepper, grid)
     return np.asarray(growth), np.asarray(phase)
 

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 from shlex import quote
 from typing import Any
 
-from vibsim.checks.results import Result
-from vibsim.checks.value.units import unit_of
-from vibsim.checks.words.verdict import Wording, expectation
+from vibsim.checks.outcome import Result
+from vibsim.checks.value import unit_of
+from vibsim.checks.verdict_text import Wording, expectation
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import worst
 from vibsim.experiment.collection import ADHOC, ENDINGS

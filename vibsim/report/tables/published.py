@@ -108,7 +108,7 @@ def _row(
     yield from (getattr(row.at, key) for key in ("t", "step", "case") if key in headers)
     yield row.printed
     yield Written(ours, words.like(ours, row.printed))
-    yield ours - row.number
+    yield ours - row.meaning.number
     yield _agrees(checks.get(name, {}).get("status"), row)
     if table.beside:
         place = record.words("check").index(name)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from vibsim.checks.value.criteria import SAMPLED
-from vibsim.checks.words.value import what
+from vibsim.checks.value import SAMPLED, what
 from vibsim.report.text import words
 from vibsim.report.types import Check, Measurement
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from vibsim.checks.value.criteria import COUNTED, depends_on_level
+from vibsim.checks.value import COUNTED, depends_on_level
 from vibsim.core.vocabulary import BY_TOLERANCE
 
 

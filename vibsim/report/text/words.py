@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from vibsim.checks.words.notation import Notation
+from vibsim.checks.sentences import Notation
 from vibsim.experiment.value_names import VALUES
 from vibsim.models.shared.phase_amplitude_names import AMPLITUDE, PHASE, is_error_part, whole_of
 from vibsim.report.style import power

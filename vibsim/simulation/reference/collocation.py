@@ -1,19 +1,21 @@
-r"""Collocation at the 12 Gauss points of a step, for ``u'' = a(u, u', t)``: coefficients, and the equations of a step.
+r"""Collocation at the 12 Gauss points of a step, for ``u'' = a(u, u', t)``: the equations of a step, and solutions.
 
 Order 24 (E. Hairer, G. Wanner, S. Noersett, Solving Ordinary Differential Equations I, section II.7); the equations are
-solved by iteration. Within a step the collocation polynomial is the solution.
+solved by iteration. Within a step the collocation polynomial is the solution. Smooth motions take equal steps, others
+those of `vibsim.simulation.reference.piecewise_collocation`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cache
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from vibsim.core.array_types import Floats
+
 Force = Callable[[Floats, Floats, Floats], Floats]
 """The accelerations, shape (coordinate, stage, case), from positions and velocities of that shape and from times."""
 
@@ -25,17 +27,6 @@ STALLED = 2.0**-30
 """Largest change that may be taken for round-off once changes no longer fall: forces magnify that of the positions."""
 
 
-@dataclass(frozen=True)
-class Tableau:
-    """Coefficients of collocation for ``u'' = a``, shape (stage,) or (stage, stage)."""
-
-    c: Floats
-    first: Floats
-    """Of the velocities at the stages."""
-    second: Floats
-    """Of the positions."""
-
-
 @cache
 def nodes() -> tuple[Floats, Floats, Floats]:
     """Return Gauss's points on [0, 1], their weights, and the barycentric weights of interpolation."""
@@ -45,7 +36,7 @@ def nodes() -> tuple[Floats, Floats, Floats]:
     return c, 0.5 * w, 1.0 / np.prod(4.0 * gaps, axis=1)
 
 
-def basis(x: Floats) -> Floats:
+def _basis(x: Floats) -> Floats:
     """Return the polynomials that are 1 at one of the points and 0 at the others, shape (..., stage)."""
     c, _, weight = nodes()
     gap = x[..., None] - c
@@ -58,18 +49,17 @@ def basis(x: Floats) -> Floats:
 def integrals(x: Floats) -> tuple[Floats, Floats]:
     """Return the integrals of these polynomials from 0 to x, and the integrals of those, shape (time, stage)."""
     c, weight, _ = nodes()
-    at = basis(x[:, None] * c)
+    at = _basis(x[:, None] * c)
     first = x[:, None] * np.sum(weight[:, None] * at, axis=1)
     second = x[:, None] ** 2 * np.sum((weight * (1.0 - c))[:, None] * at, axis=1)
     return first, second
 
 
 @cache
-def tableau() -> Tableau:
-    """Return the coefficients of the stages."""
-    c, _, _ = nodes()
-    first, second = integrals(c)
-    return Tableau(c, first, second)
+def _coefficients() -> tuple[Floats, tuple[Floats, Floats], Floats]:
+    """Return those of both integrals at the stages, of both over the step, and of the stages of an equal next step."""
+    c = nodes()[0]
+    return np.concatenate(integrals(c)), integrals(np.ones(1)), _basis(1.0 + c)
 
 
 def summed(coefficients: Floats, a: Floats) -> Floats:
@@ -86,18 +76,14 @@ def total(terms: Floats, axis: int) -> Floats:
     return np.asarray(np.add.reduce(terms, axis=axis))
 
 
-def added(total: Floats, change: Floats, lost: Floats) -> tuple[Floats, Floats]:
-    """Return a sum, and what its rounding has lost, from what the sums before have lost."""
-    change = change - lost
-    found = total + change
-    return found, (found - total) - change
-
-
 def stages(force: Force, u: Floats, v: Floats, t: Floats, h: Floats, a: Floats) -> Floats:
-    """Return the accelerations at the stages, shape (coordinate, stage, case), from a guess; NaN for no end."""
-    of, both = tableau(), np.concatenate([tableau().first, tableau().second])
+    """Return the accelerations at the stages, shape (coordinate, stage, case), from a guess; NaN for no end.
+
+    ``t`` are the times of the stages, shape (stage, case).
+    """
+    both = _coefficients()[0]
     going, before = np.ones(len(h), dtype=bool), np.full(len(h), np.inf)
-    straight = u[:, None] + of.c[:, None] * h * v[:, None]
+    straight = u[:, None] + nodes()[0][:, None] * h * v[:, None]
     for _ in range(ITERATIONS):
         once, twice = np.split(summed(both, a), 2, axis=1)
         y = v[:, None] + h * once
@@ -111,3 +97,137 @@ def stages(force: Force, u: Floats, v: Floats, t: Floats, h: Floats, a: Floats) 
         if not (going & np.isfinite(change)).any():
             break
     return np.where(going, np.nan, a)
+
+
+def ahead(a: Floats) -> Floats:
+    """Return a guess of the accelerations at the stages of an equal step behind this one."""
+    return summed(_coefficients()[2], a)
+
+
+def advanced(
+    u: Floats, v: Floats, h: Floats, a: Floats, lost: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Return positions and velocities at the end of a step, and what the rounding of their sums has lost so far."""
+    first, second = _coefficients()[1]
+    u, lost_u = added(u, h * v + h * h * summed(second, a)[:, 0], lost[0])
+    v, lost_v = added(v, h * summed(first, a)[:, 0], lost[1])
+    return u, v, np.stack([lost_u, lost_v])
+
+
+def added(total: Floats, change: Floats, lost: Floats) -> tuple[Floats, Floats]:
+    """Return a sum, and what its rounding has lost, from what the sums before have lost."""
+    change = change - lost
+    found = total + change
+    return found, (found - total) - change
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A solution by equal steps: states at their starts, and accelerations at the stages."""
+
+    end: Floats
+    position: Floats
+    """Shape (step, coordinate, case)."""
+    velocity: Floats
+    acceleration: Floats
+    """Shape (step, coordinate, stage, case)."""
+
+    @property
+    def length(self) -> Floats:
+        """Lengths of the steps, shape (step, case)."""
+        return np.repeat(self.end[None] / len(self.position), len(self.position), axis=0)
+
+    @property
+    def begin(self) -> Floats:
+        """Times at which they begin."""
+        return self.length * np.arange(len(self.position))[:, None]
+
+    def at(self, fraction: Floats) -> Floats:
+        """Return all positions and then all velocities at fractions of the end time, shape (state, case, time)."""
+        steps = len(self.position)
+        place = fraction * steps
+        step = np.minimum(place.astype(np.int64), steps - 1)
+        first, second = integrals(place - step)
+        h = self.end / steps
+        u = self.position[step] + h * (place - step)[:, None, None] * self.velocity[step]
+        v = self.velocity[step].copy()
+        for j in range(STAGES):
+            a = self.acceleration[step, :, j]
+            v += h * (first[:, j, None, None] * a)
+            u += h * h * (second[:, j, None, None] * a)
+        return np.moveaxis(np.concatenate([u, v], axis=1), 0, -1)
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """A solution by steps of different lengths; NaN behind the last one of a member, and for those without an end."""
+
+    end: Floats
+    begin: Floats
+    """Start of every step, shape (step, case)."""
+    length: Floats
+    position: Floats
+    """Shape (step, coordinate, case)."""
+    velocity: Floats
+    acceleration: Floats
+    """Shape (step, coordinate, stage, case)."""
+
+    def at(self, fraction: Floats) -> Floats:
+        """Return all positions and then all velocities at fractions of the end time, shape (state, case, time)."""
+        count = self.position.shape[1]
+        found = np.full((2 * count, len(self.end), len(fraction)), np.nan)
+        for case, end in enumerate(self.end):
+            known = int(np.sum(np.isfinite(self.length[:, case])))
+            # some times at a time
+            for first in range(0, len(fraction) if known else 0, 4096):
+                part = slice(first, first + 4096)
+                found[:, case, part] = self._at(case, fraction[part] * end, known)
+        return found
+
+    def _at(self, case: int, t: Floats, known: int) -> Floats:
+        begin = self.begin[:known, case]
+        step = np.maximum(np.searchsorted(begin, t, side="right") - 1, 0)
+        h = self.length[step, case]
+        x = (t - begin[step]) / h
+        once, twice = integrals(x)
+        v = self.velocity[step, :, case].T
+        u = self.position[step, :, case].T + h * x * v
+        for j in range(STAGES):
+            a = self.acceleration[step, :, j, case].T
+            v = v + h * (once[:, j] * a)
+            u = u + h * h * (twice[:, j] * a)
+        return np.concatenate([u, v])
+
+
+Solution = TypeVar("Solution", bound=Solved | Pieces)
+
+
+def of_members(solution: Solution, members: Any) -> Solution:
+    """Return the solutions of some members."""
+    arrays = {row.name: getattr(solution, row.name)[..., members] for row in fields(solution)}
+    return replace(solution, **arrays)
+
+
+def solve(force: Force, start: Floats, end: Floats, steps: int) -> Solved:
+    """Take equal steps to the end time of each member; NaN from where the iteration does not end.
+
+    Parameters
+    ----------
+    start
+        All positions and then all velocities at t = 0, shape (state, case).
+    end
+        End times, shape (case,).
+    """
+    h = end / steps
+    u, v = np.array(np.split(start, 2))
+    lost = np.zeros((2, *u.shape))
+    inner = (len(u), STAGES, len(end))
+    position, velocity = np.empty((2, steps, *u.shape))
+    kept = Solved(end, position, velocity, np.empty((steps, *inner)))
+    a = np.broadcast_to(force(u[:, None], v[:, None], 0.0 * end), inner)
+    for n in range(steps):
+        a = stages(force, u, v, (n + nodes()[0][:, None]) * h, h, a)
+        kept.position[n], kept.velocity[n], kept.acceleration[n] = u, v, a
+        u, v, lost = advanced(u, v, h, a, lost)
+        a = ahead(a)
+    return kept

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
-from typing import Any
+from functools import cache, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vibsim.simulation.reference.collocation import Floats, integrals, summed, total
+from vibsim.core.array_types import Flags, Floats, Integers
+from vibsim.simulation.reference.collocation import integrals, summed, total
 from vibsim.simulation.reference.one_sided_forces import Sides
 
-Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 Begin = tuple[Floats, Floats, Floats]
 """Positions and velocities, shape (coordinate, case), and time, shape (case,), where a step begins."""
 
@@ -55,14 +53,14 @@ class Exits:
     """Largest value of each quantity, shape (switch, n)."""
     hidden: Floats
     """Part of the step at which a switch is beyond its mode between two samples that are not; NaN for none, (n,)."""
-    hidden_switch: Ints
+    hidden_switch: Integers
 
     @property
     def outside(self) -> Floats:
         """Return how far each quantity is beyond its mode behind the start, shape (switch, sample, n)."""
         return _outside(self.quantity[:, 1 : LAST + 1], self.low[:, None], self.high[:, None])
 
-    def leaves(self, aim: Ints) -> Flags:
+    def leaves(self, aim: Integers) -> Flags:
         """Tell whether a switch leaves its mode; that of `aim` may at the very end, where it is meant to."""
         is_out = self.outside > 0.0
         meant = np.flatnonzero(aim >= 0)
@@ -70,8 +68,8 @@ class Exits:
         return np.asarray(is_out.any(axis=(0, 1)) | np.isfinite(self.hidden))
 
     def roots(
-        self, sides: Sides, modes: Floats, begin: Begin, h: Floats, a: Floats, which: Ints
-    ) -> tuple[Ints, Floats, Floats]:
+        self, sides: Sides, modes: Floats, begin: Begin, h: Floats, a: Floats, which: Integers
+    ) -> tuple[Integers, Floats, Floats]:
         """Return which switch leaves first, through which value, and after which part of the step.
 
         Parameters
@@ -87,7 +85,7 @@ class Exits:
         own = np.arange(len(which))
 
         def beyond(x: Floats) -> tuple[Floats, Floats]:
-            u, v, t = at(begin, h, a, x)
+            u, v, t = _at(begin, h, a, x)
             q = sides.quantities(modes, u, v, t)[switch, own]
             return _outside(q, low[switch, own], high[switch, own]), q
 
@@ -95,7 +93,7 @@ class Exits:
         above = beyond(right)[1] >= high[switch, own]
         return switch, np.where(above, high[switch, own], low[switch, own]), x
 
-    def _brackets(self, outside: Floats, which: Ints) -> tuple[Ints, Floats, Floats]:
+    def _brackets(self, outside: Floats, which: Integers) -> tuple[Integers, Floats, Floats]:
         """Return the first switch, and parts of the step before and behind its exit, each of shape (n',)."""
         is_out = (outside > 0.0).any(axis=0)
         seen = is_out.any(axis=0)
@@ -136,12 +134,11 @@ def find_exits(
     along = u[:, None] + h * x * v[:, None] + h * h * twice
     q = sides.quantities(modes, along, v[:, None] + h * once, t + h * x)
     side = np.where(q[:, 1] > edge, edge, np.where(q[:, 1] < edge, edge - 1.0, modes))
-    whole = sides.whole[:, None]
-    low = np.where(whole, modes, np.where(modes < 0.0, -np.inf, 0.0))
-    high = np.where(whole, modes + 1.0, np.where(modes < 0.0, 0.0, np.inf))
+    borders = sides.borders(modes)
     size = np.max(np.abs(np.nan_to_num(q[:, : LAST + 1])), axis=1)
-    hidden, hidden_switch = _hidden(sides, modes, (low, high), q, begin, h, a)
-    return Exits(q, low, high, side != modes, side, size, hidden, hidden_switch)
+    return Exits(
+        q, *borders, side != modes, side, size, *_hidden(sides, modes, borders, q, (begin, h, a))
+    )
 
 
 @cache
@@ -154,7 +151,7 @@ def _outside(q: Floats, low: Floats, high: Floats) -> Floats:
     return np.maximum(low - q, q - high)
 
 
-def overshoot(found: Exits, aim: Ints, goal: Floats) -> Floats:
+def overshoot(found: Exits, aim: Integers, goal: Floats) -> Floats:
     """Return by which part of a step its end is behind the place where a switch has the value `goal`; NaN for none."""
     own = np.arange(len(aim))
     q = found.quantity[np.maximum(aim, 0), :, own].T
@@ -163,7 +160,7 @@ def overshoot(found: Exits, aim: Ints, goal: Floats) -> Floats:
         return np.where(aim >= 0, (q[LAST] - goal) / slope, np.nan)
 
 
-def at(begin: Begin, h: Floats, a: Floats, x: Floats) -> Begin:
+def _at(begin: Begin, h: Floats, a: Floats, x: Floats) -> Begin:
     """Return the states after a part x of a step, each member with its own, and the times."""
     u, v, t = begin
     once, twice = integrals(x)
@@ -171,7 +168,7 @@ def at(begin: Begin, h: Floats, a: Floats, x: Floats) -> Begin:
     return along, v + h * total(once.T * a, axis=1), t + h * x
 
 
-def _root(function: Any, left: Floats, right: Floats) -> Floats:
+def _root(function: Callable[[Floats], Floats], left: Floats, right: Floats) -> Floats:
     """Return a root between two points, by regula falsi (Illinois); the function is larger on the right."""
     low, high = np.minimum(function(left), 0.0), function(right)
     kept, x, size = np.zeros(len(left)), right, np.abs(high) + np.abs(low)
@@ -195,15 +192,14 @@ def _root(function: Any, left: Floats, right: Floats) -> Floats:
 def _hidden(
     sides: Sides,
     modes: Floats,
-    ends: tuple[Floats, Floats],
+    borders: tuple[Floats, Floats],
     q: Floats,
-    begin: Begin,
-    h: Floats,
-    a: Floats,
-) -> tuple[Floats, Ints]:
+    step: tuple[Begin, Floats, Floats],
+) -> tuple[Floats, Integers]:
     """Return where a switch is beyond its mode between two samples that are not, and which; NaN for none."""
-    found, switch = np.full(len(h), np.nan), np.zeros(len(h), dtype=np.int64)
-    gap = _outside(q[:, EQUAL], ends[0][:, None], ends[1][:, None])
+    cases, ((u, v, t), h, a) = q.shape[-1], step
+    found, switch = np.full(cases, np.nan), np.zeros(cases, dtype=np.int64)
+    gap = _outside(q[:, EQUAL], borders[0][:, None], borders[1][:, None])
     before, here, behind = gap[:, :-2], gap[:, 1:-1], gap[:, 2:]
     bend = 2.0 * here - before - behind
     with np.errstate(all="ignore"):
@@ -215,32 +211,34 @@ def _hidden(
         if np.isfinite(found[n]) and found[n] <= place:
             continue
         one = slice(n, n + 1)
-        alone = sides.of(np.array([n])), modes[:, one]
-        step = (begin[0][:, one], begin[1][:, one], begin[2][one]), h[one], a[..., one]
-        x, value = _peak(alone, k, (ends[0][k, n], ends[1][k, n]), step, place)
-        if value > 0.0:
+        own = (u[:, one], v[:, one], t[one]), h[one], a[..., one]
+        ends = borders[0][k, n], borders[1][k, n]
+        beyond = partial(_beyond, sides.of(np.array([n])), modes[:, one], k, ends, own)
+        x = _peak(beyond, place)
+        if beyond(x) > 0.0:
             found[n], switch[n] = x, k
     return found, switch
 
 
-def _peak(
-    alone: tuple[Sides, Floats],
+def _beyond(
+    alone: Sides,
+    modes: Floats,
     k: int,
     ends: tuple[float, float],
     step: tuple[Begin, Floats, Floats],
-    place: float,
-) -> tuple[float, float]:
-    """Return where a switch of one member comes nearest to leaving its mode, and how far it is beyond."""
+    x: float,
+) -> float:
+    """Return how far a switch of one member is beyond its mode after a part x of a step."""
+    q = float(alone.quantity(k, modes, *_at(*step, np.array([x])))[0])
+    return max(ends[0] - q, q - ends[1])
 
-    def gap(x: float) -> float:
-        u, v, t = at(*step, np.array([x]))
-        q = float(alone[0].quantity(k, alone[1], u, v, t)[0])
-        return max(ends[0] - q, q - ends[1])
 
+def _peak(function: Callable[[float], float], place: float) -> float:
+    """Return where a function is largest near a place, by parabolas."""
     for part in NARROWER:
         d = part / SAMPLES
-        before, here, behind = gap(place - d), gap(place), gap(place + d)
+        before, here, behind = function(place - d), function(place), function(place + d)
         bend = 2.0 * here - before - behind
         if bend > 0.0:
             place += float(np.clip(0.5 * (behind - before) / bend, -1.0, 1.0)) * d
-    return place, gap(place)
+    return place

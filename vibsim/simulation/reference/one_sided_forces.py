@@ -1,5 +1,4 @@
-"""The forces of a model on one side of each of their corners, for the reference
-(`vibsim.simulation.reference.piecewise_collocation`).
+"""The forces of a model on one side of each of their corners, and pulses of a force between the times of a solution.
 
 Formulas are evaluated by numpy with the modes of their switches held (`vibsim.formula.switches`). The points of a
 table are one more switch, whose mode is the number of the point before the present place.
@@ -9,16 +8,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vibsim.formula import Binary, Expression, Number, Switch, held, names_in, values
+from vibsim.core.array_types import Flags, Floats
+from vibsim.formula import (
+    Binary,
+    Expression,
+    Number,
+    Pulses,
+    Switch,
+    held,
+    hidden_pulses,
+    names_in,
+    values,
+)
 from vibsim.models import Model, tree
-from vibsim.models.table import BEND, Lookup
-from vibsim.simulation.reference.collocation import Floats, Force
+from vibsim.models.table import BEND
+from vibsim.simulation.reference.collocation import Force
 
 TABLE = "_mode_of_table"
 """Name of the mode of a table."""
@@ -34,12 +43,12 @@ class Sides:
     switches: tuple[Switch, ...]
     parameters: Mapping[str, Floats]
 
-    @property
-    def whole(self) -> NDArray[np.bool_]:
+    @cached_property
+    def whole(self) -> Flags:
         """Which switches change at every whole number, shape (switch,)."""
         return np.array([switch.whole for switch in self.switches], dtype=bool)
 
-    @property
+    @cached_property
     def timed(self) -> tuple[int, ...]:
         """Which switches look at the time alone; a change of a mode is no motion."""
         moving = {state.name for state in self.model.states} | {BEND}
@@ -49,7 +58,13 @@ class Sides:
             if moving.isdisjoint(names_in(switch.quantity))
         )
 
-    def of(self, members: NDArray[Any]) -> Sides:
+    def borders(self, modes: Floats) -> tuple[Floats, Floats]:
+        """Return the least and the largest value that each switch looks at in its mode, shape (switch, case)."""
+        whole = self.whole[:, None]
+        low = np.where(whole, modes, np.where(modes < 0.0, -np.inf, 0.0))
+        return low, np.where(whole, modes + 1.0, np.where(modes < 0.0, 0.0, np.inf))
+
+    def of(self, members: Any) -> Sides:
         """Return the same of some members."""
         return replace(self, parameters={n: x[members] for n, x in self.parameters.items()})
 
@@ -70,8 +85,7 @@ class Sides:
 
     def quantities(self, modes: Floats, u: Floats, v: Floats, t: Floats) -> Floats:
         """Return what all switches look at, shape (switch, time, case)."""
-        rows = [self.quantity(k, modes, u, v, t) for k in range(len(self.switches))]
-        return np.stack(rows)
+        return np.stack([self.quantity(k, modes, u, v, t) for k in range(len(self.switches))])
 
     def numbers(self, modes: Floats, u: Floats, v: Floats, t: Floats) -> dict[str, Any]:
         """Return what the names in the formulas stand for."""
@@ -91,27 +105,56 @@ class Sides:
 
 @cache
 def _held(model: Model) -> tuple[tuple[Expression, ...], tuple[Switch, ...]]:
+    """Return the accelerations with modes held, and their switches, that of the table of the model first."""
     moving = (*(state.name for state in model.states), "t", BEND)
-    return held((tree(model, formula) for formula in model.accelerations), moving)
-
-
-@cache
-def switches(model: Model) -> tuple[Switch, ...]:
-    """Return the switches of a model's accelerations, that of its table first; none where they are smooth."""
-    found = _held(model)[1]
+    formulas, found = held((tree(model, formula) for formula in model.accelerations), moving)
     if model.lookup is None:
-        return found
-    return (_of_table(model, model.lookup), *found)
-
-
-def _of_table(model: Model, lookup: Lookup) -> Switch:
-    """Return the switch at the points of a table."""
-    place, first = tree(model, lookup.place), lookup.table.first
-    sign = "-" if first >= 0.0 else "+"
-    way = Binary(sign, place, Number(abs(first)))
-    return Switch(Binary("/", way, Number(lookup.table.spacing)), whole=True, mode=TABLE)
+        return formulas, found
+    place, table = tree(model, model.lookup.place), model.lookup.table
+    way = Binary("-" if table.first >= 0.0 else "+", place, Number(abs(table.first)))
+    number = Binary("/", way, Number(table.spacing))
+    return formulas, (Switch(number, whole=True, mode=TABLE), *found)
 
 
 def sides(model: Model, parameters: Mapping[str, Floats]) -> Sides:
-    """Return a model with the modes of its switches held."""
-    return Sides(model, _held(model)[0], switches(model), parameters)
+    """Return a model with the modes of its switches held; it has none where its accelerations are smooth."""
+    return Sides(model, *_held(model), parameters)
+
+
+def varies_in_time(model: Model) -> bool:
+    """Tell whether the force of a model depends on time otherwise than by a table."""
+    return any("t" in names_in(tree(model, row)) for row in model.accelerations)
+
+
+def pulses_of_force(
+    model: Model, parameters: Mapping[str, Floats], states: Floats, t: Floats, *, smooth: bool
+) -> Pulses:
+    """Find a pulse of the force of every member in time, between the times at which it is looked at.
+
+    Parameters
+    ----------
+    parameters
+        Of the members, each of shape (case,).
+    states
+        All positions and then all velocities at these times but the last, shape (state, case, gap).
+    t
+        The times, shape (case, gap + 1), ascending; NaN behind the last one of a member.
+    smooth
+        Whether the force has what it has on one side of its jumps and corners, those of each time in the middle.
+    """
+    held = sides(model, {name: x[:, None] for name, x in parameters.items()})
+    u, v = np.split(states, 2)
+    middle = 0.5 * (t[:, :-1] + t[:, 1:])
+    modes = np.zeros((len(held.switches), *middle.shape))
+    for k, is_whole in enumerate(held.whole):
+        # a switch may look at the modes of those before it
+        q = held.quantity(k, modes, u, v, middle)
+        modes[k] = np.floor(q) if is_whole else np.where(q > 0.0, 0.0, -1.0)
+    numbers = held.numbers(modes, u, v, t[:, :-1])
+    del numbers["t"]
+    formulas = held.formulas if smooth else tuple(tree(model, row) for row in model.accelerations)
+    nothing = np.full(len(t), np.nan)
+    found = Pulses(nothing, nothing)
+    for formula in formulas:
+        found = found.and_others(hidden_pulses(formula, numbers, t))
+    return found

@@ -13,41 +13,33 @@ each piece as the one before it, so that the difference of two walks tells the e
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vibsim.core.array_types import Flags, Floats, Integers
 from vibsim.simulation.reference.collocation import (
-    Floats,
+    STAGES,
+    Pieces,
     added,
-    basis,
-    integrals,
+    advanced,
+    ahead,
+    nodes,
     stages,
-    summed,
-    tableau,
 )
 from vibsim.simulation.reference.event_detection import Exits, find_exits, overshoot
 from vibsim.simulation.reference.one_sided_forces import Sides
-from vibsim.simulation.reference.piece_steps import (
-    AT_ONCE,
-    Log,
-    Walk,
-    begin_walk,
-    next_length,
-    of,
-    plan_piece,
-    settle,
-)
-from vibsim.simulation.reference.pieces import Pieces, Plan
-
-Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 MOST_ATTEMPTS = 2**13
 """Steps that are tried, at most, of every member."""
 SHORTEST = 2.0**-20
 """Part of the end time below which no step is tried."""
+AT_ONCE = 1e-13
+"""Part of the end time within which a switch is where the step begins."""
+LINEAR = 1e-9
+"""A quantity is linear in time that is half-way at half the time, to so much of its change."""
+TIED = 1e-12
+"""A switch is at a border to so much of its largest value in the step before."""
 LANDED = 2.0**-50
 """A step ends at a switch to so much of the time."""
 NEARLY = 1e-11
@@ -57,21 +49,73 @@ CLOSE = 0.02
 TRIES, MOST_TRIES = 5, 12
 OPEN, SLIDING, ENDLESS = range(3)
 """Nothing is against an end; a force holds the member at a jump; there are more corners than can be gone through."""
+END, SWITCH, EDGE, STEPS = range(4)
+"""Rows of a plan: when a piece ends, the switch that ends it (-1 for the end of the motion), the value of its quantity
+there, and the number of its steps; shape (row, piece, case)."""
+
+
+@dataclass(frozen=True)
+class Walk:
+    """Where the members are, and the steps so far; arrays of shape (case,) that change as they go on."""
+
+    sides: Sides
+    end: Floats
+    longest: Floats
+    plan: Floats | None
+    t: Floats
+    t_lost: Floats
+    """What the rounding of t has lost."""
+    u: Floats
+    """Shape (coordinate, case)."""
+    v: Floats
+    lost: Floats
+    """What the rounding of u and v has lost, shape (2, coordinate, case)."""
+    modes: Floats
+    """Shape (switch, case)."""
+    edge: Floats
+    """Value at whose border a switch is, NaN elsewhere, shape (switch, case)."""
+    h: Floats
+    """Length of the step that is tried next."""
+    last: Flags
+    """Whether it ends the motion."""
+    aim: Integers
+    """The switch at which it is to end; -1 for none."""
+    goal: Floats
+    """Value of the quantity of that switch there."""
+    guess: Floats
+    """Of the accelerations at its stages, shape (coordinate, stage, case)."""
+    fresh: Flags
+    """Whether there is no guess but the acceleration where it begins."""
+    tries: Integers
+    turns: Integers
+    """Changes of modes since the last step."""
+    taken: Integers
+    """Steps of the piece so far."""
+    planned: Integers
+    """Steps of it that are left in the plan, 0 where there is none."""
+    going: Flags
+    sliding: Flags
+    """Whether a member ended where a force holds it at a jump."""
+    count: Integers
+    """Steps in all."""
+    steps: list[tuple[Any, ...]]
+    ends: list[list[tuple[float, int, float, int]]]
+    """Of every member, a row of the plan for each of its pieces so far."""
 
 
 @dataclass(frozen=True)
 class Step:
     """A step that was tried, of the members `who`."""
 
-    who: Ints
+    who: Integers
     h: Floats
     a: Floats
     exits: Exits
 
 
 def walk_pieces(
-    sides: Sides, start: Floats, end: Floats, longest: Floats, plan: Plan | None
-) -> tuple[Pieces, Plan, Ints]:
+    sides: Sides, start: Floats, end: Floats, longest: Floats, plan: Floats | None
+) -> tuple[Pieces, Floats, Integers]:
     """Go to the end time of each member.
 
     Parameters
@@ -91,32 +135,135 @@ def walk_pieces(
         The solution, NaN for members that do not come to the end; its pieces, without steps for those; and why a
         member did not come to the end: `SLIDING`, `ENDLESS`, or `OPEN` for no reason known, shape (case,).
     """
-    walk = begin_walk(sides, start, end, longest, plan)
-    log = Log([], [[] for _ in end], np.zeros(len(end), dtype=np.int64))
+    walk = _begin(sides, start, end, longest, plan)
     for _ in range(MOST_ATTEMPTS):
         who = np.flatnonzero(walk.going)
         if not len(who):
             break
-        _go_on(walk, log, _try(walk, who))
+        _go_on(walk, _try(walk, who))
     arrived = walk.t >= end * (1.0 - AT_ONCE)
     ends = np.where(walk.going, ENDLESS, np.where(walk.sliding, SLIDING, OPEN))
-    return log.pieces(walk, arrived), log.plan(arrived), ends
+    return _pieces(walk, arrived), _plan(walk, arrived), ends
 
 
-def _try(walk: Walk, who: Ints) -> Step:
+def _begin(sides: Sides, start: Floats, end: Floats, longest: Floats, plan: Floats | None) -> Walk:
+    """Return the members at the start, with their first step."""
+    u, v = np.array(np.split(start, 2))
+    cases, switches = len(end), len(sides.switches)
+    zero, no = np.zeros(cases, dtype=np.int64), np.zeros(cases, dtype=bool)
+    nothing = np.zeros(cases)
+    walk = Walk(
+        sides=sides, end=end, longest=longest, plan=plan, t=nothing.copy(), t_lost=nothing.copy(),
+        u=u, v=v, lost=np.zeros((2, *u.shape)), modes=np.zeros((switches, cases)),
+        edge=np.full((switches, cases), np.nan), h=nothing.copy(), last=no.copy(), aim=zero - 1,
+        goal=nothing.copy(), guess=np.zeros((len(u), STAGES, cases)), fresh=~no, tries=zero.copy(),
+        turns=zero.copy(), taken=zero.copy(), planned=zero.copy(), going=~no, sliding=no.copy(),
+        count=zero.copy(), steps=[], ends=[[] for _ in end],
+    )  # fmt: skip
+    everyone = np.arange(cases)
+    _settle(walk, everyone, np.zeros((switches, cases)), zero - 1)
+    _begin_piece(walk, everyone)
+    return walk
+
+
+def _of(numbers: Floats, who: Integers) -> Floats:
+    """Return the numbers of some members, in the order of memory in which they are computed with."""
+    return np.take(numbers, who, axis=-1)
+
+
+def _settle(walk: Walk, who: Integers, size: Floats, fired: Integers) -> None:
+    """Set the modes of all switches where a piece begins; those at a border keep theirs until the step tells.
+
+    Parameters
+    ----------
+    size
+        Largest value of each quantity in the step before, shape (switch, case).
+    fired
+        The switch whose mode has just changed, -1 for none.
+    """
+    sides, modes, edge = walk.sides.of(who), _of(walk.modes, who), _of(walk.edge, who)
+    u, v, t = _of(walk.u, who), _of(walk.v, who), walk.t[who]
+    for k, is_whole in enumerate(sides.whole):
+        q = np.nan_to_num(sides.quantity(k, modes, u, v, t))
+        border = np.round(q) if is_whole else np.zeros(len(who))
+        free = np.floor(q) if is_whole else np.where(q > 0.0, 0.0, -1.0)
+        tied = np.abs(q - border) <= TIED * size[k]
+        keeps = (modes[k] == border) | (modes[k] == border - 1.0)
+        own = fired == k
+        modes[k] = np.where(own | (tied & keeps), modes[k], np.where(tied, border, free))
+        edge[k] = np.where(own, edge[k], np.where(tied, border, np.nan))
+    walk.modes[:, who], walk.edge[:, who] = modes, edge
+
+
+def _planned(walk: Walk, who: Integers) -> Floats:
+    """Return what the plan says of the present pieces, shape (row, case); no steps where it says nothing."""
+    found = np.zeros((4, len(who)))
+    if walk.plan is not None:
+        piece = np.array([len(walk.ends[case]) for case in who], dtype=np.int64)
+        row = np.minimum(piece, walk.plan.shape[1] - 1)
+        found = walk.plan[:, row, who]
+        found[STEPS] = np.where(piece == row, found[STEPS], 0.0)
+    return found
+
+
+def _begin_piece(walk: Walk, who: Integers) -> None:
+    """Choose the first step of a piece."""
+    walk.taken[who] = 0
+    walk.planned[who] = 2 * _planned(walk, who)[STEPS]
+    walk.fresh[who] = True
+    _choose_length(walk, who)
+
+
+def _choose_length(walk: Walk, who: Integers) -> None:
+    """Choose the length of the next step: of a planned piece, an equal part of what is left of it."""
+    rest = walk.end[who] - walk.t[who]
+    h = np.where(walk.h[who] > 0.0, 2.0 * walk.h[who], np.inf)
+    h = np.minimum(h, walk.longest[who])
+    left, plan = walk.planned[who], _planned(walk, who)
+    way = plan[END] - walk.t[who]
+    ahead = (left > 0) & (way > 0.0)
+    h = np.where(ahead, way / np.maximum(left, 1), h)
+    ends = ahead & (left == 1)
+    walk.aim[who] = np.where(ends, plan[SWITCH], -1)
+    walk.goal[who] = np.where(ends, plan[EDGE], 0.0)
+    walk.tries[who] = walk.turns[who] = 0
+    last = (h >= rest * (1.0 - 1e-6)) & (walk.aim[who] < 0)
+    walk.last[who] = last
+    walk.h[who] = np.where(last, rest, h)
+    _meet_known(walk, who[walk.planned[who] == 0])
+
+
+def _meet_known(walk: Walk, who: Integers) -> None:
+    """Let steps end where a switch that is linear in time will leave its mode: that is known before."""
+    sides, modes, t = walk.sides.of(who), _of(walk.modes, who), walk.t[who]
+    for k in walk.sides.timed if len(who) else ():
+        h = walk.h[who]
+        still = _of(walk.u, who), _of(walk.v, who)
+        q, half, ahead = (sides.quantity(k, modes, *still, t + x * h) for x in (0.0, 0.5, 1.0))
+        rate = ahead - q
+        linear = (np.abs(half - q - 0.5 * rate) <= LINEAR * np.abs(rate)) & (rate != 0.0)
+        low, high = sides.borders(modes)
+        goal = np.where(rate > 0.0, high[k], low[k])
+        x = (goal - q) / rate
+        meets = linear & (x > AT_ONCE) & (x < 1.0)
+        now = who[meets]
+        walk.h[now] = (x * h)[meets]
+        walk.aim[now], walk.goal[now], walk.last[now] = k, goal[meets], False
+
+
+def _try(walk: Walk, who: Integers) -> Step:
     """Take a step of every member in `who`, and look where switches leave their modes."""
-    sides, h, modes = walk.sides.of(who), walk.h[who], of(walk.modes, who)
-    u, v, t = of(walk.u, who), of(walk.v, who), walk.t[who]
+    sides, h, modes = walk.sides.of(who), walk.h[who], _of(walk.modes, who)
+    u, v, t = _of(walk.u, who), _of(walk.v, who), walk.t[who]
     force = sides.force(modes)
-    guess, fresh = of(walk.guess, who), walk.fresh[who]
+    guess, fresh = _of(walk.guess, who), walk.fresh[who]
     if fresh.any():
         guess = np.where(fresh, force(u[:, None], v[:, None], t[None]), guess)
-    a = stages(force, u, v, t + tableau().c[:, None] * h, h, guess)
-    exits = find_exits(sides, modes, of(walk.edge, who), (u, v, t), h, a)
-    return Step(who, h, a, exits)
+    a = stages(force, u, v, t + nodes()[0][:, None] * h, h, guess)
+    return Step(who, h, a, find_exits(sides, modes, _of(walk.edge, who), (u, v, t), h, a))
 
 
-def _go_on(walk: Walk, log: Log, step: Step) -> None:
+def _go_on(walk: Walk, step: Step) -> None:
     """Accept the step of each member, or change what is tried next."""
     who, found = step.who, step.exits
     failed = ~np.isfinite(step.a).all(axis=(0, 1))
@@ -131,10 +278,10 @@ def _go_on(walk: Walk, log: Log, step: Step) -> None:
     _turn(walk, who[turned], found.modes[:, turned])
     _take_aim(walk, step, leaves)
     done = _close_in(walk, step, closes, over)
-    _accept(walk, log, step, passes | done, done)
+    _accept(walk, step, passes | done, done)
 
 
-def _shorten(walk: Walk, who: Ints) -> None:
+def _shorten(walk: Walk, who: Integers) -> None:
     """Halve steps whose equations have no solution; end members whose steps become too short."""
     walk.h[who] *= 0.5
     walk.longest[who] = np.maximum(0.5 * walk.longest[who], SHORTEST * walk.end[who])
@@ -142,7 +289,7 @@ def _shorten(walk: Walk, who: Ints) -> None:
     walk.going[who[walk.h[who] < SHORTEST * walk.end[who]]] = False
 
 
-def _turn(walk: Walk, who: Ints, modes: Floats) -> None:
+def _turn(walk: Walk, who: Integers, modes: Floats) -> None:
     """Give switches at a border the mode into which the motion goes."""
     walk.modes[:, who] = modes
     walk.fresh[who] = True
@@ -157,9 +304,9 @@ def _take_aim(walk: Walk, step: Step, leaves: Flags) -> None:
         return
     which = np.flatnonzero(leaves)
     who = step.who[which]
-    sides, modes = walk.sides.of(who), of(walk.modes, who)
-    begin = of(walk.u, who), of(walk.v, who), walk.t[who]
-    a = of(step.a, which)
+    sides, modes = walk.sides.of(who), _of(walk.modes, who)
+    begin = _of(walk.u, who), _of(walk.v, who), walk.t[who]
+    a = _of(step.a, which)
     switch, edge, x = step.exits.roots(sides, modes, begin, step.h[which], a, which)
     walk.aim[who], walk.goal[who], walk.tries[who] = switch, edge, 0
     walk.last[who], walk.fresh[who], walk.planned[who] = False, True, 0
@@ -167,17 +314,16 @@ def _take_aim(walk: Walk, step: Step, leaves: Flags) -> None:
     walk.h[who] = np.where(at_once, walk.h[who], x * walk.h[who])
     now = who[at_once]
     if len(now):
-        own, border = switch[at_once], edge[at_once]
-        changed = walk.modes[:, now]
-        changed[own, np.arange(len(now))] = _beyond(walk.modes[own, now], border)
-        walk.edge[own, now] = border
+        _cross(walk, now, switch[at_once], edge[at_once])
         walk.aim[now] = -1
-        _turn(walk, now, changed)
+        _turn(walk, now, walk.modes[:, now])
 
 
-def _beyond(mode: Floats, edge: Floats) -> Floats:
-    """Return the mode on the other side of an edge."""
-    return np.where(mode < edge, edge, edge - 1.0)
+def _cross(walk: Walk, who: Integers, switch: Integers, edge: Floats) -> None:
+    """Give one switch of each member the mode on the other side of an edge."""
+    mode = walk.modes[switch, who]
+    walk.modes[switch, who] = np.where(mode < edge, edge, edge - 1.0)
+    walk.edge[switch, who] = edge
 
 
 def _close_in(walk: Walk, step: Step, closes: Flags, over: Floats) -> Flags:
@@ -195,65 +341,75 @@ def _close_in(walk: Walk, step: Step, closes: Flags, over: Floats) -> Flags:
     return closes & landed
 
 
-def _accept(walk: Walk, log: Log, step: Step, taken: Flags, ends: Flags) -> None:
+def _accept(walk: Walk, step: Step, taken: Flags, ends: Flags) -> None:
     """Go on by the steps that were taken; `ends` says which of them end at a switch."""
     if not taken.any():
         return
-    who, h, a = step.who[taken], step.h[taken], of(step.a, np.flatnonzero(taken))
-    log.keep(walk, who, h, a)
-    first, second = _whole()
-    u, v = of(walk.u, who), of(walk.v, who)
-    changes = h * v + h * h * summed(second, a)[:, 0], h * summed(first, a)[:, 0]
-    walk.u[:, who], walk.lost[0][:, who] = added(u, changes[0], walk.lost[0][:, who])
-    walk.v[:, who], walk.lost[1][:, who] = added(v, changes[1], walk.lost[1][:, who])
+    who, h, a = step.who[taken], step.h[taken], _of(step.a, np.flatnonzero(taken))
+    u, v = _of(walk.u, who), _of(walk.v, who)
+    walk.steps.append((who, walk.count[who], walk.t[who], h, u, v, a))
+    walk.count[who] += 1
+    walk.u[:, who], walk.v[:, who], walk.lost[..., who] = advanced(u, v, h, a, _of(walk.lost, who))
     walk.t[who], walk.t_lost[who] = added(walk.t[who], h, walk.t_lost[who])
     walk.taken[who] += 1
     walk.edge[:, who] = np.nan
-    walk.guess[..., who] = summed(_ahead(), a)
+    walk.guess[..., who] = ahead(a)
     walk.fresh[who] = False
-    _finish(walk, log, who[walk.last[who] & ~ends[taken]])
+    _finish(walk, who[walk.last[who] & ~ends[taken]])
     of_piece = ends[taken]
-    _change(walk, log, step, np.flatnonzero(taken)[of_piece])
+    _change(walk, step, np.flatnonzero(taken)[of_piece])
     on = who[~of_piece]
     on = on[walk.going[on]]
     before = walk.h[on]
     walk.planned[on] = np.maximum(walk.planned[on] - 1, 0)
-    next_length(walk, on)
+    _choose_length(walk, on)
     # a guess is for a step of the same length
     walk.fresh[on] |= np.abs(walk.h[on] - before) > 1e-6 * before
 
 
-@cache
-def _ahead() -> Floats:
-    """Return the coefficients by which the stages of a step tell those of an equal one behind it."""
-    return basis(1.0 + tableau().c)
-
-
-@cache
-def _whole() -> tuple[Floats, Floats]:
-    return integrals(np.ones(1))
-
-
-def _finish(walk: Walk, log: Log, who: Ints) -> None:
+def _finish(walk: Walk, who: Integers) -> None:
     walk.t[who] = walk.end[who]
     walk.going[who] = False
     for case in who:
-        log.ends[case].append((walk.end[case], -1, 0.0, int(walk.taken[case])))
+        walk.ends[case].append((walk.end[case], -1, 0.0, int(walk.taken[case])))
 
 
-def _change(walk: Walk, log: Log, step: Step, which: Ints) -> None:
+def _change(walk: Walk, step: Step, which: Integers) -> None:
     """Change the modes of switches at which steps have ended, and begin new pieces."""
     if not len(which):
         return
     who = step.who[which]
     own, edge = walk.aim[who], walk.goal[who]
     for case, switch, border in zip(who, own, edge, strict=True):
-        row = (float(walk.t[case]), int(switch), float(border), int(walk.taken[case]))
-        log.ends[case].append(row)
-    walk.modes[own, who] = _beyond(walk.modes[own, who], edge)
-    walk.edge[own, who] = edge
-    settle(walk, who, step.exits.size[:, which], own)
-    walk.piece[who] += 1
+        walk.ends[case].append((walk.t[case], switch, border, walk.taken[case]))
+    _cross(walk, who, own, edge)
+    _settle(walk, who, step.exits.size[:, which], own)
     over = walk.t[who] >= walk.end[who] * (1.0 - AT_ONCE)
-    _finish(walk, log, who[over])
-    plan_piece(walk, who[~over])
+    _finish(walk, who[over])
+    _begin_piece(walk, who[~over])
+
+
+def _pieces(walk: Walk, arrived: Flags) -> Pieces:
+    """Return the solution, of the members that arrived."""
+    count, cases = walk.u.shape
+    most = int(walk.count.max(initial=0))
+    begin, length = np.full((2, most, cases), np.nan)
+    position, velocity = np.full((2, most, count, cases), np.nan)
+    inner = np.full((most, count, STAGES, cases), np.nan)
+    for who, row, t, h, u, v, a in walk.steps:
+        begin[row, who], length[row, who] = t, h
+        position[row, :, who], velocity[row, :, who] = u.T, v.T
+        inner[row, :, :, who] = np.moveaxis(a, -1, 0)
+    length[:, ~arrived] = np.nan
+    return Pieces(walk.end, begin, length, position, velocity, inner)
+
+
+def _plan(walk: Walk, arrived: Flags) -> Floats:
+    """Return the pieces, without steps for members that did not arrive."""
+    known = [rows if is_there else [] for rows, is_there in zip(walk.ends, arrived, strict=True)]
+    plan = np.zeros((4, max((len(rows) for rows in known), default=0) or 1, len(known)))
+    plan[SWITCH] = -1.0
+    for case, rows in enumerate(known):
+        if rows:
+            plan[:, : len(rows), case] = np.transpose(rows)
+    return plan

@@ -1,31 +1,42 @@
 r"""A reference solution to about twelve digits, of models whose exact solution is not known.
 
 Collocation (`vibsim.simulation.reference.collocation`), and the step halved until two solutions agree. Smooth forces
-take equal steps (`vibsim.simulation.reference.smooth_collocation`); forces with corners or jumps are smooth from one to
-the next, and each of these pieces has equal steps of its own (`vibsim.simulation.reference.piecewise_collocation`). It
-shares no arithmetic with the schemes and their kernels: formulas are evaluated by numpy. What is left between the last
-two solutions bounds the error of the last one.
+take equal steps; forces with corners or jumps are smooth from one to the next, and each of these pieces has equal steps
+of its own (`vibsim.simulation.reference.piecewise_collocation`). It shares no arithmetic with the schemes and their
+kernels: formulas are evaluated by numpy. What is left between the last two solutions bounds the error of the last one.
+
+The jobs of an experiment's levels do not compute the same reference again: an entry of the private cache is named by
+the digest of all that its numbers depend on. One that is damaged, or no entry at all, is computed again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import hashlib
+import io
+import platform
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from functools import lru_cache
+from functools import cache, lru_cache
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.models import Model
+from vibsim.core import private_cache
+from vibsim.core.array_types import Flags, Floats, Integers
+from vibsim.models import Model, tree
+from vibsim.plan.code_digest import of_folder
+from vibsim.plan.versions import versions
 from vibsim.simulation.members import Members
-from vibsim.simulation.reference.collocation import Floats
-from vibsim.simulation.reference.missed_pulses import pulses_of_force, varies_in_time
-from vibsim.simulation.reference.one_sided_forces import Sides, sides
-from vibsim.simulation.reference.pieces import Pieces, Plan, planned
+from vibsim.simulation.reference.collocation import Pieces, Solved, of_members, solve
+from vibsim.simulation.reference.one_sided_forces import (
+    Sides,
+    pulses_of_force,
+    sides,
+    varies_in_time,
+)
 from vibsim.simulation.reference.piecewise_collocation import ENDLESS, SLIDING, walk_pieces
-from vibsim.simulation.reference.reference_cache import digest_of, kept
-from vibsim.simulation.reference.smooth_collocation import Solved, solve
 
 METHOD = "collocation at 12 Gauss points of a step, halved until two solutions agree"
 PIECEWISE = f"{METHOD}; a step ends at every corner of the force"
@@ -46,14 +57,14 @@ LOOKS = 8
 ROUND_OFF = 16.0 * 2.0**-52
 """Relative bound of the rounding errors, beside one that grows with the root of the number of steps."""
 
-Solution = Solved | Pieces
+Arrays = Mapping[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
 class Chosen:
     """The solutions that were accepted."""
 
-    parts: tuple[tuple[NDArray[np.int64], Solution], ...]
+    parts: tuple[tuple[Integers, Solved | Pieces], ...]
     """Each with its members."""
     bounds: Floats
     """Bounds of the errors, NaN where there is no solution, shape (state, case)."""
@@ -73,8 +84,8 @@ def reference(
     corners of their force, or that a force holds at a jump.
     """
     names = [state.name for state in model.states]
-    parameters = {row.name: group.parameters[row.key] for row in model.parameters}
-    columns = (*(group.initial[name] for name in names), group.end, *parameters.values())
+    parameters = (group.parameters[row.key] for row in model.parameters)
+    columns = (*(group.initial[name] for name in names), group.end, *parameters)
     numbers = tuple(np.ascontiguousarray(column, dtype=float).tobytes() for column in columns)
     chosen = choose(model, numbers)
     series = np.full((len(names), len(group.end), len(fraction)), np.nan)
@@ -85,7 +96,7 @@ def reference(
 
 @lru_cache(maxsize=8)
 def choose(model: Model, numbers: tuple[bytes, ...]) -> Chosen:
-    """Return the solutions that are accepted, computed now or before (`vibsim.simulation.reference.reference_cache`).
+    """Return the solutions that are accepted, computed now or before.
 
     Parameters
     ----------
@@ -94,23 +105,66 @@ def choose(model: Model, numbers: tuple[bytes, ...]) -> Chosen:
     """
     arrays = kept(digest_of(model, numbers), lambda: _arrays(computed(model, numbers)))
     count = sum(name.startswith("members_") for name in arrays)
-    parts = tuple((arrays[f"members_{i}"], _solution(arrays, i)) for i in range(count))
-    return Chosen(parts, arrays["bounds"])
+    parts = []
+    for i in range(count):
+        kind = Pieces if f"begin_{i}" in arrays else Solved
+        solved = kind(**{field.name: arrays[f"{field.name}_{i}"] for field in fields(kind)})
+        parts.append((arrays[f"members_{i}"], solved))
+    return Chosen(tuple(parts), arrays["bounds"])
 
 
-def _arrays(chosen: Chosen) -> dict[str, NDArray[Any]]:
+def _arrays(chosen: Chosen) -> Arrays:
     """Return the arrays of solutions by names."""
     found: dict[str, NDArray[Any]] = {"bounds": chosen.bounds}
     for i, (members, solved) in enumerate(chosen.parts):
         found[f"members_{i}"] = members
-        for field in fields(solved):
-            found[f"{field.name}_{i}"] = getattr(solved, field.name)
+        found |= {f"{row.name}_{i}": getattr(solved, row.name) for row in fields(solved)}
     return found
 
 
-def _solution(arrays: Mapping[str, NDArray[Any]], index: int) -> Solution:
-    kind = Pieces if f"begin_{index}" in arrays else Solved
-    return kind(**{field.name: arrays[f"{field.name}_{index}"] for field in fields(kind)})
+def kept(digest: str, compute: Callable[[], Arrays]) -> Arrays:
+    """Return the arrays of an entry of the cache: those on disk, or what `compute` returns, which is kept."""
+
+    def dump(arrays: Arrays) -> bytes | None:
+        # arrays that are not kept need no copy either
+        if sum(array.nbytes for array in arrays.values()) > private_cache.MOST_OF_ENTRY:
+            return None
+        buffer = io.BytesIO()
+        np.savez(buffer, allow_pickle=False, **arrays)
+        return buffer.getvalue()
+
+    def load(content: bytes) -> Arrays:
+        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+            return dict(arrays)
+
+    return private_cache.kept("references", digest, compute, dump, load)
+
+
+def digest_of(model: Model, numbers: tuple[bytes, ...]) -> str:
+    """Return the digest of all that a reference depends on, with `numbers` as for `choose`."""
+    names = [row.name for row in model.states], [row.name for row in model.parameters]
+    formulas = [tree(model, row) for row in model.accelerations]
+    parts = [*_surroundings(), *numbers]
+    if model.lookup is not None:
+        formulas.append(tree(model, model.lookup.place))
+        parts.append(model.lookup.table.digest.encode())
+    parts.append(repr((names, formulas)).encode())
+    digest = hashlib.sha256()
+    for part in parts:
+        digest.update(len(part).to_bytes(8, "little"))
+        digest.update(part)
+    return digest.hexdigest()
+
+
+@cache
+def _surroundings() -> tuple[bytes, ...]:
+    """Return the code that computes references, the libraries, and what the processor can do."""
+    # numpy chooses its functions by the processor
+    features = import_module("numpy._core._multiarray_umath").__cpu_features__
+    able = sorted(name for name, has in features.items() if has)
+    libraries = sorted(versions(("numpy", "scipy")).items())
+    code = "".join(of_folder(f"vibsim.{room}") for room in ("formula", "models", "simulation"))
+    return code.encode(), repr((libraries, platform.machine(), able)).encode()
 
 
 def computed(model: Model, numbers: tuple[bytes, ...]) -> Chosen:
@@ -131,10 +185,10 @@ class _Refined:
     held: Sides
     start: Floats
     end: Floats
-    plan: Plan | None = None
-    slid: NDArray[np.bool_] | None = None
+    plan: Floats | None = None
+    slid: Flags | None = None
 
-    def next(self, steps: int) -> tuple[Solution, NDArray[np.bool_]]:
+    def next(self, steps: int) -> tuple[Solved | Pieces, Flags]:
         """Return the next solution, and for which members no further one is of use."""
         none = np.zeros(len(self.end), dtype=bool)
         if not self.held.switches:
@@ -147,29 +201,32 @@ class _Refined:
         # what seems to slide in steps that are too long does so once
         return found, (why == ENDLESS) | (none if before is None else self.slid & before)
 
-    def missed(self, solved: Solution, members: NDArray[np.bool_]) -> Floats:
+    def missed(self, found: Solved | Pieces, members: Flags) -> Floats:
         """Return how long a pulse of the force in time lasts that the steps of some members miss, shape (case,).
 
         Two solutions may agree without it. 0 where there is none, and for other members.
         """
-        model, found = self.held.model, np.zeros(len(members))
+        model, missed = self.held.model, np.zeros(len(members))
         if not (members.any() and varies_in_time(model)):
-            return found
-        states, begin, length = solved.of(members).steps()
-        fraction = np.arange(LOOKS) / LOOKS
-        t = (begin[..., None] + length[..., None] * fraction).reshape(len(begin), -1)
+            return missed
+        solved = of_members(found, members)
+        begin, length = solved.begin.T, solved.length.T
+        t = (begin[..., None] + length[..., None] * (np.arange(LOOKS) / LOOKS)).reshape(
+            len(begin), -1
+        )
         t = np.append(t, np.full((len(t), 1), np.nan), axis=1)
         parameters = {name: x[members] for name, x in self.held.parameters.items()}
+        states = np.moveaxis(np.concatenate([solved.position, solved.velocity], axis=1), 0, -1)
         states = np.repeat(states, LOOKS, axis=-1)
         pulses = pulses_of_force(model, parameters, states, t, smooth=True)
-        found[members] = np.nan_to_num(pulses.width)
-        return found
+        missed[members] = np.nan_to_num(pulses.width)
+        return missed
 
-    def keep(self, members: NDArray[np.bool_]) -> None:
+    def keep(self, members: Flags) -> None:
         """Go on with some members."""
         self.held, self.start = self.held.of(members), self.start[:, members]
         self.end = self.end[members]
-        self.plan = planned(self.plan, members) if self.plan else None
+        self.plan = None if self.plan is None else self.plan[..., members]
         self.slid = None if self.slid is None else self.slid[members]
 
 
@@ -179,9 +236,8 @@ def _accepted(refined: _Refined) -> Chosen:
     times = np.arange(COMPARED + 1) / COMPARED
     left, accepted = np.arange(len(refined.end)), []
     before, gap, slow = None, np.full(len(left), np.inf), np.zeros(len(left), dtype=np.int64)
-    for steps in _doubled():
-        if not len(left):
-            break
+    steps = FEWEST
+    while steps <= MOST and len(left):
         solved, hopeless = refined.next(steps)
         now, goes_on = solved.at(times), ~hopeless
         if before is not None:
@@ -190,7 +246,8 @@ def _accepted(refined: _Refined) -> Chosen:
             relative = np.max(error / np.where(size > 0.0, size, 1.0), axis=0)
             gain = gap / relative
             slow = np.where((gain < SLOW) & (relative < RESOLVED), slow + 1, 0)
-            rounding = ROUND_OFF * (1.0 + 0.25 * _most_steps(solved, steps) ** 0.5)
+            own_steps = np.sum(np.isfinite(solved.length), axis=0, dtype=float)
+            rounding = ROUND_OFF * (1.0 + 0.25 * own_steps**0.5)
             settled = relative <= np.maximum(rounding, SETTLED)
             is_there = settled | ((relative <= ACCURATE) & (gain < SLOW))
             missed = refined.missed(solved, is_there)
@@ -198,24 +255,11 @@ def _accepted(refined: _Refined) -> Chosen:
             # no steps will be short enough
             goes_on &= ~((missed > 0.0) & (missed * MOST < refined.end))
             if is_there.any():
-                accepted.append((left[is_there], solved.of(is_there)))
+                accepted.append((left[is_there], of_members(solved, is_there)))
                 bounds[:, left[is_there]] = (error + rounding * size)[:, is_there]
             goes_on &= ~is_there & (slow < 2)
             gap = relative
         refined.keep(goes_on)
         before, left, gap, slow = now[:, goes_on], left[goes_on], gap[goes_on], slow[goes_on]
-    return Chosen(tuple(accepted), bounds)
-
-
-def _doubled() -> Iterator[int]:
-    steps = FEWEST
-    while steps <= MOST:
-        yield steps
         steps *= 2
-
-
-def _most_steps(solved: Solution, steps: int) -> Floats | float:
-    """Return the number of steps, of each member where they have their own."""
-    if isinstance(solved, Solved):
-        return float(steps)
-    return np.asarray(np.sum(np.isfinite(solved.length), axis=0), dtype=float)
+    return Chosen(tuple(accepted), bounds)

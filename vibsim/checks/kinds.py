@@ -1,0 +1,56 @@
+"""What is done with every kind of check: what it measures, how that is judged, and how it is put into words."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from vibsim.checks import energy, equal, order, order_text, stable, value
+from vibsim.checks.fields import Field, variables
+from vibsim.checks.outcome import Outcome
+from vibsim.checks.sentences import Description
+from vibsim.core.record import Variable
+from vibsim.observe.member_block import MemberBlock
+
+if TYPE_CHECKING:
+    from vibsim.comparison.quantity_comparison import Comparison
+    from vibsim.experiment import Experiment
+
+
+class Kind(NamedTuple):
+    """A kind of check that measures something."""
+
+    fields: Mapping[str, Field]
+    """What is stored of it."""
+    measure: Callable[..., Mapping[str, Any]]
+    """Takes a block of members, the compared quantities and the check; returns the values of the fields."""
+    judge: Callable[..., Outcome]
+    """Takes the experiment, the convergence Record, the check and its id."""
+    describe: Callable[..., Description]
+    """Takes a `Found` and the check."""
+
+
+KINDS: Mapping[str, Kind] = {
+    "converges": Kind(order.FIELDS, order.measure, order.judge, order_text.describe),
+    "value": Kind(value.FIELDS, value.measure, value.judge, value.describe),
+    "stable": Kind(stable.FIELDS, stable.measure, stable.judge, stable.describe),
+    "conserves": Kind(energy.FIELDS, energy.measure, energy.judge, energy.describe),
+    "equal": Kind(equal.FIELDS, equal.measure, equal.judge, equal.describe),
+}
+
+
+def check_variables(block: MemberBlock, compared: Mapping[str, Comparison]) -> dict[str, Variable]:
+    """Return what every check of an experiment measured, and what its figure needs beside that."""
+    table: dict[str, Variable] = {}
+    for check in block.experiment.checks:
+        kind = KINDS[check.measured.kind]
+        found = kind.measure(block, compared, check.measured)
+        table |= variables(check.id, kind.fields, found, block.lean)
+    return table
+
+
+def definition(experiment: Experiment) -> str:
+    """Return what the checks measure, as text: a verdict belongs to the checks that were measured."""
+    rows = [check.measured.model_dump(mode="json") for check in experiment.checks]
+    return json.dumps(rows, sort_keys=True)

@@ -1,0 +1,237 @@
+r"""The check ``converges``: what it measures of the order of convergence, and whether that is as expected.
+
+What would settle a verdict that is open: how many finer levels, or which levels and which arithmetic.
+
+**Too coarse.** With ``d_k = a h^p + b h^q`` the local orders approach the order p of the scheme, or the expected one
+where they are nearer to that, like ``p_k - p = C r^k``, ``r = 2^-(q-p)`` per level. So the last order and the factor r,
+as it was seen or as the powers of the scheme give it, say at which level the order is within the tolerance; one more
+confirms it. An order far above p is that of levels which have nothing to do with the solution, and tells nothing.
+
+**Round-off.** Differences fall like h^p from the finest clean one on, the predicted round-off of an arithmetic grows
+with the number of steps. An order can be read from three levels as long as the finer of their two differences is
+`ORDER_ABOVE_ROUND_OFF` times the round-off of its levels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vibsim.apriori.formal_orders import columns_of, even_powers, formal_orders, relative_floors
+from vibsim.checks.fields import REASON, STATUS, Field, facts, measured
+from vibsim.checks.outcome import (
+    FAIL,
+    INCONCLUSIVE,
+    PASS,
+    PRE_ASYMPTOTIC,
+    ROUND_OFF,
+    Outcome,
+    outcome_of,
+)
+from vibsim.comparison.order_causes import CAUSES, causes
+from vibsim.comparison.order_evidence import evidence, judge_check, judgement, order_of
+from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.convergence.differences import largest, safe_ratio
+from vibsim.convergence.thresholds import (
+    HALF_SPACING,
+    LEAST_CANDIDATE,
+    MOST_ABOVE,
+    ORDER_ABOVE_ROUND_OFF,
+    ORDINARY_ORDER,
+)
+from vibsim.convergence.verdict import Judgement
+from vibsim.core.array_types import Codes, Floats
+from vibsim.core.record import Record, Variable, attributes
+from vibsim.core.vocabulary import REASON_NAMES, STATUSES, TYPICAL_NORM
+from vibsim.models.shared.phase_amplitude_names import AMPLITUDE, PHASE
+from vibsim.observe.member_block import MemberBlock
+
+if TYPE_CHECKING:
+    from vibsim.experiment import Experiment
+    from vibsim.experiment.schema.checks import ConvergesCheck
+
+FIELDS = {
+    "status": STATUS,
+    "reason": REASON,
+    "order": Field("observed order"),
+    "order_low": Field("lower end of the interval of the order"),
+    "order_high": Field("upper end of the interval of the order"),
+    "levels": Field(
+        "first and last level that the order rests on, -1 for none",
+        np.int16,
+        none=-1,
+        dims=("scheme", "case", "end"),
+    ),
+    "failed_level": Field("coarsest level that broke down, -1 for none", np.int16, none=-1),
+    "levels_needed": Field("finer levels that are probably needed, -1 unknown", np.int8, none=-1),
+    "readable_level": Field(
+        "finest level at which the order can be read, -1 unknown", np.int8, none=-1
+    ),
+    "readable_level_compensated": Field("the same in compensated arithmetic", np.int8, none=-1),
+    "cause": Field("why the order is another one, as far as it is known", np.int8, CAUSES),
+}
+EXPECTED = Field("order that is expected; none where the quantity is to be exact")
+
+UNKNOWN = -1
+MOST = 12
+"""More levels than that are no prediction."""
+SLOWEST = 0.9
+"""Orders that approach by a larger factor do not tell where they go."""
+FINEST = 40
+"""No finer level is looked at."""
+
+
+def measure(
+    block: MemberBlock, compared: Mapping[str, Comparison], check: ConvergesCheck
+) -> Mapping[str, Any]:
+    """Return what a check measures, with what would settle a verdict that is open, or explain it."""
+    quantity, norm = compared[check.converges], check.norm
+    judged, order = judge_check(quantity, check), order_of(quantity, check)
+    return {
+        "status": judged.status,
+        "reason": judged.reason,
+        "order": judged.order,
+        "order_low": judged.low,
+        "order_high": judged.high,
+        "levels": np.stack([judged.first, judged.last], axis=-1),
+        "failed_level": judged.culprit,
+        "levels_needed": _more_levels(quantity, judged, order, check.tolerance),
+        "readable_level": _finest_readable(quantity, judged, norm, order),
+        "readable_level_compensated": _finest_readable(
+            quantity, judged, norm, order, "compensated"
+        ),
+        "cause": causes(quantity, compared, judged, norm, order, check.tolerance),
+    }
+
+
+def judge(experiment: Experiment, record: Record, check: ConvergesCheck, id_: str) -> Outcome:
+    """Compare the verdict on a quantity, of every scheme and member, with the expected one."""
+    status, reason = (measured(record, id_, field) for field in ("status", "reason"))
+    order, expect = expected_order(experiment, record, check), check.expect
+    as_expected = status == STATUSES.index(expect.status)
+    if expect.reason is not None:
+        as_expected &= reason == REASON_NAMES.index(expect.reason)
+    open_ = status == INCONCLUSIVE
+    return outcome_of(
+        experiment,
+        record,
+        check,
+        reason,
+        away=np.abs(measured(record, id_, "order") - order),
+        facts={
+            **facts(record, id_, FIELDS),
+            "expected": (EXPECTED, np.broadcast_to(order, status.shape)),
+        },
+        compared=np.where(as_expected, PASS, np.where(open_, INCONCLUSIVE, FAIL)),
+    )
+
+
+def expected_order(experiment: Experiment, record: Record, check: ConvergesCheck) -> Floats:
+    """Return the order that a check expects, shape (scheme, 1 or case)."""
+    if check.order == "scheme":
+        return formal_orders(experiment, check.converges, columns_of(record))
+    return np.full((len(experiment.schemes), 1), float(check.order))
+
+
+def phase_at_start(q: Comparison) -> dict[str, Variable]:
+    """Return the part of a phase error that is there from the first step on; nothing of any other quantity."""
+    if not q.name.endswith(PHASE) or not q.differences:
+        return {}
+    first = judgement(q, TYPICAL_NORM).first
+    levels = np.array(q.block.grid.levels[:-1])
+    # of the coarsest pair that the order rests on: furthest from round-off
+    pair = np.where(first < 0, len(levels) - 1, np.searchsorted(levels, first))
+    share = np.stack([safe_ratio(np.abs(d[..., 0]), largest(d)) for d in q.differences], axis=-1)
+    chosen = np.take_along_axis(share, pair[..., None], axis=-1)[..., 0]
+    attrs = attributes(f"{q.long_name}: what is there from the start over the largest", "1")
+    return {f"{q.name}_at_start": Variable(("scheme", "case"), chosen, attrs)}
+
+
+def is_of_parts(name: str) -> bool:
+    """Tell whether a variable of the convergence Record is one that `phase_amplitude_text` reads."""
+    return name.endswith((f"{PHASE}_order", f"{AMPLITUDE}_order", f"{PHASE}_at_start"))
+
+
+def _more_levels(q: Comparison, judged: Judgement, order: Floats, tolerance: float) -> Codes:
+    """Return how many finer levels a ladder that is too coarse probably needs, shape (scheme, case).
+
+    At least 1; `UNKNOWN` where nothing is known, or the verdict is another one.
+    """
+    shape, orders = judged.reason.shape, judged.orders
+    needed = np.full(shape, UNKNOWN, dtype=np.int8)
+    early = judged.reason == PRE_ASYMPTOTIC
+    if not np.any(early) or not orders.shape[-1]:
+        return needed
+    last, has = orders[..., -1], np.broadcast_to(q.order, shape)
+    with np.errstate(all="ignore"):
+        aim = np.where(np.abs(last - has) < np.abs(last - order), has, order)
+        away = np.abs(orders - aim[..., None])
+        promised = np.where(even_powers(q.block.experiment, q.name, q.block.columns), 0.25, 0.5)
+        seen = away[..., -1] / away[..., -2] if orders.shape[-1] > 1 else promised
+        # what was seen once may be an accident; no power falls faster than the next one
+        factor = np.maximum(seen, promised)
+        steps = np.ceil(np.log(tolerance / away[..., -1]) / np.log(factor)) + 1
+        # an error that falls faster than the powers do is none of them
+        known = early & np.isfinite(steps) & (last <= aim + MOST_ABOVE)
+        # how small the promised power still is, behind a higher one, is not in the orders
+        known &= ~((last > q.order + HALF_SPACING) & (q.special > q.order + HALF_SPACING))
+    known &= (factor <= SLOWEST) & (steps <= MOST)
+    needed[known] = np.maximum(steps[known], 1).astype(np.int8)
+    return needed
+
+
+def _finest_readable(
+    q: Comparison, judged: Judgement, norm: str, order: Floats, arithmetic: str | None = None
+) -> Codes:
+    """Return the finest level at which an order can still be read, in the arithmetic of the schemes or another one.
+
+    `UNKNOWN` where the verdict is not ``round_off``, or no three levels show an order; shape (scheme, case).
+    """
+    found = np.full(judged.reason.shape, UNKNOWN, dtype=np.int8)
+    with np.errstate(invalid="ignore"):
+        p = np.where(judged.order >= LEAST_CANDIDATE, judged.order, order)
+    lost = (judged.reason == ROUND_OFF) & np.isfinite(p)
+    if not np.any(lost):
+        return found
+    size, at = _clean_difference(q, norm, p)
+    noise = _noise(q, norm, arithmetic)
+    with np.errstate(all="ignore"):
+        for level in range(FINEST - 1):
+            left = size * np.exp2(p * (at - level - 1))
+            floor = noise(level + 1) + noise(level + 2)
+            clean = (size > 0.0) & (left >= ORDER_ABOVE_ROUND_OFF * floor)
+            found[lost & clean] = level + 2
+    return found
+
+
+def _clean_difference(q: Comparison, norm: str, p: Floats) -> tuple[Floats, Floats]:
+    """Return the finest difference above round-off, as that of neighbouring levels, and its coarser level.
+
+    Where none is above it, the coarsest difference is taken, which is noise: what can be read is then too much.
+    """
+    levels = np.array(q.block.grid.levels)
+    e = evidence(q, norm, q.order, ORDINARY_ORDER)
+    clean = e.difference >= ORDER_ABOVE_ROUND_OFF * (e.floor[..., :-1] + e.floor[..., 1:])
+    place = np.max(np.where(clean, np.arange(len(levels) - 1), 0), axis=-1)
+    size = np.take_along_axis(e.difference, place[..., None], axis=-1)[..., 0]
+    gap = np.diff(levels)[place]
+    whole = np.where(gap > 1, np.expm1(-p * np.log(2.0)) / np.expm1(-p * gap * np.log(2.0)), 1.0)
+    return size * whole, levels.astype(np.float64)[place]
+
+
+def _noise(q: Comparison, norm: str, arithmetic: str | None) -> Callable[[int], Floats]:
+    """Return what gives the predicted round-off of a level in a norm, shape (scheme, case)."""
+    block, floor = q.block, evidence(q, norm, q.order, ORDINARY_ORDER).floor[..., -1]
+    if block.stored_floor[-1] > 0.0:
+        # what storing leaves is the same at every level, in any arithmetic
+        return lambda level: floor
+    base = floor / block.relative_floor[..., -1]
+
+    def at(level: int) -> Floats:
+        steps = (block.experiment.steps(level),)
+        floors = relative_floors(block.experiment, steps, block.columns, arithmetic)
+        return np.asarray(base * floors[..., 0])
+
+    return at

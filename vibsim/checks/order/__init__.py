@@ -1,1 +1,0 @@
-"""The check ``converges``: the order of convergence that is expected, observed and believed."""

@@ -1,0 +1,237 @@
+"""What is known of the member that decided a convergence verdict, for the sentence and the advice on it."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from vibsim import theory
+from vibsim.apriori.force_discontinuities import is_on_a_point, words_of
+from vibsim.apriori.formal_orders import (
+    columns_of,
+    formal_orders,
+    has_corners,
+    options_of,
+    special_orders,
+    stability_limits,
+)
+from vibsim.apriori.phase_amplitude_orders import is_promised
+from vibsim.checks.order import expected_order
+from vibsim.checks.phase_amplitude_text import parts_in_words
+from vibsim.checks.sentences import Found, cost_in_words
+from vibsim.checks.stable import ALIKE
+from vibsim.comparison.exact_availability import has_exact
+from vibsim.core.array_types import Floats
+from vibsim.core.record import Record
+from vibsim.models.shared.phase_amplitude_names import is_error_part, whole_of
+from vibsim.observe.member_block import fastest
+from vibsim.schemes import SCHEMES
+
+if TYPE_CHECKING:
+    from vibsim.experiment.schema.checks import ConvergesCheck
+
+
+class Corner(NamedTuple):
+    """The first corner of the force that steps feel."""
+
+    words: str
+    """What happens there."""
+    time: float
+    power: float
+    """The highest power of dt that it leaves regular."""
+    on_a_point: bool = False
+    """Whether it is a jump at a grid point, not within a step."""
+
+
+class OrderContext:
+    """What a sentence on a convergence verdict needs to know; numbers are NaN, levels -1 where they are not known."""
+
+    def __init__(self, f: Found, check: ConvergesCheck) -> None:
+        experiment, record, scheme, case = f.experiment, f.record, f.scheme, f.case
+        spec, model, quantity = (
+            experiment.schemes[scheme],
+            experiment.model.definition,
+            check.converges,
+        )
+        columns = columns_of(record)
+
+        def of_member(orders: Floats) -> float:
+            """Return the order of the member, from those of shape (scheme, 1 or case)."""
+            return float(orders[scheme, case if orders.shape[1] > 1 else 0])
+
+        def of_case(name: str) -> float:
+            return float(record[name][case]) if name in record else math.nan
+
+        self.quantity, self.norm, self.tolerance = quantity, check.norm, check.tolerance
+        self.is_position = quantity in model.positions
+        self.notation, self.reason = f.notation, f.reason
+        self.cause = f.word("cause")
+        """Why the order is another one, one of `vibsim.comparison.order_causes.CAUSES`."""
+        order = float(f.fact("order"))
+        self.order = order if math.isfinite(order) else math.nan
+        self.low, self.high = float(f.fact("order_low")), float(f.fact("order_high"))
+        self.first, self.last = f.fact("levels")
+        self.levels = tuple(int(level) for level in record["level"])
+        self.orders = _orders(record, check, scheme, case)
+        """Of successive levels in the norm of the check, the coarsest first."""
+        self.more: int = f.fact("levels_needed")
+        """Finer levels that are probably needed."""
+        self.readable: int = f.fact("readable_level")
+        """Finest level at which an order can be read, ..."""
+        self.compensated: int = f.fact("readable_level_compensated")
+        """... and the same in compensated arithmetic."""
+        self.has_exact = has_exact(record, quantity, scheme, case)
+        self.cost = partial(cost_in_words, experiment)
+        self.parts = parts_in_words(f, quantity)
+
+        self.scheme, self.kind = spec.name, spec.kind
+        self.options = options_of(experiment, columns, scheme, case)
+        self.expected = of_member(expected_order(experiment, record, check))
+        """The order that was expected; infinite where the quantity was to be exact."""
+        self.promised = of_member(formal_orders(experiment, quantity, columns))
+        """The order that the scheme promises, ..."""
+        self.special = of_member(special_orders(experiment, quantity, columns))
+        """... has at most, in a special case of motion, model or options, ..."""
+        self.centred = math.nan
+        """... and would promise with `start: centred`, where it has another start."""
+        if self.options.get("start") == "first_order":
+            centred = {**self.options, "start": "centred"}
+            self.centred = float(
+                SCHEMES[self.kind].formal_order(whole_of(quantity), model, centred)
+            )
+        self.has_promise = not is_error_part(quantity) or is_promised(experiment, quantity)
+        """Whether that is a promise for the quantity; of a part of an error it may be the one for its position."""
+
+        self.culprit: int = f.fact("failed_level")
+        """Level that failed or is beyond the stability limit."""
+        at = self.levels.index(self.culprit) if self.culprit >= 0 else None
+        self.omega_dt = math.nan if at is None else float(fastest(record)[case, at])
+        self.limit = of_member(stability_limits(experiment, columns))
+        """The largest stable w dt of the scheme; infinite for none."""
+        self.growth = self._predicted_growth(), math.nan
+        """Growth factor per period at the culprit, predicted and measured."""
+        if not math.isnan(self.growth[0]) and "measured_growth" in record:
+            self.growth = self.growth[0], float(record["measured_growth"][scheme, case, at])
+        self.growth_of = model.conservative, model.linear, len(model.positions)
+        """Whether the model is conservative, whether it is linear, its number of coordinates."""
+        self.failures = _failures(record, scheme, case)
+
+        self.has_corners = has_corners(model)
+        """Whether steps have corners of a force from a table inside."""
+        self.corner = _corner(f)
+        self.pulse = of_case("pulse_time"), of_case("pulse_width")
+        """Time and length of a pulse of the force that no level sees."""
+        self.decay = (
+            float(record["decay_rate"][scheme, case]) if "decay_rate" in record else math.nan
+        )
+        """The largest rate at which damping takes a velocity away."""
+        dt = np.asarray(record["dt"])[-1]
+        self.shortest = float(dt[case] if dt.ndim else dt)
+
+    def _predicted_growth(self) -> float:
+        scheme = SCHEMES[self.kind]
+        if math.isnan(self.omega_dt) or scheme.adaptive:
+            return math.nan
+        return float(theory.dominant(scheme.stepper(self.options), self.omega_dt)[0])
+
+    @property
+    def what(self) -> str:
+        """The quantity as a sentence has it."""
+        return self.notation.quantity(self.quantity)
+
+    @property
+    def subject(self) -> str:
+        """The quantity as it begins a sentence."""
+        return self.notation.opening(self.what)
+
+    @property
+    def starts_low(self) -> bool:
+        """Whether the first step explains the order."""
+        return self.options.get("start") == "first_order" and 0.5 < self.order < 1.5
+
+    @property
+    def ends_low(self) -> bool:
+        """Whether the formula for the last velocity explains the order, or may."""
+        formula = self.options.get("end_velocity")
+        if self.norm == "linf_interior" or self.is_position:
+            return False
+        return formula == "backward" or (
+            formula == "extrapolate" and self.reason == "pre_asymptotic"
+        )
+
+    @property
+    def promises_less(self) -> bool:
+        """Whether the scheme itself promises a lower order than the check expects."""
+        return math.isfinite(self.promised) and self.promised < self.expected - self.tolerance
+
+    @property
+    def promises_more(self) -> bool:
+        """Whether the scheme itself promises a higher order than the check expects."""
+        return self.promised > self.expected + self.tolerance
+
+    @property
+    def shows_promise(self) -> bool:
+        """Whether the order that was found may be the one that the scheme promises, and not what was expected."""
+        # what has no interval may be any order
+        excluded = (
+            self.promised < self.low - self.tolerance or self.promised > self.high + self.tolerance
+        )
+        return (self.promises_less or self.promises_more) and not excluded
+
+    @property
+    def singular(self) -> float:
+        """Time at which the two finest levels failed alike, so that finer ones will, too; NaN where they did not."""
+        if len(self.failures) < 2:
+            return math.nan
+        before, last = self.failures[-2:]
+        return last if abs(before - last) <= ALIKE * before else math.nan
+
+    @property
+    def is_beyond_limit(self) -> bool:
+        """Whether w dt is beyond the stability limit at the culprit."""
+        return math.isfinite(self.omega_dt) and self.omega_dt > self.limit
+
+    @property
+    def first_stable(self) -> int:
+        """The coarsest level whose w dt is within the limit."""
+        if not self.is_beyond_limit:
+            return self.levels[-1] + 1
+        return self.culprit + math.ceil(math.log2(self.omega_dt / self.limit) - 1e-9)
+
+
+def _orders(record: Record, check: ConvergesCheck, scheme: int, case: int) -> tuple[float, ...]:
+    """Return the orders of successive levels; none where the record does not have them, or the norm."""
+    name, norms = f"{check.converges}_observed_order", record.words("norm")
+    if name not in record or check.norm not in norms:
+        return ()
+    return tuple(record[name][scheme, case, :, norms.index(check.norm)].astype(float).tolist())
+
+
+def _failures(record: Record, scheme: int, case: int) -> tuple[float, ...]:
+    """Return when each level met a number that is not finite, in its first step at 0; NaN where it did not.
+
+    Data of other programs need not say it.
+    """
+    if "failure_time" not in record:
+        return ()
+    times = np.asarray(record["failure_time"], dtype=float)[scheme, case]
+    if "last_step" in record:
+        times = np.where(record["last_step"][scheme, case] > 0, times, 0.0)
+    broken = record["status"][scheme, case] != 0
+    return tuple(np.where(broken, times, np.nan).tolist())
+
+
+def _corner(f: Found) -> Corner | None:
+    record, place = f.record, (f.scheme, f.case)
+    if "corner_switch" not in record or record["corner_switch"][place] < 0:
+        return None
+    time, dt = np.asarray(record["corner_time"])[place], np.asarray(record["dt"])[0]
+    return Corner(
+        words_of(f.experiment.model.definition, int(record["corner_switch"][place])),
+        float(time),
+        float(record["corner_power"][place]),
+        on_a_point=bool(is_on_a_point(time, dt[f.case] if dt.ndim else dt)),
+    )

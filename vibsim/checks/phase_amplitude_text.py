@@ -1,0 +1,68 @@
+"""What the parts of a position's error say of a verdict on the position: which of phase and amplitude is wrong."""
+
+from __future__ import annotations
+
+import math
+
+from vibsim.checks.sentences import Found
+from vibsim.core.vocabulary import TYPICAL_NORM
+from vibsim.models.shared.phase_amplitude_names import AMPLITUDE, PHASE
+
+APART = 0.5
+"""Orders that differ by less are the same."""
+NEAR = 0.125
+"""How near to a whole or half order a stated one must be to be told."""
+FROM_THE_START = 0.5
+"""A shift is there from the start where that of the first step is at least this part of the largest."""
+NAMES = {1.0: "first", 2.0: "second", 3.0: "third", 4.0: "fourth", 5.0: "fifth", 6.0: "sixth"}
+
+
+def parts_in_words(f: Found, quantity: str) -> str:
+    """Say of which order phase and amplitude are where they differ; empty where they do not, or it is not known.
+
+    Of a quantity that is no state nothing is said.
+    """
+    model, record, place = f.experiment.model.definition, f.record, (f.scheme, f.case)
+    known = dict(zip((*model.positions, *model.velocities), model.positions * 2, strict=True))
+    position = known.get(quantity, "")
+    # a large run keeps only the part that a check asks for
+    if any(f"{position}{end}_order" not in record for end in (PHASE, AMPLITUDE)):
+        return ""
+    norm = record.words("norm").index(TYPICAL_NORM)
+    phase, amplitude = (
+        float(record[f"{position}{end}_order"][*place, norm]) for end in (PHASE, AMPLITUDE)
+    )
+    share = float(record[f"{position}{PHASE}_at_start"][place])
+    whose = "" if quantity == position else f" of {f.notation.quantity(position)}"
+    return sentence(phase, amplitude, share, whose)
+
+
+def sentence(phase: float, amplitude: float, share: float, whose: str = "") -> str:
+    """Tell two orders apart, and where the lower one comes from.
+
+    Parameters
+    ----------
+    phase, amplitude
+        Orders; NaN where none is stated.
+    share
+        Part of the phase error that is there from the start.
+    whose
+        Of which position they are, in words; empty where the verdict is on that position.
+    """
+    if not math.isfinite(phase + amplitude) or abs(phase - amplitude) < APART:
+        return ""
+    halves = [round(2 * order) / 2 for order in (phase, amplitude)]
+    if any(
+        abs(order - half) > NEAR or order <= 2 * NEAR
+        for order, half in zip((phase, amplitude), halves, strict=True)
+    ):
+        return ""
+    of_phase, of_amplitude = (
+        f"{NAMES[half]} order" if half in NAMES else f"order {half:g}" for half in halves
+    )
+    both = f" The phase{whose} is of {of_phase}, the amplitude of {of_amplitude}"
+    if amplitude < phase:
+        return f"{both}: it is the amplitude that is wrong."
+    if share >= FROM_THE_START:
+        return f"{both}: the error is a shift in time from the first step on, so the start is of {of_phase}."
+    return f"{both}: the error is a shift in time that grows, so the frequency is of {of_phase}."

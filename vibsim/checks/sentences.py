@@ -1,0 +1,193 @@
+"""What every sentence on a result is made from: its facts, a notation, and common phrases."""
+
+from __future__ import annotations
+
+import math
+import string
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from vibsim.checks.fields import measured, name_of
+from vibsim.core.record import Record
+from vibsim.experiment.cost import load_of
+
+if TYPE_CHECKING:
+    from vibsim.experiment import Experiment
+    from vibsim.experiment.schema.checks import Measurement
+
+NEAR_ONE, ROUND_OFF = 1e-2, 1e-13
+"""A factor that is nearer to 1 is written as 1 and the rest; nearer still, the rest is rounding."""
+LONG = 120.0
+"""Seconds above which times are told in minutes, and sixty times that in hours."""
+
+NOT_FINITE = (
+    "{} means nothing here: the calculation met a number that is not finite.",
+    "Start `levels:` at a finer level, or shorten `time: end`.",
+)
+"""Sentence and advice where the calculation met a number that is not finite."""
+NOTHING_MOVES = "Nothing moves here: {} stays what it was at the start, whatever the scheme does"
+MOVE = "Choose `initial:` values, or a force, with which something moves."
+"""Advice where nothing moves."""
+
+
+class Notation:
+    """The notation of terminals and files: names as an experiment file has them, numbers as Python writes them.
+
+    A page has another one (`vibsim.report.text.words.PAGE`).
+    """
+
+    def quantity(self, name: str) -> str:
+        """Write a quantity."""
+        return name
+
+    def value(self, name: str) -> str:
+        """Write the name of a number that a check can ask for."""
+        return name
+
+    def opening(self, text: str) -> str:
+        """Write the beginning of a sentence."""
+        return text
+
+    def digits(self, text: str) -> str:
+        """Write a number that is given in digits."""
+        return text
+
+    def number(self, value: float, digits: int = 6) -> str:
+        """Write a number with up to so many significant digits."""
+        return self.digits(f"{value:.{digits}g}")
+
+    def factor(self, value: float) -> str:
+        """Write a growth factor: near 1 as ``1 + 3.5e-06``, so that its growth can be read."""
+        rest = value - 1.0
+        if abs(rest) <= ROUND_OFF:
+            return "1"
+        if abs(rest) < NEAR_ONE:
+            return f"1 {'+' if rest > 0 else '-'} {self.number(abs(rest), 3)}"
+        return self.number(value)
+
+
+PLAIN = Notation()
+
+
+class Template(string.Formatter):
+    """Fills templates with attributes of an object: ``{name}``, or ``{name:4}`` with so many digits of a number."""
+
+    def __init__(self, source: object, notation: Notation) -> None:
+        self.source, self.notation = source, notation
+
+    def get_value(self, key: int | str, args: object, kwargs: object) -> Any:
+        """Return an attribute; what is a method is called."""
+        value = getattr(self.source, str(key))
+        return value() if callable(value) else value
+
+    def format_field(self, value: Any, format_spec: str) -> Any:
+        """Write numbers in the notation."""
+        if isinstance(value, float):
+            return self.notation.number(value, int(format_spec or 6))
+        return format(value, format_spec)
+
+
+class Description(NamedTuple):
+    """A result in words."""
+
+    sentence: str
+    """What was measured."""
+    advice: str
+    """What to change in the experiment file; empty where nothing is to be changed."""
+    brief: str = ""
+    """The sentence in a few words; empty where it has no shorter form."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a check measured of one scheme and one member."""
+
+    experiment: Experiment
+    record: Record
+    """Convergence Record."""
+    check: Measurement | None
+    """What was measured; None for the tolerance of the experiment."""
+    id: str
+    scheme: int
+    case: int
+    """Their positions in the Record."""
+    reason: str
+    """The measured one."""
+    notation: Notation = PLAIN
+
+    def fact(self, name: str) -> Any:
+        """Return a field of the check: that of the scheme and the member, or the one for all."""
+        values = np.asarray(measured(self.record, self.id, name))
+        return (values[self.scheme, self.case] if values.ndim else values).tolist()
+
+    def word(self, name: str) -> str:
+        """Return a field that is a position in a list of words as its word."""
+        return self.record.meanings(name_of(self.id, name))[self.fact(name)]
+
+    @property
+    def scheme_name(self) -> str:
+        """Name of the scheme."""
+        return self.experiment.schemes[self.scheme].name
+
+    @cached_property
+    def failed_at(self) -> float:
+        """Time at which the level of the check met a number that is not finite; NaN where it did not."""
+        place = self.scheme, self.case, self.record.place("level", self.fact("level"))
+        failed = self.record["status"][place]
+        return float(self.record["failure_time"][place]) if failed else math.nan
+
+
+def growth_in_words(
+    predicted: float,
+    measured: float,
+    of: tuple[bool, bool, int] = (True, True, 1),
+    notation: Notation = PLAIN,
+) -> str:
+    """Say what growth theory predicts and what was measured; empty where neither is known.
+
+    The theory is of free linear oscillations without damping: of a model with damping or a force in time, and of a
+    nonlinear one, that is said. Of several coordinates it is that of their fastest oscillation.
+
+    Parameters
+    ----------
+    of
+        Whether the model is conservative, whether it is linear, and its number of coordinates.
+    """
+    is_conservative, is_linear, coordinates = of
+    theory = "predicted" if is_linear else "predicted of small oscillations"
+    if coordinates > 1:
+        theory = "predicted of the fastest small oscillations"
+    if not is_conservative:
+        theory = "predicted of free oscillations without damping"
+    told = [
+        f"{notation.factor(value)} {word}"
+        for value, word in ((predicted, theory), (measured, "measured"))
+        if not math.isnan(value)
+    ]
+    return f": growth factor per period {', '.join(told)}" if told else ""
+
+
+def cost_in_words(experiment: Experiment, levels: Sequence[int]) -> str:
+    """Return what levels cost together, as a plan estimates it; the memory is that of the largest job."""
+    loads = [load_of(experiment, level) for level in levels]
+    members = experiment.members
+    steps = sum(load.schemes * load.steps * members for load in loads)
+    memory = max(load.memory(min(members, load.shard)) for load in loads)
+    count = f"{steps}" if steps < 100_000 else f"{steps:.2g}"
+    size = f"{memory / 1e6:.0f} MB" if memory < 1e9 else f"{memory / 1e9:.1f} GB"
+    time = _time(sum(load.seconds(members) for load in loads))
+    return f"{count} steps, {time} of one core, {size} of memory"
+
+
+def _time(seconds: float) -> str:
+    if seconds < 0.1:
+        return "less than 0.1 s"
+    if seconds < LONG:
+        return f"{seconds:.2g} s"
+    if seconds < LONG * 60:
+        return f"{seconds / 60:.0f} min"
+    return f"{seconds / 3600:.0f} h"

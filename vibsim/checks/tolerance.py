@@ -1,0 +1,120 @@
+"""Whether every member reached the tolerance of its experiment.
+
+The levels were chosen by a pilot of a few members. What holds of all the others is found here, from the solution that
+``best.nc`` has, which need not be written for it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vibsim.checks.fields import Field
+from vibsim.checks.outcome import MATCH, MISMATCH, Outcome, outcome_of
+from vibsim.checks.sentences import Description, Found, Notation
+from vibsim.comparison.best_solution import extrapolated
+from vibsim.core.array_types import Floats, Integers
+from vibsim.core.errors import VibsimError
+from vibsim.core.record import Record, Variable, attributes
+from vibsim.observe.member_block import MemberBlock
+
+if TYPE_CHECKING:
+    from vibsim.experiment import Experiment
+
+_BOUND = "_best_error"
+"""What follows the name of a state in the name of its largest bound."""
+
+BOUND = Field("largest bound over time of the error of the extrapolated solution")
+
+
+def is_bound(name: str) -> bool:
+    """Tell whether a variable of the convergence Record is what `bounds` returned."""
+    return name.endswith(_BOUND)
+
+
+def bounds(block: MemberBlock) -> dict[str, Variable]:
+    """Return the largest bound over time of every extrapolated state, shape (scheme, case); infinite without one.
+
+    It is NaN of schemes that choose their own steps, and so have no levels.
+    """
+    rows = extrapolated(block.experiment, block.records, block.grid)
+    bounds = np.stack([row.largest_bounds() for row in rows], axis=1)
+    largest = np.full((len(bounds), *block.shape), np.nan)
+    largest[:, list(block.experiment.ladder)] = bounds
+    words = "largest bound of the error of the extrapolated solution"
+    return {
+        f"{state.name}{_BOUND}": Variable(
+            ("scheme", "case"), values, attributes(f"{state.long_name}: {words}", state.unit)
+        )
+        for state, values in zip(block.model.states, largest, strict=True)
+    }
+
+
+def _largest_bound(experiment: Experiment, record: Record) -> tuple[Floats, Integers]:
+    """Return the largest bound of every scheme and member, and the position of the state that has it."""
+    states = experiment.model.definition.states
+    table = np.stack([record[f"{state.name}{_BOUND}"] for state in states])
+    return np.max(table, axis=0), np.argmax(table, axis=0)
+
+
+def judge(experiment: Experiment, record: Record) -> Outcome:
+    """Compare the largest bound of every scheme and member with the tolerance of the experiment.
+
+    Raises
+    ------
+    VibsimError
+        Where `record`, the convergence Record, was made without the tolerance.
+    """
+    states = tuple(state.name for state in experiment.model.definition.states)
+    if experiment.tolerance is None or any(f"{name}{_BOUND}" not in record for name in states):
+        raise VibsimError("the analysis knows of no tolerance: analyse the levels again")
+    largest, which = _largest_bound(experiment, record)
+    return outcome_of(
+        experiment,
+        record,
+        None,
+        np.where(largest <= experiment.tolerance, MATCH, MISMATCH),
+        away=largest - experiment.tolerance,
+        facts={
+            "error_bound": (BOUND, largest),
+            "state": (Field("state with the largest bound", np.int8, states), which),
+        },
+    )
+
+
+def rule(experiment: Experiment, notation: Notation) -> str:
+    """Say what the bound of the error should be."""
+    return f"at most {notation.number(experiment.tolerance or 0.0)}"
+
+
+def describe(f: Found) -> Description:
+    """Say how large the error of the extrapolated solution may be, and what to change.
+
+    The pilot did not try the member, and the ladder is too coarse for it.
+    """
+    experiment, name = f.experiment, f.scheme_name
+    levels, model = experiment.levels, experiment.model.definition
+    largest, which = (found[f.scheme, f.case] for found in _largest_bound(experiment, f.record))
+    state = model.states[which].name
+    told = "nothing is known of the error of the extrapolated solution: its levels do not agree."
+    if math.isfinite(largest):
+        verb = "is" if f.reason == "match" else "is not"
+        told = (
+            f"the error of the extrapolated solution is bounded by {f.notation.number(largest, 3)} (of "
+            f"{f.notation.quantity(state)}, the largest over time); that {verb} {rule(experiment, f.notation)}."
+        )
+    swept = experiment.sweep.keys if experiment.sweep else ()
+    fixed = experiment.schemes[f.scheme].options.items()
+    options = {key: word for key, word in fixed if f"schemes.{name}.{key}" not in swept}
+    ways = [
+        "take such members into an experiment of their own, whose pilot tries them",
+        f"give finer `levels:` than {levels[0]} to {levels[-1]} in place of `tolerance:`",
+    ]
+    if state in model.velocities and options.get("end_velocity", "kick") != "kick":
+        ways.insert(0, f"set `end_velocity: kick` for scheme {name}")
+    if options.get("arithmetic", "compensated") != "compensated":
+        ways.append(f"set `arithmetic: compensated` for scheme {name}")
+    text = ", or ".join(ways)
+    return Description(told, f"{text[0].upper()}{text[1:]}.")

@@ -1,0 +1,361 @@
+"""The check ``value``: a number against its bound.
+
+A number that misses what is asked may come there on finer levels, or have settled elsewhere: the count of bounces that
+are located is the same on each of them. By how much the finest levels still change it tells the two apart.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vibsim.apriori.formal_orders import columns_of, options_of
+from vibsim.checks.fields import Field, facts, measured
+from vibsim.checks.outcome import (
+    MATCH,
+    MISMATCH,
+    NON_FINITE,
+    NOT_APPLICABLE,
+    PRE_ASYMPTOTIC,
+    TOO_FEW_LEVELS,
+    Outcome,
+    outcome_of,
+)
+from vibsim.checks.sentences import (
+    NOT_FINITE,
+    PLAIN,
+    ROUND_OFF,
+    Description,
+    Found,
+    Notation,
+    cost_in_words,
+)
+from vibsim.comparison import best_values, value_numbers
+from vibsim.comparison.best_values import has_limit
+from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.core.array_types import Flags, Floats
+from vibsim.core.record import Record
+from vibsim.experiment.value_names import VALUES
+from vibsim.observe.member_block import MemberBlock
+from vibsim.schemes.base import is_on_the_mesh
+from vibsim.simulation.scaled import has_time_unit
+
+if TYPE_CHECKING:
+    from vibsim.experiment import Experiment
+    from vibsim.experiment.schema.checks import ValueCheck
+
+FIELDS = {
+    "value": Field("the number, in its own unit"),
+    "error_bound": Field("bound of its error where it is extrapolated"),
+    "levels_needed": Field(
+        "finer levels that are probably needed, 0 where none mends it, -1 unknown", np.int8, none=-1
+    ),
+    "level_as_asked": Field("finer level at which it is as asked, -1 for none", np.int16, none=-1),
+    "value_by_level": Field(
+        "the number at every level; that of a step at the same time of every level",
+        dims=("scheme", "case", "level"),
+        of_figure=True,
+    ),
+}
+UNKNOWN, SETTLED, MOVING = -1, 0, 1
+"""What finer levels do to a number that misses what is asked: not known, too little, perhaps enough."""
+REACH = 3.0
+"""All finer levels together change a number by no more than so many times its last change (an order of 1/2 by 2.4)."""
+FEWEST = 3
+"""Fewer levels do not show how large an error is."""
+FINER = 2
+"""So many finer levels are advised."""
+
+SAMPLED = ("at", "end")
+"""Numbers that are a sample of a series, and are told by its name."""
+COUNTED = frozenset({"accepted_steps", "force_evaluations"})
+"""Numbers that finer levels make larger, and no more accurate."""
+FROM_THEORY = frozenset(
+    {
+        "stability_limit",
+        "exact_degree",
+        "predicted_growth_per_period",
+        "predicted_frequency",
+        "predicted_phase_error",
+    }
+)
+"""Numbers that no run enters."""
+SURVIVES_FAILURE = frozenset({"at", "exact_period", "growth_per_period"}) | FROM_THEORY
+"""Numbers that may be sound although the member broke down later."""
+
+
+def sees_several_levels(name: str) -> bool:
+    """Say whether a number rests on more than one level: on finer ones, or on the whole ladder."""
+    row = VALUES[name]
+    return row.finer_levels > 0 or (row.of == "convergent" and "level" not in row.at)
+
+
+def depends_on_level(name: str) -> bool:
+    """Say whether a number is another at another level, or rests on the whole ladder."""
+    return "level" in VALUES[name].at or sees_several_levels(name)
+
+
+def own_levels(name: str, levels: Sequence[int]) -> tuple[int, ...]:
+    """Return the levels that have such a number: one that is made of several has the coarsest of them as its own."""
+    return tuple(levels)[: len(levels) - VALUES[name].finer_levels]
+
+
+def compare(check: ValueCheck, number: Floats) -> tuple[Flags, Floats]:
+    """Return where numbers are as they should be, and how far beyond the border they are; of any shape."""
+    if check.below is not None:
+        return number < check.below, number - check.below
+    if check.above is not None:
+        return number > check.above, check.above - number
+    wanted = math.nan if check.equals is None else check.equals
+    away = np.abs(number - wanted)
+    return away <= check.allowed, away - check.allowed
+
+
+def measure(
+    block: MemberBlock, compared: Mapping[str, Comparison], check: ValueCheck
+) -> Mapping[str, Any]:
+    """Return the number, the bound of its error, and what finer levels do to it."""
+    at, name, levels = check.at, check.value, block.grid.levels
+    place = value_numbers.Place(block, compared, check.quantity or "", at.level, at.t, at.step)
+    value, bound = (np.broadcast_to(one, block.shape) for one in best_values.value(name, place))
+    fulfilled, _ = compare(check, value)
+    numbers = np.full((*block.shape, len(levels)), np.nan)
+    if "level" in VALUES[name].at and not (block.lean and np.all(fulfilled)):
+        numbers = _by_level(name, place)
+    own = own_levels(name, levels) or tuple(levels)
+    level = place.level if place.level in own else own[-1]
+    needed, first = _prospects(check, numbers[..., : len(own)], own, int(level), fulfilled)
+    return {
+        "value": value,
+        "error_bound": bound,
+        "levels_needed": needed,
+        "level_as_asked": first,
+        "value_by_level": numbers,
+    }
+
+
+def _by_level(name: str, place: value_numbers.Place) -> Floats:
+    """Return a number at every level, shape (scheme, case, level); NaN where a level has no such number.
+
+    A step of a level is the same time on every other one; of the extrapolated solution it is that of a common time.
+    """
+    if place.level == "best" and name in SAMPLED:
+        return np.stack(value_numbers.samples(place), axis=-1)
+    time, data = place.t, place.data()
+    if place.step is not None and data is not None:
+        index = place.step // int(np.asarray(data.attrs["every"]))
+        time = float(data["t"][index]) if index < len(data["t"]) else place.t
+    rows = (replace(place, level=level, t=time, step=None) for level in place.levels)
+    return np.stack([value_numbers.value(name, row) for row in rows], axis=-1)
+
+
+def _prospects(
+    check: ValueCheck, numbers: Floats, levels: Sequence[int], level: int, fulfilled: Flags
+) -> tuple[Any, Any]:
+    """Return what finer levels than `level` do to a number, and the first at which it is as asked, -1 for none.
+
+    The first is `SETTLED`, `MOVING` or `UNKNOWN`, as where it is `fulfilled`. `numbers` are of every level, shape
+    (scheme, case, level).
+    """
+    holds, away = compare(check, numbers)
+    helps = holds & (np.array(levels) > level)
+    first = np.where(np.any(helps, axis=-1), np.array(levels)[np.argmax(helps, axis=-1)], -1)
+    code = np.full(fulfilled.shape, UNKNOWN)
+    if len(levels) > 1:
+        with np.errstate(all="ignore"):
+            change = np.abs(np.diff(numbers[..., -3:], axis=-1))
+            change[..., :-1] *= 0.5
+            last = np.max(change, axis=-1)
+            code[away[..., -1] <= REACH * last] = MOVING
+            code[away[..., -1] > REACH * last] = SETTLED
+    return np.where(fulfilled, UNKNOWN, code), np.where(fulfilled, -1, first)
+
+
+def judge(experiment: Experiment, record: Record, check: ValueCheck, id_: str) -> Outcome:
+    """Compare a measured number with what the check asks of it.
+
+    A limit of several levels that misses what is asked by less than its bound may be right: nothing is decided then.
+    """
+    name = check.value
+    number, bound = (measured(record, id_, field) for field in ("value", "error_bound"))
+    holds, away = compare(check, number)
+    survives = np.isfinite(number) & (name in SURVIVES_FAILURE)
+    # of a stability limit infinity is a value; on the separatrix there is no period, and nothing went wrong
+    does_not_exist = np.isnan(number) | (np.isinf(number) & (name == "exact_period"))
+    infinite = np.isinf(number) & (name != "stability_limit") & ~does_not_exist
+    may_be_right = ~(away > bound) & has_limit(name, check.at.level)
+    cases = [
+        ((_failed(record, check) & ~survives) | infinite, NON_FINITE),
+        (does_not_exist, TOO_FEW_LEVELS if _lacks_levels(experiment, check) else NOT_APPLICABLE),
+        (holds, MATCH),
+        (may_be_right, TOO_FEW_LEVELS if len(record["level"]) < FEWEST else PRE_ASYMPTOTIC),
+    ]
+    reason = np.select([mask for mask, _ in cases], [code for _, code in cases], MISMATCH)
+    return outcome_of(experiment, record, check, reason, away, facts(record, id_, FIELDS))
+
+
+def _lacks_levels(experiment: Experiment, check: ValueCheck) -> bool:
+    """Say whether a number rests on more levels than the experiment has."""
+    return VALUES[check.value].finer_levels >= len(experiment.levels)
+
+
+def _failed(record: Record, check: ValueCheck) -> Flags:
+    """Say which members broke down at a level that the value depends on, shape (scheme, case)."""
+    broken, level = record["status"] != 0, check.at.level
+    if sees_several_levels(check.value) or level == "best":
+        return np.asarray(np.any(broken, axis=-1))
+    levels = np.asarray(record["level"]).tolist()
+    return np.asarray(broken[..., levels.index(level) if level in levels else -1])
+
+
+UNITS = "units_of_quantities"
+"""Attribute of a Record that holds verdicts and no quantities: their units by name, as JSON."""
+
+
+def unit_of(experiment: Experiment, record: Record, check: ValueCheck) -> str:
+    """Return the unit of the number of a check, such as ``rad s-1``; empty where it has none.
+
+    A scaled run, and a model without units, have none: the convergence Record says so.
+    """
+    time, measure = ("s" if has_time_unit(record) else ""), VALUES[check.value].measure
+    of_time = {"time": "s", "frequency": "rad s-1", "l1": "s", "l2": "sqrt(s)"}
+    unit = of_time.get(measure, "") if time else ""
+    if measure not in ("quantity", "l1", "l2", "position"):
+        return unit
+    kept = record.attrs.get(UNITS)
+    known = units_in(record) if kept is None else json.loads(str(kept))
+    of = experiment.model.definition.position if measure == "position" else check.quantity
+    return f"{known.get(of or '', '')} {unit}".strip()
+
+
+def units_in(record: Record) -> dict[str, str]:
+    """Return the units of all quantities of a convergence Record, for one that keeps `UNITS` in place of them."""
+    found: dict[str, str] = {}
+    # of every quantity that a check may ask for one of these is stored at least
+    for end in ("_end", "_difference_norm", "_finest"):
+        for name, variable in record.variables.items():
+            if name.endswith(end):
+                unit = str(variable.attrs.get("units", ""))
+                found.setdefault(name.removesuffix(end), "" if unit == "1" else unit)
+    return found
+
+
+def what(check: ValueCheck, notation: Notation = PLAIN) -> str:
+    """Say which number is meant."""
+    quantity = notation.quantity(check.quantity) if check.quantity else ""
+    if check.value in SAMPLED:
+        if check.at.t is not None:
+            return f"{quantity} at t = {check.at.t:g}"
+        when = "at the end" if check.at.step is None else f"at step {check.at.step}"
+        return f"{quantity} {when}"
+    value = notation.value(check.value)
+    return f"{value} of {quantity}" if quantity else value
+
+
+def _border(check: ValueCheck) -> tuple[str, float]:
+    """Return the key that holds the number that the check asks for, and the number."""
+    wanted = {key: getattr(check, key) for key in ("equals", "below", "above")}
+    return next((key, number) for key, number in wanted.items() if number is not None)
+
+
+def rule(check: ValueCheck, notation: Notation = PLAIN) -> str:
+    """Say what a number should be."""
+    key, wanted = _border(check)
+    if key != "equals":
+        return f"{key} {notation.number(wanted)}"
+    # counted numbers are equal, or apart by more
+    if VALUES[check.value].measure == "count" and check.allowed < 0.5:
+        return f"equal to {notation.number(wanted, 15)}"
+    return f"equal to {notation.digits(repr(wanted))} within {notation.number(check.allowed)}"
+
+
+def describe(f: Found, check: ValueCheck) -> Description:
+    """Say what a number is, whether it is what a check asks for, and what to change."""
+    told, brief, asked = (
+        f.notation.opening(what(check, f.notation)),
+        _measured(f, check),
+        rule(check, f.notation),
+    )
+    match f.reason:
+        case "match":
+            return Description(f"{told} is {brief}; it is {asked}.", "", brief)
+        case "mismatch":
+            advice = _on_mismatch(f, check)
+            return Description(f"{told} is {brief}; it is not {asked}.", advice, brief)
+        case "non_finite":
+            return Description(NOT_FINITE[0].format(told), NOT_FINITE[1], brief)
+        case "not_applicable":
+            return Description(
+                f"{told} does not exist here, or was not stored.",
+                "Ask for a level, a step and a time that are stored (`at:`, `samples: all`), and choose `time: end` so "
+                "that the number exists.",
+                brief,
+            )
+        case "too_few_levels" if _lacks_levels(f.experiment, check):
+            return Description(
+                f"{told} does not exist here, because it needs more levels than there are.",
+                f"Add finer `levels:`, so that there are {VALUES[check.value].finer_levels + 1} of them.",
+                brief,
+            )
+    finer, cost = _finer_levels(f)
+    return Description(
+        f"{told} is {brief}: it may be {asked}, or not.",
+        f"Add levels {finer[0]} and {finer[-1]} to `levels:` ({cost}), so that the bound of the error shrinks, or ask "
+        "for the number of one level (`at: {level: ...}`).",
+        brief,
+    )
+
+
+def _measured(f: Found, check: ValueCheck) -> str:
+    """Write a number with its unit, and with the bound of its error where it has one."""
+    found, bound = f.fact("value"), f.fact("error_bound")
+    # of round-off two digits say all
+    digits = 2 if f.reason == "match" and abs(found) <= ROUND_OFF else 10
+    told = f"{f.notation.number(found, digits)} {unit_of(f.experiment, f.record, check)}".rstrip()
+    if check.value == "stability_limit" and found == 0.0:
+        told += " (it grows at every step)"
+    if not has_limit(check.value, check.at.level):
+        return told
+    if math.isnan(bound):
+        return f"{told}, with an error that is not known: the levels do not approach each other"
+    return f"{told}, with an error of at most {f.notation.number(bound, 2)}"
+
+
+def _finer_levels(f: Found) -> tuple[list[int], str]:
+    """Return the next finer levels, and what they cost in words."""
+    finer = [f.experiment.levels[-1] + 1 + i for i in range(FINER)]
+    return finer, cost_in_words(f.experiment, finer)
+
+
+def _on_mismatch(f: Found, check: ValueCheck) -> str:
+    """Say what to change where a number is another one; finer levels only where they change it enough."""
+    change = f"hange `{_border(check)[0]}:`"
+    if check.value in COUNTED or not depends_on_level(check.value):
+        return f"C{change}."
+    options = options_of(f.experiment, columns_of(f.record), f.scheme, f.case)
+    if VALUES[check.value].needs_events and is_on_the_mesh(options):
+        return f"Set `events: located` for scheme {f.scheme_name}, or c{change}."
+    if (first := f.fact("level_as_asked")) > 0:
+        return f"Ask for a finer level (`at: {_at(check, first)}`), where the number is as asked, or c{change}."
+    if f.fact("levels_needed") == SETTLED:
+        return f"C{change}, or `model:` or `initial:`. Finer levels will not help."
+    finer, cost = _finer_levels(f)
+    ask = f" and ask for one (`at: {_at(check, finer[-1])}`)"
+    if check.at.level in (None, f.experiment.levels[-1], "best"):
+        ask = ""
+    return f"Add finer `levels:` ({finer[0]} and {finer[-1]} cost {cost}){ask}, or c{change}."
+
+
+def _at(check: ValueCheck, level: int) -> str:
+    """Write where a number is taken, at a finer level: a step there is the same time."""
+    found: dict[str, Any] = {"level": level}
+    if check.at.step is not None and isinstance(check.at.level, int):
+        found["step"] = check.at.step * 2 ** (level - check.at.level)
+    found |= {key: getattr(check.at, key) for key in ("t", "scheme", "case")}
+    told = (f"{key}: {value}" for key, value in found.items() if value is not None)
+    return f"{{{', '.join(told)}}}"

@@ -1,1 +1,0 @@
-"""The check ``value``: a number against its bound."""

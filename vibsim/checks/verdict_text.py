@@ -1,0 +1,145 @@
+"""The verdict on a check in words: what decides it, of how many results that is so, and what to change.
+
+Everything is made from facts: those of the summary, or of a verdict, and the variables of ``convergence.nc``. The
+sentence on a result is chosen by its reason, in the module of its kind of check.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from vibsim.apriori.formal_orders import columns_of
+from vibsim.checks import equal, tolerance, value
+from vibsim.checks.kinds import KINDS
+from vibsim.checks.outcome import Result, compared_reason, truth
+from vibsim.checks.sentences import PLAIN, Description, Found, Notation
+from vibsim.core.record import Record
+from vibsim.core.vocabulary import BY_TOLERANCE, worst
+
+if TYPE_CHECKING:
+    from vibsim.experiment import Check, Experiment
+    from vibsim.experiment.schema.checks import Measurement
+
+CORRECT = "Correct what the check expects (`expect:`), or find out why it turned out otherwise."
+
+
+def expectation(experiment: Experiment, check: Check | None, notation: Notation = PLAIN) -> str:
+    """Say what a check expects; None stands for the tolerance of the experiment."""
+    if check is None:
+        return tolerance.rule(experiment, notation)
+    match check.kind:
+        case "claim":
+            return "true" if check.holds else "false"
+        case "converges":
+            expect = check.expect
+            return expect.status if expect.reason is None else f"{expect.status} ({expect.reason})"
+        case "value":
+            return value.rule(check, notation)
+        case "stable":
+            return "stable" if check.stable else "unstable"
+        case "conserves":
+            return check.drift
+    return f"equal to {equal.other_solution(check)}"
+
+
+@dataclass(frozen=True)
+class Wording:
+    """Puts the verdict on one check into words."""
+
+    experiment: Experiment
+    record: Record
+    """Convergence Record."""
+    check: Check | None
+    """None for the tolerance of the experiment."""
+    notation: Notation = PLAIN
+
+    @property
+    def _measured(self) -> Measurement | None:
+        return None if self.check is None else self.check.measured
+
+    def _describe(self, result: Result) -> Description:
+        record, check = self.record, self._measured
+        found = Found(
+            self.experiment,
+            record,
+            check,
+            BY_TOLERANCE if self.check is None else self.check.id,
+            record.words("scheme").index(result.scheme),
+            record.place("case", result.case),
+            result.reason,
+            self.notation,
+        )
+        return (
+            tolerance.describe(found) if check is None else KINDS[check.kind].describe(found, check)
+        )
+
+    def sentence(self, result: Result) -> str:
+        """Say what was measured of one result."""
+        return self._describe(result).sentence
+
+    def measured(self, result: Result, counts: Mapping[str, int]) -> str:
+        """Say in a few words what was measured where it decides, for a table of checks that passed."""
+        description = self._describe(result)
+        told = description.brief or description.sentence.removesuffix(".")
+        total = sum(counts.values())
+        return told if total == 1 else f"{told} ({self._place(result)}, the hardest of {total})"
+
+    def text(self, result: Result, counts: Mapping[str, int], where: Mapping[str, Any]) -> str:
+        """Say what was measured where it decides, and of how many results that is so.
+
+        Parameters
+        ----------
+        result
+            The one that decides: the worst.
+        counts
+            Number of results by status, compared with what was expected.
+        where
+            Where in a sweep those of a status lie (`vibsim.checks.sweep_regions`).
+        """
+        check, status, total = self._measured, _status(counts), sum(counts.values())
+        told = self.sentence(result)
+        if check is not None and check.kind == "converges":
+            reason = compared_reason(check, status, result.status, result.reason)
+            expected = expectation(self.experiment, check)
+            if reason == "match":
+                told += f" The check detected {expected}, as intended."
+            elif reason == "mismatch":
+                told += f" The check expects {expected}."
+        if total > 1:
+            head = f"{status} in {counts[status]} of {total} results"
+            if status == "PASS":
+                head = f"All {total} results passed"
+            elif status in where:
+                head = where[status]["text"]
+            told = f"{head}. The hardest ({self._place(result)}): {told}"
+        if self.check is None or self.check.kind != "claim":
+            return told
+        holds = truth(self.check, status, result.reason)
+        decided = "cannot be decided" if holds is None else f"is {'true' if holds else 'false'}"
+        return f"Measured: the statement {decided}. {told}"
+
+    def _place(self, result: Result) -> str:
+        """Name the scheme, and of a sweep the member with its swept values."""
+        columns, parts = columns_of(self.record), [f"scheme {result.scheme}"]
+        if columns:
+            parts.append(f"case {result.case}")
+        for key, values in columns.items():
+            one = values[self.record.place("case", result.case)]
+            parts.append(f"{key} = {self.notation.number(one) if isinstance(one, float) else one}")
+        return ", ".join(parts)
+
+    def advice(self, status: str, result: Result, counts: Mapping[str, int]) -> str:
+        """Say what to change in the YAML; empty for a check whose status is PASS."""
+        if status == "PASS":
+            return ""
+        if _status(counts) != "PASS":
+            return self._describe(result).advice or CORRECT
+        is_claim = self.check is not None and self.check.kind == "claim"
+        return "Set `holds: true` if the measurement is right." if is_claim else ""
+
+
+def _status(counts: Mapping[str, int]) -> str:
+    """Return the status of the result that decides."""
+    return worst(status for status, count in counts.items() if count)

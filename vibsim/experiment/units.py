@@ -1,0 +1,388 @@
+"""Numbers with units in the content of a file: replaced by numbers in the units of the model before any check.
+
+What follows sees plain numbers alone. Units may stand where a model or the time has a unit: in ``model``, ``initial``,
+``time`` and the values of ``sweep`` over those. Their names are those of a small registry of pint's, which is loaded
+when the first unit of a file is met. Text of a user never reaches pint's expression evaluator: single names are looked
+up, and what they stand for is multiplied here, in fractions, so that ``250 g`` is the same double as ``0.25``. Angles
+are a dimension of their own: a hertz is no radian per second.
+"""
+
+from __future__ import annotations
+
+import keyword
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cache
+from types import MappingProxyType
+from typing import Any
+
+from vibsim.core.errors import nearest
+from vibsim.experiment.faults import Report
+from vibsim.experiment.schema.fields import DECLARED, FORMULA_NOTE, MAX_FORMULAS, TABLE
+from vibsim.experiment.schema.unit_text import NAME, UnitError, factors, split
+from vibsim.experiment.yaml.parse import Path_
+from vibsim.formula import CONSTANTS, FUNCTIONS, ExpressionError, constant
+from vibsim.models import MODELS, Model
+
+MAX_OWN = 50
+"""Units of one file."""
+MAX_POWER = 99
+"""Largest exponent of a base unit."""
+_ANY = ""
+"""In place of a unit: any is right, and SI base units are what follows."""
+_UNKNOWN = "?"
+"""In place of a unit: the key does not exist, which is said elsewhere, and the value does not count."""
+_STAND_IN = 1.0
+"""Takes the place of what is refused, until it is taken out; nothing objects to it."""
+
+
+class Units:
+    """The units of a file, with which its values become plain numbers."""
+
+    def __init__(self, data: Mapping[str, Any], report: Report) -> None:
+        self.report = report
+        self.own: dict[str, Any] = {}
+        """Units that the file defines."""
+        self.broken: set[str] = set()
+        """Names of units whose definition is refused; nothing is said about what is measured in them."""
+        section = data.get("model")
+        kind = section.get("kind") if isinstance(section, dict) else None
+        self.model = MODELS.get(kind) if isinstance(kind, str) else None
+        self.units, self.texts = _wanted_units(self.model)
+        if isinstance(data.get("units"), dict):
+            self._define_all(data["units"])
+
+    @property
+    def defined(self) -> dict[str, str]:
+        """The units that the file defines, in SI base units."""
+        return {name: f"{float(unit.factor):.10g} {unit.text}" for name, unit in self.own.items()}
+
+    def plain(self, path: Path_, written: Any) -> tuple[Any, set[str | int]]:
+        """Return what is written at `path` with numbers in place of those with units.
+
+        Also return the keys or positions in it where something is refused, with a fault; 1 stands in for that. Where it
+        is itself refused, `path` becomes one of the faulty places.
+        """
+        refused: set[str | int] = set()
+        if path[0] not in ("model", "initial", "time", "sweep"):
+            return written, refused
+        entries: Iterable[tuple[str | int, Any]] = ()
+        if isinstance(written, str):
+            is_number = len(path) > 1 and (path[0] != "sweep" or isinstance(path[-1], int))
+            return (self._plain_number(path, written) if is_number else written), refused
+        if isinstance(written, dict):
+            entries = written.items()
+        elif isinstance(written, list) and path[0] == "sweep":
+            # the last one is a count
+            entries = enumerate(written[: 2 if path[-1] in ("linspace", "logspace") else None])
+        others = [(key, value) for key, value in entries if not isinstance(value, float | int)]
+        # with more of them the list is refused
+        if not others or len(others) > MAX_FORMULAS:
+            return written, refused
+        found = written.copy()
+        for key, value in others:
+            found[key], inner = self.plain((*path, key), value)
+            if inner or (*path, key) in self.report.faulty:
+                refused.add(key)
+        return found, refused
+
+    def _plain_number(self, path: Path_, text: str) -> Any:
+        keys = path if path[0] != "sweep" else [key for key in path if "." in str(key)][:1]
+        key = ".".join(map(str, keys))
+        if key.startswith("schemes.") or key in self.texts:
+            return text
+        has_formulas = self.model is not None and bool(self.model.formulas)
+        is_declared = has_formulas and key.startswith(f"model.{DECLARED}.")
+        wanted = self.units.get(key, _ANY if is_declared else _UNKNOWN)
+        try:
+            number = self.number(text, wanted)
+        except UnitError as error:
+            self._refuse(path, error, text)
+            return _STAND_IN
+        return text if number is None else number
+
+    def _refuse(self, path: Path_, error: UnitError, text: object) -> None:
+        """Note a fault; nothing more is said about its place."""
+        if error.rule:
+            self.report.add(path, error.rule, error.hint, text)
+        self.report.faulty.add(path)
+
+    def number(self, text: str, wanted: str) -> float | None:
+        """Return a number with a unit in the `wanted` one; None where it has no unit."""
+        halves = split(text)
+        if halves is None:
+            return None
+        if wanted == _UNKNOWN:
+            return _STAND_IN
+        formula, unit = halves
+        if any(factor.name in self.broken for factor in factors(unit)):
+            raise UnitError("")
+        return converted(_constant(formula), unit, wanted, self.own)
+
+    def _define(self, name: str, value: Any) -> None:
+        _check_name(name)
+        halves = split(value) if isinstance(value, str) else None
+        number = _constant(halves[0] if halves else value)
+        unit = meaning(halves[1], self.own) if halves else Unit()
+        factor = finite(Fraction(repr(number)) * unit.factor)
+        if factor <= 0.0:
+            raise UnitError("a unit must be greater than 0")
+        self.own[name] = Unit(Fraction(repr(factor)), unit.powers)
+
+    def _define_all(self, units: dict[str, Any]) -> None:
+        if len(units) > MAX_OWN:
+            rule = f"must not have more than {MAX_OWN} units, has {len(units)}"
+            self._refuse(("units",), UnitError(rule), "")
+            return
+        for name, value in units.items():
+            try:
+                self._define(name, value)
+            except UnitError as error:
+                self._refuse(("units", name), error, value)
+                self.broken.add(name)
+
+
+def _check_name(name: str) -> None:
+    """Refuse names that mean something already, or that could not be told from what stands beside them."""
+    if not NAME.fullmatch(name) or keyword.iskeyword(name):
+        raise UnitError("the name of a unit must consist of letters and _, and begin with a letter")
+    if name in CONSTANTS or name in FUNCTIONS:
+        what = "constant" if name in CONSTANTS else "function"
+        raise UnitError(f"'{name}' is a {what} of formulas", "choose another name")
+    try:
+        is_taken = known(name) is not None
+    except UnitError:
+        is_taken = True
+    if is_taken:
+        raise UnitError(f"'{name}' is a unit already", "choose another name")
+
+
+def _constant(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, str | int | float):
+        raise UnitError("must be a number with a unit, such as 4.9 m")
+    try:
+        number = constant(value) if isinstance(value, str) else float(value)
+    except ExpressionError as error:
+        raise UnitError(
+            f"must be {FORMULA_NOTE}, before its unit ({error.rule})", error.hint
+        ) from None
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise UnitError("must be a finite number")
+    return number
+
+
+def _wanted_units(model: Model | None) -> tuple[dict[str, str], set[str]]:
+    """Return the unit of every dotted key that has one, and the keys of names, formulas and counts, which have none."""
+    units = {"time.end": "s", "time.base_dt": "s"}
+    units |= {"time.periods": "1", "time.steps_per_period": "1"}
+    texts = {"model.kind", "time.base_steps"}
+    if model is not None:
+        units |= {f"initial.{state.name}": state.unit for state in model.states}
+        units |= {f"model.{row.key}": row.unit for row in model.parameters}
+        for row in model.formulas:
+            key = f"model.{row.name}"
+            units |= {f"{key}.{word}": unit for word, unit in row.term_units.items()}
+            texts |= {key, *(f"{key}.{name}" for name in (TABLE, *(row.table or ())))}
+    return units, texts
+
+
+DEFINITIONS = """\
+tera- = 1e12 = T-
+giga- = 1e9 = G-
+mega- = 1e6 = M-
+kilo- = 1e3 = k-
+deci- = 1e-1 = d-
+centi- = 1e-2 = c-
+milli- = 1e-3 = m-
+micro- = 1e-6 = \u00b5- = \u03bc- = u-
+nano- = 1e-9 = n-
+pico- = 1e-12 = p-
+metre = [length] = m = meter
+second = [time] = s = sec
+gram = [mass] = g
+ampere = [current] = A
+kelvin = [temperature] = K
+radian = [angle] = rad
+turn = 6.283185307179586476925286766559005768394 * radian = _ = revolution
+degree = 0.01745329251994329576923690768488612713443 * radian = deg = \u00b0
+minute = 60 * second = min
+hour = 3600 * second = h
+day = 86400 * second
+revolution_per_minute = turn / minute = rpm
+hertz = 1 / second = Hz
+newton = 1000 * gram * metre / second ** 2 = N
+pascal = newton / metre ** 2 = Pa
+bar = 100000 * pascal
+joule = newton * metre = J
+watt = joule / second = W
+coulomb = ampere * second = C
+volt = joule / coulomb = V
+ohm = volt / ampere = \u03a9 = \u2126
+farad = coulomb / volt = F
+henry = volt * second / ampere = H
+tonne = 1000000 * gram = t
+percent = 0.01 = %
+degree_Celsius = kelvin; offset: 273.15 = degC = celsius
+degree_Fahrenheit = 5 / 9 * kelvin; offset: 255.372222 = degF = fahrenheit
+"""
+"""In the notation of pint's definition files."""
+_OFFERED = """
+m km cm mm kg g s ms min h day rad deg turn rpm Hz N kN Pa J W A V C ohm F H K t % percent
+metre meter gram second minute hour radian degree newton joule
+"""
+"""What a message offers in place of an unknown name."""
+_WORDS = """
+1: a plain number; m: a length; s: a time; kg: a mass; rad: an angle; m s-1: a velocity
+m s-2: an acceleration; rad s-1: an angular velocity; rad s-2: an angular acceleration; s-1: a frequency
+N: a force; J: an energy; W: a power; Pa: a pressure; N m-1: a stiffness; kg s-1: a linear damping
+kg m-1: a quadratic damping; m2: an area; m3: a volume; kg m2: a moment of inertia; kg m-3: a density
+A: a current; V: a voltage; C: a charge; ohm: a resistance; F: a capacitance; H: an inductance
+K: a temperature
+"""
+"""What is measured in some units, for messages."""
+_SYMBOLS = dict(
+    zip(
+        ("[angle]", "[mass]", "[length]", "[time]", "[current]", "[temperature]"),
+        ("rad", "kg", "m", "s", "A", "K"),
+        strict=True,
+    )
+)
+"""The base unit of every dimension, in the order of messages."""
+_OFFSET = ("degree_Celsius", "degree_Fahrenheit")
+"""Units that are measured from a zero of their own."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit in SI base units and radians."""
+
+    factor: Fraction = Fraction(1)
+    powers: Mapping[str, int] = field(default_factory=dict)
+    """Exponents of the base units by their symbols, none of them 0."""
+
+    @property
+    def text(self) -> str:
+        """The base units as in models: ``kg m s-2``, ``1``."""
+        parts = (
+            symbol + (str(self.powers[symbol]) if self.powers[symbol] != 1 else "")
+            for symbol in _SYMBOLS.values()
+            if symbol in self.powers
+        )
+        return " ".join(parts) or "1"
+
+    @property
+    def words(self) -> str:
+        """What is measured in it: ``a length``."""
+        return _words().get(self.text, f"a quantity in {self.text}")
+
+    def fits(self, wanted: Unit) -> bool:
+        """Whether a number with this unit may stand where `wanted` is: an angle may be a plain number, its radians."""
+        return self.powers == wanted.powers or (not wanted.powers and self.powers == {"rad": 1})
+
+    def times(self, other: Unit, exponent: int) -> Unit:
+        """Return the product with a power of another unit."""
+        powers = dict(self.powers)
+        for symbol, power in other.powers.items():
+            powers[symbol] = powers.get(symbol, 0) + power * exponent
+            if abs(powers[symbol]) > MAX_POWER:
+                raise UnitError(f"has an exponent of {symbol} above {MAX_POWER}")
+        kept = {symbol: power for symbol, power in powers.items() if power}
+        return Unit(self.factor * other.factor**exponent, kept)
+
+
+@cache
+def _words() -> Mapping[str, str]:
+    rows = (pair.split(": ") for pair in _WORDS.strip().replace("\n", "; ").split("; "))
+    return {meaning(unit).text: words for unit, words in rows}
+
+
+@cache
+def registry() -> Any:
+    """Return pint's registry of the units above, in exact fractions."""
+    import pint
+
+    found: Any = pint.UnitRegistry(None, non_int_type=Fraction, on_redefinition="raise")
+    found.load_definitions(DEFINITIONS.splitlines())
+    return found
+
+
+@cache
+def known(name: str) -> Unit | None:
+    """Return the unit of one name, with or without a prefix; None where there is none.
+
+    Raises
+    ------
+    UnitError
+        Where its zero is not that of the base unit, so that it cannot be a factor.
+    """
+    found = registry().parse_unit_name(name)
+    if not found:
+        return None
+    prefix, base, _ = found[0]
+    if base in _OFFSET:
+        rule = f"'{name}' is measured from a zero of its own, and cannot be part of a unit"
+        raise UnitError(rule, "write K")
+    factor, _ = registry().get_root_units(prefix + base)
+    dimensions = registry().get_dimensionality(prefix + base)
+    powers = {_SYMBOLS[name]: int(power) for name, power in dimensions.items()}
+    # pint's root unit of a mass is the gram
+    return Unit(Fraction(factor) / 1000 ** powers.get("kg", 0), powers)
+
+
+def meaning(text: str, own: Mapping[str, Unit] = MappingProxyType({})) -> Unit:
+    """Return what a unit is; `own` holds the names that a file defines.
+
+    Raises
+    ------
+    UnitError
+        Where the text is no unit, or names one that does not exist.
+    """
+    unit = Unit()
+    for factor in factors(text) if text != "1" else ():
+        named = own.get(factor.name) or known(factor.name)
+        if named is None:
+            choices = [*own, *_OFFERED.split()]
+            alike = [choice for choice in choices if choice.lower() == factor.name.lower()]
+            hint = f"did you mean '{alike[0]}'?" if alike else nearest(factor.name, choices)
+            raise UnitError(f"unknown unit '{factor.name}'", hint)
+        unit = unit.times(named, factor.exponent)
+    return unit
+
+
+def converted(number: float, text: str, wanted: str, own: Mapping[str, Unit]) -> float:
+    """Return a number with the unit `text` in the unit `wanted`, correctly rounded.
+
+    The number counts as the shortest decimal that is read as it: 0.3 is three tenths. Where nothing particular is
+    `wanted`, it is returned in SI base units.
+
+    Raises
+    ------
+    UnitError
+        Where the two are of different kinds, or the number is too large.
+    """
+    unit = meaning(text, own)
+    target = meaning(wanted) if wanted else Unit(powers=unit.powers)
+    if not unit.fits(target):
+        shown = f" [{wanted}]" if wanted != "1" and target.text in _words() else ""
+        is_rate = (target.text, unit.text) == ("rad s-1", "s-1")
+        hint = "1 Hz is 2*pi rad/s" if is_rate else ""
+        raise UnitError(f"must be {target.words}{shown}, but {text} is {unit.words}", hint)
+    return finite(Fraction(repr(number)) * unit.factor / target.factor)
+
+
+def finite(number: Fraction) -> float:
+    """Return `number` as a float.
+
+    Raises
+    ------
+    UnitError
+        Where it is too large.
+    """
+    try:
+        return float(number)
+    except OverflowError:
+        raise UnitError("must be a finite number") from None

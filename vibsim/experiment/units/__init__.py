@@ -1,1 +1,0 @@
-"""Numbers with units, and runs in characteristic units."""

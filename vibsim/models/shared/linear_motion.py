@@ -1,0 +1,294 @@
+r"""Exact motions of one coordinate under linear forces: free, damped, driven by exponentials, held by dry friction.
+
+Source: vibration text (B), sections 1, 8 and 10.3, exercise 11.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.core.array_types import Floats
+from vibsim.formula import Binary, Call, Expression, Negate, derivative, literal, names_in, values
+from vibsim.models.base import Numbers, State
+
+Complex = NDArray[np.complex128]
+Term = tuple[Any, Any]
+"""C and s of ``C exp(s t)``, complex numbers or arrays."""
+
+MOST_TERMS = 64
+MOST_POWER = 8
+NEAR = 0.5
+"""Points of a divided difference that lie closer than this are worked out by a series."""
+SERIES_TERMS = 20
+
+
+def harmonic(states: tuple[State, State], frequency: Callable[[Numbers], Any]) -> dict[str, Any]:
+    """Return what `Model` has of ``u'' = -w^2 u``: frequency, exact motion and period, from w of the parameters."""
+    u, v = (state.name for state in states)
+
+    def exact(t: Floats, initial: Numbers, parameters: Numbers) -> dict[str, Floats]:
+        return dict(
+            zip((u, v), motion(t, frequency(parameters), initial[u], initial[v]), strict=True)
+        )
+
+    return {
+        "natural_frequency": frequency,
+        "exact": exact,
+        "exact_period": lambda initial, p: period(frequency(p), initial[u], initial[v]),
+    }
+
+
+def motion(t: Floats, w: Any, u_0: Any, v_0: Any) -> tuple[Floats, Floats]:
+    """Return position and velocity at times `t`: vibration text (B), equation (2), for any initial velocity."""
+    cos, sin = np.cos(w * t), np.sin(w * t)
+    return u_0 * cos + v_0 / w * sin, v_0 * cos - u_0 * w * sin
+
+
+def period(w: Any, u_0: Any, v_0: Any) -> Any:
+    """Return ``2 pi/w``, whatever the amplitude; NaN at rest."""
+    rest = (np.asarray(u_0) == 0) & (np.asarray(v_0) == 0)
+    return np.where(rest, np.nan, 2 * np.pi / w)
+
+
+def damped_motion(
+    t: Floats, stiffness: Any, half: Any, u_0: Any, v_0: Any
+) -> tuple[Floats, Floats]:
+    """Return position and velocity of ``u'' + 2 half u' + stiffness u = 0`` at times `t`, in every regime.
+
+    Source: vibration text (B), section 8 and exercise 11; with ``q = sqrt(|stiffness - half^2|)`` the solution is
+    ``exp(-half t) (u_0 C + (v_0 + half u_0) S)``, with ``C = cos(q t)``, ``S = sin(q t)/q`` below critical damping,
+    1 and t at it, and the hyperbolic functions above, which are taken together with the exponential. Its velocity is
+    ``exp(-half t) (v_0 (C - half S) - stiffness u_0 S)``.
+    """
+    with np.errstate(all="ignore"):
+        square = stiffness - half * half
+        q = np.sqrt(np.abs(square))
+        decay = np.exp(-half * t)
+        # half - q and half + q: the smaller one from their product, without cancellation
+        large = half + np.copysign(q, half)
+        small_rate = stiffness / large
+        least, most = np.minimum(large, small_rate), np.maximum(large, small_rate)
+        fast, slow = np.exp(-most * t), np.exp(-least * t)
+        angle = q * t
+        # sin(x)/x and its hyperbolic twin are 1 where the damping is critical
+        small = np.abs(angle) < 1e-8
+        even, wave = decay * np.cos(angle), np.where(small, decay * t, decay * np.sin(angle) / q)
+        loss = np.expm1(-2.0 * angle)
+        rise = np.where(small, decay * t, -0.5 * slow * loss / q)
+        # C + half S and C - half S: above critical damping one of them cancels as a sum
+        is_near, width = 2.0 * angle < 1.0, 2.0 * q
+        rest = np.where(is_near, slow * (1.0 - least * loss / width), most * slow - least * fast)
+        kick = np.where(is_near, slow * (1.0 + most * loss / width), most * fast - least * slow)
+        rest, kick = (np.where(is_near, part, part / width) for part in (rest, kick))
+        is_wave = (square >= 0.0) | small
+        odd = np.where(square >= 0.0, wave, rise)
+        rest = np.where(is_wave, even + half * odd, rest)
+        kick = np.where(is_wave, even - half * odd, kick)
+    return np.asarray(u_0 * rest + v_0 * odd), np.asarray(v_0 * kick - stiffness * u_0 * odd)
+
+
+def exponentials(node: Expression, numbers: Mapping[str, Any], time: str = "t") -> list[Term]:
+    """Return the pairs of C and s of a formula in the time that is a sum of exponentials, from values of other names.
+
+    Raises
+    ------
+    ValueError
+        Where the formula is no such sum (see `is_sum_of_exponentials`).
+    """
+    if time not in names_in(node):
+        return [(values(node, numbers) + 0j, 0j)]
+    match node:
+        case Negate(operand):
+            return [(-c, s) for c, s in exponentials(operand, numbers, time)]
+        case Binary("+" | "-" as sign, left, right):
+            rest = [(c if sign == "+" else -c, s) for c, s in exponentials(right, numbers, time)]
+            return [*exponentials(left, numbers, time), *rest]
+        case Binary("*", left, right):
+            return _product(exponentials(left, numbers, time), exponentials(right, numbers, time))
+        case Binary("/", left, right) if time not in names_in(right):
+            divisor = values(right, numbers)
+            return [(c / divisor, s) for c, s in exponentials(left, numbers, time)]
+        case Binary("**", base, exponent) if _is_small_power(exponent):
+            factor, found = exponentials(base, numbers, time), [(1.0 + 0j, 0j)]
+            for _ in range(int(literal(exponent) or 0)):
+                found = _product(found, factor)
+            return found
+        case Call("sin" | "cos" | "exp" | "sinh" | "cosh" as function, (argument,)):
+            return _of_function(function, argument, numbers, time)
+    raise ValueError("no sum of exponentials")
+
+
+def _is_small_power(exponent: Expression) -> bool:
+    power = literal(exponent)
+    return power is not None and power.is_integer() and 0 <= power <= MOST_POWER
+
+
+def _product(one: list[Term], other: list[Term]) -> list[Term]:
+    if len(one) * len(other) > MOST_TERMS:
+        raise ValueError("too many exponentials")
+    return [(a * b, p + q) for a, p in one for b, q in other]
+
+
+def _of_function(
+    function: str, argument: Expression, numbers: Mapping[str, Any], time: str
+) -> list[Term]:
+    speed = derivative(argument, time)
+    if time in names_in(speed):
+        raise ValueError("no sum of exponentials")
+    start = values(argument, {**numbers, time: 0.0})
+    rate = values(speed, numbers)
+    if function == "exp":
+        return [(np.exp(start) + 0j, rate + 0j)]
+    if function in ("sinh", "cosh"):
+        sign = 0.5 if function == "cosh" else -0.5
+        return [(0.5 * np.exp(start) + 0j, rate + 0j), (sign * np.exp(-start) + 0j, -rate + 0j)]
+    # of a pair of conjugates one does: only the real part of the answer is taken
+    turned = np.exp(1j * start) * (1.0 if function == "cos" else -1j)
+    return [(0.5 * turned, 1j * rate), (0.5 * np.conj(turned), -1j * rate)]
+
+
+def is_sum_of_exponentials(node: Expression, time: str = "t") -> bool:
+    """Tell whether `exponentials` can write a formula, whatever the values of its other names."""
+    others = {name: 0.5 for name in names_in(node) if name != time}
+    try:
+        exponentials(node, others, time)
+    except ValueError:
+        return False
+    return True
+
+
+def forced_motion(
+    t: Floats, stiffness: Any, half: Any, u_0: Any, v_0: Any, terms: list[Term]
+) -> tuple[Floats, Floats]:
+    """Return position and velocity of ``u'' + 2 half u' + stiffness u = sum C exp(s t)`` at times `t`.
+
+    With the roots l1, l2 of the characteristic polynomial, the answer to ``C exp(s t)`` from rest is
+    ``C t^2 [l1 t, l2 t, s t] exp``, a divided difference of the exponential: one formula for every damping and every
+    frequency, resonance and critical damping among them, where textbooks have a case of its own for each and
+    cancellation in between. All numbers broadcast against `t`.
+
+    Parameters
+    ----------
+    terms
+        The force over the mass, `exponentials`; its imaginary part is 0.
+    """
+    u, v = damped_motion(t, stiffness, half, u_0, v_0)
+    root = np.sqrt(np.asarray(half * half - stiffness, dtype=complex))
+    # the root that is larger in size, and the other one from their product, without cancellation
+    large = np.where(np.real(half) >= 0.0, -half - root, -half + root)
+    small = np.where(large == 0.0, 0.0, stiffness / np.where(large == 0.0, 1.0, large))
+    small = np.where(np.imag(root) != 0.0, -half + root, small)
+    large = np.where(np.imag(root) != 0.0, -half - root, large)
+    with np.errstate(all="ignore"):
+        for c, s in terms:
+            a, b, e = large * t, small * t, s * t
+            u = u + np.real(c * t * t * divided_twice(a, b, e))
+            # u' - l u is the answer of the first-order equation that is left; the smaller root cancels less
+            v = v + np.real(c * t * (divided(a, e) + b * divided_twice(a, b, e)))
+    return np.asarray(u), np.asarray(v)
+
+
+def divided(a: Any, b: Any) -> Complex:
+    """Return the divided difference ``(exp b - exp a)/(b - a)`` of complex numbers, also where they coincide."""
+    # from the one that grows more: the other exponential can then only vanish
+    is_first = np.real(a) > np.real(b)
+    most, gap = np.where(is_first, a, b), np.where(is_first, a - b, b - a)
+    is_zero = gap == 0.0
+    safe = np.where(is_zero, 1.0, gap)
+    return np.asarray(np.exp(most) * np.where(is_zero, 1.0, -np.expm1(-safe) / safe))
+
+
+def divided_twice(a: Any, b: Any, c: Any) -> Complex:
+    """Return the second divided difference of the exponential at three complex numbers, which may coincide."""
+    a, b, c = np.broadcast_arrays(a, b, c)
+    ab, bc, ca = np.abs(a - b), np.abs(b - c), np.abs(c - a)
+    # the two that are farthest apart: the difference of their quotients loses no digits
+    order = [(ab >= bc) & (ab >= ca), bc >= ca]
+    first, last, middle = (
+        np.select(order, row[:2], row[2]) for row in ((a, b, c), (b, c, a), (c, a, b))
+    )
+    far = np.maximum(np.maximum(ab, bc), ca)
+    gap = np.where(far > NEAR, last - first, 1.0)
+    apart = (divided(middle, last) - divided(first, middle)) / gap
+    return np.asarray(np.where(far > NEAR, apart, _close(a, b, c)))
+
+
+def _close(a: Complex, b: Complex, c: Complex) -> Complex:
+    """Return the second divided difference at points that lie close, by Taylor's series around their mean.
+
+    ``[a, b, c] x^(k+2)`` is the complete symmetric polynomial h_k, by the recursion of its generating function.
+    """
+    mean = (a + b + c) / 3.0
+    x, y, z = a - mean, b - mean, c - mean
+    # 1 - e1 X + e2 X^2 - e3 X^3 generates 1/sum h_k X^k, with e1 = 0
+    e2, e3 = x * y + y * z + z * x, x * y * z
+    h = [np.ones_like(mean), np.zeros_like(mean), -e2]
+    total = h[0] / 2.0 + h[2] / 24.0
+    factorial = 24.0
+    for k in range(3, SERIES_TERMS):
+        h.append(-e2 * h[k - 2] + e3 * h[k - 3])
+        factorial *= k + 2
+        total = total + h[k] / factorial
+    return np.asarray(np.exp(mean) * total)
+
+
+class Swings(NamedTuple):
+    """The pieces of a motion; arrays that broadcast against the times."""
+
+    direction: Any
+    """Of the first piece: 1 or -1, 0 where the body sticks from the beginning."""
+    radius: Any
+    """Of the first piece."""
+    angle: Any
+    """``w t`` at the end of the first piece."""
+    turn: Any
+    """Position there."""
+    count: Any
+    """Number of half periods behind it; infinite without friction."""
+
+
+def swings(w: Any, c: Any, u_0: Any, v_0: Any) -> Swings:
+    """Return the pieces of the motion from initial values, all arrays broadcast."""
+    sticks = np.abs(u_0) <= c
+    direction = np.where(v_0 == 0, np.where(sticks, 0.0, -np.sign(u_0)), np.sign(v_0))
+    away = u_0 + direction * c
+    radius = np.where(direction == 0, 0.0, np.hypot(away, v_0 / w))
+    # the velocity vanishes where the oscillation is at its end on the side of `direction`
+    start = np.arctan2(np.abs(v_0) / w, direction * away)
+    turn = np.where(direction == 0, u_0, direction * (radius - c))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        count = np.ceil((np.abs(turn) - c) / (2.0 * c))
+    count = np.where(np.abs(turn) <= c, 0.0, count)
+    return Swings(direction, radius, np.where(direction == 0, 0.0, start), turn, count)
+
+
+def friction_motion(t: Floats, w: Any, c: Any, u_0: Any, v_0: Any) -> tuple[Floats, Floats]:
+    """Return position and velocity of ``u'' + w^2 u + w^2 c sign(u') = 0`` at times `t`: B, (86) with c = mu m g/k.
+
+    While it slides in the direction s = 1 or -1 it is a harmonic oscillation about ``-s c``. The first piece ends at
+    the first zero of the velocity; from there every piece takes half a period, ``pi/w``, and the size of the turning
+    point falls by 2 c, until one is within c of the origin: there the body sticks for ever.
+    """
+    s = swings(w, c, u_0, v_0)
+    phase = w * t
+    with np.errstate(invalid="ignore"):
+        done = np.clip(np.floor((phase - s.angle) / np.pi), 0.0, s.count)
+        size = np.abs(s.turn) - 2.0 * c * done
+        side = np.sign(s.turn) * np.where(done % 2 == 0, 1.0, -1.0)
+        # a piece that begins at rest at x slides towards the origin, about -s c = sign(x) c
+        late = phase - s.angle - np.pi * done
+        u = side * (c + (size - c) * np.cos(late))
+        v = -side * (size - c) * w * np.sin(late)
+        first = phase < s.angle
+        early = phase - s.angle
+        u = np.where(first, s.direction * (s.radius * np.cos(early) - c), u)
+        v = np.where(first, -s.direction * s.radius * w * np.sin(early), v)
+        rests = ~first & (done >= s.count)
+        u = np.where(rests, side * size, u)
+        u = np.where(s.direction == 0, u_0, u)
+        v = np.where(rests | (s.direction == 0), 0.0, v)
+    return np.asarray(u), np.asarray(v)
