@@ -32,16 +32,14 @@ class Measured:
     name: str
     unit: str
     value: Floats
-    error: Floats
-    """Estimated from the two finest levels; NaN with a single level."""
+    error: Floats  # estimated from the two finest levels; NaN with a single level
 
 
 @dataclass(frozen=True)
 class Error:
     """The norm of the error of the finest level; arrays have the shape (scheme, case)."""
 
-    true: Floats
-    """Against the exact solution; NaN where there is none."""
+    true: Floats  # against the exact solution; NaN where there is none
     estimate: Floats
     low: Floats
     high: Floats

@@ -85,15 +85,11 @@ LOWER = str.maketrans(SUPERSCRIPTS, "-0123456789")
 class Picture:
     """A figure with the words that belong to it."""
 
-    name: str
-    """Stem of its files, and unique on its page; plain."""
+    name: str  # stem of its files, and unique on its page; plain
     title: str
-    caption: str
-    """What to look for."""
-    alt: str
-    """The same content for a reader who cannot see it."""
-    figure: Figure | None
-    """None of a check where there is nothing to draw; the caption says why."""
+    caption: str  # what to look for
+    alt: str  # the same content for a reader who cannot see it
+    figure: Figure | None  # None of a check with nothing to draw; the caption says why
 
 
 @contextmanager

@@ -33,21 +33,14 @@ LEAST = 1e-4  # part of the time before which a logarithmic scale need not show 
 class EnergyError:
     """The energy error of one run as the check found it, over the energy at the start where that is not 0."""
 
-    kind: str
-    """Of `vocabulary.DRIFTS`."""
-    asked: str
-    """Kind of drift that the check asks for."""
+    kind: str  # of `vocabulary.DRIFTS`
+    asked: str  # kind of drift that the check asks for
     t: Floats
-    running: Floats
-    """The largest error so far, shape (t,)."""
-    means: Floats
-    """m3, m2, m1."""
-    round_off: float
-    """Largest error that is taken for round-off."""
-    power: float
-    """k, NaN where it cannot be told."""
-    rate: float
-    """Of the kind of drift, see `vibsim.observe.energy_drift.Drift`."""
+    running: Floats  # the largest error so far, shape (t,)
+    means: Floats  # m3, m2, m1
+    round_off: float  # largest error that is taken for round-off
+    power: float  # k, NaN where it cannot be told
+    rate: float  # of the kind of drift, see `vibsim.observe.energy_drift.Drift`
 
     @property
     def is_round_off(self) -> bool:

@@ -110,8 +110,7 @@ class GrowthScale(NamedTuple):
     """The vertical scale of growth factors."""
 
     title: str
-    less: float = 0.0
-    """What is taken from each factor."""
+    less: float = 0.0  # what is taken from each factor
     is_log: bool = False
 
 

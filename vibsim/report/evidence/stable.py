@@ -40,10 +40,8 @@ class _Run:
     """A run on its levels, of which one is judged."""
 
     levels: list[int]
-    index: int
-    """Position of the level that is judged."""
-    p: Floats
-    """w dt of every level: of several coordinates that of their fastest oscillation."""
+    index: int  # position of the level that is judged
+    p: Floats  # w dt of every level: of several coordinates that of their fastest oscillation
     limit: float
     figure: Figure
 

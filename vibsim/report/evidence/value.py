@@ -102,11 +102,9 @@ class ByLevel:
 
     levels: list[int]
     values: Floats
-    counts: list[bool]
-    """Whether it is the one that is asked for."""
+    counts: list[bool]  # whether it is the one that is asked for
     scheme: str
-    bound: float = math.nan
-    """Of the error of the extrapolated number; NaN where there is none."""
+    bound: float = math.nan  # of the error of the extrapolated number; NaN where there is none
 
     def panel(self, title: str, values: Floats, around: Floats, *, is_log: bool) -> Axes:
         """Return a new panel with some values by level in a range that holds those `around` them."""

@@ -42,8 +42,7 @@ class Panel:
     """One map."""
 
     title: str
-    table: Floats
-    """Shape (y, x) of cells or blocks; NaN where there is nothing."""
+    table: Floats  # shape (y, x) of cells or blocks; NaN where there is nothing
     label: str = ""
     """What the colours mean, with the unit."""
     kind: str = "size"
@@ -52,8 +51,7 @@ class Panel:
     scale: Floats | None = None
     """Values that set the range of the colours, where it is that of another panel."""
     spread: float = SPREAD
-    codes: tuple[tuple[str, str], ...] = ()
-    """Of kind ``code``: text and colour of every number."""
+    codes: tuple[tuple[str, str], ...] = ()  # of kind ``code``: text and colour of every number
 
 
 def verdicts(

@@ -26,8 +26,7 @@ class Curve:
 
     label: str
     values: Floats
-    sound: bool = True
-    """Whether it stands above round-off."""
+    sound: bool = True  # whether it stands above round-off
     lost: str = ""
     """Why it does not, in words; round-off where nothing is said."""
 

@@ -35,15 +35,13 @@ class Row:
     name: str
     title: str
     status: str
-    why: str
-    """Text and reason of the worst check, or what is wrong with the file."""
+    why: str  # text and reason of the worst check, or what is wrong with the file
     counts: str = "–"
     failures: str = "–"
     link: str = ""
     thumbnail: str = ""
     checks: Sequence[Mapping[str, Any]] = ()
-    broken: int = 0
-    """Number of runs that broke down."""
+    broken: int = 0  # number of runs that broke down
 
 
 def write_index(results: Path) -> None:

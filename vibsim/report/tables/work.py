@@ -28,10 +28,8 @@ class Line:
     """The points of one scheme over its levels, or of one adaptive method over its tolerances, coarse to fine."""
 
     name: str
-    labels: tuple[str, ...]
-    """Level or tolerance of every point."""
-    work: tuple[Floats, Floats, Floats]
-    """Steps, evaluations of the force, estimated seconds."""
+    labels: tuple[str, ...]  # level or tolerance of every point
+    work: tuple[Floats, Floats, Floats]  # steps, evaluations of the force, estimated seconds
     error: Floats
     is_adaptive: bool = False
 
