@@ -13,15 +13,7 @@ import numpy as np
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report import data
-from vibsim.report.data import (
-    MEMBER,
-    Member,
-    exact_periods,
-    formal_orders,
-    known,
-    norm_index,
-    whole,
-)
+from vibsim.report.data import MEMBER, Member, formal_orders, known, norm_index, whole
 from vibsim.report.style import no_zeros
 
 
@@ -113,7 +105,7 @@ def measured(record: Record, name: str, position: str) -> Measured:
 
 def period_error(record: Record, level: int) -> Floats:
     """Return the relative error of the period at a position of `level`, shape (scheme, case); NaN where not known."""
-    period, exact = known(record, "period", MEMBER, level=level), exact_periods(record)
+    period, exact = known(record, "period", MEMBER, level=level), data.exact_periods(record)
     with np.errstate(invalid="ignore", divide="ignore"):
         # on the separatrix there is no period to be wrong about
         return np.asarray(np.where(np.isinf(exact), np.nan, np.abs(period / exact - 1.0)))

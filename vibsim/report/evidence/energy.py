@@ -43,14 +43,9 @@ class EnergyError:
     rate: float  # of the kind of drift, see `vibsim.observe.energy_drift.Drift`
 
     @property
-    def is_round_off(self) -> bool:
-        """Whether the error is so small that nothing but the border tells anything."""
-        return self.kind == "none"
-
-    @property
     def has_border(self) -> bool:
         """Whether the error has to be compared with round-off."""
-        return self.is_round_off or self.asked == "none"
+        return "none" in (self.kind, self.asked)
 
     @property
     def is_broken(self) -> bool:
@@ -97,7 +92,7 @@ def picture(record: Record, check: ConservesCheck, name: str, member: Member) ->
 def _draw(ax: Axes, found: EnergyError) -> None:
     """Draw windows, error, means and the drift asked for."""
     t, end = found.t, float(found.t[-1])
-    has_bars = not (found.is_round_off or found.is_broken)
+    has_bars = found.kind != "none" and not found.is_broken
     ax.set_xlim(float(t[0]), end)
     if found.has_border or found.kind == "exponential" or found.is_broken:
         late, border = (
@@ -114,7 +109,7 @@ def _draw(ax: Axes, found: EnergyError) -> None:
             ax.axvspan(first * end, last * end, color=frame.BAND, alpha=0.6, linewidth=0, zorder=0)
     if found.has_border and found.round_off > 0.0:
         # the most that is taken for round-off; below is where the error is
-        if found.is_round_off:
+        if found.kind == "none":
             frame.allowed(ax, 0.0, found.round_off)
         ax.axhline(found.round_off, **frame.DASHED)
     ax.plot(*style.thin(t, found.running, 160), color=frame.COLOUR, linewidth=1.2)
@@ -151,7 +146,7 @@ def _told(found: EnergyError) -> str:
         f"{n} = {short(m)}" for n, m in zip(NAMES, found.means.tolist(), strict=True)
     )
     bars = f"the largest energy error so far has the means (bars) {numbers}."
-    if found.is_round_off:
+    if found.kind == "none":
         border = brief(found.round_off)
         return f"the largest energy error, {brief(most)}, is within the round-off of this run, {border}."
     if found.is_broken:

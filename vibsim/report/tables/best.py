@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from vibsim.comparison.best_values import WORDS, Scalar, scalars
+from vibsim.comparison.best_values import WORDS, scalars
 from vibsim.core.record import Record
 from vibsim.models import Model
 from vibsim.report import style
@@ -62,6 +62,9 @@ def _rows(model: Model, record: Record, shown: Sequence[Member]) -> Iterator[tup
     has_series = "scalar" in record
     for k, row in enumerate(scalars(model, not has_series)):
         name, nothing = row.variable, (None, None, None)
+        is_named = row.quantity in words.NAMES
+        text = f"{words.symbol(row.quantity)} {WORDS[row.value]}" if is_named else row.words
+        title = style.label(text, unit(record, f"{name}_richardson"))
         for member in shown:
             value = float(at(record, f"{name}_richardson", member))
             bound = float(at(record, f"{name}_richardson_error", member))
@@ -69,7 +72,7 @@ def _rows(model: Model, record: Record, shown: Sequence[Member]) -> Iterator[tup
                 continue
             index = float(at(record, f"{name}_gci", member)) if has_series else math.nan
             yield (
-                _name(record, row),
+                title,
                 member.scheme_name,
                 *([member.case_name] if swept(record) else []),
                 *(_finest(record, index, k, member) if has_series else nothing),
@@ -78,12 +81,6 @@ def _rows(model: Model, record: Record, shown: Sequence[Member]) -> Iterator[tup
                 _error(abs(value - _exact(record, name, member))),
                 *(_approach(record, k, member) if has_series else nothing),
             )
-
-
-def _name(record: Record, row: Scalar) -> str:
-    is_named = row.quantity in words.NAMES
-    text = f"{words.symbol(row.quantity)} {WORDS[row.value]}" if is_named else row.words
-    return style.label(text, unit(record, f"{row.variable}_richardson"))
 
 
 def _finest(record: Record, index: float, k: int, member: Member) -> tuple[Cell, Cell, Cell]:
