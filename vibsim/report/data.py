@@ -117,7 +117,7 @@ def pretty_unit(text: str) -> str:
     """Write a unit such as ``rad s-1`` with Unicode exponents."""
     parts = [(part, part.rstrip("-0123456789")) for part in text.split()]
     words = [base + part[len(base) :].translate(RAISE) for part, base in parts]
-    return "" if text in {"", "1"} else " ".join(words)
+    return "" if text in {"", "1"} else " ".join(words).replace("sqrt(s)", "√s")
 
 
 def norm_unit(record: Record, quantity: str, norm: str = TYPICAL_NORM) -> str:

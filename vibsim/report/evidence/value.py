@@ -82,7 +82,7 @@ def _values(
 ) -> tuple[Floats, str] | None:
     """Return a number on every level with its unit; None where the record does not have it."""
     if (field := name_of(name, "value_by_level")) in record:
-        measure = pretty_unit(unit_of(experiment, record, check)).replace("sqrt(s)", "√s")
+        measure = pretty_unit(unit_of(experiment, record, check))
         return at(record, field, member), measure
     if check.at.t is not None or check.at.step is not None:
         return None

@@ -107,17 +107,18 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         levels=len(data.whole(record, "level")),
         is_promised=_keeps_promise(record, measured, check),
     )
-    is_refuted = asserted is not None and asserted.kind == "claim" and not asserted.holds
-    unit = unit_of(experiment, record, value) if value else ""
+    # of a claim that is refuted as expected, what the reason does not say is the point
+    is_false = asserted is not None and asserted.kind == "claim" and not asserted.holds
+    is_refuted = is_false and check["reason"] == "match"
+    unit = data.pretty_unit(unit_of(experiment, record, value)) if value else ""
     wording = Wording(experiment, record, asserted, words.PAGE)
     decisive, counts = check["results"][0], check["counts"]
     facts = (decisive[key] for key in ("scheme", "case", "status", "reason", "facts"))
     result = Result(*facts)
     decides = worst(word for word, count in counts.items() if count)
-    told, listed = (
-        ", ".join(f"{n} {word}" for word, n in counts.items() if n),
-        len(check["results"]),
-    )
+    told = ", ".join(f"{n} {word}" for word, n in counts.items() if n)
+    listed = len(check["results"])
+    more = f"In all: {told}. Listed are the {listed} worst."
     # the result that decides has a settled order
     settled = check["status"] != "INCONCLUSIVE" and decisive["reason"] in SETTLED
     return {
@@ -130,19 +131,12 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         "note": getattr(asserted, "note", None) or "",
         "status": check["status"],
         "reason": check["reason"] or "–",
-        # of a claim that is refuted as expected, what the reason does not say is the point
-        "meaning": reasons.REFUTED
-        if is_refuted and check["reason"] == "match"
-        else explained.meaning,
+        "meaning": reasons.REFUTED if is_refuted else explained.meaning,
         "needs": explained.needs,
         "expected": expectation(experiment, asserted, words.PAGE),
         "factor": words.ratio(words.fact(decisive, "order")) if settled else "",
-        "results": check_tables.results(
-            record, check, data.pretty_unit(unit).replace("sqrt(s)", "√s")
-        ),
-        "more": f"In all: {told}. Listed are the {listed} worst."
-        if sum(counts.values()) > listed
-        else "",
+        "results": check_tables.results(record, check, unit),
+        "more": more if sum(counts.values()) > listed else "",
         # but for those that the check's own text has
         "where": [f"{place['text']}." for word, place in check["where"].items() if word != decides],
         "alone": _alone(check),
