@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from vibsim.core.record import Record
@@ -11,11 +9,8 @@ from vibsim.core.vocabulary import SEVERITY, TOLERANCE
 from vibsim.experiment.storage import asked
 from vibsim.report.data import Member, case_name, due, flags, formal_orders, swept
 from vibsim.report.finest_level import deviation
+from vibsim.report.types import ConvergesCheck, Experiment
 from vibsim.schemes import SCHEMES
-
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.checks import ConvergesCheck
 
 
 def promises(experiment: Experiment, record: Record, quantity: str) -> list[tuple[float, float]]:

@@ -22,10 +22,8 @@ from vibsim.simulation.scaled import has_time_unit
 
 MEMBER = ("scheme", "case")
 OF_LEVEL = ("scheme", "case", "level")
-ABOVE = 3.0
-"""A difference counts as more than round-off when it exceeds this many times the floor."""
-_LONGEST = 40
-"""Characters of the name of a scheme in the name of a file."""
+ABOVE = 3.0  # a difference counts as more than round-off when it exceeds this many times the floor
+_LONGEST = 40  # characters of the name of a scheme in the name of a file
 
 
 @dataclass(frozen=True)
@@ -119,7 +117,7 @@ def pretty_unit(text: str) -> str:
     """Write a unit such as ``rad s-1`` with Unicode exponents."""
     parts = [(part, part.rstrip("-0123456789")) for part in text.split()]
     words = [base + part[len(base) :].translate(RAISE) for part, base in parts]
-    return "" if text in {"", "1"} else " ".join(words)
+    return "" if text in {"", "1"} else " ".join(words).replace("sqrt(s)", "√s")
 
 
 def norm_unit(record: Record, quantity: str, norm: str = TYPICAL_NORM) -> str:

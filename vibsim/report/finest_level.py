@@ -13,15 +13,7 @@ import numpy as np
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report import data
-from vibsim.report.data import (
-    MEMBER,
-    Member,
-    exact_periods,
-    formal_orders,
-    known,
-    norm_index,
-    whole,
-)
+from vibsim.report.data import MEMBER, Member, formal_orders, known, norm_index, whole
 from vibsim.report.style import no_zeros
 
 
@@ -32,16 +24,14 @@ class Measured:
     name: str
     unit: str
     value: Floats
-    error: Floats
-    """Estimated from the two finest levels; NaN with a single level."""
+    error: Floats  # estimated from the two finest levels; NaN with a single level
 
 
 @dataclass(frozen=True)
 class Error:
     """The norm of the error of the finest level; arrays have the shape (scheme, case)."""
 
-    true: Floats
-    """Against the exact solution; NaN where there is none."""
+    true: Floats  # against the exact solution; NaN where there is none
     estimate: Floats
     low: Floats
     high: Floats
@@ -115,7 +105,7 @@ def measured(record: Record, name: str, position: str) -> Measured:
 
 def period_error(record: Record, level: int) -> Floats:
     """Return the relative error of the period at a position of `level`, shape (scheme, case); NaN where not known."""
-    period, exact = known(record, "period", MEMBER, level=level), exact_periods(record)
+    period, exact = known(record, "period", MEMBER, level=level), data.exact_periods(record)
     with np.errstate(invalid="ignore", divide="ignore"):
         # on the separatrix there is no period to be wrong about
         return np.asarray(np.where(np.isinf(exact), np.nan, np.abs(period / exact - 1.0)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +14,7 @@ from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.report import data
 from vibsim.report.data import MEMBER, OF_LEVEL, Member, known
 from vibsim.report.style import positive
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from vibsim.report.types import Axes
 
 WILD = 1e6
 """What exceeds the size of the motion by this factor grows without bound, and gives no frame its range."""
@@ -25,10 +23,8 @@ GROWS = "grows without bound"
 ROUND_OFF = "lost in round-off"
 UNLIKE = "no longer proportional"
 NO_VALUE = "no value"
-ALIKE = 0.004
-"""Curves that differ by less than this part of the frame's height look the same."""
-LEAVING = "Triangles at an edge: values beyond the frame."
-"""For captions."""
+ALIKE = 0.004  # curves that differ by less than this part of the frame's height look the same
+LEAVING = "Triangles at an edge: values beyond the frame."  # for captions
 
 
 def sizes(record: Record, quantity: str) -> Floats:

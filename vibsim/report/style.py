@@ -10,49 +10,29 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from vibsim.core.array_types import Floats
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from vibsim.core.record import Record
+from vibsim.core.record import Record
+from vibsim.report.types import Axes, Figure
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 DASHES: tuple[Any, ...] = (
-    "-",
-    (0, (5, 2)),
-    (0, (1.2, 1.6)),
-    (0, (6, 2, 1.2, 2)),
-    (0, (9, 2)),
-    (0, (3, 1.5, 1, 1.5, 1, 1.5)),
-    (0, (2, 3)),
-)
+    "-", (0, (5, 2)), (0, (1.2, 1.6)), (0, (6, 2, 1.2, 2)), (0, (9, 2)), (0, (3, 1.5, 1, 1.5, 1, 1.5)), (0, (2, 3)),
+)  # fmt: skip
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 GREY = "#707070"
 STATUS_MARKERS = {"PASS": "o", "INCONCLUSIVE": "s", "FAIL": "X"}
 STATUS_COLOURS = {"PASS": "#009E73", "INCONCLUSIVE": "#E69F00", "FAIL": "#D55E00"}
 REASON_COLOURS = {
-    "asymptotic": "#009E73",
-    "exact": "#8FD3BD",
-    "match": "#00553E",
-    "pre_asymptotic": "#E69F00",
-    "round_off": "#F0E442",
-    "oscillating": "#B8860B",
-    "non_smooth": "#7A5C00",
-    "too_few_levels": "#F7D9A0",
-    "not_applicable": "#CFC79A",
-    "order_low": "#D55E00",
-    "order_high": "#AA2288",
-    "mismatch": "#CC79A7",
-    "wrong_limit": "#5E3C99",
-    "unstable": "#7F1D00",
-    "non_finite": "#000000",
-}
+    "asymptotic": "#009E73", "exact": "#8FD3BD", "match": "#00553E",
+    "pre_asymptotic": "#E69F00", "round_off": "#F0E442", "oscillating": "#B8860B", "non_smooth": "#7A5C00",
+    "too_few_levels": "#F7D9A0", "not_applicable": "#CFC79A",
+    "order_low": "#D55E00", "order_high": "#AA2288", "mismatch": "#CC79A7", "wrong_limit": "#5E3C99",
+    "unstable": "#7F1D00", "non_finite": "#000000",
+}  # fmt: skip
 """Greens, yellows and reds by status, dark to light within each: the reason of a verdict on a map."""
 REFERENCE = dict[str, Any](color="black", linestyle=(0, (4, 3)), linewidth=1.0, zorder=1)
 """Of what is promised or exact."""
@@ -63,8 +43,7 @@ BESIDE = dict[str, Any](loc="upper left", bbox_to_anchor=(1.01, 1.03), borderaxe
 MISSING = "#d4d4d4"  # colour of what has no value
 WIDTH = 9.0  # of a figure [inch]
 POINTS = 400  # horizontal resolution to which a long series is thinned
-MANY = len(COLOURS)
-"""Schemes above which a figure has one legend for all of its panels."""
+MANY = len(COLOURS)  # schemes above which a figure has one legend for all of its panels
 LARGEST, TINIEST = 1e300, 1e-300  # of logarithmic axes: beyond, a margin would overflow
 LEAST, MOST = 1e-290, 1e290  # what lies beyond is drawn at the edge
 DECADES = (1, 2, 3, 5, 10, 20, 30, 50, 100, 200, 300)  # between ticks of a logarithmic axis
@@ -106,15 +85,11 @@ LOWER = str.maketrans(SUPERSCRIPTS, "-0123456789")
 class Picture:
     """A figure with the words that belong to it."""
 
-    name: str
-    """Stem of its files, and unique on its page; plain."""
+    name: str  # stem of its files, and unique on its page; plain
     title: str
-    caption: str
-    """What to look for."""
-    alt: str
-    """The same content for a reader who cannot see it."""
-    figure: Figure | None
-    """None of a check where there is nothing to draw; the caption says why."""
+    caption: str  # what to look for
+    alt: str  # the same content for a reader who cannot see it
+    figure: Figure | None  # None of a check with nothing to draw; the caption says why
 
 
 @contextmanager

@@ -17,31 +17,23 @@ from vibsim.core.record import Record
 from vibsim.report.data import swept, swept_label
 from vibsim.report.style import label
 
-FARTHEST = 1e100
-"""Swept values from here on are not drawn to scale."""
+FARTHEST = 1e100  # swept values from here on are not drawn to scale
 WIDE = 30.0
 """Positive values are drawn on a logarithmic axis only where the largest is so many times the least."""
-LINES = 6
-"""Most lines that the other parameters of a sweep may make."""
-CELLS = 400
-"""Most cells along each side of a map: more than its pixels could show."""
-BINS = 8, 100
-"""Least and most cells along each side of a map of members that lie on no grid."""
+LINES = 6  # most lines that the other parameters of a sweep may make
+CELLS = 400  # most cells along each side of a map: more than its pixels could show
+BINS = 8, 100  # least and most cells along each side of a map of members that lie on no grid
 
 
 @dataclass(frozen=True)
 class Key:
     """One swept key; option words are numbered in the order of the alphabet."""
 
-    key: str
-    """Dotted."""
+    key: str  # dotted
     unit: str
-    values: Floats
-    """Of every member, shape (case,)."""
-    distinct: Floats
-    """Ascending."""
-    words: tuple[str, ...] = ()
-    """What the numbers stand for, where they are words."""
+    values: Floats  # of every member, shape (case,)
+    distinct: Floats  # ascending
+    words: tuple[str, ...] = ()  # what the numbers stand for, where they are words
 
     @property
     def label(self) -> str:
@@ -106,10 +98,8 @@ class Grid:
 
     x: Key
     y: Key
-    borders: tuple[Floats, Floats]
-    """Of the cells along x and y."""
-    cell: NDArray[np.intp]
-    """Position of every member in the table (y, x) of cells, shape (case,)."""
+    borders: tuple[Floats, Floats]  # of the cells along x and y
+    cell: NDArray[np.intp]  # position of every member in the table (y, x) of cells, shape (case,)
     note: str = ""
     """What a cell stands for, where it is not one member."""
 
@@ -178,8 +168,7 @@ class Along:
     key: Key
     lines: tuple[tuple[str, NDArray[np.intp]], ...]
     """Members that belong to one line, in ascending order of the key, with a name; without where there is one line."""
-    follows: bool = False
-    """Whether other keys change with this one."""
+    follows: bool = False  # whether other keys change with this one
 
 
 def along_of(found: list[Key]) -> Along | None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,50 +21,31 @@ from vibsim.report.data import Member, at, pick, time_label, times, unit, whole
 from vibsim.report.evidence import frame
 from vibsim.report.evidence.frame import brief, evidence, measured, short
 from vibsim.report.style import Picture
+from vibsim.report.types import Axes, ConservesCheck
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from vibsim.experiment.schema.checks import ConservesCheck
-
-WINDOWS = ((0.125, 0.25), (0.25, 0.5), (0.5, 1.0))
-"""In parts of the end, those of m3, m2 and m1."""
+WINDOWS = ((0.125, 0.25), (0.25, 0.5), (0.5, 1.0))  # in parts of the end, those of m3, m2 and m1
 NAMES = ("m₃", "m₂", "m₁")
-POWERS = {"linear": 1, "quadratic": 2}
-"""Of t, in proportion to which a drift grows."""
-LEAST = 1e-4
-"""Part of the time before which a logarithmic scale need not show the error."""
+POWERS = {"linear": 1, "quadratic": 2}  # of t, in proportion to which a drift grows
+LEAST = 1e-4  # part of the time before which a logarithmic scale need not show the error
 
 
 @dataclass(frozen=True)
 class EnergyError:
     """The energy error of one run as the check found it, over the energy at the start where that is not 0."""
 
-    kind: str
-    """Of `vocabulary.DRIFTS`."""
-    asked: str
-    """Kind of drift that the check asks for."""
+    kind: str  # of `vocabulary.DRIFTS`
+    asked: str  # kind of drift that the check asks for
     t: Floats
-    running: Floats
-    """The largest error so far, shape (t,)."""
-    means: Floats
-    """m3, m2, m1."""
-    round_off: float
-    """Largest error that is taken for round-off."""
-    power: float
-    """k, NaN where it cannot be told."""
-    rate: float
-    """Of the kind of drift, see `vibsim.observe.energy_drift.Drift`."""
-
-    @property
-    def is_round_off(self) -> bool:
-        """Whether the error is so small that nothing but the border tells anything."""
-        return self.kind == "none"
+    running: Floats  # the largest error so far, shape (t,)
+    means: Floats  # m3, m2, m1
+    round_off: float  # largest error that is taken for round-off
+    power: float  # k, NaN where it cannot be told
+    rate: float  # of the kind of drift, see `vibsim.observe.energy_drift.Drift`
 
     @property
     def has_border(self) -> bool:
         """Whether the error has to be compared with round-off."""
-        return self.is_round_off or self.asked == "none"
+        return "none" in (self.kind, self.asked)
 
     @property
     def is_broken(self) -> bool:
@@ -112,7 +92,7 @@ def picture(record: Record, check: ConservesCheck, name: str, member: Member) ->
 def _draw(ax: Axes, found: EnergyError) -> None:
     """Draw windows, error, means and the drift asked for."""
     t, end = found.t, float(found.t[-1])
-    has_bars = not (found.is_round_off or found.is_broken)
+    has_bars = found.kind != "none" and not found.is_broken
     ax.set_xlim(float(t[0]), end)
     if found.has_border or found.kind == "exponential" or found.is_broken:
         late, border = (
@@ -129,7 +109,7 @@ def _draw(ax: Axes, found: EnergyError) -> None:
             ax.axvspan(first * end, last * end, color=frame.BAND, alpha=0.6, linewidth=0, zorder=0)
     if found.has_border and found.round_off > 0.0:
         # the most that is taken for round-off; below is where the error is
-        if found.is_round_off:
+        if found.kind == "none":
             frame.allowed(ax, 0.0, found.round_off)
         ax.axhline(found.round_off, **frame.DASHED)
     ax.plot(*style.thin(t, found.running, 160), color=frame.COLOUR, linewidth=1.2)
@@ -166,7 +146,7 @@ def _told(found: EnergyError) -> str:
         f"{n} = {short(m)}" for n, m in zip(NAMES, found.means.tolist(), strict=True)
     )
     bars = f"the largest energy error so far has the means (bars) {numbers}."
-    if found.is_round_off:
+    if found.kind == "none":
         border = brief(found.round_off)
         return f"the largest energy error, {brief(most)}, is within the round-off of this run, {border}."
     if found.is_broken:

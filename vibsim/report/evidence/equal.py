@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,34 +14,29 @@ from vibsim.report.evidence import frame
 from vibsim.report.evidence.frame import brief, evidence, measured, short
 from vibsim.report.style import Picture
 from vibsim.report.text import words
+from vibsim.report.text.assertions import SOLUTIONS
+from vibsim.report.types import EqualCheck
 
-if TYPE_CHECKING:
-    from vibsim.experiment.schema.checks import EqualCheck
-
-OTHERS = {"exact": "the exact solution", "discrete": "the exact solution of its own steps"}
 DIPS = 10.0
 """Percentage of the places whose difference is so small, near a zero, that the scale need not show it."""
 
 
 def picture(record: Record, check: EqualCheck, name: str, member: Member) -> Picture | None:
     """Draw the size of the difference of two solutions over time, on a logarithmic scale."""
-    field = name_of(name, "distance_over_time")
-    distance = np.asarray(data.pick(record, field, case=member.case), dtype=np.float64)
+    distance = data.at(record, name_of(name, "distance_over_time"), member)
     bound, level, most = (
         measured(record, name, field, member.scheme, member.case)
         for field in ("allowed", "level", "distance")
     )
-    second = OTHERS.get(check.second, check.second)
+    second = SOLUTIONS.get(check.second, check.second)
     who = f"{member.title}, level {level:.0f}: its {words.symbol(check.quantity)}"
     if not np.isfinite(distance).any():
         return None
     seen = frame.usable(distance)
     if not seen.size:
         return evidence(f"{who} and that of {second} are the same bit by bit at every time.")
-    title = style.label(
-        f"difference of {words.symbol(check.quantity)}",
-        data.unit(record, f"{check.quantity}_finest"),
-    )
+    measure = data.unit(record, f"{check.quantity}_finest")
+    title = style.label(f"difference of {words.symbol(check.quantity)}", measure)
     figure = style.canvas(1.0)
     ax = frame.panel(figure, title, data.time_label(record), frame.WIDE)
     ends = data.ends_of(record)
@@ -59,15 +53,14 @@ def picture(record: Record, check: EqualCheck, name: str, member: Member) -> Pic
     largest = float(distance[nearest])
     frame.points(ax, [t[nearest]], distance[[nearest]], [True])
     # a number that is not finite is the largest of all
-    told = "; then the run breaks down" if math.isnan(most) else _allowed(largest, bound)
+    if math.isnan(most):
+        told = "; then the run breaks down"
+    elif math.isnan(bound):
+        told = "; what rounding may make of it is not known"
+    elif bound == 0.0:
+        told = "; none is allowed"
+    else:
+        times = f"{brief(largest / bound)} times the {short(bound)}"
+        told = f", {times} that is allowed (dashed; grey is below it)"
     where = f"It is largest at t = {short(float(t[nearest]))}, {short(largest)} (dot)"
     return evidence(f"{who} less that of {second}. {where}{told}.", title, figure)
-
-
-def _allowed(distance: float, allowed: float) -> str:
-    """Say what the largest difference may be."""
-    if math.isnan(allowed):
-        return "; what rounding may make of it is not known"
-    if allowed == 0.0:
-        return "; none is allowed"
-    return f", {brief(distance / allowed)} times the {short(allowed)} that is allowed (dashed; grey is below it)"

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from vibsim.checks.fields import name_of
+from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import DECISIVE
 from vibsim.report import style, sweep_layout
@@ -21,14 +22,9 @@ from vibsim.report.evidence import energy, equal, frame, order, stable, value
 from vibsim.report.evidence.frame import GrowthScale, evidence, usable
 from vibsim.report.style import Picture
 from vibsim.report.text import words
+from vibsim.report.types import Check, ConservesCheck, EqualCheck, Experiment, StableCheck
 
-if TYPE_CHECKING:
-    from vibsim.core.array_types import Floats
-    from vibsim.experiment import Check, Experiment
-    from vibsim.experiment.schema.checks import ConservesCheck, EqualCheck, StableCheck
-
-MANY = 60
-"""Up to so many members each has a dot; of more the range is drawn."""
+MANY = 60  # up to so many members each has a dot; of more the range is drawn
 ALONE = "a run of so many samples keeps no series over time, so that nothing is drawn: the number alone decides."
 BESIDE = {
     "stable": ("predicted_growth", "; orange is what theory predicts, for small oscillations"),
@@ -92,7 +88,14 @@ def _of_members(
     known = usable(values)
     if not known.size:
         return evidence(f"{member.title}: no member has a number that could be drawn.")
-    up = _scale(record, check, known)
+    if check.kind == "stable":
+        up = frame.growth_scale(known)
+    elif check.kind == "conserves":
+        up = GrowthScale("largest energy error / E(0)", is_log=True)
+    else:
+        measure = unit(record, f"{check.quantity}_difference_norm")
+        text = f"largest difference of {words.symbol(check.quantity)}"
+        up = GrowthScale(style.label(text, measure), is_log=True)
     # members that differ by rounding are alike on the scale
     is_growth = check.kind == "stable"
     around = frame.ALIKE if is_growth else np.median(known) * 10.0 ** np.array([-0.5, 0.5])
@@ -119,15 +122,3 @@ def _of_members(
         f"the one that decides, {member.case_name}{more if usable(beside).size else ''}."
     )
     return evidence(caption, up.title, figure)
-
-
-def _scale(
-    record: Record, check: StableCheck | ConservesCheck | EqualCheck, values: Floats
-) -> GrowthScale:
-    if check.kind == "stable":
-        return frame.growth_scale(values)
-    if check.kind == "conserves":
-        return GrowthScale("largest energy error / E(0)", is_log=True)
-    measure = unit(record, f"{check.quantity}_difference_norm")
-    title = style.label(f"largest difference of {words.symbol(check.quantity)}", measure)
-    return GrowthScale(title, is_log=True)

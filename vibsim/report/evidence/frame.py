@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,30 +14,21 @@ from vibsim.report import frame, style
 from vibsim.report.data import pick
 from vibsim.report.style import Picture
 from vibsim.report.text import words
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from vibsim.report.types import Axes, Figure
 
 INK, SOFT, BAND = "#1b1b1b", "#555555", "#e4e4e4"
 COLOUR, SECOND = style.COLOURS[0], style.COLOURS[1]
 LEFT, RIGHT, ABOVE, BELOW, HEIGHT = 0.6, 0.35, 0.2, 0.38, 1.0
 """Room around a panel, and its height [inch]."""
-WIDE = 3.3
-"""Width of a panel over time [inch]."""
-SIZE = 8.0
-"""Of letters [point]."""
-MOST_LEVELS = 12
-"""With more of them every second one is named."""
-FEWEST = 2
-"""Round numbers on a scale: one alone does not tell how large a curve is."""
+WIDE = 3.3  # width of a panel over time [inch]
+SIZE = 8.0  # of letters [point]
+MOST_LEVELS = 12  # with more of them every second one is named
+FEWEST = 2  # round numbers on a scale: one alone does not tell how large a curve is
 DASHED: dict[str, Any] = {"color": INK, "linewidth": 0.8, "linestyle": (0, (4, 3))}
 ALIKE = np.array([1.0 - 1e-11, 1.0 + 1e-11])
 """Growth factors between these differ by rounding only: a scale need not tell them apart."""
-NEAR_ONE = 0.02
-"""Growth factors that are all so near to 1 are shown less 1."""
-FACTOR = 3.0
-"""Growth factors beyond this, or one over it, have a logarithmic scale."""
+NEAR_ONE = 0.02  # growth factors that are all so near to 1 are shown less 1
+FACTOR = 3.0  # growth factors beyond this, or one over it, have a logarithmic scale
 
 
 def evidence(caption: str, alt: str = "", figure: Figure | None = None) -> Picture:
@@ -119,8 +110,7 @@ class GrowthScale(NamedTuple):
     """The vertical scale of growth factors."""
 
     title: str
-    less: float = 0.0
-    """What is taken from each factor."""
+    less: float = 0.0  # what is taken from each factor
     is_log: bool = False
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,11 +15,7 @@ from vibsim.report.figures.order import draw_stated
 from vibsim.report.figures.time import differences as curves_of_differences
 from vibsim.report.style import Picture
 from vibsim.report.text import words
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from vibsim.experiment.schema.checks import ConvergesCheck
+from vibsim.report.types import ConvergesCheck, Figure
 
 
 def picture(record: Record, check: ConvergesCheck, member: Member) -> Picture | None:

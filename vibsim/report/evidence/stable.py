@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,18 +23,11 @@ from vibsim.report.evidence import frame
 from vibsim.report.evidence.frame import brief, evidence, measured, short, usable
 from vibsim.report.style import Picture
 from vibsim.report.text import words
+from vibsim.report.types import Axes, Experiment, Figure
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from vibsim.experiment import Experiment
-
-WIDTH = 1.56
-"""Of a panel [inch]."""
+WIDTH = 1.56  # of a panel [inch]
 MOST_LEVELS = 8
-NEAR_LIMIT = 0.02
-"""A step so near to the limit, as a part of it, is told with its distance."""
+NEAR_LIMIT = 0.02  # a step so near to the limit, as a part of it, is told with its distance
 NO_LIMIT = {
     0.0: "The scheme grows at every step, so that w dt has no limit to be compared with. ",
     math.inf: "The scheme has no limit of w dt. ",
@@ -48,10 +40,8 @@ class _Run:
     """A run on its levels, of which one is judged."""
 
     levels: list[int]
-    index: int
-    """Position of the level that is judged."""
-    p: Floats
-    """w dt of every level: of several coordinates that of their fastest oscillation."""
+    index: int  # position of the level that is judged
+    p: Floats  # w dt of every level: of several coordinates that of their fastest oscillation
     limit: float
     figure: Figure
 

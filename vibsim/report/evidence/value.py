@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,16 +17,10 @@ from vibsim.core.record import Record
 from vibsim.report import style
 from vibsim.report.data import OF_LEVEL, Member, at, norm_index, norm_unit, pretty_unit, unit, whole
 from vibsim.report.evidence import frame
-from vibsim.report.evidence.frame import COLOUR, evidence, measured
-from vibsim.report.figures.panels import figure_of
+from vibsim.report.evidence.frame import evidence, measured
 from vibsim.report.style import Picture
 from vibsim.report.text import words
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.checks import ValueCheck
+from vibsim.report.types import Axes, Experiment, ValueCheck
 
 WIDE = 30.0
 """Positive numbers of which the largest is more than so many times the least have a logarithmic scale."""
@@ -40,16 +33,40 @@ def picture(
     found = _values(experiment, record, check, name, member)
     if found is None or not np.isfinite(found[0]).any():
         return None
-    values, measure = found
-    row = _row(record, check, name, member, style.label(_spoken(check), measure), values)
-    if not np.isfinite(row.values[row.counts]).any():
+    row = _row(record, check, name, member, found[0])
+    values, title, number = row.values, style.label(_spoken(check), found[1]), words.number
+    if not np.isfinite(values[row.counts]).any():
         return None
+    bar = values[-1] + np.array([-row.bound, row.bound])
     if check.equals is None:
-        return _beside_border(row, check)
+        return _beside_border(row, check, title, bar)
+    wanted, allowed = check.equals, check.allowed
+    away = np.abs(values - wanted)
+    known = frame.usable(away)
     # what a coarser level has to give is no limit that the others approach
     is_limit = row.counts[-1] or check.at.level is None
-    drawn = _distance(row, check.equals, check.allowed) if is_limit else None
-    return drawn or _within(row, check.equals, check.allowed)
+    if not is_limit or not known.size or allowed <= 0.0:
+        around = wanted + np.array([-allowed, allowed])
+        ax = row.panel(title, values, around, is_log=False)
+        told = f"what the tolerance allows around {number(wanted, 'step')} (dashed)"
+        return row.finish(ax, (around[0], around[1]), wanted, bar, told)
+    ends = np.maximum(away[-1] + np.array([-row.bound, row.bound]), 0.0)
+    around = np.append(ends[1:], [allowed, 0.1 * known.max()])
+    ax = row.panel(f"distance of {title} from {number(wanted, 'step')}", away, around, is_log=True)
+    edge = "; a triangle at the lower edge has no distance at all" if np.any(away == 0.0) else ""
+    return row.finish(ax, (0.0, allowed), allowed, ends, f"what the tolerance allows{edge}")
+
+
+def _beside_border(row: ByLevel, check: ValueCheck, title: str, bar: Floats) -> Picture | None:
+    """Draw a number by level beside the one that it must be below or above."""
+    border = check.above if check.below is None else check.below
+    if border is None:
+        return None
+    known = np.append(style.finite(row.values), border)
+    is_log = bool(known.min() > 0.0 and known.max() > WIDE * known.min())
+    ax = row.panel(title, row.values, np.append(bar, border), is_log=is_log)
+    band = (border, math.inf) if check.below is None else (-math.inf, border)
+    return row.finish(ax, band, border, bar, "where it should lie")
 
 
 def _spoken(check: ValueCheck) -> str:
@@ -65,7 +82,7 @@ def _values(
 ) -> tuple[Floats, str] | None:
     """Return a number on every level with its unit; None where the record does not have it."""
     if (field := name_of(name, "value_by_level")) in record:
-        measure = pretty_unit(unit_of(experiment, record, check)).replace("sqrt(s)", "√s")
+        measure = pretty_unit(unit_of(experiment, record, check))
         return at(record, field, member), measure
     if check.at.t is not None or check.at.step is not None:
         return None
@@ -83,19 +100,11 @@ def _values(
 class ByLevel:
     """A number on every level, and behind them perhaps the one that is extrapolated."""
 
-    name: str
     levels: list[int]
     values: Floats
-    counts: list[bool]
-    """Whether it is the one that is asked for."""
+    counts: list[bool]  # whether it is the one that is asked for
     scheme: str
-    bound: float = math.nan
-    """Of the error of the extrapolated number; NaN where there is none."""
-
-    @property
-    def bar(self) -> Floats:
-        """The ends of the error bar of the extrapolated number; NaN where there is none."""
-        return np.asarray(self.values[-1] + np.array([-self.bound, self.bound]))
+    bound: float = math.nan  # of the error of the extrapolated number; NaN where there is none
 
     def panel(self, title: str, values: Floats, around: Floats, *, is_log: bool) -> Axes:
         """Return a new panel with some values by level in a range that holds those `around` them."""
@@ -107,68 +116,30 @@ class ByLevel:
         frame.points(ax, places, values, self.counts)
         return ax
 
-    def finish(self, ax: Axes, ends: Floats, told: str) -> Picture:
-        """Return the picture of a panel, with an error bar between two `ends` where they are known."""
+    def finish(
+        self, ax: Axes, band: tuple[float, float], border: float, ends: Floats, told: str
+    ) -> Picture:
+        """Fill a band, draw a border and an error bar between two `ends` where they are known."""
+        frame.allowed(ax, *band)
+        ax.axhline(border, **frame.DASHED)
         bar = ""
         if np.isfinite(ends).all():
-            ax.plot(np.full(2, self.levels[-1] + 1.0), ends, color=COLOUR, linewidth=1.2)
+            ax.plot(np.full(2, self.levels[-1] + 1.0), ends, color=frame.COLOUR, linewidth=1.2)
             bar = "; the bar is the bound of its error"
         one = len(self.levels) == 1 and len(self.values) == 1
         head = f"{self.scheme}, level {self.levels[0]}" if one else f"{self.scheme}, level by level"
         caption = f"{head}: filled the one that is asked for{bar}; grey is {told}."
-        return evidence(caption, ax.get_title(loc="left"), figure_of(ax))
+        return evidence(caption, ax.get_title(loc="left"), ax.get_figure(root=True))
 
 
-def _row(
-    record: Record, check: ValueCheck, name: str, member: Member, title: str, values: Floats
-) -> ByLevel:
+def _row(record: Record, check: ValueCheck, name: str, member: Member, values: Floats) -> ByLevel:
     """Return the numbers of the levels, and behind them the extrapolated one where that is asked for."""
     levels = whole(record, "level")
     if check.at.level != "best":
         own = own_levels(check.value, levels) or levels
         level = own[-1] if check.at.level is None else check.at.level
-        return ByLevel(title, levels, values, [one == level for one in levels], member.title)
+        return ByLevel(levels, values, [one == level for one in levels], member.title)
     place = member.scheme, member.case
     best, bound = (measured(record, name, field, *place) for field in ("value", "error_bound"))
     counts = [False] * len(levels) + [True]
-    return ByLevel(title, levels, np.append(values, best), counts, member.title, bound)
-
-
-def _beside_border(row: ByLevel, check: ValueCheck) -> Picture | None:
-    """Draw a number by level beside the one that it must be below or above."""
-    border = check.above if check.below is None else check.below
-    if border is None:
-        return None
-    known = np.append(row.values[np.isfinite(row.values)], border)
-    is_log = bool(known.min() > 0.0 and known.max() > WIDE * known.min())
-    ax = row.panel(row.name, row.values, np.append(row.bar, border), is_log=is_log)
-    frame.allowed(ax, *((border, math.inf) if check.below is None else (-math.inf, border)))
-    ax.axhline(border, **frame.DASHED)
-    return row.finish(ax, row.bar, "where it should lie")
-
-
-def _distance(row: ByLevel, wanted: float, allowed: float) -> Picture | None:
-    """Draw how far a number is from what it should be, on a logarithmic scale; None where nothing is allowed."""
-    away = np.abs(row.values - wanted)
-    known = frame.usable(away)
-    if not known.size or allowed <= 0.0:
-        return None
-    ends = np.maximum(away[-1] + np.array([-row.bound, row.bound]), 0.0)
-    around = np.append(ends[1:], [allowed, 0.1 * known.max()])
-    title = f"distance of {row.name} from {words.number(wanted, 'step')}"
-    ax = row.panel(title, away, around, is_log=True)
-    frame.below(ax, allowed)
-    told = "what the tolerance allows"
-    if np.any(away == 0.0):
-        told += "; a triangle at the lower edge has no distance at all"
-    return row.finish(ax, ends, told)
-
-
-def _within(row: ByLevel, wanted: float, allowed: float) -> Picture:
-    """Draw a number by level beside the one that it should equal."""
-    around = wanted + np.array([-allowed, allowed])
-    ax = row.panel(row.name, row.values, around, is_log=False)
-    frame.allowed(ax, *around)
-    ax.axhline(wanted, **frame.DASHED)
-    told = f"what the tolerance allows around {words.number(wanted, 'step')} (dashed)"
-    return row.finish(ax, row.bar, told)
+    return ByLevel(levels, np.append(values, best), counts, member.title, bound)

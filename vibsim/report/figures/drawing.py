@@ -4,19 +4,13 @@ from __future__ import annotations
 
 import io
 import re
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-    from matplotlib.transforms import Bbox
+from vibsim.report.style import Picture
+from vibsim.report.types import Bbox, Figure
 
-    from vibsim.report.style import Picture
-
-FORMATS = ("svg", "png", "pdf")
-"""Formats of figures."""
+FORMATS = ("svg", "png", "pdf")  # formats of figures
 FAMILY = "'DejaVu Sans', Verdana, Arial, Helvetica, sans-serif"
-MARGIN = 0.05
-"""Between words and the border of a figure [inch]."""
+MARGIN = 0.05  # between words and the border of a figure [inch]
 _PLACES = re.compile(r' (?:d|x|y)="[^"]*"')
 _DIGITS = re.compile(r"(\.\d\d)\d+")
 _NOTHING = re.compile(

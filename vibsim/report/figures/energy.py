@@ -6,7 +6,7 @@ slope 1 and a quadratic one with 2; the error of an unstable scheme turns upward
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,18 +14,14 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report import frame, style
 from vibsim.report.data import MEMBER, flags, known, largest, pick, time_label, times, unit, whole
-from vibsim.report.figures.panels import figure_of, panels
+from vibsim.report.figures.panels import stacked
 from vibsim.report.style import Picture
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from vibsim.report.types import Axes
 
 OWN, CENTRED = "energy_deviation_running_max", "energy_deviation_d2t_running_max"
-TOGETHER = 6
-"""Most schemes in one panel."""
+TOGETHER = 6  # most schemes in one panel
 DASHED = (0, (4, 1.6))
-RANGE = 1e18
-"""Widest range of the error: what lies further below the largest is left out."""
+RANGE = 1e18  # widest range of the error: what lies further below the largest is left out
 
 
 def running(record: Record, case: int) -> Picture | None:
@@ -51,7 +47,7 @@ def running(record: Record, case: int) -> Picture | None:
     most = frame.WILD * min(sizes, default=1.0)
     names = record.words("scheme")
     groups = [range(i, min(i + TOGETHER, len(names))) for i in range(0, len(names), TOGETHER)]
-    axes = panels([2.5] * len(groups))
+    axes = stacked([2.5] * len(groups))
     leaves = False
     for ax, group in zip(axes, groups, strict=True):
         for s in group:
@@ -82,7 +78,7 @@ def running(record: Record, case: int) -> Picture | None:
         "What is within round-off is left out where it is zero."
         + (f" {frame.LEAVING} They grow without bound." if leaves else ""),
         alt="Running maximum of the energy error of every scheme, with two velocities, against time, logarithmic",
-        figure=figure_of(axes[0]),
+        figure=axes[0].get_figure(root=True),
     )
 
 

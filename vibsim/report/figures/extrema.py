@@ -7,7 +7,7 @@ peak to the next one, the local amplitude half the height from a peak to the tro
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,18 +16,12 @@ from vibsim.core.record import Record
 from vibsim.report import data, frame, style
 from vibsim.report.choice import position
 from vibsim.report.data import Member, at, whole
-from vibsim.report.figures.panels import figure_of, note, panels
+from vibsim.report.figures.panels import note, stacked
 from vibsim.report.style import Picture
+from vibsim.report.types import Axes, Experiment
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from vibsim.experiment import Experiment
-
-CURVES = 6
-"""Most curves; more lie on one another."""
-MARKED = 40
-"""Most numbers of one curve that get a marker each."""
+CURVES = 6  # most curves; more lie on one another
+MARKED = 40  # most numbers of one curve that get a marker each
 MOSTLY = 0.5
 """Where fewer than this part of the curves stay so small for two peaks or more, the scale is logarithmic."""
 WILD = 10.0
@@ -45,7 +39,7 @@ def local(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     runs = _runs(record, [member for member in shown if member.case == case])
     if not runs:
         return None
-    axes = panels([2.1, 2.1, 2.1])
+    axes = stacked([2.1, 2.1, 2.1])
     exact = float(data.exact_periods(record)[case])
     start = first_peak(experiment, record, case, exact)
     looks = _looks(runs)
@@ -68,8 +62,7 @@ def local(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     ):
         # amplitudes that hardly differ need long numbers
         ax.yaxis.set_label_coords(-0.115, 0.5)
-        ax.set_ylabel(style.label(text, of))
-        ax.set_title(title)
+        ax.set(ylabel=style.label(text, of), title=title)
     axes[2].set_xlabel("number of the peak")
     for ax, lines in zip(axes, drawn, strict=True):
         _tell_alike(ax, lines, [label for label, _, _ in runs])
@@ -84,7 +77,7 @@ def local(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
         "coincide the first is wide and pale, and the legend says which they are."
         f"{f' {frame.LEAVING}' if leaves else ''}",
         alt="Local period, local amplitude and phase error against the number of the peak",
-        figure=figure_of(axes[0]),
+        figure=axes[0].get_figure(root=True),
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from shlex import quote
-from typing import TYPE_CHECKING
 
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import SEVERITY
@@ -24,9 +23,7 @@ from vibsim.report.figures import (
     work,
 )
 from vibsim.report.style import Picture
-
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
+from vibsim.report.types import Experiment
 
 FEW = 3
 """Schemes up to which each one's figures over time stand before those that lay schemes beside each other."""

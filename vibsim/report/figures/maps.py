@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,30 +19,20 @@ from vibsim.report.figures.separatrix import separatrix
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Grid
 from vibsim.report.text import words
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from vibsim.experiment import Experiment
+from vibsim.report.types import Axes, Experiment, Figure
 
 COLUMNS = 3
 LEFT, WIDE, TALL, GAP = 0.68, 2.52, 2.1, 0.27
 """Left margin, width and height of a panel, gap between panels [inch]."""
 ABOVE, BELOW = 0.32, 1.12
 """Room for the title above a panel, for ticks and the scale below it [inch]."""
-BORDERED = 400
-"""Most cells that are drawn one by one, with borders; more are one image."""
-DECADES = 12.0
-"""Most decades that a logarithmic scale spans, from the largest value down."""
+BORDERED = 400  # most cells that are drawn one by one, with borders; more are one image
+DECADES = 12.0  # most decades that a logarithmic scale spans, from the largest value down
 SPREAD = 20.0
 """Positive values that spread by more than this factor, but for a hundredth, have a logarithmic scale."""
-FEW = 5.0
-"""The same of periods: those of rotation are much shorter."""
-RANGE = 0.5
-"""Distance from the promised order at which the colours end."""
-APART = 0.025
-"""Distance between the dots of a separatrix, as part of the panel."""
+FEW = 5.0  # the same of periods: those of rotation are much shorter
+RANGE = 0.5  # distance from the promised order at which the colours end
+APART = 0.025  # distance between the dots of a separatrix, as part of the panel
 SHOWN_ALREADY = ("period", "period_error", "exact_period", "amplitude")
 """Values of checks that have maps of their own."""
 
@@ -52,8 +42,7 @@ class Panel:
     """One map."""
 
     title: str
-    table: Floats
-    """Shape (y, x) of cells or blocks; NaN where there is nothing."""
+    table: Floats  # shape (y, x) of cells or blocks; NaN where there is nothing
     label: str = ""
     """What the colours mean, with the unit."""
     kind: str = "size"
@@ -62,8 +51,7 @@ class Panel:
     scale: Floats | None = None
     """Values that set the range of the colours, where it is that of another panel."""
     spread: float = SPREAD
-    codes: tuple[tuple[str, str], ...] = ()
-    """Of kind ``code``: text and colour of every number."""
+    codes: tuple[tuple[str, str], ...] = ()  # of kind ``code``: text and colour of every number
 
 
 def verdicts(
@@ -104,15 +92,29 @@ def motion(experiment: Experiment, record: Record, grid: Grid, scheme: int) -> P
         finest_level.measured(record, name, position(experiment))
         for name in ("period", "amplitude")
     )
-    panels: list[Panel] = []
-    if np.isfinite(time.value[scheme]).any():
-        panels += _periods(record, grid, time, scheme)
-    for title, text, values in (
-        ("Amplitude", "amplitude", size.value[scheme]),
-        ("Error bar of the amplitude", "estimated error", size.error[scheme]),
-    ):
-        if np.isfinite(size.value[scheme]).any() and np.isfinite(values).any():
-            panels.append(Panel(title, grid.worst(values), style.label(text, size.unit)))
+    value, exact = time.value[scheme], exact_periods(record)
+    label = style.label("period", time.unit)
+    both = {"scale": style.finite(value, exact), "spread": FEW}
+    with np.errstate(invalid="ignore", divide="ignore"):
+        relative = time.error[scheme] / value
+    rows: list[tuple[str, Floats, str, dict[str, Any]]] = []
+    if np.isfinite(value).any():
+        rows += [
+            ("Period", value, label, both),
+            ("Exact period", np.where(np.isfinite(exact), exact, np.nan), label, both),
+            ("Relative error of the period", finest_level.period_error(record, -1)[scheme], "|period / exact − 1|", {}),
+            ("Error bar of the period", relative, "estimated error / period", {}),
+        ]  # fmt: skip
+    if np.isfinite(size.value[scheme]).any():
+        rows += [
+            ("Amplitude", size.value[scheme], style.label("amplitude", size.unit), {}),
+            ("Error bar of the amplitude", size.error[scheme], style.label("estimated error", size.unit), {}),
+        ]  # fmt: skip
+    panels = [
+        Panel(title, grid.worst(values), text, **more)
+        for title, values, text, more in rows
+        if np.isfinite(values).any()
+    ]
     if not panels:
         return None
     several = of_several(record, scheme)
@@ -161,48 +163,28 @@ def _picture(
     return Picture(name, title, text, alt, draw(grid, panels, ridge))
 
 
-def _periods(record: Record, grid: Grid, time: finest_level.Measured, scheme: int) -> list[Panel]:
-    exact, value = exact_periods(record), time.value[scheme]
-    label, scale = style.label("period", time.unit), style.finite(value, exact)
-    panels = [Panel("Period", grid.worst(value), label, scale=scale, spread=FEW)]
-    if np.isfinite(exact).any():
-        known = grid.worst(np.where(np.isfinite(exact), exact, np.nan))
-        relative = grid.worst(finest_level.period_error(record, -1)[scheme])
-        panels += [
-            Panel("Exact period", known, label, scale=scale, spread=FEW),
-            Panel("Relative error of the period", relative, "|period / exact − 1|"),
-        ]
-    if np.isfinite(time.error[scheme]).any():
-        with np.errstate(invalid="ignore", divide="ignore"):
-            relative = grid.worst(time.error[scheme] / value)
-        panels.append(Panel("Error bar of the period", relative, "estimated error / period"))
-    return panels
-
-
-def _codes(
-    title: str, grid: Grid, values: Floats, present: list[int], texts: list[tuple[str, str]]
-) -> Panel:
-    """Return a map of whole numbers, each with a text, to which its count is added, and a colour; the last is worst."""
-    place = np.full(values.shape, np.nan)
-    for i, code in enumerate(present):
+def _codes(title: str, grid: Grid, values: Floats, codes: list[tuple[int, str, str]]) -> Panel:
+    """Return a map of whole numbers, each with its text, to which its count is added, and colour; the last is worst."""
+    place, texts = np.full(values.shape, np.nan), []
+    for i, (code, text, colour) in enumerate(codes):
         place[values == code] = i
-    counts = [words.number(int(np.sum(values == code)), "integer") for code in present]
-    named = zip(texts, counts, strict=True)
-    codes = tuple((f"{text} ({count})", colour) for (text, colour), count in named)
-    return Panel(title, grid.worst(place), kind="code", codes=codes)
+        count = words.number(int(np.sum(values == code)), "integer")
+        texts.append((f"{text} ({count})", colour))
+    return Panel(title, grid.worst(place), kind="code", codes=tuple(texts))
 
 
 def _reasons(record: Record, grid: Grid, quantity: str, scheme: int) -> Panel:
     """Return the map of the reasons of the verdicts; of several members in a cell the worst."""
     reason = pick(record, f"{quantity}_reason", scheme=scheme)
     meanings = record.meanings(f"{quantity}_reason")
-    codes, counts = np.unique(reason, return_counts=True)
-    counted = dict(zip(codes.tolist(), counts.tolist(), strict=True))
+    counted = [
+        (-int(n), int(code)) for code, n in zip(*np.unique(reason, return_counts=True), strict=True)
+    ]
     # the milder first, of equal ones the rarer last
-    ranked = sorted(counted, key=lambda code: (SEVERITY[REASONS[meanings[code]]], -counted[code]))
-    named = [meanings[code] for code in ranked]
-    texts = [(f"{REASONS[word]}: {word}", style.REASON_COLOURS[word]) for word in named]
-    return _codes("Verdict", grid, reason, ranked, texts)
+    ranked = sorted(counted, key=lambda row: (SEVERITY[REASONS[meanings[row[1]]]], row[0]))
+    named = [(code, meanings[code]) for _, code in ranked]
+    codes = [(code, f"{REASONS[word]}: {word}", style.REASON_COLOURS[word]) for code, word in named]
+    return _codes("Verdict", grid, reason, codes)
 
 
 def _window(record: Record, grid: Grid, quantity: str, scheme: int) -> Panel:
@@ -210,14 +192,15 @@ def _window(record: Record, grid: Grid, quantity: str, scheme: int) -> Panel:
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
-    first = pick(record, f"{quantity}_window_first", scheme=scheme).astype(np.float64)
+    first = pick(record, f"{quantity}_window_first", scheme=scheme)
     levels = whole(record, "level")
-    shades = np.linspace(1.0, 0.0, len(levels))
-    present = [level for level in levels if np.any(first == level)]
-    colours = [to_hex(colormaps["viridis"](shades[levels.index(level)])) for level in present]
-    texts = [f"from level {level} on" for level in present]
-    named = list(zip(texts, colours, strict=True))
-    return _codes("Levels that the order rests on", grid, first, present, named)
+    shades = zip(levels, np.linspace(1.0, 0.0, len(levels)), strict=True)
+    codes = [
+        (level, f"from level {level} on", to_hex(colormaps["viridis"](shade)))
+        for level, shade in shades
+        if np.any(first == level)
+    ]
+    return _codes("Levels that the order rests on", grid, first, codes)
 
 
 def _errors(record: Record, grid: Grid, quantity: str, scheme: int) -> list[Panel]:

@@ -6,7 +6,7 @@ Few members are points; many are counted in cells, so that a page stays small ho
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,26 +21,16 @@ from vibsim.report.figures.panels import rows_of
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Key, bins, place_in
 from vibsim.report.text import words
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from vibsim.experiment import Experiment
+from vibsim.report.types import Axes, Experiment
 
 Masks = dict[str, Flags]
 """Which members come to each verdict, shape (case,)."""
-FEWEST, BARS = 60, 50
-"""Of fewer members a histogram says nothing; bars of one."""
-SHOWN = 6
-"""Most schemes, and most keys, that have a row; the members' table has all."""
-POINTS = 4000
-"""Most members that are drawn as points."""
-BEYOND = 1.5
-"""Distance from the promised order at which the frame ends."""
-SHARES = 24
-"""Most bars of shares along a key."""
-MESH = 160, 60
-"""Cells that members are counted in, along and up."""
+FEWEST, BARS = 60, 50  # of fewer members a histogram says nothing; bars of one
+SHOWN = 6  # most schemes, and most keys, that have a row; the members' table has all
+POINTS = 4000  # most members that are drawn as points
+BEYOND = 1.5  # distance from the promised order at which the frame ends
+SHARES = 24  # most bars of shares along a key
+MESH = 160, 60  # cells that members are counted in, along and up
 
 
 def histograms(experiment: Experiment, record: Record, quantity: str) -> Picture | None:
@@ -57,22 +47,21 @@ def histograms(experiment: Experiment, record: Record, quantity: str) -> Picture
     figure, axes = rows_of(len(schemes) * count, columns, 1.5, 0.36, 0.56)
     status = flags(record, f"{quantity}_status")
     missing = 0
+    level = whole(record, "level")[-1]
     for s, scheme in enumerate(schemes):
-        row = axes[s * count : (s + 1) * count]
-        allowed = tolerance(experiment, quantity, scheme)
-        row[0].set_ylabel("members")
-        row[0].set_title(f"Order of {letter}{of_several(record, s)}", fontsize=9)
-        row[0].set_xlabel(
-            f"stated order − {promised_text(record, quantity, s)}", fontsize=8.5, labelpad=2
+        allowed, several = tolerance(experiment, quantity, scheme), of_several(record, s)
+        stated = f"stated order − {promised_text(record, quantity, s)}"
+        drawn = (
+            (f"Order of {letter}{several}", stated, away[s], (-allowed, allowed)),
+            (f"Error of {letter}, level {level}", size, error.best[s], None),
+            ("Error of the period", "|period / exact − 1|", period[s], None),
         )
-        missing += _histogram(row[0], away[s], status[s], (-allowed, allowed))
-        row[1].set_title(f"Error of {letter}, level {whole(record, 'level')[-1]}", fontsize=9)
-        row[1].set_xlabel(size, fontsize=8.5, labelpad=2)
-        missing += _histogram(row[1], error.best[s], status[s])
-        if has_period:
-            row[2].set_title("Error of the period", fontsize=9)
-            row[2].set_xlabel("|period / exact − 1|", fontsize=8.5, labelpad=2)
-            missing += _histogram(row[2], period[s], status[s])
+        row = axes[s * count : (s + 1) * count]
+        row[0].set_ylabel("members")
+        for ax, (title, label, values, band) in zip(row, drawn[:count], strict=True):
+            ax.set_title(title, fontsize=9)
+            ax.set_xlabel(label, fontsize=8.5, labelpad=2)
+            missing += _histogram(ax, values, status[s], band)
     _explain(axes[0], status)
     return Picture(
         name=f"spread_{quantity}",
@@ -130,6 +119,8 @@ def projections(
     experiment: Experiment, record: Record, keys: list[Key], quantity: str, scheme: int
 ) -> Picture:
     """Draw order, error and shares of the verdicts of one scheme against every swept key."""
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
+
     letter, shown = words.symbol(quantity), keys[:SHOWN]
     columns = ((0.68, 2.5), (3.78, 2.3), (6.5, 2.3))
     figure, axes = rows_of(3 * len(shown), columns, 1.45, 0.0, 0.5)
@@ -146,7 +137,9 @@ def projections(
         text = f"order of {letter} − {promised_text(record, quantity, scheme)}"
         order.set_ylabel(text, fontsize=8.5)
         _draw_members(error_size, key, size, masks, None)
-        _label_decades(error_size)
+        # an axis of logarithms
+        error_size.yaxis.set_major_locator(MaxNLocator(5, integer=True))
+        error_size.yaxis.set_major_formatter(FuncFormatter(lambda y, _: style.power(round(y))))
         _draw_shares(share, key, masks)
         for ax in row:
             _frame(ax, key)
@@ -187,14 +180,6 @@ def _frame(ax: Axes, key: Key) -> None:
         ax.set_xticks(key.distinct, key.words)
     ax.set_xlabel(key.label, fontsize=8.5, labelpad=2)
     ax.tick_params(labelsize=7.5)
-
-
-def _label_decades(ax: Axes) -> None:
-    """Write the ticks of an axis that holds logarithms as powers of ten."""
-    from matplotlib.ticker import FuncFormatter, MaxNLocator
-
-    ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: style.power(round(y))))
 
 
 def _draw_members(

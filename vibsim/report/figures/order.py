@@ -5,7 +5,7 @@ Source: pendulum lecture, section 2.5.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,16 +18,11 @@ from vibsim.report.data import Member
 from vibsim.report.figures.panels import legend_above, rows_of
 from vibsim.report.style import Picture
 from vibsim.report.text import words
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from vibsim.experiment import Experiment
+from vibsim.report.types import Axes, Experiment
 
 SLOPES: tuple[Any, ...] = ((0, (4, 3)), (0, (1.2, 1.6)), (0, (7, 2, 1.2, 2)), (0, (10, 2)))
 """Dashes of several promised slopes."""
-WILD = 1e4
-"""Errors beyond so many times the upper quartile leave the frame."""
+WILD = 1e4  # errors beyond so many times the upper quartile leave the frame
 KINDS: dict[str, tuple[str, dict[str, Any]]] = {
     "difference": ("level difference", {"marker": "o", "linestyle": "none", "markersize": 5}),
     "true": ("true error", {"marker": "o", "linestyle": "none", "markersize": 7, "markerfacecolor": "none"}),

@@ -4,27 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.report import frame, style
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from vibsim.report.types import Axes, Figure
 
 WILD = 1e6
 """Curves whose largest value is so many times a usual one are drawn on a logarithmic scale."""
-APART = 8.0
-"""Spreads that differ by more than this are drawn on a logarithmic scale."""
-LONG = 36
-"""Letters of a label above which its unit stands in a line of its own."""
-LEGEND_COLUMNS = 7
-"""Most columns of a legend above panels."""
-STAMP = (136, 64)
-"""Width and height of the small figure of the index [pixel]."""
+APART = 8.0  # spreads that differ by more than this are drawn on a logarithmic scale
+LONG = 36  # letters of a label above which its unit stands in a line of its own
+LEGEND_COLUMNS = 7  # most columns of a legend above panels
+STAMP = (136, 64)  # width and height of the small figure of the index [pixel]
 
 
 @dataclass(frozen=True)
@@ -33,8 +26,7 @@ class Curve:
 
     label: str
     values: Floats
-    sound: bool = True
-    """Whether it stands above round-off."""
+    sound: bool = True  # whether it stands above round-off
     lost: str = ""
     """Why it does not, in words; round-off where nothing is said."""
 
@@ -52,20 +44,12 @@ class Curve:
         return "" if self.sound else self.lost or frame.ROUND_OFF
 
 
-def figure_of(axes: Axes) -> Figure:
-    """Return the figure that holds `axes`; a ValueError where they were taken out of it."""
-    figure = axes.get_figure(root=True)
-    if figure is None:
-        raise ValueError("these axes belong to no figure")
-    return figure
-
-
 def note(ax: Axes, text: str, height: float = 0.9) -> None:
     """Say within a panel, at its right, how it shows what it shows."""
     ax.text(0.99, height, text, transform=ax.transAxes, ha="right", fontsize=8.5)
 
 
-def panels(heights: list[float]) -> list[Axes]:
+def stacked(heights: list[float]) -> list[Axes]:
     """Return axes below each other with one common axis of abscissae; room for a legend at the right."""
     total = sum(heights) + 0.28 * len(heights) + 0.42
     figure = style.canvas(total)

@@ -7,38 +7,28 @@ the natural frequency w so that the orbit of a linear oscillation is a circle; e
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
+from vibsim.models import Model
 from vibsim.report import data, style
 from vibsim.report.data import Member, of_level, unit, whole
 from vibsim.report.figures.panels import legend_above, rows_of
 from vibsim.report.style import Picture
 from vibsim.report.text import words
+from vibsim.report.types import Axes, Experiment
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from vibsim.experiment import Experiment
-    from vibsim.models import Model
-
-ACROSS = 3
-"""Panels in a row of the phase plane, and most panels of the path."""
-MOST = 6
-"""Most panels of the phase plane, and most schemes in them."""
+ACROSS = 3  # panels in a row of the phase plane, and most panels of the path
+MOST = 6  # most panels of the phase plane, and most schemes in them
 CUT_ORBIT, CUT_PATH = 2.5, 1.3
 """What leaves the exact orbit or path by more than this factor is cut off."""
-PERIODS = 3.0
-"""Of a longer motion the first period and the last so many are drawn."""
-SAMPLED = 8
-"""Fewer samples than this in a period do not draw an orbit."""
-FLATTEST = 0.15
-"""Least height of the frame of a path over its width, or the other way round."""
-TALLEST = 4.5
-"""Largest height of a panel [inch]."""
+PERIODS = 3.0  # of a longer motion the first period and the last so many are drawn
+SAMPLED = 8  # fewer samples than this in a period do not draw an orbit
+FLATTEST = 0.15  # least height of the frame of a path over its width, or the other way round
+TALLEST = 4.5  # largest height of a panel [inch]
 
 Points = tuple[Floats, Floats]
 
@@ -145,10 +135,11 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
         panels = [(found[0].case_name, found, len(levels) - 1) for found in groups]
     else:
         panels = [(f"level {levels[i]}", shown, i) for i in style.spaced(len(levels), ACROSS)]
-    references = [_reference(record, names, members[0].case) for _, members, _ in panels]
-    curves = [[_path(record, names, m, level) for m in members] for _, members, level in panels]
-    both = zip(references, curves, strict=True)
-    frame = _frame([points for reference, panel in both for points in (*reference, *panel)])
+    references = [_points(record, names, members[0], None) for _, members, _ in panels]
+    is_known = [bool(np.isfinite(reference).all()) for reference in references]
+    curves = [[_points(record, names, m, level) for m in members] for _, members, level in panels]
+    each = zip(references, is_known, curves, strict=True)
+    frame = _frame([points for exact, has, panel in each for points in (*[exact] * has, *panel)])
     if frame is None:
         return None
     (left, right), (low, high) = frame
@@ -162,9 +153,9 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
             width = 1.0 + 1.8 * (len(members) - 1 - k) / len(members)
             axes[i].plot(x, y, color=style.look(k)["color"], linewidth=width, alpha=0.8)
             _draw_end(axes[i], (x, y), k, width, member.scheme_name)
-        for x, y in references[i]:
+        if is_known[i]:
             dashed = style.REFERENCE | {"zorder": 5, "linewidth": 0.8}
-            axes[i].plot(x, y, **dashed, label="reference")
+            axes[i].plot(*references[i], **dashed, label="reference")
         axes[i].set_title(title)
         axes[i].set(xlim=frame[0], ylim=frame[1], aspect="equal", ylabel=labels[1])
     axes[-1].set_xlabel(labels[0])
@@ -178,15 +169,15 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
     )
 
 
-def _path(record: Record, names: tuple[str, ...], member: Member, level: int) -> Points:
-    x, y = (of_level(record, name, member, level) for name in names)
+def _points(record: Record, names: tuple[str, ...], member: Member, level: int | None) -> Points:
+    """Return the path of a member on a level, or the exact one, which is NaN where it is not known."""
+    x, y = (
+        data.exact_series(record, name, member)
+        if level is None
+        else of_level(record, name, member, level)
+        for name in names
+    )
     return x, y
-
-
-def _reference(record: Record, names: tuple[str, ...], case: int) -> list[Points]:
-    """Return the exact path of a member in a list, which is empty where it is not known at every time."""
-    x, y = (data.known(record, f"{name}_exact", ("t",), case=case) for name in names)
-    return [(x, y)] if np.isfinite(x).all() and np.isfinite(y).all() else []
 
 
 def _frame(seen: list[Points]) -> tuple[tuple[float, float], tuple[float, float]] | None:

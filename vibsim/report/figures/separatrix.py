@@ -7,23 +7,19 @@ separatrix where the period keeps growing, and is an ordinary maximum where it d
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.report.sweep_layout import Grid, Key
-
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
+from vibsim.report.types import Experiment
 
 Period = Callable[[Floats, Floats], Floats]
 GROWTH = 1.3
 """A peak whose period grows by this factor from the best point of the grid to the last of the search has no end."""
 SECTIONS = 80
 """Golden sections: each leaves 0.618 of a bracket, so that 80 leave a rounding error of it."""
-SCANNED = 201
-"""Most lines of a grid that are searched in each direction."""
+SCANNED = 201  # most lines of a grid that are searched in each direction
 
 
 def separatrix(experiment: Experiment, grid: Grid) -> tuple[Floats, Floats]:

@@ -5,7 +5,7 @@ Source: pendulum lecture, section 2.5 (the estimate from two levels), and Richar
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,19 +13,10 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report import data, style
 from vibsim.report.data import Member
-from vibsim.report.figures.panels import (
-    decades,
-    explosive,
-    figure_of,
-    note,
-    panels,
-    stop_at_breakdown,
-)
+from vibsim.report.figures import panels
 from vibsim.report.style import Picture
 from vibsim.report.text import words
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from vibsim.report.types import Axes
 
 CUT = 3.0
 """A solution that grows beyond so many times the exact one is cut off there, and the panel says so."""
@@ -41,11 +32,10 @@ def solution(record: Record, quantity: str, member: Member) -> Picture:
     exact = data.exact_series(record, quantity, member)
     best, bound = (data.at(record, f"{quantity}_richardson{end}", member) for end in ("", "_error"))
     is_known = bool(np.isfinite(exact).any())
-    axes = panels([2.3, 2.5])
-    _draw_solution(axes[0], t, data.at(record, f"{quantity}_finest", member), best, exact,
-                   data.whole(record, "level")[-1])  # fmt: skip
-    axes[0].set_ylabel(style.label(letter, measure))
-    axes[0].set_title(f"Solution {letter}(t)")
+    axes = panels.stacked([2.3, 2.5])
+    finest = data.at(record, f"{quantity}_finest", member)
+    _draw_solution(axes[0], t, finest, best, exact, data.whole(record, "level")[-1])
+    axes[0].set(ylabel=style.label(letter, measure), title=f"Solution {letter}(t)")
     thickness = _draw_band(axes[0], t, best, bound, measure)
     _draw_errors(axes[1], t, record, quantity, member, bound, exact - best)
     axes[1].set_ylabel(style.label(f"|error of {letter}|", measure))
@@ -62,7 +52,7 @@ def solution(record: Record, quantity: str, member: Member) -> Picture:
         caption=f"Top: the finest level, and the value extrapolated from the two finest ones with its error bar"
         f"{thickness}. Bottom: the error that the difference of two levels predicts{trust}",
         alt=f"{words.name(quantity)} against time for {member.title}, and its estimated error on a logarithmic scale",
-        figure=figure_of(axes[0]),
+        figure=axes[0].get_figure(root=True),
     )
 
 
@@ -95,19 +85,19 @@ def _draw_solution(
     rows = [row for row in rows if np.isfinite(row[0]).any()]
     for y, text, look in rows:
         ax.plot(*style.thin(t, y), label=text, **look)
-    stop_at_breakdown(ax, t, [finest])
+    panels.stop_at_breakdown(ax, t, [finest])
     drawn = [y for y, _, _ in rows]
     # a run that blew up would hide the others
     ranged = [y for y in drawn if np.isfinite(y).all()] or drawn
     size = data.largest(exact) if np.isfinite(exact).all() else 0.0
     if 0.0 < size < max(map(data.largest, drawn)) / CUT:
         ax.set_ylim(-CUT * size, CUT * size)
-        note(ax, f"cut off at {CUT:g} times the exact solution", 0.11)
-    elif explosive(ranged):
+        panels.note(ax, f"cut off at {CUT:g} times the exact solution", 0.11)
+    elif panels.explosive(ranged):
         for line in ax.lines:
             line.set_ydata(style.no_zeros(np.asarray(line.get_ydata(), dtype=np.float64)))
-        style.log_axis(ax, "y", *decades(ranged))
-        note(ax, "size, without the sign", 0.11)
+        style.log_axis(ax, "y", *panels.decades(ranged))
+        panels.note(ax, "size, without the sign", 0.11)
     else:
         ax.set_ylim(*style.limits(*ranged))
     style.beside(ax)

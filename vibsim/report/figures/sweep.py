@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,21 +15,15 @@ from vibsim.report import finest_level, frame, style
 from vibsim.report.choice import position, promises
 from vibsim.report.data import due, exact_periods, flags, norm_unit, whole
 from vibsim.report.figures import separatrix
-from vibsim.report.figures.panels import explosive, figure_of, panels
+from vibsim.report.figures.panels import explosive, stacked
 from vibsim.report.finest_level import Measured
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Along
 from vibsim.report.text import words
+from vibsim.report.types import Axes, Experiment
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from vibsim.experiment import Experiment
-
-MARKED = 60
-"""Most members that get a marker each; above, a line says it better."""
-DEEP = 1e-16
-"""Errors below this part of the largest leave the frame."""
+MARKED = 60  # most members that get a marker each; above, a line says it better
+DEEP = 1e-16  # errors below this part of the largest leave the frame
 WIDE = 10.0
 """Where some amplitudes leave the frame, others that many times a usual one are drawn on a logarithmic scale."""
 
@@ -38,7 +32,7 @@ def orders(experiment: Experiment, record: Record, along: Along, quantity: str) 
     """Draw the stated order of every member and its error, with their intervals, and the verdict as a strip below."""
     schemes, letter = record.words("scheme"), words.symbol(quantity)
     row = 0.17 if style.crowded(record) else 0.3
-    axes = panels([2.3, 1.9, row * max(2, len(schemes))])
+    axes = stacked([2.3, 1.9, row * max(2, len(schemes))])
     _draw_orders(axes[0], experiment, record, along, quantity)
     kind, leaves = _draw_errors(axes[1], record, along, quantity)
     _draw_verdicts(axes[2], along, flags(record, f"{quantity}_status"), schemes)
@@ -56,7 +50,7 @@ def orders(experiment: Experiment, record: Record, along: Along, quantity: str) 
         f"{':' if kind == 'true' else ','} {error}. Bottom: what can be said of it. Members "
         f"that fail or stay open are worth a look one by one.{marked}{f' {frame.LEAVING}' if leaves else ''}",
         alt=f"Stated order of {words.name(quantity)}, its error and its verdict against the swept parameter",
-        figure=figure_of(axes[0]),
+        figure=axes[0].get_figure(root=True),
     )
 
 
@@ -69,7 +63,7 @@ def period(experiment: Experiment, record: Record, along: Along) -> Picture | No
     if not np.isfinite(found.value).any():
         return None
     is_known = bool(np.isfinite(exact).any())
-    axes = panels([2.4, 2.4] if is_known else [2.6])
+    axes = stacked([2.4, 2.4] if is_known else [2.6])
     _draw_numbers(axes[0], record, along, found, exact if is_known else None)
     if is_known:
         _draw_period_errors(axes[1], record, along, found)
@@ -90,7 +84,7 @@ def period(experiment: Experiment, record: Record, along: Along) -> Picture | No
         caption=(caption if is_known else f"The measured period on the finest level{bars}.")
         + marked,
         alt="Period and its relative error against the swept parameter",
-        figure=figure_of(axes[0]),
+        figure=axes[0].get_figure(root=True),
     )
 
 
@@ -107,7 +101,7 @@ def amplitude(experiment: Experiment, record: Record, along: Along) -> Picture |
     barred = bounded & frame.is_bounded(found.error, size)
     value, error = np.where(bounded, found.value, np.nan), np.where(barred, found.error, np.nan)
     several = bool(whole(record, "pair"))
-    axes = panels([2.0, 1.5] if several else [3.7 if style.crowded(record) else 2.2])
+    axes = stacked([2.0, 1.5] if several else [3.7 if style.crowded(record) else 2.2])
     for ax in axes:
         # amplitudes that hardly differ need long numbers
         ax.yaxis.set_label_coords(-0.115, 0.5)
@@ -134,7 +128,7 @@ def amplitude(experiment: Experiment, record: Record, along: Along) -> Picture |
         caption=f"{'Top: half' if several else 'Half'} the height between the last peak and the last trough, on the "
         f"finest level.{below}{marked}{f' {frame.LEAVING}' if leaves else ''}",
         alt=f"Amplitude{' and its estimated error' if several else ''} against the swept parameter",
-        figure=figure_of(axes[0]),
+        figure=axes[0].get_figure(root=True),
     )
 
 
@@ -298,8 +292,7 @@ def _draw_period_errors(ax: Axes, record: Record, along: Along, found: Measured)
                 look |= {"linestyle": style.look(colour)["linestyle"]}
                 _line(ax, x, style.no_zeros(of_level[s, members]), label=label, **look)
     style.fit_log_axis(ax, "y", *error.values(), room=2.0)
-    ax.set_ylabel("|period / exact − 1|")
-    ax.set_title("Relative error of the period")
+    ax.set(ylabel="|period / exact − 1|", title="Relative error of the period")
     if not style.crowded(record):
         style.beside(ax, fontsize=8)
 

@@ -7,7 +7,7 @@ Source: vibration text, sections 4.1 to 4.6, and exercise 2; theory from the mat
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,34 +16,22 @@ from vibsim.core.record import Record
 from vibsim.report import data, frame, style
 from vibsim.report.choice import position
 from vibsim.report.data import MEMBER, OF_LEVEL, Member, known, omega_dt
-from vibsim.report.figures.panels import figure_of, panels
+from vibsim.report.figures.panels import stacked
 from vibsim.report.style import Picture
 from vibsim.report.tables.theory import predicted
 from vibsim.report.text import words
+from vibsim.report.types import Axes, Experiment
 from vibsim.schemes import SCHEMES
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from vibsim.experiment import Experiment
-
-POINTS = 240
-"""Points of a curve."""
-SMALLEST = 1e-13
-"""Growth and phase error below this are round-off of what they are taken from."""
+POINTS = 240  # points of a curve
+SMALLEST = 1e-13  # growth and phase error below this are round-off of what they are taken from
 KINDS = ("growth", "phase error")
-ALIKE = 1e-9
-"""Curves that differ by less than this part of themselves are the same."""
-FEW = 40
-"""Dots of one scheme up to which they are large."""
-MOST = 6
-"""Most unstable runs that are drawn: the slowest and the fastest among them."""
-NOTABLE = 1e-3
-"""A run is drawn where it grows over the whole time by more than this part."""
-WHOLE = 4.0
-"""On a linear scale the solution is drawn up to so many times the exact one."""
-HIGHEST = 1e250
-"""Sizes beyond are not drawn."""
+ALIKE = 1e-9  # curves that differ by less than this part of themselves are the same
+FEW = 40  # dots of one scheme up to which they are large
+MOST = 6  # most unstable runs that are drawn: the slowest and the fastest among them
+NOTABLE = 1e-3  # a run is drawn where it grows over the whole time by more than this part
+WHOLE = 4.0  # on a linear scale the solution is drawn up to so many times the exact one
+HIGHEST = 1e250  # sizes beyond are not drawn
 SEEN = 0.2
 """Only runs that stay within the frame for so much of the time are drawn beside the exact solution."""
 BEYOND = 100.0
@@ -69,7 +57,7 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
     growth, phase = (
         [told, np.where(np.isnan(told), np.nan, seen)] for told, seen in (growth, phase)
     )
-    axes = panels([2.9, 2.9])
+    axes = stacked([2.9, 2.9])
     grid = np.geomspace(
         0.9 * float(np.min(style.finite(p[p > 0.0]))), 1.1 * float(np.nanmax(p)), POINTS
     )
@@ -84,7 +72,11 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
             if curve is None:
                 _dots(ax, p, told[s], look | {"marker": "+"}, "")
             else:
-                _signed(ax, grid, curve[k], look["color"])
+                y = curve[k]
+                size = np.where(np.abs(y) < SMALLEST, np.nan, np.abs(y))
+                for keep, dashes, width in ((y > 0.0, "-", 1.1), (y < 0.0, (0, (1, 1.3)), 1.5)):
+                    line: dict[str, Any] = {"linestyle": dashes, "linewidth": width}
+                    ax.plot(grid, np.where(keep, size, np.nan), color=look["color"], **line)
             _dots(ax, p, found[s], look, style.entry(name))
         _finish(ax, told, found, limits, grid)
     alike = _alike(record.words("scheme"), curves)
@@ -111,7 +103,7 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
         "what rounding or the interpolation of peaks leaves. Triangles at the upper edge are limits of stability."
         + _sentence(alike),
         alt="Growth per period and phase error per period of every scheme against w dt, predicted and measured",
-        figure=figure_of(axes[0]),
+        figure=axes[0].get_figure(root=True),
     )
 
 
@@ -162,13 +154,6 @@ def _theory(experiment: Experiment, s: int, grid: Floats) -> tuple[Floats, Float
     return np.asarray(growth), np.asarray(phase)
 
 
-def _signed(ax: Axes, x: Floats, y: Floats, colour: Any) -> None:
-    """Draw the size of a curve: solid where it is positive, dotted where it is negative."""
-    size = np.where(np.abs(y) < SMALLEST, np.nan, np.abs(y))
-    for keep, dashes, width in ((y > 0.0, "-", 1.1), (y < 0.0, (0, (1, 1.3)), 1.5)):
-        ax.plot(x, np.where(keep, size, np.nan), color=colour, linestyle=dashes, linewidth=width)
-
-
 def _dots(ax: Axes, p: Floats, y: Floats, look: dict[str, Any], text: str) -> None:
     """Draw measured numbers of the shape (case, level): filled where positive, hollow where negative."""
     size = np.where(np.abs(y) < SMALLEST, np.nan, np.abs(y))
@@ -213,7 +198,7 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
         return None
     quantity = position(experiment)
     letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_finest")
-    upper, lower = panels([2.2, 2.6])
+    upper, lower = stacked([2.2, 2.6])
     sizes, reference = [], 0.0
     for k, (member, level) in enumerate(runs):
         t, colour = data.times(record, member.case), style.look(k)["color"]
@@ -264,7 +249,7 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
         "constant factor in every step is a straight line; it should become parallel to the dashed one, the factor "
         "that the matrix of one step predicts. How far above or below depends on the start.",
         alt=f"{words.name(quantity)} of unstable runs against time, linear and logarithmic, with the predicted growth",
-        figure=figure_of(upper),
+        figure=upper.get_figure(root=True),
     )
 
 

@@ -6,7 +6,7 @@ Source: pendulum lecture, sections 2.5 and 2.6; `vibsim.convergence.local_order`
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,28 +15,16 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report import data, frame, style
 from vibsim.report.data import Member
-from vibsim.report.figures.panels import (
-    Curve,
-    comparable,
-    draw_curves,
-    draw_spread,
-    figure_of,
-    panels,
-)
+from vibsim.report.figures import panels
 from vibsim.report.style import Picture
 from vibsim.report.text import words
+from vibsim.report.types import Axes
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-CURVES = 6
-"""Most curves in one panel; more cannot be told apart."""
-ORDERS = 3
-"""Triples whose order is drawn over time: the finest ones above round-off."""
+CURVES = 6  # most curves in one panel; more cannot be told apart
+ORDERS = 3  # triples whose order is drawn over time: the finest ones above round-off
 UNSURE = 1.0
 """An interval of an order that is wider, or unbounded, leaves a place marked as uncertain."""
-ROOM, BEYOND = 0.35, 3.0
-"""Least and most distance from the promised order to the frame."""
+ROOM, BEYOND = 0.35, 3.0  # least and most distance from the promised order to the frame
 SPREAD = "the spread: how far each curve is from the finest one above round-off."
 
 
@@ -46,13 +34,13 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
     letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_difference")
     levels, good = data.whole(record, "level"), data.sound_triples(record, quantity, member)
     curves = differences(record, quantity, member)
-    spread, ratios = comparable(curves), bool(good)
+    spread, ratios = panels.comparable(curves), bool(good)
     orders = ratios and has_order(record, quantity, member)
-    axes = panels([2.4, *[1.3] * spread, *[1.5] * ratios, *[1.5] * orders])
-    draw_curves(axes[0], t, curves, f"rescaled difference of {letter}", measure)
+    axes = panels.stacked([2.4, *[1.3] * spread, *[1.5] * ratios, *[1.5] * orders])
+    panels.draw_curves(axes[0], t, curves, f"rescaled difference of {letter}", measure)
     axes[0].set_title("Rescaled differences between successive levels")
     if spread:
-        draw_spread(axes[1], t, curves, measure)
+        panels.draw_spread(axes[1], t, curves, measure)
     if ratios:
         _draw_ratios(axes[-2 if orders else -1], t, record, quantity, member, good)
     if orders:
@@ -85,7 +73,7 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
         alt=f"Rescaled level differences of {words.name(quantity)} against time for {member.title}"
         + (", with the ratio of successive differences" if ratios else "")
         + (" and the order over time" if orders else ""),
-        figure=figure_of(axes[0]),
+        figure=axes[0].get_figure(root=True),
     )
 
 
@@ -102,13 +90,13 @@ def energy(record: Record, member: Member) -> Picture:
         values = data.at(record, f"{name}_scaled", member, level=i)
         factor = words.factor(float(gap_ratio(order, levels[i] - levels[0])), 2.0**order)
         text = f"{factor}dE{words.lowered(levels[i])}"
-        curves.append(Curve(text, values, above[i], _lost(record, name, member, [i])))
-    spread = comparable(curves)
-    axes = panels([2.4, *[1.3] * spread])
-    draw_curves(axes[0], t, curves, "rescaled dE", measure)
+        curves.append(panels.Curve(text, values, above[i], _lost(record, name, member, [i])))
+    spread = panels.comparable(curves)
+    axes = panels.stacked([2.4, *[1.3] * spread])
+    panels.draw_curves(axes[0], t, curves, "rescaled dE", measure)
     axes[0].set_title("Energy deviation dE = E(t) − E(0), rescaled")
     if spread:
-        draw_spread(axes[1], t, curves, measure)
+        panels.draw_spread(axes[1], t, curves, measure)
     axes[-1].set_xlabel(data.time_label(record))
     return Picture(
         name=f"conservation_{member.stem}",
@@ -123,11 +111,11 @@ def energy(record: Record, member: Member) -> Picture:
             f"Below, {SPREAD}" if spread else "",
         ),
         alt=f"Rescaled energy deviation against time on levels {words.levels(levels)} for {member.title}",
-        figure=figure_of(axes[0]),
+        figure=axes[0].get_figure(root=True),
     )
 
 
-def differences(record: Record, quantity: str, member: Member) -> list[Curve]:
+def differences(record: Record, quantity: str, member: Member) -> list[panels.Curve]:
     """Return the level differences, rescaled so that an error ``C dt**p`` makes them coincide; at most `CURVES`."""
     order, levels = data.power(record, member, quantity), data.whole(record, "level")
     above, letter = data.sound_pairs(record, quantity, member), words.symbol(quantity)
@@ -137,7 +125,7 @@ def differences(record: Record, quantity: str, member: Member) -> list[Curve]:
         factor = words.factor(float(rescaling(order, levels[: i + 2])), 2.0**order)
         values = data.at(record, f"{quantity}_rescaled", member, pair=i)
         lost = _lost(record, quantity, member, [i, i + 1])
-        curves.append(Curve(f"{factor}({gap})" if factor else gap, values, above[i], lost))
+        curves.append(panels.Curve(f"{factor}({gap})" if factor else gap, values, above[i], lost))
     return curves
 
 

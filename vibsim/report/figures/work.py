@@ -6,8 +6,6 @@ error against work); vibration text, exercise 4.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from vibsim.core.record import Record
@@ -18,11 +16,7 @@ from vibsim.report.figures.panels import legend_above, rows_of
 from vibsim.report.style import Picture
 from vibsim.report.tables.work import Line, lines
 from vibsim.report.text import words
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from vibsim.experiment import Experiment
+from vibsim.report.types import Axes, Experiment
 
 
 def precision(experiment: Experiment, record: Record, case: int) -> Picture | None:

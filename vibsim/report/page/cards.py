@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from shlex import quote
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from vibsim.checks.outcome import Result
 from vibsim.checks.value import unit_of
@@ -19,17 +19,12 @@ from vibsim.report.evidence import figure
 from vibsim.report.tables import checks as check_tables
 from vibsim.report.tables import published
 from vibsim.report.text import assertions, reasons, setting, words
+from vibsim.report.types import Check, Experiment, Measurement
 
-if TYPE_CHECKING:
-    from vibsim.experiment import Check, Experiment
-    from vibsim.experiment.schema.checks import Measurement
-
-MANY = 6
-"""From so many checks on, those that passed share a table; fewer have a card each."""
+MANY = 6  # from so many checks on, those that passed share a table; fewer have a card each
 SETTLED = ("asymptotic", "order_low", "order_high")
 """Reasons of a result whose order is known: any other has at most an estimate that may be an accident."""
-BRIEF = 3
-"""With more checks than this, the evidence of those that passed is folded away."""
+BRIEF = 3  # with more checks than this, the evidence of those that passed is folded away
 PYTHON = """\
 from vibsim import Experiment, analyse, simulate, verdicts
 
@@ -59,6 +54,7 @@ def context(
     plain = [check["id"] for check in carded if _is_plain(asserted.get(check["id"]), check)]
     plain = plain if len(carded) >= MANY else []
     used = provenance.get("experiment")
+    broken, listed = words.broken(summary), len(summary.get("failures") or [])
     return {
         "collection": experiment.collection,
         "name": experiment.name,
@@ -71,7 +67,9 @@ def context(
         "plain": [made[name] | assertions.row(asserted[name]) for name in plain],
         "brief": len(carded) > BRIEF,
         "failures": check_tables.failures(summary, record),
-        "unlisted": _unlisted(summary),
+        "unlisted": f"In all {broken} runs broke down; listed are the first {listed}."
+        if broken > listed
+        else "",
         "setup": list(setting.setup(experiment, record)),
         "provenance": list(_provenance(provenance)),
         "used": json.dumps(used, indent=1, ensure_ascii=False, default=str) if used else "",
@@ -109,12 +107,18 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         levels=len(data.whole(record, "level")),
         is_promised=_keeps_promise(record, measured, check),
     )
-    is_refuted = asserted is not None and asserted.kind == "claim" and not asserted.holds
-    unit = unit_of(experiment, record, value) if value else ""
+    # of a claim that is refuted as expected, what the reason does not say is the point
+    is_false = asserted is not None and asserted.kind == "claim" and not asserted.holds
+    is_refuted = is_false and check["reason"] == "match"
+    unit = data.pretty_unit(unit_of(experiment, record, value)) if value else ""
     wording = Wording(experiment, record, asserted, words.PAGE)
     decisive, counts = check["results"][0], check["counts"]
     facts = (decisive[key] for key in ("scheme", "case", "status", "reason", "facts"))
     result = Result(*facts)
+    decides = worst(word for word, count in counts.items() if count)
+    told = ", ".join(f"{n} {word}" for word, n in counts.items() if n)
+    listed = len(check["results"])
+    more = f"In all: {told}. Listed are the {listed} worst."
     # the result that decides has a settled order
     settled = check["status"] != "INCONCLUSIVE" and decisive["reason"] in SETTLED
     return {
@@ -127,18 +131,14 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         "note": getattr(asserted, "note", None) or "",
         "status": check["status"],
         "reason": check["reason"] or "–",
-        # of a claim that is refuted as expected, what the reason does not say is the point
-        "meaning": reasons.REFUTED
-        if is_refuted and check["reason"] == "match"
-        else explained.meaning,
+        "meaning": reasons.REFUTED if is_refuted else explained.meaning,
         "needs": explained.needs,
         "expected": expectation(experiment, asserted, words.PAGE),
         "factor": words.ratio(words.fact(decisive, "order")) if settled else "",
-        "results": check_tables.results(
-            record, check, data.pretty_unit(unit).replace("sqrt(s)", "√s")
-        ),
-        "more": _more(check),
-        "where": _where(check),
+        "results": check_tables.results(record, check, unit),
+        "more": more if sum(counts.values()) > listed else "",
+        # but for those that the check's own text has
+        "where": [f"{place['text']}." for word, place in check["where"].items() if word != decides],
         "alone": _alone(check),
         "picture": figure.picture(experiment, record, asserted, check),
         "text": wording.text(result, counts, check["where"]),
@@ -161,12 +161,6 @@ def _keeps_promise(record: Record, measured: Measurement | None, check: Mapping[
     return bool(is_due and abs(own - order) <= measured.tolerance)
 
 
-def _where(check: Mapping[str, Any]) -> list[str]:
-    """Return the sentences on where in a sweep results lie, but for those that the check's own text has."""
-    decides = worst(status for status, count in check["counts"].items() if count)
-    return [f"{place['text']}." for status, place in check["where"].items() if status != decides]
-
-
 def _alone(check: Mapping[str, Any]) -> str:
     """Return the commands that run the listed members alone, a line for each; of a check that passes the first."""
     listed = (check.get("results") or [])[: 1 if check["status"] == "PASS" else None]
@@ -178,25 +172,6 @@ def _alone(check: Mapping[str, Any]) -> str:
             lines.setdefault(f".venv/bin/{result['command']}", found)
     width = max(map(len, lines), default=0)
     return "\n".join(f"{command:{width}}  # {found}" for command, found in lines.items())
-
-
-def _more(check: Mapping[str, Any]) -> str:
-    """Say how many members the listed results stand for."""
-    counts: Mapping[str, Any] = check.get("counts") or {}
-    told = ", ".join(
-        f"{count} {word}" for word, count in counts.items() if isinstance(count, int) and count
-    )
-    total = sum(count for count in counts.values() if isinstance(count, int))
-    listed = len(check.get("results") or [])
-    return f"In all: {told}. Listed are the {listed} worst." if total > listed else ""
-
-
-def _unlisted(summary: Mapping[str, Any]) -> str:
-    """Say how many failures the summary counts but does not list."""
-    total, listed = words.broken(summary), len(summary.get("failures") or [])
-    return (
-        f"In all {total} runs broke down; listed are the first {listed}." if total > listed else ""
-    )
 
 
 def _provenance(provenance: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

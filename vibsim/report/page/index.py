@@ -21,6 +21,10 @@ UNREADABLE = ("DAMAGED", "MISSING")
 """Words for an experiment whose verdict cannot be read: it counts as failed."""
 ORDER = ("FAIL", *UNREADABLE, "INCONCLUSIVE", "PASS")
 """The order in which the sentence counts experiments."""
+HEADERS = (
+    "collection", "experiment", "title", "experiment status", "check", "kind", "text", "quantity", "expected",
+    "status", "reason", "scheme", "case", "order", "order_low", "order_high", "levels", "value", "advice", "failures",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -31,15 +35,13 @@ class Row:
     name: str
     title: str
     status: str
-    why: str
-    """Text and reason of the worst check, or what is wrong with the file."""
+    why: str  # text and reason of the worst check, or what is wrong with the file
     counts: str = "–"
     failures: str = "–"
     link: str = ""
     thumbnail: str = ""
     checks: Sequence[Mapping[str, Any]] = ()
-    broken: int = 0
-    """Number of runs that broke down."""
+    broken: int = 0  # number of runs that broke down
 
 
 def write_index(results: Path) -> None:
@@ -56,7 +58,9 @@ def write_index(results: Path) -> None:
     context = {"status": status, "sentence": _sentence(rows), "collections": grouped}
     page = environment().get_template("index.html").render(context)
     store.write_text(results / "index.html", page)
-    store.write_text(results / "summary.csv", to_csv(_table(rows)))
+    cells = tuple(line for row in rows for line in _lines(row))
+    table = Table("summary", "All checks", tuple(map(Column, HEADERS)), cells)
+    store.write_text(results / "summary.csv", to_csv(table))
 
 
 def _row(results: Path, folder: Path) -> Row:
@@ -98,16 +102,6 @@ def _sentence(rows: Sequence[Row]) -> str:
     told = [f"{statuses.count(word)} {word}" for word in ORDER if word in statuses]
     whole = "experiment" if len(rows) == 1 else "experiments"
     return f"{len(rows)} {whole}: {', '.join(told)}."
-
-
-def _table(rows: Sequence[Row]) -> Table:
-    headers = (
-        "collection", "experiment", "title", "experiment status", "check", "kind", "text", "quantity", "expected",
-        "status", "reason", "scheme", "case", "order", "order_low", "order_high", "levels", "value", "advice",
-        "failures",
-    )  # fmt: skip
-    cells = tuple(line for row in rows for line in _lines(row))
-    return Table("summary", "All checks", tuple(map(Column, headers)), cells)
 
 
 def _lines(row: Row) -> Iterator[tuple[Any, ...]]:

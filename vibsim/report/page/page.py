@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -19,26 +19,17 @@ from vibsim.report.data import Member
 from vibsim.report.figures import drawing, gallery, time
 from vibsim.report.figures.panels import Curve, stamp
 from vibsim.report.page import cards
+from vibsim.report.style import Picture
 from vibsim.report.tables import best, checks, degrees, levels, members, published, theory, work
 from vibsim.report.tables.scales import table as scales_table
 from vibsim.report.tables.table import Table, to_csv, to_latex
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
-    from matplotlib.figure import Figure
-
-    from vibsim.experiment import Experiment
-    from vibsim.plan import Plan
-    from vibsim.report.style import Picture
+from vibsim.report.types import Environment, Experiment, Figure, Plan
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
 NOTHING: Mapping[str, Any] = {}
-LONG = 24
-"""Rows above which a table is folded away."""
-FOLDED = 500
-"""Most rows of members that the page itself holds; the CSV file holds more."""
-LONG_HEADING = 90
-"""Letters of a caption of which a heading has the first words only."""
+LONG = 24  # rows above which a table is folded away
+FOLDED = 500  # most rows of members that the page itself holds; the CSV file holds more
+LONG_HEADING = 90  # letters of a caption of which a heading has the first words only
 
 
 def write(
@@ -222,9 +213,9 @@ def _tables(
 def _folded(tables: Sequence[Table]) -> list[tuple[str, list[Table]]]:
     """Return tables with their headings, which differ: of two that would be the same each says more."""
     short = [_heading(table.caption) for table in tables]
-    whole = [re.split(r"[,;]|\. ", table.caption, maxsplit=1)[0] for table in tables]
-    both = zip(short, whole, tables, strict=True)
-    return [(more if short.count(text) > 1 else text, [table]) for text, more, table in both]
+    more = [re.split(r"[,;]|\. ", table.caption, maxsplit=1)[0] for table in tables]
+    headings = (b if short.count(a) > 1 else a for a, b in zip(short, more, strict=True))
+    return [(text, [table]) for text, table in zip(headings, tables, strict=True)]
 
 
 def _heading(caption: str) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from vibsim.comparison.best_values import WORDS, Scalar, scalars
+from vibsim.comparison.best_values import WORDS, scalars
 from vibsim.core.record import Record
 from vibsim.models import Model
 from vibsim.report import style
@@ -27,8 +27,7 @@ CLASSES = {
     "round_off": "round-off",
 }
 """How the levels follow each other, in words."""
-MOST_DIGITS = 16
-"""Significant digits of a double."""
+MOST_DIGITS = 16  # significant digits of a double
 PER_NUMBER = ("finest level", "GCI", "GCI relative", "order", "levels", "convergence")
 """Columns that are kept with series only."""
 
@@ -63,6 +62,9 @@ def _rows(model: Model, record: Record, shown: Sequence[Member]) -> Iterator[tup
     has_series = "scalar" in record
     for k, row in enumerate(scalars(model, not has_series)):
         name, nothing = row.variable, (None, None, None)
+        is_named = row.quantity in words.NAMES
+        text = f"{words.symbol(row.quantity)} {WORDS[row.value]}" if is_named else row.words
+        title = style.label(text, unit(record, f"{name}_richardson"))
         for member in shown:
             value = float(at(record, f"{name}_richardson", member))
             bound = float(at(record, f"{name}_richardson_error", member))
@@ -70,7 +72,7 @@ def _rows(model: Model, record: Record, shown: Sequence[Member]) -> Iterator[tup
                 continue
             index = float(at(record, f"{name}_gci", member)) if has_series else math.nan
             yield (
-                _name(record, row),
+                title,
                 member.scheme_name,
                 *([member.case_name] if swept(record) else []),
                 *(_finest(record, index, k, member) if has_series else nothing),
@@ -79,12 +81,6 @@ def _rows(model: Model, record: Record, shown: Sequence[Member]) -> Iterator[tup
                 _error(abs(value - _exact(record, name, member))),
                 *(_approach(record, k, member) if has_series else nothing),
             )
-
-
-def _name(record: Record, row: Scalar) -> str:
-    letter = words.SYMBOLS.get(row.quantity)
-    text = f"{letter} {WORDS[row.value]}" if letter else row.words
-    return style.label(text, unit(record, f"{row.variable}_richardson"))
 
 
 def _finest(record: Record, index: float, k: int, member: Member) -> tuple[Cell, Cell, Cell]:

@@ -11,8 +11,7 @@ from vibsim.report import data
 from vibsim.report.tables.table import Cell, Column, Table, Written
 from vibsim.report.text import words
 
-ROUND_OFF = 1e-12
-"""Numbers no larger than this have two digits: more would be noise."""
+ROUND_OFF = 1e-12  # numbers no larger than this have two digits: more would be noise
 
 
 def measured_order(result: Mapping[str, Any]) -> tuple[Cell, Cell, Cell, Cell]:

@@ -6,34 +6,24 @@ Source: vibration text, sections 2.2 and 8.5, problem 1 and exercise 9.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from vibsim import theory
 from vibsim.formula import Binary, Expression, Name, Negate, literal, names_in, parse
-from vibsim.models import Model
-from vibsim.report.tables.table import Column, Table
-from vibsim.schemes import SCHEMES, Stepper
+from vibsim.report.tables.table import Cell, Column, Table
+from vibsim.report.types import Experiment
+from vibsim.schemes import SCHEMES
+from vibsim.theory import Miss, Residual
 from vibsim.theory.degrees import HIGHEST, applies
 
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
-    from vibsim.theory import Miss, Residual
-
-LONGEST = 40
-"""Characters of a coefficient that a table shows."""
-DIGITS = 6
-"""Digits of whole numbers in a coefficient above which it is written with decimals."""
-EXACT, NOTHING = "exact", "–"
-CAUSES: Mapping[str, str] = MappingProxyType(
-    {
-        "": "the first step alone",
-        "differences": "its formulas for u' and u''",
-        "force": "the force, taken at a point that is off the solution",
-        "damping": "its treatment of damping",
-    }
-)
+LONGEST = 40  # characters of a coefficient that a table shows
+DIGITS = 6  # digits of whole numbers in a coefficient above which it is written with decimals
+EXACT = "exact"
+CAUSES = {
+    "": "the first step alone",
+    "differences": "its formulas for u' and u''",
+    "force": "the force, taken at a point that is off the solution",
+    "damping": "its treatment of damping",
+}
 """Where the blame lies, by `vibsim.theory.Miss.cause`."""
 
 
@@ -44,31 +34,33 @@ def table(experiment: Experiment) -> Table | None:
     Schemes with swept options and those that choose their own steps have no row.
     """
     model = experiment.model.definition
-    if not (_asks(experiment) or is_polynomial(_solution(experiment))) or not applies(model):
+    if not _is_about_polynomials(experiment) or not applies(model):
         return None
     columns = (
         Column("scheme"), Column("exact up to degree", form="integer"), Column("first miss at degree", form="integer"),
         Column("first step off by"), Column("a step at t off by"), Column("because of"),
     )  # fmt: skip
-    rows = []
+    keys = experiment.sweep.keys if experiment.sweep is not None else ()
+    rows: list[tuple[Cell, ...]] = []
     for spec in experiment.schemes:
-        if not (spec.adaptive or _is_swept(experiment, spec.name)):
-            stepper = SCHEMES[spec.kind].stepper_for(model, spec.options)
-            rows.append((spec.name, *_row(stepper, model)))
+        if spec.adaptive or any(key.startswith(f"schemes.{spec.name}.") for key in keys):
+            continue
+        stepper = SCHEMES[spec.kind].stepper_for(model, spec.options)
+        degree = theory.exact_degree(stepper, model)
+        if degree == HIGHEST:
+            rows.append((spec.name, degree, None, EXACT, EXACT, "–"))
+        else:
+            found = theory.miss(stepper, model, degree + 1)
+            off = told(found.start), told(found.step)
+            rows.append((spec.name, degree, found.degree, *off, _blame(found)))
+    # each polynomial has a force of its own
+    equation = model.equation.partition(" = ")[0]
     caption = (
         "Polynomials c₀ + c₁ t + c₂ t² + … that schemes reproduce exactly, as solutions of "
-        f"{_plain(model)} with a force for each, while the velocity keeps its sign; and the first term of what they "
+        f"{equation} with a force for each, while the velocity keeps its sign; and the first term of what they "
         "are off by (computed less exact) on the next degree"
     )
     return Table("exact_degrees", caption, columns, tuple(rows)) if rows else None
-
-
-def _row(stepper: Stepper, model: Model) -> tuple[str | int | None, ...]:
-    degree = theory.exact_degree(stepper, model)
-    if degree == HIGHEST:
-        return degree, None, EXACT, EXACT, NOTHING
-    found = theory.miss(stepper, model, degree + 1)
-    return degree, found.degree, told(found.start), told(found.step), _blame(found)
 
 
 def _blame(found: Miss) -> str:
@@ -101,30 +93,18 @@ def coefficient(residual: Residual) -> str:
     return text.replace("**", "^").replace("*", " ")
 
 
-def _asks(experiment: Experiment) -> bool:
-    measured = (check.measured for check in experiment.checks)
-    return any(getattr(check, "value", None) == "exact_degree" for check in measured)
+def _is_about_polynomials(experiment: Experiment) -> bool:
+    """Tell whether the exact solution that the file states is one, or a check asks for `exact_degree`."""
+    if any(getattr(c.measured, "value", None) == "exact_degree" for c in experiment.checks):
+        return True
+    text, model = experiment.model.formulas.get("exact"), experiment.model.definition
+    names = ("t", *(row.name for row in model.parameters))
+    return text is not None and is_polynomial(parse(text, names))
 
 
-def _is_swept(experiment: Experiment, scheme: str) -> bool:
-    keys = experiment.sweep.keys if experiment.sweep is not None else ()
-    return any(key.startswith(f"schemes.{scheme}.") for key in keys)
-
-
-def _solution(experiment: Experiment) -> Expression | None:
-    """Return the exact solution that the file states."""
-    text = experiment.model.formulas.get("exact")
-    if text is None:
-        return None
-    model = experiment.model.definition
-    return parse(text, ("t", *(row.name for row in model.parameters)))
-
-
-def is_polynomial(node: Expression | None) -> bool:
+def is_polynomial(node: Expression) -> bool:
     """Tell whether a formula is a polynomial in ``t``."""
     match node:
-        case None:
-            return False
         case Negate(operand):
             return is_polynomial(operand)
         case Binary("**", base, exponent):
@@ -136,8 +116,3 @@ def is_polynomial(node: Expression | None) -> bool:
         case Binary(_, left, right):
             return is_polynomial(left) and is_polynomial(right)
     return node == Name("t") or "t" not in names_in(node)
-
-
-def _plain(model: Model) -> str:
-    """Return the equation without the force, as the force is another one for each polynomial."""
-    return model.equation.partition(" = ")[0]

@@ -6,7 +6,6 @@ A file of a million rows takes some seconds: it is written in pieces, each of th
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -24,45 +23,35 @@ from vibsim.report.text import words
 
 LISTED = 10_000
 """Rows up to which a table lists members, and a file has every digit of what was measured."""
-DIGITS = 9
-"""Significant digits of what was measured, in a file with more rows."""
-PIECE = 10_000
-"""Rows that are formatted at once."""
+DIGITS = 9  # significant digits of what was measured, in a file with more rows
+PIECE = 10_000  # rows that are formatted at once
 
 
-@dataclass(frozen=True)
-class Field:
-    """One column of all members."""
-
-    column: Column
-    values: NDArray[Any]
-    """Shape (case,), or (scheme, case)."""
-
-    def of(self, scheme: int) -> NDArray[Any]:
-        """Return the values of one scheme, shape (case,)."""
-        return self.values if self.values.ndim == 1 else self.values[scheme]
+Field = tuple[Column, NDArray[Any]]
+"""One column, and its values of the shape (scheme, case)."""
 
 
 def fields(record: Record, quantity: str) -> list[Field]:
     """Return what is listed of every member: first what it is, then what was measured of it."""
-    letter = words.symbol(quantity)
-    error, measure = finest_level.error(record, quantity), norm_unit(record, quantity, TYPICAL_NORM)
+    error, measure = finest_level.error(record, quantity), norm_unit(record, quantity)
     time, size = (finest_level.measured(record, name, quantity) for name in ("period", "amplitude"))
     level = whole(record, "level")[-1]
-    names = [f"order of {letter}", "order, low", "order, high"]
+    names = [f"order of {words.symbol(quantity)}", "order, low", "order, high"]
     orders = zip(names, finest_level.orders(record, quantity), strict=True)
-    return [
-        Field(Column("case", form="integer"), np.asarray(record["case"])),
-        *(Field(Column(*swept_label(record, name), "step"), record[name]) for name in swept(record)),
-        *(Field(Column(name), flags(record, f"{quantity}_{name}")) for name in ("status", "reason")),
-        *(Field(Column(name, form="order"), values) for name, values in orders),
-        Field(Column(f"true error, level {level}", measure, "norm"), error.true),
-        Field(Column(f"estimated error, level {level}", measure, "norm"), error.estimate),
-        Field(Column("period", time.unit, "full"), time.value),
-        Field(Column("exact period", unit(record, "exact_period"), "full"), exact_periods(record)),
-        Field(Column("relative error of the period", form="norm"), finest_level.period_error(record, -1)),
-        Field(Column("amplitude", size.unit, "full"), size.value),
+    found: list[Field] = [
+        (Column("case", form="integer"), np.asarray(record["case"])),
+        *((Column(*swept_label(record, name), "step"), record[name]) for name in swept(record)),
+        *((Column(name), flags(record, f"{quantity}_{name}")) for name in ("status", "reason")),
+        *((Column(name, form="order"), values) for name, values in orders),
+        (Column(f"true error, level {level}", measure, "norm"), error.true),
+        (Column(f"estimated error, level {level}", measure, "norm"), error.estimate),
+        (Column("period", time.unit, "full"), time.value),
+        (Column("exact period", unit(record, "exact_period"), "full"), exact_periods(record)),
+        (Column("relative error of the period", form="norm"), finest_level.period_error(record, -1)),
+        (Column("amplitude", size.unit, "full"), size.value),
     ]  # fmt: skip
+    shape = len(record["scheme"]), len(record["case"])
+    return [(column, np.broadcast_to(values, shape)) for column, values in found]
 
 
 def table(record: Record, quantity: str) -> Table | None:
@@ -70,19 +59,19 @@ def table(record: Record, quantity: str) -> Table | None:
     schemes = record.words("scheme")
     if not swept(record) or len(record["case"]) * len(schemes) > LISTED:
         return None
-    found = [f for f in fields(record, quantity) if _has_any(f.values)]
+    found = [
+        (column, values)
+        for column, values in fields(record, quantity)
+        if values.dtype.kind != "f" or np.isfinite(values).any()
+    ]
     rows = [
         (scheme, *row)
         for s, scheme in enumerate(schemes)
-        for row in zip(*(field.of(s).tolist() for field in found), strict=True)
+        for row in zip(*(values[s].tolist() for _, values in found), strict=True)
     ]
     caption = f"Members: order of {words.symbol(quantity)} ({TYPICAL_NORM}), and numbers of the finest level"
-    columns = (Column("scheme"), *(field.column for field in found))
+    columns = (Column("scheme"), *(column for column, _ in found))
     return Table("members", caption, columns, tuple(rows))
-
-
-def _has_any(values: NDArray[Any]) -> bool:
-    return values.dtype.kind != "f" or bool(np.isfinite(values).any())
 
 
 def write_csv(path: Path, record: Record, quantity: str) -> None:
@@ -92,22 +81,18 @@ def write_csv(path: Path, record: Record, quantity: str) -> None:
     `DIGITS` significant digits (``convergence.nc`` has all of them).
     """
     found, schemes = fields(record, quantity), record.words("scheme")
-    count = len(record["case"])
     own = 1 + len(swept(record))
-    form = "%r" if count * len(schemes) <= LISTED else f"%.{DIGITS}g"
-    head = (
-        [field.column.title for field in found[:own]],
-        [field.column.title for field in found[own:]],
-    )
+    is_short = len(record["case"]) * len(schemes) <= LISTED
+    head = [column.title for column, _ in found]
     with (
         store.replacing(path) as temporary,
         temporary.open("w", encoding="utf-8", newline="") as file,
     ):
-        file.write(csv_line([*head[0], "scheme", *head[1]]))
-        first = [_repeated(field.values) for field in found[:own]]
+        file.write(csv_line([*head[:own], "scheme", *head[own:]]))
+        first = [_repeated(values[0]) for _, values in found[:own]]
         for s, scheme in enumerate(schemes):
-            columns = [*first, *(field.of(s) for field in found[own:])]
-            for text in _pieces(columns, own, form):
+            columns = [*first, *(values[s] for _, values in found[own:])]
+            for text in _pieces(columns, own, "%r" if is_short else f"%.{DIGITS}g"):
                 file.write(text.replace(SCHEME, csv_line([scheme])[:-1]))
 
 
@@ -123,8 +108,7 @@ def digits(record: Record) -> str:
     )
 
 
-SCHEME = "\0"
-"""Stands for the name of a scheme, which may hold anything, until all else is written."""
+SCHEME = "\0"  # stands for the name of a scheme, which may hold anything, until all else is written
 
 
 def _pieces(columns: Sequence[NDArray[Any]], own: int, form: str) -> Iterator[str]:

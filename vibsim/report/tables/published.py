@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from vibsim.checks.fields import measured
 from vibsim.core.record import Record
@@ -12,10 +12,7 @@ from vibsim.experiment.value_names import VALUES
 from vibsim.report import data
 from vibsim.report.tables.table import Cell, Column, Table, Written
 from vibsim.report.text import words
-
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.published import PublishedRow, PublishedTable
+from vibsim.report.types import Experiment, PublishedRow, PublishedTable
 
 AGREES = "agrees?"
 OWN = "by own velocity"

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from vibsim.core.record import Record
 from vibsim.models.shared.scales import dimensionless, scales
 from vibsim.report import data
+from vibsim.report.style import finite
 from vibsim.report.tables.table import Cell, Column, Table
-
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
+from vibsim.report.types import Experiment
 
 
 def table(experiment: Experiment, record: Record) -> Table | None:
@@ -29,14 +28,17 @@ def table(experiment: Experiment, record: Record) -> Table | None:
     sizes, numbers = scales(model, parameters, initial), dimensionless(model, parameters, initial)
     named = [(f"{row.name}_c", f"scale of the {row.words}", row) for row in sizes]
     named += [(row.name, row.words, row) for row in numbers]
-    ends = [_ends(row.value) for _, _, row in named]
+    ends = []
+    for _, _, row in named:
+        known = finite(np.asarray(row.value))
+        ends.append((float(known.min()), float(known.max())) if known.size else (np.nan, np.nan))
     values = ("least", "largest") if any(low < high for low, high in ends) else ("value",)
-    rows: list[tuple[Cell, ...]] = []
-    for (name, words, row), span in zip(named, ends, strict=True):
-        shown = span[: len(values)]
-        rows.append((name, words, row.formula, *shown, data.pretty_unit(row.unit) or "1"))
+    rows: list[tuple[Cell, ...]] = [
+        (name, words, row.formula, *span[: len(values)], data.pretty_unit(row.unit) or "1")
+        for (name, words, row), span in zip(named, ends, strict=True)
+    ]
     columns = (
-        *(Column("name"), Column("what it is"), Column("formula")),
+        *map(Column, ("name", "what it is", "formula")),
         *(Column(value, form="value") for value in values),
         Column("unit"),
     )
@@ -53,9 +55,3 @@ def _members(section: str, values: Mapping[str, float], record: Record) -> dict[
         key: record[names[f"{section}.{key}"]] if f"{section}.{key}" in names else value
         for key, value in values.items()
     }
-
-
-def _ends(value: Any) -> tuple[float, float]:
-    """Return the least and the largest value that is defined; NaN where none is."""
-    known = np.asarray(value)[np.isfinite(value)]
-    return (float(known.min()), float(known.max())) if known.size else (np.nan, np.nan)

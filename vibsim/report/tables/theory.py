@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,15 +19,11 @@ from vibsim.report import choice, data, finest_level
 from vibsim.report.data import MEMBER, OF_LEVEL, known, swept, whole
 from vibsim.report.tables.table import Cell, Column, Table, Written
 from vibsim.report.text import words
+from vibsim.report.types import Experiment
 from vibsim.schemes import SCHEMES
 
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
-
-LIMITS = {0.0: "never", math.inf: "any"}
-"""Words for limits of stability that are no number."""
-EDGE = 1e-9
-"""Relative distance within which a step counts as lying on the limit of stability."""
+LIMITS = {0.0: "never", math.inf: "any"}  # words for limits of stability that are no number
+EDGE = 1e-9  # relative distance within which a step counts as lying on the limit of stability
 ROUNDINGS = 32.0
 """Predicted and measured numbers agree to round-off within so many of them for each step of a period."""
 

@@ -7,9 +7,7 @@ error against work); vibration text, exercise 4.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,10 +19,8 @@ from vibsim.report.choice import position
 from vibsim.report.data import Member, at, case_name, unit, whole
 from vibsim.report.tables.table import Cell, Column, Table
 from vibsim.report.text import words
+from vibsim.report.types import Experiment
 from vibsim.schemes import SCHEMES
-
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
 
 
 @dataclass(frozen=True)
@@ -32,10 +28,8 @@ class Line:
     """The points of one scheme over its levels, or of one adaptive method over its tolerances, coarse to fine."""
 
     name: str
-    labels: tuple[str, ...]
-    """Level or tolerance of every point."""
-    work: tuple[Floats, Floats, Floats]
-    """Steps, evaluations of the force, estimated seconds."""
+    labels: tuple[str, ...]  # level or tolerance of every point
+    work: tuple[Floats, Floats, Floats]  # steps, evaluations of the force, estimated seconds
     error: Floats
     is_adaptive: bool = False
 
@@ -58,16 +52,10 @@ def _of_levels(experiment: Experiment, record: Record, s: int, case: int) -> Lin
     member = Member(s, case, experiment.schemes[s].name)
     steps, forces, error = _numbers(record, member)
     keep = np.isfinite(error) & np.isfinite(steps)
-    labels = tuple(
-        f"level {level}"
-        for level, is_kept in zip(whole(record, "level"), keep, strict=True)
-        if is_kept
-    )
+    labels = tuple(f"level {level}" for level in np.array(whole(record, "level"))[keep])
+    forces = forces[keep]
     return Line(
-        member.scheme_name,
-        labels,
-        (steps[keep], forces[keep], forces[keep] * ONE_SECONDS),
-        error[keep],
+        member.scheme_name, labels, (steps[keep], forces, forces * ONE_SECONDS), error[keep]
     )
 
 
@@ -105,16 +93,14 @@ def table(experiment: Experiment, record: Record) -> Table | None:
         Column("force evaluations", form="integer"), Column("estimated time", "s", "small"),
         Column("largest error", unit(record, "work_error"), "small"),
     )  # fmt: skip
+    rows: list[tuple[Cell, ...]] = [
+        (line.name, label, *(float(part[i]) for part in line.work), float(line.error[i]))
+        for line in found
+        for i, label in enumerate(line.labels)
+    ]
     name = case_name(record, 0)
     caption = (
         f"Work and precision of {words.symbol(position(experiment))}{f', {name}' if name else ''}"
         "; force evaluations of an implicit scheme are those of one iteration per step"
     )
-    return Table("work_precision", caption, columns, tuple(_rows(found)))
-
-
-def _rows(found: list[Line]) -> Iterator[tuple[Cell, ...]]:
-    for line in found:
-        for i, label in enumerate(line.labels):
-            steps, forces, time = (float(part[i]) for part in line.work)
-            yield (line.name, label, steps, forces, time, float(line.error[i]))
+    return Table("work_precision", caption, columns, tuple(rows))

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from vibsim.checks.value import SAMPLED, what
 from vibsim.report.text import words
+from vibsim.report.types import Check, Measurement
 
-if TYPE_CHECKING:
-    from vibsim.experiment import Check, ConvergesCheck, ValueCheck
-    from vibsim.experiment.schema.checks import ConservesCheck, EqualCheck, Measurement, StableCheck
-
-
-PLACES = ("t", "step", "level", "scheme", "case")
-"""Where a number may be taken."""
+PLACES = ("t", "step", "level", "scheme", "case")  # where a number may be taken
+STABLE = {
+    True: "stability: the amplitude grows by no more than an error that vanishes with dt",
+    False: "instability: the amplitude grows by more than an error that vanishes with dt",
+}
+"""What is said of a check for stability: Forward Euler, whose growth refinement cures, is not unstable."""
+DRIFTS = {
+    "none": "is conserved up to round-off",
+    "bounded": "has an error that stays bounded",
+    "linear": "has an error that grows like t",
+    "quadratic": "has an error that grows like t²",
+}
+"""What is said of the energy for every kind of drift."""
+SOLUTIONS = {"exact": "the exact solution", "discrete": "the exact solution of its own steps"}
+"""What a solution may be compared with, beside that of another scheme."""
 
 
 def heading(check: Check | Measurement) -> str:
@@ -34,14 +41,11 @@ def row(check: Check) -> dict[str, str]:
         origin = f"Source: {check.source}" if check.source else ""
         asked = f"true: {heading(check.that)}"
         return {"subject": f"Claim: {check.claim}", "origin": origin, "asked": asked}
-    found = {"subject": words.PAGE.opening(subject(check)), "origin": "", "asked": ""}
+    asked = ""
     if check.kind == "converges" and check.expect.status == "PASS":
-        found["asked"] = (
-            "as its scheme promises"
-            if check.order == "scheme"
-            else f"order {check.order:g} ± {check.tolerance:g}"
-        )
-    return found
+        order = f"order {check.order:g} ± {check.tolerance:g}" if check.order != "scheme" else ""
+        asked = order or "as its scheme promises"
+    return {"subject": words.PAGE.opening(subject(check)), "origin": "", "asked": asked}
 
 
 def background(check: Check) -> str:
@@ -56,25 +60,37 @@ def background(check: Check) -> str:
 def _measured(check: Measurement) -> str:
     match check.kind:
         case "converges":
-            return _converges(check)
+            order = (
+                "the order of its scheme" if check.order == "scheme" else f"order {check.order:g}"
+            )
+            only = f", {_listed(check.schemes)}" if check.schemes else ""
+            why = f" ({check.expect.reason})" if check.expect.reason else ""
+            trap = f", expected to end as {check.expect.status}{why}"
+            return (
+                f"{words.title(check.converges)} converges with {order} ± {check.tolerance:g} ({check.norm} norm{only})"
+                f"{'' if check.expect.status == 'PASS' else trap}"
+            )
         case "value":
-            return _value(check)
+            bounds = (
+                ("equals", check.equals),
+                ("is below", check.below),
+                ("is above", check.above),
+            )
+            given = [f" {verb} {words.PAGE.digits(repr(x))}" for verb, x in bounds if x is not None]
+            near = (("rtol", check.rtol), ("atol", check.atol))
+            tolerances = [f"{key} {words.PAGE.number(x)}" for key, x in near if x is not None]
+            extra = f" ({', '.join(tolerances)})" if tolerances else ""
+            return f"{subject(check)}{given[0] if given else ' '}{extra}"
         case "stable":
-            return _stable(check)
+            return f"{STABLE[check.stable]}{_where(check)}"
         case "conserves":
-            return _conserves(check)
+            own = "the scheme's own velocity" if check.conserves == "energy" else "[D₂ₜu]"
+            return f"the energy by {own} {DRIFTS[check.drift]}{_where(check)}"
         case "equal":
-            return _equal(check)
-
-
-def _converges(check: ConvergesCheck) -> str:
-    order = "the order of its scheme" if check.order == "scheme" else f"order {check.order:g}"
-    only = f", {_listed('scheme', check.schemes)}" if check.schemes else ""
-    text = f"{words.title(check.converges)} converges with {order} ± {check.tolerance:g} ({check.norm} norm{only})"
-    if check.expect.status == "PASS":
-        return text
-    why = f" ({check.expect.reason})" if check.expect.reason else ""
-    return f"{text}, expected to end as {check.expect.status}{why}"
+            other = SOLUTIONS.get(check.second, check.second)
+            within = "round-off" if check.atol is None else words.PAGE.number(check.atol)
+            letter = words.title(check.quantity)
+            return f"{letter} by {check.first} equals that of {other} to {within}{_where(check)}"
 
 
 def subject(check: Measurement) -> str:
@@ -83,76 +99,21 @@ def subject(check: Measurement) -> str:
         return f"{words.title(check.quantity)} by {check.first}{_where(check)}"
     if check.kind != "value":
         return _measured(check)
-    told = what(check, words.PAGE)
-    keys = ("level", "scheme", "case") if check.value in SAMPLED else PLACES
+    told, is_sampled = what(check, words.PAGE), check.value in SAMPLED
+    keys = ("level", "scheme", "case") if is_sampled else PLACES
     places = ((key, getattr(check.at, key)) for key in keys)
     where = ", ".join(f"{key} {value}" for key, value in places if value is not None)
-    if check.value in SAMPLED:
-        return f"{told}{f' ({where})' if where else ''}"
-    return f"{told}{f' at {where}' if where else ''}"
+    return f"{told}{(f' ({where})' if is_sampled else f' at {where}') if where else ''}"
 
 
-def _value(check: ValueCheck) -> str:
-    tolerances = [
-        f"{key} {words.PAGE.number(value)}"
-        for key, value in (("rtol", check.rtol), ("atol", check.atol))
-        if value is not None
-    ]
-    bounds = {"equals": check.equals, "is below": check.below, "is above": check.above}
-    rule = next(
-        (
-            f"{verb} {words.PAGE.digits(repr(value))}"
-            for verb, value in bounds.items()
-            if value is not None
-        ),
-        "",
-    )
-    extra = f" ({', '.join(tolerances)})" if tolerances else ""
-    return f"{subject(check)} {rule}{extra}"
-
-
-STABLE = {
-    True: "stability: the amplitude grows by no more than an error that vanishes with dt",
-    False: "instability: the amplitude grows by more than an error that vanishes with dt",
-}
-"""What is said of a check for stability: Forward Euler, whose growth refinement cures, is not unstable."""
-
-
-def _stable(check: StableCheck) -> str:
-    return f"{STABLE[check.stable]}{_where(check)}"
-
-
-DRIFTS = {
-    "none": "is conserved up to round-off",
-    "bounded": "has an error that stays bounded",
-    "linear": "has an error that grows like t",
-    "quadratic": "has an error that grows like t²",
-}
-"""What is said of the energy for every kind of drift."""
-
-
-def _conserves(check: ConservesCheck) -> str:
-    velocity = "the scheme's own velocity" if check.conserves == "energy" else "[D₂ₜu]"
-    return f"the energy by {velocity} {DRIFTS[check.drift]}{_where(check)}"
-
-
-def _equal(check: EqualCheck) -> str:
-    known = {"exact": "the exact solution", "discrete": "the exact solution of its own steps"}
-    other = known.get(check.second, check.second)
-    within = "round-off" if check.atol is None else words.PAGE.number(check.atol)
-    letter = words.title(check.quantity)
-    return f"{letter} by {check.first} equals that of {other} to {within}{_where(check)}"
-
-
-def _where(check: StableCheck | ConservesCheck | EqualCheck) -> str:
+def _where(check: Measurement) -> str:
     """Say in brackets which schemes, which level and which member a check is about."""
     names = getattr(check, "schemes", None)
-    parts = [_listed("scheme", names)] if names else []
-    parts += [
-        f"{key} {value}" for key in ("level", "case") if (value := getattr(check, key)) is not None
-    ]
+    parts = [_listed(names)] if names else []
+    places = ((key, getattr(check, key)) for key in ("level", "case"))
+    parts += [f"{key} {value}" for key, value in places if value is not None]
     return f" ({', '.join(parts)})" if parts else ""
 
 
-def _listed(word: str, names: tuple[str, ...]) -> str:
-    return f"{word}{'s' if len(names) > 1 else ''} {', '.join(names)}"
+def _listed(names: tuple[str, ...]) -> str:
+    return f"scheme{'s' if len(names) > 1 else ''} {', '.join(names)}"

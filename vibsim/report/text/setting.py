@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -11,11 +11,9 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import HIGHEST
 from vibsim.report import data
 from vibsim.report.text import words
+from vibsim.report.types import Axis, Experiment, SchemeSpec
 
-if TYPE_CHECKING:
-    from vibsim.experiment import Experiment
-    from vibsim.experiment.data import Scaling, SchemeSpec, TableSpec
-    from vibsim.experiment.schema.sweep import Axis
+LISTED = 8  # most values of a key that are written out
 
 
 def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
@@ -26,15 +24,32 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     sizes = {p.key: data.pretty_unit(p.unit) for p in model.parameters}
     units = {state.name: data.pretty_unit(state.unit) for state in model.states}
     yield "Model", f"{model.title}: {model.equation}"
-    yield from (("Table", _table(name, spec)) for name, spec in experiment.model.tables.items())
+    for name, spec in experiment.model.tables.items():
+        steps = (
+            "no step has one of its points inside"
+            if spec.is_met
+            else "steps have its points inside, where the force has corners"
+        )
+        yield "Table", f"{name} from {spec.file}, columns {spec.place} and {spec.value}; {steps}"
     if experiment.units:
-        yield "Units of the file", ", ".join(_units(experiment.units))
-    if experiment.scaling is not None:
-        yield "Scaled", _scaled(experiment.scaling, sizes, units)
+        parts = [(name, *text.partition(" ")) for name, text in experiment.units.items()]
+        told = [f"1 {name} = {number} {data.pretty_unit(base)}" for name, number, _, base in parts]
+        yield "Units of the file", ", ".join(text.rstrip() for text in told)
+    if (scaling := experiment.scaling) is not None:
+        # everything else on the page is in characteristic units
+        given = (
+            _listing("model", scaling.parameters, sizes),
+            _listing("initial", scaling.initial, units),
+        )
+        yield (
+            "Scaled",
+            f"the file has {'; '.join(given)}; end = {_plain(scaling.end)} s; the run is made in the scales of the "
+            "table below, and every other number is dimensionless",
+        )
         sizes, units = {}, {}
     yield "Parameters", _listing("model", experiment.model.parameters, sizes, keys)
     yield "Initial values", _listing("initial", experiment.initial, units, keys)
-    yield from _grid(experiment, record)
+    yield from _times(experiment, record)
     if experiment.tolerance is not None:
         bound = words.number(experiment.tolerance, "step")
         yield "Tolerance", f"the levels were chosen so that the error bound reaches {bound}"
@@ -46,86 +61,47 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
         yield "Sweep", f"{count} members. {'; '.join(map(_axis, axes))}"
 
 
-def _units(units: Mapping[str, str]) -> Iterator[str]:
-    for name, text in units.items():
-        number, _, base = text.partition(" ")
-        yield f"1 {name} = {number} {data.pretty_unit(base)}".rstrip()
-
-
-def _table(name: str, spec: TableSpec) -> str:
-    """Write where a table stands, and whether steps end at its points."""
-    told = (
-        "no step has one of its points inside"
-        if spec.is_met
-        else "steps have its points inside, where the force has corners"
-    )
-    return f"{name} from {spec.file}, columns {spec.place} and {spec.value}; {told}"
-
-
-def _scaled(scaling: Scaling, sizes: Mapping[str, str], units: Mapping[str, str]) -> str:
-    """Write what the file gives, of which everything else on the page is in characteristic units."""
-    parts = (
-        _listing("model", scaling.parameters, sizes, set()),
-        _listing("initial", scaling.initial, units, set()),
-        f"end = {_plain(scaling.end)} s",
-    )
-    return (
-        f"the file has {'; '.join(parts)}; "
-        "the run is made in the scales of the table below, and every other number is dimensionless"
-    )
-
-
 def _scheme(spec: SchemeSpec, swept: set[str]) -> str:
     """Write a scheme: its name, its kind where that is another word, and its options."""
-    options = [
-        f"{key} swept" if f"schemes.{spec.name}.{key}" in swept else f"{key}: {_option(value)}"
-        for key, value in spec.options.items()
-        if value is not False or f"schemes.{spec.name}.{key}" in swept
-    ]
+    options = []
+    for key, value in spec.options.items():
+        if f"schemes.{spec.name}.{key}" in swept:
+            options.append(f"{key} swept")
+        elif value is not False:
+            options.append(f"{key}: {'true' if value is True else _plain(value)}")
     named = spec.kind if spec.name == spec.kind else f"{spec.name}: {spec.kind}"
     return f"{named} ({', '.join(options)})" if options else named
 
 
-def _option(value: str | float | bool) -> str:
-    return "true" if value is True else _plain(value)
-
-
-def _grid(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
+def _times(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     levels, time = list(experiment.levels), data.time_unit(record, "dt")
-    counts = [
-        words.number(float(experiment.steps(level)), "integer") for level in (levels[0], levels[-1])
-    ]
-    dt = np.asarray(record["dt"], dtype=np.float64)
-    sizes = [words.number(float(value), "step") for value in (dt.max(), dt.min())]
-    ends = data.ends_of(record)
-    extent = " … ".join(
-        words.number(value, "step") for value in sorted({float(ends.min()), float(ends.max())})
-    )
-    yield (
-        "Time",
-        f"0 to {extent} {time}" + (" (differs between members)" if "end" in record else ""),
-    )
+    counts = [words.number(float(experiment.steps(level)), "integer") for level in levels]
+    dt, ends = np.asarray(record["dt"], dtype=np.float64), data.ends_of(record)
+    coarsest, finest = (words.number(float(value), "step") for value in (dt.max(), dt.min()))
+    extent = [words.number(x, "step") for x in sorted({float(ends.min()), float(ends.max())})]
+    differs = " (differs between members)" if "end" in record else ""
+    yield "Time", f"0 to {' … '.join(extent)} {time}{differs}"
     run = levels == list(range(levels[0], levels[-1] + 1))
     named = words.levels(levels) if run else ", ".join(map(str, levels))
-    spread = f"{counts[0]} to {counts[1]} steps, dt = {sizes[0]} to {sizes[1]} {time}"
+    several = len(levels) > 1
+    steps = f"{counts[0]} to {counts[-1]}" if several else counts[0]
     yield (
         "Levels",
-        f"{named}: {spread}"
-        if len(levels) > 1
-        else f"{named}: {counts[0]} steps, dt = {sizes[0]} {time}",
+        f"{named}: {steps} steps, dt = {coarsest}{f' to {finest}' if several else ''} {time}",
     )
     if "omega_dt" in record:
-        which = {"omega_dt": "natural frequency", HIGHEST: "frequency to be resolved"}
-        for name in (name for name in which if name in record):
-            product = np.asarray(record[name], dtype=np.float64)
-            largest = float(product[np.isfinite(product)].max(initial=0.0))
+        for name, text in (
+            ("omega_dt", "natural frequency"),
+            (HIGHEST, "frequency to be resolved"),
+        ):
+            largest = data.largest(np.asarray(record[name], np.float64)) if name in record else 0.0
             # a ball in free fall has no frequency
             if largest > 0.0:
-                yield "w dt", f"at most {words.number(largest)} ({which[name]} times step)"
+                yield "w dt", f"at most {words.number(largest)} ({text} times step)"
 
 
 def _listing(
-    section: str, values: Mapping[str, Any], units: Mapping[str, str], swept: set[str]
+    section: str, values: Mapping[str, Any], units: Mapping[str, str], swept: Collection[str] = ()
 ) -> str:
     parts = (
         f"{key} swept"
@@ -165,7 +141,3 @@ def _range(values: Any) -> str:
         return ", ".join(map(_plain, values))
     ends = f"{_plain(values[0])}, {_plain(values[1])}, … {_plain(values[-1])}"
     return f"{ends} ({len(values)} values)"
-
-
-LISTED = 8
-"""Most values of a key that are written out."""

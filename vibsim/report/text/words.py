@@ -12,55 +12,49 @@ from vibsim.experiment.value_names import VALUES
 from vibsim.models.shared.phase_amplitude_names import AMPLITUDE, PHASE, is_error_part, whole_of
 from vibsim.report.style import power
 
-SYMBOLS = {
-    "theta": "θ",
-    "omega": "ω",
-    "energy": "E",
-    "kinetic_energy": "T",
-    "potential_energy": "V",
-    "energy_deviation": "dE",
-}
 NAMES = {
-    "theta": "the angle θ",
-    "omega": "the angular velocity ω",
-    "energy": "the energy E",
-    "kinetic_energy": "the kinetic energy T",
-    "potential_energy": "the potential energy V",
-    "energy_deviation": "the energy deviation dE = E(t) − E(0)",
+    "theta": ("θ", "the angle θ"),
+    "omega": ("ω", "the angular velocity ω"),
+    "energy": ("E", "the energy E"),
+    "kinetic_energy": ("T", "the kinetic energy T"),
+    "potential_energy": ("V", "the potential energy V"),
+    "energy_deviation": ("dE", "the energy deviation dE = E(t) − E(0)"),
 }
+"""Letter and words of quantities; others go by their name."""
 CENTRED = "_d2t"
 """Ends the name of a quantity that is made with the centred difference ``[D_2t u]`` of the position."""
 PARTS = {PHASE: ("φ({})", "phase error of {}"), AMPLITUDE: ("a({})", "amplitude error of {}")}
 """Of a part of a position's error, by the end of its name: letter and words."""
 
 
-def _part(quantity: str, form: int) -> str:
-    """Write a part of a position's error as a letter (0) or in words (1)."""
-    whole = whole_of(quantity)
-    return PARTS[quantity.removeprefix(whole)][form].format(SYMBOLS.get(whole, whole))
-
-
-def title(quantity: str) -> str:
-    """Return a quantity as it stands in the title of a figure, and in a sentence: its letter, or a part in words."""
-    return _part(quantity, 1) if is_error_part(quantity) else symbol(quantity)
+def _named(quantity: str) -> tuple[str, str]:
+    """Return the letter and the words of a quantity, or of a part of a position's error."""
+    if is_error_part(quantity):
+        whole = whole_of(quantity)
+        letter = symbol(whole)
+        part, text = (form.format(letter) for form in PARTS[quantity.removeprefix(whole)])
+        return part, text
+    plain = quantity.removesuffix(CENTRED)
+    letter, text = NAMES.get(plain, (plain, plain))
+    if plain == quantity:
+        return letter, text
+    return f"{letter} by [D₂ₜu]", f"{text} by the centred difference [D₂ₜu]"
 
 
 def symbol(quantity: str) -> str:
     """Return the letter of a quantity; its name where it has none."""
-    if is_error_part(quantity):
-        return _part(quantity, 0)
-    plain = quantity.removesuffix(CENTRED)
-    letter = SYMBOLS.get(plain, plain)
-    return letter if plain == quantity else f"{letter} by [D₂ₜu]"
+    return _named(quantity)[0]
+
+
+def title(quantity: str) -> str:
+    """Return a quantity as it stands in the title of a figure, and in a sentence: its letter, or a part in words."""
+    return _named(quantity)[is_error_part(quantity)]
 
 
 def name(quantity: str) -> str:
     """Return a quantity in words."""
-    if is_error_part(quantity):
-        return f"the {_part(quantity, 1)}, {_part(quantity, 0)}"
-    plain = quantity.removesuffix(CENTRED)
-    text = NAMES.get(plain, plain)
-    return text if plain == quantity else f"{text} by the centred difference [D₂ₜu]"
+    letter, text = _named(quantity)
+    return f"the {text}, {letter}" if is_error_part(quantity) else text
 
 
 def overall(summary: Mapping[str, Any]) -> str:
@@ -73,7 +67,6 @@ def overall(summary: Mapping[str, Any]) -> str:
 
 
 def _counted(statuses: Sequence[str]) -> str:
-    """Say how many checks passed, failed and are undecided."""
     total = len(statuses)
     if not total:
         return "There is no check, so nothing was decided."
@@ -92,10 +85,8 @@ def broken(summary: Mapping[str, Any]) -> int:
     return int(summary.get("failure_count") or len(summary.get("failures") or []))
 
 
-DIGITS = {"brief": 2, "close": 7, "full": 10, "step": 6, "value": 12}
-"""Significant digits of forms."""
-MOST_DIGITS = 11
-"""Characters of a mantissa that are read."""
+DIGITS = {"brief": 2, "close": 7, "full": 10, "step": 6, "value": 12}  # significant digits of forms
+MOST_DIGITS = 11  # characters of a mantissa that are read
 PROSE = {"phase", "amplitude"} | {name.partition("_")[0] for name in VALUES}
 """With what the name of a value, or of a part of an error, begins."""
 

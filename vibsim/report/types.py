@@ -1,0 +1,35 @@
+"""Types that only annotations name: their modules take long to import, or no job that draws needs them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.transforms import Bbox
+
+    from vibsim.experiment import Check, Experiment
+    from vibsim.experiment.data import SchemeSpec, TableSpec
+    from vibsim.experiment.schema.checks import (
+        ConservesCheck,
+        ConvergesCheck,
+        EqualCheck,
+        Measurement,
+        StableCheck,
+        ValueCheck,
+    )
+    from vibsim.experiment.schema.published import PublishedRow, PublishedTable
+    from vibsim.experiment.schema.sweep import Axis
+    from vibsim.plan import Plan
+else:
+    Environment = Axes = Figure = Bbox = Check = Experiment = SchemeSpec = TableSpec = object
+    ConservesCheck = ConvergesCheck = EqualCheck = Measurement = StableCheck = ValueCheck = object
+    PublishedRow = PublishedTable = Axis = Plan = object
+
+__all__ = [
+    "Axes", "Axis", "Bbox", "Check", "ConservesCheck", "ConvergesCheck", "Environment", "EqualCheck", "Experiment",
+    "Figure", "Measurement", "Plan", "PublishedRow", "PublishedTable", "SchemeSpec", "StableCheck", "TableSpec",
+    "ValueCheck",
+]  # fmt: skip
