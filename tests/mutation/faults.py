@@ -369,14 +369,14 @@ FAULTS = (
         "common grid off by one",
         "analysis",
         "observe/common_grid.py",
-        "values = record[name][...,",
-        "values = np.roll(record[name], 1, axis=-1)[...,",
+        "laid_out(record[name][...,",
+        "laid_out(np.roll(record[name], 1, axis=-1)[...,",
     ),
     Fault(
         "stride of the next level",
         "analysis",
         "observe/common_grid.py",
-        'stride = grid.strides[grid.levels.index(_whole(record, "level"))]',
+        'stride = grid.strides[grid.levels.index(whole(record, "level"))]',
         "stride = grid.strides[0]",
     ),
     Fault(
