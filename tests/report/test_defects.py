@@ -120,6 +120,7 @@ def test_missing_cells_of_a_map_are_hatched_and_cells_have_borders():
     assert "Grey" not in full.caption
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_sweep_names_a_member_once_per_block_of_a_page_and_in_every_row_of_a_file(tmp_path):
     exp = samples.experiment(levels=[6, 7, 8, 9], sweep=GRID)
     record = samples.record(exp)

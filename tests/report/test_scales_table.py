@@ -50,6 +50,7 @@ def page(experiment, folder):
     return (folder / "report.html").read_text()
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_the_page_of_a_scaled_run_has_units_in_its_setting_alone(tmp_path):
     text = page(samples.experiment(model=MODEL, scaled=True, units={"rod": "4.9 m"}), tmp_path)
     assert "Scales and dimensionless numbers" in text

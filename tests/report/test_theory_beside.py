@@ -82,6 +82,7 @@ def write(directory, exp, rec, summary):
     return (directory / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_printed_digits_stand_beside_ours(text, tmp_path):
     exp, rec, summary = text
     (table,) = published.tables(exp, rec, summary)
@@ -105,12 +106,14 @@ def test_printed_digits_stand_beside_ours(text, tmp_path):
     assert float(rows[2][rows[0].index("ours")]) == column(table, "ours")[1]
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_only_printed_numbers_that_surprise_have_a_card(text, tmp_path):
     page = write(tmp_path, *text)
     cards = set(re.findall(r"<dd>(published_\d_\d) ", page))
     assert cards == {"published_1_4"}
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_note_of_a_claim_is_shown_and_harmless(tmp_path):
     claim = {
         "claim": "it lags",
