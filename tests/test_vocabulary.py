@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from vibsim.core.vocabulary import NORMS, REASONS, STATUSES, TOLERANCE, TYPICAL_NORM, worst
+from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE, REASONS, STATUSES, TYPICAL_NORM, worst
 
 PAGE = Path(__file__).parents[1] / "docs" / "verdicts.md"
 
@@ -41,6 +41,6 @@ def test_a_check_that_names_neither_norm_nor_tolerance_has_the_common_ones() -> 
     from vibsim.experiment.schema.checks import ConvergesCheck
 
     check = ConvergesCheck(converges="theta")
-    assert (check.norm, check.tolerance) == (TYPICAL_NORM, TOLERANCE)
+    assert (check.norm, check.tolerance) == (TYPICAL_NORM, ORDER_TOLERANCE)
     for norm in NORMS:
         assert ConvergesCheck(converges="theta", norm=norm).norm == norm

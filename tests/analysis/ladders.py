@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vibsim.apriori.roundoff_floor import norm_of_floor
 from vibsim.convergence import differences
 from vibsim.convergence.ladder_statistics import Evidence
-from vibsim.core.vocabulary import TOLERANCE
+from vibsim.core.vocabulary import ORDER_TOLERANCE
 
 Floats = NDArray[np.float64]
 
@@ -81,7 +81,7 @@ def evidence_with(**known: Any) -> Evidence:
     shape = order.shape
     unknown, no = np.full(shape, np.nan), np.zeros(shape, dtype=bool)
     neutral = {
-        "tolerance": TOLERANCE,
+        "tolerance": ORDER_TOLERANCE,
         "ceiling": known["floor"],
         "error": np.full((*shape, n), np.nan),
         "error_scatter": np.full((*shape, n - 1), np.nan),

@@ -51,7 +51,7 @@ def factors(exp):
 )
 def test_no_factor_is_told_where_no_order_is_settled(changes):
     for check, factor in factors(samples.experiment(**changes)):
-        assert check["results"][0]["reason"] not in cards.SETTLED
+        assert check["results"][0]["reason"] not in cards.WITH_AN_ORDER
         assert factor == ""
 
 

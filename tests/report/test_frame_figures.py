@@ -199,7 +199,7 @@ def test_the_local_amplitude_is_shown_or_said_to_be_cut():
             picture = extrema.local(exp, record, shown)
         peaks = record["peak"][np.isfinite(record["peak"])]
         top = picture.figure.axes[1].get_ylim()[1]
-        assert bool(peaks.max() > extrema.WILD) == cut
+        assert bool(peaks.max() > extrema.CUT_OFF) == cut
         assert cut or peaks.max() < top
         said = words_of(picture.figure)
         assert ("cut off" in said or "logarithmic" in said) is cut

@@ -44,7 +44,7 @@ def test_every_member_of_every_scheme_has_a_row_with_every_digit(tmp_path, recor
 
 def test_long_files_have_nine_digits_of_what_was_measured(tmp_path, record, monkeypatch):
     monkeypatch.setattr(members, "LISTED", 17)
-    monkeypatch.setattr(members, "PIECE", 4)
+    monkeypatch.setattr(members, "ROWS_AT_A_TIME", 4)
     members.write_csv(tmp_path / "m.csv", record, "theta")
     found = rows(tmp_path / "m.csv")
     assert len(found) == 18

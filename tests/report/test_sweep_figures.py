@@ -243,14 +243,14 @@ def test_shares_add_up_to_one_and_count_every_member(cloud, monkeypatch):
 
 def test_many_members_are_counted_in_cells(cloud, monkeypatch):
     exp, record = cloud
-    monkeypatch.setattr(members, "POINTS", 10)
+    monkeypatch.setattr(members, "MOST_POINTS", 10)
     with style.applied():
         picture = members.projections(exp, record, sweep_layout.keys(record), "theta", 0)
     for ax in picture.figure.axes[:2]:
         counts = [np.ma.filled(image.get_array(), 0.0).sum() for image in ax.collections]
         assert sum(counts) == 80
-    away = np.nan_to_num(finest_level.deviation(record, "theta")[0], nan=-members.BEYOND)
-    inside = np.clip(away, -members.BEYOND, members.BEYOND)
+    away = np.nan_to_num(finest_level.deviation(record, "theta")[0], nan=-members.ORDER_FRAME)
+    inside = np.clip(away, -members.ORDER_FRAME, members.ORDER_FRAME)
     images = picture.figure.axes[0].collections
     found = sum(np.ma.filled(image.get_array(), 0.0).sum(axis=1) for image in images)
     up = images[0].get_coordinates()[:, 0, 1]

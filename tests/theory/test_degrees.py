@@ -15,7 +15,7 @@ from vibsim.models.oscillator import written
 from vibsim.schemes import FIXED_STEP, SCHEMES
 from vibsim.schemes.base import handed
 from vibsim.theory import degrees
-from vibsim.theory.degrees import HIGHEST, exact_degree, fitted_force, miss, reproduces
+from vibsim.theory.degrees import HIGHEST_DEGREE, exact_degree, fitted_force, miss, reproduces
 
 FORMULAS = {
     "none": {"spring": "k*u"},
@@ -342,7 +342,7 @@ def test_nothing_is_missed_without_forces_but_by_the_differences():
     assert exact_degree(stepper("rk4", of), of) == 4
     assert exact_degree(stepper("gauss4", of), of) == 4
     assert exact_degree(stepper("rkn4", of), of) == 4
-    assert HIGHEST > 4
+    assert HIGHEST_DEGREE > 4
 
 
 def test_names_of_a_model_are_not_taken_for_coefficients():

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 Reader = Callable[[int, int], Record]
 """Returns the level Record of members start..stop-1."""
 
-SAMPLES = 2**17
+BLOCK_SAMPLES = 2**17
 """Samples of one variable in a part: a few arrays of them fit into the cache of a core."""
 
 
@@ -47,7 +47,7 @@ def analyse_parts(
     readers
         For every level, what returns its Record for a range of members.
     size
-        Members of a part; by default as many as make `SAMPLES` samples. No number depends on it.
+        Members of a part; by default as many as make `BLOCK_SAMPLES` samples. No number depends on it.
     threads
         How many parts are made at the same time; at most one more is kept. No number depends on it.
 
@@ -63,7 +63,7 @@ def analyse_parts(
     """
     coarsest = experiment.levels[0]
     points = experiment.steps(coarsest) // plan.sampling(experiment, coarsest) + 1
-    size = size or max(SAMPLES // (points * len(experiment.schemes)), 1)
+    size = size or max(BLOCK_SAMPLES // (points * len(experiment.schemes)), 1)
     count = experiment.members
     given = (
         {level: read(start, min(start + size, count)) for level, read in readers.items()}

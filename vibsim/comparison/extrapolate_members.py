@@ -32,7 +32,7 @@ from vibsim.engine import integrate
 from vibsim.models import Model
 from vibsim.schemes import Options, Scheme
 
-PIECE = 2**14  # points extrapolated at a time, so that the tableau stays in cache
+POINTS_AT_A_TIME = 2**14  # points extrapolated at a time, so that the tableau stays in cache
 
 
 @dataclass(frozen=True)
@@ -261,7 +261,7 @@ def extrapolate_members(
     noise
         What `noise_of` returned.
     """
-    size = max(PIECE // len(t), 1)
+    size = max(POINTS_AT_A_TIME // len(t), 1)
     parts = []
     for first in range(0, len(start.end), size):
         part = slice(first, first + size)

@@ -24,7 +24,7 @@ from vibsim.convergence.ladder_statistics import Evidence, at_rest, floor_of_pai
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING
 from vibsim.convergence.verdict import Judgement, judge
 from vibsim.core.array_types import Codes, Flags, Floats
-from vibsim.core.vocabulary import NORMS, REASON_NAMES, TOLERANCE
+from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE, REASON_NAMES
 from vibsim.models import ENERGIES
 from vibsim.models.shared.phase_amplitude_names import is_error_part
 from vibsim.observe import predicted_oscillation
@@ -50,13 +50,13 @@ ROUGH = ("pre_asymptotic", "non_smooth")
 def judgement(q: Comparison, norm: str) -> Judgement:
     """Judge a quantity by the order that its scheme promises."""
     if norm not in q.judged:
-        q.judged[norm] = judge(evidence(q, norm, q.order, TOLERANCE))
+        q.judged[norm] = judge(evidence(q, norm, q.order, ORDER_TOLERANCE))
     return q.judged[norm]
 
 
 def judge_check(q: Comparison, check: ConvergesCheck) -> Judgement:
     """Judge a quantity as a check asks for it."""
-    if check.order == "scheme" and check.tolerance == TOLERANCE:
+    if check.order == "scheme" and check.tolerance == ORDER_TOLERANCE:
         return judgement(q, check.norm)
     return judge(evidence(q, check.norm, order_of(q, check), check.tolerance))
 

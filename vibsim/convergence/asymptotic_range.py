@@ -168,7 +168,7 @@ def _settled(tail: Tail, tolerance: float) -> tuple[Floats, Floats]:
     generic &= spread > th.PARALLEL * th.LOG2 * np.abs(change)
     steady = (of_change > th.FASTEST) & (of_change < th.SLOWEST)
     falls = of_scatter <= th.FADING
-    settled = steady & generic & (np.abs(of_change - of_scatter) <= th.ALIKE) & falls
+    settled = steady & generic & (np.abs(of_change - of_scatter) <= th.SAME_POWER) & falls
     alone = steady & ~generic
     fades = settled | (generic & falls & np.isnan(earlier))
     f = np.where(fades, of_scatter, np.where(alone, of_change, 0.0))
@@ -223,7 +223,7 @@ def most_left(order: Floats, mismatch: Floats, before: Floats, several: Flags) -
         Whether there is one before, and what is left is more than round-off.
     """
     growth = np.where(before > 0, mismatch / np.where(before > 0, before, 1.0), np.inf)
-    gap = np.clip(np.log2(np.maximum(growth, 1.0)), 0.5, th.FARTHEST)
+    gap = np.clip(np.log2(np.maximum(growth, 1.0)), 0.5, th.LARGEST_POWER_GAP)
     p = np.maximum(order, 1.0)
     lower = np.exp2(np.maximum(p - gap, 0.5)) - 1
     seen = th.EMERGING * lower / (np.exp2(p) - 1) * (1 - np.exp2(-gap))

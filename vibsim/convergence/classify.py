@@ -23,7 +23,7 @@ from vibsim.convergence.ladder_statistics import (
 )
 from vibsim.convergence.roundoff_onset import steepest
 from vibsim.core.array_types import Flags, Floats
-from vibsim.core.vocabulary import TOLERANCE
+from vibsim.core.vocabulary import ORDER_TOLERANCE
 
 
 def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Floats]:
@@ -137,7 +137,7 @@ def _settled_elsewhere(e: Evidence, t: Trend, p: Floats) -> Flags:
     What is enough to believe an order is enough to say that it is not p.
     """
     likely = np.maximum(np.round(2.0 * t.order) / 2, th.LEAST_CANDIDATE)
-    usual = replace(e, tolerance=min(e.tolerance, TOLERANCE))
+    usual = replace(e, tolerance=min(e.tolerance, ORDER_TOLERANCE))
     settled = _right(usual, t, likely)
     doubtful = ~settled & _two_ratios(usual, t, likely)
     low = np.where(doubtful, _below(t), t.low)
@@ -255,7 +255,7 @@ def _two_ratios(e: Evidence, t: Trend, p: Floats) -> Flags:
 
 def _below(t: Trend) -> Floats:
     """Return the lower end of an interval that reaches to the lowest power that may be hiding, shape (...)."""
-    return np.minimum(t.low, lowest(t.order - t.width, th.FARTHEST))
+    return np.minimum(t.low, lowest(t.order - t.width, th.LARGEST_POWER_GAP))
 
 
 def _little_left(t: Trend, p: Floats) -> Flags:

@@ -126,7 +126,7 @@ def _extrapolated(
     expansions = np.stack([p, np.broadcast_to(q, p.shape)], axis=-1)
     for order, step in np.unique(expansions[p > 0], axis=0).tolist():
         own = np.all(expansions == (order, step), axis=-1)
-        scheme = triangular_scheme(steps_of(levels), order, int(step), th.COLUMNS + 1)
+        scheme = triangular_scheme(steps_of(levels), order, int(step), th.MOST_COLUMNS + 1)
         found = _Rows(values[own], scheme, floor[own])
         rows = found.least(Limit(*(of[own] for of in vars(best).values())))
         for of, new in zip(vars(best).values(), vars(rows).values(), strict=True):
@@ -143,7 +143,7 @@ class _Rows:
         self.changes: list[list[Floats]] = []
         for i, entries in enumerate(scheme):
             before = self.entries[-1] if i else []
-            row, changes = next_row(entries[: th.COLUMNS], values[..., i], before)
+            row, changes = next_row(entries[: th.MOST_COLUMNS], values[..., i], before)
             self.entries.append(row)
             self.changes.append(changes)
         few = len(scheme) == 3
@@ -184,7 +184,7 @@ class _Rows:
         """Return the entry with the least bound, or what there is already."""
         for i in range(2, len(self.entries)):
             believed = np.ones(self.floor.shape[:-1], dtype=bool)
-            for j in range(1, min(i - 1, th.COLUMNS) + 1):
+            for j in range(1, min(i - 1, th.MOST_COLUMNS) + 1):
                 believed = believed & self._agrees(j - 1, i)
                 floors = [self.floor[..., k] for k in range(i - j, i + 1)]
                 noise = self.scheme[i][j - 1].round_off(floors)

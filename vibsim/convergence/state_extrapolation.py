@@ -65,14 +65,14 @@ def _itself(value: float) -> float:
 
 
 def _so_far(values: Any) -> Any:
-    if values.shape[1] < MANY:
+    if values.shape[1] < MANY_MEMBERS:
         return np.fmax.accumulate(values, axis=0)
     for before, now in pairwise(values):
         np.fmax(before, now, out=now)
     return values
 
 
-MANY = 16
+MANY_MEMBERS = 16
 """From so many members on numpy's own loop over times is slower than one of ours over rows of members."""
 
 FLOATS = Arithmetic(_larger, _smaller, _choose, _itself, bool)

@@ -24,7 +24,7 @@ HALF_SPACING = 0.25
 LEAST_CANDIDATE = 0.5  # least order of an expansion: a solution that stays away has none [derived]
 # The powers of an expansion are at most so far apart: an order that is not settled may become the next. [derived]
 NEXT = 2.0
-FARTHEST = 3.0  # a lower power is lower by no more [convention]
+LARGEST_POWER_GAP = 3.0  # a lower power is lower by no more [convention]
 MOST_ABOVE = 2.0  # a superconvergent quantity gains at most the next even power [derived]
 ORDINARY_ORDER = 2.0  # of an error, where a scheme promises none, or exactness [convention]
 STEEPEST = 64.0  # orders are sought between -STEEPEST and STEEPEST [convention]
@@ -72,7 +72,7 @@ GROWS = 1.3  # drifting scatter grows by more; a power lower by 1/2 makes it 2^0
 READABLE, PARALLEL = 1e-5, 0.05
 # Factors per level between which changes of the order fade when they come from a power of the expansion. [derived]
 SLOWEST, FASTEST = 0.8, 0.1
-ALIKE = 0.15  # largest difference of two such factors that tell of the same power [calibrated]
+SAME_POWER = 0.15  # largest difference of two such factors that tell of the same power [calibrated]
 # Largest mismatch of a settled order: a second term of a tenth makes 0.2 for neighbouring powers. [derived]
 SETTLED_MISMATCH = 0.15
 # A tenth of h^(p-1), or of h^(p-2), beside h^p makes at least this mismatch: 0.0167 for p = 2, 0.015 for p = 4. With
@@ -155,7 +155,7 @@ SERIES_SAFETY = 1.25
 
 # ---- Extrapolation of numbers
 
-COLUMNS = 5  # so many powers are taken away at most [convention]
+MOST_COLUMNS = 5  # so many powers are taken away at most [convention]
 # Relative distance of a ratio of changes from that of the power: of the last, of the one before, of a single one.
 # [calibrated]
 RATIO_AGREES, RATIO_BEFORE_AGREES, RATIO_ALONE_AGREES = 0.3, 0.6, 0.2

@@ -58,7 +58,7 @@ def _little(t: Trend, p: Floats, last: Floats, before: Floats) -> Flags:
     level.
     """
     now, then = mismatches(t, p)
-    gap = np.clip(np.log2(np.maximum(safe_ratio(last, before), 1.0)), 0.5, th.FARTHEST)
+    gap = np.clip(np.log2(np.maximum(safe_ratio(last, before), 1.0)), 0.5, th.LARGEST_POWER_GAP)
     share = th.LOG2 * last / (1.0 - np.exp2(-gap))
     return np.asarray((now > th.GROWS * then) & (share <= th.EMERGING))
 

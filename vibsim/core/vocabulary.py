@@ -36,7 +36,7 @@ NORMS: tuple[Norm, ...] = get_args(Norm)
 """Every norm over time; ``linf_interior`` leaves the last point out."""
 TYPICAL_NORM: Norm = "l2"
 """The norm of a check that names none, and of the verdict on a quantity."""
-TOLERANCE = 0.1
+ORDER_TOLERANCE = 0.1
 """How far from the promised order a measured one may be where a check does not say."""
 BY_TOLERANCE = "tolerance"
 """Name and kind of the verdict that an experiment with a tolerance has beside those of its checks."""

@@ -36,7 +36,7 @@ WRITTEN_SECONDS = 4e-9
 JOB_SECONDS = 0.5
 """Of a job before and after its steps: start, imports, kernels from the disk."""
 
-GATHERED = 160
+BYTES_BESIDE_SERIES = 160
 """Bytes that are kept of a scheme and member beside its series: extremes, peaks, periods, status."""
 GATHERED_D2T = 8
 """Bytes beside these where a scheme has another velocity than the centred difference."""
@@ -78,12 +78,12 @@ ANALYSED = 3.8
 """Bytes that an analysis holds at its peak for each byte that it reads of the members at hand."""
 PART_SAMPLES = 2**17
 """Samples of one variable that an analysis takes at a time (`vibsim.analysis`)."""
-PARTS = 3
+RANGES_HELD = 3
 """Ranges of members that an analysis holds at a time: one for each of two threads, and one that is written."""
 RESULT = 100
 """Bytes that an analysis keeps of each scheme and member until its end."""
 
-COMPARED = (116, 190)
+ANALYSIS_BYTES = (116, 190)
 """Bytes that an analysis writes of a scheme and member: once, and for each level; two norms, and no series."""
 COMPARED_SERIES = (-48, 184)
 """Bytes beside these of a scheme, member and sample, where an analysis writes series."""
@@ -139,7 +139,7 @@ class Load:
     def stored(self) -> int:
         """Bytes on disk of one member."""
         series = self.schemes * self.series + self.exact
-        numbers = GATHERED + EXTREMUM * self.extrema + (GATHERED_D2T if self.d2t else 0)
+        numbers = BYTES_BESIDE_SERIES + EXTREMUM * self.extrema + (GATHERED_D2T if self.d2t else 0)
         return 8 * self.samples * series + numbers * self.schemes + CONSTANT
 
     @property
@@ -197,7 +197,7 @@ def _packed(size: int, extrema: int) -> int:
 def analysis_memory(loads: Sequence[Load], members: int) -> int:
     """Return the bytes that an analysis of `members` holds at its peak; `loads` are those of every level."""
     part = max(1, PART_SAMPLES // (loads[0].samples * loads[0].schemes))
-    at_hand = min(members, PARTS * part)
+    at_hand = min(members, RANGES_HELD * part)
     read = at_hand * sum(load.stored for load in loads)
     written = _packed(analysis_disk(loads, members, is_lean=False), loads[0].extrema)
     return ANALYSIS_MEMORY + round(ANALYSED * read) + RESULT * loads[0].schemes * members + written
@@ -208,7 +208,7 @@ def analysis_disk(loads: Sequence[Load], members: int, is_lean: bool) -> int:
 
     `loads` are those of every level; `is_lean` tells whether series are left out.
     """
-    once, each = COMPARED
+    once, each = ANALYSIS_BYTES
     size, file = once + each * len(loads), COMPARED_FILE
     if not is_lean:
         once, each = COMPARED_SERIES

@@ -155,7 +155,7 @@ def _over(left: Expression, right: Expression) -> Expression:
     return ZERO if left == ZERO else Binary("/", left, right)
 
 
-POINTS = 24
+QUADRATURE_POINTS = 24
 """Points of the rule: polynomials up to degree 47 are integrated exactly."""
 POLES = frozenset(
     ("sqrt", "hypot", "log", "log1p", "log2", "log10", "atan", "asinh", "tanh", "tan", "atan2")
@@ -328,7 +328,7 @@ def _by_quadrature(node: Expression, name: str) -> Expression:
     x: Expression = Name(name)
     way = Call("asinh", (x,)) if _has_poles(node, name) else x
     terms: list[Expression] = []
-    places, weights = np.polynomial.legendre.leggauss(POINTS)
+    places, weights = np.polynomial.legendre.leggauss(QUADRATURE_POINTS)
     for place, weight in zip(
         (0.5 * (places + 1.0)).tolist(), (0.5 * weights).tolist(), strict=True
     ):

@@ -43,13 +43,13 @@ from vibsim.formula.tree import (
 )
 
 HALVINGS = 48
-MOST = 2**14
+MOST_INTERVALS = 2**14
 """Intervals that are looked at together, at most: those that may hold the largest values."""
-BEYOND = 2.0
+PULSE_RATIO = 2.0
 """A pulse leaves the values around it by more than so many times their range, ..."""
-LEAST = 1e-9
+SMALLEST_PULSE = 1e-9
 """... and by this part of the largest value at all times."""
-HALF = 0.5
+HEIGHT_AT_ENDS = 0.5
 """What a pulse still has of its height at its ends."""
 
 PIECES = 1024
@@ -59,7 +59,7 @@ MOST_PULSES = 8
 UNEVEN = 0.37
 """How far their ends are moved, in pieces, so that they do not keep step with a square wave."""
 JUMP_HALVINGS = 50
-SMALL = 1e-6
+SMALLEST_JUMP = 1e-6
 """A jump is larger than this part of the formula's largest value."""
 GENTLE = frozenset(
     ("sin", "cos", "exp", "expm1", "sinh", "cosh", "tanh", "atan", "asinh", "erf", "erfc")
@@ -113,7 +113,7 @@ def hidden_pulses(formula: Expression, numbers: Mapping[str, Floats], t: Floats)
     def width_of(row: Integers, at: Floats) -> float:
         """Return the time over which the pulse around a time has half its height or more, to a factor of 2."""
         reach = float(end[row][0] - begin[row][0]) * 0.5 ** np.arange(HALVINGS)
-        rows, least = np.broadcast_to(row, reach.shape), HALF * excess(row, at)[0]
+        rows, least = np.broadcast_to(row, reach.shape), HEIGHT_AT_ENDS * excess(row, at)[0]
         sides = (excess(rows, at + side * reach) >= least for side in (-1.0, 1.0))
         return sum(float(reach[np.argmax(high)]) if high.any() else 0.0 for high in sides)
 
@@ -126,8 +126,8 @@ def hidden_pulses(formula: Expression, numbers: Mapping[str, Floats], t: Floats)
             least, most = bounds(formula, {**own, "t": (a, b)})
             largest = np.broadcast_to(np.maximum(low[row] - least, most - high[row]), a.shape)
             left = np.flatnonzero((largest > 0.0) & np.isnan(time[case[row]]))
-            if len(left) > MOST:
-                left = left[np.argsort(-largest[left], kind="stable")[:MOST]]
+            if len(left) > MOST_INTERVALS:
+                left = left[np.argsort(-largest[left], kind="stable")[:MOST_INTERVALS]]
             row, a, b = row[left], a[left], b[left]
             if not len(row):
                 break
@@ -152,7 +152,7 @@ def _limits(formula: Expression, numbers: Mapping[str, Floats], t: Floats) -> tu
     seen = np.where(np.isfinite(places), seen, seen[..., 1:2])
     low, high = np.min(seen, axis=-1), np.max(seen, axis=-1)
     size = np.nanmax(np.abs(np.where(np.isfinite(seen), seen, np.nan)), axis=(1, 2), initial=0.0)
-    room = BEYOND * (high - low) + LEAST * size[:, None]
+    room = PULSE_RATIO * (high - low) + SMALLEST_PULSE * size[:, None]
     return (low - room).ravel(), (high + room).ravel()
 
 
@@ -185,7 +185,7 @@ def first_jump(formula: Expression, numbers: Mapping[str, float], end: float) ->
     edges = _with_pulses(formula, numbers, edges)
     with np.errstate(all="ignore"):
         size = np.abs(np.broadcast_to(values(formula, {**numbers, "t": edges}), edges.shape))
-        least = SMALL * float(np.max(size, initial=0.0, where=np.isfinite(size)))
+        least = SMALLEST_JUMP * float(np.max(size, initial=0.0, where=np.isfinite(size)))
         a, b = edges[:-1], edges[1:]
         kept = missing(a, b) > least
         a, b = a[kept], b[kept]

@@ -45,7 +45,7 @@ LEAST_STEPS = 16
 """Steps of the coarsest level that is tried."""
 TIMES = 32
 """At so many times at most the pilot looks."""
-LONGEST = 12
+MOST_LEVELS = 12
 """Levels of a ladder at most; more of them only add round-off."""
 MOST_STEPS = 2**27
 """Steps that the pilot may take, all its members and levels together."""
@@ -137,7 +137,7 @@ def resolve(experiment: Experiment) -> Experiment:
         for run in runs:
             run.add_level(experiment.steps(level), points)
         here = math.inf
-        for count in range(2, min(level - lowest + 1, LONGEST) + 1):
+        for count in range(2, min(level - lowest + 1, MOST_LEVELS) + 1):
             trial = _trial(experiment, runs, tuple(range(level - count + 1, level + 1)), points)
             if trial.error <= tolerance:
                 chosen = experiment.with_levels(trial.levels)

@@ -26,7 +26,7 @@ from vibsim.formula import Expression
 Floats = NDArray[np.float64]
 Formula = str | Expression
 
-FEWEST = 3
+FEWEST_POINTS = 3
 """Points of a table, at least: a second difference takes three."""
 HEADER, HEIGHTS, BENDS = range(3)
 """Rows of `Table.rows`."""

@@ -13,7 +13,7 @@ from vibsim.core.errors import SimulationError
 
 INLINE = "compiled"
 """Decorator of a function that becomes part of its callers."""
-APART = ("called", "entry")
+COMPILED_ALONE = ("called", "entry")
 """Decorators of functions that are compiled for themselves, where LLVM does not think better of it."""
 
 _OPERATIONS = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul}
@@ -76,9 +76,9 @@ class Source:
 def is_inline(function: ast.FunctionDef) -> bool:
     """Say whether a function becomes part of its callers."""
     match function.decorator_list:
-        case [ast.Name(id=mark)] if mark == INLINE or mark in APART:
+        case [ast.Name(id=mark)] if mark == INLINE or mark in COMPILED_ALONE:
             return mark == INLINE
-    raise refusal(function, f"it has to be marked as one of {', '.join((INLINE, *APART))}")
+    raise refusal(function, f"it has to be marked as one of {', '.join((INLINE, *COMPILED_ALONE))}")
 
 
 def assigned(*body: ast.AST) -> Counter[str]:

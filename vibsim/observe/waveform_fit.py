@@ -34,7 +34,7 @@ from vibsim.convergence.differences import total
 from vibsim.core.array_types import Floats, Integers
 from vibsim.observe import thresholds as th
 
-PIECE = 2**18  # numbers of one kind that are worked on at a time
+NUMBERS_AT_A_TIME = 2**18  # numbers of one kind that are worked on at a time
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def shift(
 
 def _pieces(rows: Integers, points: int) -> Iterator[tuple[Integers, Integers]]:
     """Yield rows and samples that are worked on together."""
-    piece = max(PIECE // th.WINDOW_POINTS, 1)
+    piece = max(NUMBERS_AT_A_TIME // th.WINDOW_POINTS, 1)
     step = max(piece // points, 1)
     for first in range(0, len(rows), step):
         for start in range(0, points, piece):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import SEVERITY, TOLERANCE
+from vibsim.core.vocabulary import ORDER_TOLERANCE, SEVERITY
 from vibsim.experiment.storage import asked
 from vibsim.report.data import Member, case_name, due, flags, formal_orders, swept
 from vibsim.report.finest_level import deviation
@@ -39,7 +39,7 @@ def tolerance(experiment: Experiment, quantity: str, scheme: str) -> float:
     """Return the smallest tolerance of a check that is about the order of a quantity by a scheme."""
     checks = _on_order(experiment, quantity)
     found = [row.tolerance for row in checks if row.schemes is None or scheme in row.schemes]
-    return min(found, default=TOLERANCE)
+    return min(found, default=ORDER_TOLERANCE)
 
 
 def _on_order(experiment: Experiment, quantity: str) -> list[ConvergesCheck]:

@@ -16,14 +16,14 @@ from vibsim.report.data import MEMBER, OF_LEVEL, Member, known
 from vibsim.report.style import positive
 from vibsim.report.types import Axes
 
-WILD = 1e6
+UNBOUNDED = 1e6
 """What exceeds the size of the motion by this factor grows without bound, and gives no frame its range."""
 BROKE_DOWN = "broke down"
 GROWS = "grows without bound"
 ROUND_OFF = "lost in round-off"
 UNLIKE = "no longer proportional"
 NO_VALUE = "no value"
-ALIKE = 0.004  # curves that differ by less than this part of the frame's height look the same
+LOOKS_ALIKE = 0.004  # curves that differ by less than this part of the frame's height look the same
 LEAVING = "Triangles at an edge: values beyond the frame."  # for captions
 
 
@@ -51,7 +51,7 @@ def sizes(record: Record, quantity: str) -> Floats:
 def is_bounded(values: Floats, size: Floats) -> Flags:
     """Say of every value whether it is finite and, where the size of the motion is known, not far beyond it."""
     with np.errstate(over="ignore"):
-        return np.isfinite(values) & ~(np.abs(values) > WILD * size)
+        return np.isfinite(values) & ~(np.abs(values) > UNBOUNDED * size)
 
 
 def why_lost(
@@ -62,7 +62,7 @@ def why_lost(
     if np.any(status[levels] != 0):
         return BROKE_DOWN
     size = float(sizes(record, quantity)[member.case])
-    if math.isfinite(size) and data.largest(values) > WILD * size:
+    if math.isfinite(size) and data.largest(values) > UNBOUNDED * size:
         return GROWS
     pairs = [i for i in levels if i < len(data.whole(record, "pair"))]
     if not pairs:
@@ -114,7 +114,7 @@ def same_as(curves: list[Floats], height: float) -> list[int | None]:
         both = in_a & in_b
         if both.sum() < 2 or 2 * both.sum() < max(in_a.sum(), in_b.sum()):
             return False
-        return bool(np.max(np.abs(a[both] - b[both])) <= ALIKE * height)
+        return bool(np.max(np.abs(a[both] - b[both])) <= LOOKS_ALIKE * height)
 
     for i, curve in enumerate(curves):
         firsts = (j for j in range(i) if found[j] is None and is_alike(curve, curves[j]))

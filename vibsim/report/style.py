@@ -42,7 +42,7 @@ BESIDE = dict[str, Any](loc="upper left", bbox_to_anchor=(1.01, 1.03), borderaxe
 """The place of a legend at the right of its axes."""
 MISSING = "#d4d4d4"  # colour of what has no value
 WIDTH = 9.0  # of a figure [inch]
-POINTS = 400  # horizontal resolution to which a long series is thinned
+THINNED_POINTS = 400  # horizontal resolution to which a long series is thinned
 MANY = len(COLOURS)  # schemes above which a figure has one legend for all of its panels
 LARGEST, TINIEST = 1e300, 1e-300  # of logarithmic axes: beyond, a margin would overflow
 LEAST, MOST = 1e-290, 1e290  # what lies beyond is drawn at the edge
@@ -123,7 +123,7 @@ def crowded(record: Record) -> bool:
     return len(record["scheme"]) > MANY
 
 
-def thin(t: Floats, y: Floats, width: int = POINTS) -> tuple[Floats, Floats]:
+def thin(t: Floats, y: Floats, width: int = THINNED_POINTS) -> tuple[Floats, Floats]:
     """Thin a series for drawing without losing an extreme.
 
     Of ascending `t` and values `y` of shape (n,), where NaN is a gap, it keeps the first, the last, and the smallest

@@ -17,8 +17,8 @@ from vibsim.core.record import Record
 from vibsim.report.data import swept, swept_label
 from vibsim.report.style import label
 
-FARTHEST = 1e100  # swept values from here on are not drawn to scale
-WIDE = 30.0
+LARGEST_TO_SCALE = 1e100  # swept values from here on are not drawn to scale
+LOG_RATIO = 30.0
 """Positive values are drawn on a logarithmic axis only where the largest is so many times the least."""
 LINES = 6  # most lines that the other parameters of a sweep may make
 CELLS = 400  # most cells along each side of a map: more than its pixels could show
@@ -62,7 +62,7 @@ def _key(record: Record, name: str) -> Key:
     if np.issubdtype(values.dtype, np.number):
         numbers = np.asarray(values, dtype=np.float64)
         distinct, place = np.unique(numbers, return_inverse=True)
-        if np.max(np.abs(distinct)) < FARTHEST:
+        if np.max(np.abs(distinct)) < LARGEST_TO_SCALE:
             return Key(key, unit, numbers, distinct)
         # no axis reaches so far: the values are numbered like words
         names = [f"{value:.6g}" for value in distinct.tolist()]
@@ -76,7 +76,7 @@ def _key(record: Record, name: str) -> Key:
 def is_geometric(distinct: Floats) -> bool:
     """Say whether ascending values spread over decades, and more evenly in their logarithm than as they are."""
     low, high = float(distinct[0]), float(distinct[-1])
-    if low <= 0.0 or high < WIDE * low:
+    if low <= 0.0 or high < LOG_RATIO * low:
         return False
     even = np.linspace(0.0, 1.0, distinct.size)
     linear = np.max(np.abs((distinct - low) / (high - low) - even))

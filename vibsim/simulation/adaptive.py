@@ -41,7 +41,7 @@ MOST_STEPS = 2**20
 """Steps after which a run is given up, as one that fails: some minutes of work."""
 KEPT_STEPS = 140_000
 """Steps that are kept in the process for the other levels of a job, of all runs together."""
-PIECE = 2**20
+POINTS_AT_A_TIME = 2**20
 """Points that are worked out at a time."""
 
 CLASSES = {"dop853": "DOP853", "lsoda": "LSODA", "radau": "Radau"}
@@ -127,7 +127,7 @@ def along_a_table(coordinates: int) -> Stepper:
 
 def pieces(where: Integers, steps: int) -> Iterator[Integers]:
     """Yield as many members at a time as `integrate` may hold the points of."""
-    size = max(PIECE // (steps + 1), 1)
+    size = max(POINTS_AT_A_TIME // (steps + 1), 1)
     for first in range(0, len(where), size):
         yield where[first : first + size]
 
@@ -162,8 +162,8 @@ def integrate(
         )
         run = solved(problem)
         # the loop over the points has the first one from elsewhere
-        for first in range(1, steps + 1, PIECE):
-            n = np.arange(first, min(first + PIECE, steps + 1))
+        for first in range(1, steps + 1, POINTS_AT_A_TIME):
+            n = np.arange(first, min(first + POINTS_AT_A_TIME, steps + 1))
             table[i, n] = run.at(n * dt[i]).T
         done[:, i] = len(run.pieces), run.force_evaluations
     found = gather_over(

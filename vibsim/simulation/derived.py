@@ -15,7 +15,7 @@ from vibsim.models import BUDGET, Model, centred, tree
 from vibsim.models.base import Formula
 from vibsim.simulation.members import Members
 
-PIECE = 2**16
+SAMPLES_AT_A_TIME = 2**16
 """Samples that are worked on at a time, so that little memory is needed beside what is kept."""
 
 
@@ -68,7 +68,7 @@ def derived(
     found = {name: np.empty((schemes, cases, times)) for name in wanted}
     found["energy_initial"] = np.empty((schemes, cases))
     parameters = np.stack([group.parameters[p.key] for p in model.parameters], axis=-1)
-    lane, piece = lane_for(cases, schemes * times), max(PIECE // times, 1)
+    lane, piece = lane_for(cases, schemes * times), max(SAMPLES_AT_A_TIME // times, 1)
     for s in range(schemes):
         for first in range(0, cases, piece):
             part = slice(first, first + piece)

@@ -33,11 +33,11 @@ from vibsim.theory.polynomial import (
     with_symbols,
 )
 
-HIGHEST = 8
+HIGHEST_DEGREE = 8
 """Degree at which the search ends."""
-KNOWN = 12
+KNOWN_POWERS = 12
 """Power of dt from which on nothing is known of a residual: twice that of any scheme at these degrees."""
-STEPS = 4
+FOLLOWED_STEPS = 4
 """Steps that a polynomial must be followed for: more than any scheme carries points."""
 ROUNDED = 1e-13
 """Size of a term that is none: some schemes state their coefficients to 16 decimals."""
@@ -87,9 +87,9 @@ def reproduces(stepper: Stepper, model: Model, degree: int) -> bool:
     The stepper is that of `vibsim.schemes.Scheme.stepper_for`. ValueError where the model has no rational formulas.
     """
     _refuse(model)
-    course = with_numbers(stepper, model, degree, KNOWN)
+    course = with_numbers(stepper, model, degree, KNOWN_POWERS)
     state, t = course.start(), course.dt
-    for _ in range(STEPS):
+    for _ in range(FOLLOWED_STEPS):
         if (state[0] - course.solution(0, t)).leading is not None:
             return False
         state, t = course.step(state, t), t + course.dt
@@ -98,16 +98,16 @@ def reproduces(stepper: Stepper, model: Model, degree: int) -> bool:
 
 @lru_cache(maxsize=256)
 def exact_degree(stepper: Stepper, model: Model) -> int:
-    """Return the highest degree up to which polynomials are reproduced, -1 for none, `HIGHEST` for all tried."""
-    missed = (d for d in range(HIGHEST + 1) if not reproduces(stepper, model, d))
-    return next(missed, HIGHEST + 1) - 1
+    """Return the highest degree up to which polynomials are reproduced, -1 for none, `HIGHEST_DEGREE` for all tried."""
+    missed = (d for d in range(HIGHEST_DEGREE + 1) if not reproduces(stepper, model, d))
+    return next(missed, HIGHEST_DEGREE + 1) - 1
 
 
 @lru_cache(maxsize=256)
 def miss(stepper: Stepper, model: Model, degree: int) -> Miss:
     """Return what the first step and every further one are off by, on polynomials of a degree."""
     _refuse(model)
-    course = with_numbers(stepper, model, degree, KNOWN)
+    course = with_numbers(stepper, model, degree, KNOWN_POWERS)
     first, step = (_residual(course, off) for off in (_first, _step))
     if step is None:
         return Miss(degree, first, step, "")
@@ -148,7 +148,7 @@ def _residual(course: Course, off: Callable[[Course], State]) -> Residual | None
         )
         power = next(powers, None)
         if power is not None:
-            known = power + 1 + (KNOWN - number.end)
+            known = power + 1 + (KNOWN_POWERS - number.end)
             symbolic = with_symbols(course.stepper, course.model, course.degree, known)
             coefficient = factor(off(symbolic)[index].at(power).as_expr())
             return Residual(OF[min(index, 2)], power, coefficient)
@@ -165,7 +165,7 @@ def fitted_force(stepper: Stepper, model: Model, degree: int) -> Any:
     from sympy import Symbol
 
     _refuse(model)
-    course = with_symbols(stepper, model, degree, KNOWN)
+    course = with_symbols(stepper, model, degree, KNOWN_POWERS)
     before, ahead = (_step(replace(course, fitted=x))[0] for x in (0.0, 1.0))
     fitted = -before / (ahead - before)
     fits = not _is_off((*_first(course), *_step(replace(course, fitted=fitted))))

@@ -44,7 +44,7 @@ from vibsim.theory.laurent import HALF, SUBSTITUTES, Field, Laurent, coefficient
 
 CRITICAL = 2.0
 """The damping rate over w from which on nothing oscillates."""
-KNOWN = 14
+KNOWN_POWERS = 14
 """Power of h from which on nothing is known; quotients by powers of h lose some of them."""
 
 Pair = NDArray[Any]
@@ -118,11 +118,11 @@ class Mode:
 @lru_cache(maxsize=1024)
 def principal_mode(stepper: Stepper, damping: float) -> Mode:
     """Return the principal mode of the arithmetic of a scheme on a linear model (`Scheme.stepper_for`), g below 2."""
-    step = principal(stepper, damping, KNOWN)
+    step = principal(stepper, damping, KNOWN_POWERS)
     square, decay = step.square, step.determinant**-HALF
     cosine = step.trace * HALF * decay
     sinc, power = square.lift(1.0), square
-    for k in range(1, KNOWN // 2 + 1):
+    for k in range(1, KNOWN_POWERS // 2 + 1):
         sinc, power = sinc + power * Fraction((-1) ** k, math.factorial(2 * k + 1)), power * square
     firsts = [_first_two(step, start) for start in step.starts]
     # what is left of y_1 without growth and turning, over sin(w~ h)/(w~ h) h

@@ -26,9 +26,9 @@ CHUNK = 2**16
 """Members that are looked at together."""
 SLACK = 1e-6
 """What is no difference between two places, in spacings of the table or in steps: rounding."""
-LISTED = 3
+MOST_NAMED = 3
 """Most swept numbers of a member that a message names."""
-MEMBERS = 64
+SAMPLED_MEMBERS = 64
 """Members of a sweep that are looked at for jumps, evenly spread: a jump is hardly ever there for single ones."""
 WORK = 2**14
 """Operations of all these members together: of a long formula, fewer members are looked at."""
@@ -107,7 +107,7 @@ def check_length(numbers: MemberNumbers, name: str, report: Report) -> None:
         if places[i] > most:
             most = float(places[i])
             swept = [f"{key} = {column[i]:.10g}" for key, column in found.items()]
-            who = ", ".join(swept[:LISTED])
+            who = ", ".join(swept[:MOST_NAMED])
     if most > table.last + SLACK * table.spacing:
         count = int(np.ceil((most - table.first) / table.spacing - SLACK)) + 1
         rule = f"the table ends at {table.last:.10g} m, but the motion comes to {most:.10g} m"
@@ -173,7 +173,7 @@ def _check_jumps(row: FormulaField, text: str, members: MemberNumbers, report: R
 
 def _jump(formula: Expression, members: MemberNumbers, along: Expression) -> float | None:
     """Return the place of a jump of some member; None where none is found."""
-    most = max(1, min(MEMBERS, WORK // size(formula, WORK)))
+    most = max(1, min(SAMPLED_MEMBERS, WORK // size(formula, WORK)))
     for numbers, end in members.some(most):
         at = first_jump(formula, numbers, end)
         if at is not None:

@@ -10,7 +10,7 @@ from vibsim.experiment.faults import MISSING, Report
 from vibsim.experiment.schema.document import TimeSection
 from vibsim.models import Model, natural_end
 
-WHOLE = 1e-12
+WHOLE_NUMBER = 1e-12
 """How far, relative to it, a number may be from a whole number that is meant."""
 
 
@@ -67,8 +67,8 @@ def _refuse(names: set[str], rule: str, report: Report) -> None:
 
 
 def _whole(value: float) -> int | None:
-    """Return the whole number, at least 1, that `value` is to `WHOLE`; None where there is none."""
+    """Return the whole number, at least 1, that `value` is to `WHOLE_NUMBER`; None where there is none."""
     if not math.isfinite(value):
         return None
     nearest = round(value)
-    return nearest if nearest >= 1 and abs(value - nearest) <= WHOLE * nearest else None
+    return nearest if nearest >= 1 and abs(value - nearest) <= WHOLE_NUMBER * nearest else None

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, StrictBool, WithJsonSchema
 
-from vibsim.core.vocabulary import REASONS, TOLERANCE, TYPICAL_NORM, Norm, Status
+from vibsim.core.vocabulary import ORDER_TOLERANCE, REASONS, TYPICAL_NORM, Norm, Status
 from vibsim.experiment.schema.fields import (
     MAX_LEVEL,
     STAND_IN,
@@ -207,7 +207,7 @@ class ConvergesCheck(MeasuringCheck):
     `<position>_phase_error` or `<position>_amplitude_error`."""
     order: Order = "scheme"
     """The order: `scheme` for the order that the scheme promises, or a number."""
-    tolerance: Positive = TOLERANCE
+    tolerance: Positive = ORDER_TOLERANCE
     """How far the observed order may be from the expected one."""
     norm: Norm = TYPICAL_NORM
     """The norm over time in which differences are measured."""

@@ -20,7 +20,7 @@ from vibsim.experiment.schema.fields import TABLE
 from vibsim.experiment.tables import csv_text
 from vibsim.experiment.yaml.file_content import MOST_BYTES, content_of
 from vibsim.models import MODELS
-from vibsim.models.table import FEWEST, Table
+from vibsim.models.table import FEWEST_POINTS, Table
 
 ENDINGS = (".csv", ".nc")
 MOST_POINTS = 2**20
@@ -152,8 +152,8 @@ def _variable(dataset: Any, key: str, name: str) -> Floats:
 
 
 def _check_count(points: int) -> None:
-    if points < FEWEST:
-        raise TableError(TABLE, f"must have at least {FEWEST} points, has {points}")
+    if points < FEWEST_POINTS:
+        raise TableError(TABLE, f"must have at least {FEWEST_POINTS} points, has {points}")
     if points > MOST_POINTS:
         raise TableError(TABLE, f"must not have more than {MOST_POINTS} points, has {points}")
 

@@ -51,7 +51,7 @@ TWO = Number(2.0)
 Powers = tuple[int, int, int]
 """Of mass, position and time."""
 FORCE: Powers = (1, 1, -2)
-ALIKE = frozenset({"abs", "max", "min", "mod", "hypot"})
+SAME_DIMENSION = frozenset({"abs", "max", "min", "mod", "hypot"})
 """Functions whose arguments and value have one dimension."""
 FREE = frozenset({"sign", "heaviside", "atan2"})
 """Functions without a dimension, whose arguments have any, but all the same one."""
@@ -252,9 +252,9 @@ class Equations:
                 return self._alike(tuple(choices), node)
             case Call("sqrt" | "cbrt" as root, (argument,)):
                 return _product(NONE, self.of(argument), Fraction(1, 2 if root == "sqrt" else 3))
-            case Call(function, arguments) if function in ALIKE | FREE:
+            case Call(function, arguments) if function in SAME_DIMENSION | FREE:
                 found = self._alike(arguments, node)
-                return found if function in ALIKE else NONE
+                return found if function in SAME_DIMENSION else NONE
             case Call(_, arguments):
                 for argument in arguments:
                     self.equal(self.of(argument), NONE, node)

@@ -21,7 +21,7 @@ from vibsim.report.types import Axes
 OWN, CENTRED = "energy_deviation_running_max", "energy_deviation_d2t_running_max"
 TOGETHER = 6  # most schemes in one panel
 DASHED = (0, (4, 1.6))
-RANGE = 1e18  # widest range of the error: what lies further below the largest is left out
+WIDEST_RANGE = 1e18  # widest range of the error: what lies further below the largest is left out
 
 
 def running(record: Record, case: int) -> Picture | None:
@@ -44,7 +44,7 @@ def running(record: Record, case: int) -> Picture | None:
     both = [style.no_zeros(part / first[:, None] if usable else part) for part in both]
     # of a body at rest nothing else tells a size
     sizes = [1.0] if usable else [size for part in both for row in part if (size := largest(row))]
-    most = frame.WILD * min(sizes, default=1.0)
+    most = frame.UNBOUNDED * min(sizes, default=1.0)
     names = record.words("scheme")
     groups = [range(i, min(i + TOGETHER, len(names))) for i in range(0, len(names), TOGETHER)]
     axes = stacked([2.5] * len(groups))
@@ -107,8 +107,8 @@ def _limits(series: list[Floats], most: float) -> tuple[float, float]:
     shown = kept or [values[values <= most] for values in grown]
     values = style.finite(*shown)
     if values.size == 0:
-        return (most / frame.WILD, most) if grown else (0.1, 1.0)
+        return (most / frame.UNBOUNDED, most) if grown else (0.1, 1.0)
     high = min(float(values.max()), style.LARGEST)
     if grown:
-        high = max(high, 1e3 * most / frame.WILD)
-    return max(float(values.min()), high / RANGE) / 2.0, 2.0 * high
+        high = max(high, 1e3 * most / frame.UNBOUNDED)
+    return max(float(values.min()), high / WIDEST_RANGE) / 2.0, 2.0 * high

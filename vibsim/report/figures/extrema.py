@@ -20,11 +20,11 @@ from vibsim.report.figures.panels import note, stacked
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes, Experiment
 
-CURVES = 6  # most curves; more lie on one another
-MARKED = 40  # most numbers of one curve that get a marker each
+MOST_CURVES = 6  # most curves; more lie on one another
+MOST_MARKERS = 40  # most numbers of one curve that get a marker each
 MOSTLY = 0.5
 """Where fewer than this part of the curves stay so small for two peaks or more, the scale is logarithmic."""
-WILD = 10.0
+CUT_OFF = 10.0
 """Amplitudes and periods beyond so many times the exact one are cut off, and the panel says so."""
 
 Run = tuple[str, Member, int]
@@ -84,9 +84,9 @@ def local(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
 def _runs(record: Record, members: list[Member]) -> list[Run]:
     """Choose the curves: of one or two schemes several levels, of more schemes the coarsest level."""
     levels = whole(record, "level")
-    each = max(1, min(len(levels), 4, CURVES // max(1, len(members))))
+    each = max(1, min(len(levels), 4, MOST_CURVES // max(1, len(members))))
     found = []
-    for member in members[:CURVES]:
+    for member in members[:MOST_CURVES]:
         for i in range(each):
             if np.isfinite(at(record, "peak_time", member, level=i)).sum() >= 2:
                 who = member.scheme_name if len(members) > 1 else ""
@@ -120,7 +120,7 @@ def _draw(
     keep = np.isfinite(time)
     time, grid, peak = time[keep], grid[keep], peak[keep]
     number = np.arange(1, time.size + 1)
-    marker = look["marker"] if number.size <= MARKED else ""
+    marker = look["marker"] if number.size <= MOST_MARKERS else ""
     line = look | {"linewidth": 1.1, "markersize": 4, "marker": marker}
     faint: dict[str, Any] = {"color": look["color"], "linestyle": "none", "marker": "o"}
     faint |= {"markerfacecolor": "none", "alpha": 0.45, "markersize": 6.5, "zorder": 1.5}
@@ -208,7 +208,7 @@ def _ranges(
 
     leaves = False
     for ax, lines, value in zip(axes, drawn, sizes, strict=True):
-        most = WILD * abs(value)
+        most = CUT_OFF * abs(value)
         values = style.finite(*map(_heights_of, ax.lines))
         kept = values[~(np.abs(values) > most)]
         if kept.size in (0, values.size):
@@ -220,7 +220,7 @@ def _ranges(
             _grow(ax, lines, abs(value))
         else:
             ax.set_ylim(*style.limits(kept))
-            note(ax, f"cut off beyond {WILD:g} times the exact one")
+            note(ax, f"cut off beyond {CUT_OFF:g} times the exact one")
         for line in lines:
             x = np.asarray(line.get_xdata(), dtype=np.float64)
             leaves |= frame.mark_leaving(ax, x, _heights_of(line), color=line.get_color())
@@ -233,6 +233,6 @@ def _grow(ax: Axes, lines: tuple[Any, ...], size: float) -> None:
     for line in lines:
         line.set_ydata(style.no_zeros(_heights_of(line)))
     values = np.concatenate([*map(_heights_of, lines), [size]])
-    shown = values[(values <= frame.WILD * size) & (values >= size / frame.WILD)]
+    shown = values[(values <= frame.UNBOUNDED * size) & (values >= size / frame.UNBOUNDED)]
     style.log_axis(ax, "y", float(shown.min()) / 2.0, 2.0 * float(shown.max()))
     note(ax, "size, logarithmic")

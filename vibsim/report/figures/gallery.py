@@ -25,9 +25,9 @@ from vibsim.report.figures import (
 from vibsim.report.style import Picture
 from vibsim.report.types import Experiment
 
-FEW = 3
+FEW_SCHEMES = 3
 """Schemes up to which each one's figures over time stand before those that lay schemes beside each other."""
-SHOWN = 6
+MOST_SHOWN = 6
 """Most schemes and members that get figures of their own, of more schemes half as many; the tables have them all."""
 
 Drawn = list[Picture | None]
@@ -45,7 +45,7 @@ def pictures(experiment: Experiment, record: Record, shown: list[Member]) -> lis
     drawn += over_members(experiment, record, found)
     alone: Drawn = []
     # of several schemes what they have in common comes first, and what each does over time behind it
-    own = alone if len(record["scheme"]) > FEW else drawn
+    own = alone if len(record["scheme"]) > FEW_SCHEMES else drawn
     for quantity in found:
         is_energy = quantity == "energy_deviation" and "energy_deviation_scaled" in record
         if is_energy:
@@ -72,7 +72,7 @@ def over_members(experiment: Experiment, record: Record, found: list[str]) -> li
     if not keys:
         return []
     along, grid = sweep_layout.along_of(keys), sweep_layout.grid_of(keys)
-    schemes = range(min(len(record["scheme"]), SHOWN))
+    schemes = range(min(len(record["scheme"]), MOST_SHOWN))
     drawn: Drawn = []
     if along is not None:
         drawn.append(sweep.period(experiment, record, along))
@@ -101,7 +101,7 @@ def choose(experiment: Experiment, record: Record) -> tuple[list[Member], str]:
     everyone = choice.with_levels(experiment, choice.members(record, quantity))
     status = data.flags(record, f"{quantity}_status")
     severity = [SEVERITY[status[m.scheme, m.case]] for m in everyone]
-    room = SHOWN if len(record["scheme"]) <= SHOWN else SHOWN // 2
+    room = MOST_SHOWN if len(record["scheme"]) <= MOST_SHOWN else MOST_SHOWN // 2
     ranked = sorted(range(len(everyone)), key=lambda i: (-severity[i], i))[:room]
     shown = [everyone[i] for i in sorted(ranked)]
     parts, is_swept = [], bool(data.swept(record))

@@ -21,18 +21,18 @@ from vibsim.report.sweep_layout import Grid
 from vibsim.report.text import words
 from vibsim.report.types import Axes, Experiment, Figure
 
-COLUMNS = 3
+PANELS_A_ROW = 3
 LEFT, WIDE, TALL, GAP = 0.68, 2.52, 2.1, 0.27
 """Left margin, width and height of a panel, gap between panels [inch]."""
 ABOVE, BELOW = 0.32, 1.12
 """Room for the title above a panel, for ticks and the scale below it [inch]."""
 BORDERED = 400  # most cells that are drawn one by one, with borders; more are one image
-DECADES = 12.0  # most decades that a logarithmic scale spans, from the largest value down
-SPREAD = 20.0
+MOST_DECADES = 12.0  # most decades that a logarithmic scale spans, from the largest value down
+LOG_SPREAD = 20.0
 """Positive values that spread by more than this factor, but for a hundredth, have a logarithmic scale."""
-FEW = 5.0  # the same of periods: those of rotation are much shorter
-RANGE = 0.5  # distance from the promised order at which the colours end
-APART = 0.025  # distance between the dots of a separatrix, as part of the panel
+LOG_SPREAD_OF_PERIODS = 5.0  # the same of periods: those of rotation are much shorter
+ORDER_RANGE = 0.5  # distance from the promised order at which the colours end
+DOT_SPACING = 0.025  # distance between the dots of a separatrix, as part of the panel
 SHOWN_ALREADY = ("period", "period_error", "exact_period", "amplitude")
 """Values of checks that have maps of their own."""
 
@@ -50,7 +50,7 @@ class Panel:
     tolerance: float = 0.0
     scale: Floats | None = None
     """Values that set the range of the colours, where it is that of another panel."""
-    spread: float = SPREAD
+    spread: float = LOG_SPREAD
     codes: tuple[tuple[str, str], ...] = ()  # of kind ``code``: text and colour of every number
 
 
@@ -94,7 +94,7 @@ def motion(experiment: Experiment, record: Record, grid: Grid, scheme: int) -> P
     )
     value, exact = time.value[scheme], exact_periods(record)
     label = style.label("period", time.unit)
-    both = {"scale": style.finite(value, exact), "spread": FEW}
+    both = {"scale": style.finite(value, exact), "spread": LOG_SPREAD_OF_PERIODS}
     with np.errstate(invalid="ignore", divide="ignore"):
         relative = time.error[scheme] / value
     rows: list[tuple[str, Floats, str, dict[str, Any]]] = []
@@ -222,11 +222,11 @@ def _errors(record: Record, grid: Grid, quantity: str, scheme: int) -> list[Pane
 
 def draw(grid: Grid, panels: list[Panel], ridge: tuple[Floats, Floats]) -> Figure:
     """Return a figure with the panels in rows of three, all over the same two parameters."""
-    columns = [(LEFT + i * (WIDE + GAP), WIDE) for i in range(COLUMNS)]
+    columns = [(LEFT + i * (WIDE + GAP), WIDE) for i in range(PANELS_A_ROW)]
     figure, axes = rows_of(len(panels), columns, TALL, ABOVE, BELOW)
     for i, (ax, panel) in enumerate(zip(axes, panels, strict=True)):
         image = _cells(ax, grid, panel)
-        _frame(ax, grid, panel.title, first=i % COLUMNS == 0)
+        _frame(ax, grid, panel.title, first=i % PANELS_A_ROW == 0)
         _mark(ax, ridge)
         if panel.kind == "code":
             _legend(ax, panel)
@@ -259,7 +259,7 @@ def _colours(panel: Panel) -> tuple[Any, Any]:
         colours = [colour for _, colour in panel.codes]
         return ListedColormap(colours), BoundaryNorm(borders, len(panel.codes))
     if panel.kind == "distance":
-        return pale_within(panel.tolerance), Normalize(-RANGE, RANGE)
+        return pale_within(panel.tolerance), Normalize(-ORDER_RANGE, ORDER_RANGE)
     if panel.kind == "factor":
         return colormaps["PuOr"], LogNorm(0.5, 2.0)
     values = style.finite(panel.table if panel.scale is None else panel.scale)
@@ -268,23 +268,23 @@ def _colours(panel: Panel) -> tuple[Any, Any]:
 
 
 def pale_within(tolerance: float) -> Any:
-    """Return colours around zero from -RANGE to RANGE that jump where the tolerance ends."""
+    """Return colours around zero from -ORDER_RANGE to ORDER_RANGE that jump where the tolerance ends."""
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
 
-    x = np.linspace(-RANGE, RANGE, 401)
+    x = np.linspace(-ORDER_RANGE, ORDER_RANGE, 401)
     size = np.abs(x)
     inner = 0.10 * size / max(tolerance, 1e-9)
-    outer = 0.22 + 0.28 * (size - tolerance) / max(RANGE - tolerance, 1e-9)
+    outer = 0.22 + 0.28 * (size - tolerance) / max(ORDER_RANGE - tolerance, 1e-9)
     place = 0.5 + np.sign(x) * np.where(size <= tolerance, inner, outer)
     return ListedColormap(colormaps["PuOr"](np.clip(place, 0.0, 1.0)))
 
 
-def limits(values: Floats, spread: float = SPREAD) -> tuple[float, float, bool]:
+def limits(values: Floats, spread: float = LOG_SPREAD) -> tuple[float, float, bool]:
     """Return the range of a scale, and whether it is logarithmic: then a hundredth of the values may lie below it."""
     low, high = float(values.min()), float(values.max())
     if low >= 0.0 and high > 0.0:
-        usual = max(float(np.quantile(values[values > 0.0], 0.01)), high * 10.0**-DECADES)
+        usual = max(float(np.quantile(values[values > 0.0], 0.01)), high * 10.0**-MOST_DECADES)
         if high >= spread * usual:
             return usual, high, True
     room = 0.0 if high > low else 0.01 * abs(high) or 1.0
@@ -308,14 +308,14 @@ def _frame(ax: Axes, grid: Grid, title: str, first: bool) -> None:
 
 
 def _mark(ax: Axes, ridge: tuple[Floats, Floats]) -> None:
-    """Draw the separatrix as dots that stand out from light and dark, no two of them closer than `APART`."""
+    """Draw the separatrix as dots that stand out from light and dark, no two of them closer than `DOT_SPACING`."""
     if not ridge[0].size:
         return
     ends = ax.get_xlim(), ax.get_ylim()
     places = ax.transAxes.inverted().transform(ax.transData.transform(np.column_stack(ridge)))
     kept: list[int] = []
     for i in np.lexsort((places[:, 1], places[:, 0])).tolist():
-        if not kept or np.hypot(*(places[kept] - places[i]).T).min() >= APART:
+        if not kept or np.hypot(*(places[kept] - places[i]).T).min() >= DOT_SPACING:
             kept.append(i)
     dot: Any = {"linestyle": "none", "marker": "o", "markeredgewidth": 0.0}
     for size, colour in ((3.0, "white"), (1.6, "black")):
@@ -348,7 +348,7 @@ def _scale(ax: Axes, image: Any, panel: Panel) -> None:
     bar.outline.set_linewidth(0.5)
     bar.ax.grid(visible=False)
     if panel.kind == "distance":
-        bar.set_ticks([-RANGE, -panel.tolerance, 0.0, panel.tolerance, RANGE])
+        bar.set_ticks([-ORDER_RANGE, -panel.tolerance, 0.0, panel.tolerance, ORDER_RANGE])
         bar.ax.set_xticklabels([f"{x:+g}".replace("-", "−") if x else "0" for x in bar.get_ticks()])
     elif panel.kind == "factor":
         bar.set_ticks([0.5, 0.7, 1.0, 1.4, 2.0], labels=["0.5", "0.7", "1", "1.4", "2"])

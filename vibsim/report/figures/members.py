@@ -26,9 +26,9 @@ from vibsim.report.types import Axes, Experiment
 Masks = dict[str, Flags]
 """Which members come to each verdict, shape (case,)."""
 FEWEST, BARS = 60, 50  # of fewer members a histogram says nothing; bars of one
-SHOWN = 6  # most schemes, and most keys, that have a row; the members' table has all
-POINTS = 4000  # most members that are drawn as points
-BEYOND = 1.5  # distance from the promised order at which the frame ends
+MOST_ROWS = 6  # most schemes, and most keys, that have a row; the members' table has all
+MOST_POINTS = 4000  # most members that are drawn as points
+ORDER_FRAME = 1.5  # distance from the promised order at which the frame ends
 SHARES = 24  # most bars of shares along a key
 MESH = 160, 60  # cells that members are counted in, along and up
 
@@ -37,7 +37,7 @@ def histograms(experiment: Experiment, record: Record, quantity: str) -> Picture
     """Draw the spread of order, error and period error, one row per scheme; None for few members."""
     if len(record["case"]) < FEWEST:
         return None
-    schemes, letter = record.words("scheme")[:SHOWN], words.symbol(quantity)
+    schemes, letter = record.words("scheme")[:MOST_ROWS], words.symbol(quantity)
     error, away = finest_level.error(record, quantity), finest_level.deviation(record, quantity)
     period = finest_level.period_error(record, -1)
     has_period = quantity == position(experiment) and bool(np.isfinite(period).any())
@@ -121,7 +121,7 @@ def projections(
     """Draw order, error and shares of the verdicts of one scheme against every swept key."""
     from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-    letter, shown = words.symbol(quantity), keys[:SHOWN]
+    letter, shown = words.symbol(quantity), keys[:MOST_ROWS]
     columns = ((0.68, 2.5), (3.78, 2.3), (6.5, 2.3))
     figure, axes = rows_of(3 * len(shown), columns, 1.45, 0.0, 0.5)
     status = flags(record, f"{quantity}_status")[scheme]
@@ -133,7 +133,7 @@ def projections(
     for i, key in enumerate(shown):
         order, error_size, share = row = axes[3 * i : 3 * i + 3]
         order.axhspan(-allowed, allowed, **style.ALLOWED)
-        _draw_members(order, key, away, masks, (-BEYOND, BEYOND))
+        _draw_members(order, key, away, masks, (-ORDER_FRAME, ORDER_FRAME))
         text = f"order of {letter} − {promised_text(record, quantity, scheme)}"
         order.set_ylabel(text, fontsize=8.5)
         _draw_members(error_size, key, size, masks, None)
@@ -160,10 +160,10 @@ def projections(
             f"{whole(record, 'level')[-1]}; right what share of the members near a value comes to which verdict. A "
             "key whose shares do not vary does not matter.",
             "Darker cells hold more members; FAIL lies over INCONCLUSIVE over PASS."
-            if away.size > POINTS
+            if away.size > MOST_POINTS
             else "",
             "Orders beyond the frame are drawn at its edge, members without an order at the lower edge."
-            if np.any(~(np.abs(away) < BEYOND))
+            if np.any(~(np.abs(away) < ORDER_FRAME))
             else "",
             f"{more} more keys are not shown; the table of members has them." if more else "",
         ),
@@ -191,7 +191,7 @@ def _draw_members(
     room, some = 0.06 * (high - low), values.size > 500
     for word, chosen in masks.items():
         colour = style.STATUS_COLOURS[word]
-        if values.size <= POINTS:
+        if values.size <= MOST_POINTS:
             dot: Any = {"linestyle": "none", "marker": style.STATUS_MARKERS[word], "color": colour}
             dot |= {"markersize": 2.6 if some else 4.0, "markeredgewidth": 0.0, "rasterized": some}
             ax.plot(key.values[chosen], inside[chosen], **dot)
@@ -199,7 +199,7 @@ def _draw_members(
             up = np.linspace(low - room, high + room, MESH[1] + 1)
             _draw_counts(ax, replace(key, values=key.values[chosen]), inside[chosen], colour, up)
     ax.set_ylim(low - room, high + room)
-    ax.grid(visible=False, axis="both" if values.size > POINTS else "x")
+    ax.grid(visible=False, axis="both" if values.size > MOST_POINTS else "x")
 
 
 def _draw_counts(ax: Axes, key: Key, values: Floats, colour: str, up: Floats) -> None:

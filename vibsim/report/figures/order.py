@@ -22,7 +22,7 @@ from vibsim.report.types import Axes, Experiment
 
 SLOPES: tuple[Any, ...] = ((0, (4, 3)), (0, (1.2, 1.6)), (0, (7, 2, 1.2, 2)), (0, (10, 2)))
 """Dashes of several promised slopes."""
-WILD = 1e4  # errors beyond so many times the upper quartile leave the frame
+OUTLIER = 1e4  # errors beyond so many times the upper quartile leave the frame
 KINDS: dict[str, tuple[str, dict[str, Any]]] = {
     "difference": ("level difference", {"marker": "o", "linestyle": "none", "markersize": 5}),
     "true": ("true error", {"marker": "o", "linestyle": "none", "markersize": 7, "markerfacecolor": "none"}),
@@ -134,7 +134,7 @@ def _positive(parts: list[Floats]) -> Floats:
 
 def _highest(values: Floats) -> float:
     """Return the largest value that a range holds: an unstable level would hide all others."""
-    return min(float(values.max()), WILD * float(np.quantile(values, 0.75)), style.LARGEST)
+    return min(float(values.max()), OUTLIER * float(np.quantile(values, 0.75)), style.LARGEST)
 
 
 def _reference(

@@ -12,10 +12,10 @@ from vibsim.core.array_types import Floats
 from vibsim.report import frame, style
 from vibsim.report.types import Axes, Figure
 
-WILD = 1e6
+LOG_RATIO = 1e6
 """Curves whose largest value is so many times a usual one are drawn on a logarithmic scale."""
-APART = 8.0  # spreads that differ by more than this are drawn on a logarithmic scale
-LONG = 36  # letters of a label above which its unit stands in a line of its own
+LOG_SPREAD = 8.0  # spreads that differ by more than this are drawn on a logarithmic scale
+LONG_LABEL = 36  # letters of a label above which its unit stands in a line of its own
 LEGEND_COLUMNS = 7  # most columns of a legend above panels
 STAMP = (136, 64)  # width and height of the small figure of the index [pixel]
 
@@ -122,7 +122,7 @@ def draw_curves(ax: Axes, t: Floats, curves: list[Curve], text: str, measure: st
         ax.set_ylim(*style.limits(*(values / 10.0**exponent for values in shown)))
     words = style.label(f"|{text}|" if wild else text, measure, exponent)
     # a long label would run into the panel below
-    ax.set_ylabel(words.replace(f"{text} [", f"{text}\n[") if len(words) > LONG else words)
+    ax.set_ylabel(words.replace(f"{text} [", f"{text}\n[") if len(words) > LONG_LABEL else words)
     style.beside(ax)
 
 
@@ -140,7 +140,9 @@ def stop_at_breakdown(ax: Axes, t: Floats, series: list[Floats]) -> None:
 def explosive(series: list[Floats]) -> bool:
     """Say whether values grow beyond all bounds, so that on a linear scale only the last of them would be seen."""
     sizes = _sizes(series)
-    return bool(sizes) and max(s.max() for s in sizes) > WILD * min(np.median(s) for s in sizes)
+    return bool(sizes) and max(s.max() for s in sizes) > LOG_RATIO * min(
+        np.median(s) for s in sizes
+    )
 
 
 def decades(series: list[Floats]) -> tuple[float, float]:
@@ -188,7 +190,7 @@ def draw_spread(ax: Axes, t: Floats, curves: list[Curve], measure: str) -> None:
     # an end point of its own kind does not count
     typical = [float(np.nanquantile(np.abs(gap), 0.9)) for gap in shown]
     sizes = [size for size in typical if size > 0]
-    logarithmic = bool(sizes) and max(sizes) > APART * min(sizes)
+    logarithmic = bool(sizes) and max(sizes) > LOG_SPREAD * min(sizes)
     exponent = 0 if logarithmic else style.scale(*shown)
     for i, gap in gaps.items():
         values = style.no_zeros(gap) if logarithmic else gap / 10.0**exponent

@@ -21,12 +21,12 @@ from vibsim.report.style import Picture
 from vibsim.report.text import words
 from vibsim.report.types import Axes, Experiment
 
-ACROSS = 3  # panels in a row of the phase plane, and most panels of the path
-MOST = 6  # most panels of the phase plane, and most schemes in them
+PANELS_A_ROW = 3  # panels in a row of the phase plane, and most panels of the path
+MOST_PANELS = 6  # most panels of the phase plane, and most schemes in them
 CUT_ORBIT, CUT_PATH = 2.5, 1.3
 """What leaves the exact orbit or path by more than this factor is cut off."""
 PERIODS = 3.0  # of a longer motion the first period and the last so many are drawn
-SAMPLED = 8  # fewer samples than this in a period do not draw an orbit
+FEWEST_SAMPLES = 8  # fewer samples than this in a period do not draw an orbit
 FLATTEST = 0.15  # least height of the frame of a path over its width, or the other way round
 TALLEST = 4.5  # largest height of a panel [inch]
 
@@ -39,18 +39,18 @@ def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     A few schemes only, and series with samples enough in a period.
     """
     model = experiment.model.definition
-    if not shown or len({member.scheme for member in shown}) > MOST:
+    if not shown or len({member.scheme for member in shown}) > MOST_PANELS:
         return None
     case = shown[0].case
     members = [member for member in shown if member.case == case]
     w, t = data.natural_frequency(record, case), data.times(record, case)
     exact = float(data.exact_periods(record)[case])
     period = exact if math.isfinite(exact) else 2.0 * math.pi / w if w > 0.0 else math.nan
-    if not math.isfinite(w) or w <= 0.0 or period < SAMPLED * float(t[1] - t[0]):
+    if not math.isfinite(w) or w <= 0.0 or period < FEWEST_SAMPLES * float(t[1] - t[0]):
         return None
     levels, dt = whole(record, "level"), data.steps_of(record, case)
-    chosen = style.spaced(len(levels), MOST)
-    columns = [(0.62 + 2.75 * i, 2.35) for i in range(ACROSS)]
+    chosen = style.spaced(len(levels), MOST_PANELS)
+    columns = [(0.62 + 2.75 * i, 2.35) for i in range(PANELS_A_ROW)]
     figure, axes = rows_of(len(chosen), columns, 2.35, 0.5, 0.45)
     size = _draw_orbit(axes, record, model, case, w, t <= 1.02 * period)
     is_long = bool(t[-1] > (PERIODS + 1.0) * period)
@@ -75,7 +75,7 @@ def phase(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     for n, ax in enumerate(axes):
         ax.set(xlim=(-edge, edge), ylim=(-edge, edge), aspect="equal")
         ax.set_xlabel(style.label(letter, measure))
-        if n % ACROSS == 0:
+        if n % PANELS_A_ROW == 0:
             ax.set_ylabel(style.label(f"{words.symbol(model.velocity)} / w", measure))
     legend_above(figure, axes[0])
     told = (
@@ -130,11 +130,11 @@ def path(experiment: Experiment, record: Record, shown: list[Member]) -> Picture
         return None
     names, levels = model.positions[:2], whole(record, "level")
     if data.swept(record):
-        cases = sorted({member.case for member in shown})[:ACROSS]
+        cases = sorted({member.case for member in shown})[:PANELS_A_ROW]
         groups = [[member for member in shown if member.case == case] for case in cases]
         panels = [(found[0].case_name, found, len(levels) - 1) for found in groups]
     else:
-        panels = [(f"level {levels[i]}", shown, i) for i in style.spaced(len(levels), ACROSS)]
+        panels = [(f"level {levels[i]}", shown, i) for i in style.spaced(len(levels), PANELS_A_ROW)]
     references = [_points(record, names, members[0], None) for _, members, _ in panels]
     is_known = [bool(np.isfinite(reference).all()) for reference in references]
     curves = [[_points(record, names, m, level) for m in members] for _, members, level in panels]

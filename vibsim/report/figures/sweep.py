@@ -22,9 +22,9 @@ from vibsim.report.sweep_layout import Along
 from vibsim.report.text import words
 from vibsim.report.types import Axes, Experiment
 
-MARKED = 60  # most members that get a marker each; above, a line says it better
+MOST_MARKERS = 60  # most members that get a marker each; above, a line says it better
 DEEP = 1e-16  # errors below this part of the largest leave the frame
-WIDE = 10.0
+LOG_RATIO = 10.0
 """Where some amplitudes leave the frame, others that many times a usual one are drawn on a logarithmic scale."""
 
 
@@ -107,10 +107,10 @@ def amplitude(experiment: Experiment, record: Record, along: Along) -> Picture |
         ax.yaxis.set_label_coords(-0.115, 0.5)
     _draw_numbers(axes[0], record, along, replace(found, error=error), None)
     usual = style.finite(value)
-    is_wide = usual.size > 0 and float(usual.max()) > WIDE * float(np.median(usual))
+    is_wide = usual.size > 0 and float(usual.max()) > LOG_RATIO * float(np.median(usual))
     if explosive([value.ravel()]) or (is_wide and explosive([found.value.ravel()])):
         # a motion that a scheme damps away would fill the frame with its decades
-        least = np.nanmin(np.append(size, np.nanmax(value))) / frame.WILD
+        least = np.nanmin(np.append(size, np.nanmax(value))) / frame.UNBOUNDED
         style.fit_log_axis(axes[0], "y", np.maximum(value, least), room=2.0)
     else:
         axes[0].set_ylim(*_room(replace(found, value=value, error=error), None))
@@ -254,7 +254,7 @@ def _draw_numbers(
             label = _text(scheme if len(schemes) > 1 else "", name) or f"level {level}"
             look = _mark(s, s + k, len(schemes))
             _interval(ax, x, value - error, value + error, look["color"])
-            dashes = "none" if x.size <= MARKED else "-"
+            dashes = "none" if x.size <= MOST_MARKERS else "-"
             _line(ax, x, value, linestyle=dashes, label=label, **look)
     ax.set_ylim(*_room(found, exact))
     ax.set_ylabel(style.label(found.name, found.unit))
@@ -321,21 +321,21 @@ def _mark_members(ax: Axes, along: Along, values: Floats) -> bool:
         for _, members in along.lines:
             x, y = along.key.values[members], values[s, members]
             grown = np.where(y > high, y, np.where(np.isfinite(y), high, np.nan))
-            each = x.size <= MARKED
+            each = x.size <= MOST_MARKERS
             leaves |= frame.mark_leaving(ax, x, grown, color=style.look(s)["color"], each=each)
     return leaves
 
 
 def _line(ax: Axes, x: Floats, y: Floats, **look: Any) -> None:
     """Draw a quantity over members in the order of `x`, thinned; markers only while they are few."""
-    if x.size > MARKED:
+    if x.size > MOST_MARKERS:
         look["marker"] = "," if look.get("linestyle") == "none" else ""
     ax.plot(*style.thin(x, y), **look)
 
 
 def _interval(ax: Axes, x: Floats, low: Floats, high: Floats, colour: str) -> None:
     """Draw error bars: one for each of few members, else a band between two lines."""
-    if x.size <= MARKED:
+    if x.size <= MOST_MARKERS:
         ax.vlines(x, low, high, color=colour, linewidth=2.4, alpha=0.4)
         return
     for bound in (low, high):

@@ -23,18 +23,18 @@ from vibsim.report.text import words
 from vibsim.report.types import Axes, Experiment
 from vibsim.schemes import SCHEMES
 
-POINTS = 240  # points of a curve
+CURVE_POINTS = 240  # points of a curve
 SMALLEST = 1e-13  # growth and phase error below this are round-off of what they are taken from
 KINDS = ("growth", "phase error")
-ALIKE = 1e-9  # curves that differ by less than this part of themselves are the same
-FEW = 40  # dots of one scheme up to which they are large
-MOST = 6  # most unstable runs that are drawn: the slowest and the fastest among them
+SAME_CURVE = 1e-9  # curves that differ by less than this part of themselves are the same
+FEW_DOTS = 40  # dots of one scheme up to which they are large
+MOST_RUNS = 6  # most unstable runs that are drawn: the slowest and the fastest among them
 NOTABLE = 1e-3  # a run is drawn where it grows over the whole time by more than this part
-WHOLE = 4.0  # on a linear scale the solution is drawn up to so many times the exact one
-HIGHEST = 1e250  # sizes beyond are not drawn
+FULLY_DRAWN = 4.0  # on a linear scale the solution is drawn up to so many times the exact one
+LARGEST_DRAWN = 1e250  # sizes beyond are not drawn
 SEEN = 0.2
 """Only runs that stay within the frame for so much of the time are drawn beside the exact solution."""
-BEYOND = 100.0
+LEAVES_FRAME = 100.0
 """What is beyond so many times the exact solution is not drawn on that scale, so that curves leave the frame."""
 
 
@@ -59,7 +59,7 @@ def order_and_stability(experiment: Experiment, record: Record) -> Picture | Non
     )
     axes = stacked([2.9, 2.9])
     grid = np.geomspace(
-        0.9 * float(np.min(style.finite(p[p > 0.0]))), 1.1 * float(np.nanmax(p)), POINTS
+        0.9 * float(np.min(style.finite(p[p > 0.0]))), 1.1 * float(np.nanmax(p)), CURVE_POINTS
     )
     curves = [_theory(experiment, s, grid) for s in range(len(record["scheme"]))]
     limits = known(record, "stability_limit", MEMBER)[:, 0]
@@ -115,7 +115,7 @@ def _alike(
     for k, kind in enumerate(KINDS):
         drawn = [(s, curve[k]) for s, curve in enumerate(curves) if curve is not None]
         drawn = [(s, np.log(np.where(np.abs(y) < SMALLEST, np.nan, np.abs(y)))) for s, y in drawn]
-        firsts = frame.same_as([y for _, y in drawn], ALIKE / frame.ALIKE)
+        firsts = frame.same_as([y for _, y in drawn], SAME_CURVE / frame.LOOKS_ALIKE)
         for (s, _), first in zip(drawn, firsts, strict=True):
             if first is not None:
                 found.append((kind, names[s], names[drawn[first][0]]))
@@ -157,7 +157,7 @@ def _theory(experiment: Experiment, s: int, grid: Floats) -> tuple[Floats, Float
 def _dots(ax: Axes, p: Floats, y: Floats, look: dict[str, Any], text: str) -> None:
     """Draw measured numbers of the shape (case, level): filled where positive, hollow where negative."""
     size = np.where(np.abs(y) < SMALLEST, np.nan, np.abs(y))
-    few = np.isfinite(size).sum() <= FEW
+    few = np.isfinite(size).sum() <= FEW_DOTS
     mark: dict[str, Any] = {"color": look["color"], "marker": look["marker"], "linestyle": "none"}
     mark |= {"markersize": 4.5 if few else 2.8, "markeredgewidth": 0.9}
     ax.plot([], [], **mark, label=text)
@@ -206,14 +206,14 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
         exact = data.exact_series(record, quantity, member)
         most = data.largest(exact)
         reference = max(reference, most)
-        if k == 0 or np.mean(np.abs(values) <= WHOLE * most) >= SEEN:
-            within = np.abs(values) <= BEYOND * most if most > 0.0 else np.isfinite(values)
+        if k == 0 or np.mean(np.abs(values) <= FULLY_DRAWN * most) >= SEEN:
+            within = np.abs(values) <= LEAVES_FRAME * most if most > 0.0 else np.isfinite(values)
             upper.plot(
                 *style.thin(t, np.where(within, values, np.nan)), color=colour, linewidth=1.2
             )
         # the margin of an axis would overflow beyond
         size = style.no_zeros(values)
-        size = np.where(size < HIGHEST, size, np.nan)
+        size = np.where(size < LARGEST_DRAWN, size, np.nan)
         sizes.append(size)
         text = _of_run(record, member, level)
         lower.plot(*style.thin(t, size), color=colour, linewidth=0.9, label=text)
@@ -221,13 +221,13 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
         w = data.natural_frequency(record, member.case)
         if math.isfinite(growth) and math.isfinite(w) and most > 0.0:
             exponent = (t - t[0]) * w / (2.0 * np.pi) * math.log10(growth) + math.log10(most)
-            keep = exponent < math.log10(HIGHEST)
+            keep = exponent < math.log10(LARGEST_DRAWN)
             dashed: dict[str, Any] = {"linestyle": (0, (4, 2)), "linewidth": 1.0}
             lower.plot(t[keep], 10.0 ** exponent[keep], color=colour, **dashed)
         if k == 0 and np.isfinite(exact).any():
             upper.plot(*style.thin(t, exact), color="black", linestyle=(0, (1, 2)), zorder=5)
     if reference > 0.0:
-        upper.set_ylim(-WHOLE * reference, WHOLE * reference)
+        upper.set_ylim(-FULLY_DRAWN * reference, FULLY_DRAWN * reference)
     found = style.finite(*sizes)
     found = found if found.size else np.array([1.0])
     least = 0.2 * (reference or float(np.median(found)))
@@ -235,7 +235,7 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
     upper.set_ylabel(style.label(letter, measure))
     lower.set_ylabel(style.label(f"|{letter}|", measure))
     upper.set_title(
-        f"The slowest beside the exact solution (dotted), up to {WHOLE:g} times its size"
+        f"The slowest beside the exact solution (dotted), up to {FULLY_DRAWN:g} times its size"
     )
     lower.set_title("Size of the solution, and the predicted growth (dashed)")
     lower.set_xlabel(data.time_label(record))
@@ -265,7 +265,7 @@ def _unstable(record: Record) -> list[tuple[Member, int]]:
             if is_beyond and factor > 1.0 + NOTABLE:
                 found.append((factor, member, i))
     found.sort(key=lambda run: run[0])
-    return [found[i][1:] for i in style.spaced(len(found), MOST)]
+    return [found[i][1:] for i in style.spaced(len(found), MOST_RUNS)]
 
 
 def _of_run(record: Record, member: Member, level: int) -> str:

@@ -20,7 +20,7 @@ from vibsim.report.style import Picture
 from vibsim.report.text import words
 from vibsim.report.types import Axes
 
-CURVES = 6  # most curves in one panel; more cannot be told apart
+MOST_CURVES = 6  # most curves in one panel; more cannot be told apart
 ORDERS = 3  # triples whose order is drawn over time: the finest ones above round-off
 UNSURE = 1.0
 """An interval of an order that is wider, or unbounded, leaves a place marked as uncertain."""
@@ -116,7 +116,7 @@ def energy(record: Record, member: Member) -> Picture:
 
 
 def differences(record: Record, quantity: str, member: Member) -> list[panels.Curve]:
-    """Return the level differences, rescaled so that an error ``C dt**p`` makes them coincide; at most `CURVES`."""
+    """Return the level differences, rescaled so that errors ``C dt**p`` make them coincide; at most `MOST_CURVES`."""
     order, levels = data.power(record, member, quantity), data.whole(record, "level")
     above, letter = data.sound_pairs(record, quantity, member), words.symbol(quantity)
     curves = []
@@ -154,7 +154,7 @@ def _few(sound: list[bool]) -> list[int]:
     """
     kept = [i for i, good in enumerate(sound) if good] or list(range(len(sound)))
     lost = [i for i, good in enumerate(sound) if not good and i > max(kept, default=-1)][:1]
-    room = CURVES - len(lost)
+    room = MOST_CURVES - len(lost)
     if len(kept) > room:
         between = np.linspace(0, len(kept) - 2, room - 1).round().astype(int)
         kept = [*(kept[i] for i in between), kept[-1]]

@@ -21,8 +21,8 @@ from vibsim.report.tables import published
 from vibsim.report.text import assertions, reasons, setting, words
 from vibsim.report.types import Check, Experiment, Measurement
 
-MANY = 6  # from so many checks on, those that passed share a table; fewer have a card each
-SETTLED = ("asymptotic", "order_low", "order_high")
+MANY_CHECKS = 6  # from so many checks on, those that passed share a table; fewer have a card each
+WITH_AN_ORDER = ("asymptotic", "order_low", "order_high")
 """Reasons of a result whose order is known: any other has at most an estimate that may be an accident."""
 BRIEF = 3  # with more checks than this, the evidence of those that passed is folded away
 PYTHON = """\
@@ -52,7 +52,7 @@ def context(
         if check["id"] not in in_tables or check["status"] != "PASS"
     ]
     plain = [check["id"] for check in carded if _is_plain(asserted.get(check["id"]), check)]
-    plain = plain if len(carded) >= MANY else []
+    plain = plain if len(carded) >= MANY_CHECKS else []
     used = provenance.get("experiment")
     broken, listed = words.broken(summary), len(summary.get("failures") or [])
     return {
@@ -120,7 +120,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
     listed = len(check["results"])
     more = f"In all: {told}. Listed are the {listed} worst."
     # the result that decides has a settled order
-    settled = check["status"] != "INCONCLUSIVE" and decisive["reason"] in SETTLED
+    settled = check["status"] != "INCONCLUSIVE" and decisive["reason"] in WITH_AN_ORDER
     return {
         "id": check["id"],
         "kind": check["kind"],

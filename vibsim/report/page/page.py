@@ -27,7 +27,7 @@ from vibsim.report.types import Environment, Experiment, Figure, Plan
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
 NOTHING: Mapping[str, Any] = {}
-LONG = 24  # rows above which a table is folded away
+LONG_TABLE = 24  # rows above which a table is folded away
 FOLDED = 500  # most rows of members that the page itself holds; the CSV file holds more
 LONG_HEADING = 90  # letters of a caption of which a heading has the first words only
 
@@ -191,14 +191,14 @@ def _tables(
         levels.scalars(record, shown),
         None if data.is_lean(record) else work.table(experiment, record),
     ]
-    if len(record["scheme"]) > gallery.FEW:
+    if len(record["scheme"]) > gallery.FEW_SCHEMES:
         # a row for each scheme says more than many for each
         kept, rest = [*first, *beside], [*orders, *optional]
     else:
         kept, rest = [*first, *orders, *beside, *optional], []
     listed = [table for table in kept if table is not None]
     # the first table is what the page is about; a long one after it would push the figures away
-    long = [table for table in listed[1:] if len(table.rows) > LONG]
+    long = [table for table in listed[1:] if len(table.rows) > LONG_TABLE]
     listed = [table for table in listed if table not in long]
     folded = _folded([table for table in [*long, *rest] if table is not None])
     other = [levels.orders(record, quantity, shown, norm) for quantity in found for norm in norms]

@@ -13,7 +13,7 @@ from vibsim.report.tables.table import Cell, Column, Table
 from vibsim.report.types import Experiment
 from vibsim.schemes import SCHEMES
 from vibsim.theory import Miss, Residual
-from vibsim.theory.degrees import HIGHEST, applies
+from vibsim.theory.degrees import HIGHEST_DEGREE, applies
 
 LONGEST = 40  # characters of a coefficient that a table shows
 DIGITS = 6  # digits of whole numbers in a coefficient above which it is written with decimals
@@ -47,7 +47,7 @@ def table(experiment: Experiment) -> Table | None:
             continue
         stepper = SCHEMES[spec.kind].stepper_for(model, spec.options)
         degree = theory.exact_degree(stepper, model)
-        if degree == HIGHEST:
+        if degree == HIGHEST_DEGREE:
             rows.append((spec.name, degree, None, EXACT, EXACT, "–"))
         else:
             found = theory.miss(stepper, model, degree + 1)

@@ -24,7 +24,7 @@ from vibsim.report.text import words
 LISTED = 10_000
 """Rows up to which a table lists members, and a file has every digit of what was measured."""
 DIGITS = 9  # significant digits of what was measured, in a file with more rows
-PIECE = 10_000  # rows that are formatted at once
+ROWS_AT_A_TIME = 10_000  # rows that are formatted at once
 
 
 Field = tuple[Column, NDArray[Any]]
@@ -117,8 +117,8 @@ def _pieces(columns: Sequence[NDArray[Any]], own: int, form: str) -> Iterator[st
     forms = [exact.get(column.dtype.kind, "%s") for column in columns[:own]]
     forms += [form if column.dtype.kind == "f" else "%s" for column in columns[own:]]
     template = ",".join([*forms[:own], SCHEME, *forms[own:]]) + "\n"
-    for start in range(0, len(columns[0]), PIECE):
-        parts = [column[start : start + PIECE].tolist() for column in columns]
+    for start in range(0, len(columns[0]), ROWS_AT_A_TIME):
+        parts = [column[start : start + ROWS_AT_A_TIME].tolist() for column in columns]
         cells = tuple(chain.from_iterable(zip(*parts, strict=True)))
         # a number that does not exist is an empty cell; no word of a status or reason begins so
         yield (template * len(parts[0]) % cells).replace(",nan", ",")

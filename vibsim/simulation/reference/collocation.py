@@ -21,7 +21,7 @@ Force = Callable[[Floats, Floats, Floats], Floats]
 
 STAGES = 12
 ITERATIONS = 60
-SMALL = 2.0**-51
+SETTLED_CHANGE = 2.0**-51
 """A change of the accelerations is none that is smaller relative to them and to the velocities over a step."""
 STALLED = 2.0**-30
 """Largest change that may be taken for round-off once changes no longer fall: forces magnify that of the positions."""
@@ -93,7 +93,7 @@ def stages(force: Force, u: Floats, v: Floats, t: Floats, h: Floats, a: Floats) 
         # a member that has come to rest in its last digits keeps them, whatever the others do
         a = np.where(going, found, a)
         stalled = (change <= STALLED * size) & ~(change < 0.5 * before)
-        going, before = going & ~(change <= SMALL * size) & ~stalled, change
+        going, before = going & ~(change <= SETTLED_CHANGE * size) & ~stalled, change
         if not (going & np.isfinite(change)).any():
             break
     return np.where(going, np.nan, a)

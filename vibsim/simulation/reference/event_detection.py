@@ -15,18 +15,20 @@ from vibsim.simulation.reference.one_sided_forces import Sides
 Begin = tuple[Floats, Floats, Floats]
 """Positions and velocities, shape (coordinate, case), and time, shape (case,), where a step begins."""
 
-SAMPLES = 32
+PARTS_OF_A_STEP = 32
 """Equal parts of a step at whose ends a switch is looked at."""
 PROBE = 2.0**-8
 """Part of a step after which the side is read into which the motion goes."""
 NUDGE = 2.0**-10
 """Part of a step before and behind its end between which the slope is taken."""
-X = np.array([0.0, PROBE, *(np.arange(1, SAMPLES + 1) / SAMPLES), 1.0 - NUDGE, 1.0 + NUDGE])
-LAST = SAMPLES + 1
+X = np.array(
+    [0.0, PROBE, *(np.arange(1, PARTS_OF_A_STEP + 1) / PARTS_OF_A_STEP), 1.0 - NUDGE, 1.0 + NUDGE]
+)
+LAST = PARTS_OF_A_STEP + 1
 """Index of the end of the step."""
 EQUAL = np.array([0, *range(2, LAST + 1)])
 """Indices of the equally spaced samples."""
-ROUNDS = 12
+REGULA_FALSI_STEPS = 12
 """Steps of regula falsi; what they leave is corrected where the step ends."""
 ROUGH = 1e-9
 """A value is one of a root that is smaller, relative to those at both ends."""
@@ -108,7 +110,7 @@ class Exits:
         left, right = X[first], X[first + 1]
         hidden = self.hidden[which]
         earlier = np.isfinite(hidden) & (~seen | (hidden < right))
-        left = np.where(earlier, np.maximum(hidden - 1.0 / SAMPLES, 0.0), left)
+        left = np.where(earlier, np.maximum(hidden - 1.0 / PARTS_OF_A_STEP, 0.0), left)
         return (
             np.where(earlier, self.hidden_switch[which], switch),
             left,
@@ -173,7 +175,7 @@ def _root(function: Callable[[Floats], Floats], left: Floats, right: Floats) -> 
     low, high = np.minimum(function(left), 0.0), function(right)
     kept, x, size = np.zeros(len(left)), right, np.abs(high) + np.abs(low)
     going = np.ones(len(left), dtype=bool)
-    for _ in range(ROUNDS):
+    for _ in range(REGULA_FALSI_STEPS):
         way = np.where(low == 0.0, 0.5, low / np.where(high > low, low - high, -1.0))
         x = np.where(going, left + way * (right - left), x)
         value = function(x)
@@ -207,7 +209,9 @@ def _hidden(
         near = (here <= 0.0) & (here >= before) & (here >= behind) & (bend > 0.0)
         near &= peak > -DOUBTFUL * bend
     for k, i, n in zip(*np.nonzero(near), strict=True):
-        place = (i + 1.0 + 0.5 * (behind[k, i, n] - before[k, i, n]) / bend[k, i, n]) / SAMPLES
+        place = (
+            i + 1.0 + 0.5 * (behind[k, i, n] - before[k, i, n]) / bend[k, i, n]
+        ) / PARTS_OF_A_STEP
         if np.isfinite(found[n]) and found[n] <= place:
             continue
         one = slice(n, n + 1)
@@ -236,7 +240,7 @@ def _beyond(
 def _peak(function: Callable[[float], float], place: float) -> float:
     """Return where a function is largest near a place, by parabolas."""
     for part in NARROWER:
-        d = part / SAMPLES
+        d = part / PARTS_OF_A_STEP
         before, here, behind = function(place - d), function(place), function(place + d)
         bend = 2.0 * here - before - behind
         if bend > 0.0:

@@ -42,11 +42,11 @@ METHOD = "collocation at 12 Gauss points of a step, halved until two solutions a
 PIECEWISE = f"{METHOD}; a step ends at every corner of the force"
 FEWEST, MOST = 8, 2**11
 """Steps over the whole interval; where there are corners, of a motion without any."""
-COMPARED = 64
+COMPARED_TIMES = 64
 """At so many equal times, and at t = 0, two solutions are compared."""
 ACCURATE = 1e-12
 """A solution is accepted whose bound is smaller, relative to its largest value."""
-SETTLED = 2e-14
+BEST_AGREEMENT = 2e-14
 """No more is to be had from halving the step."""
 SLOW = 32.0
 """A smooth motion that is resolved gains far more by halving the step; one that gains less twice is none."""
@@ -54,7 +54,7 @@ RESOLVED = 1e-3
 """A relative difference below says that the steps see the motion."""
 LOOKS = 8
 """Equal parts of a step, no longer than the distances of its points, between which a force may not have a pulse."""
-ROUND_OFF = 16.0 * 2.0**-52
+ROUNDING_BOUND = 16.0 * 2.0**-52
 """Relative bound of the rounding errors, beside one that grows with the root of the number of steps."""
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -233,7 +233,7 @@ class _Refined:
 def _accepted(refined: _Refined) -> Chosen:
     """Refine until two solutions agree, each member on its own."""
     bounds = np.full((len(refined.start), len(refined.end)), np.nan)
-    times = np.arange(COMPARED + 1) / COMPARED
+    times = np.arange(COMPARED_TIMES + 1) / COMPARED_TIMES
     left, accepted = np.arange(len(refined.end)), []
     before, gap, slow = None, np.full(len(left), np.inf), np.zeros(len(left), dtype=np.int64)
     steps = FEWEST
@@ -247,8 +247,8 @@ def _accepted(refined: _Refined) -> Chosen:
             gain = gap / relative
             slow = np.where((gain < SLOW) & (relative < RESOLVED), slow + 1, 0)
             own_steps = np.sum(np.isfinite(solved.length), axis=0, dtype=float)
-            rounding = ROUND_OFF * (1.0 + 0.25 * own_steps**0.5)
-            settled = relative <= np.maximum(rounding, SETTLED)
+            rounding = ROUNDING_BOUND * (1.0 + 0.25 * own_steps**0.5)
+            settled = relative <= np.maximum(rounding, BEST_AGREEMENT)
             is_there = settled | ((relative <= ACCURATE) & (gain < SLOW))
             missed = refined.missed(solved, is_there)
             is_there &= missed == 0.0
