@@ -15,14 +15,22 @@ from vibsim.checks.kinds import check_variables, definition
 from vibsim.checks.order import phase_at_start
 from vibsim.checks.tolerance import bounds
 from vibsim.comparison import best_values
-from vibsim.comparison.comparison_variables import SERIES, Table, in_precision, numbers, over_time
+from vibsim.comparison.comparison_variables import Table, in_precision, numbers, over_time
 from vibsim.comparison.order_evidence import judgement
 from vibsim.comparison.quantity_comparison import Comparison, comparisons
 from vibsim.comparison.work_precision import work_precision
 from vibsim.convergence import differences
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record, Variable, attributes
-from vibsim.core.vocabulary import HIGHEST, REASON_NAMES, STATUSES, TYPICAL_NORM
+from vibsim.core.vocabulary import (
+    HIGHEST,
+    MEMBER,
+    OF_LEVEL,
+    REASON_NAMES,
+    SERIES,
+    STATUSES,
+    TYPICAL_NORM,
+)
 from vibsim.experiment.storage import RUNNING, asked, lean_series
 from vibsim.models import centred
 from vibsim.models.events import TREATMENTS
@@ -99,7 +107,7 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
         table |= missed_variables(block.missed)
     if is_damped(block.model):
         attrs = attributes("largest rate at which damping takes a velocity away", "1/s")
-        table["decay_rate"] = Variable(("scheme", "case"), block.decay, attrs)
+        table["decay_rate"] = Variable(MEMBER, block.decay, attrs)
     table |= best_values.table(block, found)
     if experiment.tolerance is not None:
         table |= bounds(block)
@@ -191,8 +199,8 @@ def _scalars(block: MemberBlock) -> Table:
             if not name.endswith((CENTRED, RUNNING)):
                 attrs["long_name"] = f"{attrs.get('long_name', name)} at the last stored time"
                 last = np.stack([row[name][..., -1] for row in rows], -1)
-                table[f"{name}_end"] = Variable(("scheme", "case", "level"), last, attrs)
-        elif dims not in (("scheme", "case"), ("case",)):
+                table[f"{name}_end"] = Variable(OF_LEVEL, last, attrs)
+        elif dims not in (MEMBER, ("case",)):
             continue
         elif name in ONCE:
             table[name] = variable

@@ -18,7 +18,7 @@ from vibsim.comparison.comparison_variables import Table
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Variable, attributes
-from vibsim.core.vocabulary import DRIFTS
+from vibsim.core.vocabulary import DRIFTS, MEMBER, OF_LEVEL
 from vibsim.experiment.schema.published import row_at, row_id
 from vibsim.experiment.value_names import VALUES
 from vibsim.observe import oscillation, predicted_oscillation
@@ -29,7 +29,6 @@ from vibsim.observe.member_block import MemberBlock, by_level
 THEORY_RUNS = 2**12
 """Runs for which theory is worked out, at about 0.1 ms each."""
 
-OF_LEVEL = ("scheme", "case", "level")
 
 PEAKS = "interpolated peaks"
 RECURRENCE = f"recurrence of the steps; {PEAKS} where a run satisfies none to rounding"
@@ -43,8 +42,8 @@ def motion(block: MemberBlock, compared: Mapping[str, Comparison]) -> Table:
     table = _theory(block) | _drift(block) | _extrema(block) | _running(block)
     table |= _beside(block, compared)
     words = "largest stable w dt: infinite for none, 0 where every step grows"
-    limits, member = predicted_oscillation.limits(block), ("scheme", "case")
-    table["stability_limit"] = Variable(member, limits, attributes(words, "1"))
+    limits = predicted_oscillation.limits(block)
+    table["stability_limit"] = Variable(MEMBER, limits, attributes(words, "1"))
     words = "largest position over the largest exact one, or over that of the coarsest level"
     table["size_over_exact"] = Variable(OF_LEVEL, block.growth, attributes(words, "1"))
     words = "evaluations of the acceleration; of an implicit scheme those of one iteration per step"

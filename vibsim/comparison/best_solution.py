@@ -20,6 +20,7 @@ from vibsim.comparison.extrapolate_members import (
 from vibsim.convergence.state_extrapolation import Pair
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.record import Attribute, Record, Variable, attributes
+from vibsim.core.vocabulary import MEMBER, SERIES
 from vibsim.observe.common_grid import Grid, check_belonging, common_grid, take
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import Members, members
@@ -28,7 +29,6 @@ from vibsim.simulation.scaled import in_scales
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
 
-SERIES = ("scheme", "case", "t")
 REACHED = ("no", "yes")
 """Meaning of the variable ``reached``."""
 
@@ -166,7 +166,7 @@ def record_of(
         )
         codes = np.arange(len(REACHED), dtype=np.int8)
         attrs = attributes(words, "1", flag_values=codes, flag_meanings=" ".join(REACHED))
-        variables["reached"] = Variable(SERIES[:2], reached.astype(np.int8), attrs)
+        variables["reached"] = Variable(MEMBER, reached.astype(np.int8), attrs)
     about: dict[str, Attribute] = {
         "title": experiment.title,
         "model": model.kind,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from vibsim.apriori.formal_orders import even_powers, formal_orders
 from vibsim.comparison import value_numbers
-from vibsim.comparison.comparison_variables import MEMBER, Table
+from vibsim.comparison.comparison_variables import Table
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.comparison.thresholds import MISSED_EXTREMUM, OF_GRID, OF_PARABOLA
 from vibsim.convergence import gci
@@ -25,6 +25,7 @@ from vibsim.convergence.number_extrapolation import Limit, limit, observed_order
 from vibsim.convergence.thresholds import ORDER_ABOVE_ROUND_OFF
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Variable, attributes
+from vibsim.core.vocabulary import MEMBER
 from vibsim.experiment.value_names import HAVE_LIMITS
 from vibsim.models import Model
 from vibsim.observe import oscillation

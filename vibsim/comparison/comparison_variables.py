@@ -18,7 +18,7 @@ from vibsim.convergence.local_order import local_order, window_points
 from vibsim.convergence.thresholds import ORDINARY_ORDER
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Variable, attributes
-from vibsim.core.vocabulary import TYPICAL_NORM
+from vibsim.core.vocabulary import MEMBER, OF_LEVEL, SERIES, TYPICAL_NORM
 from vibsim.models import ENERGIES
 from vibsim.models.shared.phase_amplitude_names import is_error_part
 from vibsim.observe.member_block import CENTRED, by_level, plain_name
@@ -32,8 +32,6 @@ LEAST_ORDER = (
     "order that the scheme promises for the position, at least that of a part of its error"
 )
 """What is said of the order of a part of an error of which theory says nothing."""
-MEMBER = ("scheme", "case")
-SERIES = (*MEMBER, "t")
 _IN_NORM = "{} in a norm over time (times s for l1, times the square root of s for l2)"
 
 
@@ -60,7 +58,7 @@ def numbers(q: Comparison) -> Table:
     table: Table = {}
     add = _adder(table, q)
     block, levels = q.block, len(q.block.grid.levels)
-    of_level, of_triple = (*MEMBER, "level"), (*MEMBER, "triple", "norm")
+    of_level, of_triple = OF_LEVEL, (*MEMBER, "triple", "norm")
 
     def stacked(of: Callable[[str], Floats]) -> Floats:
         return np.stack([of(norm) for norm in block.norms], axis=-1)

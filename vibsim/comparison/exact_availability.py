@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vibsim.core.record import Record, Variable, attributes
+from vibsim.core.vocabulary import MEMBER
 
 NORM = "_error_norm"
 KNOWN = "_error_known"
@@ -18,9 +19,9 @@ def known_errors(record: Record) -> dict[str, Variable]:
     found = {}
     attrs = attributes("whether a true error is known", "1")
     for name, norms in record.variables.items():
-        if norms.dims[:2] == ("scheme", "case") and name.endswith(NORM):
+        if norms.dims[:2] == MEMBER and name.endswith(NORM):
             known = np.isfinite(norms.values).any(axis=tuple(range(2, norms.values.ndim)))
-            found[name.removesuffix(NORM) + KNOWN] = Variable(("scheme", "case"), known, attrs)
+            found[name.removesuffix(NORM) + KNOWN] = Variable(MEMBER, known, attrs)
     return found
 
 

@@ -20,6 +20,7 @@ from vibsim.comparison.comparison_variables import Table
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Variable, attributes
+from vibsim.core.vocabulary import OF_LEVEL
 from vibsim.observe import oscillation
 from vibsim.observe.member_block import MemberBlock, by_level
 
@@ -58,7 +59,7 @@ def work_precision(block: MemberBlock, found: Mapping[str, Comparison]) -> Table
         attrs = attributes(
             f"{text}; of an adaptive scheme once, at the finest level", units, **more
         )
-        table[name] = Variable(("scheme", "case", "level"), values, attrs)
+        table[name] = Variable(OF_LEVEL, values, attrs)
     attrs = attributes(f"largest error bound of {words}", position.units)
     return table | {"work_reference_error": Variable(("case",), bound, attrs)}
 

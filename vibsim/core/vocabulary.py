@@ -1,4 +1,4 @@
-"""The words and numbers that every part of vibsim must agree on: statuses, reasons, norms, and the file format.
+"""The words and numbers that all of vibsim agrees on: statuses, reasons, norms, dimensions, and the file format.
 
 This module imports nothing of vibsim and no library, so that any command may have it.
 """
@@ -36,6 +36,12 @@ NORMS: tuple[Norm, ...] = get_args(Norm)
 """Every norm over time; ``linf_interior`` leaves the last point out."""
 TYPICAL_NORM: Norm = "l2"
 """The norm of a check that names none, and of the verdict on a quantity."""
+MEMBER = ("scheme", "case")
+"""Dimensions of a number of each scheme and member."""
+SERIES = (*MEMBER, "t")
+"""Dimensions of a series over the stored times."""
+OF_LEVEL = (*MEMBER, "level")
+"""Dimensions of a number of each level."""
 ORDER_TOLERANCE = 0.1
 """How far from the promised order a measured one may be where a check does not say."""
 BY_TOLERANCE = "tolerance"

@@ -20,8 +20,6 @@ from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.report.style import RAISE, finite, label
 from vibsim.simulation.scaled import has_time_unit
 
-MEMBER = ("scheme", "case")
-OF_LEVEL = ("scheme", "case", "level")
 ABOVE = 3.0  # a difference counts as more than round-off when it exceeds this many times the floor
 _LONGEST = 40  # characters of the name of a scheme in the name of a file
 

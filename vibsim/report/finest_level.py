@@ -12,8 +12,9 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
+from vibsim.core.vocabulary import MEMBER
 from vibsim.report import data
-from vibsim.report.data import MEMBER, Member, formal_orders, known, norm_index, whole
+from vibsim.report.data import Member, formal_orders, known, norm_index, whole
 from vibsim.report.style import no_zeros
 
 

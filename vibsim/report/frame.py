@@ -10,9 +10,9 @@ import numpy as np
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import TYPICAL_NORM
+from vibsim.core.vocabulary import MEMBER, OF_LEVEL, TYPICAL_NORM
 from vibsim.report import data
-from vibsim.report.data import MEMBER, OF_LEVEL, Member, known
+from vibsim.report.data import Member, known
 from vibsim.report.style import positive
 from vibsim.report.types import Axes
 

@@ -12,7 +12,7 @@ import numpy as np
 from vibsim import plan
 from vibsim.core.array_types import Floats, Integers
 from vibsim.core.record import Attribute, Record, Variable, attributes
-from vibsim.core.vocabulary import HIGHEST
+from vibsim.core.vocabulary import HIGHEST, MEMBER, SERIES
 from vibsim.engine import EventTimes, Extrema, Gathered, Trajectories
 from vibsim.experiment.storage import (
     RUNNING,
@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 
     from vibsim.experiment import Experiment
 
-SERIES = ("scheme", "case", "t")
-OUTCOME = SERIES[:2]
 STATUS = ("ok", "non_finite")
 """Meaning of the variable ``status``."""
 MOST_REFERENCES = 1024
@@ -116,7 +114,7 @@ def simulate_record(
         words = "largest absolute deviation of the energy with [D_2t u] as velocity, over every inner step"
         name = "energy_deviation_d2t_max_abs"
         rows.append((name, run.deviation_d2t, words, model.energy_unit))
-    outcomes = _table(OUTCOME, rows)
+    outcomes = _table(MEMBER, rows)
     status = outcomes["status"]
     flags: dict[str, Any] = {
         "flag_values": np.arange(len(STATUS), dtype=np.int8),
@@ -129,8 +127,8 @@ def simulate_record(
         **({} if is_lean else _exact(experiment, group, number, steps)),
         **outcomes,
         **(_extrema(model, found.extrema) if found.extrema else {}),
-        **(_table(OUTCOME, _events(found.events)) if found.events else {}),
-        **(_table(OUTCOME, _own_steps(run)) if has_adaptive(experiment) else {}),
+        **(_table(MEMBER, _events(found.events)) if found.events else {}),
+        **(_table(MEMBER, _own_steps(run)) if has_adaptive(experiment) else {}),
         **_table(("case",), _constants(model, group, steps)),
     }
     attrs: dict[str, Attribute] = {
@@ -226,7 +224,7 @@ def _series(
     start = values_of["energy_initial"]
     return {
         **_table(SERIES, rows),
-        **_table(OUTCOME, [("energy_initial", start, "total mechanical energy at t = 0", unit)]),
+        **_table(MEMBER, [("energy_initial", start, "total mechanical energy at t = 0", unit)]),
     }
 
 
@@ -327,10 +325,10 @@ def _extrema(model: Model, found: Extrema) -> dict[str, Variable]:
             (f"{kind}_grid", f"height of the {kind}s at grid points", unit),
         )
         table |= _table(
-            (*OUTCOME, "extremum"), ((row[0], getattr(found, row[0]), *row[1:]) for row in rows)
+            (*MEMBER, "extremum"), ((row[0], getattr(found, row[0]), *row[1:]) for row in rows)
         )
         name, words = f"{kind}_count", f"number of {kind}s, those that are not kept among them"
-        table |= _table(OUTCOME, [(name, getattr(found, name), words, "1")])
+        table |= _table(MEMBER, [(name, getattr(found, name), words, "1")])
     return table
 
 

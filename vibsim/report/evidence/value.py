@@ -14,8 +14,9 @@ from vibsim.checks.fields import name_of
 from vibsim.checks.value import SAMPLED, own_levels, unit_of, what
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
+from vibsim.core.vocabulary import OF_LEVEL
 from vibsim.report import style
-from vibsim.report.data import OF_LEVEL, Member, at, norm_index, norm_unit, pretty_unit, unit, whole
+from vibsim.report.data import Member, at, norm_index, norm_unit, pretty_unit, unit, whole
 from vibsim.report.evidence import frame
 from vibsim.report.evidence.frame import evidence, measured
 from vibsim.report.style import Picture

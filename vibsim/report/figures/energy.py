@@ -12,8 +12,9 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
+from vibsim.core.vocabulary import MEMBER
 from vibsim.report import frame, style
-from vibsim.report.data import MEMBER, flags, known, largest, pick, time_label, times, unit, whole
+from vibsim.report.data import flags, known, largest, pick, time_label, times, unit, whole
 from vibsim.report.figures.panels import stacked
 from vibsim.report.style import Picture
 from vibsim.report.types import Axes

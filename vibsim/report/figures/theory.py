@@ -13,9 +13,10 @@ import numpy as np
 
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
+from vibsim.core.vocabulary import MEMBER, OF_LEVEL
 from vibsim.report import data, frame, style
 from vibsim.report.choice import position
-from vibsim.report.data import MEMBER, OF_LEVEL, Member, known, omega_dt
+from vibsim.report.data import Member, known, omega_dt
 from vibsim.report.figures.panels import stacked
 from vibsim.report.style import Picture
 from vibsim.report.tables.theory import predicted

@@ -14,9 +14,9 @@ import numpy as np
 
 from vibsim.core.array_types import Flags, Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import TYPICAL_NORM
+from vibsim.core.vocabulary import MEMBER, OF_LEVEL, TYPICAL_NORM
 from vibsim.report import data, frame
-from vibsim.report.data import MEMBER, OF_LEVEL, Member, at, known, time_unit, unit, whole
+from vibsim.report.data import Member, at, known, time_unit, unit, whole
 from vibsim.report.tables.table import (
     Cell,
     Column,

@@ -14,9 +14,9 @@ import numpy as np
 from vibsim.analysis.motion_variables import PEAKS
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import TYPICAL_NORM
+from vibsim.core.vocabulary import MEMBER, OF_LEVEL, TYPICAL_NORM
 from vibsim.report import choice, data, finest_level
-from vibsim.report.data import MEMBER, OF_LEVEL, known, swept, whole
+from vibsim.report.data import known, swept, whole
 from vibsim.report.tables.table import Cell, Column, Table, Written
 from vibsim.report.text import words
 from vibsim.report.types import Experiment
