@@ -94,7 +94,7 @@ DIAGNOSES: Words = {
         "{other_arithmetic}.",
     ),
     "round_off, stored": (
-        "{subject} is stored in single precision. Its differences have reached the round-off of that, so they say "
+        "{subject} is stored in single precision, and its differences have reached that round-off, so they say "
         "nothing about the scheme{before_round_off}.",
         "Store the states in double precision (float64), or u{coarser}.",
     ),
@@ -161,7 +161,7 @@ DIAGNOSES: Words = {
         "{more_levels}",
     ),
     "pre_asymptotic, steep": (
-        "The step is still too coarse to show the order of {what}. Its differences fall faster than any power of dt on "
+        "The step is still too coarse to show the order of {what}. The differences fall faster than any power of dt on "
         "levels {first} to {last}, so the coarser levels may be unrelated to the solution.{parts}",
         "{more_levels}",
     ),
@@ -314,7 +314,7 @@ class _Phrases(OrderContext):
         with_order = f", with {self.measured()}" if self.measured() else ""
         if math.isinf(self.expected) and self.reason == "order_low":
             return f"{self.subject} should be exact here, but levels differ by more than round-off{with_order}."
-        word = "slower" if self.reason == "order_low" else "faster"
+        word = "more slowly" if self.reason == "order_low" else "faster"
         expected = self.notation.number(self.expected)
         return f"{self.subject} converges {word} than order {expected}{with_order}."
 
@@ -376,7 +376,7 @@ class _Phrases(OrderContext):
             return f"{below} or a longer `time: end`"
         return (
             f"{below} and look for noise above round-off in `model:` and `schemes:`. Round-off alone would leave an "
-            f"order up to level {self.readable}"
+            f"order readable up to level {self.readable}"
         )
 
     def other_arithmetic(self) -> str:
