@@ -158,7 +158,7 @@ def test_an_error_above_round_off_is_not_none_however_short_the_run() -> None:
     checks = [{"conserves": "energy", "drift": drift} for drift in ("none", "bounded")]
     none, bounded = spring(["central"], *checks, time={"end": 1.0, "base_steps": 40}).verdicts
     assert (none.status, none.reason) == ("FAIL", "mismatch")
-    assert "more than round-off" in none.text
+    assert "exceeds round-off" in none.text
     assert (bounded.status, bounded.reason) == ("INCONCLUSIVE", "pre_asymptotic")
 
 

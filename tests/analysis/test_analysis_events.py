@@ -92,7 +92,7 @@ def test_the_verdict_says_what_to_change() -> None:
     record = analyse(made, [simulate(made, level) for level in made.levels])
     verdict = verdicts(made, record)[0]
     assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "non_smooth")
-    assert "leaves events to the mesh" in verdict.text
+    assert "notices events only at grid points" in verdict.text
     assert verdict.advice == "Set `events: located` for scheme mesh."
 
 

@@ -189,4 +189,4 @@ def test_where_is_empty_for_what_passes() -> None:
     record = analyse_records(experiment, simulated(experiment))
     (found,) = verdicts(experiment, record)
     assert found.where == {}
-    assert found.text.startswith("All 4 results passed. The hardest (")
+    assert found.text.startswith("All 4 results passed. The hardest is ")

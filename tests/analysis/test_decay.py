@@ -52,7 +52,7 @@ def test_the_decay_is_named(scheme: str, strength: float) -> None:
     made = experiment({"damping": {"linear": strength}}, {"v": 1.0}, schemes=[scheme])
     found = judged(made)[-1]
     assert (found.status, found.reason) == ("INCONCLUSIVE", "pre_asymptotic")
-    assert f"The damping takes a velocity away at a rate of up to {strength:.2g}" in found.text
+    assert f"The damping makes a velocity decay at a rate of up to {strength:.2g}" in found.text
     assert "will not help" not in found.advice
 
 

@@ -243,7 +243,7 @@ def test_members_of_a_sweep_have_the_bits_that_they_have_alone() -> None:
     [
         (1.0, 2.0, 0.9, "so the start is of first order"),
         (2.0, 4.02, 1e-9, "so the frequency is of second order"),
-        (2.0, 1.0, 0.0, "it is the amplitude that is wrong"),
+        (2.0, 1.0, 0.0, "The amplitude is wrong"),
         (1.5, 2.5, 1.0, "order 1.5"),
     ],
 )

@@ -60,7 +60,7 @@ def test_a_member_that_the_pilot_did_not_try_fails(swept: Experiment, convergenc
     omega = float(found["initial_omega"][HARD])
     assert verdict.where["FAIL"]["keys"]["initial.omega"]["range"] == [omega, omega]
     assert f"FAIL in 1 of 40 results, with initial.omega equal to {omega:.6g}" in verdict.text
-    assert f"The hardest (scheme central, case {HARD}, " in verdict.text
+    assert f"The hardest is scheme central, case {HARD} (" in verdict.text
     assert f"{bounds[HARD]:.3g}" in verdict.text
     first, last = swept.levels[0], swept.levels[-1]
     assert f"finer `levels:` than {first} to {last}" in verdict.advice
@@ -105,7 +105,7 @@ def test_levels_in_which_nothing_is_known() -> None:
     lone = experiment(sweep=None, time={"end": 2000.0}).with_levels((5, 6))
     verdict = verdicts(lone, analyse_records(lone, simulated(lone)))[-1]
     assert (verdict.status, verdict.reason, verdict.results[0].value) == ("FAIL", "mismatch", None)
-    assert "nothing is known" in verdict.text
+    assert "is unknown" in verdict.text
 
 
 @pytest.mark.parametrize("is_swept", [False, True])

@@ -89,7 +89,7 @@ LADDERS = {
         ("FAIL", "unstable"),
         (
             "w dt = 25 is beyond the limit 2",
-            "growth factor per period 5.03885 predicted, 5.03885 measured",
+            "growth factor per period is 5.03885 (predicted) and 5.03885 (measured)",
         ),
     ),
     "friction on the mesh": Ladder(
@@ -114,7 +114,7 @@ LADDERS = {
         (9, 10, 11, 12),
         {"converges": "u", "order": 2},
         ("INCONCLUSIVE", "round_off"),
-        ("floor of round-off",),
+        ("have reached round-off",),
     ),
     "Dt = pi/w": Ladder(
         {**SPRING, "time": {"end": 16 * math.pi}, "samples": {"every": 16}},
@@ -122,7 +122,7 @@ LADDERS = {
         (8, 9, 10, 11, 12),
         {"converges": "u", "order": 2},
         ("FAIL", "order_high"),
-        ("All common times are turning points of u", "This is no higher order"),
+        ("All common times are turning points of u", "The order is not really higher"),
     ),
 }
 

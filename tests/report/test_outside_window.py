@@ -55,7 +55,7 @@ def test_a_floor_above_round_off_is_not_called_round_off() -> None:
     assert "no longer proportional" in notes(record)
     found, _ = made(range(9, 14), noise=1e-3)
     assert found.status == "INCONCLUSIVE"
-    assert "floor of round-off" not in found.text
+    assert "have reached round-off" not in found.text
 
 
 def test_what_is_round_off_is_called_so() -> None:

@@ -55,16 +55,16 @@ EXPECTED_DRIFTS = get_args(Drift)
 """What `drift:` may be."""
 _DRIFTS = {
     "none": "is round-off",
-    "bounded": "is bounded: its largest value no longer grows",
-    "linear": "grows in proportion to the time",
-    "quadratic": "grows in proportion to the square of the time",
-    "exponential": "grows exponentially with time",
-    "unclear": "is more than round-off, but this run does not show how it grows",
+    "bounded": "is bounded and its largest value no longer grows",
+    "linear": "grows linearly with time",
+    "quadratic": "grows quadratically with time",
+    "exponential": "shows that the energy grows exponentially",
+    "unclear": "exceeds round-off, but this run does not show how it grows",
 }
 _RATES = {
-    "linear": "by {} of the energy per period",
-    "quadratic": "by {} of the energy per period squared",
-    "exponential": "the energy by the factor exp({}) per period",
+    "linear": ", by {} of the energy per period",
+    "quadratic": ", by {} of the energy per period squared",
+    "exponential": ", by the factor exp({}) per period",
 }
 
 
@@ -153,16 +153,16 @@ def describe(f: Found, check: ConservesCheck) -> Description:
             )
     told = _DRIFTS[drift]
     if drift == "exponential" and rate < 0:
-        told = "is that of an energy that decays exponentially"
+        told = "shows that the energy decays exponentially"
     if rate and math.isfinite(rate):
-        told += f", {_RATES.get(drift, '').format(number(rate, 4))}"
+        told += _RATES.get(drift, "").format(number(rate, 4))
     most = (
-        f"it is at most {number(size, 4)} of the energy"
+        f"The error is at most {number(size, 4)} of the energy"
         if math.isfinite(size)
-        else "the energy is 0"
+        else "The energy is 0"
     )
     return Description(
-        f"The error of {name} {told}; {most}. {expects}", _advice(f.reason, drift, check)
+        f"The error of {name} {told}. {most}. {expects}", _advice(f.reason, drift, check)
     )
 
 

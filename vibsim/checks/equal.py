@@ -124,7 +124,7 @@ def describe(f: Found, check: EqualCheck) -> Description:
     both = f"{what} of scheme {check.first} and {other}"
     apart = f"at most {number(distance, 4)} apart"
     brief = f"{apart}; {number(allowed, 4)} is allowed"
-    enough = f"above {_rounded_up(distance)} if so much is right"
+    enough = f"above {_rounded_up(distance)} if that is close enough"
     sentence = f"{what} of scheme {check.first} {{}} {other}. They are {brief}."
     match f.reason:
         case "match":
@@ -132,15 +132,15 @@ def describe(f: Found, check: EqualCheck) -> Description:
         case "non_finite":
             return Description(NOT_FINITE[0].format(what), NOT_FINITE[1], brief)
         case "not_applicable" if distance <= allowed:
-            told = f"{NOTHING_MOVES.format(what)}, and {other} shows no difference."
+            told = f"{NOTHING_MOVES.format(what)}. A comparison with {other} shows nothing."
             return Description(told, MOVE, brief)
         case "not_applicable" if math.isfinite(distance):
-            told = f"{both} are {apart}, and the round-off to compare that with is not known here."
+            told = f"{both} are {apart}, but the round-off to compare with is not known here."
             return Description(told, f"Give `atol:`, {enough}.", brief)
         case "not_applicable":
             return Description(
                 f"{what} and {other} cannot be compared here, or were not stored.",
-                "Name in `equal:` a scheme or a solution that exists here, or another `quantity:`.",
+                "Name a scheme or a solution that exists here (`equal:`), or another `quantity:`.",
                 brief,
             )
     ways = " or the options of one of the `schemes:`,"
@@ -148,7 +148,7 @@ def describe(f: Found, check: EqualCheck) -> Description:
         ways = ", take a finer `level:`,"
     return Description(
         sentence.format("differs from"),
-        f"Correct what `equal:` names{ways} or give `atol:` {enough}.",
+        f"Correct `equal:`{ways} or give `atol:` {enough}.",
         brief,
     )
 

@@ -37,18 +37,18 @@ START_FINER = "Start `levels:` at {first_good} or finer ({cost_of_first}), or sh
 CANNOT_SHOW = "{subject} cannot show order {expected}, because "
 ON_MESH = "Set `events: located` for scheme {scheme}."
 ON_TABLE = (
-    "Choose steps in `time:` that end at every point of the table: the coarsest dt is its spacing over the speed, or a "
-    "whole fraction of it."
+    "Choose steps in `time:` that end at every point of the table. The coarsest dt must be the spacing over the speed, "
+    "or a whole fraction of it."
 )
 
-NOT_FINITE = "The calculation of {what} met a number that is not finite{place}."
+NOT_FINITE = "The calculation of {what} produced a number that is not finite{place}."
 PROMISED_LESS = " Scheme {scheme} promises no more than order {promised} here"
 NO_SYMMETRY = "Try other `initial:` values or another `time: end`, where nothing cancels by symmetry{or_expect}."
 PULSE = (
-    "Near t = {pulse[0]} the force has a pulse of length {pulse[1]:1} or so, between two points of "
-    "every level (the shortest step is {shortest:2}). No level sees it, and differences do not show the error.",
-    "Use steps that are shorter than the pulse, from level {level_of_pulse} on, write a wider pulse of the same "
-    "impulse, or end the time interval (`time: end`) before t = {pulse[0]}.",
+    "The force has a pulse about {pulse[1]:1} long near t = {pulse[0]}, between two points of every level (the "
+    "shortest step is {shortest:2}). No level sees it, so differences do not show the error.",
+    "Use steps shorter than the pulse (from level {level_of_pulse} on), write a wider pulse of the same impulse, or "
+    "end the time interval (`time: end`) before t = {pulse[0]}.",
 )
 DIAGNOSES: Words = {
     "asymptotic": (
@@ -57,36 +57,35 @@ DIAGNOSES: Words = {
         "",
     ),
     "exact": (
-        "{subject} is exact: the levels differ by round-off only, and there is no order to measure.{unseen}",
+        "{subject} is exact. The levels differ only by round-off, so there is no order to measure.{unseen}",
         "",
     ),
     "wrong_limit": (
-        "The levels of {what} approach each other, but not the exact solution: too large an error remains.",
-        "Check `model:` and `initial:` against the equation that you mean: finer levels will not help.",
+        "The levels of {what} approach each other, but not the exact solution. The remaining error is too large.",
+        "Check `model:` and `initial:` against the intended equation. Finer levels will not help.",
     ),
     "unstable, beyond the limit": (
-        "The run is unstable: at level {culprit}, w dt = {omega_dt:4} is beyond the limit {limit} of scheme "
-        "{scheme}{growth_in_words}; level {first_stable} is the first within it.",
+        "The run is unstable at level {culprit}, where w dt = {omega_dt:4} is beyond the limit {limit} of scheme "
+        "{scheme}. Level {first_stable} is the first within it.{growth_in_words}",
         START_FINER,
     ),
     "unstable": (
-        "{subject} is unstable: the solution grows where the exact one does not, and finer levels do not remove that.",
+        "{subject} is unstable. The solution grows where the exact one does not, and finer levels do not cure this.",
         START_FINER,
     ),
     "non_finite, from the start": (
         NOT_FINITE,
-        "Check the formulas of `model:` at t = 0, and `initial:`: something has no finite value there (a quotient of "
-        "two zeros takes its limit by a condition, sin(t)/t if t > 0 else 1).",
+        "Check the formulas of `model:` at t = 0, and `initial:`. Something has no finite value there. A quotient of "
+        "two zeros needs a condition, such as sin(t)/t if t > 0 else 1.",
     ),
     "non_finite, always": (
         NOT_FINITE,
-        "End the time interval (`time: end`) before t = {singular:4}, or check the formulas of `model:`: finer levels "
-        "will not help where the motion escapes, or a formula has no finite value.",
+        "End the time interval (`time: end`) before t = {singular:4}, or check the formulas of `model:`. Finer levels "
+        "will not help if the motion escapes or a formula has no finite value.",
     ),
     "non_finite": (NOT_FINITE, START_FINER),
     "round_off": (
-        "The differences of {what} have reached the floor of round-off, where they say nothing about the "
-        "scheme{before_round_off}.",
+        "The differences of {what} have reached round-off, so they say nothing about the scheme{before_round_off}.",
         "{other_arithmetic}.",
     ),
     "round_off, noise": (
@@ -95,8 +94,8 @@ DIAGNOSES: Words = {
         "{other_arithmetic}.",
     ),
     "round_off, stored": (
-        "The differences of {what} have reached the floor of round-off of the single precision that it is stored in, "
-        "where they say nothing about the scheme{before_round_off}.",
+        "{subject} is stored in single precision, and its differences have reached that round-off, so they say "
+        "nothing about the scheme{before_round_off}.",
         "Store the states in double precision (float64), or u{coarser}.",
     ),
     "oscillating": (
@@ -104,45 +103,47 @@ DIAGNOSES: Words = {
         "{add}, or measure in another `norm:`.",
     ),
     "too_few_levels": (
-        "{count} too few to judge the convergence of {what}: three are needed, four are better.",
+        "{count} too few to judge the convergence of {what}. Three are needed, and four are better.",
         "{add_missing}.",
     ),
     "not_applicable, adaptive": (
-        "Scheme {scheme} is adaptive: it chooses its own steps at every level, so {what} has no order.",
-        "Name schemes with a fixed step (`schemes:`), or ask for its error with a `value:` check.",
+        "Scheme {scheme} is adaptive and chooses its own steps at every level, so {what} has no order.",
+        "Name schemes with a fixed step (`schemes:`), or check the error with `value:`.",
     ),
     "not_applicable, still": (
         "{subject} does not change after the start, or too little for an error to show. There is nothing to judge.",
-        "Choose `initial:` values, a force or a `time: end` with which {what} moves from one common time to the next.",
+        "Choose `initial:` values, a force or a `time: end` so that {what} changes from one common time to the next.",
     ),
     "not_applicable": (
         "{subject} does not exist here, so there is nothing to judge.",
         "Choose a quantity (`converges:`) that this model and scheme have.",
     ),
     "pre_asymptotic, decay": (
-        "The damping takes a velocity away at a rate of up to {decay:2}, within a time of {decay_time:2}. That is less "
-        "than the shortest step, {shortest:2}. No level sees the decay, and differences do not show the error.",
-        "Use shorter steps, from level {level_of_decay} on, a weaker damping, or `initial:` velocities that it leaves.",
+        "The damping makes a velocity decay at a rate of up to {decay:2}, within a time of {decay_time:2}. The "
+        "shortest step, {shortest:2}, is longer. No level sees the decay, so differences do not show the error.",
+        "Use shorter steps (from level {level_of_decay} on), weaker damping, or `initial:` velocities that do not "
+        "decay.",
     ),
     "non_smooth, pulse": PULSE,
     "pre_asymptotic, pulse": PULSE,
     "non_smooth, mesh": (
-        "Scheme {scheme} leaves events to the mesh and notices them up to a step late. So the error of {what} has no "
-        "regular expansion in powers of dt.",
+        "Scheme {scheme} notices events only at grid points (`events: mesh`), up to a step late, so the error of "
+        "{what} has no regular expansion in powers of dt.",
         ON_MESH,
     ),
     "non_smooth, table": (
-        "Between the points of its table the force is a straight line, and its corners lie within steps. So the error "
-        "of {what} has no regular expansion in powers of dt.",
+        "The force is linear between the points of its table and has corners within steps, so the error of "
+        "{what} has no regular expansion in powers of dt.",
         ON_TABLE,
     ),
     "non_smooth, jump at a point": (
-        CANNOT_SHOW + "the force jumps at a grid point: {corner.words} at t = {corner.time:4}, and "
+        CANNOT_SHOW
+        + "the force jumps at a grid point ({corner.words} at t = {corner.time:4}), and "
         "the steps on both sides use the same value there. Expect order 1{beside_corner}.",
         "{end_before_corner}",
     ),
     "non_smooth, corner": (
-        CANNOT_SHOW + "{jump} within a step: {corner.words} at t = {corner.time:4}. Expect order "
+        CANNOT_SHOW + "{jump} within a step ({corner.words} at t = {corner.time:4}). Expect order "
         "{corner.power}{beside_corner}.",
         "{end_before_corner}",
     ),
@@ -151,33 +152,33 @@ DIAGNOSES: Words = {
         "Set `order:` to what the kink allows, or end the time interval (`time: end`) before it.",
     ),
     "pre_asymptotic, still": (
-        "{subject} lies still at every common time, while the exact solution moves: the step is still too coarse.",
+        "{subject} is at rest at every common time, while the exact solution moves. The step is still too coarse.",
         "{more_levels}",
     ),
     "pre_asymptotic, growing": (
-        "The differences of {what} grow from level to level ({measured}). The step is still too coarse to tell an "
-        "order, or level {last} is not of one kind with those before it.{parts}",
+        "The differences of {what} grow from level to level ({measured}). The step is still too coarse to show an "
+        "order, or level {last} differs in kind from those before it.{parts}",
         "{more_levels}",
     ),
     "pre_asymptotic, steep": (
-        "The step is still too coarse to tell the order of {what}: its differences fall faster on levels {first} to "
-        "{last} than any power of dt. The coarser levels may have nothing to do with the solution.{parts}",
+        "The step is still too coarse to show the order of {what}. The differences fall faster than any power of dt on "
+        "levels {first} to {last}, so the coarser levels may be unrelated to the solution.{parts}",
         "{more_levels}",
     ),
     "pre_asymptotic": (
-        "The step is still too coarse to tell the order of {what}{so_far}.{hidden}{parts}",
+        "The step is still too coarse to show the order of {what}{so_far}.{hidden}{parts}",
         "{more_levels}",
     ),
     "order_low, mesh": (
-        " The likely cause is `events: mesh`: an event is noticed up to a step late.",
+        " The likely cause is `events: mesh`, which notices an event up to a step late.",
         ON_MESH,
     ),
     "order_low, table": (
-        " The likely cause is the table: the force has corners at its points, which lie within steps.",
+        " The likely cause is the table. The force has corners at its points, which lie within steps.",
         ON_TABLE,
     ),
     "order_low, promise, damping": (
-        PROMISED_LESS + ": it takes the damping backward.",
+        PROMISED_LESS + ", because it uses the backward difference for the damping.",
         "Set `kind: central` for scheme {scheme}, which centres the damping, or `order: scheme`.",
     ),
     "order_low, promise, start": (
@@ -186,26 +187,27 @@ DIAGNOSES: Words = {
     ),
     "order_low, promise": (
         PROMISED_LESS + ".",
-        "Set `order: scheme`, or another `kind:` than that of scheme {scheme}.",
+        "Set `order: scheme`, or give scheme {scheme} another `kind:`.",
     ),
     "order_low, start": (
-        " The likely cause is the first step: `start: first_order` leaves its dt^2 term out.",
+        " The likely cause is the first step, because `start: first_order` omits its dt^2 term.",
         "Set `start: centred` for scheme {scheme}.",
     ),
     "order_low, end": (
-        " The likely cause is the last point: `end_velocity: {options[end_velocity]}` is one-sided, of lower order.",
+        " The likely cause is the last point, because `end_velocity: {options[end_velocity]}` is one-sided and of "
+        "lower order.",
         "Set `end_velocity: kick` for scheme {scheme}, or measure with `norm: linf_interior`.",
     ),
     "order_low, last_point": (
-        " Without the last point the order is the expected one: what is of lower order is a formula at the end.",
+        " The order is as expected without the last point, so a formula at the end is of lower order.",
         "Measure with `norm: linf_interior`{or_kick}.",
     ),
     "order_low, one_quantity": (
-        " Another state has the expected order: what is of lower order is how {what} is made, not the step.",
-        "Look for a formula of lower order that {what} alone is made with{or_expect}.",
+        " Another state has the expected order, so the cause is how {what} is computed, not the step.",
+        "Look for a formula of lower order that only {what} uses{or_expect}.",
     ),
     "order_low, everything": (
-        " It is so in every state and at every time: the step of scheme {scheme}, its start or the force is the cause.",
+        " Every state shows this at every time, so the cause is the step of scheme {scheme}, its start or the force.",
         "Look for a term of lower order in scheme {scheme}{or_expect}.",
     ),
     "order_low": ("", "Look for a term of lower order in scheme {scheme}{or_expect}."),
@@ -218,22 +220,23 @@ DIAGNOSES: Words = {
         "Set `order: scheme`.",
     ),
     "order_high, special_times": (
-        " All common times are turning points of {what}, where a shift in time does not show. This is no higher order.",
-        "Choose another `time: end`, or start `levels:` at a finer level, so that other times are compared, too.",
+        " All common times are turning points of {what}, where a shift in time does not show. The order is not really "
+        "higher.",
+        "Choose another `time: end`, or start `levels:` at a finer level, to compare at other times, too.",
     ),
     "order_high, theory": (
-        " The theory of scheme {scheme} has that order on this linear model, too.",
-        "Set `order: {likely}`, which the theory of scheme {scheme} has here.",
+        " Theory predicts that order for scheme {scheme} on this linear model.",
+        "Set `order: {likely}`, as theory predicts for scheme {scheme} here.",
     ),
     "order_high, one_norm": (
-        " In another norm than {norm} the order is the expected one: errors cancel in this one.",
+        " The order is as expected in another norm, so errors cancel in {norm}.",
         "Measure in another `norm:`{or_expect}.",
     ),
     "order_high, one_quantity": (
-        " Another state has the expected order: the leading error vanishes in {what}, not in every state.",
+        " Another state has the expected order. The leading error vanishes in {what}, but not in every state.",
         "Check another state (`converges:`){or_expect}.",
     ),
-    "order_high, everything": (" It is so in every state and every norm.", NO_SYMMETRY),
+    "order_high, everything": (" Every state shows this in every norm.", NO_SYMMETRY),
     "order_high": ("", NO_SYMMETRY),
 }
 
@@ -310,8 +313,8 @@ class _Phrases(OrderContext):
         """Say that an order is lower or higher than the expected one."""
         with_order = f", with {self.measured()}" if self.measured() else ""
         if math.isinf(self.expected) and self.reason == "order_low":
-            return f"{self.subject} is promised to be exact, but levels differ by more than round-off{with_order}."
-        word = "slower" if self.reason == "order_low" else "faster"
+            return f"{self.subject} should be exact here, but levels differ by more than round-off{with_order}."
+        word = "more slowly" if self.reason == "order_low" else "faster"
         expected = self.notation.number(self.expected)
         return f"{self.subject} converges {word} than order {expected}{with_order}."
 
@@ -351,40 +354,40 @@ class _Phrases(OrderContext):
             return ""
         where, number = f" at level {self.culprit}", self.notation.number
         if self.singular == 0.0:
-            return f"{where}, in its first step, and so does every finer level"
+            return f" in the first step at level {self.culprit} and at every finer one"
         if not math.isnan(self.singular):
-            again = f"level {self.levels[-1]} met one at t = {number(self.singular, 4)}"
-            return f"{where}, and finer ones do not avoid it: {again}"
+            again = f"level {self.levels[-1]} produced one at t = {number(self.singular, 4)}"
+            return f"{where}. Finer levels do not avoid it; {again}"
         at = dict(zip(self.levels, self.failures, strict=False)).get(self.culprit, math.nan)
         return where if math.isnan(at) else f"{where}, at t = {number(at, 4)}"
 
     def before_round_off(self) -> str:
-        return f"; before it, {self.measured()} is all that is left" if self.order > 0.0 else ""
+        return f". The only estimate before that is {self.measured()}" if self.order > 0.0 else ""
 
     def coarser(self) -> str:
         """Say which levels show an order, from the second letter on."""
         is_fine = self.readable >= max(self.levels[-1], 2)
         if self.readable >= 2 and not is_fine:
             first = max(self.readable - 3, 0)
-            return f"se coarser `levels:`, such as {first} to {self.readable}: finer ones are round-off"
+            return f"se coarser `levels:`, such as {first} to {self.readable}, because finer ones are round-off"
         last = self.last if self.last >= 0 else self.levels[-1 if is_fine else 0]
         below = f"se coarser `levels:`, below {max(last, 1)},"
         if not is_fine:
             return f"{below} or a longer `time: end`"
         return (
-            f"{below} and look for what is rougher than rounding in `model:` and `schemes:`: that alone would leave an "
-            f"order up to level {self.readable}"
+            f"{below} and look for noise above round-off in `model:` and `schemes:`. Round-off alone would leave an "
+            f"order readable up to level {self.readable}"
         )
 
     def other_arithmetic(self) -> str:
         """Say in which arithmetic and on which levels an order can be read, as far as they are predicted."""
         coarser = self.coarser()
         if not self.order > 0.0:
-            coarser += "; where those are round-off, too, the scheme is exact here, and another `model:` shows its "
-            coarser += "order"
+            coarser += ". If the coarser ones are round-off, too, the scheme is exact here, and another `model:` "
+            coarser += "shows its order"
         if self.options.get("arithmetic", "compensated") == "compensated":
             return f"U{coarser}"
-        reach = f" (it can be read up to level {self.compensated})"
+        reach = f" (the order can be read up to level {self.compensated})"
         reach = reach if self.compensated > self.readable else ""
         return f"Set `arithmetic: compensated` for scheme {self.scheme}{reach}, or u{coarser}"
 
@@ -405,9 +408,9 @@ class _Phrases(OrderContext):
     def more_levels(self) -> str:
         kick = f", or set `end_velocity: kick` for scheme {self.scheme}" if self.ends_low else ""
         if self.more < 1:
-            return f"{self.add()}{kick}; how many are needed cannot be told yet."
-        needed = "is probably what is" if self.more == 1 else "are probably what is"
-        return f"{self.add(self.more)}{kick}; {self.more} more {needed} needed."
+            return f"{self.add()}{kick}; the number needed is not known yet."
+        verb = "is" if self.more == 1 else "are"
+        return f"{self.add(self.more)}{kick}; {self.more} more {verb} probably needed."
 
     def level_of_pulse(self) -> int:
         steps = math.ceil(math.log2(self.shortest / self.pulse[1]))
@@ -442,14 +445,14 @@ class _Phrases(OrderContext):
             f", or take a scheme (`schemes:`) of order {number(most)}{' at most' * (power > 1.0)}"
         )
         return (
-            f"{start} the time interval (`time: end`) before t = {number(self.corner.time, 4)}, where order "
-            f"{number(order)} can be seen{'' if self.promised <= most else lower}."
+            f"{start} the time interval (`time: end`) before t = {number(self.corner.time, 4)} to see "
+            f"order {number(order)}{'' if self.promised <= most else lower}."
         )
 
     def so_far(self) -> str:
         if not self.measured():
             return ""
-        return f": the last estimate is {self.measured()}{self._trend()}"
+        return f". The last estimate is {self.measured()}{self._trend()}"
 
     def _trend(self) -> str:
         """Say where orders go; empty where it is not known, or they are near the one that levels should approach."""
@@ -461,15 +464,15 @@ class _Phrases(OrderContext):
             return ""
         known = known[-LAST_ORDERS:]
         goal, is_above = f"order {self.notation.number(due)}", known[-1] > due
-        why = ": a higher power of dt still outweighs that one" if is_above else ""
+        why = ", because a higher power of dt still dominates" if is_above else ""
         if len(known) == 1:
             return f", which is above {goal}{why}" if is_above else ""
         told = ", ".join(f"{order:.2f}" for order in known)
-        start = "; from level to level the estimates"
+        start = ". From level to level the estimates"
         steps = {math.copysign(1.0, b - a) for a, b in pairwise(known)}
         same_side = all((order > due) == is_above for order in known)
         if len(steps) > 1 or not same_side:
-            return f"{start} are {told}, which do not settle"
+            return f"{start} do not settle ({told})"
         if (steps == {-1.0}) != is_above:
             return f"{start} move away from {goal} ({told})"
         return f"{start} {'fall' if is_above else 'rise'} towards {goal} ({told}){why}"
@@ -480,7 +483,7 @@ class _Phrases(OrderContext):
             return ""
         return (
             f" Scheme {self.scheme} has an error of order {self.notation.number(self.promised)} here, which may still "
-            "be too small to be seen: finer levels decide."
+            "be too small to see. Finer levels decide."
         )
 
     def likely(self) -> float:

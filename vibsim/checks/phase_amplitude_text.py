@@ -62,7 +62,7 @@ def sentence(phase: float, amplitude: float, share: float, whose: str = "") -> s
     )
     both = f" The phase{whose} is of {of_phase}, the amplitude of {of_amplitude}"
     if amplitude < phase:
-        return f"{both}: it is the amplitude that is wrong."
+        return f"{both}. The amplitude is wrong."
     if share >= FROM_THE_START:
-        return f"{both}: the error is a shift in time from the first step on, so the start is of {of_phase}."
-    return f"{both}: the error is a shift in time that grows, so the frequency is of {of_phase}."
+        return f"{both}. The error is a shift in time from the first step on, so the start is of {of_phase}."
+    return f"{both}. The error is a shift in time that grows, so the frequency is of {of_phase}."

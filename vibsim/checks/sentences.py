@@ -27,12 +27,12 @@ LONG = 120.0
 """Seconds above which times are told in minutes, and sixty times that in hours."""
 
 NOT_FINITE = (
-    "{} means nothing here: the calculation met a number that is not finite.",
+    "{} has no meaning here, because the calculation produced a number that is not finite.",
     "Start `levels:` at a finer level, or shorten `time: end`.",
 )
 """Sentence and advice where the calculation met a number that is not finite."""
-NOTHING_MOVES = "Nothing moves here: {} stays what it was at the start, whatever the scheme does"
-MOVE = "Choose `initial:` values, or a force, with which something moves."
+NOTHING_MOVES = "Nothing moves here, so {} keeps its initial value with any scheme"
+MOVE = "Choose `initial:` values or a force that cause motion."
 """Advice where nothing moves."""
 
 
@@ -153,22 +153,22 @@ class Found:
 
 
 def growth_in_words(f: Found, predicted: float, measured: float) -> str:
-    """Say what growth theory predicts and what was measured; empty where neither is known.
+    """Return a sentence on the growth that theory predicts and the measured one; empty where neither is known.
 
     The theory is of free linear oscillations without damping: of a model with damping or a force in time, and of a
     nonlinear one, that is said. Of several coordinates it is that of their fastest oscillation.
     """
-    theory = "predicted" if f.model.linear else "predicted of small oscillations"
+    theory = "predicted" if f.model.linear else "predicted for small oscillations"
     if len(f.model.positions) > 1:
-        theory = "predicted of the fastest small oscillations"
+        theory = "predicted for the fastest small oscillations"
     if not f.model.conservative:
-        theory = "predicted of free oscillations without damping"
+        theory = "predicted for free oscillations without damping"
     told = [
-        f"{f.notation.factor(value)} {word}"
+        f"{f.notation.factor(value)} ({word})"
         for value, word in ((predicted, theory), (measured, "measured"))
         if not math.isnan(value)
     ]
-    return f": growth factor per period {', '.join(told)}" if told else ""
+    return f" The growth factor per period is {' and '.join(told)}." if told else ""
 
 
 def cost_in_words(experiment: Experiment, levels: Sequence[int]) -> str:
@@ -180,7 +180,7 @@ def cost_in_words(experiment: Experiment, levels: Sequence[int]) -> str:
     count = f"{steps}" if steps < 100_000 else f"{steps:.2g}"
     size = f"{memory / 1e6:.0f} MB" if memory < 1e9 else f"{memory / 1e9:.1f} GB"
     time = _time(sum(load.seconds(members) for load in loads))
-    return f"{count} steps, {time} of one core, {size} of memory"
+    return f"{count} steps, {time} on one core, {size} of memory"
 
 
 def _time(seconds: float) -> str:

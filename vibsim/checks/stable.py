@@ -152,25 +152,25 @@ def describe(f: Found, check: StableCheck) -> Description:
     time = "" if math.isnan(failed) else number(failed, 4)
     if f.reason == "non_finite":
         return Description(
-            f"Scheme {f.scheme_name} met a number that is not finite or too large at level "
-            f"{level}{f', at t = {time}' if time else ''}, and the finest levels did so at the same time. So the "
-            "motion itself escapes, or a formula has no finite value, which says nothing about stability.",
+            f"Scheme {f.scheme_name} produced a number that is not finite or too large at level "
+            f"{level}{f', at t = {time}' if time else ''}, and the finest levels did so at the same time. Either "
+            "the motion itself escapes or a formula has no finite value, so this says nothing about stability.",
             f"End the time interval (`time: end`){f' before t = {time}' if time else ''}, or check the formulas of "
             "`model:`.",
         )
     factors = f.fact("predicted_growth"), f.fact("growth")
     told = (
         f"Scheme {f.scheme_name} is {'stable' if f.reason == 'match' else 'unstable'} at level {level}"
-        f"{f', w dt = {number(p, 4)}' if math.isfinite(p) else ''}"
+        f"{f', where w dt = {number(p, 4)}' if math.isfinite(p) else ''}."
     )
     told += growth_in_words(f, *factors)
     if f.reason == "match" and _always_grows(f):
         told += _vanishing(f, factors)
     if time:
-        told += f"; it met a number that is not finite or too large at t = {time}"
+        told += f" It produced a number that is not finite or too large at t = {time}."
     if f.reason == "mismatch":
-        told += "; the two do not agree, so this is not the scheme that the theory describes"
-    return Description(f"{told}.", _advice(f, level, p, time))
+        told += " Prediction and measurement disagree, so this is not the scheme that the theory describes."
+    return Description(told, _advice(f, level, p, time))
 
 
 def _always_grows(f: Found) -> bool:
@@ -186,17 +186,17 @@ def _vanishing(f: Found, factors: tuple[float, float]) -> str:
         return ""
     number = f.notation.number
     is_small = known[0] < 2.0
-    much = f"by {number(known[0] - 1.0, 3)}" if is_small else f"by the factor {number(known[0])}"
-    return f"; it grows {much} per period, which vanishes with dt"
+    much = f"of {number(known[0] - 1.0, 3)}" if is_small else f"by the factor {number(known[0])}"
+    return f" This growth {much} per period vanishes with dt."
 
 
 def _advice(f: Found, level: int, p: float, time: str) -> str:
     if f.reason == "match":
-        return "Set `stable: true`, or take coarser `levels:` where the scheme has a limit (w dt beyond it)."
+        return "Set `stable: true`, or take coarser `levels:` if the scheme has a limit (w dt beyond it)."
     if f.reason == "mismatch":
         return (
-            "Take another `kind:` in `schemes:`, or look for an error in this one: it does not grow as its own theory "
-            "says."
+            "Take another `kind:` in `schemes:`, or look for an error in this one, which does not grow as its own "
+            "theory predicts."
         )
     limit = f.of_member(stability_limits(f.experiment, columns_of(f.record)))
     if math.isfinite(limit) and math.isfinite(p) and p > limit:

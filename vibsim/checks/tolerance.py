@@ -94,19 +94,19 @@ def describe(f: Found) -> Description:
     levels = experiment.levels
     largest, which = (found[f.scheme, f.case] for found in _largest_bound(experiment, f.record))
     state = f.model.states[which].name
-    told = "nothing is known of the error of the extrapolated solution: its levels do not agree."
+    told = "The error of the extrapolated solution is unknown, because its levels do not agree."
     if math.isfinite(largest):
         verb = "is" if f.reason == "match" else "is not"
         told = (
-            f"the error of the extrapolated solution is bounded by {f.notation.number(largest, 3)} (of "
-            f"{f.notation.quantity(state)}, the largest over time); that {verb} {rule(experiment, f.notation)}."
+            f"The error bound of the extrapolated solution is {f.notation.number(largest, 3)} (of "
+            f"{f.notation.quantity(state)}, the largest over time). It {verb} {rule(experiment, f.notation)}."
         )
     swept = experiment.sweep.keys if experiment.sweep else ()
     fixed = experiment.schemes[f.scheme].options.items()
     options = {key: word for key, word in fixed if f"schemes.{name}.{key}" not in swept}
     ways = [
-        "take such members into an experiment of their own, whose pilot tries them",
-        f"give finer `levels:` than {levels[0]} to {levels[-1]} in place of `tolerance:`",
+        "put such members in an experiment of their own, so that its pilot tries them",
+        f"replace `tolerance:` by finer `levels:` than {levels[0]} to {levels[-1]}",
     ]
     if state in f.model.velocities and options.get("end_velocity", "kick") != "kick":
         ways.insert(0, f"set `end_velocity: kick` for scheme {name}")

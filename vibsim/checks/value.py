@@ -294,14 +294,14 @@ def describe(f: Found, check: ValueCheck) -> Description:
         case "too_few_levels" if _lacks_levels(f.experiment, check):
             return Description(
                 f"{told} does not exist here, because it needs more levels than there are.",
-                f"Add finer `levels:`, so that there are {VALUES[check.value].finer_levels + 1} of them.",
+                f"Add finer `levels:` until there are {VALUES[check.value].finer_levels + 1}.",
                 brief,
             )
     finer, cost = _finer_levels(f)
     return Description(
-        f"{told} is {brief}: it may be {asked}, or not.",
-        f"Add levels {finer[0]} and {finer[-1]} to `levels:` ({cost}), so that the bound of the error shrinks, or ask "
-        "for the number of one level (`at: {level: ...}`).",
+        f"{told} is {brief}; it may or may not be {asked}.",
+        f"Add levels {finer[0]} and {finer[-1]} to `levels:` ({cost}) to shrink the error bound, or ask for the "
+        "number of one level (`at: {level: ...}`).",
         brief,
     )
 
@@ -317,7 +317,7 @@ def _measured(f: Found, check: ValueCheck) -> str:
     if not has_limit(check.value, check.at.level):
         return told
     if math.isnan(bound):
-        return f"{told}, with an error that is not known: the levels do not approach each other"
+        return f"{told}, with an unknown error, because the levels do not approach each other"
     return f"{told}, with an error of at most {f.notation.number(bound, 2)}"
 
 
@@ -338,7 +338,7 @@ def _on_mismatch(f: Found, check: ValueCheck) -> str:
     if (first := f.fact("level_as_asked")) > 0:
         return f"Ask for a finer level (`at: {_at(check, first)}`), where the number is as asked, or c{change}."
     if f.fact("levels_needed") == SETTLED:
-        return f"C{change}, or `model:` or `initial:`. Finer levels will not help."
+        return f"C{change}, `model:` or `initial:`. Finer levels will not help."
     finer, cost = _finer_levels(f)
     ask = f" and ask for one (`at: {_at(check, finer[-1])}`)"
     if check.at.level in (None, f.experiment.levels[-1], "best"):

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from vibsim.experiment import Check, Experiment
     from vibsim.experiment.schema.checks import Measurement
 
-CORRECT = "Correct what the check expects (`expect:`), or find out why it turned out otherwise."
+CORRECT = "Correct `expect:`, or find out why the outcome differs."
 
 
 def expectation(experiment: Experiment, check: Check | None, notation: Notation = PLAIN) -> str:
@@ -113,22 +113,23 @@ class Wording:
                 head = f"All {total} results passed"
             elif status in where:
                 head = where[status]["text"]
-            told = f"{head}. The hardest ({self._place(result)}): {told}"
+            told = f"{head}. The hardest is {self._place(result, brackets=True)}. {told}"
         if self.check is None or self.check.kind != "claim":
             return told
         holds = truth(self.check, status, result.reason)
         decided = "cannot be decided" if holds is None else f"is {'true' if holds else 'false'}"
-        return f"Measured: the statement {decided}. {told}"
+        return f"The statement {decided}. {told}"
 
-    def _place(self, result: Result) -> str:
-        """Name the scheme, and of a sweep the member with its swept values."""
-        columns, parts = columns_of(self.record), [f"scheme {result.scheme}"]
-        if columns:
-            parts.append(f"case {result.case}")
+    def _place(self, result: Result, brackets: bool = False) -> str:
+        """Name the scheme, and of a sweep the member with its swept values, these perhaps in brackets."""
+        columns, head, swept = columns_of(self.record), f"scheme {result.scheme}", []
         for key, values in columns.items():
             one = values[self.record.place("case", result.case)]
-            parts.append(f"{key} = {self.notation.number(one) if isinstance(one, float) else one}")
-        return ", ".join(parts)
+            swept.append(f"{key} = {self.notation.number(one) if isinstance(one, float) else one}")
+        if not swept:
+            return head
+        told = ", ".join(swept)
+        return f"{head}, case {result.case}{f' ({told})' if brackets else f', {told}'}"
 
     def advice(self, status: str, result: Result, counts: Mapping[str, int]) -> str:
         """Say what to change in the YAML; empty for a check whose status is PASS."""

@@ -78,7 +78,9 @@ def picture(record: Record, check: ConservesCheck, name: str, member: Member) ->
         rate=rate,
     )
     if not frame.usable(found.running).size:
-        nothing = f"{member.title}: the energy error is 0 at every step; there is nothing to draw."
+        nothing = (
+            f"{member.title}: the energy error is 0 at every step, so there is nothing to draw."
+        )
         return evidence(nothing) if np.any(found.running == 0.0) else None
     by = " by [D₂ₜu]" if check.conserves.endswith("_d2t") else ""
     label = f"largest energy error so far{' / E(0)' if first else ''}{by}"
@@ -153,21 +155,21 @@ def _told(found: EnergyError) -> str:
         return "the largest energy error so far; it ends where the run breaks down."
     if found.kind == "bounded":
         part = 100.0 * (first - second) / most
-        how = "no growth" if part <= 100.0 * STILL else "it creeps ever more slowly"
+        how = "no growth" if part <= 100.0 * STILL else "it grows ever more slowly"
         return f"{bars} m₁ is above m₂ by {brief(part)} % of the largest error: {how}."
     if found.kind == "exponential":
         factor = short(float(np.exp(found.rate)))
         return f"{bars} The energy itself changes by the factor {factor} per period: exponential."
     if math.isnan(found.power):
         return (
-            f"{bars} That is too short a run to name a drift: {LEAST_PERIODS:g} periods and {LEAST_SAMPLES} times "
+            f"{bars} The run is too short to name a drift; {LEAST_PERIODS:g} periods and {LEAST_SAMPLES} times "
             "are needed."
         )
     before = second - third
     law = f"(m₁ − m₂)/(m₂ − m₃) = {short((first - second) / before) if before else '∞'}"
     if found.kind in POWERS:
-        return f"{bars} {law}; a drift like {_like(found.kind)} has {2 ** POWERS[found.kind]}."
-    return f"{bars} {law}, which is that of no drift that has a name."
+        return f"{bars} {law}; a drift like {_like(found.kind)} gives {2 ** POWERS[found.kind]}."
+    return f"{bars} {law}, which matches no named drift."
 
 
 def _dashed(found: EnergyError) -> str:
@@ -175,7 +177,7 @@ def _dashed(found: EnergyError) -> str:
     if found.is_broken:
         return ""
     if found.has_border:
-        return "Dashed: the most that is taken for round-off."
+        return "Dashed: the largest error that counts as round-off."
     if found.asked == "bounded":
         return "Dashed: m₂, above which a bounded error does not rise."
     return f"Dashed: a drift in proportion to {_like(found.asked)} through m₂ and m₁."

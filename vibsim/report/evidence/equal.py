@@ -34,7 +34,7 @@ def picture(record: Record, check: EqualCheck, name: str, member: Member) -> Pic
         return None
     seen = frame.usable(distance)
     if not seen.size:
-        return evidence(f"{who} and that of {second} are the same bit by bit at every time.")
+        return evidence(f"{who} and that of {second} are identical bit by bit at every time.")
     measure = data.unit(record, f"{check.quantity}_finest")
     title = style.label(f"difference of {words.symbol(check.quantity)}", measure)
     figure = style.canvas(1.0)
@@ -56,11 +56,11 @@ def picture(record: Record, check: EqualCheck, name: str, member: Member) -> Pic
     if math.isnan(most):
         told = "; then the run breaks down"
     elif math.isnan(bound):
-        told = "; what rounding may make of it is not known"
+        told = "; the rounding error is not known"
     elif bound == 0.0:
         told = "; none is allowed"
     else:
-        times = f"{brief(largest / bound)} times the {short(bound)}"
-        told = f", {times} that is allowed (dashed; grey is below it)"
-    where = f"It is largest at t = {short(float(t[nearest]))}, {short(largest)} (dot)"
+        times = f"{brief(largest / bound)} times the allowed {short(bound)}"
+        told = f", {times} (dashed; grey is below it)"
+    where = f"It is largest at t = {short(float(t[nearest]))}, with {short(largest)} (dot)"
     return evidence(f"{who} less that of {second}. {where}{told}.", title, figure)

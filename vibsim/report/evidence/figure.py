@@ -25,10 +25,12 @@ from vibsim.report.text import words
 from vibsim.report.types import Check, ConservesCheck, EqualCheck, Experiment, StableCheck
 
 MANY = 60  # up to so many members each has a dot; of more the range is drawn
-ALONE = "a run of so many samples keeps no series over time, so that nothing is drawn: the number alone decides."
+ALONE = (
+    "a run of so many samples keeps no time series, so nothing is drawn. The number alone decides."
+)
 BESIDE = {
-    "stable": ("predicted_growth", "; orange is what theory predicts, for small oscillations"),
-    "equal": ("allowed", "; orange is what is allowed"),
+    "stable": ("predicted_growth", "; orange is the prediction for small oscillations"),
+    "equal": ("allowed", "; orange is the allowed distance"),
 }
 """Kind of a check to the field that is drawn beside the one that decides, and the words on it."""
 
@@ -87,7 +89,7 @@ def _of_members(
     beside = of(other_field) if other_field else np.full(count, np.nan)
     known = usable(values)
     if not known.size:
-        return evidence(f"{member.title}: no member has a number that could be drawn.")
+        return evidence(f"{member.title}: no member has a number to draw.")
     if check.kind == "stable":
         up = frame.growth_scale(known)
     elif check.kind == "conserves":
@@ -118,7 +120,7 @@ def _of_members(
         frame.points(ax, x.tolist(), shown, [False] * count)
     frame.points(ax, [x[member.case]], shown[[member.case]], [True])
     caption = (
-        f"{member.scheme_name}, all {words.number(count, 'integer')} members, of which no series are kept: filled is "
-        f"the one that decides, {member.case_name}{more if usable(beside).size else ''}."
+        f"{member.scheme_name}, all {words.number(count, 'integer')} members (no time series are kept). The one "
+        f"that decides, {member.case_name}, is filled{more if usable(beside).size else ''}."
     )
     return evidence(caption, up.title, figure)

@@ -27,8 +27,8 @@ def picture(record: Record, check: ConvergesCheck, member: Member) -> Picture | 
         return None
     alt = f"Evidence on the order of {words.name(quantity)}"
     told = (
-        "the order that three levels give, by the coarsest of them; filled where it counts. Grey: what the check asks "
-        "for. Bar: the stated order with its interval."
+        "the order from three levels, at the coarsest of them; filled where it counts. Grey: what the check asks for. "
+        "Bar: the stated order with its interval."
     )
     figure = style.canvas(1.0)
     has_series = not data.is_lean(record)

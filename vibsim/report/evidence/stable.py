@@ -29,8 +29,8 @@ WIDTH = 1.56  # of a panel [inch]
 MOST_LEVELS = 8
 NEAR_LIMIT = 0.02  # a step so near to the limit, as a part of it, is told with its distance
 NO_LIMIT = {
-    0.0: "The scheme grows at every step, so that w dt has no limit to be compared with. ",
-    math.inf: "The scheme has no limit of w dt. ",
+    0.0: "The scheme grows at every step, so there is no limit to compare w dt with. ",
+    math.inf: "The scheme has no limit on w dt. ",
 }
 SIDES = {1: ("Here",), 2: ("Left", "Right"), 3: ("Left", "Middle", "Right")}
 
@@ -68,7 +68,7 @@ def picture(experiment: Experiment, record: Record, name: str, member: Member) -
     if not told:
         return None
     sides = " ".join(f"{s}: {text}" for s, text in zip(SIDES[len(told)], told, strict=True))
-    head = f"{member.title}, level by level; filled is level {level}, which is judged."
+    head = f"{member.title}, level by level; the judged level {level} is filled."
     caption = f"{head} {NO_LIMIT.get(limit, '')}{sides}"
     return evidence(caption, f"Stability of {member.title}", run.figure)
 
@@ -85,7 +85,7 @@ def _steps(run: _Run) -> str:
     text, away = f"w dt = {words.number(p, 'step')} is", abs(p / limit - 1.0)
     border = f"the limit {words.number(limit, 'step')}"
     if away <= LIMIT_ROUNDING:
-        edge = "where a solution may stay as it is or grow in proportion to the time"
+        edge = "where a solution may keep its size or grow linearly with time"
         return f"{text} at {border}, {edge}; grey is stable."
     by = f" by {brief(away)} of it" if away < NEAR_LIMIT else ""
     return f"{text} {'beyond' if p > limit else 'below'} {border}{by}; grey is stable."
@@ -101,7 +101,7 @@ def _sizes(run: _Run, size: Floats, letter: str) -> str:
     run.points(ax, size)
     one = float(size[run.index])
     if not math.isfinite(one):
-        return "the run of this level met a number that is too large."
+        return "the run of this level produced a number that is too large."
     times = short(one)
     text = f"the solution is at most {'as large as' if times == '1' else f'{times} times'} the exact one"
     border = f"{BLOWN_UP:g} (dashed)"
@@ -143,6 +143,4 @@ def _growths(run: _Run, record: Record, member: Member, name: str) -> str:
     ]
     if not numbers:
         return "the growth factor per period of the levels that have one."
-    return (
-        f"the amplitude is multiplied in each period by {', '.join(numbers)}; dashed is no growth."
-    )
+    return f"each period multiplies the amplitude by {', '.join(numbers)}; dashed is no growth."

@@ -129,7 +129,7 @@ class ByLevel:
             bar = "; the bar is the bound of its error"
         one = len(self.levels) == 1 and len(self.values) == 1
         head = f"{self.scheme}, level {self.levels[0]}" if one else f"{self.scheme}, level by level"
-        caption = f"{head}: filled the one that is asked for{bar}; grey is {told}."
+        caption = f"{head}: the one asked for is filled{bar}; grey is {told}."
         return evidence(caption, ax.get_title(loc="left"), ax.get_figure(root=True))
 
 

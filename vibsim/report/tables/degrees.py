@@ -57,8 +57,8 @@ def table(experiment: Experiment) -> Table | None:
     equation = model.equation.partition(" = ")[0]
     caption = (
         "Polynomials c₀ + c₁ t + c₂ t² + … that schemes reproduce exactly, as solutions of "
-        f"{equation} with a force for each, while the velocity keeps its sign; and the first term of what they "
-        "are off by (computed less exact) on the next degree"
+        f"{equation} with a force for each, while the velocity keeps its sign; and the first term of their "
+        "error (computed less exact) on the next degree"
     )
     return Table("exact_degrees", caption, columns, tuple(rows)) if rows else None
 

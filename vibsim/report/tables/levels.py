@@ -107,9 +107,7 @@ def maxima(record: Record, shown: Sequence[Member]) -> Table | None:
             filled.append(
                 (Column(ratio, form="order"), cells(_ratios(values, is_sound))) if several else None
             )
-    caption = (
-        "Largest energy deviation over every step; the last point has an end formula of its own"
-    )
+    caption = "Largest energy deviation over every step; the last point has its own end formula"
     return by_level(record, "energy_maxima", caption, shown, filled, titled=True)
 
 
@@ -168,11 +166,10 @@ def velocities(record: Record) -> Table | None:
         return str(kinds[place]).replace("_", " ")
 
     caption = (
-        "Energy error by the velocity that it is made with: the scheme's own, over every step; and [D₂ₜu], over every "
-        "step but the first and the last, as in the tables of the text. Where the second is much larger, it shows the "
-        "error of the centred difference and not that of the scheme; where both are alike, the scheme makes it; where "
-        "the second is smaller, the own velocity is the less accurate one, as that of Euler-Cromer, which is of first "
-        "order only"
+        "Energy error by velocity: the scheme's own, over every step; and [D₂ₜu], over every step but the first and "
+        "the last, as in the tables of the text. If the second is much larger, it shows the error of the centred "
+        "difference, not that of the scheme. If both are alike, the scheme makes the error. If the second is smaller, "
+        "the own velocity is less accurate, as with Euler-Cromer, whose velocity is of first order only"
     )
     filled = (
         step_column(record),

@@ -52,8 +52,8 @@ def tables(experiment: Experiment, record: Record, summary: Mapping[str, Any]) -
         of = f" of {words.symbol(table.quantity)}" if table.quantity else ""
         named = table.source or experiment.source
         caption = (
-            f"{table.title}{f' ({named})' if named else ''}. Ours: {_told(table.value)}{of}; it agrees where it "
-            "differs by half a unit of the last printed digit at most"
+            f"{table.title}{f' ({named})' if named else ''}. Ours: {_told(table.value)}{of}; it agrees if it "
+            "differs by at most half a unit of the last printed digit"
         )
         found.append(Table(f"published_{i}", caption, columns, rows))
     return found

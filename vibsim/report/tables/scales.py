@@ -44,7 +44,7 @@ def table(experiment: Experiment, record: Record) -> Table | None:
     )
     caption = "Scales and dimensionless numbers"
     if scaling is not None:
-        caption += "; the run is made in these scales: its numbers times them are those of the file"
+        caption += "; the run uses these scales, and its numbers times them are those of the file"
     return Table("scales", caption, columns, tuple(rows))
 
 

@@ -54,10 +54,10 @@ def schemes(experiment: Experiment, record: Record) -> Table | None:
     measured = several = ""
     if whole(record, "triple"):
         measured = f", and the order measured in the {TYPICAL_NORM} norm"
-        several = "; of a sweep the member whose order is farthest from the stated one"
+        several = "; in a sweep, that of the member farthest from the stated order"
     caption = (
-        f"Schemes: what each states (explicit or implicit, s: symplectic){measured} (order ∞: exact, there is no "
-        f"error to shrink){several if swept(record) else ''}"
+        f"Schemes: stated properties (explicit or implicit, s: symplectic){measured} (order ∞: exact, no error "
+        f"to shrink){several if swept(record) else ''}"
     )
     return Table("schemes", caption, tuple(columns), rows)
 
@@ -111,8 +111,7 @@ def predictions(record: Record) -> list[Table]:
     rate = data.unit(record, "theory_frequency") or f"rad/{time}"
     by_peaks = record.variable("measured_growth").attrs.get("method") == PEAKS
     how = (
-        "The measured numbers come from peaks interpolated by a parabola, which leaves an error of its own on coarse "
-        "levels"
+        "The measured numbers come from peaks interpolated by a parabola, which adds an error on coarse levels"
         if by_peaks
         else "The measured numbers are those of the recurrence that the computed steps satisfy"
     )

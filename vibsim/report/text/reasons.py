@@ -17,9 +17,9 @@ class Reason(NamedTuple):
 
 REASONS = {
     "asymptotic": Reason(
-        "The error shrinks from level to level with the order that is asked for. The rescaled differences coincide, "
+        "The error shrinks from level to level with the expected order. The rescaled differences coincide, "
         "more closely so on finer levels.",
-        "Three levels at least, curves that coincide, ratios that settle, and differences well above round-off. "
+        "At least three levels, curves that coincide, ratios that settle, and differences well above round-off. "
         "The levels named meet all four.",
     ),
     "exact": Reason(
@@ -27,18 +27,19 @@ REASONS = {
         "Nothing more, if exactness is expected here; otherwise a problem on which the scheme does make an error.",
     ),
     "match": Reason(
-        "The outcome is the expected one, which is not plain convergence: the check is a trap, for instance.",
-        "The measured verdict and the expected one agree; look at the measured reason to see what was noticed.",
+        "The outcome is as expected, but it is not plain convergence. The check may be a trap, for instance.",
+        "The measured and the expected verdict agree. The measured reason says what was detected.",
     ),
     "order_low": Reason(
         "The error does shrink, but more slowly than the scheme promises. A first-order start, a one-sided formula at "
         "the end, or a mistake in the code does this.",
-        "The ratios have settled, at the wrong number; more levels will not change it. Look for a step of lower order.",
+        "The ratios have settled at the wrong number, and more levels will not change it. Look for a step of lower "
+        "order.",
     ),
     "order_high": Reason(
         "The error shrinks faster than promised. Either the leading error term vanishes for this problem, or the order "
         "was stated too low.",
-        "A problem without special symmetry, or the higher order stated as the expected one.",
+        "A problem without special symmetry, or the higher order as the expected one.",
     ),
     "mismatch": Reason(
         "The measured outcome is not the expected one.",
@@ -49,16 +50,16 @@ REASONS = {
         "The differences alone cannot show this; the exact solution does. Check the equation that is being solved.",
     ),
     "unstable": Reason(
-        "The numerical solution grows where the exact one does not: w dt is beyond the limit of the scheme, or the "
-        "next finer level grows no less.",
+        "The numerical solution grows where the exact one does not. Either w dt is beyond the limit of the scheme, or "
+        "the next finer level grows no less.",
         "A smaller step (w dt below the stability limit), or a scheme without such a limit.",
     ),
     "non_finite": Reason(
-        "The calculation overflowed or met an undefined number; nothing after that moment means anything.",
+        "The calculation overflowed or produced an undefined number. Nothing after that moment has a meaning.",
         "A smaller step, or a look at the member, level and time listed under Failures.",
     ),
     "pre_asymptotic": Reason(
-        "The step is still too coarse. The ratios have not settled, so the order read from them is an accident.",
+        "The step is still too coarse. The ratios have not settled, so an order read from them is accidental.",
         "Finer levels, until the ratios settle and the rescaled curves coincide.",
     ),
     "round_off": Reason(
@@ -71,12 +72,12 @@ REASONS = {
     ),
     "non_smooth": Reason(
         "The problem is not smooth, so its error has no regular expansion in powers of dt.",
-        "Location of the events, an interval that ends before the corner of the force, or an expected order that takes "
-        "it into account.",
+        "Located events, an interval that ends before the corner of the force, or an expected order that allows "
+        "for it.",
     ),
     "too_few_levels": Reason(
         "Two levels cannot show an order, because a single difference has nothing to compare with.",
-        "Three levels at least; four or more let the trend of the ratios be seen.",
+        "At least three levels; four or more show the trend of the ratios.",
     ),
     "not_applicable": Reason(
         "The measured number does not exist here, so there is nothing to judge.",
@@ -90,50 +91,51 @@ _NUMBERS = {
     "scheme": "Nothing more. It follows from the equations of the scheme or the model, without a run.",
     "counted": "Nothing more. It is a count, and exact.",
 }
-"""What a number that is as it should be needs: of several levels, of one, of none, and one that is counted."""
+"""What a number that is as expected needs: of several levels, of one, of none, and one that is counted."""
 _BY_KIND = {
     "stable": Reason(
-        "The scheme grows, or does not, as the check says.",
-        "A growth factor that agrees with the predicted one. Where the scheme has a limit, a w dt well within it, or "
-        "well beyond it; where it has none, a finer level on which the growth is smaller, or is not.",
+        "The scheme grows or does not grow, as the check expects.",
+        "A growth factor that agrees with the predicted one. If the scheme has a limit, w dt should be well within or "
+        "well beyond it; if not, a finer level should show whether the growth becomes smaller.",
     ),
     "conserves": Reason(
-        "The error of the energy changes with time as the check says.",
-        "A run of many periods, because a slow drift below a larger oscillation shows late. The figure of the running "
+        "The error of the energy changes with time as the check expects.",
+        "A run of many periods, because an oscillation hides a slow drift at first. The figure of the running "
         "maximum shows it at every time.",
     ),
     "equal": Reason(
-        "The two solutions are as near to each other as the check says.",
-        "A distance well below what is allowed, at every stored time. Without `atol`, the rounding errors of both are "
+        "The two solutions are as close as the check expects.",
+        "A distance well below the allowed one at every stored time. Without `atol`, the rounding errors of both are "
         "allowed.",
     ),
 }
 
 _OF_PROMISE = {
     "order_low": Reason(
-        "The error does shrink, with the order that the scheme promises here, which is lower than the one asked for.",
+        "The error shrinks with the order that the scheme promises here, which is lower than the expected one.",
         "Nothing more. The ratios have settled where they should. Ask for the order of the scheme, or take a scheme of "
-        "a higher one.",
+        "higher order.",
     ),
     "order_high": Reason(
-        "The error shrinks faster than asked for, as the scheme promises here.",
+        "The error shrinks faster than expected, as the scheme promises here.",
         "Nothing more. The ratios have settled where they should. Ask for the order of the scheme.",
     ),
 }
 """What an order means that is not the one of the check, but the one of the scheme."""
 
-REFUTED = "The measurement contradicts the statement, as was expected of it."
+REFUTED = "The measurement contradicts the statement, as expected."
 """What it means that a claim matches which is expected to be false."""
 
 _OF_TOLERANCE = {
     "match": Reason(
-        "The levels, extrapolated, bound the error of every scheme and member at every stored time by the tolerance.",
-        "The bound is an estimate that has been tested, no proof: best.nc has it for every time (output: best).",
+        "The error bound of the extrapolated solution is within the tolerance, for every scheme and member at every "
+        "stored time.",
+        "The bound is a tested estimate, not a proof. best.nc has it for every time (output: best).",
     ),
     "mismatch": Reason(
         "The levels were chosen by a pilot of a few members. Another member is harder, and its error is not known to "
         "be within the tolerance.",
-        "Finer levels, or a pilot that tries such members; those listed below are the worst.",
+        "Finer levels, or a pilot that tries such members. The worst are listed below.",
     ),
 }
 
@@ -163,5 +165,5 @@ def reason(
             if levels > 1
             else "one"
         )
-        return Reason("The measured number is what the check says.", _NUMBERS[of])
+        return Reason("The measured number is as expected.", _NUMBERS[of])
     return REASONS.get(word or "", Reason("", ""))

@@ -26,9 +26,9 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
     yield "Model", f"{model.title}: {model.equation}"
     for name, spec in experiment.model.tables.items():
         steps = (
-            "no step has one of its points inside"
+            "no step contains one of its points"
             if spec.is_met
-            else "steps have its points inside, where the force has corners"
+            else "steps contain its points, where the force has corners"
         )
         yield "Table", f"{name} from {spec.file}, columns {spec.place} and {spec.value}; {steps}"
     if experiment.units:
@@ -43,7 +43,7 @@ def setup(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
         )
         yield (
             "Scaled",
-            f"the file has {'; '.join(given)}; end = {_plain(scaling.end)} s; the run is made in the scales of the "
+            f"the file has {'; '.join(given)}; end = {_plain(scaling.end)} s; the run uses the scales of the "
             "table below, and every other number is dimensionless",
         )
         sizes, units = {}, {}
