@@ -10,10 +10,10 @@ run: set-up-run  ## run the default experiments and write results/index.html (th
 	@$(BIN)/vibsim run
 
 test: set-up-dev  ## run the tests, without those marked slow
-	$(BIN)/pytest -n 2 --dist worksteal -m "not slow"
+	$(BIN)/pytest -n 2 --dist worksteal --durations 10 -m "not slow"
 
 test-slow: set-up-dev  ## run the tests marked slow
-	$(BIN)/pytest -n 2 --dist worksteal -m slow
+	$(BIN)/pytest -n 2 --dist worksteal --durations 10 -m slow
 
 lint: set-up-dev  ## check style, types, layers, workflow and generated files
 	$(BIN)/ruff check .

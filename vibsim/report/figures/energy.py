@@ -68,7 +68,7 @@ def running(record: Record, case: int) -> Picture | None:
         style.beside(ax, fontsize=8, handlelength=2.4)
         text = style.label("max |dE| so far", unit(record, "energy_deviation_max_abs"))
         ax.set_ylabel("max |dE| / E(0) so far" if usable else text)
-    axes[0].set_title("Energy error by the velocity that it is made with")
+    axes[0].set_title("Energy error by velocity")
     axes[-1].set_xlabel(time_label(record))
     return Picture(
         name=f"energy_running_{case}",
@@ -76,7 +76,7 @@ def running(record: Record, case: int) -> Picture | None:
         caption="The largest energy error over every step so far, on the coarsest level: solid with the scheme's own "
         "velocity, dashed with the centred difference [D₂ₜu] that the tables of the text use. Flat is bounded, slope "
         "1 is a linear drift, slope 2 a quadratic one. A scheme without a dashed curve has [D₂ₜu] for its velocity. "
-        "What is within round-off is left out where it is zero."
+        "Values within round-off are left out where they are zero."
         + (f" {frame.LEAVING} They grow without bound." if leaves else ""),
         alt="Running maximum of the energy error of every scheme, with two velocities, against time, logarithmic",
         figure=axes[0].get_figure(root=True),

@@ -66,7 +66,7 @@ def histograms(experiment: Experiment, record: Record, quantity: str) -> Picture
     return Picture(
         name=f"spread_{quantity}",
         title=f"How the members are spread: {letter}",
-        caption="Number of members by what was measured of them, on a logarithmic scale so that a single one is seen; "
+        caption="Histograms of the members. The counts are on a logarithmic scale, so that a single member is seen; "
         "the colour is the verdict on the order. A few far from the rest are the ones to look at."
         + (" Members without the number are left out." if missing else ""),
         alt=f"Histograms of the order and the error of {words.name(quantity)} over the members",
