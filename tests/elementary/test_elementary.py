@@ -175,7 +175,7 @@ def test_special_values(name):
 @pytest.mark.parametrize("name", [*ODD, *EVEN])
 def test_symmetry_to_the_last_bit(name):
     full = ELEMENTARY[name].full
-    (column,) = arguments(name, 500)
+    (column,) = arguments(name, 2000)
     for x in column.tolist():
         expected = -full(x) if name in ODD else full(x)
         # the sign of a zero is no sign

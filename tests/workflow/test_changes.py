@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from forked import vibsim
 
-from .conftest import TEXT, Place, here
+from .conftest import TEXT, Place
 from .test_faults import flip
 
 END_PRODUCTS = {
@@ -156,7 +156,7 @@ def touch(path: Path) -> Path:
 
 def test_what_is_no_longer_asked_for_is_removed_and_nothing_else(place: Place) -> None:
     place.change("levels:", "output: best\nlevels:")
-    assert here("extrapolate", place.file, "--results", place.results).returncode == 0
+    assert place.run().returncode == 0
     assert (place.tiny / "best.nc").is_file()
     place.change("output: best\n", "")
     place.change("8, 9]", "8]")
@@ -172,6 +172,7 @@ def test_what_is_no_longer_asked_for_is_removed_and_nothing_else(place: Place) -
     assert "removed, no longer asked for: " in ended.stderr
     assert not (place.tiny / "level_09.nc").exists()
     assert not (place.tiny / "best.nc").exists()
+    assert not any(b"best.nc" in content for content in place.content().values())
     assert not shards[0].parent.exists()
     assert all(path.is_file() for path in (*users, other))
 
@@ -190,7 +191,7 @@ def test_two_files_of_one_name_do_not_replace_each_other(place: Place) -> None:
         assert "--results" in ended.stderr
     assert place.content() == before
     place.file.unlink()
-    assert place.run("--dry-run", files=[other]).returncode == 0
+    assert place.run(files=[other]).returncode == 0
 
 
 def test_another_spelling_of_a_path_is_the_same_file(place: Place) -> None:

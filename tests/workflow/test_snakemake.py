@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from forked import vibsim
 
-from .conftest import ROOT, TEXT, Place
+from .conftest import ROOT, Place
 from .test_faults import flip
 
 BIN = Path(sys.executable).parent
@@ -28,6 +28,9 @@ def by_hand(place: Place, *options: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_snakemake_by_hand_agrees_with_a_run_and_is_on_record(place: Place) -> None:
+    ended = by_hand(place)
+    assert ended.returncode == 0, ended.stderr
+    assert "Nothing to be done" in ended.stdout + ended.stderr
     # every kind of job works
     place.change("8, 9]", "8, 9, 10]")
     assert by_hand(place).returncode == 0
@@ -47,6 +50,18 @@ def test_snakemake_by_hand_rebuilds_a_damaged_file_at_the_second_try(place: Plac
     assert by_hand(place).returncode == 0
 
 
+def test_rules_are_in_style() -> None:
+    files = [ROOT / "Snakefile", *sorted((ROOT / "workflow/rules").glob("*.smk"))]
+    assert len((ROOT / "Snakefile").read_text().splitlines()) <= 50
+    subprocess.run([BIN / "snakefmt", "--check", *files], check=True, capture_output=True)
+
+
+def test_snakemakes_own_lint_finds_nothing_that_applies() -> None:
+    command = [sys.executable, "workflow/lint.py"]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+
+
 def test_a_job_imports_what_it_uses_and_no_more(place: Place, tmp_path: Path) -> None:
     command = ["simulate", str(place.file), "--level", "6", "--out", str(tmp_path / "x.nc")]
     program = (
@@ -58,10 +73,12 @@ def test_a_job_imports_what_it_uses_and_no_more(place: Place, tmp_path: Path) ->
     subprocess.run([sys.executable, "-c", program], check=True)
 
 
-def test_one_refused_file_keeps_all_from_running(tmp_path: Path) -> None:
+def test_a_sweep_goes_through_its_shard_and_refusals_run_nothing(tmp_path: Path) -> None:
+    from .conftest import TEXT
+
     place = Place(tmp_path)
     place.file.parent.mkdir()
-    place.file.write_text(TEXT)
+    place.file.write_text(TEXT.replace("time:", "sweep: {initial.theta: [0.5, 1.0]}\ntime:"))
     bad = place.file.with_name("bad.yaml")
     bad.write_text(TEXT.replace("end: 20.0", "end: -20.0"))
     ended = place.run(files=[place.file, bad])
@@ -69,6 +86,10 @@ def test_one_refused_file_keeps_all_from_running(tmp_path: Path) -> None:
     assert f"{bad}:5: time.end" in ended.stderr
     assert "Traceback" not in ended.stderr
     assert not place.results.exists()
+    assert place.run().returncode == 0
+    assert (place.tiny / "level_06/shard_0000.nc").is_file()
+    assert (place.tiny / "logs/level_06_to_09.log").is_file()
+    assert (place.tiny / "benchmarks/level_06_to_09.tsv").is_file()
 
 
 def test_jobs_are_usable_by_hand(place: Place, tmp_path: Path, finished: Place) -> None:
