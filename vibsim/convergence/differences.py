@@ -94,7 +94,7 @@ def error_factor(order: Floats | float, gap: int) -> Floats:
     return np.asarray(1.0 / np.expm1(-np.asarray(order, dtype=np.float64) * gap * np.log(2.0)))
 
 
-def target_ratio(order: Floats | float, levels: Sequence[int]) -> Floats:
+def target_ratio(order: Floats | float, levels: Sequence[float]) -> Floats:
     """Return the ratio of the two differences of a triple of levels, for an error of one power.
 
     ``(2^(p a) - 1)/(1 - 2^(-p b))`` for the gaps a and b: 2^p where both are 1, and a/b at p = 0.
@@ -118,7 +118,7 @@ def rescaling(order: Floats | float, levels: Sequence[int]) -> Floats:
     return factor
 
 
-def order_of_ratio(ratio: Floats, levels: Sequence[int]) -> Floats:
+def order_of_ratio(ratio: Floats, levels: Sequence[float]) -> Floats:
     """Solve `target_ratio` for the order; NaN where that is beyond `STEEPEST`, or the ratio not positive and finite.
 
     The ratio grows with the order, so there is one root; it is found by bisection, for all entries at once.

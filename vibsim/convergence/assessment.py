@@ -1,0 +1,239 @@
+"""The verdict on any ladder of levels, from the probabilities of the error model.
+
+A power *dominates* where no other one has more than a tenth of it. The table of decisions, first to last:
+
+| what is found | status and reason |
+|---|---|
+| a value that is not finite | FAIL ``non_finite`` |
+| fewer than three levels | INCONCLUSIVE ``too_few_levels`` |
+| all differences are noise as expected, but not the distance from the exact solution | FAIL ``wrong_limit`` |
+| all differences are noise as expected | PASS ``exact`` |
+| the limit is another one than the exact solution, surely | FAIL ``wrong_limit`` |
+| a power within the tolerance of the expected one dominates, surely | PASS ``asymptotic`` |
+| another one dominates, surely, and the expected one does not | FAIL ``order_low``, ``order_high`` |
+| else, by what is most probable: an expansion, or none | INCONCLUSIVE ``pre_asymptotic`` |
+| errors that change their sign from level to level | INCONCLUSIVE ``oscillating`` |
+| noise | INCONCLUSIVE ``round_off`` |
+
+*Surely* is a probability above ``1 - RISK``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vibsim.convergence.error_model import Ladder, Posterior, local_orders, posterior
+from vibsim.core.array_types import Codes, Flags, Floats, Integers
+from vibsim.core.vocabulary import ORDER_TOLERANCE, REASON_NAMES, REASONS, STATUSES
+
+RISK = 0.01
+"""Accepted probability that a verdict is wrong."""
+INTERVAL = 0.95
+"""Probability of the interval of an order."""
+BOUND = 2.5
+"""Standard deviations in the bound of an error. The posterior has longer tails than a normal one: these are 95 %."""
+ROUNDING = 10.0
+"""Noise may be so many times its prediction where levels are said to differ by nothing else."""
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """What was decided of ladders; arrays of shape (ladder,) where no other is given."""
+
+    status: Codes  # index into `vocabulary.STATUSES`
+    reason: Codes  # index into `vocabulary.REASON_NAMES`
+    order: Floats  # the order of the finest three levels that the verdict rests on; NaN where there is none
+    low: Floats  # lower end of the interval of the order
+    high: Floats  # upper end
+    first: Integers  # coarsest level that the verdict rests on, as a position
+    last: Integers  # finest one
+    error: Floats  # norm of the error of the finest level, estimated where the exact solution is not known
+    error_bound: Floats  # what it is at most
+    weights: Floats  # the best value is the sum of these times the values of the levels, shape (ladder, level)
+    best_bound: Floats  # how far the limit is from the best value, at most
+
+
+def assess(
+    ladder: Ladder,
+    *,
+    expected: float | None = None,
+    at_least: float | None = None,
+    tolerance: float = ORDER_TOLERANCE,
+) -> Assessment:
+    """Decide whether ladders converge as expected.
+
+    Parameters
+    ----------
+    ladder
+        The numbers of any number of ladders with the same step sizes.
+    expected
+        The order that is expected.
+    at_least
+        The least order that is expected. Without either, any order will do that can be believed.
+    tolerance
+        How far from `expected`, or below `at_least`, an order may be.
+    """
+    n, count = len(ladder.h), len(ladder.gram)
+    finite = np.all(np.isfinite(ladder.gram), axis=(-2, -1)) & np.all(
+        np.isfinite(ladder.floor), axis=-1
+    )
+    reason = np.full(count, REASON_NAMES.index("non_finite"))
+    found = _nothing(count, n)
+    if n < 3:
+        reason[finite] = REASON_NAMES.index("too_few_levels")
+    elif np.any(finite):
+        part = Ladder(
+            ladder.h,
+            ladder.gram[finite],
+            ladder.floor[finite],
+            ladder.numbers[finite],
+            ladder.exact_known,
+        )
+        reason[finite] = _decide(part, expected, at_least, tolerance, found, finite)
+    status = np.array(
+        [STATUSES.index(REASONS[REASON_NAMES[code]]) for code in reason], dtype=np.int8
+    )
+    return Assessment(status=status, reason=reason.astype(np.int8), **found)
+
+
+def _nothing(count: int, levels: int) -> dict[str, np.ndarray]:
+    """Return the numbers of ladders of which nothing is known."""
+    names = ("order", "low", "high", "error", "error_bound", "best_bound")
+    unknown = {name: np.full(count, np.nan) for name in names}
+    window = {"first": np.zeros(count, dtype=np.int64), "last": np.full(count, levels - 1)}
+    return {**unknown, **window, "weights": np.full((count, levels), np.nan)}
+
+
+def _decide(
+    ladder: Ladder,
+    expected: float | None,
+    at_least: float | None,
+    tolerance: float,
+    found: dict[str, np.ndarray],
+    rows: Flags,
+) -> Integers:
+    """Return the reasons, and write the numbers of these rows into `found`."""
+    n = len(ladder.h)
+    believed = posterior(ladder, expected)
+    window = np.argmax(believed.window, axis=-1)
+    first, last = np.array(believed.windows)[window].T
+    orders = local_orders(ladder)
+    order = _finest_order(orders, last)
+    low, high = _interval(believed, order)
+    best = believed if not ladder.exact_known else posterior(_without_exact(ladder), expected)
+    numbers = _best(ladder, best, orders)
+    found["first"][rows], found["last"][rows] = first, last
+    found["order"][rows], found["low"][rows], found["high"][rows] = order, low, high
+    for name, value in numbers.items():
+        found[name][rows] = value
+
+    lower, right, higher = _sides(believed, expected, at_least, tolerance)
+    others = lower + higher
+    sure = others > 1.0 - RISK
+    sure &= right < RISK
+    d = np.sqrt(np.diagonal(ladder.gram, axis1=1, axis2=2))
+    allowed = ROUNDING * (ladder.floor[:, :-1] + ladder.floor[:, 1:])
+    exact = np.all(d[:, : n - 1] <= allowed, axis=-1)
+    away = ladder.exact_known & (d[:, -1] > ROUNDING * ladder.floor[:, -1])
+    kinds = np.stack(
+        [
+            believed.expansion + believed.elsewhere + believed.scattered,
+            believed.alternating,
+            believed.noise,
+        ]
+    )
+    open_ = np.array(
+        [REASON_NAMES.index(r) for r in ("pre_asymptotic", "oscillating", "round_off")]
+    )
+    cases = [
+        (exact & away, "wrong_limit"),
+        (exact, "exact"),
+        (believed.elsewhere > 1.0 - RISK, "wrong_limit"),
+        (right > 1.0 - RISK, "asymptotic"),
+        (sure & (lower > higher), "order_low"),
+        (sure, "order_high"),
+    ]
+    for name in ("first", "last"):
+        found[name][rows] = np.where(exact, {"first": 0, "last": n - 1}[name], found[name][rows])
+    for name in ("order", "low", "high"):
+        found[name][rows] = np.where(exact, np.nan, found[name][rows])
+    codes = [REASON_NAMES.index(name) for _, name in cases]
+    return np.select([mask for mask, _ in cases], codes, open_[np.argmax(kinds, axis=0)])
+
+
+def _without_exact(ladder: Ladder) -> Ladder:
+    m = len(ladder.h) - 1
+    return Ladder(ladder.h, ladder.gram[:, :m, :m], ladder.floor, ladder.numbers, exact_known=False)
+
+
+def _sides(
+    believed: Posterior, expected: float | None, at_least: float | None, tolerance: float
+) -> tuple[Floats, Floats, Floats]:
+    """Return the probabilities that a lower power dominates, one that is expected, and a higher one."""
+    powers, alone = believed.powers, believed.alone
+    if expected is not None:
+        below, above = powers < expected - tolerance - 1e-9, powers > expected + tolerance + 1e-9
+    elif at_least is not None:
+        below, above = powers < at_least - tolerance - 1e-9, np.zeros(len(powers), dtype=bool)
+    else:
+        # the neighbourhood that holds most
+        near = np.abs(powers[:, None] - powers) <= tolerance + 1e-9
+        right = np.max(alone @ near, axis=-1)
+        return np.zeros(len(alone)), right, np.zeros(len(alone))
+    parts = (below, ~below & ~above, above)
+    lower, right, higher = (np.sum(alone[:, part], axis=-1) for part in parts)
+    return lower, right, higher
+
+
+def _finest_order(orders: Floats, last: Integers) -> Floats:
+    """Return the order of the finest three levels up to `last` that have one."""
+    index = np.arange(orders.shape[-1])
+    usable = np.isfinite(orders) & (index <= last[:, None] - 2)
+    usable = np.where(np.any(usable, axis=-1, keepdims=True), usable, np.isfinite(orders))
+    finest = np.max(np.where(usable, index, -1), axis=-1)
+    picked = np.take_along_axis(orders, np.maximum(finest, 0)[:, None], axis=-1)[:, 0]
+    return np.where(finest >= 0, picked, np.nan)
+
+
+def _interval(believed: Posterior, order: Floats) -> tuple[Floats, Floats]:
+    """Return the range of powers that holds `INTERVAL` of what is believed, and the measured order."""
+    outside = 0.5 * (1.0 - INTERVAL)
+    whole = np.maximum(believed.expansion, 1e-300)[:, None]
+    below = np.cumsum(believed.lowest, axis=-1) / whole
+    above = np.cumsum(believed.highest[:, ::-1], axis=-1) / whole
+    low = believed.powers[np.argmax(below > outside, axis=-1)]
+    high = believed.powers[::-1][np.argmax(above > outside, axis=-1)]
+    return np.fmin(low, order), np.fmax(high, order)
+
+
+def _best(ladder: Ladder, believed: Posterior, orders: Floats) -> dict[str, Floats]:
+    """Return the best value, its bound, and the error of the finest level.
+
+    Three levels have the extrapolation by their own order, more levels the mean over all hypotheses.
+    """
+    n = len(ladder.h)
+    path = believed.path
+    differences = ladder.gram[:, : n - 1, : n - 1]
+    spread = believed.path_squared - np.einsum("ci,cij,cj->c", path, differences, path)
+    floor = ladder.floor[:, -1]
+    if n == 3:
+        p, ratio = orders[:, 0], ladder.h[1] / ladder.h[2]
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            step = np.where(p > 0.0, -1.0 / (ratio**p - 1.0), np.nan)
+        other = np.stack([np.zeros_like(step), step], axis=-1) - path
+        spread = spread + np.einsum("ci,cij,cj->c", other, differences, other)
+        path = path + other
+    weights = np.zeros((len(path), n))
+    weights[:, -1] = 1.0
+    weights[:, :-1] += path
+    weights[:, 1:] -= path
+    bound = BOUND * np.sqrt(np.maximum(spread, 0.0) + floor**2)
+    if ladder.exact_known:
+        error = np.sqrt(ladder.gram[:, -1, -1])
+        largest = error + floor
+    else:
+        error = np.sqrt(np.einsum("ci,cij,cj->c", path, differences, path))
+        largest = error + bound
+    return {"weights": weights, "best_bound": bound, "error": error, "error_bound": largest}
