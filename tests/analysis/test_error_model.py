@@ -1,0 +1,254 @@
+"""The error model on ladders of which the truth is known: every verdict, any step sizes, and how often it is right."""
+
+from __future__ import annotations
+
+import datetime
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from synthetic import EPSILON, TOLERANCE, Group, groups
+
+from vibsim.convergence.assessment import Assessment, assess
+from vibsim.convergence.error_model import Ladder, posterior
+from vibsim.core.array_types import Floats
+from vibsim.core.vocabulary import REASON_NAMES, STATUSES
+
+HALVED = 0.1 * 0.5 ** np.arange(4)
+UNEVEN = np.array([0.1, 0.07, 0.04, 0.03, 0.01])
+T = np.linspace(0.0, 1.0, 41)
+SHAPE, OTHER_SHAPE = np.sin(5.0 * T), T * np.cos(3.0 * T)
+HELD_OUT = 2
+"""A seed of which no number of the model was set."""
+
+
+def ladder(
+    h: Floats,
+    values: list[float] | list[Floats],
+    *,
+    exact: float | Floats | None = None,
+    noise: float | None = None,
+) -> Ladder:
+    """Return the ladder of one quantity, with the rounding of double precision as its noise."""
+    u = [np.atleast_1d(np.asarray(value, dtype=float)) for value in values]
+    rows = [a - b for a, b in pairwise(u)]
+    if exact is not None:
+        rows.append(u[-1] - exact)
+    x = np.array(rows)
+    size = math.sqrt(np.mean(u[-1] ** 2))
+    floor = np.full((1, len(u)), EPSILON * size if noise is None else noise)
+    gram = (x @ x.T / x.shape[1])[None]
+    return Ladder(h, gram, floor, np.array([x.shape[1] == 1]), exact is not None)
+
+
+def numbers(h: Floats, *terms: tuple[float, float]) -> list[float]:
+    """Return ``1 + sum of c h^p`` for every step."""
+    return [1.0 + sum(c * x**p for c, p in terms) for x in h]
+
+
+def series(h: Floats, *terms: tuple[float, float, Floats]) -> list[Floats]:
+    return [np.cos(T) + sum(c * x**p * shape for c, p, shape in terms) for x in h]
+
+
+def found(a: Assessment) -> tuple[str, str]:
+    return STATUSES[a.status[0]], REASON_NAMES[a.reason[0]]
+
+
+PASSES, FAILS, OPEN = "PASS", "FAIL", "INCONCLUSIVE"
+RNG = np.random.default_rng(5)
+TABLE = {
+    "a value that is not finite": (ladder(HALVED, [1.0, math.nan, 1.0, 1.0]), 2.0, (FAILS, "non_finite")),
+    "two levels": (ladder(HALVED[:2], [1.1, 1.05]), 2.0, (OPEN, "too_few_levels")),
+    "nothing but rounding": (ladder(HALVED, [1.0, 1.0 + 2e-16, 1.0, 1.0]), 2.0, (PASSES, "exact")),
+    "nothing but the given noise": (
+        ladder(HALVED, [1.001, 1.002, 0.999, 1.0], noise=2e-3), 2.0, (PASSES, "exact"),
+    ),
+    "the same number, but not the exact one": (
+        ladder(HALVED, [1.0, 1.0, 1.0, 1.0], exact=0.9), 2.0, (FAILS, "wrong_limit"),
+    ),
+    "another limit": (
+        ladder(HALVED, series(HALVED, (1.0, 2.0, SHAPE)), exact=np.cos(T) + 0.1), 2.0, (FAILS, "wrong_limit"),
+    ),
+    "the order, of numbers": (ladder(HALVED, numbers(HALVED, (1.0, 2.0))), 2.0, (PASSES, "asymptotic")),
+    "the order, of series": (
+        ladder(HALVED, series(HALVED, (1.0, 2.0, SHAPE), (0.5, 3.0, OTHER_SHAPE))), 2.0, (PASSES, "asymptotic"),
+    ),
+    "the order and the limit": (
+        ladder(HALVED, series(HALVED, (1.0, 2.0, SHAPE)), exact=np.cos(T)), 2.0, (PASSES, "asymptotic"),
+    ),
+    "a lower order": (ladder(HALVED, series(HALVED, (1.0, 1.0, SHAPE))), 2.0, (FAILS, "order_low")),
+    "a higher order": (ladder(HALVED, series(HALVED, (1.0, 4.0, SHAPE))), 2.0, (FAILS, "order_high")),
+    "two powers of one size": (
+        ladder(HALVED, series(HALVED, (1.0, 2.0, SHAPE), (0.03, 1.0, OTHER_SHAPE))), 2.0, (OPEN, "pre_asymptotic"),
+    ),
+    "errors that change their sign": (
+        ladder(HALVED, series(HALVED * np.array([1, -1, 1, -1.0]), (1.0, 1.0, SHAPE))), 2.0, (OPEN, "oscillating"),
+    ),
+    "noise": (
+        ladder(HALVED, [np.cos(T) + 1e-13 * RNG.normal(size=T.size) for _ in HALVED]), 2.0, (OPEN, "round_off"),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", TABLE)
+def test_every_row_of_the_table_of_decisions(case: str) -> None:
+    given, order, expected = TABLE[case]
+    assert found(assess(given, expected=order)) == expected
+
+
+@pytest.mark.parametrize("h", [HALVED, UNEVEN], ids=["halved", "uneven"])
+@pytest.mark.parametrize("p", [0.5, 1.0, 4 / 3, 1.786, 2.0, 3.0, 4.0, 6.0])
+def test_any_power_on_any_step_sizes(p: float, h: Floats) -> None:
+    values = numbers(h, (0.3, p))
+    a = assess(ladder(h, values, noise=1e-15), expected=p)
+    assert found(a) == (PASSES, "asymptotic")
+    assert a.order[0] == pytest.approx(p, abs=1e-4)
+    assert a.low[0] <= p + 1e-4
+    assert a.high[0] >= p - 1e-4
+    best = a.weights[0] @ np.array(values)
+    assert abs(best - 1.0) <= a.best_bound[0]
+    assert a.error[0] == pytest.approx(0.3 * h[-1] ** p, rel=0.01)
+    assert 0.3 * h[-1] ** p <= a.error_bound[0]
+
+
+def test_three_levels_have_the_order_and_the_extrapolation_of_their_equation() -> None:
+    """The grid study of the NASA tutorial: order 1.786170, extrapolated pressure recovery 0.971300."""
+    h = np.array([4.0, 2.0, 1.0])
+    values = [0.96178, 0.96854, 0.97050]
+    a = assess(ladder(h, values))
+    assert a.order[0] == pytest.approx(1.786170, abs=1e-6)
+    assert a.weights[0] @ np.array(values) == pytest.approx(0.971300, abs=1e-6)
+    assert found(a) == (OPEN, "pre_asymptotic")
+
+
+def test_without_an_expectation_any_order_will_do() -> None:
+    given = ladder(HALVED, series(HALVED, (1.0, 3.0, SHAPE)))
+    assert found(assess(given)) == (PASSES, "asymptotic")
+    assert found(assess(given, at_least=2.0)) == (PASSES, "asymptotic")
+    assert found(assess(given, at_least=4.0)) == (FAILS, "order_low")
+
+
+def test_a_scheme_is_given_the_benefit_of_its_promise() -> None:
+    """Three numbers with the order 2.011 are enough for a promised order of 2, but not without a promise."""
+    h = np.array([4.0, 2.0, 1.0])
+    given = ladder(h, [1.0 + 0.01 * (1.0 + 4.03), 1.0 + 0.01, 1.0])
+    assert found(assess(given, expected=2.0)) == (PASSES, "asymptotic")
+    assert found(assess(given)) == (OPEN, "pre_asymptotic")
+
+
+@pytest.mark.parametrize("factor", [1e-30, 1e30])
+def test_units_do_not_matter(factor: float) -> None:
+    usual = series(UNEVEN, (1.0, 2.0, SHAPE), (0.5, 3.0, OTHER_SHAPE))
+    one, other = (
+        assess(ladder(h, [f * u for u in usual]), expected=2.0)
+        for h, f in ((UNEVEN, 1.0), (1e3 * UNEVEN, factor))
+    )
+    assert found(one) == found(other)
+    np.testing.assert_allclose(other.error, factor * one.error, rtol=1e-6)
+    np.testing.assert_allclose(other.weights, one.weights, rtol=1e-6)
+
+
+def test_probabilities_add_up_to_one() -> None:
+    for exact in (None, np.cos(T)):
+        p = posterior(ladder(HALVED, series(HALVED, (1.0, 2.0, SHAPE)), exact=exact), 2.0)
+        whole = p.expansion + p.alternating + p.scattered + p.noise + p.elsewhere
+        assert whole == pytest.approx(1.0, abs=1e-9)
+        assert np.all(p.mixed >= -1e-9)
+
+
+# ---- How often it is right
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Verdicts on ladders that were judged by their true order and by others."""
+
+    judged: int
+    right: int
+    false_pass: int
+    mixed_pass: int
+    false_fail: int
+    left_open: int
+    decidable: int
+    intervals: float
+    errors: float
+    best: float
+    """Parts of the ladders that pass whose order, error and limit are within what is stated."""
+
+
+def of_group(group: Group) -> tuple[Ladder, Floats]:
+    """Return the ladders of a group, and their true errors, shape (ladder, level, t)."""
+    errors = np.array([one.errors for one in group.ladders])
+    rows = np.diff(errors, axis=1)
+    if group.known:
+        rows = np.concatenate([rows, -errors[:, -1:]], axis=1)
+    gram = rows @ np.swapaxes(rows, 1, 2) / rows.shape[2]
+    points = np.count_nonzero(
+        np.abs(rows[:, -1]) > 1e-3 * np.max(np.abs(rows[:, -1]), axis=-1, keepdims=True), axis=-1
+    )
+    floor = np.full(errors.shape[:2], EPSILON)
+    return Ladder(2.0 ** -np.array(group.levels), gram, floor, points <= 2, group.known), errors
+
+
+def counted(
+    seed: int, number: int = 42, size: int = 12, orders: tuple[float, ...] = (1.0, 2.0, 3.0, 4.0)
+) -> Counts:
+    total = dict.fromkeys(
+        ("judged", "right", "false_pass", "mixed_pass", "false_fail", "left_open", "decidable"), 0
+    )
+    within = []
+    for group in groups(seed, number, size):
+        if len(group.levels) < 3:
+            continue
+        given, errors = of_group(group)
+        for p in orders:
+            a = assess(given, expected=p)
+            total["judged"] += len(group.ladders)
+            for i, one in enumerate(group.ladders):
+                status, mine = STATUSES[a.status[i]], abs(one.order - p) <= TOLERANCE
+                passed = status == PASSES and REASON_NAMES[a.reason[i]] != "exact"
+                total["right"] += passed and mine
+                total["mixed_pass"] += passed and math.isnan(one.order)
+                total["false_pass"] += passed and not mine and not math.isnan(one.order)
+                total["false_fail"] += status == FAILS and mine
+                total["decidable"] += mine and one.decidable
+                total["left_open"] += mine and one.decidable and status == OPEN
+                if passed and mine:
+                    size_of = lambda x: math.sqrt(np.mean(x**2))  # noqa: E731
+                    within.append(
+                        (
+                            a.low[i] - 1e-9 <= one.order <= a.high[i] + 1e-9,
+                            size_of(errors[i, -1]) <= a.error_bound[i],
+                            size_of(a.weights[i] @ errors[i]) <= a.best_bound[i],
+                        )
+                    )
+    return Counts(
+        **total, **dict(zip(("intervals", "errors", "best"), np.mean(within, axis=0), strict=True))
+    )
+
+
+def check(c: Counts) -> None:
+    """Compare with what may go wrong: a false verdict in a thousand, a decidable ladder in ten left open."""
+    assert c.right > 0.12 * c.judged
+    assert c.false_pass <= 0.002 * c.judged, c
+    assert c.false_fail <= 0.002 * c.judged, c
+    assert c.mixed_pass <= 0.004 * c.judged, c
+    assert c.left_open <= 0.12 * c.decidable, c
+    margin = 2.0 * math.sqrt(0.05 * 0.95 / c.right)
+    assert min(c.intervals, c.errors, c.best) >= 0.95 - margin, c
+
+
+def test_verdicts_on_random_ladders_are_right() -> None:
+    c = counted(HELD_OUT, number=28)
+    print(c)
+    check(c)
+
+
+@pytest.mark.slow
+def test_verdicts_on_the_ladders_of_today_are_right() -> None:
+    seed = datetime.datetime.now(tz=datetime.UTC).toordinal()
+    c = counted(seed, size=55)
+    print(seed, c)
+    check(c)
