@@ -17,6 +17,7 @@ from functools import partial, reduce
 import numpy as np
 
 from vibsim.formula.algebra import filled, minus, plus, slope_of, times
+from vibsim.formula.arrays import values
 from vibsim.formula.parser import ExpressionError
 from vibsim.formula.tree import (
     ONE,
@@ -303,9 +304,10 @@ def _of_part(node: Expression, condition: Expression, side: float, name: str) ->
         case _:
             return None
     inside = sum(isinstance(part, Compare | Call) for part in walk(node))
-    slope = literal(slope_of(difference, name) or ZERO)
+    rate = slope_of(difference, name) or ZERO
+    slope = math.nan if names_in(rate) else float(values(rate, {}))
     whole = _found(node, name) if inside <= MAX_CONDITIONS else None
-    if not slope or whole is None:
+    if slope == 0.0 or not math.isfinite(slope) or whole is None:
         return None
     place = Binary("/", Negate(put(difference, name, ZERO)), number(slope))
     function = "max" if slope * side > 0.0 else "min"
