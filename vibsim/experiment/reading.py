@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
-from itertools import pairwise
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
@@ -17,11 +16,12 @@ from vibsim.experiment.faults import MISSING, Report, shorten
 from vibsim.experiment.rules import members, size_limits, timing
 from vibsim.experiment.rules import schemes as scheme_rules
 from vibsim.experiment.rules.checks import check_published, finish_checks
+from vibsim.experiment.rules.levels import rising_levels
 from vibsim.experiment.rules.model import equation as read_equation
 from vibsim.experiment.rules.scaling import Numbers, characteristic
 from vibsim.experiment.rules.sweep import read_sweep
 from vibsim.experiment.schema.checks import ConvergesCheck
-from vibsim.experiment.schema.document import Document, Every, LevelRange
+from vibsim.experiment.schema.document import Document, Every
 from vibsim.experiment.schema.fields import IDENTIFIER
 from vibsim.experiment.schema.model_and_schemes import scheme_names
 from vibsim.experiment.schema.published import claims
@@ -94,7 +94,12 @@ def build(
         document.model, of_kind, swept, file.parent if file else Path(), report
     )
     model, parameters = equation.model, equation.parameters
-    levels = _levels(document, source, report)
+    given = [key for key in ("levels", "tolerance") if source.data.get(key) is not None]
+    if not given:
+        report.add(("levels",), MISSING, "or tolerance")
+    elif len(given) > 1:
+        report.add(("tolerance",), "must not be given together with levels", at_key=True)
+    levels = rising_levels(document.levels, report)
     schemes = tuple(scheme_rules.finish_schemes(document.schemes, model, report))
     knows_schemes = scheme_rules.are_known(document.schemes)
     time = timing.time_spec(document.time, model, parameters, report)
@@ -184,27 +189,6 @@ def _keys(section: Any) -> Iterator[str]:
         for key, value in section.items():
             yield str(key)
             yield from _keys(value)
-
-
-def _levels(document: Any, source: Source, report: Report) -> tuple[int, ...]:
-    """Return the levels; none where the section is missing or faulty, or a tolerance stands for it."""
-    given = [key for key in ("levels", "tolerance") if source.data.get(key) is not None]
-    if not given:
-        report.add(("levels",), MISSING, "or tolerance")
-    elif len(given) > 1:
-        report.add(("tolerance",), "must not be given together with levels", at_key=True)
-    section = document.levels
-    if isinstance(section, LevelRange):
-        if section.from_ > section.to:
-            report.add(("levels", "to"), f"must be at least 'from', which is {section.from_}")
-        return tuple(range(section.from_, section.to + 1))
-    levels: tuple[int, ...] = section or ()
-    falling = [i for i, (low, high) in enumerate(pairwise(levels), 1) if low >= high]
-    for i in falling:
-        is_same = levels[i] == levels[i - 1]
-        word = "must not be repeated" if is_same else "must be in increasing order"
-        report.add(("levels", i), f"levels {word}", value=levels[i])
-    return () if falling else levels
 
 
 def _initial(
