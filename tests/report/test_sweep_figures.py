@@ -169,7 +169,7 @@ def test_maps_show_verdict_order_error_and_the_separatrix(across):
         text = samples.svg(picture) + samples.svg(motion)
     titles = [ax.get_title(loc="left") for ax in (*picture.figure.axes, *motion.figure.axes)]
     for title in (
-        "Verdict", "Order against the promised one", "Error bar of the order", "Levels that the order rests on",
+        "Verdict", "Order against the promised one", "Error bar of the order", "Levels used for the order",
         "Error on level 11", "Can the estimate be trusted?", "Period", "Exact period",
         "Relative error of the period", "Error bar of the period", "Amplitude", "Error bar of the amplitude",
     ):  # fmt: skip

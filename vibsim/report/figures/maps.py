@@ -142,7 +142,7 @@ def numbers(experiment: Experiment, record: Record, grid: Grid, scheme: int) -> 
         return None
     several = of_several(record, scheme)
     return _picture(
-        grid, panels, f"map_checks_{scheme}", f"The numbers that the checks are about{several}",
+        grid, panels, f"map_checks_{scheme}", f"Numbers of the checks{several}",
         f"Maps of the numbers that checks ask for{several}", "Each panel has the name of its check.",
     )  # fmt: skip
 
@@ -198,7 +198,7 @@ def _window(record: Record, grid: Grid, quantity: str, scheme: int) -> Panel:
         for level, shade in shades
         if np.any(first == level)
     ]
-    return _codes("Levels that the order rests on", grid, first, codes)
+    return _codes("Levels used for the order", grid, first, codes)
 
 
 def _errors(record: Record, grid: Grid, quantity: str, scheme: int) -> list[Panel]:
