@@ -117,7 +117,7 @@ def source(
     states = carried(stepper, model) if count == 1 else 0
     parameters = n_parameters(stepper, model)
     with_peaks = with_peaks and with_gathered
-    settings = {
+    settings: dict[str, object] = {
         "GATHER": with_gathered,
         "D2T": with_gathered and stepper.own_velocity,
         "SERIES": with_gathered and with_series,
@@ -135,6 +135,8 @@ def source(
         **block_loop.row_numbers(states, parameters, with_peaks),
         **gather.sample_rows(count),
     }
+    if count > 1:
+        settings["ZERO"] = coordinates.vector(*[0.0] * count)
     module = _module(lane, settings)
     again = lane != "blocks" and bool(settings["D2T"])
     with_work = bool(settings["WORK"])
@@ -144,17 +146,17 @@ def source(
     if again:
         put_energy_with(module, model)
     if count > 1:
-        coordinates.put_scheme(module, stepper, count)
+        coordinates.put_vectors(module, stepper, count)
+    if stepper.scaling is None:
+        collect(module, stepper.start, "start", {})
     else:
-        if stepper.scaling is None:
-            collect(module, stepper.start, "start", {})
-        else:
-            collect(module, stepper.start, "start_unscaled", {})
-            line = "return start_unscaled(variant, u, v * p[-1], dt, p)"
-            module.define("start(variant, u, v, dt, p)", line)
-        if model.events is not None:
-            _put_events(module, model, stepper)
-        collect(module, stepper.step, "step", {})
+        collect(module, stepper.start, "start_unscaled", {})
+        line = "return start_unscaled(variant, u, v * p[-1], dt, p)"
+        module.define("start(variant, u, v, dt, p)", line)
+    if model.events is not None:
+        _put_events(module, model, stepper)
+    collect(module, stepper.step, "step", {})
+    if "backward" not in module.parts:
         collect(module, stepper.backward, "backward", {})
     if lane == "blocks":
         put_formulas(module, model, "_fast", stepper, with_work=with_work)
@@ -202,7 +204,7 @@ def _module(lane: str, settings: Mapping[str, object]) -> Module:
 
 def _in_lane(text: str, lane: str, kinds: str) -> Kernel:
     if lane == "plain":
-        namespace: dict[str, Any] = {"divided": divided}
+        namespace: dict[str, Any] = {"divided": divided, "vector": coordinates.vector}
         exec(compile(with_quotients(_PLAIN + text), "<kernel>", "exec"), namespace)
         plain: Kernel = namespace["kernel"]
         return plain

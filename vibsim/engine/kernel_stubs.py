@@ -18,7 +18,7 @@ Settings:
 ``STAGED``              a step is cut into stages (`vibsim.engine.stages`)
 ``EVENTS``              the model has events (`vibsim.engine.events`)
 ``LOCATED``             they are found within the step, not noticed at the grid point behind
-``SYSTEM``              there are several coordinates, ``COORDINATES``: a position and a velocity are then tuples
+``SYSTEM``              there are several coordinates, ``COORDINATES``: a position and a velocity are then vectors
 ``STATES, PARAMETERS``  entries of the scheme's state, and of the parameters
 ======================  ===============================================================================================
 
@@ -39,6 +39,7 @@ Functions; u, v, t and p are position, velocity, time and parameters of a member
 ``first_further, next_further, note_further``                   `vibsim.engine.gather` for coordinates behind the first
 ``parameters_in, states_in, extrema_in``                        tuples in the rows of a lane (`vibsim.engine.rows`)
 ``put_states, put_extrema``                                     write them
+``vector(*numbers)``                                            a vector (`vibsim.engine.coordinates`)
 ``total(state)``                                                the sum of a state, NaN where an entry is
 ``drive, limit, impact_of``                                     the formulas of `vibsim.models.events`
 ``mode_of(p)``, ``start_of(p)``, ``with_mode(p, mode, start)``  mode of a member, and when its scheme has last started

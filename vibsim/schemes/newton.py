@@ -169,7 +169,9 @@ def solver(coordinates: int, stages: int) -> Callable[..., Any]:
     guesses = ("x", "y")[:stages]
     unknowns = list(product(range(stages), range(coordinates)))
     name = f"solved_{'together_' if stages > 1 else ''}{coordinates}"
-    found = [f"({', '.join(f'x_{i}_{c}' for c in range(coordinates))})" for i in range(stages)]
+    found = [
+        f"vector({', '.join(f'x_{i}_{c}' for c in range(coordinates))})" for i in range(stages)
+    ]
     done = ", ".join(found)
     lines = [
         "@alone",
