@@ -85,32 +85,18 @@ def row_numbers(states: int, parameters: int, with_peaks: bool) -> dict[str, int
     return numbers | {"FIRST_PARAMETER": first} | last
 
 
-def run(
-    parameters: Any,
-    table: Any,
-    initial: Any,
-    dt: Any,
-    first: int,
-    stop: int,
-    steps: int,
-    every: int,
-    variant: int,
-    end_rule: int,
-    turn: float,
-    samples: Any,
-    stats: Any,
-    counts: Any,
-    kept: Any,
-    rows: Any,
-) -> None:
-    """Step members first..stop-1 of one scheme: see `vibsim.engine.member_loop.run`.
+def run(members: Any, span: Any, settings: Any, found: Any, rows: Any) -> None:
+    """Step some members of one scheme: see `vibsim.engine.member_loop.run`.
 
     Parameters
     ----------
     rows
         Scratch memory: `LANES` numbers for each row.
     """
-    found = samples, stats, counts, kept
+    parameters, table, initial, dt = members
+    first, stop = span
+    steps, every, variant, end_rule, turn = settings
+    samples = found[0]
     for base in range(first, stop, LANES):
         width = min(LANES, stop - base)
         # whole vectors: the lanes behind the last member repeat it and are never written

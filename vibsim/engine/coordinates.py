@@ -67,7 +67,7 @@ def vector(*components: float) -> Vector:
 
 
 def put_vectors(module: Module, stepper: Stepper, count: int) -> None:
-    """Write what a kernel for `count` coordinates needs beside the text of the scheme and the loop."""
+    """Write what stands for functions of the schemes that are written for numbers alone."""
     used = stepper.step.__globals__
     for stages, function in enumerate((newton.solved, newton.solved_together), 1):
         if used.get(function.__name__) is function:
@@ -75,28 +75,46 @@ def put_vectors(module: Module, stepper: Stepper, count: int) -> None:
     if stepper.backward is no_backward:
         components = ", ".join(["math.nan"] * count)
         module.define("backward(state, dt)", f"return vector({components})")
-    put_moves(module, count)
-    for text in (gather.first_extrema, gather.next_extrema, gather.note_extrema):
-        collect(module, text, text.__name__, {})
-    further = range(1, count)
-    sizes = " + ".join(f"abs({name}[{k}])" for k in range(count) for name in ("u", "v"))
-    module.define("size_of(u, v)", f"return {sizes}")
-    first = ", ".join(f"first_extrema(u[{k}], v[{k}])" for k in further)
-    module.define("first_further(u, v)", f"return ({first},)")
-    ahead = ", ".join(f"next_extrema(further[{k - 1}], u[{k}], v[{k}], 0.0)" for k in further)
-    module.define("next_further(further, u, v)", f"return ({ahead},)")
-    notes = (
-        f"note_extrema(stats, case, {k * gather.N_STATS}, further[{k - 1}], 0.0)" for k in further
-    )
-    module.define("note_further(stats, case, further)", *notes)
 
 
 def put_moves(module: Module, count: int) -> None:
-    """Write what reads positions and velocities from arrays with a row of each."""
+    """Write what moves positions and velocities from and to arrays with a row of each component."""
+
+    def together(parts: list[str]) -> str:
+        return f"vector({', '.join(parts)})" if count > 1 else parts[0]
+
+    def components(name: str) -> list[str]:
+        return [f"{name}[{k}]" for k in range(count)] if count > 1 else [name]
+
     for head, place in (
         ("initial_of(values, k)", "values[k, {}]"),
         ("point_of(values, case, k)", "values[{}, case, k]"),
     ):
         rows = [f"float({place.format(row)})" for row in range(2 * count)]
-        halves = (", ".join(half) for half in (rows[:count], rows[count:]))
-        module.define(head, f"return {', '.join(f'vector({half})' for half in halves)}")
+        module.define(head, f"return {together(rows[:count])}, {together(rows[count:])}")
+    for head, parts in (
+        ("put_components(samples, first, case, k, w)", components("w")),
+        ("put_moving(samples, case, k, q, w)", components("q") + components("w")),
+    ):
+        first = "first + " if "first" in head else ""
+        lines = (f"samples[{first}{row}, case, k] = {part}" for row, part in enumerate(parts))
+        module.define(head, *lines)
+    module.define("first_of(q)", f"return {components('q')[0]}")
+    pairs = zip(components("q"), components("w"), strict=True)
+    sizes = " + ".join(f"abs({part})" for pair in pairs for part in pair)
+    module.define("size_of(q, w)", f"return {sizes}")
+
+
+def put_further(module: Module, count: int) -> None:
+    """Write what gathers the extrema of coordinates behind the first."""
+    for text in (gather.first_extrema, gather.next_extrema, gather.note_extrema):
+        collect(module, text, text.__name__, {})
+    further = range(1, count)
+    first = "".join(f"first_extrema(q[{k}], w[{k}]), " for k in further)
+    module.define("first_further(q, w)", f"return ({first})")
+    ahead = "".join(f"next_extrema(further[{k - 1}], q[{k}], w[{k}], 0.0), " for k in further)
+    module.define("next_further(further, q, w)", f"return ({ahead})")
+    notes = (
+        f"note_extrema(stats, case, {k * gather.N_STATS}, further[{k - 1}], 0.0)" for k in further
+    )
+    module.define("note_further(stats, case, further)", "pass", *notes)

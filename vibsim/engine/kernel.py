@@ -43,8 +43,17 @@ def compiled(function):
 called = entry = compiled
 """
 
+_ENTRY = """\
+@entry
+def kernel(
+    parameters, table, initial, dt, first, stop, steps, every, variant, end_rule, turn,
+    samples, stats, counts, kept, rows
+):
+    members, settings = (parameters, table, initial, dt), (steps, every, variant, end_rule, turn)
+    run(members, (first, stop), settings, (samples, stats, counts, kept), rows)"""
+"""What is called from outside, with `vibsim.engine.member_loop.run` or that of blocks."""
 _STEPPING = "f2 f2 f2 f1 i i i i i i f f3 f2 i2 f3 f1"
-"""Arguments of `vibsim.engine.member_loop.run`, as `vibsim.native.linking.link` has them."""
+"""Its arguments, as `vibsim.native.linking.link` has them."""
 _OBSERVING = "f2 f2 f1 i i f3 f3"
 """Arguments of `vibsim.engine.member_loop.observe`."""
 
@@ -93,9 +102,8 @@ def kernel(
 def observer(model: Model, formulas: tuple[Formula, ...], lane: str) -> Kernel:
     """Return the function that works out formulas of samples (`vibsim.engine.member_loop.observe`)."""
     count = model.coordinates
-    module = _module(lane, {"SYSTEM": count > 1})
-    if count > 1:
-        coordinates.put_moves(module, count)
+    module = _module(lane, {})
+    coordinates.put_moves(module, count)
     put = marked(model)
     results = {f"_value_{i}": put(formula) for i, formula in enumerate(formulas)}
     put_functions(module, model, "", {"observed": results}, always_tuple=True)
@@ -127,8 +135,6 @@ def source(
         "STAGED": bool(stages(stepper.step)),
         "EVENTS": model.events is not None,
         "LOCATED": stepper.events != "mesh",
-        "SYSTEM": count > 1,
-        "COORDINATES": count,
         "STATES": states,
         "SET": block_loop.set_of(states, with_peaks),
         "PARAMETERS": parameters,
@@ -145,6 +151,9 @@ def source(
     put_formulas(module, model, "", stepper, is_rare=rare, with_kinetic=again, with_work=with_work)
     if again:
         put_energy_with(module, model)
+    if lane != "blocks":
+        coordinates.put_moves(module, count)
+        coordinates.put_further(module, count)
     if count > 1:
         coordinates.put_vectors(module, stepper, count)
     if stepper.scaling is None:
@@ -170,7 +179,8 @@ def source(
         else:
             collect(module, stepper.step, "step_fast", renamed)
         rows.put_rows(module, states, parameters, settings)
-    collect(module, block_loop.run if lane == "blocks" else member_loop.run, "kernel", {})
+    collect(module, block_loop.run if lane == "blocks" else member_loop.run, "run", {})
+    module.put("kernel", _ENTRY)
     return module.text
 
 
