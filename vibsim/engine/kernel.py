@@ -135,10 +135,8 @@ def source(
         "STAGED": bool(stages(stepper.step)),
         "EVENTS": model.events is not None,
         "LOCATED": stepper.events != "mesh",
-        "STATES": states,
-        "SET": block_loop.set_of(states, with_peaks),
         "PARAMETERS": parameters,
-        **block_loop.row_numbers(states, parameters, with_peaks),
+        **block_loop.row_places(states, parameters, with_peaks),
         **gather.sample_rows(count),
     }
     if count > 1:

@@ -18,7 +18,7 @@ Settings:
 ``STAGED``              a step is cut into stages (`vibsim.engine.stages`)
 ``EVENTS``              the model has events (`vibsim.engine.events`)
 ``LOCATED``             they are found within the step, not noticed at the grid point behind
-``STATES, PARAMETERS``  entries of the scheme's state, and of the parameters
+``PARAMETERS``          the number of parameters
 ======================  ===============================================================================================
 
 Functions; u, v, t and p are position, velocity, time and parameters of a member. Of several coordinates position and
