@@ -11,7 +11,7 @@ from typing import Any
 
 from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.experiment.collection import collection_of
-from vibsim.experiment.data import AnyExperiment, ModelSpec, Sweep
+from vibsim.experiment.data import AnyExperiment, ModelSpec
 from vibsim.experiment.faults import MISSING, Report, shorten
 from vibsim.experiment.rules import members, size_limits, timing
 from vibsim.experiment.rules import schemes as scheme_rules
@@ -20,7 +20,7 @@ from vibsim.experiment.rules.levels import rising_levels
 from vibsim.experiment.rules.model import equation as read_equation
 from vibsim.experiment.rules.scaling import Numbers, characteristic
 from vibsim.experiment.rules.sweep import read_sweep
-from vibsim.experiment.schema.checks import ConvergesCheck
+from vibsim.experiment.schema.checks import Check, ConvergesCheck
 from vibsim.experiment.schema.document import Document, Every
 from vibsim.experiment.schema.fields import IDENTIFIER
 from vibsim.experiment.schema.model_and_schemes import scheme_names
@@ -94,25 +94,13 @@ def build(
         document.model, of_kind, swept, file.parent if file else Path(), report
     )
     model, parameters = equation.model, equation.parameters
-    given = [key for key in ("levels", "tolerance") if source.data.get(key) is not None]
-    if not given:
-        report.add(("levels",), MISSING, "or tolerance")
-    elif len(given) > 1:
-        report.add(("tolerance",), "must not be given together with levels", at_key=True)
-    levels = rising_levels(document.levels, report)
+    levels = _levels(document, source, report)
     schemes = tuple(scheme_rules.finish_schemes(document.schemes, model, report))
     knows_schemes = scheme_rules.are_known(document.schemes)
     time = timing.time_spec(document.time, model, parameters, report)
     initial = _initial(document.initial, model or of_kind, parameters, report)
-    sweep, is_whole = Sweep(axes=()), True
-    if document.sweep is not None:
-        order = list(source.data["sweep"])
-        sweep, is_whole = read_sweep(document, order, model, schemes, not knows_schemes, report)
-    # something of it may be malformed and was left out
-    is_wellformed = not any(path[:1] == ("sweep",) for path in report.faulty)
-    if document.sweep is not None and is_whole and is_wellformed and not sweep.axes:
-        report.add(("sweep",), "must not be empty")
-    is_whole = is_whole and is_wellformed
+    order = source.data.get("sweep")
+    sweep, is_whole = read_sweep(document, order, model, schemes, not knows_schemes, report)
     if time is not None and is_whole and model is not None and parameters:
         of_members = members.MemberNumbers(model, parameters, time, sweep.axes)
         for table in equation.tables:
@@ -135,12 +123,7 @@ def build(
     )
     size_limits.check(setting, report)
     _check_output(document, model, levels, report)
-    checks = document.checks
-    if not checks and not document.published and model is not None:
-        checks = [ConvergesCheck(converges=position) for position in model.positions]
-    given_ids = [check.id if check is not None else "" for check in document.checks]
-    checks = finish_checks(checks, setting, report)
-    check_published(document.published, given_ids, setting, report)
+    checks = _checks(document, setting, report)
     report.raise_any()
     assert model is not None
     assert numbers.time is not None
@@ -164,7 +147,7 @@ def build(
         samples=setting.samples,
         output=document.output,
         tolerance=document.tolerance,
-        checks=(*checks, *claims(document.published, document.source)),
+        checks=checks,
         published=document.published,
         units=document.units,
         scaling=numbers.scaling,
@@ -189,6 +172,16 @@ def _keys(section: Any) -> Iterator[str]:
         for key, value in section.items():
             yield str(key)
             yield from _keys(value)
+
+
+def _levels(document: Any, source: Source, report: Report) -> tuple[int, ...]:
+    """Return the levels; none where the section is missing or faulty, or a tolerance stands for it."""
+    given = [key for key in ("levels", "tolerance") if source.data.get(key) is not None]
+    if not given:
+        report.add(("levels",), MISSING, "or tolerance")
+    elif len(given) > 1:
+        report.add(("tolerance",), "must not be given together with levels", at_key=True)
+    return rising_levels(document.levels, report)
 
 
 def _initial(
@@ -218,6 +211,18 @@ def _initial(
             report.add(("initial", name), rule)
         found[name] = float(value)
     return found
+
+
+def _checks(document: Any, setting: size_limits.Setting, report: Report) -> tuple[Check, ...]:
+    """Return the checks of a file, or those of one that has none, and the claims of its printed tables."""
+    given, model = document.checks, setting.model
+    if not given and not document.published and model is not None:
+        given = [ConvergesCheck(converges=position) for position in model.positions]
+    checks = finish_checks(given, setting, report)
+    ids = [check.id if check is not None else "" for check in document.checks]
+    check_published(document.published, ids, setting, report)
+    rows = [] if report.faults else claims(document.published, document.source)
+    return (*checks, *rows)
 
 
 def _check_output(
