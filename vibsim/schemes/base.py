@@ -87,7 +87,7 @@ class Stepper:
     """The arithmetic of a scheme: functions on the carried state of one member, and how it starts and ends.
 
     A function may ask for `slopes` or `damping_rate` (`vibsim.models.base.Damping`) behind `acceleration`, by these
-    names.
+    names. Of several coordinates positions, velocities and accelerations are vectors (`vibsim.engine.coordinates`).
     """
 
     start: Callable[..., CarriedState]
