@@ -164,6 +164,8 @@ BROKEN = {
     "k < u": [1.7],
     "(u - 1)*heaviside(u - 1)": [1.0],
     "k*(u + u**3)*(2*u <= 3)": [1.5],
+    "k*(u + u**3)*(u*2 - 1 <= 2)": [1.5],
+    "sin(u) if 2*(3*u)/4 - 0.5 < 1 else u**2": [1.0],
     "(-1 < u)*(1 - u)": [-1.0],
     "-1 < u < 2": [-1.0, 2.0],
     "(k < u)*u*erf(2)": [1.7],
@@ -221,6 +223,23 @@ def test_integral_across_corners_and_jumps(text: str) -> None:
     for u, true in true_integrals(text, places, BROKEN.get(text, [0.0])).items():
         found = float(values(rule, {"u": u, "k": 1.7}))
         assert found == pytest.approx(true, rel=2e-13, abs=2e-14), u
+
+
+@pytest.mark.parametrize("slope", ["k", "0", "(k*k)"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "sin({}*u)", "cos({}*u)", "exp(-{}*u)", "erfc({}*u)", "abs({}*u - 1)", "floor({}*u + 2.5)",
+        "mod({}*u + 1.2, 0.5)", "max({}*u - 1, 0)", "min({}*u, 0.4)", "{}*u < 0.3", "max({}*u + 2, 0)**1.5",
+    ],
+)  # fmt: skip
+def test_without_a_slope_a_function_is_a_constant(text: str, slope: str) -> None:
+    tree = parse(text.format(slope), ("u", "k"))
+    assert has_rule(tree, "u")
+    for u in (-1.7, 0.0, 2.3):
+        numbers = {"u": u, "k": 0.0}
+        constant = float(values(tree, numbers))
+        assert float(values(integral(tree, "u"), numbers)) == pytest.approx(constant * u, rel=1e-15)
 
 
 @pytest.mark.parametrize("text", [*SMOOTH, "mod(u, k)", "floor(u)", "abs(u)", "heaviside(u)"])

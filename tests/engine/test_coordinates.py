@@ -10,10 +10,11 @@ from scipy.integrate import solve_ivp
 
 from vibsim.core.errors import SimulationError
 from vibsim.engine import integrate
-from vibsim.engine.coordinates import NUMBER, VECTOR, collect_system
-from vibsim.engine.text import Module
+from vibsim.engine.coordinates import vector
+from vibsim.engine.text import Module, collect
 from vibsim.models import MODELS
 from vibsim.models.base import Damping, Parameter, State
+from vibsim.native.machine import machine_code
 from vibsim.schemes import FIXED_STEP, SCHEMES
 from vibsim.simulation.adaptive import integrate as integrate_adaptive
 
@@ -202,11 +203,6 @@ def test_a_stiff_wire_keeps_its_digits():
         np.testing.assert_allclose(found, wanted, rtol=0.0, atol=2e-15 / (1 - beta) + 1e-15)
 
 
-def written_out(function, kinds):
-    module = Module("step", {})
-    return collect_system(module, function, "step", kinds, 2)
-
-
 def product_of_vectors(state, t, dt, p, acceleration):
     u, v = state
     return (u * v, v), v
@@ -224,10 +220,46 @@ def number_and_vector(state, t, dt, p, acceleration):
     return (u + dt, v), v
 
 
-@pytest.mark.parametrize("function", [product_of_vectors, compared_vectors, number_and_vector])
+def number_over_vector(state, t, dt, p, acceleration):
+    u, v = state
+    return (dt / u, v), v
+
+
+def number_less_vector(state, t, dt, p, acceleration):
+    u, v = state
+    return (dt - u, v), v
+
+
+def quotient_of_vectors(state, t, dt, p, acceleration):
+    u, v = state
+    return (u / v, v), v
+
+
+MEANINGLESS = [
+    product_of_vectors,
+    compared_vectors,
+    number_and_vector,
+    number_over_vector,
+    number_less_vector,
+    quotient_of_vectors,
+]
+CALL = """\
+@entry
+def kernel(x):
+    step((vector(x[0], x[1]), vector(x[0], x[1])), 0.0, x[0], x)
+"""
+
+
+@pytest.mark.parametrize("function", MEANINGLESS)
 def test_what_has_no_meaning_for_vectors_is_refused(function):
-    with pytest.raises(SimulationError, match="cannot be written out for 2 coordinates"):
-        written_out(function, ((VECTOR, VECTOR), NUMBER, NUMBER, NUMBER))
+    state = vector(1.0, 2.0), vector(1.0, 2.0)
+    with pytest.raises(SimulationError, match="no meaning for vectors"):
+        function(state, 0.0, 0.1, (), None)
+    module = Module("kernel")
+    collect(module, function, "step", {})
+    module.put("kernel", CALL)
+    with pytest.raises(SimulationError, match=r"no such operation|not a number"):
+        machine_code(module.text, "kernel", "f1")
 
 
 def test_blocks_are_for_one_coordinate():

@@ -113,7 +113,7 @@ def test_a_tolerance_leaves_the_levels_open() -> None:
     experiment = by_tolerance(samples={"every": 4}, sweep={"model.g": [1, 2]}, output="best")
     assert (experiment.tolerance, experiment.levels, experiment.output) == (1e-10, (), "best")
     assert restore(json.loads(json.dumps(canonical(experiment)))) == experiment
-    chosen = experiment.with_levels([5, 7])
+    chosen = experiment.with_levels(range(5, 8, 2))
     assert chosen.levels == (5, 7)
     assert chosen.tolerance == 1e-10
     assert chosen == build(
@@ -134,8 +134,15 @@ def test_chosen_levels_are_held_to_the_rules_of_a_file() -> None:
             experiment.with_levels(levels)
     with pytest.raises(InputError, match="must divide the 4 steps"):
         by_tolerance(samples={"every": 3}).with_levels([2, 3])
-    for bad in ([], [3, 3], [4, 3], [-1, 2], [3, 41]):
-        with pytest.raises(ValueError, match="in increasing order"):
+    for bad, told in (
+        ([], r"levels: \[\]: must not be empty"),
+        ([3, 3], r"levels\[1\]: 3: levels must not be repeated"),
+        ([4, 3], r"levels\[1\]: 3: levels must be in increasing order"),
+        ([-1, 2], r"levels\[0\]: -1: must be at least 0"),
+        ([3, 41], r"levels\[1\]: 41: must be at most 40"),
+        ([1, 2.5], r"levels\[1\]: 2.5: must be a whole number"),
+    ):
+        with pytest.raises(InputError, match=told):
             experiment.with_levels(bad)
 
 

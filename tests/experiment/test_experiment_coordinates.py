@@ -66,6 +66,14 @@ def test_terms_that_are_not_there_are_no_part_of_the_equation():
         ({"output": "best"}, "extrapolates a motion of one coordinate"),
         ({"checks": [{"converges": "y_d2t", "order": 2}]}, "did you mean 'vy_d2t'?"),
         (
+            {"checks": [{"value": "running_max", "quantity": "energy_d2t", "below": 1}]},
+            "choose from energy_deviation, energy_deviation_d2t",
+        ),
+        (
+            {"checks": [{"value": "max_abs", "quantity": "energy_d2t", "below": 1}]},
+            "choose from x, y, vx, vy, energy_deviation, energy_deviation_d2t",
+        ),
+        (
             {"model": {"kind": "elastic_pendulum", "exact_x": "sin(t)", "Theta": 30}},
             "model.Theta: 30.0: has no meaning beside an exact solution",
         ),

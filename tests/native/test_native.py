@@ -9,12 +9,16 @@ import numpy as np
 import pytest
 
 from vibsim.elementary import primitives
+from vibsim.engine.coordinates import vector
 from vibsim.native.linking import identity, link
 from vibsim.native.machine import machine_code
 from vibsim.native.source import NativeError
 
 PLAIN = {"compiled": lambda f: f, "called": lambda f: f, "entry": lambda f: f}
-PLAIN |= {name: getattr(primitives, name) for name in primitives.NAMES} | {"math": math}
+PLAIN |= {name: getattr(primitives, name) for name in primitives.NAMES} | {
+    "math": math,
+    "vector": vector,
+}
 
 FLOATS = [0.0, -0.0, 1.0, -1.5, 2.5, -7.25, 1e300, -1e-300, 0.1, 1 / 3, math.pi, math.inf, math.nan]
 WHOLES = [0, 1, -1, 2, 7, -7, 12, 2**40 + 3, -(2**40) - 5]
@@ -270,6 +274,20 @@ def test_parts_of_doubles() -> None:
         "f[0, 0] = exponent_of(x)\nf[0, 1] = mantissa_of(x)\nf[0, 2] = two_to(float(i))",
         floats=sizes,
         wholes=[-1022, 0, 5, 1023],
+    )
+
+
+def test_tuples_of_floats_are_vectors() -> None:
+    both(
+        """
+a, b = vector(x, y), vector(y, 0.5)
+for k in range(2):
+    f[0, k] = (a + b)[k]
+    f[1, k] = (-(x * a - b * y) / 3.0)[k]
+f[2, 0] = abs(a - b)
+f[2, 1] = (SHIFT + (a if x < y else SHIFT))[1]
+""",
+        head="SHIFT = vector(0.25, 1.5)",
     )
 
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import csv
+import re
 
 import pytest
 import samples
 from test_page import make, read
 
 from vibsim import report, store
+from vibsim.report.page import cards
+from vibsim.report.text import words
 
 
 def put(results, collection, name, exp=None, **changes):
@@ -119,3 +122,36 @@ def test_the_index_is_the_same_bytes_every_time(tmp_path):
         (tmp_path / "index.html").read_bytes(),
         (tmp_path / "summary.csv").read_bytes(),
     )
+
+
+WRONG = [{"kind": "central", "start": "first_order"}]
+
+
+@pytest.mark.parametrize(
+    "check",
+    [
+        {"converges": "theta", "order": 2},
+        {"converges": "energy_deviation", "order": 4},
+        {"value": "end", "quantity": "theta", "above": 9},
+        {"equal": ["central", "exact"], "quantity": "theta"},
+        {"claim": "It converges.", "that": {"converges": "omega", "order": 3}},
+        {"conserves": "energy", "drift": "linear"},
+    ],
+)
+def test_the_index_calls_a_quantity_what_its_page_calls_it(tmp_path, check):
+    exp = samples.experiment(schemes=WRONG, checks=[check], initial={"theta": 1.0})
+    _, exp, record, summary = put(tmp_path, "pendulum_lab", "theta", exp)
+    assert summary["status"] != "PASS"
+    report.write_index(tmp_path)
+    told = " ".join(read(tmp_path / "index.html").text)
+    ours = cards.context(exp, record, summary, {})["checks"][0]["text"]
+    # a page writes its own powers of ten
+    labels = re.compile(r"\b(?:θ|ω|dE|theta|omega|energy\w*)\b")
+    assert labels.findall(ours)
+    assert labels.findall(told)[-len(labels.findall(ours)) :] == labels.findall(ours)
+
+
+def test_a_name_in_code_or_a_dotted_path_stays_as_it_is():
+    text = "theta at initial.theta = 1 (`theta: 2`), theta_0, of theta."
+    told = "θ at initial.theta = 1 (`theta: 2`), theta_0, of θ."
+    assert words.labelled(text, "theta") == told

@@ -22,7 +22,7 @@ from vibsim.report.figures import order as figures_order
 from vibsim.report.figures import sweep as figures_sweep
 from vibsim.report.figures import time
 from vibsim.report.page import cards
-from vibsim.report.text import reasons
+from vibsim.report.text import reasons, setting
 
 PROVENANCE = {"versions": {"vibsim": "1.2", "python": "3.99", "numpy": "9.9"}, "digest": "d1"}
 VOID = {"meta", "br", "img", "link", "hr", "input", "col"}
@@ -340,7 +340,7 @@ PANELS = [
     "Verdict",
     "Order against the promised one",
     "Error bar of the order",
-    "Levels that the order rests on",
+    "Levels used for the order",
     "Error on level 10",
     "Can the estimate be trusted?",
 ]
@@ -506,3 +506,16 @@ def test_an_unknown_format_is_refused_before_anything_is_written(tmp_path):
     with pytest.raises(VibsimError, match=r"'svgz'.*did you mean 'svg'"):
         make(tmp_path, samples.plain(), formats=("svg", "svgz"))
     assert not list(tmp_path.iterdir())
+
+
+def test_the_two_frequencies_of_a_stiff_model_have_labels_of_their_own():
+    exp = samples.experiment(
+        model={"kind": "elastic_pendulum", "beta": 0.9},
+        initial={},
+        time={"end": 6.0},
+        levels=[6, 7],
+    )
+    rows = [row for row in setting.setup(exp, samples.record(exp)) if "w dt" in row[0]]
+    assert [term for term, _ in rows] == ["w dt", "Highest w dt"]
+    assert "natural frequency" in rows[0][1]
+    assert "fastest oscillation" in rows[1][1]

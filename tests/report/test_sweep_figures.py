@@ -111,10 +111,24 @@ def test_members_anywhere_in_a_plane_are_gathered_in_cells():
 
 def test_the_separatrix_is_found_where_the_energy_says(across):
     exp, record = across
-    x, y = separatrix.separatrix(exp, sweep_layout.grid_of(sweep_layout.keys(record)))
+    grid = sweep_layout.grid_of(sweep_layout.keys(record))
+    x, y = separatrix.with_separatrix(exp, grid).separatrix
     assert x.size >= 12
     # from w = 1: omega = 2 cos(theta/2); golden sections end within rounding errors of a bracket
     np.testing.assert_allclose(y, 2.0 * np.cos(x / 2.0), atol=1e-9)
+
+
+def test_the_separatrix_is_searched_once_for_all_maps(across, monkeypatch):
+    exp, record = across
+    searches = []
+    peaks = separatrix._peaks
+    monkeypatch.setattr(separatrix, "_peaks", lambda *a: searches.append(1) or peaks(*a))
+    with style.applied():
+        pictures = gallery.over_members(exp, record, ["theta", "omega"])
+    marked = [p for p in pictures if "separatrix" in p.caption]
+    assert len(marked) >= 3
+    # down and across
+    assert len(searches) == 2
 
 
 def test_no_separatrix_is_drawn_where_there_is_none():
@@ -122,7 +136,7 @@ def test_no_separatrix_is_drawn_where_there_is_none():
     for model in ("pendulum", "linear_pendulum"):
         exp = samples.experiment(sweep=sweep, model={"kind": model})
         grid = sweep_layout.grid_of(sweep_layout.keys(samples.record(exp)))
-        assert not separatrix.separatrix(exp, grid)[0].size
+        assert not separatrix.with_separatrix(exp, grid).separatrix[0].size
         assert not separatrix.on_line(exp, grid.x).size
 
 
@@ -148,14 +162,14 @@ def test_the_estimated_error_of_the_finest_level_is_the_true_one(across):
 
 def test_maps_show_verdict_order_error_and_the_separatrix(across):
     exp, record = across
-    grid = sweep_layout.grid_of(sweep_layout.keys(record))
+    grid = separatrix.with_separatrix(exp, sweep_layout.grid_of(sweep_layout.keys(record)))
     with style.applied():
         picture = maps.verdicts(exp, record, grid, "theta", 0)
         motion = maps.motion(exp, record, grid, 0)
         text = samples.svg(picture) + samples.svg(motion)
     titles = [ax.get_title(loc="left") for ax in (*picture.figure.axes, *motion.figure.axes)]
     for title in (
-        "Verdict", "Order against the promised one", "Error bar of the order", "Levels that the order rests on",
+        "Verdict", "Order against the promised one", "Error bar of the order", "Levels used for the order",
         "Error on level 11", "Can the estimate be trusted?", "Period", "Exact period",
         "Relative error of the period", "Error bar of the period", "Amplitude", "Error bar of the amplitude",
     ):  # fmt: skip

@@ -165,7 +165,11 @@ def put_functions(
             if function in scaled:
                 lines.append(f"{result} = {result} * p[{len(names) + n_between(model)}]")
         returned = ", ".join(results)
-        lines.append(f"return ({returned},)" if always_tuple else f"return {returned}")
+        if always_tuple:
+            returned = f"({returned},)"
+        elif model.coordinates > 1 and function == "acceleration":
+            returned = f"vector({returned})"
+        lines.append(f"return {returned}")
         module.define(f"{function}{suffix}({arguments})", *lines)
 
 

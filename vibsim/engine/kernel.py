@@ -43,8 +43,17 @@ def compiled(function):
 called = entry = compiled
 """
 
+_ENTRY = """\
+@entry
+def kernel(
+    parameters, table, initial, dt, first, stop, steps, every, variant, end_rule, turn,
+    samples, stats, counts, kept, rows
+):
+    members, settings = (parameters, table, initial, dt), (steps, every, variant, end_rule, turn)
+    run(members, (first, stop), settings, (samples, stats, counts, kept), rows)"""
+"""What is called from outside, with `vibsim.engine.member_loop.run` or that of blocks."""
 _STEPPING = "f2 f2 f2 f1 i i i i i i f f3 f2 i2 f3 f1"
-"""Arguments of `vibsim.engine.member_loop.run`, as `vibsim.native.linking.link` has them."""
+"""Its arguments, as `vibsim.native.linking.link` has them."""
 _OBSERVING = "f2 f2 f1 i i f3 f3"
 """Arguments of `vibsim.engine.member_loop.observe`."""
 
@@ -93,9 +102,8 @@ def kernel(
 def observer(model: Model, formulas: tuple[Formula, ...], lane: str) -> Kernel:
     """Return the function that works out formulas of samples (`vibsim.engine.member_loop.observe`)."""
     count = model.coordinates
-    module = _module(lane, {"SYSTEM": count > 1})
-    if count > 1:
-        coordinates.put_moves(module, count)
+    module = _module(lane, {})
+    coordinates.put_moves(module, count)
     put = marked(model)
     results = {f"_value_{i}": put(formula) for i, formula in enumerate(formulas)}
     put_functions(module, model, "", {"observed": results}, always_tuple=True)
@@ -117,7 +125,7 @@ def source(
     states = carried(stepper, model) if count == 1 else 0
     parameters = n_parameters(stepper, model)
     with_peaks = with_peaks and with_gathered
-    settings = {
+    settings: dict[str, object] = {
         "GATHER": with_gathered,
         "D2T": with_gathered and stepper.own_velocity,
         "SERIES": with_gathered and with_series,
@@ -127,14 +135,12 @@ def source(
         "STAGED": bool(stages(stepper.step)),
         "EVENTS": model.events is not None,
         "LOCATED": stepper.events != "mesh",
-        "SYSTEM": count > 1,
-        "COORDINATES": count,
-        "STATES": states,
-        "SET": block_loop.set_of(states, with_peaks),
         "PARAMETERS": parameters,
-        **block_loop.row_numbers(states, parameters, with_peaks),
+        **block_loop.row_places(states, parameters, with_peaks),
         **gather.sample_rows(count),
     }
+    if count > 1:
+        settings["ZERO"] = coordinates.vector(*[0.0] * count)
     module = _module(lane, settings)
     again = lane != "blocks" and bool(settings["D2T"])
     with_work = bool(settings["WORK"])
@@ -143,18 +149,21 @@ def source(
     put_formulas(module, model, "", stepper, is_rare=rare, with_kinetic=again, with_work=with_work)
     if again:
         put_energy_with(module, model)
+    if lane != "blocks":
+        coordinates.put_moves(module, count)
+        coordinates.put_further(module, count)
     if count > 1:
-        coordinates.put_scheme(module, stepper, count)
+        coordinates.put_vectors(module, stepper, count)
+    if stepper.scaling is None:
+        collect(module, stepper.start, "start", {})
     else:
-        if stepper.scaling is None:
-            collect(module, stepper.start, "start", {})
-        else:
-            collect(module, stepper.start, "start_unscaled", {})
-            line = "return start_unscaled(variant, u, v * p[-1], dt, p)"
-            module.define("start(variant, u, v, dt, p)", line)
-        if model.events is not None:
-            _put_events(module, model, stepper)
-        collect(module, stepper.step, "step", {})
+        collect(module, stepper.start, "start_unscaled", {})
+        line = "return start_unscaled(variant, u, v * p[-1], dt, p)"
+        module.define("start(variant, u, v, dt, p)", line)
+    if model.events is not None:
+        _put_events(module, model, stepper)
+    collect(module, stepper.step, "step", {})
+    if "backward" not in module.parts:
         collect(module, stepper.backward, "backward", {})
     if lane == "blocks":
         put_formulas(module, model, "_fast", stepper, with_work=with_work)
@@ -168,7 +177,8 @@ def source(
         else:
             collect(module, stepper.step, "step_fast", renamed)
         rows.put_rows(module, states, parameters, settings)
-    collect(module, block_loop.run if lane == "blocks" else member_loop.run, "kernel", {})
+    collect(module, block_loop.run if lane == "blocks" else member_loop.run, "run", {})
+    module.put("kernel", _ENTRY)
     return module.text
 
 
@@ -202,7 +212,7 @@ def _module(lane: str, settings: Mapping[str, object]) -> Module:
 
 def _in_lane(text: str, lane: str, kinds: str) -> Kernel:
     if lane == "plain":
-        namespace: dict[str, Any] = {"divided": divided}
+        namespace: dict[str, Any] = {"divided": divided, "vector": coordinates.vector}
         exec(compile(with_quotients(_PLAIN + text), "<kernel>", "exec"), namespace)
         plain: Kernel = namespace["kernel"]
         return plain

@@ -18,11 +18,11 @@ Settings:
 ``STAGED``              a step is cut into stages (`vibsim.engine.stages`)
 ``EVENTS``              the model has events (`vibsim.engine.events`)
 ``LOCATED``             they are found within the step, not noticed at the grid point behind
-``SYSTEM``              there are several coordinates, ``COORDINATES``: a position and a velocity are then tuples
-``STATES, PARAMETERS``  entries of the scheme's state, and of the parameters
+``PARAMETERS``          the number of parameters
 ======================  ===============================================================================================
 
-Functions; u, v, t and p are position, velocity, time and parameters of a member:
+Functions; u, v, t and p are position, velocity, time and parameters of a member. Of several coordinates position and
+velocity are vectors (`vibsim.engine.coordinates`); q and w are either:
 
 ==============================================================  =======================================================
 ``start, step, backward``                                       those of `vibsim.schemes.base.Stepper`
@@ -35,10 +35,14 @@ Functions; u, v, t and p are position, velocity, time and parameters of a member
 ``parameters_of(parameters, table, case)``                      the parameters of a member, and the table of the model
 ``initial_of(values, k)``, ``point_of(values, case, k)``        all positions and all velocities, at the start or of
                                                                 sample k
-``size_of(u, v)``                                               the sum of the absolute values of all of them
+``put_moving(samples, case, k, q, w)``                          writes them
+``put_components(samples, first, case, k, w)``                  writes one of them into rows from ``first`` on
+``first_of(q)``                                                 that of the first coordinate
+``size_of(q, w)``                                               the sum of the absolute values of all of them
 ``first_further, next_further, note_further``                   `vibsim.engine.gather` for coordinates behind the first
 ``parameters_in, states_in, extrema_in``                        tuples in the rows of a lane (`vibsim.engine.rows`)
 ``put_states, put_extrema``                                     write them
+``vector(*numbers)``                                            a vector
 ``total(state)``                                                the sum of a state, NaN where an entry is
 ``drive, limit, impact_of``                                     the formulas of `vibsim.models.events`
 ``mode_of(p)``, ``start_of(p)``, ``with_mode(p, mode, start)``  mode of a member, and when its scheme has last started

@@ -33,114 +33,78 @@ from vibsim.engine.gather import (
     note_events,
     note_extrema,
 )
-from vibsim.engine.kernel_stubs import unbound
+from vibsim.engine.kernel_stubs import P, unbound
 
 # bound by the kernel (`vibsim.engine.kernel_stubs`)
-D2T = EVENTS = GATHER = KEEP = SERIES = STAGGERED = SYSTEM = WORK = True
-COORDINATES = 1
-backward = energies = energy_with = first_further = initial_of = mode_of = next_further = unbound
-note_further = observed = parameters_of = point_of = powers = size_of = start = step = unbound
+D2T = EVENTS = GATHER = KEEP = SERIES = STAGGERED = WORK = True
+backward = energies = energy_with = first_further = first_of = initial_of = mode_of = unbound
+next_further = note_further = observed = parameters_of = point_of = powers = unbound
+put_components = put_moving = size_of = start = step = unbound
 
 
-def run(
-    parameters: Any,
-    table: Any,
-    initial: Any,
-    dt: Any,
-    first: int,
-    stop: int,
-    steps: int,
-    every: int,
-    variant: int,
-    end_rule: int,
-    turn: float,
-    samples: Any,
-    stats: Any,
-    counts: Any,
-    kept: Any,
-    rows: Any,
-) -> None:
-    """Step members first..stop-1 of one scheme, and fill `samples`, `stats` and `counts`.
+def run(members: Any, span: Any, settings: Any, found: Any, rows: Any) -> None:
+    """Step some members of one scheme, and fill what is found.
 
     Parameters
     ----------
-    parameters, initial, dt
-        Shapes (case, n_parameters), (case, state) with positions and then velocities, and (case,).
-    table
-        What formulas look up (`vibsim.models.table`), shape (row, point); empty where they do not.
-    steps, every
-        Number of steps; a sample is stored at each multiple of `every`, which divides `steps`.
-    variant
-        Which of its starts the scheme takes.
-    end_rule
-        Velocity at the last point: index into `vibsim.schemes.base.END_RULES`.
-    turn
-        Angle of a whole turn; 0 where the position is no angle.
-    samples
-        Shape (rows, case, n_samples), filled with NaN: positions, velocities, and the rows of `vibsim.engine.gather`.
-    stats
-        Shape (case, `N_STATS`), filled with NaN: columns of `vibsim.engine.gather`.
-    counts
-        Shape (case, `N_COUNTS`), filled with zeros: columns of `vibsim.engine.gather`, and behind them those of
+    members
+        ``parameters``, shape (case, n_parameters). ``table``, shape (row, point), empty where no formula looks anything
+        up (`vibsim.models.table`). ``initial``, shape (case, state): positions, then velocities. ``dt``, shape (case,).
+    span
+        The first member, and the one behind the last.
+    settings
+        ``steps, every``: number of steps; a sample is stored at each multiple of `every`, which divides `steps`.
+        ``variant``: which of its starts the scheme takes. ``end_rule``: velocity at the last point, index into
+        `vibsim.schemes.base.END_RULES`. ``turn``: angle of a whole turn; 0 where the position is no angle.
+    found
+        ``samples``, shape (rows, case, n_samples), filled with NaN: positions, velocities, and the rows of
+        `vibsim.engine.gather`. ``stats``, shape (case, `N_STATS`), filled with NaN: columns of `vibsim.engine.gather`.
+        ``counts``, shape (case, `N_COUNTS`), filled with zeros: columns of `vibsim.engine.gather`, and behind them
+        those of `vibsim.engine.extrema`. ``kept``, shape (`N_KEPT`, case, extremum), filled with NaN: rows of
         `vibsim.engine.extrema`.
-    kept
-        Shape (`N_KEPT`, case, extremum), filled with NaN: rows of `vibsim.engine.extrema`.
     rows
         Scratch of `vibsim.engine.block_loop`, which this loop does without.
     """
-    # positions q and velocities w are tuples for several coordinates; u and v are those of the first one
+    parameters, table, initial, dt = members
+    first, stop = span
+    steps, every, variant, end_rule, turn = settings
+    samples, stats, counts, kept = found
     for case in range(first, stop):
         h = float(dt[case])
         p = parameters_of(parameters, table, case)
-        if SYSTEM:
-            q, w = initial_of(initial, case)
-            u, v = q[0], w[0]
-            further = first_further(q, w)
-            for i in range(COORDINATES):
-                samples[i, case, 0] = q[i]
-                samples[COORDINATES + i, case, 0] = w[i]
-        else:
-            q = u = float(initial[case, 0])
-            w = v = float(initial[case, 1])
-            samples[0, case, 0] = u
-            samples[1, case, 0] = v
+        # positions and velocities are vectors for several coordinates; u and v are those of the first one
+        q, w = initial_of(initial, case)
+        u, v = first_of(q), first_of(w)
+        if EVENTS:
+            p = begun(stats, case, u, v, p)
+            last_event = -1
         energy_0 = 0.0
         if GATHER:
             kinetic, potential = energies(q, w, 0.0, p)
             energy_0 = kinetic + potential
+        work = first_work(q, w, p)
+        if D2T:
+            # deviation of the energy by the centred difference: at this point, and the largest one before it
+            pending = largest_d2t = 0.0
+        put_moving(samples, case, 0, q, w)
         if SERIES:
             samples[RUNNING_ROW, case, 0] = 0.0
         if WORK:
-            if EVENTS:
-                dissipated = driven = 0.0
-                samples[LOST_ROW, case, 0] = 0.0
-            else:
-                dissipated, driven = powers(q, w, 0.0, p)
-            samples[DISSIPATED_ROW, case, 0] = dissipated
-            samples[DRIVEN_ROW, case, 0] = driven
-        extrema = first_extrema(u, v)
-        bottom = bottom_of(u, turn)
-        if EVENTS:
-            p = begun(stats, case, u, v, p)
-            last_event = -1
-        state = start(variant, q, w, h, p)
+            put_work(samples, stats, case, 0, work)
+        extrema, further = first_extrema(u, v), first_further(q, w)
         interior = 0.0
+        bottom = bottom_of(u, turn)
+        state = start(variant, q, w, h, p)
         good = 0
         sample = 1
         due = every
-        q_before, w_before, slope = q, w, v
+        u_before, q_before, w_before, slope = u, q, w, v
         if STAGGERED:
             slope = math.nan
-        if D2T:
-            rate = 0.5 / h
-            pending = largest_d2t = 0.0
-        if KEEP:
-            u_before = u
         for n in range(1, steps + 1):
             t = n * h
-            if KEEP:
-                u_two_before = u_before
-            u_before, q_before, w_two_before, w_before = u, q, w_before, w
+            u_two_before, u_before, q_before = u_before, u, q
+            w_two_before, w_before = w_before, w
             if EVENTS:
                 record = stats, counts, case
                 q, following, own, p, passes = passed(record, variant, n, h, q, w_before, state, p)
@@ -156,21 +120,15 @@ def run(
                 if n - last_event < 2 or mode_of(p) == 0.0:
                     w = own
             state = following
-            # the scheme's own velocity: an end formula would move a peak in the last step
-            if SYSTEM:
-                size, u, v, own_first = size_of(q, w), q[0], w[0], own[0]  # type: ignore[index]
-            else:
-                size, u, v, own_first = abs(q) + abs(w), q, w, own
             # written so that NaN fails as well
-            if not size < OVERFLOW:
+            if not size_of(q, w) < OVERFLOW:
                 break
             good = n
-            slope_before, slope = slope, own_first
+            u, v = first_of(q), first_of(w)
+            # the scheme's own velocity: an end formula would move a peak in the last step
+            slope_before, slope = slope, first_of(own)
             if STAGGERED:
-                if SYSTEM:  # noqa: SIM108
-                    slope = (following[0][0] - u_before) * (0.5 / h)
-                else:
-                    slope = (following[0] - u_before) * (0.5 / h)
+                slope = (first_of(following[0]) - u_before) * (0.5 / h)
             if EVENTS:  # noqa: SIM102
                 # events have noted themselves whether they are peaks, also one at rest on the point before
                 if n == last_event or (n - 1 == last_event and slope_before == 0.0):
@@ -179,59 +137,66 @@ def run(
                 kinetic, potential = energies(q, w, t, p)
                 interior = extrema[LARGEST_DEVIATION]
                 extrema = next_extrema(extrema, u, v, (kinetic + potential) - energy_0)
-                if SYSTEM:
-                    further = next_further(further, q, w)
+                further = next_further(further, q, w)
                 if is_event(turn, bottom, slope_before, u, slope):
                     points = (t, h, u_before, slope_before, u, slope)
                     bottom = note_events(stats, counts, case, turn, bottom, points)
             if WORK:
-                if EVENTS:
-                    driven = stats[case, DONE]
-                else:
-                    taken, put = powers(q, w, t, p)
-                    dissipated += taken
-                    driven += put
+                work = next_work(work, stats, case, (q, w, t, p))
             if D2T:
                 # that of the point before counts now that this one is sound, since it rests on it
                 largest_d2t = larger(pending, largest_d2t)
-                velocity_d2t = centred_difference(following[0], q_before, rate)
+                velocity_d2t = centred_difference(following[0], q_before, 0.5 / h)
                 pending = abs(energy_with(q, velocity_d2t, t, p, potential) - energy_0)
             if KEEP:  # noqa: SIM102
                 if is_turned(u_two_before, u_before, u):
                     note_turned(kept, counts, case, n - 1, h, u_two_before, u_before, u)
             if n == due:
-                if SYSTEM:
-                    for i in range(COORDINATES):
-                        samples[i, case, sample] = q[i]
-                        samples[COORDINATES + i, case, sample] = w[i]
-                else:
-                    samples[0, case, sample] = u
-                    samples[1, case, sample] = v
+                put_moving(samples, case, sample, q, w)
                 if SERIES:
                     samples[RUNNING_ROW, case, sample] = extrema[LARGEST_DEVIATION]
                     if D2T:
-                        if SYSTEM:
-                            for i in range(COORDINATES):
-                                samples[VELOCITY_D2T_ROW + i, case, sample] = velocity_d2t[i]
-                        else:
-                            samples[VELOCITY_D2T_ROW, case, sample] = velocity_d2t
+                        put_components(samples, VELOCITY_D2T_ROW, case, sample, velocity_d2t)
                         samples[RUNNING_D2T_ROW, case, sample] = larger(pending, largest_d2t)
                     if WORK:
-                        samples[DISSIPATED_ROW, case, sample] = dissipated
-                        samples[DRIVEN_ROW, case, sample] = driven
-                        if EVENTS:
-                            samples[LOST_ROW, case, sample] = stats[case, LOST]
+                        put_work(samples, stats, case, sample, work)
                 sample += 1
                 due += every
         if GATHER:
             # of a member that failed, all points came before the last one
             interior = interior if good == steps else extrema[LARGEST_DEVIATION]
             note_extrema(stats, case, 0, extrema, interior)
-            if SYSTEM:
-                note_further(stats, case, further)
+            note_further(stats, case, further)
         if D2T:
             note_d2t(stats, samples, case, good, every, largest_d2t)
         counts[case, LAST_STEP] = good
+
+
+def first_work(q: Any, w: Any, p: P) -> tuple[float, float]:
+    """Return the powers of damping and of driving forces at t = 0; with events, their work so far."""
+    work = 0.0, 0.0
+    if WORK:
+        if EVENTS:
+            return work
+        work = powers(q, w, 0.0, p)
+    return work
+
+
+def next_work(work: tuple[float, float], stats: Any, case: int, point: Any) -> tuple[float, float]:
+    """Return the sums of the powers after one more point: position, velocity, time and parameters."""
+    if EVENTS:
+        return work[0], stats[case, DONE]
+    q, w, t, p = point
+    dissipated, driven = powers(q, w, t, p)
+    return work[0] + dissipated, work[1] + driven
+
+
+def put_work(samples: Any, stats: Any, case: int, k: int, work: tuple[float, float]) -> None:
+    """Write the work of sample k."""
+    samples[DISSIPATED_ROW, case, k] = work[0]
+    samples[DRIVEN_ROW, case, k] = work[1]
+    if EVENTS:
+        samples[LOST_ROW, case, k] = stats[case, LOST]
 
 
 def observe(
@@ -256,11 +221,7 @@ def observe(
         case = first + member
         p = parameters_of(parameters, table, case)
         for k in range(found.shape[2]):
-            if SYSTEM:
-                u, v = point_of(samples, case, k)
-            else:
-                u = float(samples[0, case, k])
-                v = float(samples[1, case, k])
+            u, v = point_of(samples, case, k)
             values = observed(u, v, (k * every) * float(dt[case]), p)
             for i in range(found.shape[0]):
                 found[i, member, k] = values[i]

@@ -5,20 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import deepcopy
 
-from vibsim.engine import block_loop, gather
+from vibsim.engine import gather
+from vibsim.engine.block_loop import LANES
 from vibsim.engine.stages import kept_names, stages
 from vibsim.engine.text import Module, enter
 from vibsim.schemes.base import Stepper
 
 
-def put_rows(module: Module, states: int, parameters: int, numbers: Mapping[str, object]) -> None:
-    """Write the functions that move tuples; `numbers` has those of the rows."""
+def put_rows(module: Module, states: int, parameters: int, begin: Mapping[str, object]) -> None:
+    """Write the functions that move tuples; `begin` says where rows begin."""
     for name, argument, first, count in (
         ("states", "first, ", "first", states),
-        ("extrema", "", numbers["EXTREMA"], gather.N_EXTREMA),
-        ("parameters", "", numbers["FIRST_PARAMETER"], parameters),
+        ("extrema", "", begin["EXTREMA"], gather.N_EXTREMA),
+        ("parameters", "", begin["FIRST_PARAMETER"], parameters),
     ):
-        places = [f"rows[({first} + {i}) * {block_loop.LANES} + j]" for i in range(count)]
+        places = [f"rows[{first} + {i * LANES} + j]" for i in range(count)]
         module.define(f"{name}_in(rows, {argument}j)", f"return ({', '.join(places) or '0.0'},)")
         if name != "parameters":
             lines = (f"{place} = values[{i}]" for i, place in enumerate(places))
@@ -27,11 +28,11 @@ def put_rows(module: Module, states: int, parameters: int, numbers: Mapping[str,
 
 
 def put_stages(
-    module: Module, stepper: Stepper, renamed: Mapping[str, str], numbers: Mapping[str, object]
+    module: Module, stepper: Stepper, renamed: Mapping[str, str], begin: Mapping[str, object]
 ) -> None:
     """Write the stages of a step as functions, and the loops over lanes that take all but the last."""
     places = {
-        name: f"rows[({numbers['FIRST_KEPT']} + {i}) * {block_loop.LANES} + j]"
+        name: f"rows[{begin['FIRST_KEPT']} + {i * LANES} + j]"
         for i, name in enumerate(kept_names(stepper.step))
     }
     lines = ["def stages_of(rows, old, filled, n):"]
@@ -41,7 +42,7 @@ def put_stages(
         kept = "".join(f"{places[name]}, " for name in part.before)
         lines += [
             "    for j in range(filled):",
-            f"        h = rows[{numbers['DT']} * {block_loop.LANES} + j]",
+            f"        h = rows[{begin['DT']} + j]",
             f"        p_{i}, state_{i} = parameters_in(rows, j), states_in(rows, old, j)",
             f"        values_{i} = stage_{i}(state_{i}, n * h, h, p_{i}, ({kept}))",
             *(f"        {places[name]} = values_{i}[{k}]" for k, name in enumerate(part.after)),

@@ -173,9 +173,9 @@ class _Settled(ast.NodeTransformer):
         return (node.body if answer else node.orelse) or None
 
 
-def divided(a: float, b: float) -> float:
-    """Return a/b as IEEE 754 has it, where Python raises at b = 0."""
-    if b != 0.0:
+def divided(a: Any, b: Any) -> Any:
+    """Return a/b as IEEE 754 has it, where Python raises at b = 0; of a vector a, too."""
+    if b != 0.0 or isinstance(a, tuple):
         return a / b
     return (
         math.nan

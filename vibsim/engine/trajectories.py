@@ -105,8 +105,8 @@ def integrate(
     scratch = 0
     if lane == "blocks":
         states, n_kept = carried(stepper, model), len(kept_names(stepper.step))
-        number_of = block_loop.row_numbers(states, parameters.shape[1], n_extrema > 0)
-        scratch = (number_of["FIRST_KEPT"] + n_kept) * block_loop.LANES
+        places = block_loop.row_places(states, parameters.shape[1], n_extrema > 0)
+        scratch = places["FIRST_KEPT"] + n_kept * block_loop.LANES
     settings = steps, every, stepper.variant, END_RULES.index(stepper.end), model.turn or 0.0
 
     def task(first: int) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from typing import Any, TypeVar
 
 from vibsim.core.errors import Fault, InputError
@@ -11,6 +10,7 @@ from vibsim.experiment.data import AnyExperiment, SchemeSpec, Sweep
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules import size_limits
 from vibsim.experiment.rules.checks import check_published, finish_checks
+from vibsim.experiment.rules.levels import rising_levels
 from vibsim.experiment.rules.members import update_tables
 from vibsim.experiment.schema.checks import (
     Check,
@@ -19,10 +19,12 @@ from vibsim.experiment.schema.checks import (
     PublishedAt,
     ValueCheck,
 )
-from vibsim.experiment.schema.fields import MAX_LEVEL, FrozenDict
+from vibsim.experiment.schema.document import Levels
+from vibsim.experiment.schema.fields import FrozenDict
 from vibsim.experiment.schema.published import PublishedTable, claims
 from vibsim.experiment.schema.sweep import as_option
 from vibsim.experiment.sweep_columns import columns
+from vibsim.experiment.validation import read_value
 from vibsim.experiment.yaml.parse import Source
 
 AnyAt = TypeVar("AnyAt", bound=PublishedAt)
@@ -118,17 +120,16 @@ def with_levels(experiment: AnyExperiment, levels: Sequence[int]) -> AnyExperime
     Raises
     ------
     InputError
-        Where what they ask for cannot be run, or a check names a time that they do not store.
-    ValueError
-        Where they are no levels: none at all, not increasing, or out of range.
+        Where they are no levels (none at all, not increasing, or out of range), what they ask for cannot be run, or a
+        check names a time that they do not store.
     """
-    rises = all(low < high for low, high in pairwise(levels))
-    if not levels or not rises or not 0 <= levels[0] <= levels[-1] <= MAX_LEVEL:
-        raise ValueError(f"{list(levels)} are not levels from 0 to {MAX_LEVEL} in increasing order")
+    report = Report(Source(str(experiment.file or experiment.name), {}))
+    rising = rising_levels(read_value(("levels",), list(levels), Levels, report), report)
+    report.raise_any()
     setting = size_limits.Setting(
         model=experiment.model.definition,
         time=experiment.time,
-        levels=tuple(levels),
+        levels=rising,
         schemes=experiment.schemes,
         names=tuple(scheme.name for scheme in experiment.schemes),
         sweep=experiment.sweep or Sweep(axes=()),
@@ -142,7 +143,6 @@ def with_levels(experiment: AnyExperiment, levels: Sequence[int]) -> AnyExperime
         else check
         for check in experiment.written
     ]
-    report = Report(Source(str(experiment.file or experiment.name), {}))
     size_limits.check(setting, report)
     finish_checks(written, setting, report)
     check_published(experiment.published, (), setting, report)

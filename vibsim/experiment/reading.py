@@ -5,23 +5,23 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
-from itertools import pairwise
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
 from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.experiment.collection import collection_of
-from vibsim.experiment.data import AnyExperiment, ModelSpec, Sweep
+from vibsim.experiment.data import AnyExperiment, ModelSpec
 from vibsim.experiment.faults import MISSING, Report, shorten
 from vibsim.experiment.rules import members, size_limits, timing
 from vibsim.experiment.rules import schemes as scheme_rules
 from vibsim.experiment.rules.checks import check_published, finish_checks
+from vibsim.experiment.rules.levels import rising_levels
 from vibsim.experiment.rules.model import equation as read_equation
 from vibsim.experiment.rules.scaling import Numbers, characteristic
 from vibsim.experiment.rules.sweep import read_sweep
-from vibsim.experiment.schema.checks import ConvergesCheck
-from vibsim.experiment.schema.document import Document, Every, LevelRange
+from vibsim.experiment.schema.checks import Check, ConvergesCheck
+from vibsim.experiment.schema.document import Document, Every
 from vibsim.experiment.schema.fields import IDENTIFIER
 from vibsim.experiment.schema.model_and_schemes import scheme_names
 from vibsim.experiment.schema.published import claims
@@ -99,15 +99,8 @@ def build(
     knows_schemes = scheme_rules.are_known(document.schemes)
     time = timing.time_spec(document.time, model, parameters, report)
     initial = _initial(document.initial, model or of_kind, parameters, report)
-    sweep, is_whole = Sweep(axes=()), True
-    if document.sweep is not None:
-        order = list(source.data["sweep"])
-        sweep, is_whole = read_sweep(document, order, model, schemes, not knows_schemes, report)
-    # something of it may be malformed and was left out
-    is_wellformed = not any(path[:1] == ("sweep",) for path in report.faulty)
-    if document.sweep is not None and is_whole and is_wellformed and not sweep.axes:
-        report.add(("sweep",), "must not be empty")
-    is_whole = is_whole and is_wellformed
+    order = source.data.get("sweep")
+    sweep, is_whole = read_sweep(document, order, model, schemes, not knows_schemes, report)
     if time is not None and is_whole and model is not None and parameters:
         of_members = members.MemberNumbers(model, parameters, time, sweep.axes)
         for table in equation.tables:
@@ -130,12 +123,7 @@ def build(
     )
     size_limits.check(setting, report)
     _check_output(document, model, levels, report)
-    checks = document.checks
-    if not checks and not document.published and model is not None:
-        checks = [ConvergesCheck(converges=position) for position in model.positions]
-    given_ids = [check.id if check is not None else "" for check in document.checks]
-    checks = finish_checks(checks, setting, report)
-    check_published(document.published, given_ids, setting, report)
+    checks = _checks(document, setting, report)
     report.raise_any()
     assert model is not None
     assert numbers.time is not None
@@ -159,7 +147,7 @@ def build(
         samples=setting.samples,
         output=document.output,
         tolerance=document.tolerance,
-        checks=(*checks, *claims(document.published, document.source)),
+        checks=checks,
         published=document.published,
         units=document.units,
         scaling=numbers.scaling,
@@ -193,18 +181,7 @@ def _levels(document: Any, source: Source, report: Report) -> tuple[int, ...]:
         report.add(("levels",), MISSING, "or tolerance")
     elif len(given) > 1:
         report.add(("tolerance",), "must not be given together with levels", at_key=True)
-    section = document.levels
-    if isinstance(section, LevelRange):
-        if section.from_ > section.to:
-            report.add(("levels", "to"), f"must be at least 'from', which is {section.from_}")
-        return tuple(range(section.from_, section.to + 1))
-    levels: tuple[int, ...] = section or ()
-    falling = [i for i, (low, high) in enumerate(pairwise(levels), 1) if low >= high]
-    for i in falling:
-        is_same = levels[i] == levels[i - 1]
-        word = "must not be repeated" if is_same else "must be in increasing order"
-        report.add(("levels", i), f"levels {word}", value=levels[i])
-    return () if falling else levels
+    return rising_levels(document.levels, report)
 
 
 def _initial(
@@ -234,6 +211,18 @@ def _initial(
             report.add(("initial", name), rule)
         found[name] = float(value)
     return found
+
+
+def _checks(document: Any, setting: size_limits.Setting, report: Report) -> tuple[Check, ...]:
+    """Return the checks of a file, or those of one that has none, and the claims of its printed tables."""
+    given, model = document.checks, setting.model
+    if not given and not document.published and model is not None:
+        given = [ConvergesCheck(converges=position) for position in model.positions]
+    checks = finish_checks(given, setting, report)
+    ids = [check.id if check is not None else "" for check in document.checks]
+    check_published(document.published, ids, setting, report)
+    rows = [] if report.faults else claims(document.published, document.source)
+    return (*checks, *rows)
 
 
 def _check_output(

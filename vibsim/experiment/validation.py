@@ -42,6 +42,13 @@ def read_document(source: Source, report: Report) -> Any:
     return _Reader(source, report, units).section((), data, Document)
 
 
+def read_value(path: Path_, written: Any, annotation: Any, report: Report) -> Any:
+    """Return a value that stands in no file, and note its faults; None where it has any."""
+    reader = _Reader(report.source, report, Units({}, report))
+    found = reader.value(path, written, _Form(annotation), keeps_rest=False)
+    return None if found is _FAULTY else found
+
+
 class _Reader:
     def __init__(self, source: Source, report: Report, units: Units) -> None:
         self.source, self.report, self.units = source, report, units

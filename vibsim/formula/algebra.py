@@ -53,6 +53,9 @@ def minus(left: Expression, right: Expression) -> Expression:
     return Negate(right) if left == ZERO else Binary("-", left, right)
 
 
+_OPERATIONS = {"+": plus, "-": minus, "*": times, "/": over}
+
+
 @cache
 def _pattern(text: str, names: tuple[str, ...]) -> Expression:
     return parse(text, names)
@@ -71,11 +74,10 @@ def tidied(node: Expression) -> Expression:
 
     Raises `ExpressionError` where numbers alone have no value: 1/0.
     """
-    operations = {"+": plus, "-": minus, "*": times, "/": over}
 
     def tidy(part: Expression) -> Expression:
-        if isinstance(part, Binary) and part.operator in operations:
-            part = operations[part.operator](part.left, part.right)
+        if isinstance(part, Binary) and part.operator in _OPERATIONS:
+            part = _OPERATIONS[part.operator](part.left, part.right)
         if names_in(part) or isinstance(part, Number):
             return part
         return number(evaluate(part, {}))
@@ -139,14 +141,9 @@ def slope_of(node: Expression, name: str, *, with_start: bool = True) -> Express
             found = inner(right)
             return Negate(found) if found is not None and symbol == "-" else found
         case Binary("*", left, right) if name not in names_in(left):
-            return _scaled(left, inner(right))
-        case Binary("*", left, right) if name not in names_in(right) and not with_start:
-            return _scaled(right, inner(left))
+            found = inner(right)
+            return None if found is None else times(left, found)
         case Binary("*" | "/" as symbol, left, right) if name not in names_in(right):
             found = inner(left)
-            return None if found is None else Binary(symbol, found, right)
+            return None if found is None else _OPERATIONS[symbol](found, right)
     return None
-
-
-def _scaled(factor: Expression, found: Expression | None) -> Expression | None:
-    return factor if found == ONE else None if found is None else Binary("*", factor, found)

@@ -14,15 +14,20 @@ from typing import Any
 import numpy as np
 
 from vibsim.core.array_types import Floats
-from vibsim.formula.tree import Binary, Call, Compare, Expression, Name, Negate, Number, literal
+from vibsim.formula.tree import (
+    FUNCTIONS,
+    OPERATORS,
+    Binary,
+    Call,
+    Compare,
+    Expression,
+    Name,
+    Negate,
+    Number,
+    literal,
+)
 
 Interval = tuple[Floats, Floats]
-
-_OPERATORS: Mapping[str, Callable[..., Any]] = {
-    **{"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "**": np.power},
-    **{"<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal},
-    **{"==": np.equal, "!=": np.not_equal},
-}
 
 
 def _by_scipy(name: str) -> Callable[..., Any]:
@@ -30,18 +35,12 @@ def _by_scipy(name: str) -> Callable[..., Any]:
     return lambda x: getattr(import_module("scipy.special"), name)(x)
 
 
-_SAME_NAME = (
-    *("abs", "cbrt", "ceil", "cos", "cosh", "exp", "expm1", "floor", "hypot", "log", "log10"),
-    *("log1p", "log2", "mod", "sign", "sin", "sinh", "sqrt", "tan", "tanh"),
-)
 _FUNCTIONS: Mapping[str, Callable[..., Any]] = {
-    **{f"a{name}": getattr(np, f"arc{name}") for name in ("cos", "cosh", "sin", "sinh")},
-    **{f"a{name}": getattr(np, f"arc{name}") for name in ("tan", "tan2", "tanh")},
+    **{name: getattr(np, name) for name in FUNCTIONS if hasattr(np, name)},
     **{"erf": _by_scipy("erf"), "erfc": _by_scipy("erfc")},
     **{"max": np.maximum, "min": np.minimum, "round": np.rint},
     "heaviside": lambda x: np.heaviside(x, 0.5),
     "where": lambda condition, yes, no: np.where(condition != 0.0, yes, no),
-    **{name: getattr(np, name) for name in _SAME_NAME},
 }
 FALLING = frozenset(("acos", "erfc"))
 EVEN = frozenset(("abs", "cosh"))
@@ -70,8 +69,10 @@ def _values(node: Expression, numbers: Mapping[str, Any]) -> Any:
             return np.asarray(numbers[name], dtype=np.float64)
         case Negate(operand):
             return np.negative(_values(operand, numbers))
+        case Binary("**", base, exponent):
+            return np.power(_values(base, numbers), _values(exponent, numbers))
         case Binary(symbol, left, right) | Compare(symbol, left, right):
-            found = _OPERATORS[symbol](_values(left, numbers), _values(right, numbers))
+            found = OPERATORS[symbol](_values(left, numbers), _values(right, numbers))
             return found if isinstance(node, Binary) else np.where(found, 1.0, 0.0)
         case Call(function, arguments):
             return _FUNCTIONS[function](*(_values(argument, numbers) for argument in arguments))
@@ -111,7 +112,7 @@ def _bounds(node: Expression, numbers: Mapping[str, Any]) -> Interval:
             ends = _bounds(left, numbers), _bounds(right, numbers)
             if symbol in "*/":
                 return _known(*(_times(*ends) if symbol == "*" else _over(*ends)))
-            return _known(*_corners(_OPERATORS[symbol], *ends))
+            return _known(*_corners(OPERATORS[symbol], *ends))
         case Compare(symbol, left, right):
             return _compared(symbol, _bounds(left, numbers), _bounds(right, numbers))
         case Call(function, arguments):

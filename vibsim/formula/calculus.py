@@ -17,6 +17,7 @@ from functools import partial, reduce
 import numpy as np
 
 from vibsim.formula.algebra import filled, minus, plus, slope_of, times
+from vibsim.formula.arrays import values
 from vibsim.formula.parser import ExpressionError
 from vibsim.formula.tree import (
     ONE,
@@ -251,25 +252,28 @@ def _found(node: Expression, name: str) -> Expression | None:
             # e**x
             return _found(filled("exp(log(base)*x)", base=base, x=exponent), name)
         case Call(function, (x,)) if function in SMOOTH:
-            return _joined("/", filled(SMOOTH[function], x=x), slope_of(x, name, with_start=False))
+            slope = slope_of(x, name, with_start=False)
+            return _over_slope(filled(SMOOTH[function], x=x), slope, node, name)
         case Call(function, (x,)) if function in BROKEN:
-            return _of_linear(BROKEN[function], x, name)
+            return _of_linear(BROKEN[function], x, node, name)
         case Call("mod", (x, period)) if is_free(period):
-            return _of_linear(MOD, x, name, period=period)
+            return _of_linear(MOD, x, node, name, period=period)
         case Call("max" | "min" as function, (left, right)) if differ(left, right):
             # max(a, b) = b + max(a - b, 0), min(a, b) = a - max(a - b, 0)
             base, symbol = (right, "+") if function == "max" else (left, "-")
-            above = _of_linear("0.5*x*max(x, 0)", Binary("-", left, right), name)
+            difference = Binary("-", left, right)
+            ramp = filled(RAMP, x=difference)
+            above = _of_linear("0.5*x*max(x, 0)", difference, ramp, name)
             return _joined(symbol, _found(base, name), above)
         case Compare("<" | "<=", left, right) if differ(left, right):
-            return _of_linear(RAMP, Binary("-", right, left), name)
+            return _of_linear(RAMP, Binary("-", right, left), node, name)
         case Compare(">" | ">=", left, right) if differ(left, right):
-            return _of_linear(RAMP, Binary("-", left, right), name)
+            return _of_linear(RAMP, Binary("-", left, right), node, name)
         case Binary("**", Call("max", (x, Number(0.0))), exponent):
             more = (literal(exponent) or -1.0) + 1.0
             if more <= 1.0:
                 return None
-            return _of_linear("max(x, 0)**n/n", x, name, n=Number(more))
+            return _of_linear("max(x, 0)**n/n", x, node, name, n=Number(more))
         case Call("where", (condition, yes, no)) if is_free(condition):
             first, second = _found(yes, name), _found(no, name)
             if first is None or second is None:
@@ -303,9 +307,10 @@ def _of_part(node: Expression, condition: Expression, side: float, name: str) ->
         case _:
             return None
     inside = sum(isinstance(part, Compare | Call) for part in walk(node))
-    slope = literal(slope_of(difference, name) or ZERO)
+    rate = slope_of(difference, name) or ZERO
+    slope = math.nan if names_in(rate) else float(values(rate, {}))
     whole = _found(node, name) if inside <= MAX_CONDITIONS else None
-    if not slope or whole is None:
+    if slope == 0.0 or not math.isfinite(slope) or whole is None:
         return None
     place = Binary("/", Negate(put(difference, name, ZERO)), number(slope))
     function = "max" if slope * side > 0.0 else "min"
@@ -313,14 +318,28 @@ def _of_part(node: Expression, condition: Expression, side: float, name: str) ->
     return Binary("-", *ends)
 
 
-def _of_linear(text: str, x: Expression, name: str, **more: Expression) -> Expression | None:
-    """Return the integral of a function of ``a x + b`` whose antiderivative is given; None for other arguments."""
+def _of_linear(
+    text: str, x: Expression, node: Expression, name: str, **more: Expression
+) -> Expression | None:
+    """Return the integral of a function `node` of ``a x + b``, from an antiderivative; None for other arguments."""
     found = filled(text, x=x, **more)
-    factor = slope_of(x, name, with_start=False)
-    if factor is None:
-        factor = slope_of(x, name)
+    slope = slope_of(x, name, with_start=False)
+    if slope is None:
+        slope = slope_of(x, name)
         found = Binary("-", found, filled(text, x=put(x, name, ZERO), **more))
-    return _joined("/", found, factor)
+    return _over_slope(found, slope, node, name)
+
+
+def _over_slope(
+    found: Expression, slope: Expression | None, node: Expression, name: str
+) -> Expression | None:
+    """Return an antiderivative by ``a x + b`` over the slope a; where that is 0, `node` is a constant."""
+    if slope is None:
+        return None
+    quotient, constant = Binary("/", found, slope), Binary("*", node, Name(name))
+    if names_in(slope):
+        return Call("where", (Compare("==", slope, ZERO), constant, quotient))
+    return quotient if values(slope, {}) != 0.0 else constant
 
 
 def _by_quadrature(node: Expression, name: str) -> Expression:

@@ -7,14 +7,14 @@ bits whether it was worked out here or in the engine.
 from __future__ import annotations
 
 import math
-import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from itertools import accumulate
 
 from vibsim.elementary import ELEMENTARY
 from vibsim.formula.parser import ExpressionError, parse
 from vibsim.formula.tree import (
     FUNCTIONS,
+    OPERATORS,
     Binary,
     Call,
     Compare,
@@ -27,12 +27,6 @@ from vibsim.formula.tree import (
 
 MAX_NESTING = 120
 """Parentheses in each other from which `to_statements` gives a part a name: Python reads 200, derivatives have more."""
-
-_OPERATORS: Mapping[str, Callable[[float, float], float]] = {
-    **{"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv},
-    **{"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge},
-    **{"==": operator.eq, "!=": operator.ne},
-}
 
 
 def constant(text: str) -> float:
@@ -79,7 +73,7 @@ def _value(node: Expression, values: Mapping[str, float]) -> float:
         case Binary("**", base, exponent):
             return _power(_value(base, values), _value(exponent, values), literal(exponent))
         case Binary(symbol, left, right) | Compare(symbol, left, right):
-            return float(_OPERATORS[symbol](_value(left, values), _value(right, values)))
+            return float(OPERATORS[symbol](_value(left, values), _value(right, values)))
         case Call("where", (condition, yes, no)):
             # the other one need not exist
             chosen = _value(condition, values)

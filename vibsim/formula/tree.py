@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
+from typing import Any
 
 from vibsim.elementary import ELEMENTARY
 
@@ -70,6 +72,12 @@ FUNCTIONS: Mapping[str, tuple[int, Callable[..., float]]] = {
     if name != "power"  # written ``**``
 }
 """Functions that a formula may call: number of arguments, and the value for constants."""
+OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
+    **{"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv},
+    **{"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge},
+    **{"==": operator.eq, "!=": operator.ne},
+}
+"""What operators do with floats and with arrays; a power is another one for each."""
 STEPS = frozenset({"ceil", "floor", "heaviside", "round", "sign"})
 """Functions that are constant but for jumps."""
 

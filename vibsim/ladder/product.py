@@ -44,7 +44,8 @@ def best(
     Raises
     ------
     VibsimError
-        Where no ladder reaches the tolerance: an `InputError` that names the least bound and what forbids less.
+        Where no ladder reaches the tolerance: an `InputError` that names the least bound and what forbids less. Where
+        `levels` break a rule for the levels of a file: an `InputError` too.
     """
     if levels is not None:
         experiment = experiment.with_levels(levels)

@@ -16,6 +16,7 @@ from llvmlite import ir
 from vibsim.native import operations
 from vibsim.native.inference import Inference, row_from
 from vibsim.native.kinds import (
+    FLOAT,
     TRUTH,
     WHOLE,
     Array,
@@ -118,14 +119,12 @@ class Expressions:
             case ast.BinOp(left=left, op=op, right=right):
                 one, other = self.value(left), self.value(right)
                 kind = operations.kind_of_binary(node, op, kind_of(one), kind_of(other))
-                numbers = cast(Number, one), cast(Number, other)
-                return Number(kind, operations.binary(self.builder, op, kind, *numbers))
+                return self._binary(op, kind, one, other)
             case ast.UnaryOp(op=ast.Not(), operand=operand):
                 return Number(TRUTH, self.builder.not_(self.truth(operand)))
-            case ast.UnaryOp(operand=operand):
-                number = self.number(operand)
-                kind = number.kind if number.kind != TRUTH else WHOLE
-                return Number(kind, operations.negated(self.builder, number))
+            case ast.UnaryOp(op=op, operand=operand):
+                given = self.value(operand)
+                return self._negated(given, operations.kind_of_unary(node, op, kind_of(given)))
             case ast.Compare(left=left, ops=ops, comparators=others):
                 sides = [self.number(part) for part in (left, *others)]
                 bits = map(partial(operations.compared, self.builder), ops, sides, sides[1:])
@@ -143,6 +142,21 @@ class Expressions:
             case ast.Call(func=func, args=arguments):
                 return self._call(node, func, [self.value(value) for value in arguments])
         raise refusal(node, "this cannot be compiled")
+
+    def _binary(self, op: ast.operator, kind: Kind, left: Value, right: Value) -> Value:
+        """Work out ``left op right``, of a vector component by component."""
+        if isinstance(kind, tuple):
+            sides = (x if isinstance(x, tuple) else (x,) * len(kind) for x in (left, right))
+            pairs = zip(*sides, strict=True)
+            return tuple([self._binary(op, FLOAT, a, b) for a, b in pairs])
+        numbers = cast(Number, left), cast(Number, right)
+        name = cast(str, kind)
+        return Number(name, operations.binary(self.builder, op, name, *numbers))
+
+    def _negated(self, value: Value, kind: Kind) -> Value:
+        if isinstance(value, tuple):
+            return tuple([self._negated(part, FLOAT) for part in value])
+        return Number(cast(str, kind), operations.negated(self.builder, cast(Number, value)))
 
     def _bool(self, node: ast.BoolOp) -> Value:
         """Work out ``and`` or ``or``: what stands behind is worked out only where it decides."""
@@ -243,6 +257,10 @@ class Expressions:
             return self.call(self.builder, func.id, arguments)
         name = ast.unparse(func)
         kind = operations.kind_of_call(node, name, [kind_of(value) for value in arguments])
+        if name == "vector":
+            return self.turned(tuple(arguments), kind)
+        if name == "abs" and isinstance(arguments[0], tuple):
+            return Number(FLOAT, operations.norm(self.builder, arguments[0]))
         return operations.call(self.builder, name, cast(str, kind), cast(list[Number], arguments))
 
 

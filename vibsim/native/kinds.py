@@ -66,6 +66,11 @@ def kind_of(value: Value) -> Kind:
     return tuple(map(kind_of, value)) if isinstance(value, tuple) else value.kind
 
 
+def is_vector(kind: Kind) -> bool:
+    """Say whether a kind is that of a vector: a tuple of floats, of which there are sums, multiples and a norm."""
+    return isinstance(kind, tuple) and set(kind) == {FLOAT}
+
+
 def joined(one: Kind, other: Kind) -> Kind | None:
     """Return the kind that holds what both kinds hold, None where there is none."""
     if one == other:

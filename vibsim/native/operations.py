@@ -8,11 +8,23 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Sequence
+from functools import reduce
 from typing import Any
 
 from llvmlite import ir
 
-from vibsim.native.kinds import BIT, DOUBLE, FLOAT, TRUTH, WHOLE, WORD, Kind, Number, joined
+from vibsim.native.kinds import (
+    BIT,
+    DOUBLE,
+    FLOAT,
+    TRUTH,
+    WHOLE,
+    WORD,
+    Kind,
+    Number,
+    is_vector,
+    joined,
+)
 from vibsim.native.source import refusal
 
 _FLOATS = {ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul"}
@@ -21,8 +33,15 @@ _BITS = {ast.BitAnd: "and_", ast.BitOr: "or_"}
 _ORDERS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 
 
-def kind_of_binary(node: ast.expr, op: ast.operator, left: Kind, right: Kind) -> str:
+def kind_of_binary(node: ast.expr, op: ast.operator, left: Kind, right: Kind) -> Kind:
     """Return the kind of ``left op right``."""
+    match op:
+        case ast.Add() | ast.Sub() if is_vector(left) and left == right:
+            return left
+        case ast.Mult() | ast.Div() if is_vector(left) and isinstance(right, str):
+            return left
+        case ast.Mult() if isinstance(left, str) and is_vector(right):
+            return right
     both = joined(left, right) if isinstance(left, str) and isinstance(right, str) else None
     if both is None:
         raise refusal(node, f"a {left} and a {right} have no such operation")
@@ -39,6 +58,8 @@ def kind_of_binary(node: ast.expr, op: ast.operator, left: Kind, right: Kind) ->
 
 def kind_of_unary(node: ast.expr, op: ast.unaryop, kind: Kind) -> Kind:
     """Return the kind of ``op value``."""
+    if is_vector(kind) and isinstance(op, ast.USub):
+        return kind
     if isinstance(kind, str):
         if isinstance(op, ast.Not):
             return TRUTH
@@ -95,6 +116,12 @@ def negated(builder: ir.IRBuilder, value: Number) -> ir.Value:
     if value.kind == FLOAT:
         return builder.fneg(value.word)
     return builder.neg(turned(builder, value, WHOLE))
+
+
+def norm(builder: ir.IRBuilder, vector: Sequence[Number]) -> ir.Value:
+    """Return the Euclidean norm of a vector."""
+    total = reduce(builder.fadd, [builder.fmul(part.word, part.word) for part in vector])
+    return _intrinsic("sqrt")(builder, [Number(FLOAT, total)])
 
 
 def compared(builder: ir.IRBuilder, op: ast.cmpop, left: Number, right: Number) -> ir.Value:
@@ -198,6 +225,10 @@ _CALLS: dict[str, tuple[int, str, Build]] = {
 
 def kind_of_call(node: ast.expr, name: str, arguments: Sequence[Kind]) -> Kind:
     """Return the kind of what a library function gives."""
+    if name == "vector":
+        return (FLOAT,) * len(arguments)
+    if name == "abs" and is_vector(arguments[0]):
+        return FLOAT
     if name not in _CALLS:
         raise refusal(node, f"there is no function {name}; there are {', '.join(_CALLS)}")
     count, kind, _ = _CALLS[name]

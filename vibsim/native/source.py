@@ -46,6 +46,8 @@ class Source:
             match node:
                 case ast.FunctionDef(name=name):
                     functions[name] = node
+                case ast.Assign(targets=[ast.Name(id=name)], value=ast.Call(args=parts)):
+                    constants[name] = tuple(map(ast.literal_eval, parts))
                 case ast.Assign(targets=[ast.Name(id=name)], value=value):
                     constants[name] = ast.literal_eval(value)
                 case ast.Import(names=[ast.alias(name="math", asname=None)]):

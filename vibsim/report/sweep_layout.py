@@ -102,6 +102,8 @@ class Grid:
     cell: NDArray[np.intp]  # position of every member in the table (y, x) of cells, shape (case,)
     note: str = ""
     """What a cell stands for, where it is not one member."""
+    separatrix: tuple[Floats, Floats] = (np.empty(0), np.empty(0))
+    """Points along x and y where the exact period is infinite."""
 
     def worst(self, values: NDArray[Any], badness: NDArray[Any] | None = None) -> Floats:
         """Return the value of every cell's worst member, shape (y, x): the one of most `badness`.

@@ -87,7 +87,7 @@ class Stepper:
     """The arithmetic of a scheme: functions on the carried state of one member, and how it starts and ends.
 
     A function may ask for `slopes` or `damping_rate` (`vibsim.models.base.Damping`) behind `acceleration`, by these
-    names.
+    names. Of several coordinates positions, velocities and accelerations are vectors (`vibsim.engine.coordinates`).
     """
 
     start: Callable[..., CarriedState]
@@ -115,12 +115,13 @@ class Stepper:
     functions of time."""
     tabulated: bool = False
     """Whether the points are known before, and stand behind the parameters (`vibsim.simulation.adaptive`)."""
-    whole: bool = False
-    """Whether its functions are written for all coordinates of a model with several; else they are written out."""
 
 
 END_RULES = ("own", "extrapolate", "backward")
 """The scheme's own velocity, the linear extrapolation of the last two, or `Stepper.backward`."""
+
+ZERO = 0.0
+"""The number 0; in a kernel for several coordinates, the vector of zeros."""
 
 HANDED = ("acceleration", "slopes", "damping_rate")
 """Functions of the model that a function of a scheme is handed, by these names."""

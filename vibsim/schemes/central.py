@@ -42,6 +42,7 @@ from vibsim.models.base import Model
 from vibsim.schemes.base import (
     UNIT_ROUND_OFF,
     VECTOR,
+    ZERO,
     Acceleration,
     Flag,
     Option,
@@ -57,7 +58,7 @@ def start_three_term(
     variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
 ) -> tuple[float, float]:
     """Return u^1 and u^0; u^1 by A (11), or without its dt^2 term (the trap of A, section 2.3)."""
-    kick = 0.0 if variant else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
+    kick = ZERO if variant else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
     return u + dt * v + kick, u
 
 
@@ -71,7 +72,7 @@ def start_increment(
     variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
 ) -> tuple[float, float]:
     """Return u^1 and the increment u^1 - u^0."""
-    kick = 0.0 if variant else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
+    kick = ZERO if variant else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
     d = dt * v + kick
     return u + d, d
 
@@ -85,7 +86,7 @@ def start_compensated(
     variant: int, u: float, v: float, dt: float, p: Any, acceleration: Acceleration
 ) -> tuple[float, float, float, float]:
     """Return u^1, the increment u^1 - u^0, and the rounding errors that both still have to get."""
-    kick = 0.0 if variant else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
+    kick = ZERO if variant else 0.5 * (dt * dt) * acceleration(u, v, 0.0, p)
     push = dt * v
     d = push + kick
     part = d - push
@@ -104,11 +105,11 @@ class Treatment:
     """Formula of the kick, from ``push``, which is ``dt^2 a``, and ``d``."""
     lines: tuple[str, ...] = ()
     """Assignments before it."""
-    velocity: str = "0.0"
+    velocity: str = "ZERO"
     """The velocity at which the acceleration is taken: at rest it has no damping."""
 
 
-_RATE = "rate = damping_rate(u, 0.0, t, p)"
+_RATE = "rate = damping_rate(u, ZERO, t, p)"
 UNDAMPED = Treatment("push")
 LINEAR = Treatment("(push - rate * dt * d) / (1.0 + 0.5 * dt * rate)", (_RATE,))
 GEOMETRIC = Treatment("(push - share * d) / (1.0 + share)", (_RATE, "share = rate * abs(d)"))
@@ -207,7 +208,7 @@ def _step(arithmetic: str, treatment: Treatment) -> Callable[..., Any]:
         increment="" if treatment is UNDAMPED else "    d = u - behind\n",
     )
     functions = {"sqrt": ELEMENTARY["sqrt"].full} if "sqrt" in lines else {}
-    return written(text.lstrip("\n"), functions=functions)
+    return written(text.lstrip("\n"), {"ZERO": "0"}, functions)
 
 
 def corrected(p: Floats) -> tuple[Floats, Floats]:

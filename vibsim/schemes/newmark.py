@@ -47,7 +47,7 @@ def step_newmark(state, t, dt, p, acceleration, slopes):
 """
 """Solved for the force at the next point, with ``a^(n+1) = rest + SHARE f^(n+1)``."""
 
-_ALONE = {"rest": "rest = 0.0", "guess": "a"}
+_ALONE = {"rest": "rest = ZERO", "guess": "a"}
 _AVERAGED = {
     "rest": "now = acceleration(u, v, t, p)\n    rest = OLD_FORCE * now - OLD * a",
     "guess": "now",
@@ -60,6 +60,7 @@ def _stepper(beta: str, gamma: str, alpha_m: str = "0", alpha_f: str = "0") -> S
     is_averaged = (alpha_m, alpha_f) != ("0", "0")
     new, share = f"(1 - ({alpha_m}))", f"(1 - ({alpha_f}))/(1 - ({alpha_m}))"
     formulas = {
+        "ZERO": "0",
         "SHARE": share,
         "NEAR": f"1/2 - ({beta})",
         "BETA": beta,

@@ -163,30 +163,26 @@ def solved_together(
 def solver(coordinates: int, stages: int) -> Callable[..., Any]:
     """Return what `solved` (one stage) or `solved_together` (two) is for several coordinates.
 
-    Positions, velocities and accelerations are tuples, as long as there are coordinates; `slopes` returns the
-    derivatives of every acceleration by every position, row by row, and then those by every velocity.
+    Positions, velocities and accelerations are vectors; `slopes` returns the derivatives of every acceleration by every
+    position, row by row, and then those by every velocity.
     """
-    guesses = ("x", "y")[:stages]
-    unknowns = list(product(range(stages), range(coordinates)))
+    guesses = ", ".join(("x", "y")[:stages])
     name = f"solved_{'together_' if stages > 1 else ''}{coordinates}"
-    found = [f"({', '.join(f'x_{i}_{c}' for c in range(coordinates))})" for i in range(stages)]
-    done = ", ".join(found)
+    nothing = f"vector({', '.join(['math.nan'] * coordinates)})"
     lines = [
         "@alone",
-        f"def {name}({', '.join(guesses)}, u, d_u, v, d_v, t, p, acceleration, slopes):",
-        *(f"    x_{i}_{c} = {guesses[i]}[{c}]" for i, c in unknowns),
+        f"def {name}({guesses}, u, d_u, v, d_v, t, p, acceleration, slopes):",
         "    before = 0.0",
         f"    for k in range({MOST_TOGETHER}):",
         *(f"        {line}" for line in _iteration(coordinates, stages)),
         "        rate = change / before if k else 1.0",
         "        # `not >`, so that NaN ends it as well",
         "        if not change * rate > TOLERANCE * scale + LEAST:",
-        f"            return {done}",
+        f"            return {guesses}",
         "        if k and not change > STALLED * scale + LEAST and not rate < 0.5:",
-        f"            return {done}",
+        f"            return {guesses}",
         "        before = change",
-        *(f"    x_{i}_{c} = math.nan" for i, c in unknowns),
-        f"    return {done}",
+        f"    return {', '.join([nothing] * stages)}",
     ]
     numbers = {"LEAST": LEAST, "STALLED": STALLED, "TOLERANCE": TOLERANCE}
     formulas = {name: repr(value) for name, value in numbers.items()}
@@ -195,7 +191,7 @@ def solver(coordinates: int, stages: int) -> Callable[..., Any]:
 
 def _iteration(coordinates: int, stages: int) -> Iterator[str]:
     """Yield the lines of one iteration, which change the unknowns and set `change` and `scale`."""
-    several = range(coordinates)
+    several, guesses = range(coordinates), ("x", "y")[:stages]
     unknowns = list(enumerate(product(range(stages), several)))
 
     def of_stage(name: str, *index: int) -> str:
@@ -210,11 +206,8 @@ def _iteration(coordinates: int, stages: int) -> Iterator[str]:
     terms = []
     for i in range(stages):
         for name, known, weights in (("place", "u", "d_u"), ("speed", "v", "d_v")):
-            entries = []
-            for c in several:
-                reach = (f"{of_stage(weights, i, j)} * x_{j}_{c}" for j in range(stages))
-                entries.append(f"{of_stage(known, i)}[{c}] + ({' + '.join(reach)})")
-            yield f"{name}_{i} = ({', '.join(entries)})"
+            reach = (f"{of_stage(weights, i, j)} * {x}" for j, x in enumerate(guesses))
+            yield f"{name}_{i} = {of_stage(known, i)} + ({' + '.join(reach)})"
         for name in ("acceleration", "slopes"):
             found = "force" if name == "acceleration" else name
             yield f"{found}_{i} = {name}(place_{i}, speed_{i}, {of_stage('t', i)}, p)"
@@ -224,13 +217,15 @@ def _iteration(coordinates: int, stages: int) -> Iterator[str]:
                 terms.append(f"abs({slope(i, c, e, 0)} * place_{i}[{e}])")
                 terms.append(f"abs({slope(i, c, e, 1)} * speed_{i}[{e}])")
     for row, (i, c) in unknowns:
-        yield f"r_{row} = x_{i}_{c} - force_{i}[{c}]"
+        yield f"r_{row} = {guesses[i]}[{c}] - force_{i}[{c}]"
         for column, (j, e) in unknowns:
             by_u = f"{slope(i, c, e, 0)} * {of_stage('d_u', i, j)}"
             by_v = f"{slope(i, c, e, 1)} * {of_stage('d_v', i, j)}"
             yield f"m_{row}_{column} = {'1.0 - ' if row == column else '-'}({by_u} + {by_v})"
     yield from elimination(len(unknowns))
-    yield from (f"x_{i}_{c} = x_{i}_{c} - r_{row}" for row, (i, c) in unknowns)
+    for i, x in enumerate(guesses):
+        step = ", ".join(f"r_{i * coordinates + c}" for c in several)
+        yield f"{x} = {x} - vector({step})"
     yield "change = abs(r_0)"
     for row, _ in unknowns[1:]:
         yield f"change = abs(r_{row}) if abs(r_{row}) > change else change"

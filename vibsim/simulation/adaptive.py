@@ -105,23 +105,24 @@ def along_a_table(coordinates: int) -> Stepper:
     """
     place = ", ".join(f"float(p[-1][first + {k}])" for k in range(coordinates))
     speed = ", ".join(f"float(p[-1][first + {k}])" for k in range(coordinates, 2 * coordinates))
+    if coordinates > 1:
+        place, speed = f"vector({place})", f"vector({speed})"
     behind = place.replace("first", f"first + {2 * coordinates}")
     start = (
         "def start_tabulated(variant, u, v, dt, p, acceleration):\n"
         f"    first = {2 * coordinates}\n"
-        f"    return ({place}), 1.0\n"
+        f"    return {place}, 1.0\n"
     )
     step = (
         "def step_tabulated(state, t, dt, p, acceleration):\n"
         f"    first = {2 * coordinates} * int(state[1])\n"
-        f"    return (({behind}), state[1] + 1.0), ({speed})\n"
+        f"    return ({behind}, state[1] + 1.0), {speed}\n"
     )
     return Stepper(
         start=written(start),
         step=written(step),
         own_velocity=False,
         tabulated=True,
-        whole=coordinates > 1,
     )
 
 

@@ -347,7 +347,7 @@ def _allowed(row: Value, setting: Setting, best: bool = False) -> tuple[str, ...
         return ()
     states = tuple(state.name for state in model.states)
     more = centred(model) if setting.own_velocity else ()
-    deviations = ("energy_deviation", *more[2:])
+    deviations = ("energy_deviation", *more[-1:])
     choices = {
         "states": states,
         "stored": (*states, *(output.name for output in model.outputs)),

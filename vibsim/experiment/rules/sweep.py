@@ -47,7 +47,7 @@ def _table_keys(model: Model) -> set[str]:
 
 def read_sweep(
     document: Any,
-    order: Sequence[str],
+    order: Any,
     model: Model | None,
     schemes: Sequence[SchemeSpec],
     lacks_scheme: bool,
@@ -55,11 +55,14 @@ def read_sweep(
 ) -> tuple[Sweep, bool]:
     """Return what is sound of the sweep of a document, whose keys stand in some `order`, and whether that is all.
 
-    Where a scheme is at fault (`lacks_scheme`), nothing is said about options of unknown schemes.
+    What is malformed was left out of the document. Where a scheme is at fault (`lacks_scheme`), nothing is said about
+    options of unknown schemes.
     """
+    section = document.sweep
+    if section is None:
+        return Sweep(axes=()), _is_wellformed(report)
     types = sweep_types(model, ((scheme.name, scheme.kind) for scheme in schemes))
     reader = _SweepReader(document.time, model, types, lacks_scheme, report)
-    section = document.sweep
     found: list[Axis | None] = []
     for key in order:
         if key == "zip" and section.zip is not None:
@@ -69,7 +72,14 @@ def read_sweep(
         elif key in section.single:
             found.append(reader.alone(key, section.single[key]))
     sound = tuple(axis for axis in found if axis is not None)
-    return Sweep.model_construct(axes=sound), len(sound) == len(found)
+    is_whole = _is_wellformed(report) and len(sound) == len(found)
+    if is_whole and not sound:
+        report.add(("sweep",), "must not be empty")
+    return Sweep.model_construct(axes=sound), is_whole
+
+
+def _is_wellformed(report: Report) -> bool:
+    return not any(path[:1] == ("sweep",) for path in report.faulty)
 
 
 def _is_words(kind: Any) -> bool:

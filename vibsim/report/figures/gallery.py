@@ -22,6 +22,7 @@ from vibsim.report.figures import (
     time,
     work,
 )
+from vibsim.report.figures.separatrix import with_separatrix
 from vibsim.report.style import Picture
 from vibsim.report.types import Experiment
 
@@ -74,6 +75,8 @@ def over_members(experiment: Experiment, record: Record, found: list[str]) -> li
     along, grid = sweep_layout.along_of(keys), sweep_layout.grid_of(keys)
     schemes = range(min(len(record["scheme"]), MOST_SHOWN))
     drawn: Drawn = []
+    if grid is not None:
+        grid = with_separatrix(experiment, grid)
     if along is not None:
         drawn.append(sweep.period(experiment, record, along))
         drawn.append(sweep.amplitude(experiment, record, along))

@@ -15,7 +15,6 @@ from vibsim.report import finest_level, style
 from vibsim.report.choice import position, tolerance
 from vibsim.report.data import due, exact_periods, norm_unit, of_several, pick, promised_text, whole
 from vibsim.report.figures.panels import rows_of
-from vibsim.report.figures.separatrix import separatrix
 from vibsim.report.style import Picture
 from vibsim.report.sweep_layout import Grid
 from vibsim.report.text import words
@@ -78,7 +77,7 @@ def verdicts(
         f"Pale colours are orders within ± {allowed:g} of the {promise} one, where the scale jumps."
     )
     return _picture(
-        experiment, grid, panels, f"map_{quantity}_{scheme}",
+        grid, panels, f"map_{quantity}_{scheme}",
         f"Where does it converge, how fast, how well? {letter}{several}",
         f"Maps over two swept parameters: verdict on {words.name(quantity)}, its order and its error{several}",
         pale if "distance" in kinds else "",
@@ -123,7 +122,7 @@ def motion(experiment: Experiment, record: Record, grid: Grid, scheme: int) -> P
         "where they agree with the true error, they can be trusted where it is not known."
     )
     return _picture(
-        experiment, grid, panels, f"map_period_{scheme}", f"Period and amplitude{several}",
+        grid, panels, f"map_period_{scheme}", f"Period and amplitude{several}",
         f"Maps of the period, the exact period, the error of the period and the amplitude{several}", bars,
     )  # fmt: skip
 
@@ -143,24 +142,23 @@ def numbers(experiment: Experiment, record: Record, grid: Grid, scheme: int) -> 
         return None
     several = of_several(record, scheme)
     return _picture(
-        experiment, grid, panels, f"map_checks_{scheme}", f"The numbers that the checks are about{several}",
+        grid, panels, f"map_checks_{scheme}", f"Numbers of the checks{several}",
         f"Maps of the numbers that checks ask for{several}", "Each panel has the name of its check.",
     )  # fmt: skip
 
 
 def _picture(
-    experiment: Experiment, grid: Grid, panels: list[Panel], name: str, title: str, alt: str, *caption: str
+    grid: Grid, panels: list[Panel], name: str, title: str, alt: str, *caption: str
 ) -> Picture:  # fmt: skip
     """Draw panels, and explain what is grey, dotted or gathered in blocks; nothing that is not there."""
-    ridge = separatrix(experiment, grid)
     has_gaps = any(not np.isfinite(panel.table).all() for panel in panels)
     text = style.sentences(
         *caption,
         "Grey hatched cells have no such number." if has_gaps else "",
-        "The dotted line is the separatrix, where the exact period is infinite." if ridge[0].size else "",
+        "The dotted line is the separatrix, where the exact period is infinite." if grid.separatrix[0].size else "",
         grid.note,
     )  # fmt: skip
-    return Picture(name, title, text, alt, draw(grid, panels, ridge))
+    return Picture(name, title, text, alt, draw(grid, panels))
 
 
 def _codes(title: str, grid: Grid, values: Floats, codes: list[tuple[int, str, str]]) -> Panel:
@@ -200,7 +198,7 @@ def _window(record: Record, grid: Grid, quantity: str, scheme: int) -> Panel:
         for level, shade in shades
         if np.any(first == level)
     ]
-    return _codes("Levels that the order rests on", grid, first, codes)
+    return _codes("Levels used for the order", grid, first, codes)
 
 
 def _errors(record: Record, grid: Grid, quantity: str, scheme: int) -> list[Panel]:
@@ -220,14 +218,14 @@ def _errors(record: Record, grid: Grid, quantity: str, scheme: int) -> list[Pane
     return [*panels, Panel("Error bar of the error", grid.worst(width), "relative width")]
 
 
-def draw(grid: Grid, panels: list[Panel], ridge: tuple[Floats, Floats]) -> Figure:
+def draw(grid: Grid, panels: list[Panel]) -> Figure:
     """Return a figure with the panels in rows of three, all over the same two parameters."""
     columns = [(LEFT + i * (WIDE + GAP), WIDE) for i in range(PANELS_A_ROW)]
     figure, axes = rows_of(len(panels), columns, TALL, ABOVE, BELOW)
     for i, (ax, panel) in enumerate(zip(axes, panels, strict=True)):
         image = _cells(ax, grid, panel)
         _frame(ax, grid, panel.title, first=i % PANELS_A_ROW == 0)
-        _mark(ax, ridge)
+        _mark(ax, grid.separatrix)
         if panel.kind == "code":
             _legend(ax, panel)
         elif image is not None:

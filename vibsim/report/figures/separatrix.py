@@ -7,6 +7,7 @@ separatrix where the period keeps growing, and is an ordinary maximum where it d
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,17 +23,18 @@ SECTIONS = 80
 SCANNED = 201  # most lines of a grid that are searched in each direction
 
 
-def separatrix(experiment: Experiment, grid: Grid) -> tuple[Floats, Floats]:
-    """Return points of the separatrix within a grid; none where the model has no exact period or no separatrix."""
+def with_separatrix(experiment: Experiment, grid: Grid) -> Grid:
+    """Return a grid with the separatrix within it; as it is without an exact period or a separatrix."""
     if experiment.model.definition.exact_period is None or grid.x.words or grid.y.words:
-        return np.empty(0), np.empty(0)
+        return grid
 
     def period(x: Floats, y: Floats) -> Floats:
         return _period_at(experiment, {grid.x.key: x, grid.y.key: y})
 
     down = _peaks(period, grid.x.distinct, grid.y.distinct)
     across = _peaks(lambda y, x: period(x, y), grid.y.distinct, grid.x.distinct)
-    return np.concatenate([down[0], across[1]]), np.concatenate([down[1], across[0]])
+    found = np.concatenate([down[0], across[1]]), np.concatenate([down[1], across[0]])
+    return replace(grid, separatrix=found)
 
 
 def on_line(experiment: Experiment, key: Key) -> Floats:

@@ -92,7 +92,9 @@ def _why(checks: Sequence[Mapping[str, Any]]) -> str:
     first = max(checks, key=lambda check: SEVERITY[check["status"]])
     if first["status"] == "PASS":
         return ", ".join(dict.fromkeys(str(check["reason"]) for check in checks))
-    return f"{first['reason']}: {first['text']}"
+    # what is conserved goes by its name on its page, too
+    quantity = None if first["kind"] == "conserves" else first["quantity"]
+    return f"{first['reason']}: {words.labelled(first['text'], quantity)}"
 
 
 def _sentence(rows: Sequence[Row]) -> str:

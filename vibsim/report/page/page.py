@@ -203,7 +203,7 @@ def _tables(
     folded = _folded([table for table in [*long, *rest] if table is not None])
     other = [levels.orders(record, quantity, shown, norm) for quantity in found for norm in norms]
     if other:
-        folded.append(("Norms and orders in the other norms", other))
+        folded.append(("Other norms", other))
     everyone = members.table(record, found[0])
     if everyone is not None and len(everyone.rows) <= FOLDED:
         folded.append((f"All {len(record['case'])} members", [everyone]))

@@ -90,14 +90,14 @@ def _times(experiment: Experiment, record: Record) -> Iterator[tuple[str, str]]:
         f"{named}: {steps} steps, dt = {coarsest}{f' to {finest}' if several else ''} {time}",
     )
     if "omega_dt" in record:
-        for name, text in (
-            ("omega_dt", "natural frequency"),
-            (HIGHEST, "frequency to be resolved"),
+        for name, term, text in (
+            ("omega_dt", "w dt", "natural frequency"),
+            (HIGHEST, "Highest w dt", "frequency of the fastest oscillation"),
         ):
             largest = data.largest(np.asarray(record[name], np.float64)) if name in record else 0.0
             # a ball in free fall has no frequency
             if largest > 0.0:
-                yield "w dt", f"at most {words.number(largest)} ({text} times step)"
+                yield term, f"at most {words.number(largest)} ({text} times step)"
 
 
 def _listing(

@@ -57,6 +57,19 @@ def name(quantity: str) -> str:
     return f"the {text}, {letter}" if is_error_part(quantity) else text
 
 
+_LETTERED = NAMES.keys() - {"energy"}
+"""Names that are no English words."""
+
+
+def labelled(text: str, quantity: str | None) -> str:
+    """Return a sentence on a quantity with the labels of a page for names; what stands between backticks is code."""
+    names, ends = "|".join(filter(None, {*_LETTERED, quantity})), "|".join((CENTRED, *PARTS))
+    word = re.compile(rf"(?<![\w.])({names})({ends})?(?!\w|\.\w)")
+    parts = text.split("`")
+    parts[::2] = [word.sub(lambda found: title(found.group()), part) for part in parts[::2]]
+    return "`".join(parts)
+
+
 def overall(summary: Mapping[str, Any]) -> str:
     """Return the verdict on a whole experiment in one or two sentences."""
     failures = broken(summary)
