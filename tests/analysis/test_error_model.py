@@ -12,7 +12,7 @@ import pytest
 from synthetic import EPSILON, TOLERANCE, Group, groups
 
 from vibsim.convergence.assessment import Assessment, assess
-from vibsim.convergence.error_model import Ladder, posterior
+from vibsim.convergence.error_model.posterior import Ladder, posterior
 from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import REASON_NAMES, STATUSES
 

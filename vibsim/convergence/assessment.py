@@ -11,9 +11,9 @@ A power *dominates* where no other one has more than a tenth of it. The table of
 | the limit is another one than the exact solution, surely | FAIL ``wrong_limit`` |
 | a power within the tolerance of the expected one dominates, surely | PASS ``asymptotic`` |
 | another one dominates, surely, and the expected one does not | FAIL ``order_low``, ``order_high`` |
-| else, by what is most probable: an expansion, or none | INCONCLUSIVE ``pre_asymptotic`` |
-| errors that change their sign from level to level | INCONCLUSIVE ``oscillating`` |
-| noise | INCONCLUSIVE ``round_off`` |
+| noise is more probable than all else | INCONCLUSIVE ``round_off`` |
+| errors that change their sign from level to level are | INCONCLUSIVE ``oscillating`` |
+| anything else | INCONCLUSIVE ``pre_asymptotic`` |
 
 *Surely* is a probability above ``1 - RISK``.
 """
@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibsim.convergence.error_model import Ladder, Posterior, local_orders, posterior
+from vibsim.convergence.error_model.posterior import Ladder, Posterior, local_orders, posterior
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
 from vibsim.core.vocabulary import ORDER_TOLERANCE, REASON_NAMES, REASONS, STATUSES
 
@@ -34,7 +34,9 @@ INTERVAL = 0.95
 """Probability of the interval of an order."""
 BOUND = 2.5
 """Standard deviations in the bound of an error. The posterior has longer tails than a normal one: these are 95 %."""
-ROUNDING = 10.0
+BLOCK = 256
+"""Ladders that are judged together: all hypotheses on them take some 30 MB."""
+NOISE_FACTOR = 10.0
 """Noise may be so many times its prediction where levels are said to differ by nothing else."""
 
 
@@ -83,15 +85,17 @@ def assess(
     found = _nothing(count, n)
     if n < 3:
         reason[finite] = REASON_NAMES.index("too_few_levels")
-    elif np.any(finite):
-        part = Ladder(
-            ladder.h,
-            ladder.gram[finite],
-            ladder.floor[finite],
-            ladder.numbers[finite],
-            ladder.exact_known,
-        )
-        reason[finite] = _decide(part, expected, at_least, tolerance, found, finite)
+    else:
+        every = np.flatnonzero(finite)
+        for rows in (every[i : i + BLOCK] for i in range(0, len(every), BLOCK)):
+            part, size = _scaled(ladder, rows)
+            believed = posterior(part, expected)
+            sides = _sides(believed, expected, at_least, tolerance)
+            exact = _is_only_noise(part)
+            reason[rows] = _reasons(part, believed, sides, exact)
+            for name, value in _numbers(part, believed, expected, exact).items():
+                in_units = name in ("error", "error_bound", "best_bound")
+                found[name][rows] = value * size if in_units else value
     status = np.array(
         [STATUSES.index(REASONS[REASON_NAMES[code]]) for code in reason], dtype=np.int8
     )
@@ -106,61 +110,60 @@ def _nothing(count: int, levels: int) -> dict[str, np.ndarray]:
     return {**unknown, **window, "weights": np.full((count, levels), np.nan)}
 
 
-def _decide(
-    ladder: Ladder,
-    expected: float | None,
-    at_least: float | None,
-    tolerance: float,
-    found: dict[str, np.ndarray],
-    rows: Flags,
-) -> Integers:
-    """Return the reasons, and write the numbers of these rows into `found`."""
-    n = len(ladder.h)
-    believed = posterior(ladder, expected)
-    window = np.argmax(believed.window, axis=-1)
-    first, last = np.array(believed.windows)[window].T
-    orders = local_orders(ladder)
-    order = _finest_order(orders, last)
-    low, high = _interval(believed, order)
-    best = believed if not ladder.exact_known else posterior(_without_exact(ladder), expected)
-    numbers = _best(ladder, best, orders)
-    found["first"][rows], found["last"][rows] = first, last
-    found["order"][rows], found["low"][rows], found["high"][rows] = order, low, high
-    for name, value in numbers.items():
-        found[name][rows] = value
+def _scaled(ladder: Ladder, rows: Integers) -> tuple[Ladder, Floats]:
+    """Return some of the ladders over the norm of their largest row, and that norm."""
+    gram = ladder.gram[rows]
+    size = np.sqrt(np.max(np.diagonal(gram, axis1=1, axis2=2), axis=-1))
+    size = np.where(size > 0.0, size, 1.0)
+    gram = gram / size[:, None, None] / size[:, None, None]
+    floor = ladder.floor[rows] / size[:, None]
+    return Ladder(ladder.h, gram, floor, ladder.numbers[rows], ladder.exact_known), size
 
-    lower, right, higher = _sides(believed, expected, at_least, tolerance)
-    others = lower + higher
-    sure = others > 1.0 - RISK
-    sure &= right < RISK
-    d = np.sqrt(np.diagonal(ladder.gram, axis1=1, axis2=2))
-    allowed = ROUNDING * (ladder.floor[:, :-1] + ladder.floor[:, 1:])
-    exact = np.all(d[:, : n - 1] <= allowed, axis=-1)
-    away = ladder.exact_known & (d[:, -1] > ROUNDING * ladder.floor[:, -1])
-    kinds = np.stack(
-        [
-            believed.expansion + believed.elsewhere + believed.scattered,
-            believed.alternating,
-            believed.noise,
-        ]
-    )
-    open_ = np.array(
-        [REASON_NAMES.index(r) for r in ("pre_asymptotic", "oscillating", "round_off")]
-    )
+
+def _is_only_noise(ladder: Ladder) -> Flags:
+    """Say where all levels differ by no more than the noise that is expected of them."""
+    n = len(ladder.h)
+    d = np.sqrt(np.diagonal(ladder.gram, axis1=1, axis2=2))[:, : n - 1]
+    allowed = NOISE_FACTOR * (ladder.floor[:, :-1] + ladder.floor[:, 1:])
+    return np.asarray(np.all(d <= allowed, axis=-1))
+
+
+def _reasons(
+    ladder: Ladder, p: Posterior, sides: tuple[Floats, Floats, Floats], exact: Flags
+) -> Integers:
+    """Return the reasons of the verdicts, as positions in `REASON_NAMES`; see the head of this module."""
+    lower, right, higher = sides
+    away = np.zeros(len(exact), dtype=bool)
+    if ladder.exact_known:
+        away = np.sqrt(ladder.gram[:, -1, -1]) > NOISE_FACTOR * ladder.floor[:, -1]
+    another = (lower + higher > 1.0 - RISK) & (right < RISK)
     cases = [
         (exact & away, "wrong_limit"),
         (exact, "exact"),
-        (believed.elsewhere > 1.0 - RISK, "wrong_limit"),
+        (p.elsewhere > 1.0 - RISK, "wrong_limit"),
         (right > 1.0 - RISK, "asymptotic"),
-        (sure & (lower > higher), "order_low"),
-        (sure, "order_high"),
+        (another & (lower > higher), "order_low"),
+        (another, "order_high"),
+        (p.noise > np.maximum(1.0 - p.noise - p.alternating, p.alternating), "round_off"),
+        (p.alternating > 1.0 - p.noise - p.alternating, "oscillating"),
     ]
-    for name in ("first", "last"):
-        found[name][rows] = np.where(exact, {"first": 0, "last": n - 1}[name], found[name][rows])
-    for name in ("order", "low", "high"):
-        found[name][rows] = np.where(exact, np.nan, found[name][rows])
     codes = [REASON_NAMES.index(name) for _, name in cases]
-    return np.select([mask for mask, _ in cases], codes, open_[np.argmax(kinds, axis=0)])
+    return np.select([mask for mask, _ in cases], codes, REASON_NAMES.index("pre_asymptotic"))
+
+
+def _numbers(
+    ladder: Ladder, believed: Posterior, expected: float | None, exact: Flags
+) -> dict[str, np.ndarray]:
+    """Return what an `Assessment` holds beside status and reason, for ladders of three levels and more."""
+    n, orders = len(ladder.h), local_orders(ladder)
+    first, last = np.array(believed.windows)[np.argmax(believed.window, axis=-1)].T
+    order = np.where(exact, np.nan, _finest_order(orders, last))
+    low, high = (np.where(exact, np.nan, end) for end in _interval(believed, order))
+    window = {"first": np.where(exact, 0, first), "last": np.where(exact, n - 1, last)}
+    if ladder.exact_known:
+        believed = posterior(_without_exact(ladder), expected)
+    best = _best(ladder, believed, orders, exact)
+    return {"order": order, "low": low, "high": high, **window, **best}
 
 
 def _without_exact(ladder: Ladder) -> Ladder:
@@ -208,10 +211,11 @@ def _interval(believed: Posterior, order: Floats) -> tuple[Floats, Floats]:
     return np.fmin(low, order), np.fmax(high, order)
 
 
-def _best(ladder: Ladder, believed: Posterior, orders: Floats) -> dict[str, Floats]:
+def _best(ladder: Ladder, believed: Posterior, orders: Floats, exact: Flags) -> dict[str, Floats]:
     """Return the best value, its bound, and the error of the finest level.
 
-    Three levels have the extrapolation by their own order, more levels the mean over all hypotheses.
+    Three levels have the extrapolation by their own order, more levels the mean over all hypotheses. Where levels
+    differ by noise alone, the finest one is the best.
     """
     n = len(ladder.h)
     path = believed.path
@@ -225,6 +229,8 @@ def _best(ladder: Ladder, believed: Posterior, orders: Floats) -> dict[str, Floa
         other = np.stack([np.zeros_like(step), step], axis=-1) - path
         spread = spread + np.einsum("ci,cij,cj->c", other, differences, other)
         path = path + other
+    path = np.where(exact[:, None], 0.0, path)
+    spread = np.where(exact, differences[:, -1, -1], spread)
     weights = np.zeros((len(path), n))
     weights[:, -1] = 1.0
     weights[:, :-1] += path

@@ -1,0 +1,24 @@
+r"""The error model: what the differences of a ladder of levels say about its order, its limit and its error.
+
+Levels with step sizes ``h_0 > h_1 > ... > h_L`` have the values ``u_k = u* + A h_k^p + B h_k^q + n_k`` on common points
+of time or space, with unknown functions A and B and the noise n_k of level k. The *rows* are the differences
+``d_k = u_k - u_(k+1)`` and, where the exact solution u is known, ``u_L - u``, which is the difference to a level of the
+size 0. So a power p has the coefficient ``c_k(p) = h_k^p - h_(k+1)^p`` in row k, whatever the sizes are.
+
+A *hypothesis* says which powers there are, how large the second one is, over which *window* of levels this holds, and
+how levels deviate from it. Its functions A and B are Gaussian, with a few independent points (`POINTS`) and of any
+size. They integrate out, and the rows X have the evidence
+
+    log p(X) = log(1/2) + log Gamma(n/2) - n/2 log(pi tr(K^-1 G)) - N/2 log det K,   n = N w,
+
+for w rows and N independent points, with the Gram matrix ``G_kl = <d_k, d_l>`` of the rows and the covariance K that
+the hypothesis gives them. G is all that is read of the data. Three kinds of hypotheses compete:
+
+- *two shapes*: A and B are unrelated. ``K = c(p) c(p)^T + s^2 c(q) c(q)^T + noise``;
+- *one shape*: B is a multiple of A, and the error of every level is off by a factor of its own (`JITTERS`), as where
+  events fall between grid points. K is one-dimensional, and the rows are parallel but for a small part (`MISFIT`);
+- *no expansion*: every row has a size of its own, from the first to one behind which all rows are noise.
+
+Rows before a window are coarse levels that the expansion does not reach: each has a size of its own, for the price
+`PRICE`. Rows behind it are noise that grows as the steps shrink; noise as large as its prediction costs nothing more.
+"""

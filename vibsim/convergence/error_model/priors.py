@@ -1,0 +1,40 @@
+"""Every number of the error model: its value, its meaning, and where it comes from.
+
+[expansion] follows from expansions of errors, [arithmetic] from double precision. [chosen] is a prior that was written
+down before anything was judged. [calibrated] was set on seeds 1 and 3 of the random ladders with known truth
+(``tests/analysis/synthetic.py``); the counts there hardly change where such a number is doubled or halved.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+POINTS = 2.0  # independent points of a series or field; a single number has one [calibrated]
+POWERS = (*(0.5 * k for k in range(1, 11)), 6.0, 7.0, 8.0)  # that expansions have [expansion]
+HIGHEST = 8.0  # power that is looked for [chosen]
+BIN = 0.05  # distance of the powers among which such a power is counted [chosen]
+OTHER_PRIOR = 0.1  # of a single power of any other value up to `HIGHEST` [chosen]
+# It is looked for at these distances from the measured order. [chosen]
+AROUND = np.array(
+    [s * 3e-4 * 2.0**k for s, ks in ((-1, range(8, -1, -1)), (0, (0,)), (1, range(9))) for k in ks]
+)
+PROMISE = 0.5  # prior of the order that is promised, beside that of every power [chosen]
+DISTANCES = (0.5, 1.0, 2.0)  # from the first power to the second [expansion]
+PURE_PRIOR = 0.3  # that there is no second power in sight [chosen]
+# Size of the second power over the first, at the finest level of a window. [chosen]
+SHARES = tuple(10.0 ** (-4.25 + 0.5 * k) for k in range(15))
+MISFIT = 3e-4  # of a level from its expansion, over its error [calibrated]
+JITTERS, JITTER_PRIORS = (5e-3, 0.1), (0.7, 0.3)  # of errors of one shape [calibrated]
+ONE_SHAPE_PRIOR = 0.1  # of ladders of one shape [calibrated]
+FINEST_NOISE = (0.0, 0.1)  # noise of the finest level of a window, over its error [chosen]
+UNEXPECTED = 0.03  # prior of noise that nothing predicts [chosen]
+PREDICTION = 10.0  # noise is predicted within this factor [arithmetic]
+GROWTHS = (0.0, 0.5, 1.0, 1.5)  # of round-off: N to this power [arithmetic]
+COHERENCES = (3e-4, 3e-3, 3e-2, 0.3, 1.0)  # of a row that nothing is known of [chosen]
+PRICE = 2.0  # of a row with a size of its own: log of the range that sizes may have [calibrated]
+ALTERNATING = 0.02  # prior of errors that change their sign at every level [chosen]
+ELSEWHERE = 0.02  # prior of a limit that is not the exact solution [chosen]
+LONGEST_WINDOW = 5  # rows: more add nothing [chosen]
+DOMINATES = 0.1  # a power dominates where no other one has more than this part of it [chosen]
+ROUNDING = 0.1  # square of the noise that a level has at least, over its prediction [chosen]
+EPSILON = 2.0**-53  # the least noise of a level, over the largest difference [arithmetic]
