@@ -75,9 +75,11 @@ def _sizes(ax: Axes, verdict: VerdictData) -> None:
         return
     ax.set_xscale("log")
     ax.set_yscale("log")
+    # the slope for comparison may leave the frame
+    ax.set_ylim(*ax.get_ylim())
     _reference(ax, verdict, h, drawn[0])
     _plain_ticks(ax, h)
-    ax.legend(fontsize="small")
+    ax.legend(fontsize="small", loc="best")
 
 
 def _reference(ax: Axes, verdict: VerdictData, h: Floats, sizes: Floats) -> None:
@@ -138,6 +140,7 @@ def _curves(ax: Axes, verdict: VerdictData) -> None:
         look = {"color": CURVES[k % len(CURVES)], "linestyle": DASHES[k % len(DASHES)]}
         label = f"{verdict.size_name} = {number(float(h[k]), 3)} and {number(float(h[k + 1]), 3)}"
         ax.plot(x if is_numeric else np.arange(count), curve, linewidth=1.3, label=label, **look)
+    ax.yaxis.set_major_formatter(lambda value, _: number(value, 3))
     ax.set_xlabel(dim if dim in verdict.coords and is_numeric else "point")
     ax.set_title(f"Differences, rescaled with order {order:.3g}", fontsize="medium", loc="left")
     ax.legend(fontsize="small")

@@ -178,11 +178,11 @@ def _every_kth(dim: str, lengths: Sequence[int]) -> Common:
         counts = ", ".join(map(str, lengths))
         note = (
             f"The levels have {counts} values{_along(dim)}, which were taken for those of a periodic grid: every level "
-            "begins at the same point. For averages of cells use restrict='mean'."
+            "begins at the same point. For averages of cells use restrict: mean."
         )
     else:
         rule = "the points of the coarsest level are not among those of the finer ones"
-        hint = "give xarray objects with coordinates, or restrict='linear' or 'cubic'"
+        hint = "give coordinates, or use restrict: linear or cubic"
         raise refused(dim, f"lengths {list(lengths)}", rule, hint)
     base = np.arange(first)[:, None]
     found = tuple(Restriction(base * k, np.ones(base.shape)) for k in factors)
@@ -209,7 +209,7 @@ def _subset(dim: str, coordinates: Sequence[Coordinate], lengths: Sequence[int])
             dim,
             "coordinates",
             rule,
-            "use restrict='linear', 'cubic', or 'mean' for averages of cells",
+            "use restrict: linear or cubic, or mean for averages of cells",
         )
     note = ""
     if there.sum() < lengths[0]:
@@ -234,7 +234,7 @@ def _means(dim: str, coordinate: Coordinate, lengths: Sequence[int]) -> Common:
     if any(n % first for n in lengths):
         rule = "the number of cells of a finer level must be a multiple of that of the coarsest one"
         raise refused(
-            dim, f"lengths {list(lengths)}", rule, "or use restrict='subset', 'linear' or 'cubic'"
+            dim, f"lengths {list(lengths)}", rule, "or use restrict: subset, linear or cubic"
         )
     found = []
     for n in lengths:

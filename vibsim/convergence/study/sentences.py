@@ -41,6 +41,8 @@ class Facts:
     notes: tuple[str, ...] = ()
 
 
+MOST_DIGITS = 12
+"""Of an extrapolated number in a sentence."""
 LOOK_FOR = (
     "Look for a part of lower order, such as the first step, a formula at a boundary, a limiter, or an iteration that "
     "stops too early"
@@ -127,7 +129,7 @@ def _phrases(facts: Facts) -> dict[str, Any]:
     kind, own = facts.interpolation or ("", 0)
     count = len(facts.h)
     finer = facts.h[-1] * (facts.h[-1] / facts.h[-2] if count > 1 else 0.5)
-    points = "Take levels that have the coarsest points in common (restrict='subset')"
+    points = "Take levels that have the coarsest points in common (restrict: subset)"
     return {
         "quantity": facts.quantity,
         "order": order_with_interval(facts),
@@ -146,7 +148,7 @@ def _phrases(facts: Facts) -> dict[str, Any]:
         "count": "One level is" if count == 1 else f"{count} levels are",
         "kind": kind,
         "own": own,
-        "other_points": f"{points}, or restrict='cubic'" if kind == "linear" else points,
+        "other_points": f"{points}, or use restrict: cubic" if kind == "linear" else points,
     }
 
 
@@ -185,7 +187,12 @@ def _error(facts: Facts) -> str:
 
 def _best(facts: Facts) -> str:
     """Say the extrapolated number with its bound."""
-    if facts.best is None or facts.status == "FAIL" or facts.reason == "exact":
+    if (
+        facts.best is None
+        or facts.is_exact_known
+        or facts.status == "FAIL"
+        or facts.reason == "exact"
+    ):
         return ""
     if facts.best_bound is None:
         return f"The extrapolated value is {number(facts.best, 6)}."
@@ -208,8 +215,8 @@ def number(value: float | None, digits: int) -> str:
     text = f"{value:.{digits}g}"
     mantissa, has_power, exponent = text.partition("e")
     if not has_power and value and abs(value) < 1e-3:
-        mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
-        has_power = "e"
+        mantissa, has_power, exponent = f"{value:.{digits - 1}e}".partition("e")
+        mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
     return f"{mantissa}e{int(exponent)}" if has_power else mantissa
 
 
@@ -224,10 +231,10 @@ def with_bound(value: float, bound: float) -> str:
         return number(value, 10)
     places = max(1 - math.floor(math.log10(bound)), 0)
     largest = max(abs(value), bound)
-    if 1e-3 <= largest < 1e7 and places <= 15:
+    if 1e-3 <= largest < 1e7 and places <= MOST_DIGITS:
         return f"{value:.{places}f}, within {number(bound, 2)}"
     digits = 2 + max(math.floor(math.log10(largest)) - math.floor(math.log10(bound)), 0)
-    return f"{number(value, min(digits, 17))}, within {number(bound, 2)}"
+    return f"{number(value, min(digits, MOST_DIGITS))}, within {number(bound, 2)}"
 
 
 def listed(sizes: Sequence[float]) -> str:
