@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import netCDF4
 import numpy as np
 import pytest
@@ -22,6 +23,9 @@ KEYS = [
     *("quantity", "status", "reason", "order", "order_low", "order_high", "h_used", "error"),
     *("error_bound", "best", "best_bound", "gci", "sentence", "advice"),
 ]
+SCHEMA = json.loads(
+    (Path(__file__).parents[2] / "workflow/schemas/verdict.schema.json").read_text()
+)
 H = [0.1, 0.05, 0.025, 0.0125]
 TABLE = "dt,u,flux\n" + "".join(f"{h},{3 + h**2!r},{1 + h!r}\n" for h in H)
 
@@ -49,6 +53,7 @@ def entries(capsys: Capture) -> list[dict[str, Any]]:
     content = json.loads(captured.out, parse_constant=refuse)
     assert list(content) == ["vibsim_format", "verdicts"]
     assert content["vibsim_format"] == 2
+    jsonschema.validate(content, SCHEMA)
     for verdict in content["verdicts"]:
         assert list(verdict) == KEYS
     found: list[dict[str, Any]] = content["verdicts"]
