@@ -185,6 +185,29 @@ def test_huge_and_tiny_values_have_the_same_verdict() -> None:
         assert verdict.error == pytest.approx(factor * 0.7 * H[-1] ** 2, rel=1e-3)
 
 
+def test_a_coarse_level_that_blew_up_does_not_hide_the_others() -> None:
+    for size in (1e30, 1e200, 1e306):
+        verdict = judge([0.4, *H], [size, *numbers(2.0)])
+        assert verdict.order == pytest.approx(2.0, abs=1e-5), size
+        assert verdict.best == pytest.approx(3.0, abs=1e-6)
+
+
+def test_numbers_of_cells_in_place_of_step_sizes_are_suspected() -> None:
+    verdict = judge([1 / h for h in H], numbers(2.0), order=2)
+    assert verdict.status != "PASS"
+    assert verdict.order == pytest.approx(-2.0, abs=1e-5)
+    assert "no number of cells or steps" in verdict.advice
+
+
+def test_three_levels_have_an_order_and_a_best_value_whatever_the_status() -> None:
+    h, u = [0.4, 0.2, 0.1], [1.0, 0.7, 0.69]
+    for more in ({}, {"order": 1.0}, {"order": 2.0}, {"noise": 0.1}, {"exact": 2.0}):
+        verdict = judge(h, u, **more)
+        if verdict.reason != "exact":
+            assert verdict.order == pytest.approx(np.log2(30))
+            assert verdict.best == pytest.approx(0.69 - 0.01 / 29)
+
+
 def test_several_sizes_are_refined_together() -> None:
     dx = [10 * h for h in H]
     verdict = judge({"dt": H, "dx": dx}, numbers(2.0), order=2)
@@ -242,7 +265,7 @@ def test_the_sentence_says_order_error_and_bound() -> None:
 def test_every_reason_has_a_sentence() -> None:
     from vibsim.convergence.study.sentences import SENTENCES, Facts, describe
 
-    assert set(SENTENCES) == {*REASONS, "interpolation"}
+    assert set(SENTENCES) == {*REASONS, "interpolation", "growing"}
     for reason, status in REASONS.items():
         for count in (1, 2, 3):
             facts = Facts("flux", status, reason, (0.4, 0.2, 0.1)[:count], 1.5, not_finite=(0.1,))

@@ -127,10 +127,9 @@ def exact_values(exact: Any, common: CommonValues, *, members: bool = False) -> 
         found = given.values
         if named:
             inner = [dim for dim in common.dims if dim in given.dims]
-            found = _transposed(given, inner)
+            found = _at_common_points(_transposed(given, inner), given, inner, common)
             places = [slice(None) if dim in inner else None for dim in common.dims]
             found = found[tuple(places)]
-            _check_coordinates(given, common)
     try:
         values = np.broadcast_to(found, shape)
     except ValueError:
@@ -141,11 +140,18 @@ def exact_values(exact: Any, common: CommonValues, *, members: bool = False) -> 
     return values
 
 
-def _check_coordinates(given: GridValues, common: CommonValues) -> None:
-    for dim, points in given.coords.items():
-        if dim in common.coords and not restriction.are_equal(common.coords[dim], points):
-            rule = f"must be given at the {len(common.coords[dim])} common points of the levels"
-            raise refused("exact", f"coordinates {dim}", rule)
+def _at_common_points(
+    values: Floats, given: GridValues, dims: Sequence[str], common: CommonValues
+) -> Floats:
+    """Take the values at the common points, where these are known."""
+    for axis, dim in enumerate(dims):
+        if dim in given.coords and dim in common.coords:
+            places = restriction.positions(common.coords[dim], given.coords[dim])
+            if places is None:
+                rule = f"must be given at the {len(common.coords[dim])} common points of the levels"
+                raise refused("exact", f"coordinates {dim}", rule)
+            values = np.take(values, places, axis)
+    return values
 
 
 def _of_function(exact: Callable[..., Any], common: CommonValues, dims: Sequence[str]) -> Floats:

@@ -9,6 +9,9 @@ import numpy as np
 from vibsim.convergence.assessment import Ladder
 from vibsim.core.array_types import Flags, Floats
 
+LARGEST = 1e150
+"""Scaled values do not exceed it: their squares are numbers."""
+
 
 @dataclass(frozen=True)
 class Measurement:
@@ -25,8 +28,12 @@ class Measurement:
 
 
 def scale_of(values: Floats) -> Floats:
-    """Return a power of two near the largest finite value of each member, shape (member,), for (member, n, points)."""
-    size = np.max(np.abs(np.where(np.isfinite(values), values, 0.0)), axis=(1, 2), initial=0.0)
+    """Return a power of two near the size of the finest level of each member, shape (member,), for (member, n, points).
+
+    It is larger where a coarse level has blown up, whose square would overflow.
+    """
+    sizes = np.max(np.abs(values), axis=2)
+    size = np.maximum(sizes[:, -1], np.max(sizes, axis=1) / LARGEST)
     return np.asarray(np.ldexp(1.0, np.frexp(np.where(size > 0.0, size, 1.0))[1] - 1))
 
 

@@ -145,6 +145,15 @@ def are_equal(first: NDArray[Any], other: NDArray[Any]) -> bool:
     return bool(np.all(np.abs(first - other) <= tolerance))
 
 
+def positions(targets: NDArray[Any], points: NDArray[Any]) -> Integers | None:
+    """Return where each target stands among some points; None where one is none of them."""
+    if not (_is_numeric(targets) and _is_numeric(points)):
+        return np.arange(len(targets)) if are_equal(targets, points) else None
+    index, distance = _nearest(targets, points)
+    tolerance = spacing_tolerance(points, max(_epsilon(targets), _epsilon(points)))
+    return index if np.all(distance <= tolerance) else None
+
+
 def _is_numeric(points: NDArray[Any]) -> bool:
     return points.dtype.kind in "fiu"
 

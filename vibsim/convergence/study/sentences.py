@@ -80,6 +80,11 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
             "The levels of {quantity} do not show a settled order yet{estimate}.",
             "Add a finer level, such as {size} = {finer}.",
         ),
+        "growing": (
+            "The differences of {quantity} grow towards the finer levels{estimate}.",
+            "Check that {size} is a step size and no number of cells or steps, whose reciprocal is one. If it is, add "
+            "a finer level, such as {size} = {finer}.",
+        ),
         "round_off": (
             "The differences of {quantity} have reached {floor}, so they do not show its order{estimate}.",
             "Use coarser levels, or compute {quantity} with less noise.",
@@ -107,12 +112,15 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
     }
 )
-"""Reason to the templates of sentence and advice; ``interpolation`` is a special case of ``not_applicable``."""
+"""Reason to the templates of sentence and advice; ``interpolation`` is a case of ``not_applicable``, ``growing`` one of
+``pre_asymptotic``."""
 
 
 def describe(facts: Facts) -> tuple[str, str]:
     """Return the sentence on a ladder, and the advice; the advice on one that passed is empty."""
     key = "interpolation" if facts.interpolation else facts.reason
+    if key == "pre_asymptotic" and facts.order is not None and facts.order < 0.0:
+        key = "growing"
     phrases = _phrases(facts)
     sentence, advice = (template.format_map(phrases) for template in SENTENCES[key])
     more = [_error(facts), _best(facts), _together(facts)]
