@@ -41,6 +41,8 @@ class Facts:
     notes: tuple[str, ...] = ()
 
 
+PLAIN_DIGITS = 5
+"""Whole numbers of so many digits are written without a power of ten."""
 MOST_DIGITS = 12
 """Of an extrapolated number in a sentence."""
 LOOK_FOR = (
@@ -187,7 +189,8 @@ def _error(facts: Facts) -> str:
     if facts.error is None:
         return ""
     size = number(abs(facts.error), 2)
-    share = f" ({percent(facts.relative_error)})" if facts.relative_error else ""
+    share = percent(facts.relative_error)
+    share = f" ({share})" if share else ""
     bound = facts.error_bound
     at_most = "" if facts.is_exact_known or bound is None else f", at most {number(bound, 2)}"
     return f"The error of the finest level is {size}{share}{at_most}."
@@ -222,6 +225,8 @@ def number(value: float | None, digits: int) -> str:
         return "-"
     text = f"{value:.{digits}g}"
     mantissa, has_power, exponent = text.partition("e")
+    if has_power and 0 <= int(exponent) < PLAIN_DIGITS:
+        return f"{float(text):.0f}"
     if not has_power and value and abs(value) < 1e-3:
         mantissa, has_power, exponent = f"{value:.{digits - 1}e}".partition("e")
         mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
@@ -229,8 +234,8 @@ def number(value: float | None, digits: int) -> str:
 
 
 def percent(share: float | None) -> str:
-    """Write a share in percent."""
-    return "" if share is None else f"{number(100.0 * share, 2)} %"
+    """Write a share in percent; empty where an error is as large as what it belongs to."""
+    return f"{number(100.0 * share, 2)} %" if share and share < 1.0 else ""
 
 
 def with_bound(value: float, bound: float) -> str:
