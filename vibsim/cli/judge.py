@@ -31,9 +31,9 @@ def judge(options: Namespace) -> int:
     verdicts = [_judged(study, options, exact.get(study.quantity)) for study in studies]
     content = as_json(verdicts)
     if options.report:
-        from vibsim.report.page import ladder
+        from vibsim.report.page import study
 
-        ladder.write(verdicts, [study.files for study in studies], options.report, content)
+        study.write(verdicts, [study.files for study in studies], options.report, content)
     if options.json:
         print(json.dumps(content, indent=1, ensure_ascii=False))
     else:

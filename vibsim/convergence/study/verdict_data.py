@@ -88,6 +88,16 @@ class VerdictData:
     """The values extrapolated over the levels, shape (*points)."""
 
     @property
+    def id(self) -> str:
+        """The quantity, under the name that it has in a verdict on an experiment."""
+        return self.quantity
+
+    @property
+    def text(self) -> str:
+        """The sentence, under the name that it has in a verdict on an experiment."""
+        return self.sentence
+
+    @property
     def is_number(self) -> bool:
         """Whether a single number was judged."""
         return bool(self.values[0].size == 1) if len(self.values) else not self.dims

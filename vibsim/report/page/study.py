@@ -56,7 +56,7 @@ def write(
     ]
     status = worst(verdict.status for verdict in verdicts)
     context = {"status": status, "sentence": _overall(verdicts), "cards": cards}
-    page = environment().get_template("ladder.html").render(context)
+    page = environment().get_template("study.html").render(context)
     store.write_text(directory / "report.html", page)
     text = json.dumps(content, indent=1, ensure_ascii=False)
     store.write_text(directory / "verdict.json", text + "\n")
@@ -142,4 +142,4 @@ def _picture(i: int, verdict: LadderVerdict) -> Picture:
     alt = f"Error and difference of {verdict.quantity} against {verdict.size_name}. {verdict.sentence}"
     with style.applied():
         figure = convergence_figure(verdict)
-    return Picture(f"ladder-{i}", "", caption, alt, figure)
+    return Picture(f"study-{i}", "", caption, alt, figure)
