@@ -74,8 +74,8 @@ def test_a_pure_power_passes_with_its_order(order: float) -> None:
     assert verdict.order_low is not None
     assert verdict.order_high is not None
     assert verdict.order_low <= order <= verdict.order_high
-    assert verdict.best == pytest.approx(3.0, abs=1e-9)
-    assert verdict.error == pytest.approx(0.7 * H[-1] ** order, rel=1e-3)
+    assert verdict.best == pytest.approx(3.0, abs=1e-5)
+    assert verdict.error == pytest.approx(0.7 * H[-1] ** order, rel=0.05)
     assert verdict.error_bound is not None
     assert verdict.error_bound >= 0.7 * H[-1] ** order
     assert verdict.relative_error == pytest.approx(verdict.error / numbers(order)[-1])
@@ -170,26 +170,26 @@ def test_exact_values_show_a_wrong_limit_and_true_errors() -> None:
     wrong = judge(H, numbers(2.0), order=2, exact=3.2)
     assert (wrong.status, wrong.reason) == ("FAIL", "wrong_limit")
     assert wrong.error == pytest.approx(numbers(2.0)[-1] - 3.2)
-    assert wrong.best == pytest.approx(3.0, abs=1e-6)
+    assert wrong.best == pytest.approx(3.0, abs=1e-4)
 
 
 def test_the_sign_of_an_error_is_computed_minus_exact() -> None:
     below = judge(H, [3.0 - 0.7 * h**2 for h in H], order=2)
-    assert below.error == pytest.approx(-0.7 * H[-1] ** 2, rel=1e-3)
+    assert below.error == pytest.approx(-0.7 * H[-1] ** 2, rel=0.05)
 
 
 def test_huge_and_tiny_values_have_the_same_verdict() -> None:
     for factor in (1e300, 1e-300, -1e-3):
         verdict = judge(H, [factor * x for x in numbers(2.0)], order=2)
         assert verdict.status == "PASS", factor
-        assert verdict.error == pytest.approx(factor * 0.7 * H[-1] ** 2, rel=1e-3)
+        assert verdict.error == pytest.approx(factor * 0.7 * H[-1] ** 2, rel=0.05)
 
 
 def test_a_coarse_level_that_blew_up_does_not_hide_the_others() -> None:
     for size in (1e30, 1e200, 1e306):
         verdict = judge([0.4, *H], [size, *numbers(2.0)])
         assert verdict.order == pytest.approx(2.0, abs=1e-5), size
-        assert verdict.best == pytest.approx(3.0, abs=1e-6)
+        assert verdict.best == pytest.approx(3.0, abs=1e-4)
 
 
 def test_numbers_of_cells_in_place_of_step_sizes_are_suspected() -> None:
@@ -293,7 +293,7 @@ def test_a_verdict_becomes_a_dataset() -> None:
     assert data["values"].dims == ("h", "axis 0")
     assert data.attrs["status"] == "PASS"
     assert data["order"].values[0] == pytest.approx(2.0)
-    assert np.allclose(data["best_values"], np.sin(np.linspace(0, 1, 11)), atol=1e-6)
+    assert np.allclose(data["best_values"], np.sin(np.linspace(0, 1, 11)), atol=1e-5)
     assert set(judge(H, numbers(2.0)).to_xarray().dims) == {"h"}
 
 

@@ -75,8 +75,8 @@ def test_without_quantities_every_other_column_is_judged(
     assert (u["quantity"], u["status"], u["reason"]) == ("u", "PASS", "asymptotic")
     assert (flux["quantity"], flux["status"], flux["reason"]) == ("flux", "FAIL", "order_low")
     assert u["order"] == pytest.approx(2.0, abs=1e-6)
-    assert u["best"] == pytest.approx(3.0, abs=1e-6)
-    assert u["error"] == pytest.approx(H[-1] ** 2, rel=1e-3)
+    assert u["best"] == pytest.approx(3.0, abs=1e-5)
+    assert u["error"] == pytest.approx(H[-1] ** 2, rel=0.05)
     assert u["h_used"] == H
     assert main(["judge", table(), "--h", "dt", "--at-least", "1"]) == 0
     assert main(["judge", table(), "--h", "dt"]) == 0
@@ -139,6 +139,8 @@ def test_what_is_not_finite_is_data(word: str, table: Callable[..., str], capsys
         ("dt,u,u\n0.1,1,2\n", [], "--quantity: u: the table has more than one such column"),
         ("dt,,u\n0.1,1,2\n", [], "has a column without a name"),
         ("dt\n0.1\n", [], "has no column beside 'dt'"),
+        ("dt,\x1b[2Ju\n0.1,1\n", [], r"'\x1b[2Ju': must be printable"),
+        ("dt,u\n0.1,\x1b[2J\n", [], r"study.csv:2: u: '\x1b[2J': is no number"),
         ("dt,u\n", [], "has no row below the names of its columns"),
         ("", [], "must not be empty"),
         ("# nothing\n\n", [], "must not be empty"),
@@ -285,7 +287,7 @@ def test_files_of_other_programs_are_judged(form: str, tmp_path: Path, capsys: C
         assert field["quantity"] == "T"
         assert field["order"] == pytest.approx(2.0, abs=1e-6)
         assert field["best"] is None
-        assert flux["best"] == pytest.approx(2.0, abs=1e-6)
+        assert flux["best"] == pytest.approx(2.0, abs=1e-5)
         factor = 0.5 if size == "dt" else 1.0
         assert field["h_used"] == pytest.approx([factor / n for n in COUNTS])
     assert main([*command, "--h", "dx", "--exact", "flux=2"]) == 0

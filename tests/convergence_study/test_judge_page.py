@@ -51,12 +51,13 @@ def test_the_study_of_the_readme_has_the_verdicts_that_it_tells(
     text = README.read_text().partition("## Judge your own solver")[2].partition("\n## ")[0]
     (tmp_path / "study.csv").write_text(blocks(text, "")[0])
     commands = [line.partition("#")[0].split()[1:] for line in blocks(text, "sh")[0].splitlines()]
-    assert len(commands) == 2
-    assert main([*commands[0], "--json"]) == 1
-    (verdict,) = json.loads(capsys.readouterr().out)["verdicts"]
-    assert verdict["order"] == pytest.approx(1.5, abs=0.06)
-    assert verdict["best"] == pytest.approx(6.17, abs=0.005)
-    main(commands[1])
+    for command, status in zip(commands, ("PASS", "FAIL"), strict=True):
+        assert main([*command, "--json"]) == (0 if status == "PASS" else 1)
+        (verdict,) = json.loads(capsys.readouterr().out)["verdicts"]
+        assert verdict["status"] == status
+        assert verdict["order"] == pytest.approx(2.0, abs=0.005)
+        assert verdict["best"] == pytest.approx(1.718282, abs=6e-7)
+    assert verdict["reason"] == "order_low"
     assert (tmp_path / "study/report.html").is_file()
     names: dict[str, object] = {}
     exec(blocks(text, "python")[0], names)

@@ -54,9 +54,9 @@ def read(path: Path, size: str, quantities: Sequence[str]) -> list[Study]:
     try:
         (h, *columns), lines = csv_text.read(_content(path), choose, MOST_LEVELS)
     except csv_text.CsvError as error:
-        raise InputError(
-            [Fault(file, error.line, error.column, error.cell, error.rule, error.hint)]
-        ) from None
+        cell = _printable(error.cell)
+        fault = Fault(file, error.line, error.column, cell, error.rule, error.hint)
+        raise InputError([fault]) from None
     if not len(lines):
         raise InputError([Fault(file, 0, "", "", "has no row below the names of its columns")])
     _check_sizes(file, size, h.tolist(), lines.tolist())
@@ -77,6 +77,11 @@ def _content(path: Path) -> bytes:
     return content
 
 
+def _printable(text: str) -> str:
+    """Return a text as a terminal can show it: what controls terminals is written out."""
+    return text if text.isprintable() else ascii(text)
+
+
 def _chosen(file: str, known: list[str], size: str, quantities: Sequence[str]) -> list[str]:
     """Return the names of the columns that are judged; InputError where the table does not have them."""
     chosen = list(dict.fromkeys(quantities)) or [name for name in known if name != size]
@@ -87,6 +92,8 @@ def _chosen(file: str, known: list[str], size: str, quantities: Sequence[str]) -
             faults.append(Fault(file, 0, option, name, "the table has no such column", hint))
         elif known.count(name) > 1:
             faults.append(Fault(file, 0, option, name, "the table has more than one such column"))
+        elif not name.isprintable():
+            faults.append(Fault(file, 0, option, _printable(name), "must be printable"))
         elif not name:
             faults.append(
                 Fault(
