@@ -135,6 +135,8 @@ def test_what_is_not_finite_is_data(word: str, table: Callable[..., str], capsys
         ("dt,u\n0.1,1\n0.2,1\n0.1,2\n", [], "study.csv:4: dt: 0.1: is the step size of line 2, too"),
         ("dtt,u\n0.1,1\n", [], "study.csv: --h: dt: the table has no such column: did you mean 'dtt'?"),
         ("a,u\n0.1,1\n", [], "the table has no such column: choose from a, u"),
+        ("0.1,1\n0.2,2\n", [], "the first line must hold the names of the columns"),
+        ("dt u\n0.1 1\n", [], "separate cells by commas, semicolons or tabs"),
         ("dt,dt,u\n0.1,1,2\n", [], "--h: dt: the table has more than one such column"),
         ("dt,u,u\n0.1,1,2\n", [], "--quantity: u: the table has more than one such column"),
         ("dt,,u\n0.1,1,2\n", [], "has a column without a name"),

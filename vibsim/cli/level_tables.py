@@ -88,7 +88,7 @@ def _chosen(file: str, known: list[str], size: str, quantities: Sequence[str]) -
     faults = []
     for name, option in ((size, "--h"), *((name, "--quantity") for name in chosen)):
         if name not in known:
-            hint = nearest(name, known) if any(known) else "the first line must name the columns"
+            hint = _hint(name, known)
             faults.append(Fault(file, 0, option, name, "the table has no such column", hint))
         elif known.count(name) > 1:
             faults.append(Fault(file, 0, option, name, "the table has more than one such column"))
@@ -112,6 +112,15 @@ def _chosen(file: str, known: list[str], size: str, quantities: Sequence[str]) -
     if faults:
         raise InputError(dict.fromkeys(faults))
     return chosen
+
+
+def _hint(name: str, known: list[str]) -> str:
+    """Return what to do where a table does not have a column."""
+    if all(csv_text.is_shown(other) for other in known):
+        return "the first line must hold the names of the columns"
+    if len(known) == 1 and name in known[0].split():
+        return "separate cells by commas, semicolons or tabs"
+    return nearest(name, [_printable(other) for other in known])
 
 
 def _check_sizes(file: str, column: str, h: Sequence[float], lines: Sequence[int]) -> None:

@@ -20,6 +20,8 @@ ERROR, DIFFERENCE = "#0072B2", "#D55E00"
 """Colours of Okabe and Ito (2008), for the colour-blind."""
 CURVES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 DASHES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.2, 1.6)), (0, (6, 2, 1.2, 2)), (0, (9, 2)))
+FEW_DECADES = 1.5
+"""Of an axis whose ticks are not at powers of ten alone."""
 LEAST, MOST = 1e-290, 1e290
 """Of a logarithmic axis."""
 
@@ -105,7 +107,7 @@ def _reference(ax: Axes, verdict: VerdictData, h: Floats, sizes: Floats) -> None
 
 def _plain_ticks(ax: Axes, h: Floats) -> None:
     """Label the step sizes themselves, and powers of ten as plain text."""
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+    from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
     apart = [h[-1]]
     for size in h[::-1]:
@@ -118,9 +120,10 @@ def _plain_ticks(ax: Axes, h: Floats) -> None:
     ax.xaxis.set_major_formatter(plain)
     ax.yaxis.set_major_formatter(plain)
     low, high = np.log10(ax.get_ylim())
-    if high - low > 1.0:
+    if high - low > FEW_DECADES:
         ax.yaxis.set_minor_locator(NullLocator())
     else:
+        ax.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
         ax.yaxis.set_minor_formatter(plain)
 
 

@@ -63,11 +63,9 @@ def write(
 
 
 def _overall(verdicts: Sequence[LadderVerdict]) -> str:
-    statuses = [verdict.status for verdict in verdicts]
-    if len(statuses) == 1:
-        return verdicts[0].sentence
-    passed = statuses.count("PASS")
-    return f"{passed} of {len(statuses)} quantities passed."
+    """Return the verdict on several quantities."""
+    passed = [verdict.status for verdict in verdicts].count("PASS")
+    return f"{passed} of {len(verdicts)} quantities passed."
 
 
 def _card(i: int, verdict: LadderVerdict, files: Sequence[str]) -> dict[str, Any]:
