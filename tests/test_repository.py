@@ -183,9 +183,10 @@ def test_documented_targets_are_in_the_makefile() -> None:
 def test_documented_commands_are_understood() -> None:
     calls = commands("vibsim")
     assert len(calls) > 5
+    # a page may name a command without what it needs to run
+    alone = ("check", "plan", "list", "judge", "simulate", "analyse", "report")
     for words in calls:
-        # a page may name a command without what it needs to run
-        if words in ([], ["check"], ["plan"], ["list"], ["simulate"], ["analyse"], ["report"]):
+        if words == [] or words in [[name] for name in alone]:
             continue
         try:
             parser().parse_args(words)

@@ -11,6 +11,7 @@ from vibsim.core.lazy import loader
 
 if TYPE_CHECKING:
     from vibsim.analysis import Verdict, analyse, verdicts
+    from vibsim.convergence import LadderVerdict, judge
     from vibsim.core.errors import InputError, VibsimError
     from vibsim.experiment import Experiment
     from vibsim.ladder import best
@@ -21,10 +22,12 @@ __version__ = "0.1.0"
 _HOME = {
     "Experiment": "vibsim.experiment",
     "InputError": "vibsim.core.errors",
+    "LadderVerdict": "vibsim.convergence",
     "Verdict": "vibsim.analysis",
     "VibsimError": "vibsim.core.errors",
     "analyse": "vibsim.analysis",
     "best": "vibsim.ladder",
+    "judge": "vibsim.convergence",
     "simulate": "vibsim.simulation",
     "verdicts": "vibsim.analysis",
 }
@@ -32,11 +35,13 @@ _HOME = {
 __all__ = [
     "Experiment",
     "InputError",
+    "LadderVerdict",
     "Verdict",
     "VibsimError",
     "__version__",
     "analyse",
     "best",
+    "judge",
     "simulate",
     "verdicts",
 ]

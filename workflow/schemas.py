@@ -1,6 +1,7 @@
 """The JSON Schemas of ``workflow/schemas``: ``python workflow/schemas.py [--check]``.
 
-Written from the code that reads experiment files and writes summaries, for editors and for programs that read results.
+Written from the code that reads experiment files and writes summaries and verdicts, for editors and for programs that
+read results.
 """
 
 from __future__ import annotations
@@ -12,11 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from vibsim.analysis import summary_schema
+from vibsim.convergence.study import verdict_schema
 from vibsim.experiment.schema import document
 
 SCHEMAS: Mapping[str, Callable[[], dict[str, Any]]] = {
     "experiment": document.schema,
     "summary": summary_schema.schema,
+    "verdict": verdict_schema.schema,
 }
 FOLDER = Path(__file__).resolve().parent / "schemas"
 

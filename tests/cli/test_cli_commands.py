@@ -240,7 +240,8 @@ def test_a_file_of_another_job_is_refused_by_name_and_kept(
 
 
 @pytest.mark.parametrize(
-    "arguments", [[], ["fly"], ["run", "--cores", "0"], ["list", "planets"], ["check"]]
+    "arguments",
+    [[], ["fly"], ["run", "--cores", "0"], ["list", "planets"], ["check"], ["judge", "study.csv"]],
 )
 def test_a_wrong_command_line_is_refused(arguments: list[str]) -> None:
     with pytest.raises(SystemExit) as caught:
@@ -361,6 +362,11 @@ def test_snakemake_keeps_its_rules_where_nobody_else_can_write(
         ["report", "theta_convergence", "--out", ""],
         ["report", "--results", ""],
         ["report", "theta_convergence", "--formats", ""],
+        ["judge", "", "--h", "dt"],
+        ["judge", "study.csv", "--h", " "],
+        ["judge", "study.csv", "--h", "dt", "--quantity", "u", ""],
+        ["judge", "study.csv", "--h", "dt", "--exact", ""],
+        ["judge", "study.csv", "--h", "dt", "--report", ""],
     ],
 )
 def test_an_empty_name_is_refused(

@@ -20,6 +20,7 @@ PUBLIC = {
     "__version__",
     "analyse",
     "best",
+    "judge",
     "simulate",
     "verdicts",
 }

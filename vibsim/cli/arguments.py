@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from importlib import import_module
@@ -13,6 +14,7 @@ import vibsim
 
 _NAMES = "experiment (name or collection/name), one member of its sweep (NAME@CASE), collection, or FILE.yaml"
 LISTS = ("models", "schemes", "checks", "experiments")
+RESTRICTIONS = ("subset", "mean", "linear", "cubic")
 _Row = tuple[str, dict[str, Any]]
 """An option with what `argparse` takes of it."""
 
@@ -65,6 +67,7 @@ def _commands() -> Iterator[tuple[str, str, str, Sequence[_Row]]]:
     yield "check", "plan", "Validate experiment files, without running them.", (files,)
     text = "Show members, jobs, steps, memory, disk space and time of experiments before they run."
     yield "plan", "plan", text, (results, files, _flag("--json", "print the plans as JSON"))
+    yield "judge", "judge", "Judge whether the results of any solver converge.", tuple(_judge())
     what: _Row = "what", {"choices": LISTS}
     yield "list", "listing", "List what there is to choose from.", (what,)
 
@@ -100,6 +103,44 @@ def _commands() -> Iterator[tuple[str, str, str, Sequence[_Row]]]:
     formats = "formats of the figure files: svg, png, pdf; several with commas (default: svg)"
     formats_row = _row("--formats", _word, "LIST", formats)
     yield "report", "jobs.report", text, (*job, perhaps, folder, formats_row)
+
+
+def _judge() -> Iterator[_Row]:
+    """Yield the options of ``vibsim judge``."""
+    text = "a table (CSV or TSV) with a row for each level, or a netCDF file for each level"
+    yield _row("files", _path, "FILE", text, nargs="+")
+    text = "step size: a column of the table; an attribute or variable of each netCDF file, or h1,h2,... in their order"
+    yield _row("--h", _word, "NAME", text, required=True)
+    text = "columns (default: all others) or netCDF variables to judge"
+    yield _row("--quantity", _word, "NAME", text, nargs="+", action="extend")
+    text = "how netCDF fields are brought to common points (default: subset)"
+    yield "--restrict", {"choices": RESTRICTIONS, "help": text}
+    yield _row("--order", _above_zero, "P", "the order that is expected")
+    yield _row("--at-least", _above_zero, "P", "the lowest order that is expected")
+    text = "the exact value of a quantity, where it is known; may be repeated"
+    yield _row("--exact", _word, "QUANTITY=VALUE", text, action="append")
+    text = "how noisy each level is (root mean square; default: round-off)"
+    yield _row("--noise", _from_zero, "X", text)
+    yield _row("--report", _path, "DIR", "write report.html and verdict.json to this folder")
+    yield _flag("--json", "print the verdicts as JSON, and nothing else")
+
+
+def _above_zero(text: str) -> float:
+    return _number(text, "above 0", least=math.ulp(0.0))
+
+
+def _from_zero(text: str) -> float:
+    return _number(text, "from 0", least=0.0)
+
+
+def _number(text: str, bound: str, least: float) -> float:
+    try:
+        found = float(text)
+    except ValueError:
+        found = math.nan
+    if not least <= found < math.inf:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a finite number {bound}")
+    return found
 
 
 def _path(text: str) -> Path:

@@ -141,6 +141,16 @@ def order_of_ratio(ratio: Floats, levels: Sequence[float]) -> Floats:
     return np.asarray(np.where(usable, 0.5 * (low + high), np.nan))
 
 
+def difference_ratio(order: Floats | float, h: Floats) -> Floats:
+    """Return the ratio of the two differences of three levels with step sizes `h`, shape (3,), for some orders."""
+    return target_ratio(order, (-np.log2(h)).tolist())
+
+
+def order_of_differences(ratio: Floats, h: Floats) -> Floats:
+    """Solve `difference_ratio` for the order, for any three step sizes."""
+    return order_of_ratio(ratio, (-np.log2(h)).tolist())
+
+
 def safe_ratio(top: Floats, bottom: Floats) -> Floats:
     """Return ``top/bottom``, NaN where the bottom is zero or either is not finite."""
     usable = np.isfinite(top) & np.isfinite(bottom) & (bottom != 0)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibsim.convergence.differences import order_of_ratio, safe_ratio
+from vibsim.convergence.differences import order_of_differences, safe_ratio
 from vibsim.convergence.error_model import priors
 from vibsim.convergence.error_model.hypotheses import (
     Window,
@@ -86,12 +86,11 @@ def local_orders(ladder: Ladder) -> Floats:
     """
     n = len(ladder.h)
     sizes = np.sqrt(np.diagonal(ladder.gram, axis1=1, axis2=2))[:, : n - 1]
-    exponents = -np.log2(ladder.h)
     found = []
     for i in range(n - 2):
         same = ladder.gram[:, i, i + 1] > 0.0
         ratio = np.where(same, safe_ratio(sizes[:, i], sizes[:, i + 1]), np.nan)
-        found.append(order_of_ratio(ratio, list(exponents[i : i + 3])))
+        found.append(order_of_differences(ratio, ladder.h[i : i + 3]))
     return np.stack(found, axis=-1)
 
 

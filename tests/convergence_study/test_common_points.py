@@ -1,0 +1,250 @@
+"""How levels are brought to common points: subsets, averages of cells, interpolation, in any dimension."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray
+from numpy.typing import NDArray
+
+from vibsim import InputError, LadderVerdict, judge
+
+Array = NDArray[np.float64]
+COUNTS = [8, 16, 32, 64]
+H = [1.0 / n for n in COUNTS]
+
+
+def nodes(n: int) -> Array:
+    return np.linspace(0.0, 1.0, n + 1)
+
+
+def centres(n: int) -> Array:
+    return (np.arange(n) + 0.5) / n
+
+
+def wave(x: Array, h: float, order: float) -> Array:
+    """A smooth function with a smooth error of one power."""
+    return np.asarray(np.sin(3 * x) + np.cos(5 * x) * h**order)
+
+
+def levels(
+    points: Callable[[int], Array], power: float, counts: list[int] = COUNTS, **more: Any
+) -> LadderVerdict:
+    h = [1.0 / n for n in counts]
+    values = [
+        xarray.DataArray(wave(points(n), 1.0 / n, power), {"x": points(n)}, ["x"], name="T")
+        for n in counts
+    ]
+    return judge(h, values, **more)
+
+
+def arrays(points: Callable[[int], Array], order: float, counts: list[int] = COUNTS) -> list[Array]:
+    return [wave(points(n), 1.0 / n, order) for n in counts]
+
+
+def test_points_from_end_to_end_nest_by_their_number() -> None:
+    verdict = judge(H, arrays(nodes, 2.0), order=2)
+    assert verdict.status == "PASS"
+    assert verdict.order == pytest.approx(2.0)
+    assert verdict.values.shape == (4, 9)
+    irregular = [4, 8, 24, 48]
+    verdict = judge([1 / n for n in irregular], arrays(nodes, 2.0, irregular), order=2)
+    assert verdict.order == pytest.approx(2.0)
+
+
+def test_points_of_a_periodic_grid_nest_by_their_number() -> None:
+    values = arrays(lambda n: np.arange(n) / n, 2.0)
+    assert judge(H, values, order=2).status == "PASS"
+    cells = judge(H, arrays(centres, 2.0), order=2)
+    assert cells.status != "PASS", "centres of cells have no points in common"
+    assert "restrict: mean" in cells.advice
+
+
+def test_numbers_of_points_that_do_not_nest_are_refused() -> None:
+    counts = [8, 13, 21]
+    h = [1 / n for n in counts]
+    with pytest.raises(InputError, match=r"axis 0: lengths \[9, 14, 22\].*restrict: linear"):
+        judge(h, arrays(nodes, 2.0, counts), order=2)
+    assert judge(h, arrays(nodes, 2.0, counts), order=2, restrict="cubic").status == "PASS"
+
+
+def test_coordinates_say_which_points_are_common() -> None:
+    verdict = levels(nodes, 2.0, order=2)
+    assert verdict.status == "PASS"
+    assert verdict.quantity == "T"
+    assert np.array_equal(verdict.coords["x"], nodes(8))
+    # thirds and halves: only the points of the common divisor
+    some = levels(nodes, 2.0, [4, 6, 8], order=2)
+    assert some.coords["x"].tolist() == [0.0, 0.5, 1.0]
+    assert some.order == pytest.approx(2.0)
+    # an odd factor has the centres in common
+    odd = levels(centres, 2.0, [4, 12, 36], order=2)
+    assert np.allclose(odd.coords["x"], centres(4))
+    assert odd.status == "PASS"
+
+
+def test_coordinates_may_differ_by_rounding_only() -> None:
+    def shifted(by: float) -> Callable[[int], Array]:
+        return lambda n: nodes(n) + (by / n if n == 16 else 0.0)
+
+    assert levels(shifted(1e-10), 2.0, order=2).values.shape == (4, 9)
+    with pytest.raises(InputError, match="no point in common"):
+        levels(shifted(1e-8), 2.0, order=2)
+    with pytest.raises(InputError, match="no point in common"):
+        levels(centres, 2.0, order=2)
+
+    def accumulated(n: int) -> Array:
+        t = np.zeros(n + 1)
+        for k in range(n):
+            t[k + 1] = t[k] + 1.0 / n
+        return t
+
+    assert levels(accumulated, 2.0, [10, 100, 1000], order=2).values.shape == (3, 11)
+
+
+def test_coordinates_may_descend_or_be_single_precision() -> None:
+    assert levels(lambda n: nodes(n)[::-1], 2.0, order=2).status == "PASS"
+    single = [
+        xarray.DataArray(wave(nodes(n), 1 / n, 2), {"x": nodes(n).astype("f4")}, ["x"])
+        for n in (10, 20, 30)
+    ]
+    assert judge([0.1, 0.05, 1 / 30], single, order=2).values.shape == (3, 11)
+
+
+def test_averages_of_cells_are_exact_for_averages() -> None:
+    def average(n: int, order: float) -> Array:
+        edges = nodes(n)
+        means = -np.diff(np.cos(3 * edges)) / 3 * n
+        return np.asarray(means + np.diff(np.sin(5 * edges)) / 5 * n * (1 / n) ** order)
+
+    for order in (1.0, 2.0, 3.0):
+        verdict = judge(H, [average(n, order) for n in COUNTS], order=order, restrict="mean")
+        assert verdict.status == "PASS"
+        assert verdict.order == pytest.approx(order)
+    coarse = [xarray.DataArray(average(n, 2.0), {"x": centres(n)}, ["x"], name="T") for n in COUNTS]
+    exact = judge(H, coarse, order=2, restrict="mean", exact=lambda x: np.sin(3 * x))
+    assert exact.status == "PASS", "the function is averaged over the cells"
+    edges = nodes(8)
+    part = (np.sin(5 * edges[1:]) - np.sin(5 * edges[:-1])) / 5 * 8 * H[-1] ** 2
+    assert exact.error == pytest.approx(np.sqrt(np.mean(part**2)), rel=1e-6)
+    with pytest.raises(InputError, match="must be a multiple"):
+        judge([1, 0.5, 0.3], [np.ones(8), np.ones(16), np.ones(20)], restrict="mean")
+
+
+@pytest.mark.parametrize(("kind", "own"), [("linear", 2), ("cubic", 4)])
+def test_an_order_is_not_believed_from_that_of_the_interpolation_on(kind: str, own: int) -> None:
+    counts = [16, 37, 83, 190, 431]
+    h = [1 / n for n in counts]
+    below = judge(h, arrays(nodes, 1.0, counts), order=1, restrict=kind)
+    assert below.status == "PASS"
+    above = judge(h, arrays(nodes, own + 1.0, counts), order=own + 1, restrict=kind)
+    assert above.status == "INCONCLUSIVE"
+    if above.order is not None and above.order >= own - 0.1:
+        assert above.reason == "not_applicable"
+        assert f"{kind} interpolation to common points has order {own}" in above.sentence
+    assert judge(h, arrays(nodes, 5.0, counts), restrict=kind).status == "INCONCLUSIVE"
+
+
+def test_interpolation_at_points_of_a_level_changes_nothing() -> None:
+    for kind in ("linear", "cubic"):
+        verdict = judge(H, arrays(nodes, 4.0), order=4, restrict=kind)
+        assert verdict.status == "PASS", "the points are common, so that nothing is interpolated"
+        assert verdict.order == pytest.approx(4.0, abs=1e-6)
+
+
+def test_an_interpolation_needs_points_and_a_common_range() -> None:
+    far = [xarray.DataArray(np.ones(9), {"x": nodes(8) + shift}, ["x"]) for shift in (0, 2, 4)]
+    with pytest.raises(InputError, match="cover no common range"):
+        judge([3, 2, 1], far, restrict="linear")
+    with pytest.raises(InputError, match="needs 4 points"):
+        judge([3, 2, 1], [np.ones(2), np.ones(3), np.ones(5)], restrict="cubic")
+    half = [xarray.DataArray(wave(x, h, 2), {"x": x}, ["x"]) for x, h in (
+        (nodes(40), 1 / 4), (nodes(60) * 0.51, 1 / 6), (nodes(90), 1 / 9))]  # fmt: skip
+    assert judge([1 / 4, 1 / 6, 1 / 9], half, restrict="cubic").values.shape == (3, 21)
+
+
+def plane(n: int, m: int, h: float) -> xarray.DataArray:
+    x, y = nodes(n), nodes(m)
+    values = np.sin(x)[:, None] * np.cos(y) + h**2 * np.exp(x)[:, None] * y
+    return xarray.DataArray(values, {"x": x, "y": y}, ["x", "y"], name="T")
+
+
+def test_fields_of_two_dimensions_are_compared_at_common_points() -> None:
+    fields = [plane(n, n // 2, 1 / n) for n in COUNTS]
+    verdict = judge(H, fields, order=2)
+    assert verdict.status == "PASS"
+    assert verdict.values.shape == (4, 9, 5)
+    assert verdict.to_dict()["best"] is None
+    assert judge(H, [field.values for field in fields], order=2).order == pytest.approx(
+        verdict.order
+    )
+    swapped = [field.T if i % 2 else field for i, field in enumerate(fields)]
+    assert judge(H, swapped, order=2).order == pytest.approx(verdict.order)
+    known = judge(H, fields, order=2, exact=lambda x, y: np.sin(x) * np.cos(y))
+    assert known.status == "PASS"
+    x, y = nodes(8), nodes(4)
+    size = np.sqrt(np.mean((H[-1] ** 2 * np.exp(x)[:, None] * y) ** 2))
+    assert known.error == pytest.approx(size)
+    given = xarray.DataArray(np.sin(x)[:, None] * np.cos(y), {"x": x, "y": y}, ["x", "y"])
+    assert judge(H, fields, order=2, exact=given.T).error == pytest.approx(size)
+    assert judge(H, fields, order=2, exact=given.values).error == pytest.approx(size)
+    fine = plane(64, 32, 0.0)
+    assert judge(H, fields, order=2, exact=fine).error == pytest.approx(size)
+    with pytest.raises(InputError, match="exact: coordinates x: must be given at the 9 common"):
+        judge(H, fields, exact=given.assign_coords(x=x + 0.1))
+
+
+def test_dimensions_that_are_not_refined_must_agree() -> None:
+    fields = [plane(n, 4, 1 / n) for n in COUNTS]
+    assert judge(H, fields, order=2, dims=["x"]).status == "PASS"
+    with pytest.raises(InputError, match=r"x: lengths .*none of `dims`"):
+        judge(H, fields, order=2, dims=["y"])
+    with pytest.raises(InputError, match="dims: z: is no dimension of the values, which have x, y"):
+        judge(H, fields, dims=["z"])
+    moved = [field.assign_coords(y=nodes(4) + h) for field, h in zip(fields, H, strict=True)]
+    with pytest.raises(InputError, match="y: coordinates: must be the same on every level"):
+        judge(H, moved, dims=["x"])
+
+
+def test_labels_and_times_are_coordinates_too() -> None:
+    names = ["north", "south"]
+    fields = [
+        xarray.DataArray(
+            np.stack([wave(nodes(n), 1 / n, 2)] * 2),
+            {"place": names, "x": nodes(n)},
+            ["place", "x"],
+        )
+        for n in COUNTS
+    ]
+    assert judge(H, fields, order=2).status == "PASS"
+    fields[1] = fields[1].assign_coords(place=["north", "west"])
+    with pytest.raises(InputError, match="place"):
+        judge(H, fields, order=2)
+    days = [
+        xarray.DataArray(
+            wave(nodes(n), 1 / n, 2),
+            {"t": np.datetime64("2020-01-01T00:00:00", "ns") + np.arange(n + 1) * np.timedelta64(3600 * 64 // n, "s")},
+            ["t"],
+        )
+        for n in COUNTS
+    ]  # fmt: skip
+    assert judge(H, days, order=2).status == "PASS"
+
+
+def test_other_dimensions_are_refused() -> None:
+    a, b = plane(8, 4, 1.0), plane(16, 8, 0.5)
+    with pytest.raises(InputError, match="has the dimensions x, z, the coarsest level has x, y"):
+        judge([1.0, 0.5], [a, b.rename(y="z")])
+    with pytest.raises(InputError, match="level 1 has none, others do"):
+        judge([1.0, 0.5], [a, b.drop_vars("x")])
+
+
+def test_missing_values_are_not_finite() -> None:
+    values = [np.ma.masked_greater(x, 1.5) for x in arrays(nodes, 2.0)]
+    values[2] = np.ma.array(values[2], mask=np.arange(33) == 8)
+    verdict = judge(H, values, order=2)
+    assert verdict.reason == "non_finite"
+    assert "h = 0.03125" in verdict.sentence

@@ -1,0 +1,70 @@
+"""Whatever the core decides of a ladder has words, numbers that JSON has, a table and a picture."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from vibsim import judge
+from vibsim.convergence.assessment import Assessment, Ladder
+from vibsim.convergence.study import outcomes
+from vibsim.core.vocabulary import REASON_NAMES, REASONS, STATUSES
+
+H = [0.4, 0.2, 0.1, 0.05]
+
+
+def decided(ladder: Ladder, reason: str, *, known: bool) -> Assessment:
+    """An assessment with all of its numbers, or with none."""
+    shape, n = ladder.size.shape, len(ladder.h)
+    number = np.full(shape, 1.5 if known else np.nan)
+    weights = np.full((*shape, n), 0.0 if known else np.nan)
+    weights[..., -1] += 1.0
+    return Assessment(
+        status=np.full(shape, STATUSES.index(REASONS[reason]), dtype=np.int8),
+        reason=np.full(shape, REASON_NAMES.index(reason), dtype=np.int8),
+        order=number,
+        low=0.5 * number,
+        high=2.0 * number,
+        first=np.full(shape, 1 if known else -1),
+        last=np.full(shape, n - 1 if known else -1),
+        error=1e-3 * number,
+        error_bound=2e-3 * number,
+        weights=weights,
+    )
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["numbers", "none"])
+@pytest.mark.parametrize("reason", REASON_NAMES)
+def test_every_assessment_has_a_verdict(
+    reason: str, known: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        outcomes, "assess", lambda ladder, **_: decided(ladder, reason, known=known)
+    )
+    falling = [1.0, 1.5, 1.75, 1.875]
+    swinging = [1.0, 2.0, 1.5, 1.75]
+    constant = [2.0, 2.0, 2.0, 2.0]
+    series = [np.array([x, 2 * x, 3 * x]) for x in falling]
+    for values in (falling, swinging, constant, series):
+        for more in ({}, {"order": 2.0}, {"at_least": 1.0}, {"exact": 2.0}, {"noise": 1e-3}):
+            verdict = judge(H, values, **more)
+            assert (verdict.status, verdict.reason) == (REASONS[reason], reason)
+            assert verdict.sentence.endswith(".")
+            assert bool(verdict.advice) == (verdict.status != "PASS")
+            json.dumps(verdict.to_dict(), allow_nan=False)
+            assert str(verdict)
+            if known:
+                assert verdict.order == 1.5
+                assert verdict.h_used == (0.2, 0.1, 0.05)
+                assert verdict.error_bound is not None
+            elif values is falling and reason != "exact":
+                assert verdict.order == pytest.approx(1.0), "three levels give an estimate"
+                assert verdict.best == pytest.approx(2.0)
+                assert verdict.h_used == (0.2, 0.1, 0.05)
+            elif values is constant:
+                assert verdict.order is None
+                assert verdict.h_used == ()
+        assert verdict.plot().axes
+        verdict.to_xarray()

@@ -1,0 +1,369 @@
+"""`vibsim.judge`: the results of any solver, in memory."""
+
+from __future__ import annotations
+
+import doctest
+import inspect
+import subprocess
+import sys
+import time
+from dataclasses import FrozenInstanceError
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray
+
+import vibsim
+from vibsim import InputError, judge
+from vibsim.convergence.study import judgement
+from vibsim.core.vocabulary import REASONS
+
+KEYS = [
+    *("quantity", "status", "reason", "order", "order_low", "order_high", "h_used", "error"),
+    *("error_bound", "best", "best_bound", "gci", "sentence", "advice"),
+]
+H = [0.2, 0.1, 0.05, 0.025, 0.0125]
+
+
+def numbers(order: float, h: list[float] = H, limit: float = 3.0) -> list[float]:
+    """Numbers with one pure error term."""
+    return [limit + 0.7 * size**order for size in h]
+
+
+def test_the_worked_examples_are_true() -> None:
+    found = doctest.testmod(judgement)
+    assert found.attempted > 15
+    assert found.failed == 0
+
+
+def test_the_signature_is_the_public_one() -> None:
+    parameters = inspect.signature(judge).parameters
+    assert list(parameters) == [
+        *("h", "values", "order", "at_least", "exact", "noise", "restrict", "dims", "members")
+    ]
+    assert [p.default for p in parameters.values()][2:] == [
+        *(None, None, None, None, "subset", None, False)
+    ]
+    assert vibsim.convergence.judge is judge
+
+
+def test_the_import_is_quick_and_light() -> None:
+    program = (
+        "import sys, time; start = time.process_time(); import vibsim.convergence; "
+        "from vibsim.convergence import judge; judge([1, 2, 4], [1.0, 2.0, 4.0]); "
+        "print(time.process_time() - start); "
+        "heavy = {'xarray', 'matplotlib', 'scipy', 'pydantic', 'netCDF4', 'yaml', 'snakemake'}; "
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules); "
+        "rooms = {'models', 'schemes', 'experiment', 'engine', 'checks'}; "
+        "assert not {f'vibsim.{room}' for room in rooms} & set(sys.modules)"
+    )
+    runs = [
+        float(subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True).stdout)
+        for _ in range(2)
+    ]  # fmt: skip
+    assert min(runs) < 0.3
+
+
+@pytest.mark.parametrize("order", [1.0, 2.0, 3.0, 4.0])
+def test_a_pure_power_passes_with_its_order(order: float) -> None:
+    verdict = judge(H, numbers(order), order=order)
+    assert (verdict.status, verdict.reason) == ("PASS", "asymptotic")
+    assert verdict.order == pytest.approx(order, abs=1e-5)
+    assert verdict.order_low is not None
+    assert verdict.order_high is not None
+    assert verdict.order_low <= order <= verdict.order_high
+    assert verdict.best == pytest.approx(3.0, abs=1e-5)
+    assert verdict.error == pytest.approx(0.7 * H[-1] ** order, rel=0.05)
+    assert verdict.error_bound is not None
+    assert verdict.error_bound >= 0.7 * H[-1] ** order
+    assert verdict.relative_error == pytest.approx(verdict.error / numbers(order)[-1])
+
+
+def test_another_order_fails() -> None:
+    low = judge(H, numbers(1.0), order=2)
+    assert (low.status, low.reason) == ("FAIL", "order_low")
+    assert "instead of 2" in low.sentence
+    assert low.advice
+    high = judge(H, numbers(2.0), order=1)
+    assert (high.status, high.reason) == ("FAIL", "order_high")
+
+
+def test_an_order_may_be_a_lower_bound_or_unknown() -> None:
+    assert judge(H, numbers(2.0), at_least=1).status == "PASS"
+    assert judge(H, numbers(2.0), at_least=2).status == "PASS"
+    assert judge(H, numbers(1.0), at_least=2).reason == "order_low"
+    assert judge(H, numbers(2.0)).status == "PASS"
+
+
+def test_levels_may_come_in_any_order_and_ratio() -> None:
+    h = [0.13, 0.4, 0.05, 0.22, 0.31]
+    verdict = judge(h, numbers(2.0, h), order=2)
+    assert verdict.status == "PASS"
+    assert verdict.order == pytest.approx(2.0, abs=1e-9)
+    assert [level.h for level in verdict.levels] == sorted(h, reverse=True)
+    other = [h[i] for i in (3, 1, 4, 0, 2)]
+    assert judge(other, numbers(2.0, other), order=2) == verdict
+
+
+def test_three_levels_give_the_order_of_their_equation() -> None:
+    h, u = [0.3, 0.17, 0.1], [1.31, 1.12, 1.07]
+    verdict = judge(h, u, order=1)
+    p = verdict.order
+    assert p is not None
+    measured = (u[0] - u[1]) / (u[1] - u[2])
+    assert (h[0] ** p - h[1] ** p) / (h[1] ** p - h[2] ** p) == pytest.approx(measured, rel=1e-9)
+    best = u[2] - (u[1] - u[2]) * h[2] ** p / (h[1] ** p - h[2] ** p)
+    assert verdict.best == pytest.approx(best, rel=1e-9)
+    size = abs((u[1] - u[2]) / u[2])
+    assert verdict.gci == pytest.approx(1.25 * size / ((h[1] / h[2]) ** p - 1), rel=1e-9)
+
+
+def test_fewer_than_three_levels_decide_nothing() -> None:
+    for count in (1, 2):
+        verdict = judge(H[:count], numbers(2.0)[:count], order=2)
+        assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "too_few_levels")
+        assert verdict.order is None
+        assert verdict.best is None
+        assert verdict.h_used == ()
+        assert verdict.advice
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_a_number_that_is_not_finite_fails(bad: float) -> None:
+    values = numbers(2.0)
+    values[1] = bad
+    verdict = judge(H, values, order=2)
+    assert (verdict.status, verdict.reason) == ("FAIL", "non_finite")
+    assert "h = 0.1" in verdict.sentence
+    assert verdict.order == pytest.approx(2.0), "four levels are left, and three give an estimate"
+    for count in (1, 3):
+        assert judge(H[:count], [bad] * count).reason == "non_finite"
+    values[1], values[4] = 3.0, bad
+    assert judge(H, values, order=2).error is None, "the finest level has none"
+
+
+def test_round_off_is_exact_and_noise_moves_the_floor() -> None:
+    equal = judge(H, [2.0, 2.0 + 4e-16, 2.0, 2.0, 2.0 - 4e-16], order=2)
+    assert (equal.status, equal.reason) == ("PASS", "exact")
+    noisy = [2.0, 2.003, 1.998, 2.001, 2.0]
+    assert judge(H, noisy, order=2, noise=0.01).reason == "exact"
+    assert "stated noise" in judge(H, noisy, order=2, noise=0.01).sentence
+    assert judge(H, noisy, order=2).reason != "exact"
+    single = [np.float32(2.0 + 1e-7 * k) for k in range(5)]
+    assert judge(H, single, order=2).reason == "exact", "single precision has its own round-off"
+    assert judge(H, [float(x) for x in single], order=2).reason != "exact"
+
+
+def test_constant_levels_are_exact_with_no_error() -> None:
+    verdict = judge(H, [2.0] * 5)
+    assert (verdict.reason, verdict.gci) == ("exact", 0.0)
+    assert judge(H, [0.0] * 5).reason == "exact"
+
+
+def test_exact_values_show_a_wrong_limit_and_true_errors() -> None:
+    right = judge(H, numbers(2.0), order=2, exact=3.0)
+    assert right.status == "PASS"
+    assert right.error == pytest.approx(0.7 * H[-1] ** 2, rel=1e-9)
+    assert [level.error for level in right.levels] == pytest.approx([0.7 * h**2 for h in H])
+    wrong = judge(H, numbers(2.0), order=2, exact=3.2)
+    assert (wrong.status, wrong.reason) == ("FAIL", "wrong_limit")
+    assert wrong.error == pytest.approx(numbers(2.0)[-1] - 3.2)
+    assert wrong.best == pytest.approx(3.0, abs=1e-4)
+
+
+def test_the_sign_of_an_error_is_computed_minus_exact() -> None:
+    below = judge(H, [3.0 - 0.7 * h**2 for h in H], order=2)
+    assert below.error == pytest.approx(-0.7 * H[-1] ** 2, rel=0.05)
+
+
+def test_huge_and_tiny_values_have_the_same_verdict() -> None:
+    for factor in (1e300, 1e-300, -1e-3):
+        verdict = judge(H, [factor * x for x in numbers(2.0)], order=2)
+        assert verdict.status == "PASS", factor
+        assert verdict.error == pytest.approx(factor * 0.7 * H[-1] ** 2, rel=0.05)
+
+
+def test_a_coarse_level_that_blew_up_does_not_hide_the_others() -> None:
+    for size in (1e30, 1e200, 1e306):
+        verdict = judge([0.4, *H], [size, *numbers(2.0)])
+        assert verdict.order == pytest.approx(2.0, abs=1e-5), size
+        assert verdict.best == pytest.approx(3.0, abs=1e-4)
+
+
+def test_numbers_of_cells_in_place_of_step_sizes_are_suspected() -> None:
+    verdict = judge([1 / h for h in H], numbers(2.0), order=2)
+    assert verdict.status != "PASS"
+    assert verdict.order == pytest.approx(-2.0, abs=1e-5)
+    assert "no number of cells or steps" in verdict.advice
+
+
+def test_three_levels_have_an_order_and_a_best_value_whatever_the_status() -> None:
+    h, u = [0.4, 0.2, 0.1], [1.0, 0.7, 0.69]
+    for more in ({}, {"order": 1.0}, {"order": 2.0}, {"noise": 0.1}, {"exact": 2.0}):
+        verdict = judge(h, u, **more)
+        if verdict.reason != "exact":
+            assert verdict.order == pytest.approx(np.log2(30))
+            assert verdict.best == pytest.approx(0.69 - 0.01 / 29)
+
+
+def test_several_sizes_are_refined_together() -> None:
+    dx = [10 * h for h in H]
+    verdict = judge({"dt": H, "dx": dx}, numbers(2.0), order=2)
+    assert verdict.status == "PASS"
+    assert verdict.size_name == "dt"
+    assert "in proportion" not in verdict.sentence
+    squares = judge({"dx": dx, "dt": [h * h for h in H]}, numbers(2.0), order=2)
+    assert squares.status == "PASS"
+    assert "counts powers of dx; dt is refined with it, not in proportion" in squares.sentence
+    with pytest.raises(InputError, match=r"h\['dx'\].*must decrease from level to level, as dt"):
+        judge({"dt": H, "dx": [1.0, 0.5, 0.6, 0.2, 0.1]}, numbers(2.0))
+
+
+def test_members_have_verdicts_of_their_own() -> None:
+    values = [np.array([3 + h**2, 2 + h, np.nan if h == H[0] else 1.0 + h**2, 1.0]) for h in H]
+    found = judge(H, values, order=2, members=True)
+    assert [v.reason for v in found] == ["asymptotic", "order_low", "non_finite", "exact"]
+    assert found[0] == judge(H, [float(v[0]) for v in values], order=2)
+    fields = [np.stack([np.outer(x, x), 2 * np.outer(x, x)]) * (1 + h) for h, x in series()]
+    both = judge(H, fields, order=1, members=True)
+    assert [v.status for v in both] == ["PASS", "PASS"]
+    assert both[1].error == pytest.approx(2 * both[0].error)
+    with pytest.raises(InputError, match="members"):
+        judge(H, numbers(2.0), members=True)
+    with pytest.raises(InputError, match=r"axis 0.*same points"):
+        judge(H, [np.ones(3)] * 4 + [np.ones(5)], members=True)
+
+
+def series() -> list[tuple[float, Any]]:
+    """Step sizes with their points from 0 to 1."""
+    return [(h, np.linspace(0.0, 1.0, round(2 / h) + 1)) for h in H]
+
+
+def test_a_verdict_is_frozen_and_has_the_keys_of_the_contract() -> None:
+    verdict = judge(H, numbers(2.0), order=2)
+    content = verdict.to_dict()
+    assert list(content) == KEYS
+    assert content["h_used"] == list(verdict.h_used)
+    with pytest.raises(FrozenInstanceError):
+        verdict.status = "FAIL"  # type: ignore[misc]
+    field = judge(H, [np.sin(x) * (1 + h**2) for h, x in series()], order=2).to_dict()
+    assert field["best"] is None
+    assert field["best_bound"] is None
+    assert field["status"] == "PASS"
+
+
+def test_the_sentence_says_order_error_and_bound() -> None:
+    sentence = judge(H, numbers(2.0), order=2).sentence
+    assert sentence.startswith("u converges with order 2.00")
+    assert ", as expected." in sentence
+    assert "The error of the finest level is 1.1e-4 (0.0036 %), at most 1." in sentence
+    assert "The extrapolated value is 3.0000" in sentence
+
+
+def test_every_reason_has_a_sentence() -> None:
+    from vibsim.convergence.study.sentences import SENTENCES, Facts, describe
+
+    assert set(SENTENCES) == {*REASONS, "interpolation", "growing"}
+    for reason, status in REASONS.items():
+        for count in (1, 2, 3):
+            facts = Facts("flux", status, reason, (0.4, 0.2, 0.1)[:count], 1.5, not_finite=(0.1,))
+            sentence, advice = describe(facts)
+            assert "flux" in sentence
+            assert sentence.endswith(".")
+            assert bool(advice) == (status != "PASS")
+            assert "None" not in sentence + advice
+            assert "{" not in sentence + advice
+
+
+def test_a_verdict_prints_as_a_table_with_a_picture() -> None:
+    lines = str(judge(H, numbers(2.0), order=2)).splitlines()
+    assert lines[0] == "PASS  asymptotic  u"
+    assert lines[-6].split()[:2] == ["h", "value"]
+    bars = [line.count("#") for line in lines[-5:]]
+    assert bars == sorted(bars, reverse=True)
+    assert bars[0] > bars[-2] > bars[-1] == 0
+    assert max(map(len, lines)) <= 100
+
+
+def test_a_verdict_becomes_a_dataset() -> None:
+    verdict = judge(H, [np.sin(x) * (1 + h**2) for h, x in series()], order=2)
+    data = verdict.to_xarray()
+    assert data["values"].dims == ("h", "axis 0")
+    assert data.attrs["status"] == "PASS"
+    assert data["order"].values[0] == pytest.approx(2.0)
+    assert np.allclose(data["best_values"], np.sin(np.linspace(0, 1, 11)), atol=1e-5)
+    assert set(judge(H, numbers(2.0)).to_xarray().dims) == {"h"}
+
+
+def test_a_verdict_is_drawn(tmp_path: Path) -> None:
+    file = tmp_path / "picture.png"
+    figure = judge(H, numbers(2.0), order=2).plot(file)
+    assert file.stat().st_size > 5000
+    assert len(figure.axes) == 1
+    (axes,) = figure.axes
+    assert axes.get_xscale() == axes.get_yscale() == "log"
+    assert any("slope 2 (expected)" in text.get_text() for text in axes.get_legend().get_texts())
+    of_series = judge(H, [np.sin(x) * (1 + h**2) for h, x in series()], order=2).plot()
+    assert len(of_series.axes) == 2
+    curves = [line.get_ydata() for line in of_series.axes[1].lines]
+    assert np.allclose(curves[0], curves[-1], rtol=1e-6), "rescaled differences coincide"
+    for values in ([1.0], [2.0] * 5, [np.nan] * 5, [1e300, -1e300, 1e300]):
+        judge(H[: len(values)], values).plot(file)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ({"h": [0.2, 0.1]}, "h: .*has 2 step sizes for 5 levels"),
+        ({"h": 0.1}, "h: .*must be a list"),
+        ({"h": [0.2, 0.1, 0.05, 0.025, 0.0]}, r"h\[4\]: 0.0: must be a finite number above 0"),
+        ({"h": [0.2, 0.1, 0.05, 0.025, -1.0]}, r"h\[4\]: -1.0: must be a finite number above 0"),
+        ({"h": [0.2, 0.1, 0.05, 0.025, np.nan]}, r"h\[4\]: nan: must be a finite number above 0"),
+        ({"h": [0.2, 0.1, 0.05, 0.025, "x"]}, r"h\[4\]: x: must be a finite number above 0"),
+        ({"h": [0.2, 0.1, 0.05, 0.025, True]}, r"h\[4\]: True: must be a finite number above 0"),
+        ({"h": [0.2, 0.1, 0.05, 0.025, 0.1]}, r"h\[4\]: 0.1: is the step size of level 1, too"),
+        ({"h": {}}, "must name at least one size"),
+        ({"values": 3.0}, "values: float: must be a list"),
+        ({"values": "abc"}, "values: str: must be a list"),
+        ({"values": [], "h": []}, "at least one level"),
+        ({"values": ["a", "b", "c", "d", "e"]}, r"values\[0\]: str.*: must hold numbers"),
+        ({"values": [1j, 2j, 3j, 4j, 5j]}, r"values\[0\].*must be real"),
+        ({"values": [np.empty(0)] * 5}, r"values\[0\].*must not be empty"),
+        ({"values": [1.0, 2.0, 3.0, 4.0, np.ones(3)]}, "has the dimensions axis 0, the coarsest"),
+        ({"order": 0}, "order: 0.0: must be a finite number above 0"),
+        ({"order": np.inf}, "order: inf: must be a finite number above 0"),
+        ({"order": "2"}, "order: 2: must be a finite number above 0"),
+        ({"at_least": -1}, "at_least: -1.0: must be a finite number above 0"),
+        ({"order": 2, "at_least": 1}, "must not be given together with at_least"),
+        ({"noise": -1.0}, "noise: -1.0: must be a finite number from 0"),
+        ({"restrict": "nearest"}, "restrict: nearest: must be one of subset, mean, linear, cubic"),
+        ({"restrict": None}, "restrict: None: must be one of subset"),
+        ({"exact": np.nan}, "exact: values: must be finite"),
+        ({"exact": [1.0, 2.0]}, r"exact: values: has shape \(2,\), and the common points have \(\)"),
+        ({"exact": lambda t: t}, "exact.*is a function, and the values have no coordinates"),
+        ({"exact": "pi"}, "exact: .*must hold numbers"),
+    ],
+    ids=str,
+)  # fmt: skip
+def test_faulty_arguments_are_refused_in_a_sentence(arguments: dict[str, Any], told: str) -> None:
+    whole = {"h": H, "values": numbers(2.0), **arguments}
+    with pytest.raises(InputError, match=told):
+        judge(**whole)
+
+
+def test_a_dataset_with_one_variable_is_taken_and_another_refused() -> None:
+    levels = [xarray.Dataset({"T": ("x", np.sin(x) * (1 + h))}, {"x": x}) for h, x in series()]
+    assert judge(H, levels, order=1).quantity == "T"
+    with pytest.raises(InputError, match="is a dataset of 2 variables"):
+        judge(H, [level.assign(S=level["T"]) for level in levels])
+
+
+def test_ten_thousand_members_take_seconds() -> None:
+    rng = np.random.default_rng(5)
+    limit = rng.normal(size=10_000)
+    start = time.process_time()
+    found = judge(H, [limit + h**2 for h in H], order=2, members=True)
+    assert time.process_time() - start < 30.0
+    assert len(found) == 10_000

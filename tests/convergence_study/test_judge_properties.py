@@ -1,0 +1,98 @@
+"""What a verdict does not depend on: units, signs, the order of levels, dimensions of no length."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vibsim import LadderVerdict, judge
+from vibsim.convergence.differences import difference_ratio, order_of_differences
+
+FACTORS = st.floats(1.3, 3.0)
+POWERS = st.floats(0.5, 5.0)
+SIGNS = st.sampled_from([1.0, -1.0])
+
+
+def sizes(factors: list[float]) -> list[float]:
+    return np.cumprod([1.0, *(1.0 / f for f in factors)]).tolist()
+
+
+def facts(verdict: LadderVerdict) -> tuple[object, ...]:
+    return verdict.status, verdict.reason, verdict.order, verdict.order_low, verdict.order_high
+
+
+LADDERS = st.tuples(st.lists(FACTORS, min_size=2, max_size=5), POWERS, st.floats(-2.0, 2.0))
+
+
+@settings(max_examples=60, deadline=None)
+@given(LADDERS, st.randoms(use_true_random=False))
+def test_the_order_of_levels_does_not_matter(
+    ladder: tuple[list[float], float, float], random: object
+) -> None:
+    factors, p, second = ladder
+    h = sizes(factors)
+    values = [5.0 + x**p + second * x ** (p + 1) for x in h]
+    places = list(range(len(h)))
+    random.shuffle(places)  # type: ignore[attr-defined]
+    mixed = judge([h[i] for i in places], [values[i] for i in places], order=p)
+    assert mixed == judge(h, values, order=p)
+
+
+@settings(max_examples=60, deadline=None)
+@given(LADDERS, st.integers(-60, 60), SIGNS)
+def test_units_and_signs_do_not_matter(
+    ladder: tuple[list[float], float, float], power: int, sign: float
+) -> None:
+    factors, p, second = ladder
+    h = sizes(factors)
+    values = [5.0 + x**p + second * x ** (p + 1) for x in h]
+    verdict = judge(h, values, order=p)
+    scale = sign * 2.0**power
+    scaled = judge(h, [scale * x for x in values], order=p)
+    assert facts(scaled) == facts(verdict)
+    for name in ("error", "best"):
+        one, other = getattr(verdict, name), getattr(scaled, name)
+        assert (one is None) == (other is None)
+        if one is not None:
+            assert other == scale * one
+    assert scaled.gci == verdict.gci
+    in_other_units = judge([4.0 * x for x in h], values, order=p)
+    assert in_other_units.reason == verdict.reason
+
+
+@settings(max_examples=60, deadline=None)
+@given(LADDERS)
+def test_a_number_is_a_field_of_one_point(ladder: tuple[list[float], float, float]) -> None:
+    factors, p, second = ladder
+    h = sizes(factors)
+    values = [5.0 + x**p + second * x ** (p + 1) for x in h]
+    verdict = judge(h, values, order=p)
+    assert facts(judge(h, [np.array([[x]]) for x in values], order=p)) == facts(verdict)
+    (member,) = judge(h, [np.array([x]) for x in values], order=p, members=True)
+    assert member == verdict
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.floats(-20.0, 20.0), FACTORS, FACTORS)
+def test_the_order_of_three_levels_solves_their_equation(
+    order: float, first: float, second: float
+) -> None:
+    h = np.array(sizes([first, second]))
+    ratio = difference_ratio(np.array(order), h)
+    assert float(order_of_differences(ratio, h)) == pytest.approx(order, abs=1e-9)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.floats(), min_size=1, max_size=6))
+def test_no_numbers_break_it(values: list[float]) -> None:
+    h = [0.5**k for k in range(len(values))]
+    for more in ({}, {"order": 2.0}, {"at_least": 1.0, "noise": 1e-3}, {"exact": 1.0}):
+        verdict = judge(h, values, **more)
+        assert verdict.status in ("PASS", "FAIL", "INCONCLUSIVE")
+        if not np.all(np.isfinite(values)):
+            assert verdict.reason == "non_finite"
+        assert str(verdict)
+        for value in verdict.to_dict().values():
+            assert not isinstance(value, float) or np.isfinite(value)

@@ -1,0 +1,134 @@
+"""``vibsim judge``: whether the results of any solver converge, from a table or from netCDF files."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import sys
+from argparse import Namespace
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vibsim.cli import level_tables
+from vibsim.cli.level_tables import Study
+from vibsim.core.errors import Fault, InputError, nearest
+from vibsim.core.vocabulary import FORMAT, worst
+
+if TYPE_CHECKING:
+    from vibsim.convergence import LadderVerdict
+
+_COMMAND = "vibsim judge"
+
+
+def judge(options: Namespace) -> int:
+    """Judge every quantity, show the verdicts, and write the report that is asked for."""
+    if options.order is not None and options.at_least is not None:
+        _refuse("--at-least", f"{options.at_least:g}", "must not be given together with --order")
+    studies = _studies(options)
+    exact = _exact(options.exact, [study.quantity for study in studies])
+    verdicts = [_judged(study, options, exact.get(study.quantity)) for study in studies]
+    content = as_json(verdicts)
+    if options.report:
+        from vibsim.report.page import study
+
+        study.write(verdicts, [study.files for study in studies], options.report, content)
+    if options.json:
+        print(json.dumps(content, indent=1, ensure_ascii=False))
+    else:
+        print(*_text(verdicts, options.report), sep="\n")
+    return 0 if all(verdict.status == "PASS" for verdict in verdicts) else 1
+
+
+def as_json(verdicts: Sequence[LadderVerdict]) -> dict[str, Any]:
+    """Return the verdicts as ``--json`` prints them."""
+    return {"vibsim_format": FORMAT, "verdicts": [verdict.to_dict() for verdict in verdicts]}
+
+
+def _refuse(key: str, value: str, rule: str, hint: str = "") -> None:
+    raise InputError([Fault(_COMMAND, 0, key, value, rule, hint)])
+
+
+def _studies(options: Namespace) -> list[Study]:
+    """Read what is to be judged: one table, or netCDF files."""
+    from vibsim.cli import level_files
+
+    paths: list[Path] = options.files
+    quantities = options.quantity or []
+    are_netcdf = [level_files.is_netcdf(path) for path in paths]
+    if all(are_netcdf):
+        return level_files.read(paths, options.h, quantities)
+    first = paths[are_netcdf.index(False)]
+    if len(paths) > 1:
+        rule = "is no netCDF file, and a table holds all levels itself"
+        raise InputError(
+            [Fault(str(first), 0, "", "", rule, "name one table, or a netCDF file for each level")]
+        )
+    if options.restrict is not None:
+        _refuse(
+            "--restrict", options.restrict, "is for fields in netCDF files; a table holds numbers"
+        )
+    return level_tables.read(first, options.h.strip(), [name.strip() for name in quantities])
+
+
+def _exact(entries: Sequence[str] | None, known: Sequence[str]) -> Mapping[str, float]:
+    """Return the exact values by quantity, from ``QUANTITY=VALUE``."""
+    found: dict[str, float] = {}
+    for entry in entries or ():
+        name, has_value, text = entry.rpartition("=")
+        name = name.strip()
+        if not has_value or not name:
+            _refuse("--exact", entry, "must be QUANTITY=VALUE")
+        if name not in known:
+            _refuse("--exact", name, "is no quantity that is judged", nearest(name, list(known)))
+        if name in found:
+            _refuse("--exact", name, "is given twice")
+        try:
+            found[name] = float(text)
+        except ValueError:
+            found[name] = math.nan
+        if not math.isfinite(found[name]):
+            _refuse("--exact", entry, "its value must be a finite number")
+    return found
+
+
+def _judged(study: Study, options: Namespace, exact: float | None) -> LadderVerdict:
+    from vibsim.convergence.study.judgement import verdicts
+
+    try:
+        (found,) = verdicts(
+            study.h,
+            study.values,
+            quantity=study.quantity,
+            order=options.order,
+            at_least=options.at_least,
+            exact=exact,
+            noise=options.noise,
+            restrict=options.restrict or "subset",
+        )
+    except InputError as error:
+        # what the library says of its arguments is of these files
+        more = len(study.files) - 1
+        file = f"{study.files[0]} and {more} more" if more else study.files[0]
+        faults = (
+            Fault(file, 0, f"{study.quantity}: {fault.key}", fault.value, fault.rule, fault.hint)
+            for fault in error.faults
+        )
+        raise InputError(faults) from None
+    return found
+
+
+def _text(verdicts: Sequence[LadderVerdict], report: Path | None) -> list[str]:
+    """Return the lines for a terminal."""
+    from vibsim.convergence.study.terminal import COLUMNS, as_text
+
+    # what goes to a file has a width of its own
+    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else COLUMNS
+    lines = [f"{as_text(verdict, columns)}\n" for verdict in verdicts]
+    statuses = [verdict.status for verdict in verdicts]
+    counted = "1 quantity" if len(verdicts) == 1 else f"{len(verdicts)} quantities"
+    lines.append(f"{counted}, {statuses.count('PASS')} passed: {worst(statuses)}")
+    if report:
+        lines.append(f"report: {report / 'report.html'}")
+    return lines

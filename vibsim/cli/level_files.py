@@ -1,0 +1,186 @@
+"""Values of levels from netCDF files of any program, a file for each level."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.cli.level_tables import Study
+from vibsim.convergence.study.grid_values import GridValues, plain_coordinate, real
+from vibsim.core import netcdf, regular_files
+from vibsim.core.errors import Fault, InputError, nearest
+
+MAGIC = (b"CDF", b"\x89HDF")
+"""With what the files of netCDF 3 and 4 begin."""
+
+
+def is_netcdf(path: Path) -> bool:
+    """Tell whether a file is one of netCDF; InputError where it cannot be read."""
+    try:
+        with regular_files.reading(path) as stream:
+            return stream.read(4).startswith(MAGIC)
+    except OSError as error:
+        _refuse(str(path), "", "", f"cannot be read ({error.strerror or error})")
+
+
+def read(paths: Sequence[Path], size: str, quantities: Sequence[str]) -> list[Study]:
+    """Return the studies that files hold, one for each variable.
+
+    Parameters
+    ----------
+    paths
+        A file for each level.
+    size
+        Name of an attribute or of a variable with one value, the step size of a file; or the step sizes themselves,
+        separated by commas, in the order of the files.
+    quantities
+        Names of the variables; in a group ``group/name``.
+
+    Raises
+    ------
+    InputError
+        Where a file cannot be read, or does not have them.
+    """
+    if not quantities:
+        _refuse(str(paths[0]), "--quantity", "", "must name the variables to be judged")
+    listed = _listed(size)
+    if listed is not None and len(listed) != len(paths):
+        rule = f"has {len(listed)} step sizes for {len(paths)} files"
+        _refuse("vibsim judge", "--h", size, rule)
+    names = list(dict.fromkeys(quantities))
+    h: list[float] = []
+    values: dict[str, list[GridValues]] = {name: [] for name in names}
+    for i, path in enumerate(paths):
+        with _opened(path) as dataset:
+            h.append(listed[i] if listed is not None else _step_size(str(path), dataset, size))
+            for name in names:
+                values[name].append(_grid_values(str(path), dataset, name))
+    _check_sizes(paths, size if listed is None else "h", h)
+    files = [str(path) for path in paths]
+    key = "h" if listed is not None else size.rpartition("/")[2]
+    return [Study(name, {key: h}, values[name], files) for name in names]
+
+
+def _refuse(file: str, key: str, value: str, rule: str, hint: str = "") -> NoReturn:
+    raise InputError([Fault(file, 0, key, value, rule, hint)])
+
+
+def _listed(size: str) -> list[float] | None:
+    """Return step sizes that are given as a list; None for a name."""
+    try:
+        return [float(part) for part in size.split(",")]
+    except ValueError:
+        if "," in size:
+            _refuse("vibsim judge", "--h", size, "must be a name, or numbers separated by commas")
+        return None
+
+
+def _opened(path: Path) -> Any:
+    try:
+        return netcdf.opened(path)
+    except (OSError, RuntimeError) as error:
+        _refuse(str(path), "", "", f"the netCDF library cannot read it ({error})")
+
+
+def _check_sizes(paths: Sequence[Path], key: str, h: Sequence[float]) -> None:
+    faults, seen = [], dict[float, Path]()
+    for path, size in zip(paths, h, strict=True):
+        if not 0.0 < size < math.inf:
+            rule = "must be a finite number above 0"
+            faults.append(Fault(str(path), 0, key, f"{size:g}", rule))
+        elif size in seen:
+            rule = f"is the step size of {seen[size]}, too; all must differ"
+            faults.append(Fault(str(path), 0, key, f"{size:g}", rule))
+        seen.setdefault(size, path)
+    if faults:
+        raise InputError(faults)
+
+
+def _variable(dataset: Any, name: str) -> Any | None:
+    """Return a variable of the root, or of a group by its path; None where there is none."""
+    *groups, last = name.strip("/").split("/")
+    for group in groups:
+        if group not in dataset.groups:
+            return None
+        dataset = dataset.groups[group]
+    return dataset.variables.get(last)
+
+
+def _step_size(file: str, dataset: Any, name: str) -> float:
+    """Return the step size of a file, an attribute or a variable with one value."""
+    variable = _variable(dataset, name)
+    if name in dataset.ncattrs():
+        value = np.asarray(dataset.getncattr(name))
+    elif variable is not None:
+        value = np.ma.filled(np.ma.asarray(variable[...], dtype=np.float64), np.nan)
+    else:
+        single = [n for n, v, group in netcdf.variables(dataset) if v.size == 1 and not group]
+        hint = nearest(name, [*dataset.ncattrs(), *single])
+        _refuse(file, "--h", name, "is neither an attribute nor a variable of the file", hint)
+    if value.size != 1:
+        _refuse(file, "--h", name, f"has {value.size} values, and must have one")
+    try:
+        return float(value.reshape(())[()])
+    except ValueError:
+        _refuse(file, name, str(value), "must be a number")
+
+
+def _grid_values(file: str, dataset: Any, name: str) -> GridValues:
+    variable = _variable(dataset, name)
+    if variable is None:
+        known = [f"{group}/{n}" if group else n for n, _, group in netcdf.variables(dataset)]
+        _refuse(file, "--quantity", name, "the file has no such variable", nearest(name, known))
+    array = _array(file, name, variable)
+    try:
+        values, epsilon = real(array, name)
+    except InputError as error:
+        fault = error.faults[0]
+        _refuse(file, name, fault.value, fault.rule, fault.hint)
+    dims = tuple(variable.dimensions)
+    find = _coordinate_of(variable, dataset)
+    coords = {dim: found for dim in dims if (found := find(dim)) is not None}
+    return GridValues(values, dims, coords, name, epsilon)
+
+
+def _array(file: str, name: str, variable: Any) -> NDArray[Any]:
+    try:
+        return np.ma.asarray(variable[...])
+    except (OSError, RuntimeError, ValueError) as error:
+        _refuse(file, name, "", f"the netCDF library cannot read it ({error})")
+
+
+def _coordinate_of(variable: Any, dataset: Any) -> Callable[[str], NDArray[Any] | None]:
+    """Return what finds the coordinate of a dimension.
+
+    It is the variable of that name, in the group of the values or in the root; else the one along that dimension alone
+    that the attribute ``coordinates`` of the values names (CF conventions).
+    """
+    scopes: list[Mapping[str, Any]] = [variable.group().variables, dataset.variables]
+    listed = getattr(variable, "coordinates", "")
+    named = str(listed).split()
+
+    def find(dim: str) -> NDArray[Any] | None:
+        for scope in scopes:
+            for name in (dim, *named):
+                found = scope.get(name)
+                if found is not None and found.dimensions == (dim,):
+                    return _coordinate(found)
+        return None
+
+    return find
+
+
+def _coordinate(variable: Any) -> NDArray[Any]:
+    points = np.ma.asarray(variable[...])
+    if points.dtype.kind in "fiu":
+        return (
+            np.ma.filled(points.astype(points.dtype), np.nan)
+            if points.dtype.kind == "f"
+            else np.asarray(points)
+        )
+    return plain_coordinate(np.asarray(points))

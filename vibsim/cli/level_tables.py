@@ -1,0 +1,137 @@
+"""Numbers of levels from a table: a row for each level, a column of step sizes, and a column for each quantity."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from vibsim.core.errors import Fault, InputError, nearest
+from vibsim.experiment.tables import csv_text
+from vibsim.experiment.yaml.file_content import MOST_BYTES, content_of
+
+MOST_LEVELS = 1000
+
+
+@dataclass(frozen=True)
+class Study:
+    """The levels of one quantity, in the order of the file or the files."""
+
+    quantity: str
+    h: Mapping[str, Sequence[float]]
+    """Name and values of the step size."""
+    values: Sequence[Any]
+    """Numbers, or `vibsim.convergence.study.grid_values.GridValues`."""
+    files: Sequence[str] = field(default_factory=tuple)
+
+
+def read(path: Path, size: str, quantities: Sequence[str]) -> list[Study]:
+    """Return the studies that a table holds.
+
+    Parameters
+    ----------
+    path
+        CSV or TSV text (`vibsim.experiment.tables.csv_text`).
+    size
+        Name of the column of step sizes.
+    quantities
+        Names of the columns of numbers; none for all others.
+
+    Raises
+    ------
+    InputError
+        With the file, the line, the column, the value and the rule that it breaks.
+    """
+    file = str(path)
+    names: list[str] = []
+
+    def choose(known: list[str], _: bool) -> list[int]:
+        names.extend(_chosen(file, known, size, quantities))
+        return [known.index(name) for name in (size, *names)]
+
+    try:
+        (h, *columns), lines = csv_text.read(_content(path), choose, MOST_LEVELS)
+    except csv_text.CsvError as error:
+        cell = _printable(error.cell)
+        fault = Fault(file, error.line, error.column, cell, error.rule, error.hint)
+        raise InputError([fault]) from None
+    if not len(lines):
+        raise InputError([Fault(file, 0, "", "", "has no row below the names of its columns")])
+    _check_sizes(file, size, h.tolist(), lines.tolist())
+    table = zip(names, columns, strict=True)
+    return [Study(name, {size: h.tolist()}, column.tolist(), [file]) for name, column in table]
+
+
+def _content(path: Path) -> bytes:
+    try:
+        content = content_of(path, MOST_BYTES)
+    except (OSError, ValueError) as error:
+        rule = f"cannot be read ({getattr(error, 'strerror', None) or error})"
+        raise InputError([Fault(str(path), 0, "", "", rule)]) from None
+    if len(content) > MOST_BYTES:
+        raise InputError(
+            [Fault(str(path), 0, "", "", f"must not be larger than {MOST_BYTES >> 20} MiB")]
+        )
+    return content
+
+
+def _printable(text: str) -> str:
+    """Return a text as a terminal can show it: what controls terminals is written out."""
+    return text if text.isprintable() else ascii(text)
+
+
+def _chosen(file: str, known: list[str], size: str, quantities: Sequence[str]) -> list[str]:
+    """Return the names of the columns that are judged; InputError where the table does not have them."""
+    chosen = list(dict.fromkeys(quantities)) or [name for name in known if name != size]
+    faults = []
+    for name, option in ((size, "--h"), *((name, "--quantity") for name in chosen)):
+        if name not in known:
+            hint = _hint(name, known)
+            faults.append(Fault(file, 0, option, name, "the table has no such column", hint))
+        elif known.count(name) > 1:
+            faults.append(Fault(file, 0, option, name, "the table has more than one such column"))
+        elif not name.isprintable():
+            faults.append(Fault(file, 0, option, _printable(name), "must be printable"))
+        elif not name:
+            faults.append(
+                Fault(
+                    file,
+                    0,
+                    "",
+                    "",
+                    "has a column without a name",
+                    "name it, or choose with --quantity",
+                )
+            )
+    if size in quantities:
+        faults.append(Fault(file, 0, "--quantity", size, "holds the step sizes (--h)"))
+    if not chosen:
+        faults.append(Fault(file, 0, "", "", f"has no column beside '{size}'"))
+    if faults:
+        raise InputError(dict.fromkeys(faults))
+    return chosen
+
+
+def _hint(name: str, known: list[str]) -> str:
+    """Return what to do where a table does not have a column."""
+    if all(csv_text.is_shown(other) for other in known):
+        return "the first line must hold the names of the columns"
+    if len(known) == 1 and name in known[0].split():
+        return "separate cells by commas, semicolons or tabs"
+    return nearest(name, [_printable(other) for other in known])
+
+
+def _check_sizes(file: str, column: str, h: Sequence[float], lines: Sequence[int]) -> None:
+    """Refuse step sizes that are not positive, finite and different, each with its line."""
+    faults, seen = [], dict[float, int]()
+    for size, line in zip(h, lines, strict=True):
+        if not 0.0 < size < math.inf:
+            faults.append(Fault(file, line, column, f"{size:g}", "must be a finite number above 0"))
+        elif size in seen:
+            rule = f"is the step size of line {seen[size]}, too; all must differ"
+            faults.append(Fault(file, line, column, f"{size:g}", rule))
+        seen.setdefault(size, line)
+    if faults:
+        raise InputError(faults)

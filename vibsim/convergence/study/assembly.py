@@ -1,0 +1,158 @@
+"""What was decided of a ladder as a verdict: numbers, words and the table of levels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from vibsim.convergence.differences import order_of_differences
+from vibsim.convergence.study.common_points import CommonValues
+from vibsim.convergence.study.outcomes import FEWEST, Outcome, Question
+from vibsim.convergence.study.refinement import Refinement
+from vibsim.convergence.study.sentences import Facts, describe
+from vibsim.convergence.study.verdict import LadderVerdict
+from vibsim.convergence.study.verdict_data import Level
+from vibsim.core.array_types import Floats
+from vibsim.core.vocabulary import ORDER_TOLERANCE, REASONS
+
+GCI_FACTOR = 1.25
+"""Safety factor of the grid convergence index of three levels and more."""
+
+
+def verdict(
+    question: Question,
+    steps: Refinement,
+    common: CommonValues,
+    one: Outcome,
+    shown: tuple[Floats, tuple[str, ...]],
+) -> LadderVerdict:
+    """Put a verdict into numbers and words.
+
+    `shown` are the compared values, shape (n, *points), and the names of their dimensions.
+    """
+    h, (values, dims) = steps.h, shown
+    hidden = _hidden(question, common, one)
+    reason = "not_applicable" if hidden else one.reason
+    status = REASONS[reason]
+    best = float(one.best[0]) if one.best is not None and not dims else None
+    best_bound = _best_bound(one, best)
+    size = one.size if one.size > 0.0 else np.nan
+    relative = abs(one.error) / size
+    used = tuple(h[list(one.used)].tolist())
+    broken = tuple(h[np.isnan(one.values)].tolist())
+    facts = Facts(
+        quantity=question.quantity,
+        status=status,
+        reason=reason,
+        h=tuple(h.tolist()),
+        order=_known(one.order),
+        low=_known(one.low),
+        high=_known(one.high),
+        expected=question.order,
+        at_least=question.at_least,
+        error=_known(one.error),
+        error_bound=_known(one.error_bound),
+        relative_error=_known(relative),
+        best=best,
+        best_bound=best_bound,
+        is_exact_known=one.exact_known,
+        is_number=one.is_number,
+        has_noise=bool(question.noise),
+        not_finite=broken,
+        sizes=steps.names,
+        is_proportional=steps.is_proportional,
+        interpolation=(common.kind, common.interpolation_order or 0) if hidden else None,
+        notes=common.notes,
+    )
+    sentence, advice = describe(facts)
+    return LadderVerdict(
+        quantity=question.quantity,
+        status=status,
+        reason=reason,
+        order=facts.order,
+        order_low=facts.low,
+        order_high=facts.high,
+        h_used=used,
+        error=facts.error,
+        error_bound=facts.error_bound,
+        relative_error=facts.relative_error,
+        best=best,
+        best_bound=best_bound,
+        gci=_known(_gci(one, h)),
+        sentence=sentence,
+        advice=advice,
+        levels=tuple(_table(one, h)),
+        expected=question.order,
+        at_least=question.at_least,
+        size_name=steps.names[0],
+        is_exact_known=one.exact_known,
+        dims=dims,
+        coords={dim: common.coords[dim] for dim in dims if dim in common.coords},
+        values=values,
+        best_values=None if one.best is None else one.best.reshape(values.shape[1:]),
+    )
+
+
+def _known(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _hidden(question: Question, common: CommonValues, one: Outcome) -> bool:
+    """Say whether an order may be that of the interpolation: one that is at or above it cannot be believed."""
+    if common.interpolation_order is None or not np.isfinite(one.order):
+        return False
+    least = common.interpolation_order - ORDER_TOLERANCE
+    if one.order < least or one.reason in ("exact", "non_finite"):
+        return False
+    # the error of the values falls at least as fast as that of values and interpolation together
+    enough = question.at_least is not None and question.at_least <= least
+    return not (enough and one.reason == "asymptotic")
+
+
+def _best_bound(one: Outcome, best: float | None) -> float | None:
+    """Return how far the extrapolated number may be from the limit: what the bound of the error leaves beside it."""
+    if best is None:
+        return None
+    finest = one.values[one.finite[-1]]
+    if one.exact_known:
+        # the bound of the error is then that of a known error, and says nothing of the extrapolation
+        return _known(abs(best - (finest - one.error)) + one.floor)
+    return _known(max(one.error_bound - abs(finest - best), one.floor))
+
+
+def _gci(one: Outcome, h: Floats) -> float:
+    """Return the grid convergence index of the finest level over its size; NaN where no order is observed.
+
+    ``1.25 |u_n - u_(n-1)| / (|u_n| (r^p - 1))`` (Roache, J. Fluids Eng. 116, 1994).
+    """
+    if one.reason == "exact" and not np.any(one.differences):
+        return 0.0
+    if not one.order > 0.0 or len(one.finite) < FEWEST or one.finite[-1] < len(h) - 1:
+        return np.nan
+    ratio = h[one.finite[-2]] / h[one.finite[-1]]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        relative = np.abs(one.differences[-1]) / np.float64(one.size)
+        return float(GCI_FACTOR * relative / np.expm1(one.order * np.log(ratio)))
+
+
+def _table(one: Outcome, h: Floats) -> Iterator[Level]:
+    """Yield the rows of the table of levels."""
+    places = {int(position): k for k, position in enumerate(one.finite)}
+    steps = h[one.finite]
+    ratios = enumerate(one.ratios)
+    orders = np.array([float(order_of_differences(r, steps[k : k + 3])) for k, r in ratios])
+
+    def at(entries: Floats, i: int) -> float | None:
+        k = places.get(i)
+        return None if k is None or k >= len(entries) else _known(entries[k])
+
+    for i, size in enumerate(h.tolist()):
+        yield Level(
+            h=size,
+            value=_known(one.values[i]),
+            difference=at(one.differences, i),
+            ratio=at(one.ratios, i),
+            order=at(orders, i),
+            error=_known(one.errors[i]),
+        )

@@ -1,0 +1,185 @@
+"""The values of all levels at their common points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.convergence.study import restriction
+from vibsim.convergence.study.grid_values import GridValues, grid_values, real
+from vibsim.convergence.study.refusal import refused
+from vibsim.core.array_types import Floats
+
+GAUSS = 5
+"""Points of the quadrature that makes the average of a function over a cell, in each dimension."""
+
+
+@dataclass(frozen=True)
+class CommonValues:
+    """Values of all levels at common points."""
+
+    values: Floats
+    """Shape (n, *points), the coarsest level first."""
+    dims: tuple[str, ...]
+    coords: Mapping[str, NDArray[Any]]
+    """Of the dimensions that have any, at the common points."""
+    epsilon: Floats
+    """Relative spacing of the precision of every level, shape (n,)."""
+    kind: str
+    """One of `restriction.RESTRICTIONS`."""
+    interpolation_order: int | None
+    """Order of the error of an interpolation; None where no value was interpolated."""
+    notes: tuple[str, ...] = ()
+    """What a reader must know of the points."""
+
+
+def common_values(
+    levels: Sequence[GridValues], kind: str, dims: Sequence[str] | None, fixed: Sequence[str] = ()
+) -> CommonValues:
+    """Bring the values of all levels, the coarsest first, to their common points.
+
+    Parameters
+    ----------
+    levels
+        All with the same dimensions, in any order.
+    kind
+        How: one of `restriction.RESTRICTIONS`.
+    dims
+        Names of the dimensions that are refined; None for all. The others must be the same on every level.
+    fixed
+        Names of further dimensions that are not refined.
+
+    Raises
+    ------
+    InputError
+        Where the levels have no common points.
+    """
+    first = levels[0]
+    for i, level in enumerate(levels):
+        if set(level.dims) != set(first.dims) or len(level.dims) != len(first.dims):
+            rule = f"has the dimensions {_listed(level.dims)}, the coarsest level has {_listed(first.dims)}"
+            raise refused(f"level {i} (from the coarsest)", level.name or "values", rule)
+    refined = _refined(first.dims, dims)
+    arrays = [_transposed(level, first.dims) for level in levels]
+    coords: dict[str, NDArray[Any]] = {}
+    notes, interpolated = [], False
+    for axis, dim in enumerate(first.dims):
+        lengths = [array.shape[axis] for array in arrays]
+        of_levels = [level.coords.get(dim) for level in levels]
+        found = (
+            restriction.common(dim, kind, of_levels, lengths)
+            if dim in refined and dim not in fixed
+            else restriction.same_points(dim, of_levels, lengths)
+        )
+        arrays = [r.of(a, axis) for r, a in zip(found.restrictions, arrays, strict=True)]
+        if found.coordinate is not None:
+            coords[dim] = found.coordinate
+        interpolated |= found.interpolated
+        notes += [found.note] if found.note else []
+    order = restriction.INTERPOLATION_ORDERS[kind] if interpolated else None
+    epsilon = np.array([level.epsilon for level in levels])
+    return CommonValues(np.stack(arrays), first.dims, coords, epsilon, kind, order, tuple(notes))
+
+
+def _listed(dims: Sequence[str]) -> str:
+    return ", ".join(dims) or "none (a number)"
+
+
+def _refined(known: Sequence[str], dims: Sequence[str] | None) -> Sequence[str]:
+    if dims is None:
+        return known
+    for dim in dims:
+        if dim not in known:
+            raise refused(
+                "dims", dim, f"is no dimension of the values, which have {_listed(known)}"
+            )
+    return dims
+
+
+def _transposed(level: GridValues, dims: Sequence[str]) -> Floats:
+    return np.transpose(level.values, [level.dims.index(dim) for dim in dims])
+
+
+def exact_values(exact: Any, common: CommonValues, *, members: bool = False) -> Floats:
+    """Return the exact values at the common points, shape (*points).
+
+    `exact` is a number, an array, an xarray object, or a function of the coordinates, which it gets in the order of the
+    dimensions, as arrays that can be broadcast. Where averages of cells are compared, the function is averaged over
+    each cell. Of `members` the first dimension is no coordinate of that function.
+
+    Raises
+    ------
+    InputError
+        Where it has other points, or values that are no real numbers.
+    """
+    shape = common.values.shape[1:]
+    if callable(exact):
+        found = _of_function(exact, common, common.dims[1:] if members else common.dims)
+    else:
+        given = grid_values(exact, "exact")
+        named = bool(given.coords) or set(given.dims) == set(common.dims)
+        if named and not set(given.dims) <= set(common.dims):
+            raise refused("exact", _listed(given.dims), f"the values have {_listed(common.dims)}")
+        found = given.values
+        if named:
+            inner = [dim for dim in common.dims if dim in given.dims]
+            found = _at_common_points(_transposed(given, inner), given, inner, common)
+            places = [slice(None) if dim in inner else None for dim in common.dims]
+            found = found[tuple(places)]
+    try:
+        values = np.broadcast_to(found, shape)
+    except ValueError:
+        rule = f"has shape {found.shape}, and the common points have {shape}"
+        raise refused("exact", "values", rule) from None
+    if not np.isfinite(values).all():
+        raise refused("exact", "values", "must be finite")
+    return values
+
+
+def _at_common_points(
+    values: Floats, given: GridValues, dims: Sequence[str], common: CommonValues
+) -> Floats:
+    """Take the values at the common points, where these are known."""
+    for axis, dim in enumerate(dims):
+        if dim in given.coords and dim in common.coords:
+            places = restriction.positions(common.coords[dim], given.coords[dim])
+            if places is None:
+                rule = f"must be given at the {len(common.coords[dim])} common points of the levels"
+                raise refused("exact", f"coordinates {dim}", rule)
+            values = np.take(values, places, axis)
+    return values
+
+
+def _of_function(exact: Callable[..., Any], common: CommonValues, dims: Sequence[str]) -> Floats:
+    missing = [dim for dim in dims if dim not in common.coords]
+    if missing or not dims:
+        rule = "is a function, and the values have no coordinates that it could be given"
+        hint = "give values, or xarray objects with coordinates"
+        raise refused("exact", _listed(dims), rule, hint)
+    points = [np.asarray(common.coords[dim], dtype=np.float64) for dim in dims]
+    if common.kind != "mean":
+        grids = np.meshgrid(*points, indexing="ij", sparse=True)
+        return real(np.asarray(exact(*grids)), "exact")[0]
+    nodes, weights = np.polynomial.legendre.leggauss(GAUSS)
+    flat = []
+    for x in points:
+        if len(x) < 2:
+            raise refused(
+                "exact", "a function", "cannot be averaged over a single cell", "give its average"
+            )
+        edges = np.concatenate(
+            [[1.5 * x[0] - 0.5 * x[1]], 0.5 * (x[1:] + x[:-1]), [1.5 * x[-1] - 0.5 * x[-2]]]
+        )
+        middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
+        flat.append((middle[:, None] + half[:, None] * nodes).ravel())
+    grids = np.meshgrid(*flat, indexing="ij", sparse=True)
+    found, _ = real(np.asarray(exact(*grids)), "exact")
+    found = np.broadcast_to(found, [len(x) for x in flat])
+    for axis, x in enumerate(points):
+        shape = (*found.shape[:axis], len(x), GAUSS, *found.shape[axis + 1 :])
+        found = np.tensordot(found.reshape(shape), 0.5 * weights, axes=([axis + 1], [0]))
+    return found

@@ -1,0 +1,230 @@
+"""Judge the results of any solver at several step sizes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal, overload
+
+import numpy as np
+
+from vibsim.convergence.study.assembly import verdict
+from vibsim.convergence.study.common_points import common_values, exact_values
+from vibsim.convergence.study.grid_values import GridValues, grid_values
+from vibsim.convergence.study.outcomes import Question, outcomes
+from vibsim.convergence.study.refinement import refinement
+from vibsim.convergence.study.refusal import chosen, number, refused
+from vibsim.convergence.study.restriction import RESTRICTIONS
+from vibsim.convergence.study.verdict import LadderVerdict
+
+Sizes = Sequence[float] | Mapping[str, Sequence[float]]
+Exact = Any | Callable[..., Any]
+
+
+@overload
+def judge(
+    h: Sizes,
+    values: Sequence[Any],
+    *,
+    order: float | None = None,
+    at_least: float | None = None,
+    exact: Exact | None = None,
+    noise: float | None = None,
+    restrict: str = "subset",
+    dims: Sequence[str] | None = None,
+    members: Literal[False] = False,
+) -> LadderVerdict: ...
+
+
+@overload
+def judge(
+    h: Sizes,
+    values: Sequence[Any],
+    *,
+    order: float | None = None,
+    at_least: float | None = None,
+    exact: Exact | None = None,
+    noise: float | None = None,
+    restrict: str = "subset",
+    dims: Sequence[str] | None = None,
+    members: Literal[True],
+) -> list[LadderVerdict]: ...
+
+
+def judge(
+    h: Sizes,
+    values: Sequence[Any],
+    *,
+    order: float | None = None,
+    at_least: float | None = None,
+    exact: Exact | None = None,
+    noise: float | None = None,
+    restrict: str = "subset",
+    dims: Sequence[str] | None = None,
+    members: bool = False,
+) -> LadderVerdict | list[LadderVerdict]:
+    """Judge whether results at several step sizes converge, with which order, and how large their error is.
+
+    Parameters
+    ----------
+    h
+        Step size of every level, in any order: positive, all different, in any ratio. Where several sizes are refined
+        together, a mapping from names to such lists. The order then counts powers of the first one. The others need
+        not be proportional to it, but must decrease with it.
+    values
+        The result of every level, in the order of `h`: numbers, numpy arrays of any dimension, or xarray objects.
+    order, at_least
+        The order that is expected, or the lowest one that is. Without both any order passes that may be believed.
+    exact
+        The exact result, if it is known: a number; an array or xarray object at the points that are compared; or a
+        function of the coordinates, in the order of the dimensions.
+    noise
+        How noisy each level is (an iteration that stops early, printed digits): the root mean square of the noise.
+        Without it the levels are taken to be exact up to rounding.
+    restrict
+        How levels are brought to common points. ``subset`` takes the points that all levels have: by their coordinates
+        (xarray), or by their number, of n, 2n - 1, 3n - 2, ... points from end to end or n, 2n, 3n, ... points of a
+        periodic grid. ``mean`` takes averages over the cells of the coarsest level. ``linear`` and ``cubic``
+        interpolate, with an error of order 2 or 4, so that no order from there on is believed.
+    dims
+        Names of the dimensions that are refined (``"axis 0"``, ``"axis 1"`` of numpy arrays). The others must be the
+        same on every level. Without it all are compared.
+    members
+        Whether the first dimension of each result counts members, each a ladder of its own.
+
+    Returns
+    -------
+    LadderVerdict or list of LadderVerdict
+        The verdict; with `members` one for each.
+
+    Raises
+    ------
+    InputError
+        For arguments that do not fit together; the message names the argument, its value and the rule.
+
+    Examples
+    --------
+    The midpoint rule for the integral of exp(x) from 0 to 1, with 10, 20, 40 and 80 intervals:
+
+    >>> import numpy as np
+    >>> from vibsim import judge
+    >>> def midpoint(n):
+    ...     return float(np.mean(np.exp((np.arange(n) + 0.5) / n)))
+    >>> counts = [10, 20, 40, 80]
+    >>> verdict = judge([1 / n for n in counts], [midpoint(n) for n in counts], order=2)
+    >>> verdict.status, verdict.reason
+    ('PASS', 'asymptotic')
+    >>> round(verdict.order, 2)
+    2.0
+    >>> abs(verdict.best - (np.e - 1)) < 1e-6
+    True
+
+    The error of the finest level is known without the exact value, here to two digits:
+
+    >>> f"{verdict.error:.1e}", f"{midpoint(80) - (np.e - 1):.1e}"
+    ('-1.1e-05', '-1.1e-05')
+
+    A rule of first order is told apart from it:
+
+    >>> def left(n):
+    ...     return float(np.mean(np.exp(np.arange(n) / n)))
+    >>> verdict = judge([1 / n for n in counts], [left(n) for n in counts], order=2)
+    >>> verdict.status, verdict.reason
+    ('FAIL', 'order_low')
+
+    Series and fields are compared at the points that all levels have. Euler's method for u' = -u:
+
+    >>> def euler(n):
+    ...     return (1 - 1 / n) ** np.arange(n + 1)
+    >>> verdict = judge([1 / n for n in counts], [euler(n) for n in counts], at_least=1)
+    >>> verdict.status, round(verdict.order, 1)
+    ('PASS', 1.0)
+
+    With coordinates the exact solution may be a function of them:
+
+    >>> import xarray
+    >>> def series(n):
+    ...     return xarray.DataArray(euler(n), {"t": np.linspace(0, 1, n + 1)}, ["t"], name="u")
+    >>> levels = [series(n) for n in counts]
+    >>> verdict = judge([1 / n for n in counts], levels, order=1, exact=lambda t: np.exp(-t))
+    >>> verdict.quantity, verdict.status, f"{verdict.error:.1e}"
+    ('u', 'PASS', '1.8e-03')
+
+    Faulty arguments are refused:
+
+    >>> judge([0.1, 0.05, 0.05], [1.0, 2.0, 3.0])
+    Traceback (most recent call last):
+    ...
+    vibsim.core.errors.InputError: judge: h[2]: 0.05: is the step size of level 1, too; all must differ
+    """
+    found = verdicts(
+        h,
+        values,
+        order=order,
+        at_least=at_least,
+        exact=exact,
+        noise=noise,
+        restrict=restrict,
+        dims=dims,
+        members=members,
+    )
+    return found if members else found[0]
+
+
+def verdicts(
+    h: Sizes,
+    values: Sequence[Any],
+    *,
+    quantity: str | None = None,
+    order: float | None = None,
+    at_least: float | None = None,
+    exact: Exact | None = None,
+    noise: float | None = None,
+    restrict: str = "subset",
+    dims: Sequence[str] | None = None,
+    members: bool = False,
+) -> list[LadderVerdict]:
+    """Return the verdict on each member, or on the one ladder; `quantity` is its name in words, the rest as `judge`."""
+    if order is not None and at_least is not None:
+        raise refused("order", order, "must not be given together with at_least")
+    order = None if order is None else number("order", order, above=0.0)
+    at_least = None if at_least is None else number("at_least", at_least, above=0.0)
+    noise = None if noise is None else number("noise", noise, least=0.0)
+    kind = chosen("restrict", restrict, RESTRICTIONS)
+    levels = _levels(values, members)
+    steps = refinement(h, len(levels))
+    levels = [levels[i] for i in steps.positions]
+    if isinstance(dims, str):
+        dims = [dims]
+    fixed = levels[0].dims[:1] if members else ()
+    common = common_values(levels, kind, dims, fixed)
+    truth = None if exact is None else exact_values(exact, common, members=members)
+    question = Question(quantity or levels[0].name or "u", order, at_least, noise)
+    shape, n = common.values.shape[1:], len(steps.h)
+    count, inner = (shape[0], shape[1:]) if members else (1, shape)
+    ladders = np.swapaxes(common.values.reshape(n, count, -1), 0, 1)
+    limits = None if truth is None else truth.reshape(count, -1)
+    found = outcomes(question, steps.h, ladders, common.epsilon, limits)
+    shown = common.dims[1:] if members else common.dims
+    return [
+        verdict(question, steps, common, one, (ladder.reshape(n, *inner), shown))
+        for one, ladder in zip(found, ladders, strict=True)
+    ]
+
+
+def _levels(values: Any, members: bool) -> list[GridValues]:
+    """Return the values of every level."""
+    if isinstance(values, str | Mapping):
+        raise refused(
+            "values", type(values).__name__, "must be a list with the result of every level"
+        )
+    try:
+        entries = list(values)
+    except TypeError:
+        rule = "must be a list with the result of every level"
+        raise refused("values", type(values).__name__, rule) from None
+    if not entries:
+        raise refused("values", "[]", "must hold at least one level")
+    levels = [grid_values(entry, f"values[{i}]") for i, entry in enumerate(entries)]
+    if members and not levels[0].dims:
+        raise refused("members", "True", "needs values with a first dimension that counts members")
+    return levels

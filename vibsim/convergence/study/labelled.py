@@ -1,0 +1,52 @@
+"""A verdict as a labelled dataset."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vibsim.convergence.study.verdict_data import VerdictData
+
+if TYPE_CHECKING:
+    import xarray
+
+COLUMNS = {
+    "value": "value, or norm of the values",
+    "difference": "this level minus the next finer one",
+    "ratio": "this difference over the next one",
+    "order": "order that belongs to this ratio",
+    "error": "this level minus the exact or the extrapolated values",
+}
+"""Columns of the table of levels with what they mean."""
+
+
+def dataset(verdict: VerdictData) -> xarray.Dataset:
+    """Return a verdict as a dataset over the step sizes; missing numbers are NaN, missing facts left out."""
+    import xarray
+
+    table: dict[str, Any] = {
+        name: ("h", _floats([getattr(row, name) for row in verdict.levels]), {"long_name": text})
+        for name, text in COLUMNS.items()
+    }
+    dims = tuple(f"{dim}_" if dim == "h" else dim for dim in verdict.dims)
+    coords: dict[str, Any] = {
+        "h": ("h", [row.h for row in verdict.levels], {"long_name": "step size"})
+    }
+    coords |= {
+        name: (name, verdict.coords[dim])
+        for name, dim in zip(dims, verdict.dims, strict=True)
+        if dim in verdict.coords
+    }
+    if verdict.dims:
+        meaning = {"long_name": "values at the common points of the levels"}
+        table["values"] = (("h", *dims), verdict.values, meaning)
+        if verdict.best_values is not None:
+            meaning = {"long_name": "values extrapolated over the levels"}
+            table["best_values"] = (dims, verdict.best_values, meaning)
+    facts = {key: value for key, value in verdict.to_dict().items() if value is not None}
+    return xarray.Dataset(table, coords, facts)
+
+
+def _floats(entries: list[float | None]) -> Any:
+    return np.array([np.nan if x is None else x for x in entries], dtype=np.float64)

@@ -1,0 +1,92 @@
+"""From values at common points to what the assessment needs: inner products, norms and noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vibsim.convergence.error_model.posterior import Ladder
+from vibsim.core.array_types import Flags, Floats
+
+LARGEST = 1e150
+"""Scaled values do not exceed it: their squares are numbers."""
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What was measured of the ladders of all members, in units of `scale`."""
+
+    ladder: Ladder
+    """With the leading dimension member."""
+    scale: Floats
+    """A power of two for each member, so that squares neither overflow nor vanish, shape (member,)."""
+    size: Floats
+    """Root mean square of the values of the finest level, shape (member,)."""
+    norms: Floats
+    """The same of every level, but in the units of the values, shape (member, n)."""
+    products: Floats
+    """Inner products of the differences of successive levels, shape (member, n-1, n-1)."""
+
+
+def scale_of(values: Floats) -> Floats:
+    """Return a power of two near the size of the finest level of each member, shape (member,), for (member, n, points).
+
+    It is larger where a coarse level has blown up, whose square would overflow.
+    """
+    sizes = np.max(np.abs(values), axis=2)
+    size = np.maximum(sizes[:, -1], np.max(sizes, axis=1) / LARGEST)
+    return np.asarray(np.ldexp(1.0, np.frexp(np.where(size > 0.0, size, 1.0))[1] - 1))
+
+
+def finite_levels(values: Floats) -> Flags:
+    """Tell which levels hold finite numbers only, shape (member, n)."""
+    return np.asarray(np.all(np.isfinite(values), axis=2))
+
+
+def measurement(
+    values: Floats, h: Floats, epsilon: Floats, noise: float | None, exact: Floats | None
+) -> Measurement:
+    """Return the ladder of finite values.
+
+    Parameters
+    ----------
+    values
+        Shape (member, n, points), the coarsest level first.
+    h
+        Step sizes, strictly decreasing, shape (n,).
+    epsilon
+        Relative spacing of the precision of every level, shape (n,).
+    noise
+        Root mean square of the noise of every level, as the user states it; None for round-off alone.
+    exact
+        Exact values, shape (member, points); None where they are not known.
+    """
+    scale = scale_of(values)
+    scaled = values / scale[:, None, None]
+    points = values.shape[2]
+    norms = _rms(scaled)
+    rows = scaled[:, :-1] - scaled[:, 1:]
+    if exact is not None:
+        true_error = scaled[:, -1] - exact / scale[:, None]
+        rows = np.concatenate([rows, true_error[:, None]], axis=1)
+    with np.errstate(over="ignore"):
+        gram = np.matmul(rows, np.swapaxes(rows, 1, 2)) / points
+    floor = 0.5 * epsilon * norms
+    if noise is not None:
+        floor = np.maximum(floor, noise / scale[:, None])
+    n = len(h)
+    ladder = Ladder(
+        h=h,
+        gram=gram,
+        floor=floor,
+        numbers=np.full(len(values), points == 1),
+        exact_known=exact is not None,
+    )
+    return Measurement(
+        ladder, scale, norms[:, -1], norms * scale[:, None], gram[:, : n - 1, : n - 1]
+    )
+
+
+def _rms(values: Floats) -> Floats:
+    return np.asarray(np.sqrt(np.mean(values * values, axis=-1)))

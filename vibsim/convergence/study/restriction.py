@@ -1,0 +1,311 @@
+"""Ways to bring the values of a finer level to the points of the coarsest one, along one dimension.
+
+``subset``
+    the values at points that all levels have.
+``mean``
+    averages over the cells of the coarsest level, with equal weights.
+``linear``, ``cubic``
+    interpolation by polynomials through the 2 or 4 nearest points, with an error of order 2 or 4 of its own.
+
+Each is a weighted sum: of a level of l points, m common points take ``sum_q weights[m, q] values[indices[m, q]]``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.convergence.study.refusal import refused
+from vibsim.core.array_types import Flags, Floats, Integers
+
+EQUAL = 1e-9
+"""Two points whose distance is less than this part of the spacing are one."""
+RESTRICTIONS = ("subset", "mean", "linear", "cubic")
+INTERPOLATION_ORDERS: Mapping[str, int] = MappingProxyType({"linear": 2, "cubic": 4})
+"""Of which order the error of an interpolation is, which is the number of points it takes."""
+Coordinate = NDArray[Any] | None
+"""Points of a dimension, shape (length,); None where there are none but their count."""
+
+
+@dataclass(frozen=True)
+class Restriction:
+    """Weighted sums of the values of a level along a dimension."""
+
+    indices: Integers
+    """Shape (m, q)."""
+    weights: Floats
+    """Shape (m, q)."""
+
+    def of(self, values: Floats, axis: int) -> Floats:
+        """Return the sums of `values`, whose dimension `axis` then has m points."""
+        if self.indices.shape == (values.shape[axis], 1) and np.all(
+            np.diff(self.indices[:, 0]) == 1
+        ):
+            return values
+        if self.indices.shape[1] == 1:
+            return np.take(values, self.indices[:, 0], axis)
+        taken = np.take(values, self.indices, axis)
+        weights = self.weights.reshape(self.weights.shape + (1,) * (values.ndim - axis - 1))
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.asarray(np.sum(taken * weights, axis=axis + 1))
+
+
+@dataclass(frozen=True)
+class Common:
+    """The common points of all levels along one dimension."""
+
+    restrictions: tuple[Restriction, ...]
+    """One for each level, the coarsest first."""
+    coordinate: Coordinate
+    """The common points."""
+    interpolated: bool = False
+    """Whether a value is not one of its level."""
+    note: str = ""
+    """What a reader must know of these points."""
+
+
+def common(
+    dim: str, kind: str, coordinates: Sequence[Coordinate], lengths: Sequence[int]
+) -> Common:
+    """Return the common points of the levels along a dimension, the coarsest level first.
+
+    Parameters
+    ----------
+    dim
+        Name of the dimension.
+    kind
+        One of `RESTRICTIONS`.
+    coordinates
+        Of every level; None where it has none.
+    lengths
+        Number of points of every level.
+
+    Raises
+    ------
+    InputError
+        Where the levels do not have such points.
+    """
+    known = [c is not None for c in coordinates]
+    if any(known) and not all(known):
+        raise refused(dim, "coordinates", f"level {known.index(False)} has none, others do")
+    if len(set(lengths)) == 1 and _all_equal(coordinates):
+        return _everything(coordinates[0], len(lengths), lengths[0])
+    if kind == "mean":
+        return _means(dim, coordinates[0], lengths)
+    if kind == "subset":
+        return _subset(dim, coordinates, lengths) if all(known) else _every_kth(dim, lengths)
+    points = [
+        _numeric(dim, c) if c is not None else np.linspace(0.0, 1.0, n)
+        for c, n in zip(coordinates, lengths, strict=True)
+    ]
+    return _interpolations(dim, kind, points, has_points=all(known))
+
+
+def same_points(dim: str, coordinates: Sequence[Coordinate], lengths: Sequence[int]) -> Common:
+    """Return all points of a dimension that is not refined; InputError where the levels differ in it."""
+    if len(set(lengths)) > 1:
+        rule = "must have the same points on every level, because it is none of `dims`"
+        raise refused(dim, f"lengths {list(lengths)}", rule)
+    if not _all_equal(coordinates):
+        raise refused(
+            dim, "coordinates", "must be the same on every level, because it is none of `dims`"
+        )
+    return _everything(coordinates[0], len(lengths), lengths[0])
+
+
+def spacing_tolerance(points: NDArray[Any], epsilon: float) -> float:
+    """Return how far two points may be apart that are one: a part of the spacing, and the rounding of numbers."""
+    size = float(np.max(np.abs(points)))
+    gaps = np.abs(np.diff(np.sort(points)))
+    spacing = float(np.min(gaps)) if gaps.size else size
+    return EQUAL * spacing + 8.0 * epsilon * size
+
+
+def _everything(coordinate: Coordinate, levels: int, length: int) -> Common:
+    indices = np.arange(length)[:, None]
+    one = Restriction(indices, np.ones(indices.shape))
+    return Common((one,) * levels, coordinate)
+
+
+def _all_equal(coordinates: Sequence[Coordinate]) -> bool:
+    first = coordinates[0]
+    if first is None:
+        return all(c is None for c in coordinates)
+    return all(c is not None and are_equal(first, c) for c in coordinates[1:])
+
+
+def are_equal(first: NDArray[Any], other: NDArray[Any]) -> bool:
+    """Tell whether two coordinates are the same points, but for rounding."""
+    if first.shape != other.shape:
+        return False
+    if not (_is_numeric(first) and _is_numeric(other)):
+        return bool(np.all(first == other))
+    tolerance = spacing_tolerance(first, max(_epsilon(first), _epsilon(other)))
+    return bool(np.all(np.abs(first - other) <= tolerance))
+
+
+def positions(targets: NDArray[Any], points: NDArray[Any]) -> Integers | None:
+    """Return where each target stands among some points; None where one is none of them."""
+    if not (_is_numeric(targets) and _is_numeric(points)):
+        return np.arange(len(targets)) if are_equal(targets, points) else None
+    index, distance = _nearest(targets, points)
+    tolerance = spacing_tolerance(points, max(_epsilon(targets), _epsilon(points)))
+    return index if np.all(distance <= tolerance) else None
+
+
+def _is_numeric(points: NDArray[Any]) -> bool:
+    return points.dtype.kind in "fiu"
+
+
+def _epsilon(points: NDArray[Any]) -> float:
+    """Return the relative spacing of the numbers that a coordinate consists of; whole numbers are not rounded."""
+    return float(np.finfo(points.dtype).eps) if points.dtype.kind == "f" else 0.0
+
+
+def _numeric(dim: str, points: NDArray[Any]) -> NDArray[Any]:
+    """Return points that can be compared: numbers, all different."""
+    if not _is_numeric(points):
+        raise refused(
+            dim, str(points.dtype), "its coordinates are no numbers, and differ between levels"
+        )
+    if not np.isfinite(points).all():
+        raise refused(dim, "coordinates", "must be finite")
+    if np.unique(points).size < points.size:
+        raise refused(dim, "coordinates", "must differ from each other")
+    return points
+
+
+def _every_kth(dim: str, lengths: Sequence[int]) -> Common:
+    """Return common points of levels without coordinates, by the number of points: from end to end, or periodic."""
+    first = lengths[0]
+    steps = [n - 1 for n in lengths]
+    if first > 1 and all(s % steps[0] == 0 for s in steps):
+        factors, note = [s // steps[0] for s in steps], ""
+    elif all(n % first == 0 for n in lengths):
+        factors = [n // first for n in lengths]
+        counts = ", ".join(map(str, lengths))
+        note = (
+            f"The levels have {counts} values{_along(dim)}, which were taken for those of a periodic grid: every level "
+            "begins at the same point. For averages of cells use restrict: mean."
+        )
+    else:
+        rule = "the points of the coarsest level are not among those of the finer ones"
+        hint = "give coordinates, or use restrict: linear or cubic"
+        raise refused(dim, f"lengths {list(lengths)}", rule, hint)
+    base = np.arange(first)[:, None]
+    found = tuple(Restriction(base * k, np.ones(base.shape)) for k in factors)
+    return Common(found, None, note=note)
+
+
+def _along(dim: str) -> str:
+    return "" if dim == "axis 0" else f" along {dim}"
+
+
+def _subset(dim: str, coordinates: Sequence[Coordinate], lengths: Sequence[int]) -> Common:
+    points = [_numeric(dim, c) for c in coordinates if c is not None]
+    epsilon = max(map(_epsilon, points))
+    coarse = points[0]
+    places = [np.arange(lengths[0])]
+    there: Flags = np.ones(lengths[0], dtype=bool)
+    for fine in points[1:]:
+        index, distance = _nearest(coarse, fine)
+        there &= distance <= spacing_tolerance(fine, epsilon)
+        places.append(index)
+    if not there.any():
+        rule = "the levels have no point in common"
+        raise refused(
+            dim,
+            "coordinates",
+            rule,
+            "use restrict: linear or cubic, or mean for averages of cells",
+        )
+    note = ""
+    if there.sum() < lengths[0]:
+        note = f"The levels have {there.sum()} of the {lengths[0]} points of the coarsest one in common along {dim}."
+    found = tuple(Restriction(i[there][:, None], np.ones((int(there.sum()), 1))) for i in places)
+    return Common(found, coarse[there], note=note)
+
+
+def _nearest(targets: NDArray[Any], points: NDArray[Any]) -> tuple[Integers, Floats]:
+    """Return the index of the point nearest to each target, and its distance."""
+    order = np.argsort(points)
+    ordered = points[order]
+    right = np.clip(np.searchsorted(ordered, targets), 0, len(points) - 1)
+    left = np.clip(right - 1, 0, None)
+    is_left = np.abs(targets - ordered[left]) < np.abs(targets - ordered[right])
+    found = np.where(is_left, left, right)
+    return order[found], np.abs(targets - ordered[found]).astype(np.float64)
+
+
+def _means(dim: str, coordinate: Coordinate, lengths: Sequence[int]) -> Common:
+    first = lengths[0]
+    if any(n % first for n in lengths):
+        rule = "the number of cells of a finer level must be a multiple of that of the coarsest one"
+        raise refused(
+            dim, f"lengths {list(lengths)}", rule, "or use restrict: subset, linear or cubic"
+        )
+    found = []
+    for n in lengths:
+        k = n // first
+        indices = np.arange(n).reshape(first, k)
+        found.append(Restriction(indices, np.full(indices.shape, 1.0 / k)))
+    return Common(tuple(found), coordinate)
+
+
+def _interpolations(
+    dim: str, kind: str, points: Sequence[NDArray[Any]], *, has_points: bool
+) -> Common:
+    width = INTERPOLATION_ORDERS[kind]
+    epsilon = max(map(_epsilon, points))
+    tolerances = [spacing_tolerance(p, epsilon) for p in points]
+    coarse = points[0].astype(np.float64)
+    low = max(float(p.min()) - t for p, t in zip(points, tolerances, strict=True))
+    high = min(float(p.max()) + t for p, t in zip(points, tolerances, strict=True))
+    inside = (coarse >= low) & (coarse <= high)
+    if not inside.any():
+        raise refused(dim, "coordinates", "the levels cover no common range")
+    targets = coarse[inside]
+    found = [Restriction(np.flatnonzero(inside)[:, None], np.ones((len(targets), 1)))]
+    interpolated = False
+    for fine, tolerance in zip(points[1:], tolerances[1:], strict=True):
+        if len(fine) < width:
+            raise refused(
+                dim, f"length {len(fine)}", f"{kind} interpolation needs {width} points at least"
+            )
+        weights, indices, between = _polynomials(targets, fine.astype(np.float64), width, tolerance)
+        interpolated |= between
+        found.append(Restriction(indices, weights))
+    note = ""
+    if not inside.all():
+        note = f"Of the {len(coarse)} points of the coarsest level along {dim}, {inside.sum()} lie within all levels."
+    return Common(tuple(found), targets if has_points else None, interpolated, note)
+
+
+def _polynomials(
+    targets: Floats, points: Floats, width: int, tolerance: float
+) -> tuple[Floats, Integers, bool]:
+    """Return the weights of Lagrange's polynomials through the nearest `width` points, and whether any is used.
+
+    A target that is a point takes the value there.
+    """
+    order = np.argsort(points)
+    ordered = points[order]
+    left = np.searchsorted(ordered, targets) - width // 2
+    start = np.clip(left, 0, len(points) - width)
+    stencil = start[:, None] + np.arange(width)
+    x = ordered[stencil]
+    weights = np.ones(x.shape)
+    for q in range(width):
+        for other in range(width):
+            if other != q:
+                weights[:, q] *= (targets - x[:, other]) / (x[:, q] - x[:, other])
+    distance = np.abs(x - targets[:, None])
+    nearest = np.argmin(distance, axis=1)
+    hit = np.take_along_axis(distance, nearest[:, None], axis=1)[:, 0] <= tolerance
+    weights[hit] = np.eye(width)[nearest[hit]]
+    return weights, order[stencil], not bool(hit.all())

@@ -1,0 +1,68 @@
+"""A verdict on a ladder as text for a terminal: status, sentence, advice, and the table of levels with a picture."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterator, Sequence
+
+from vibsim.convergence.study.sentences import number
+from vibsim.convergence.study.verdict_data import Level, VerdictData
+
+COLUMNS = 100
+_BAR = 24
+"""Characters of the longest bar of the picture."""
+_LEAST = 4
+
+
+def as_text(verdict: VerdictData, columns: int = COLUMNS) -> str:
+    """Return the text, wrapped to a terminal of so many columns."""
+    return "\n".join(_lines(verdict, max(columns, 40)))
+
+
+def _lines(verdict: VerdictData, columns: int) -> Iterator[str]:
+    yield f"{verdict.status}  {verdict.reason}  {verdict.quantity}"
+    for text in filter(None, (verdict.sentence, verdict.advice)):
+        yield textwrap.indent(textwrap.fill(text, columns - 2), "  ")
+    yield ""
+    rows = [_head(verdict), *(_row(level, verdict) for level in verdict.levels)]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    bars = ["", *_bars(verdict.levels)]
+    if any(bars):
+        bars[0] = "|difference|, logarithmic"
+    for row, bar in zip(rows, bars, strict=True):
+        cells = "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
+        yield f"  {cells}  {bar}".rstrip()[:columns]
+
+
+def _head(verdict: VerdictData) -> Sequence[str]:
+    value = "value" if verdict.is_number else "norm"
+    error = "error" if verdict.is_exact_known else "estimated error"
+    return verdict.size_name, value, error, "difference", "ratio", "order"
+
+
+def _row(level: Level, verdict: VerdictData) -> Sequence[str]:
+    digits = 8 if verdict.is_number else 4
+    return (
+        number(level.h, 6),
+        number(level.value, digits),
+        number(level.error, 3),
+        number(level.difference, 3),
+        number(level.ratio, 4),
+        "-" if level.order is None else f"{level.order:.2f}",
+    )
+
+
+def _bars(levels: Sequence[Level]) -> list[str]:
+    """Return a bar for each level, as long as the logarithm of its difference; empty without at least two."""
+    sizes = [abs(level.difference) if level.difference else 0.0 for level in levels]
+    logs = [math.log10(size) if size > 0.0 else math.nan for size in sizes]
+    known = [x for x in logs if not math.isnan(x)]
+    if len(known) < 2:
+        return [""] * len(levels)
+    low, high = min(known), max(known)
+    span = max(high - low, 1e-300)
+    return [
+        "" if math.isnan(x) else "#" * (_LEAST + round((_BAR - _LEAST) * (x - low) / span))
+        for x in logs
+    ]

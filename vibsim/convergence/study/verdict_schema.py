@@ -1,0 +1,54 @@
+"""The JSON Schema of what ``vibsim judge --json`` prints, and of ``verdict.json`` beside its report."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from vibsim.convergence.study.verdict_data import KEYS
+from vibsim.core.vocabulary import FORMAT, REASON_NAMES, STATUSES
+
+NUMBERS = {
+    "order": "observed order; a number wherever three levels give an estimate, whatever the status",
+    "order_low": "lower end of its interval of 95 %",
+    "order_high": "upper end of its interval of 95 %",
+    "error": "error of the finest level: computed minus exact of a number, root mean square of a series or field",
+    "error_bound": "what the size of that error does not exceed, in 95 % of such ladders",
+    "best": "number extrapolated over the levels; null of a series or field",
+    "best_bound": "what the error of `best` does not exceed",
+    "gci": "grid convergence index of the finest level, relative, with safety factor 1.25",
+}
+"""Numbers of a verdict with what they mean; null where the levels do not tell them."""
+TEXTS = {
+    "quantity": "name of the column or the variable",
+    "sentence": "what was found, in words",
+    "advice": "what to do about it; empty where nothing is to be done",
+}
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12)."""
+    fields: dict[str, Any] = {
+        name: {"type": ["number", "null"], "description": text} for name, text in NUMBERS.items()
+    }
+    fields |= {name: {"type": "string", "description": text} for name, text in TEXTS.items()}
+    fields["status"] = {"enum": list(STATUSES)}
+    fields["reason"] = {"enum": list(REASON_NAMES)}
+    meaning = "step sizes of the levels that the order rests on, the coarsest first"
+    fields["h_used"] = {"type": "array", "items": {"type": "number"}, "description": meaning}
+    verdict = {
+        "type": "object",
+        "properties": {key: fields[key] for key in KEYS},
+        "required": list(KEYS),
+        "additionalProperties": False,
+    }
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "verdicts of vibsim judge",
+        "type": "object",
+        "properties": {
+            "vibsim_format": {"const": FORMAT},
+            "verdicts": {"type": "array", "items": verdict},
+        },
+        "required": ["vibsim_format", "verdicts"],
+        "additionalProperties": False,
+    }

@@ -1,0 +1,143 @@
+"""The page on ladders that any solver computed: one file that opens anywhere, and the verdicts as JSON beside it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from vibsim import store
+from vibsim.convergence import LadderVerdict
+from vibsim.convergence.study.figure import convergence_figure, shows_curves
+from vibsim.core.vocabulary import worst
+from vibsim.report import style
+from vibsim.report.page.page import environment
+from vibsim.report.style import Picture
+from vibsim.report.tables.table import Column, Table
+from vibsim.report.text import words
+
+UNSEEN = (
+    "Levels can agree with each other and still approach a wrong answer. Only an exact solution shows that, and none "
+    "was given."
+)
+CAPTION = (
+    "Both axes are logarithmic: an error of order p is a line of slope p. The dashed line has the "
+    "{word} slope {order}."
+)
+CURVES = (
+    "On the right, each difference of two levels is rescaled to the error that it predicts for the finest level. The "
+    "curves coincide where the error has order {order}."
+)
+
+
+def write(
+    verdicts: Sequence[LadderVerdict],
+    sources: Sequence[Sequence[str]],
+    directory: Path,
+    content: Mapping[str, Any],
+) -> None:
+    """Write ``report.html`` and ``verdict.json``.
+
+    Parameters
+    ----------
+    verdicts
+        One for each quantity.
+    sources
+        Names of the files that each was read from.
+    directory
+        Folder to write to; it is made.
+    content
+        The verdicts as the command prints them.
+    """
+    cards = [
+        _card(i, verdict, files)
+        for i, (verdict, files) in enumerate(zip(verdicts, sources, strict=True))
+    ]
+    status = worst(verdict.status for verdict in verdicts)
+    context = {"status": status, "sentence": _overall(verdicts), "cards": cards}
+    page = environment().get_template("study.html").render(context)
+    store.write_text(directory / "report.html", page)
+    text = json.dumps(content, indent=1, ensure_ascii=False)
+    store.write_text(directory / "verdict.json", text + "\n")
+
+
+def _overall(verdicts: Sequence[LadderVerdict]) -> str:
+    """Return the verdict on several quantities."""
+    passed = [verdict.status for verdict in verdicts].count("PASS")
+    return f"{passed} of {len(verdicts)} quantities passed."
+
+
+def _card(i: int, verdict: LadderVerdict, files: Sequence[str]) -> dict[str, Any]:
+    """Return what the page shows of a quantity."""
+    asked = "no order, so any that may be believed passes"
+    if verdict.expected is not None:
+        asked = f"order {verdict.expected:g}"
+    elif verdict.at_least is not None:
+        asked = f"order {verdict.at_least:g} at least"
+    rows = [
+        ("Expected", asked),
+        ("Order", _order(verdict)),
+        ("Levels used", ", ".join(words.number(h, "step") for h in verdict.h_used) or "–"),
+        ("Error of the finest level", words.number(verdict.error, "small")),
+        ("Its bound (95 %)", words.number(verdict.error_bound, "small")),
+        ("Relative error", words.number(verdict.relative_error, "small")),
+        ("Extrapolated value", words.number(verdict.best, "full")),
+        ("Its bound", words.number(verdict.best_bound, "small")),
+        ("Grid convergence index", words.number(verdict.gci, "small")),
+        ("Reason", verdict.reason),
+        ("Files" if len(files) > 1 else "File", ", ".join(files)),
+    ]
+    return {
+        "verdict": verdict,
+        "facts": rows,
+        "table": _table(verdict),
+        "picture": _picture(i, verdict),
+        "doubt": UNSEEN if verdict.status == "PASS" and not verdict.is_exact_known else "",
+    }
+
+
+def _order(verdict: LadderVerdict) -> str:
+    text = words.number(verdict.order, "order")
+    interval = words.interval((verdict.order_low, verdict.order_high))
+    return text if interval == "–" else f"{text} ({interval})"
+
+
+def _table(verdict: LadderVerdict) -> Table:
+    """Return the table of levels."""
+    value = "value" if verdict.is_number else "norm"
+    columns = (
+        Column(verdict.size_name, form="step"),
+        Column(value, form="full"),
+        Column("error" if verdict.is_exact_known else "estimated error", form="small"),
+        Column("difference", form="small"),
+        Column("ratio", form="norm"),
+        Column("order", form="order"),
+    )
+    rows = tuple(
+        (row.h, row.value, row.error, row.difference, row.ratio, row.order)
+        for row in verdict.levels
+    )
+    caption = (
+        "Levels, the coarsest first. The difference is that to the next finer level, the ratio is this difference over "
+        "the next one, and the order follows from the ratio and the step sizes."
+    )
+    if not verdict.is_number:
+        caption += " Norms are root mean squares over the common points."
+    return Table("levels", caption, columns, rows)
+
+
+def _picture(i: int, verdict: LadderVerdict) -> Picture:
+    """Return the figure of a verdict with its caption."""
+    asked = verdict.expected or verdict.at_least
+    order = asked or verdict.order
+    caption = ""
+    if order is not None and order > 0.0:
+        word = "expected" if asked else "observed"
+        caption = CAPTION.format(word=word, order=f"{order:.3g}")
+        if shows_curves(verdict):
+            caption += " " + CURVES.format(order=f"{order:.3g}")
+    alt = f"Error and difference of {verdict.quantity} against {verdict.size_name}. {verdict.sentence}"
+    with style.applied():
+        figure = convergence_figure(verdict)
+    return Picture(f"study-{i}", "", caption, alt, figure)
