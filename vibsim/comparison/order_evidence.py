@@ -10,6 +10,7 @@ times that all lie at turning points (Dt = pi/w after a release from rest) there
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING
@@ -19,10 +20,11 @@ import numpy as np
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, norm_of_floor
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.comparison.thresholds import STRAIGHT, THEORY_ROUNDING, VANISHING_RATE
+from vibsim.convergence.batches import batches
 from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.convergence.ladder_statistics import Evidence, at_rest, floor_of_pairs, unresolved
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING
-from vibsim.convergence.verdict import Judgement, judge
+from vibsim.convergence.verdict import Judgement, judge, judge_together
 from vibsim.core.array_types import Codes, Flags, Floats
 from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE, REASON_NAMES
 from vibsim.models import ENERGIES
@@ -47,6 +49,15 @@ ROUGH = ("pre_asymptotic", "non_smooth")
 """What is said where the force has a pulse that no level sees."""
 
 
+def judge_promised(quantities: Iterable[Comparison]) -> None:
+    """Judge quantities by the orders that their schemes promise, in every norm; `judgement` returns what was found."""
+    due = [(q, norm) for q in quantities for norm in q.block.norms if norm not in q.judged]
+    for part in batches(due, math.prod(due[0][0].block.shape) if due else 0):
+        found = judge_together([evidence(q, norm, q.order, ORDER_TOLERANCE) for q, norm in part])
+        for (q, norm), judged in zip(part, found, strict=True):
+            q.judged[norm] = judged
+
+
 def judgement(q: Comparison, norm: str) -> Judgement:
     """Judge a quantity by the order that its scheme promises."""
     if norm not in q.judged:
@@ -56,9 +67,10 @@ def judgement(q: Comparison, norm: str) -> Judgement:
 
 def judge_check(q: Comparison, check: ConvergesCheck) -> Judgement:
     """Judge a quantity as a check asks for it."""
-    if check.order == "scheme" and check.tolerance == ORDER_TOLERANCE:
+    order = order_of(q, check)
+    if check.tolerance == ORDER_TOLERANCE and np.all(order == q.order):
         return judgement(q, check.norm)
-    return judge(evidence(q, check.norm, order_of(q, check), check.tolerance))
+    return judge(evidence(q, check.norm, order, check.tolerance))
 
 
 def order_of(q: Comparison, check: ConvergesCheck) -> Floats:
