@@ -11,9 +11,11 @@ times that all lie at turning points (Dt = pi/w after a release from rest) there
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from itertools import groupby
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -51,11 +53,18 @@ ROUGH = ("pre_asymptotic", "non_smooth")
 
 def judge_promised(quantities: Iterable[Comparison]) -> None:
     """Judge quantities by the orders that their schemes promise, in every norm; `judgement` returns what was found."""
-    due = [(q, norm) for q in quantities for norm in q.block.norms if norm not in q.judged]
-    for part in batches(due, math.prod(due[0][0].block.shape) if due else 0):
-        found = judge_together([evidence(q, norm, q.order, ORDER_TOLERANCE) for q, norm in part])
-        for (q, norm), judged in zip(part, found, strict=True):
-            q.judged[norm] = judged
+    due = {(q.name, norm): q for q in quantities for norm in q.block.norms if norm not in q.judged}
+    if not due:
+        return
+    ladders = math.prod(next(iter(due.values())).block.shape)
+    for part in batches(list(due), ladders):
+        rows: list[Evidence] = []
+        for name, same in groupby(part, key=itemgetter(0)):
+            norms = [norm for _, norm in same]
+            q = due[name, norms[0]]
+            rows += evidences(q, norms, q.order, ORDER_TOLERANCE)
+        for key, judged in zip(part, judge_together(rows), strict=True):
+            due[key].judged[key[1]] = judged
 
 
 def judgement(q: Comparison, norm: str) -> Judgement:
@@ -80,9 +89,15 @@ def order_of(q: Comparison, check: ConvergesCheck) -> Floats:
 
 def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evidence:
     """Collect the evidence on a quantity in a norm, for the order that is expected, shape (scheme, 1 or case)."""
-    block, measured = q.block, q.in_norm(norm)
+    return evidences(q, (norm,), order, tolerance)[0]
+
+
+def evidences(
+    q: Comparison, norms: Sequence[str], order: Floats, tolerance: float
+) -> list[Evidence]:
+    """Collect the evidence on a quantity in several norms; see `evidence`."""
+    block = q.block
     grid, shape = block.grid, block.shape
-    points = len(grid.t)
     size, exists = largest(q.values[-1]), np.ones(shape, dtype=bool)
     if not np.all(np.isfinite(size)):
         # of a member that has broken down, what there is of it
@@ -92,12 +107,6 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
         # what is left of an energy is known no better than the energy, and a part of an error no better than the motion
         size = q.scale
 
-    def in_norm(noise: Floats) -> Floats:
-        return norm_of_floor(noise, norm, points, grid.spacing)
-
-    def by_level(noise: Floats) -> Floats:
-        return np.moveaxis(in_norm(np.moveaxis(noise, -1, 0)), 0, -1)
-
     def all_cases(values: Floats) -> Floats:
         return np.broadcast_to(values, shape)
 
@@ -106,38 +115,50 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
     worst = SPACING_AT_ONE * steps**2 * (q.scale * block.magnified)[..., None]
     # where nothing oscillates, no order is promised of a part of an error
     promised = ~block.adaptive[:, None] & ~np.isnan(order)
-    return Evidence(
-        levels=grid.levels,
-        order=all_cases(order),
-        tolerance=tolerance,
-        difference=measured.difference,
-        scatter=measured.scatter,
-        floor=by_level(q.floor),
-        ceiling=by_level(np.maximum(worst, q.floor)),
-        relative_floor=all_cases(block.relative_floor[..., 0]),
-        size=in_norm(size),
-        error=measured.error,
-        error_scatter=measured.error_scatter,
-        blur=by_level(q.blur),
-        promised=all_cases(q.order),
-        special=all_cases(q.special),
-        combined=partial(q.combined, norm),
-        numbers=q.are_numbers,
-        failed=block.failed,
-        applicable=(exists | np.any(block.failed, axis=-1)) & promised,
-        omega_dt=np.broadcast_to(block.fastest, (*shape, len(grid.levels))),
-        stability_limit=all_cases(block.stability_limit),
-        span=all_cases(block.omega_dt[:, 0] * float(grid.steps[0])),
-        steps=float(grid.steps[0]),
-        moved=moved,
-        straight=straight,
-        left_to_the_mesh=all_cases(block.left_to_the_mesh),
-        corner=block.corners.power,
-        missed=np.broadcast_to(np.isfinite(block.missed.time), shape),
-        jumps=np.broadcast_to(block.missed.jumps, shape),
-        decay=block.decay * block.group.end / grid.steps[-1],
-        growth=block.growth,
-    )
+    same: dict[str, Any] = {
+        "levels": grid.levels,
+        "order": all_cases(order),
+        "tolerance": tolerance,
+        "relative_floor": all_cases(block.relative_floor[..., 0]),
+        "promised": all_cases(q.order),
+        "special": all_cases(q.special),
+        "numbers": q.are_numbers,
+        "failed": block.failed,
+        "applicable": (exists | np.any(block.failed, axis=-1)) & promised,
+        "omega_dt": np.broadcast_to(block.fastest, (*shape, len(grid.levels))),
+        "stability_limit": all_cases(block.stability_limit),
+        "span": all_cases(block.omega_dt[:, 0] * float(grid.steps[0])),
+        "steps": float(grid.steps[0]),
+        "moved": moved,
+        "straight": straight,
+        "left_to_the_mesh": all_cases(block.left_to_the_mesh),
+        "corner": block.corners.power,
+        "missed": np.broadcast_to(np.isfinite(block.missed.time), shape),
+        "jumps": np.broadcast_to(block.missed.jumps, shape),
+        "decay": block.decay * block.group.end / grid.steps[-1],
+        "growth": block.growth,
+    }
+    ceiling = np.maximum(worst, q.floor)
+    found = []
+    for norm in norms:
+        measured = q.in_norm(norm)
+        # noise of size 1 at every point
+        weight = norm_of_floor(np.ones(1), norm, len(grid.t), grid.spacing)
+        found.append(
+            Evidence(
+                difference=measured.difference,
+                scatter=measured.scatter,
+                floor=q.floor * weight[:, None],
+                ceiling=ceiling * weight[:, None],
+                size=size * weight,
+                error=measured.error,
+                error_scatter=measured.error_scatter,
+                blur=q.blur * weight[:, None],
+                combined=partial(q.combined, norm),
+                **same,
+            )
+        )
+    return found
 
 
 def _motion(q: Comparison, order: Floats, size: Floats) -> tuple[Floats, Flags]:
