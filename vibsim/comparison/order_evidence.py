@@ -51,40 +51,61 @@ ROUGH = ("pre_asymptotic", "non_smooth")
 """What is said where the force has a pulse that no level sees."""
 
 
-def judge_promised(quantities: Iterable[Comparison]) -> None:
-    """Judge quantities by the orders that their schemes promise, in every norm; `judgement` returns what was found."""
-    due = {(q.name, norm): q for q in quantities for norm in q.block.norms if norm not in q.judged}
-    if not due:
-        return
-    ladders = math.prod(next(iter(due.values())).block.shape)
-    for part in batches(list(due), ladders):
+def judge_orders(quantities: Mapping[str, Comparison], checks: Iterable[ConvergesCheck]) -> None:
+    """Judge quantities in every norm by the orders that their schemes promise, and by those that checks expect.
+
+    `judgement` and `judge_check` return what was found.
+    """
+    due: list[tuple[str, float | str, str]] = [
+        (q.name, "scheme", norm) for q in quantities.values() for norm in q.block.norms
+    ]
+    due += [
+        (check.converges, check.order, check.norm)
+        for check in checks
+        if not _is_promised(quantities[check.converges], check) and _is_usual(check)
+    ]
+    due = list(dict.fromkeys(due))
+    ladders = math.prod(quantities[due[0][0]].block.shape) if due else 0
+    for part in batches(due, ladders):
         rows: list[Evidence] = []
-        for name, same in groupby(part, key=itemgetter(0)):
-            norms = [norm for _, norm in same]
-            q = due[name, norms[0]]
-            rows += evidences(q, norms, q.order, ORDER_TOLERANCE)
-        for key, judged in zip(part, judge_together(rows), strict=True):
-            due[key].judged[key[1]] = judged
+        for (name, order), same in groupby(part, key=itemgetter(0, 1)):
+            q, norms = quantities[name], [norm for *_, norm in same]
+            rows += evidences(q, norms, _order(q, order), ORDER_TOLERANCE)
+        for (name, order, norm), judged in zip(part, judge_together(rows), strict=True):
+            quantities[name].judged[norm, order] = judged
 
 
-def judgement(q: Comparison, norm: str) -> Judgement:
-    """Judge a quantity by the order that its scheme promises."""
-    if norm not in q.judged:
-        q.judged[norm] = judge(evidence(q, norm, q.order, ORDER_TOLERANCE))
-    return q.judged[norm]
+def judgement(q: Comparison, norm: str, order: float | str = "scheme") -> Judgement:
+    """Judge a quantity by the order that its scheme promises, or by another one."""
+    if (norm, order) not in q.judged:
+        found = judge(evidence(q, norm, _order(q, order), ORDER_TOLERANCE))
+        q.judged[norm, order] = found
+    return q.judged[norm, order]
 
 
 def judge_check(q: Comparison, check: ConvergesCheck) -> Judgement:
     """Judge a quantity as a check asks for it."""
-    order = order_of(q, check)
-    if check.tolerance == ORDER_TOLERANCE and np.all(order == q.order):
-        return judgement(q, check.norm)
-    return judge(evidence(q, check.norm, order, check.tolerance))
+    if not _is_usual(check):
+        return judge(evidence(q, check.norm, order_of(q, check), check.tolerance))
+    return judgement(q, check.norm, "scheme" if _is_promised(q, check) else check.order)
+
+
+def _is_usual(check: ConvergesCheck) -> bool:
+    return check.tolerance == ORDER_TOLERANCE
+
+
+def _is_promised(q: Comparison, check: ConvergesCheck) -> bool:
+    """Tell whether a check expects of every scheme and member the order that is promised."""
+    return check.order == "scheme" or bool(np.all(order_of(q, check) == q.order))
 
 
 def order_of(q: Comparison, check: ConvergesCheck) -> Floats:
     """Return the order that a check expects of a quantity, which broadcasts against (scheme, case)."""
-    return q.order if check.order == "scheme" else np.full((1, 1), float(check.order))
+    return _order(q, check.order)
+
+
+def _order(q: Comparison, order: float | str) -> Floats:
+    return q.order if order == "scheme" else np.full((1, 1), float(order))
 
 
 def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evidence:
