@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import sys
+from functools import cache
 
 import numpy as np
 import pytest
@@ -28,13 +29,20 @@ def storage(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
     return str(request.param)
 
 
+@cache
+def made(name: str, storage: str) -> tuple[dict[int, Record], Record]:
+    """Return the levels of a sweep, and what was found of it, in the storage that the test has set."""
+    records = simulated(SWEEPS[name])
+    whole = analyse_records(SWEEPS[name], records)
+    assert whole.attrs["storage"] == storage
+    return records, whole
+
+
 @pytest.mark.parametrize("name", SWEEPS)
 def test_parts_and_threads_change_no_bit(name: str, storage: str) -> None:
     """Parts of one member on threads, and parts that the members do not divide evenly one after the other."""
     experiment = SWEEPS[name]
-    records = simulated(experiment)
-    whole = analyse_records(experiment, records)
-    assert whole.attrs["storage"] == storage
+    records, whole = made(name, storage)
     for size, threads in ((1, 3), (5, 1)):
         assert_same_bytes(analysed(experiment, records, size, threads), whole)
 
@@ -44,7 +52,8 @@ def test_a_member_alone_has_the_numbers_and_verdicts_that_it_has_in_the_sweep(
     name: str, storage: str
 ) -> None:
     experiment = SWEEPS[name]
-    whole = analyse_records(experiment, simulated(experiment))
+    _, whole = made(name, storage)
+    expected = verdicts(experiment, whole)
     # every third: of a grid of 7 by 4 that is every value of both
     for case in range(0, experiment.members, 3 if experiment.members > 12 else 1):
         alone = experiment.alone(case)
@@ -53,7 +62,7 @@ def test_a_member_alone_has_the_numbers_and_verdicts_that_it_has_in_the_sweep(
         for key, variable in same.variables.items():
             one = found.variables[key].values
             assert np.array_equal(one.ravel(), variable.values.ravel(), equal_nan=True), key
-        for verdict, check in zip(verdicts(alone, found), verdicts(experiment, whole), strict=True):
+        for verdict, check in zip(verdicts(alone, found), expected, strict=True):
             own = {r.scheme: r for r in check.results if r.case == case}
             for result in verdict.results:
                 assert result.reason == own[result.scheme].reason
@@ -64,9 +73,9 @@ def test_a_member_alone_has_the_numbers_and_verdicts_that_it_has_in_the_sweep(
 @pytest.mark.parametrize("name", SWEEPS)
 def test_bounded_storage_changes_no_number(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     experiment = SWEEPS[name]
-    full = analyse_records(experiment, simulated(experiment))
+    _, full = made(name, "series")
     monkeypatch.setattr("vibsim.experiment.storage.LEAN", 0)
-    lean = analyse_records(experiment, simulated(experiment))
+    _, lean = made(name, "lean")
     assert not any("t" in variable.dims for variable in lean.variables.values())
     assert lean.words("norm") == ["l1", "l2", "linf"]
     kinds = [full.words("norm").index(norm) for norm in lean.words("norm")]
@@ -144,8 +153,7 @@ def test_what_bounded_storage_keeps_of_a_member(monkeypatch: pytest.MonkeyPatch)
 
 def test_verdicts_need_only_what_is_kept_of_parts() -> None:
     experiment = SWEEPS["ends"]
-    records = simulated(experiment)
-    whole = analyse_records(experiment, records)
+    _, whole = made("ends", "series")
     thin: list[Record] = []
     (part,) = kept(experiment, [whole], thin)
     assert part is whole
@@ -157,9 +165,9 @@ def test_verdicts_need_only_what_is_kept_of_parts() -> None:
 
 def test_a_failure_has_its_step_where_storage_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     experiment = SWEEPS["ends"]
-    full = analyse_records(experiment, simulated(experiment))
+    _, full = made("ends", "series")
     monkeypatch.setattr("vibsim.experiment.storage.LEAN", 0)
-    lean = analyse_records(experiment, simulated(experiment))
+    _, lean = made("ends", "lean")
     assert "last_step" in full
     assert "last_step" not in lean
     of_full, of_lean = (
@@ -171,7 +179,7 @@ def test_a_failure_has_its_step_where_storage_is_bounded(monkeypatch: pytest.Mon
 
 def test_options_that_are_swept_give_each_member_the_promises_of_its_own_scheme() -> None:
     experiment = SWEEPS["options"]
-    record = analyse_records(experiment, simulated(experiment))
+    _, record = made("options", "series")
     assert record.variables["theta_formal_order"].dims == ("scheme", "case")
     arithmetic = record["schemes_central_arithmetic"]
     floor = record["theta_floor"][0, :, -1]
@@ -189,7 +197,7 @@ def test_options_that_are_swept_give_each_member_the_promises_of_its_own_scheme(
 
 def test_swept_words_are_as_wide_in_every_part() -> None:
     experiment = SWEEPS["options"]
-    records = simulated(experiment)
+    records, _ = made("options", "series")
     found = set()
     for case in range(experiment.members):
         one = {level: cut(record, case, case + 1) for level, record in records.items()}
@@ -204,8 +212,7 @@ def test_swept_words_are_as_wide_in_every_part() -> None:
 
 
 def test_verdicts_are_refused_where_the_checks_changed() -> None:
-    experiment = SWEEPS["grid"]
-    record = analyse_records(experiment, simulated(experiment))
+    _, record = made("grid", "series")
     other = [dict(check, id=f"check_{i + 1}") for i, check in enumerate(CHECKS)]
     other[0]["tolerance"] = 0.2
     changed = of({"initial.theta": [1.0]}, checks=other)
@@ -216,7 +223,7 @@ def test_verdicts_are_refused_where_the_checks_changed() -> None:
 @pytest.mark.filterwarnings("ignore:.*:FutureWarning")
 def test_a_grid_unstacks_with_one_call(storage: str) -> None:
     experiment = SWEEPS["grid"]
-    records = simulated(experiment)
+    records, _ = made("grid", storage)
     data = analyse(experiment, [record.to_xarray() for record in records.values()])
     grid = data.set_index(case=["initial_theta", "initial_omega"]).unstack("case")
     assert grid.theta_order.dims == ("scheme", "norm", "initial_theta", "initial_omega")

@@ -10,7 +10,8 @@ import pytest
 from ladders import T, Truth, evidence_of, evidence_with, random_truth, shape_in_time
 
 from vibsim.convergence import ladder_statistics
-from vibsim.convergence.verdict import judge
+from vibsim.convergence.batches import LADDERS, batches
+from vibsim.convergence.verdict import judge, judge_together
 from vibsim.core.vocabulary import NORMS, REASON_NAMES, STATUSES
 
 EXACT = np.cos(T)
@@ -390,3 +391,49 @@ def test_a_change_that_scatter_does_not_explain_is_no_round_off() -> None:
 
 def test_three_levels_must_be_proportional_however_wide_the_tolerance() -> None:
     assert from_orders([2.02], [0.2], tolerance=0.5) == UNDECIDED
+
+
+def test_ladders_judged_together_are_judged_as_alone() -> None:
+    rng = np.random.default_rng(11)
+    groups: dict[tuple[int, ...], list[Truth]] = {}
+    for _ in range(120):
+        truth = random_truth(rng)
+        groups.setdefault(truth.levels, []).append(truth)
+    seen, hidden = set(), 0
+    for levels, truths in groups.items():
+        rows = []
+        for i, truth in enumerate(truths):
+            # of every second one the promised order may be hidden: each is to be asked for its own combinations
+            part = np.inf if i % 2 else 0.0
+            own = evidence_of(
+                truth.fields,
+                levels,
+                order=float(rng.integers(1, 4)),
+                norm=str(rng.choice(NORMS)),
+                floor=truth.floor,
+                exact=truth.exact if i % 3 else None,
+                promised=np.array([max(truth.orders[0] - 1.0, 1.0)]),
+                special=np.array([9.0]),
+                combined=lambda which, pair, weights, part=part: np.full(which.sum(), part),
+            )
+            rows.append(own)
+        alone = [judge(row) for row in rows]
+        open_ = [judge(dataclasses.replace(row, special=row.promised)) for row in rows]
+        for one, other, free in zip(judge_together(rows), alone, open_, strict=True):
+            for field in dataclasses.fields(one):
+                found, expected = getattr(one, field.name), getattr(other, field.name)
+                assert found.dtype == expected.dtype
+                np.testing.assert_array_equal(found, expected, strict=True)
+            seen.add(int(one.reason[0]))
+            hidden += int(other.reason[0] != free.reason[0])
+    assert len(seen) > 5
+    assert hidden > 3
+
+
+@pytest.mark.parametrize("ladders", [0, 1, 7, LADDERS - 1, LADDERS, 3 * LADDERS])
+def test_batches_hold_every_row_once_and_few_ladders(ladders: int) -> None:
+    rows = tuple(range(31))
+    found = [list(part) for part in batches(rows, ladders)]
+    assert [row for part in found for row in part] == list(rows)
+    assert all(len(part) == 1 or len(part) * ladders <= LADDERS for part in found)
+    assert not list(batches((), ladders))

@@ -173,6 +173,7 @@ def tried(seed: int) -> list[Tried]:
     for group in groups(seed):
         steps = 2.0 ** np.array(group.levels)
         floor = EPSILON * np.maximum(0.5 * steps ** GROWTH[group.arithmetic], 1.0)
+        rows = []
         for one in group.ladders:
             times = [-1]
             if one.family != "scalar":
@@ -181,19 +182,19 @@ def tried(seed: int) -> list[Tried]:
             value = rng.uniform(-1.0, 1.0)
             p = one.order if np.isfinite(one.order) else min(one.orders)
             p = float(rng.choice([1, 2, 4])) if rng.random() < 0.3 else p
-            count = len(times)
-            best = limit(
-                value - errors,
-                group.levels,
-                np.full(count, p),
-                np.full(count, one.family == "even"),
-                np.broadcast_to(floor, errors.shape),
-            )
-            for k in range(count):
-                off, finest = abs(best.value[k] - value), abs(errors[k, -1])
-                found.append(
-                    Tried(one.family, len(group.levels), off, float(best.bound[k]), finest)
-                )
+            rows += [(one.family, value, p, error) for error in errors]
+        families, value, p, errors = (np.array(column) for column in zip(*rows, strict=True))
+        best = limit(
+            value[:, None] - errors,
+            group.levels,
+            p,
+            families == "even",
+            np.broadcast_to(floor, errors.shape),
+        )
+        off, finest = np.abs(best.value - value), np.abs(errors[:, -1])
+        numbers = (column.tolist() for column in (families, off, best.bound, finest))
+        for family, *of_one in zip(*numbers, strict=True):
+            found.append(Tried(family, len(group.levels), *of_one))
     print(table(found))
     return found
 
@@ -256,12 +257,13 @@ def test_bounds_hold_where_levels_were_left_out() -> None:
         floor = EPSILON * np.maximum(
             0.5 * (2.0 ** np.array(levels)) ** GROWTH[group.arithmetic], 1.0
         )
-        for one in group.ladders:
-            error = one.errors[kept][:, -1]
-            p = one.order if np.isfinite(one.order) else min(one.orders)
-            value, bound, *_ = run(0.37 - error, levels, p, one.family == "even", floor)
-            if np.isfinite(bound):
-                held.append(abs(value - 0.37) <= bound + ROUNDING)
+        errors = np.array([one.errors[kept][:, -1] for one in group.ladders])
+        p = [one.order if np.isfinite(one.order) else min(one.orders) for one in group.ladders]
+        even = np.array([one.family == "even" for one in group.ladders])
+        floors = np.broadcast_to(floor, errors.shape)
+        best = limit(0.37 - errors, levels, np.array(p), even, floors)
+        known = np.isfinite(best.bound)
+        held += (np.abs(best.value - 0.37) <= best.bound + ROUNDING)[known].tolist()
     assert len(held) > 1000
     assert np.mean(held) >= COVERS
 

@@ -12,7 +12,10 @@ FALLING = {"kind": "oscillator", "spring": "0", "force": "1"}
 SPRING = {"kind": "spring", "w": 2.0}
 
 
-def judged(model: dict[str, Any], initial: dict[str, Any], scheme: Any, quantity: str) -> Any:
+def judged(
+    model: dict[str, Any], initial: dict[str, Any], scheme: Any, *quantities: str
+) -> list[Any]:
+    """Return the verdicts on the orders of quantities."""
     content = {
         "title": "still",
         "model": model,
@@ -20,12 +23,11 @@ def judged(model: dict[str, Any], initial: dict[str, Any], scheme: Any, quantity
         "time": {"end": 10.0},
         "levels": [6, 7, 8, 9],
         "schemes": [scheme],
-        "checks": [{"converges": quantity}],
+        "checks": [{"converges": quantity} for quantity in quantities],
     }
     experiment = Experiment.from_dict(content)
     levels = [simulate(experiment, level) for level in experiment.levels]
-    (found,) = verdicts(experiment, analyse(experiment, levels))
-    return found
+    return list(verdicts(experiment, analyse(experiment, levels)))
 
 
 def damped(b: float) -> dict[str, Any]:
@@ -60,8 +62,9 @@ def damped(b: float) -> dict[str, Any]:
 def test_what_lies_still_is_not_exact(
     model: dict[str, Any], initial: dict[str, Any], scheme: str, quantities: list[str]
 ) -> None:
-    for quantity in quantities:
-        found = judged(model, initial, scheme, quantity)
+    for quantity, found in zip(
+        quantities, judged(model, initial, scheme, *quantities), strict=True
+    ):
         assert (found.status, found.reason) == ("INCONCLUSIVE", "not_applicable")
         assert f"{quantity} does not change" in found.text
         assert "`initial:`" in found.advice
@@ -78,17 +81,19 @@ def test_what_lies_still_is_not_exact(
 def test_an_exact_scheme_of_a_motion_is_exact(
     model: dict[str, Any], initial: dict[str, Any], scheme: str, quantities: list[str]
 ) -> None:
-    for quantity in quantities:
-        found = judged(model, initial, scheme, quantity)
+    found_of_all = judged(model, initial, scheme, *quantities)
+    assert len(found_of_all) == len(quantities)
+    for found in found_of_all:
         assert (found.status, found.reason) == ("PASS", "exact"), found.text
 
 
 def test_a_scheme_that_is_exact_on_the_spring_stays_exact() -> None:
     scheme = {"kind": "central", "frequency_correction": True}
     short = {"kind": "spring", "w": 0.01}
-    found = judged(short, {"u": 1.0}, "crank_nicolson", "energy_deviation")
+    (found,) = judged(short, {"u": 1.0}, "crank_nicolson", "energy_deviation")
     assert found.reason == "exact"
-    assert judged(SPRING, {"u": 1.0}, scheme, "u").status == "PASS"
+    (found,) = judged(SPRING, {"u": 1.0}, scheme, "u")
+    assert found.status == "PASS"
 
 
 def test_levels_that_lie_still_beside_a_motion_are_too_coarse() -> None:
@@ -98,7 +103,7 @@ def test_levels_that_lie_still_beside_a_motion_are_too_coarse() -> None:
         "spring": "u",
         "force": "1e9*(heaviside(t - 1.3001) - heaviside(t - 1.3001 - 1e-9))",
     }
-    found = judged(model, {"u": 0.0}, "central", "u")
+    (found,) = judged(model, {"u": 0.0}, "central", "u")
     assert found.status == "INCONCLUSIVE"
     assert found.reason in {"pre_asymptotic", "non_smooth"}
     assert "finer levels will not help" not in found.advice

@@ -1,6 +1,7 @@
 """Kernels: what may enter one, and what becomes of one that was damaged on disk."""
 
 import dataclasses
+import itertools
 import subprocess
 import sys
 
@@ -9,7 +10,7 @@ import pytest
 
 from vibsim.core.errors import SimulationError
 from vibsim.elementary import ELEMENTARY
-from vibsim.engine import LANES, integrate
+from vibsim.engine import LANES, integrate, text
 from vibsim.engine.kernel import source
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
@@ -147,3 +148,21 @@ def test_a_tableau_of_numbers_can(lane):
     numbers = (np.ones((1, 4)), np.array([[1.0, 0.0]]), np.array([0.1]), 64, 1)
     one, other = (integrate(PENDULUM, s, options, *numbers, lane=lane) for s in (scheme, CENTRAL))
     np.testing.assert_array_equal(one.position, other.position)
+
+
+def test_the_text_of_a_kernel_does_not_depend_on_those_written_before():
+    wanted = [
+        (MODELS[model], SCHEMES[kind].stepper_for(MODELS[model], SCHEMES[kind].defaults()), *more)
+        for model, kind, more in itertools.product(
+            ("pendulum", "sliding_box"),
+            ("central", "rk4"),
+            (("plain",), ("scalar", True, True, True), ("scalar", False), ("blocks",)),
+        )
+        if "blocks" not in more or model == "pendulum"
+    ]
+    together = [source(*one) for one in wanted]
+    assert len(set(together)) == len(together)
+    for one, found in zip(wanted, together, strict=True):
+        for kept in (text._source, text._names, text._text):
+            kept.cache_clear()
+        assert source(*one) == found

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import vibsim
+from vibsim.core import private_cache
 from vibsim.models import MODELS
 from vibsim.plan import build, code_digest
 from vibsim.schemes import SCHEMES
@@ -33,6 +34,7 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 def forget() -> None:
     for cached in (
         code_digest.everything,
+        code_digest._of_all_modules,
         code_digest._imports,
         code_digest._handed_on,
         build.code_of,
@@ -175,6 +177,45 @@ def test_imports_are_followed_wherever_they_stand(package: Path) -> None:
         "vibsim.store.atomic",
         "vibsim.variables",
     }
+
+
+def test_imports_that_are_kept_are_those_of_the_code_as_it_is(
+    package: Path, before: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("VIBSIM_CACHE_DIR", str(tmp_path / "cache"))
+    read, changed, asked = code_digest._imports, "vibsim.core.record", list[str]()
+
+    def imports(module: str) -> frozenset[str]:
+        asked.append(module)
+        return read.__wrapped__(module) if module in (changed, "vibsim.broken") else read(module)
+
+    def reached() -> set[str]:
+        asked.clear()
+        code_digest.everything.cache_clear()
+        code_digest._of_all_modules.cache_clear()
+        return code_digest.reached("vibsim.cli.jobs.simulate")
+
+    monkeypatch.setattr(code_digest, "_imports", imports)
+    first = reached()
+    assert len(asked) > len(first) > 100
+    assert reached() == first
+    assert not asked
+    folder, key = private_cache.opened("imports"), code_digest.everything()
+    assert folder is not None
+    for damaged in (b"[1]", b'{"vibsim": 1}', b"{", b"\xff"):
+        folder.write(key, damaged)
+        assert reached() == first
+        assert asked
+    # of other code, with a file that nothing uses and nobody can read
+    file = package / "core/record.py"
+    content = file.read_bytes()
+    file.write_bytes(content + b"\nimport vibsim.report.style\n")
+    (package / "broken.py").write_text("def half(")
+    assert reached() >= {*first, "vibsim.report", "vibsim.report.style"}
+    file.write_bytes(content)
+    (package / "broken.py").unlink()
+    assert reached() == first
+    assert not asked
 
 
 def test_every_lazy_name_is_found_without_running_anything() -> None:

@@ -16,7 +16,7 @@ from vibsim.checks.order import phase_at_start
 from vibsim.checks.tolerance import bounds
 from vibsim.comparison import best_values
 from vibsim.comparison.comparison_variables import Table, in_precision, numbers, over_time
-from vibsim.comparison.order_evidence import judgement
+from vibsim.comparison.order_evidence import judge_orders, judgement
 from vibsim.comparison.quantity_comparison import Comparison, comparisons
 from vibsim.comparison.work_precision import work_precision
 from vibsim.convergence import differences
@@ -91,6 +91,8 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
     """
     block = block_of(experiment, records)
     found = comparisons(block, compared(experiment, block.lean) + _centred(block))
+    measured = (check.measured for check in experiment.checks)
+    judge_orders(found, [check for check in measured if check.kind == "converges"])
     table: Table = {}
     asked_for = asked(experiment)
     for q in found.values():

@@ -19,7 +19,6 @@ from vibsim.apriori.formal_orders import (
     special_orders,
     stability_limits,
 )
-from vibsim.checks.order import expected_order
 from vibsim.checks.phase_amplitude_text import parts_in_words
 from vibsim.checks.sentences import Found, cost_in_words, growth_in_words
 from vibsim.checks.stable import ALIKE
@@ -80,8 +79,6 @@ class OrderContext:
         self.scheme, self.kind = f.scheme_name, experiment.schemes[scheme].kind
         method = SCHEMES[self.kind]
         self.options = options_of(experiment, columns, scheme, case)
-        self.expected = f.of_member(expected_order(experiment, record, check))
-        """The order that was expected; infinite where the quantity was to be exact."""
         self.promised = f.of_member(formal_orders(experiment, quantity, columns))
         """The order that the scheme promises, ..."""
         self.special = f.of_member(special_orders(experiment, quantity, columns))
@@ -91,6 +88,8 @@ class OrderContext:
         if self.options.get("start") == "first_order":
             centred = {**self.options, "start": "centred"}
             self.centred = float(method.formal_order(whole_of(quantity), model, centred))
+        self.expected = self.promised if check.order == "scheme" else float(check.order)
+        """The order that was expected; infinite where the quantity was to be exact."""
         self.has_promise = not is_error_part(quantity) or is_promised(experiment, quantity)
         """Whether that is a promise for the quantity; of a part of an error it may be the one for its position."""
 

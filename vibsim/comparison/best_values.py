@@ -8,7 +8,8 @@ extrapolated solution has no peaks of its own. Beside the bound stands the grid 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,6 +22,7 @@ from vibsim.comparison.comparison_variables import Table
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.comparison.thresholds import MISSED_EXTREMUM, OF_GRID, OF_PARABOLA
 from vibsim.convergence import gci
+from vibsim.convergence.batches import batches
 from vibsim.convergence.number_extrapolation import Limit, limit, observed_order
 from vibsim.convergence.thresholds import ORDER_ABOVE_ROUND_OFF
 from vibsim.core.array_types import Flags, Floats
@@ -104,6 +106,12 @@ def _ladder(name: str, place: value_numbers.Place) -> _Ladder:
     return _Ladder(place.levels, values, *_promised(name, place), floor, size, missed)
 
 
+def _beside_each_other(rows: Sequence[_Ladder]) -> _Ladder:
+    """Return ladders of the same levels as one, along a new first axis."""
+    names = ("values", "order", "even", "floor", "size", "missed")
+    return _Ladder(rows[0].levels, *(np.stack([getattr(r, name) for r in rows]) for name in names))
+
+
 def _missed(block: MemberBlock, values: Floats, floor: Floats, size: Floats) -> Floats:
     """Return how much of an extremum lies between grid points: ``w^2 dt^2/8`` of its size at most.
 
@@ -185,22 +193,26 @@ def table(block: MemberBlock, compared: Mapping[str, Comparison]) -> Table:
     found: Table = {}
     kept: dict[str, list[NDArray[Any]]] = {name: [] for name in COLUMNS}
     levels = np.array(block.grid.levels, dtype=np.int16)
-    for row in scalars(block.model, block.lean):
-        place = value_numbers.Place(block, compared, row.quantity, "best", None, None)
-        one = _ladder(row.value, place)
+    for rows in batches(scalars(block.model, block.lean), math.prod(block.shape)):
+        places = [
+            value_numbers.Place(block, compared, r.quantity, "best", None, None) for r in rows
+        ]
+        one = _beside_each_other([_ladder(r.value, p) for r, p in zip(rows, places, strict=True)])
         best = one.limit()
-        words = f"{row.words}: extrapolated over the levels"
-        of_value = Variable(MEMBER, np.array(best.value), attributes(words, row.units))
-        words = f"{row.words}: bound of the error of the extrapolated value"
-        of_bound = Variable(MEMBER, best.bound, attributes(words, row.units))
-        name = f"{row.variable}_richardson"
-        found |= {name: of_value, f"{name}_error": of_bound}
+        numbers = {
+            "richardson": (best.value, "extrapolated over the levels"),
+            "richardson_error": (best.bound, "bound of the error of the extrapolated value"),
+        }
+        if not block.lean:
+            kinds = gci.classify(one.values, one.levels, one.floor)
+            index = gci.index(one.values, one.levels, one.order, kinds)
+            numbers["gci"] = index, "grid convergence index of the finest level"
+        for i, row in enumerate(rows):
+            for key, (values, words) in numbers.items():
+                attrs = attributes(f"{row.words}: {words}", row.units)
+                found[f"{row.variable}_{key}"] = Variable(MEMBER, values[i].copy(), attrs)
         if block.lean:
             continue
-        kinds = gci.classify(one.values, one.levels, one.floor)
-        index = gci.index(one.values, one.levels, one.order, kinds)
-        words = f"{row.words}: grid convergence index of the finest level"
-        found[f"{row.variable}_gci"] = Variable(MEMBER, index, attributes(words, row.units))
         columns: tuple[NDArray[Any], ...] = (
             one.values[..., -1],
             gci.relative(index, one.values[..., -1], one.size),
@@ -210,14 +222,14 @@ def table(block: MemberBlock, compared: Mapping[str, Comparison]) -> Table:
             levels[best.last],
         )
         for column, values in zip(kept.values(), columns, strict=True):
-            column.append(values)
+            column.extend(values)
     codes = np.arange(len(gci.CLASSES), dtype=np.int8)
     of_kinds = {"flag_values": codes, "flag_meanings": " ".join(gci.CLASSES)}
-    for name, rows in kept.items():
-        if rows:
+    for name, of_rows in kept.items():
+        if of_rows:
             more = of_kinds if name == "convergence" else {}
             attrs = attributes(COLUMNS[name], "1", **more)
-            found[f"scalar_{name}"] = Variable(("scalar", *MEMBER), np.stack(rows), attrs)
+            found[f"scalar_{name}"] = Variable(("scalar", *MEMBER), np.stack(of_rows), attrs)
     return found
 
 

@@ -10,19 +10,23 @@ times that all lie at turning points (Dt = pi/w after a release from rest) there
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from itertools import groupby
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, norm_of_floor
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.comparison.thresholds import STRAIGHT, THEORY_ROUNDING, VANISHING_RATE
+from vibsim.convergence.batches import batches
 from vibsim.convergence.differences import largest, safe_ratio
 from vibsim.convergence.ladder_statistics import Evidence, at_rest, floor_of_pairs, unresolved
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING
-from vibsim.convergence.verdict import Judgement, judge
+from vibsim.convergence.verdict import Judgement, judge, judge_together
 from vibsim.core.array_types import Codes, Flags, Floats
 from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE, REASON_NAMES
 from vibsim.models import ENERGIES
@@ -47,30 +51,74 @@ ROUGH = ("pre_asymptotic", "non_smooth")
 """What is said where the force has a pulse that no level sees."""
 
 
-def judgement(q: Comparison, norm: str) -> Judgement:
-    """Judge a quantity by the order that its scheme promises."""
-    if norm not in q.judged:
-        q.judged[norm] = judge(evidence(q, norm, q.order, ORDER_TOLERANCE))
-    return q.judged[norm]
+def judge_orders(quantities: Mapping[str, Comparison], checks: Iterable[ConvergesCheck]) -> None:
+    """Judge quantities in every norm by the orders that their schemes promise, and by those that checks expect.
+
+    `judgement` and `judge_check` return what was found.
+    """
+    due: list[tuple[str, float | str, str]] = [
+        (q.name, "scheme", norm) for q in quantities.values() for norm in q.block.norms
+    ]
+    due += [
+        (check.converges, check.order, check.norm)
+        for check in checks
+        if not _is_promised(quantities[check.converges], check) and _is_usual(check)
+    ]
+    due = list(dict.fromkeys(due))
+    ladders = math.prod(quantities[due[0][0]].block.shape) if due else 0
+    for part in batches(due, ladders):
+        rows: list[Evidence] = []
+        for (name, order), same in groupby(part, key=itemgetter(0, 1)):
+            q, norms = quantities[name], [norm for *_, norm in same]
+            rows += evidences(q, norms, _order(q, order), ORDER_TOLERANCE)
+        for (name, order, norm), judged in zip(part, judge_together(rows), strict=True):
+            quantities[name].judged[norm, order] = judged
+
+
+def judgement(q: Comparison, norm: str, order: float | str = "scheme") -> Judgement:
+    """Judge a quantity by the order that its scheme promises, or by another one."""
+    if (norm, order) not in q.judged:
+        found = judge(evidence(q, norm, _order(q, order), ORDER_TOLERANCE))
+        q.judged[norm, order] = found
+    return q.judged[norm, order]
 
 
 def judge_check(q: Comparison, check: ConvergesCheck) -> Judgement:
     """Judge a quantity as a check asks for it."""
-    if check.order == "scheme" and check.tolerance == ORDER_TOLERANCE:
-        return judgement(q, check.norm)
-    return judge(evidence(q, check.norm, order_of(q, check), check.tolerance))
+    if not _is_usual(check):
+        return judge(evidence(q, check.norm, order_of(q, check), check.tolerance))
+    return judgement(q, check.norm, "scheme" if _is_promised(q, check) else check.order)
+
+
+def _is_usual(check: ConvergesCheck) -> bool:
+    return check.tolerance == ORDER_TOLERANCE
+
+
+def _is_promised(q: Comparison, check: ConvergesCheck) -> bool:
+    """Tell whether a check expects of every scheme and member the order that is promised."""
+    return check.order == "scheme" or bool(np.all(order_of(q, check) == q.order))
 
 
 def order_of(q: Comparison, check: ConvergesCheck) -> Floats:
     """Return the order that a check expects of a quantity, which broadcasts against (scheme, case)."""
-    return q.order if check.order == "scheme" else np.full((1, 1), float(check.order))
+    return _order(q, check.order)
+
+
+def _order(q: Comparison, order: float | str) -> Floats:
+    return q.order if order == "scheme" else np.full((1, 1), float(order))
 
 
 def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evidence:
     """Collect the evidence on a quantity in a norm, for the order that is expected, shape (scheme, 1 or case)."""
-    block, measured = q.block, q.in_norm(norm)
+    return evidences(q, (norm,), order, tolerance)[0]
+
+
+def evidences(
+    q: Comparison, norms: Sequence[str], order: Floats, tolerance: float
+) -> list[Evidence]:
+    """Collect the evidence on a quantity in several norms; see `evidence`."""
+    block = q.block
     grid, shape = block.grid, block.shape
-    points = len(grid.t)
     size, exists = largest(q.values[-1]), np.ones(shape, dtype=bool)
     if not np.all(np.isfinite(size)):
         # of a member that has broken down, what there is of it
@@ -80,12 +128,6 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
         # what is left of an energy is known no better than the energy, and a part of an error no better than the motion
         size = q.scale
 
-    def in_norm(noise: Floats) -> Floats:
-        return norm_of_floor(noise, norm, points, grid.spacing)
-
-    def by_level(noise: Floats) -> Floats:
-        return np.moveaxis(in_norm(np.moveaxis(noise, -1, 0)), 0, -1)
-
     def all_cases(values: Floats) -> Floats:
         return np.broadcast_to(values, shape)
 
@@ -94,38 +136,50 @@ def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evide
     worst = SPACING_AT_ONE * steps**2 * (q.scale * block.magnified)[..., None]
     # where nothing oscillates, no order is promised of a part of an error
     promised = ~block.adaptive[:, None] & ~np.isnan(order)
-    return Evidence(
-        levels=grid.levels,
-        order=all_cases(order),
-        tolerance=tolerance,
-        difference=measured.difference,
-        scatter=measured.scatter,
-        floor=by_level(q.floor),
-        ceiling=by_level(np.maximum(worst, q.floor)),
-        relative_floor=all_cases(block.relative_floor[..., 0]),
-        size=in_norm(size),
-        error=measured.error,
-        error_scatter=measured.error_scatter,
-        blur=by_level(q.blur),
-        promised=all_cases(q.order),
-        special=all_cases(q.special),
-        combined=partial(q.combined, norm),
-        numbers=q.are_numbers,
-        failed=block.failed,
-        applicable=(exists | np.any(block.failed, axis=-1)) & promised,
-        omega_dt=np.broadcast_to(block.fastest, (*shape, len(grid.levels))),
-        stability_limit=all_cases(block.stability_limit),
-        span=all_cases(block.omega_dt[:, 0] * float(grid.steps[0])),
-        steps=float(grid.steps[0]),
-        moved=moved,
-        straight=straight,
-        left_to_the_mesh=all_cases(block.left_to_the_mesh),
-        corner=block.corners.power,
-        missed=np.broadcast_to(np.isfinite(block.missed.time), shape),
-        jumps=np.broadcast_to(block.missed.jumps, shape),
-        decay=block.decay * block.group.end / grid.steps[-1],
-        growth=block.growth,
-    )
+    same: dict[str, Any] = {
+        "levels": grid.levels,
+        "order": all_cases(order),
+        "tolerance": tolerance,
+        "relative_floor": all_cases(block.relative_floor[..., 0]),
+        "promised": all_cases(q.order),
+        "special": all_cases(q.special),
+        "numbers": q.are_numbers,
+        "failed": block.failed,
+        "applicable": (exists | np.any(block.failed, axis=-1)) & promised,
+        "omega_dt": np.broadcast_to(block.fastest, (*shape, len(grid.levels))),
+        "stability_limit": all_cases(block.stability_limit),
+        "span": all_cases(block.omega_dt[:, 0] * float(grid.steps[0])),
+        "steps": float(grid.steps[0]),
+        "moved": moved,
+        "straight": straight,
+        "left_to_the_mesh": all_cases(block.left_to_the_mesh),
+        "corner": block.corners.power,
+        "missed": np.broadcast_to(np.isfinite(block.missed.time), shape),
+        "jumps": np.broadcast_to(block.missed.jumps, shape),
+        "decay": block.decay * block.group.end / grid.steps[-1],
+        "growth": block.growth,
+    }
+    ceiling = np.maximum(worst, q.floor)
+    found = []
+    for norm in norms:
+        measured = q.in_norm(norm)
+        # noise of size 1 at every point
+        weight = norm_of_floor(np.ones(1), norm, len(grid.t), grid.spacing)
+        found.append(
+            Evidence(
+                difference=measured.difference,
+                scatter=measured.scatter,
+                floor=q.floor * weight[:, None],
+                ceiling=ceiling * weight[:, None],
+                size=size * weight,
+                error=measured.error,
+                error_scatter=measured.error_scatter,
+                blur=q.blur * weight[:, None],
+                combined=partial(q.combined, norm),
+                **same,
+            )
+        )
+    return found
 
 
 def _motion(q: Comparison, order: Floats, size: Floats) -> tuple[Floats, Flags]:

@@ -46,8 +46,8 @@ class Comparison:
     floor: Floats  # predicted round-off at one point, shape (scheme, case, level)
     scale: Floats  # size that round-off is relative to, shape (scheme, case)
     blur: Floats  # what it is measured wrong by, rounding apart, shape (scheme, case, level)
-    # judgements by the promised order that were made so far, by norm
-    judged: dict[str, Judgement] = field(default_factory=dict, repr=False)
+    # judgements with the usual tolerance that were made so far, by norm and expected order
+    judged: dict[tuple[str, float | str], Judgement] = field(default_factory=dict, repr=False)
     _norms: dict[str, InNorm] = field(default_factory=dict, repr=False)
 
     @property

@@ -5,8 +5,10 @@ Leading dimensions ``...`` are ladders (scheme, case); n is the number of levels
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -51,6 +53,33 @@ class Evidence:
     decay: Floats  # the largest rate at which damping takes a velocity away, times the finest step
     growth: Floats  # largest position over the largest exact one, shape (..., n); NaN if not known
 
+    @cached_property
+    def error_orders(self) -> Floats:
+        """Order of the true errors of every pair, shape (..., n-1); NaN where they are not known."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            fall = np.log2(safe_ratio(self.error[..., :-1], self.error[..., 1:]))
+        return np.asarray(fall / np.diff(np.array(self.levels)))
+
+
+def beside_each_other(rows: Sequence[Evidence]) -> Evidence:
+    """Return several sets of ladders as one, along a new first axis.
+
+    They have the same shape, levels and tolerance. No number depends on it: every ladder stands for itself.
+    """
+    first = rows[0]
+
+    def combined(which: Flags, pair: int, weights: Floats) -> Floats:
+        chosen = zip(rows, which, strict=True)
+        found = [e.combined(part, pair, weights) for e, part in chosen if np.any(part)]
+        return np.concatenate(found) if found else np.empty(0)
+
+    together: dict[str, Any] = {
+        one.name: np.stack([getattr(row, one.name) for row in rows])
+        for one in fields(first)
+        if isinstance(getattr(first, one.name), np.ndarray)
+    }
+    return replace(first, **together, combined=combined)
+
 
 def breakdown(e: Evidence) -> tuple[Flags, Flags, Flags]:
     """Say of every level whether it broke down or is beyond the limit, and of every ladder whether it grows."""
@@ -63,13 +92,6 @@ def breakdown(e: Evidence) -> tuple[Flags, Flags, Flags]:
     # levels that see a pulse differ from those that do not; a step that sees a jump sees it for its whole length
     growing &= ~e.missed & ~((e.corner == 1.0) & (before <= th.BLOWN_UP))
     return e.failed, beyond, growing
-
-
-def error_orders(e: Evidence) -> Floats:
-    """Return the order of the true errors of every pair, shape (..., n-1); NaN where they are not known."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        fall = np.log2(safe_ratio(e.error[..., :-1], e.error[..., 1:]))
-    return np.asarray(fall / np.diff(np.array(e.levels)))
 
 
 def floor_of_pairs(e: Evidence) -> Floats:

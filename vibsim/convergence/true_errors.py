@@ -10,7 +10,7 @@ import numpy as np
 from vibsim.convergence import thresholds as th
 from vibsim.convergence.asymptotic_range import Trend, mismatches
 from vibsim.convergence.differences import safe_ratio
-from vibsim.convergence.ladder_statistics import Evidence, accuracy, error_orders, pick
+from vibsim.convergence.ladder_statistics import Evidence, accuracy, pick
 from vibsim.core.array_types import Flags, Floats
 
 
@@ -36,7 +36,7 @@ def limit_is_missed(e: Evidence, t: Trend, p: Floats) -> Flags:
 
 def _away(e: Evidence, t: Trend, p: Floats) -> tuple[Flags, Floats, Floats]:
     """Say where the orders of the true errors move away from p, and return how far the last two are from it."""
-    last, before = (np.abs(pick(error_orders(e), t.last + 1 - back) - p) for back in (0, 1))
+    last, before = (np.abs(pick(e.error_orders, t.last + 1 - back) - p) for back in (0, 1))
     known = pick(e.error, t.last + 2) > accuracy(e)
     return np.asarray(known & (last > th.LEAVES) & (last > th.GROWS * before)), last, before
 
@@ -71,7 +71,7 @@ def vouch(e: Evidence, p: Floats) -> Flags:
     """
     if len(e.levels) != 3:
         return np.zeros(p.shape, dtype=bool)
-    mismatch = np.hypot(e.error_scatter, th.LOG2 * (error_orders(e) - p[..., None]))
+    mismatch = np.hypot(e.error_scatter, th.LOG2 * (e.error_orders - p[..., None]))
     return _no_room(e, e.error[..., -1], mismatch[..., 1], mismatch[..., 0])
 
 
@@ -81,7 +81,7 @@ def confirm(e: Evidence, t: Trend, p: Floats) -> Flags:
     The scatter of the errors is at most that of the differences times what these see less of h^(p-1), or of the least
     power below p.
     """
-    found = error_orders(e)
+    found = e.error_orders
     below = np.maximum(np.where(p > 1.0, p - 1.0, p - 0.5), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         less = np.expm1(p * th.LOG2) / np.expm1(below * th.LOG2)
@@ -149,6 +149,6 @@ def agree(e: Evidence, t: Trend) -> Flags:
     Without an exact solution there is nothing to compare.
     """
     near = np.maximum(th.HALF_SPACING, t.width)
-    last, before = (pick(error_orders(e), t.last + 1 - back) for back in (0, 1))
+    last, before = (pick(e.error_orders, t.last + 1 - back) for back in (0, 1))
     agrees = [~np.isfinite(found) | (np.abs(found - t.order) <= near) for found in (last, before)]
     return np.asarray(agrees[0] & agrees[1])

@@ -27,6 +27,7 @@ The rules, in the order in which they apply (the first that applies decides):
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -35,7 +36,12 @@ from vibsim.convergence import true_errors as errors
 from vibsim.convergence.asymptotic_range import trend
 from vibsim.convergence.classify import rules
 from vibsim.convergence.differences import order_of_ratio, safe_ratio
-from vibsim.convergence.ladder_statistics import Evidence, at_round_off, breakdown, error_orders
+from vibsim.convergence.ladder_statistics import (
+    Evidence,
+    at_round_off,
+    beside_each_other,
+    breakdown,
+)
 from vibsim.core.array_types import Codes, Floats, Integers
 from vibsim.core.vocabulary import REASON_NAMES, REASONS, STATUSES
 
@@ -76,7 +82,7 @@ def judge(e: Evidence) -> Judgement:
     else:
         of_errors, vouched = np.full(shape, np.nan), np.zeros(shape, dtype=bool)
         if len(e.levels) == 3:
-            of_errors = error_orders(e)[..., -1]
+            of_errors = e.error_orders[..., -1]
             vouched = errors.vouch(e, np.round(2.0 * orders[..., 0]) / 2)
         found = trend(e, orders, of_errors, vouched)
         read, lower = rules(e, found)
@@ -103,6 +109,14 @@ def judge(e: Evidence) -> Judgement:
         culprit=np.where(fails, levels[np.argmax(culprits, axis=-1)], -1),
         orders=orders,
     )
+
+
+def judge_together(rows: Sequence[Evidence]) -> list[Judgement]:
+    """Decide on several sets of ladders at once, of the same shape, levels and tolerance; see `batches`."""
+    found = vars(judge(beside_each_other(rows)))
+    # what is kept of one does not keep the others
+    parts = [{name: of[i].copy() for name, of in found.items()} for i in range(len(rows))]
+    return [Judgement(**part) for part in parts]
 
 
 def local_orders(difference: Floats, levels: tuple[int, ...]) -> Floats:

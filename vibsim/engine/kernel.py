@@ -9,6 +9,7 @@ is also the key of the cache: a changed formula, scheme or loop is another kerne
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import cache
 from types import FunctionType
@@ -28,7 +29,7 @@ from vibsim.engine.formulas import (
 )
 from vibsim.engine.kernel_cache import Kernel, load
 from vibsim.engine.stages import stages
-from vibsim.engine.text import Module, collect, divided, with_quotients
+from vibsim.engine.text import Module, collect, divided, plain_code
 from vibsim.models import Model, has_budget
 from vibsim.models.base import Formula
 from vibsim.models.events import Friction
@@ -94,8 +95,8 @@ def kernel(
             if holds:
                 which = "has them" if "has" in reason else "does"
                 raise SimulationError(f"{model.kind} {reason}: no block of members {which}")
-    text = source(model, stepper, lane, with_gathered, with_series, with_peaks)
-    return _in_lane(text, lane, _STEPPING)
+    module = _written(model, stepper, lane, with_gathered, with_series, with_peaks)
+    return _in_lane(module, lane, _STEPPING)
 
 
 @cache
@@ -109,7 +110,7 @@ def observer(model: Model, formulas: tuple[Formula, ...], lane: str) -> Kernel:
     put_functions(module, model, "", {"observed": results}, always_tuple=True)
     put_parameters(module, model)
     collect(module, member_loop.observe, "kernel", {})
-    return _in_lane(module.text, lane, _OBSERVING)
+    return _in_lane(module, lane, _OBSERVING)
 
 
 def source(
@@ -121,6 +122,17 @@ def source(
     with_peaks: bool = False,
 ) -> str:
     """Return the text of the kernel of `model` and `stepper`, without the head that says what compiles it."""
+    return _written(model, stepper, lane, with_gathered, with_series, with_peaks).text
+
+
+def _written(
+    model: Model,
+    stepper: Stepper,
+    lane: str,
+    with_gathered: bool,
+    with_series: bool,
+    with_peaks: bool,
+) -> Module:
     count = model.coordinates
     states = carried(stepper, model) if count == 1 else 0
     parameters = n_parameters(stepper, model)
@@ -179,7 +191,7 @@ def source(
         rows.put_rows(module, states, parameters, settings)
     collect(module, block_loop.run if lane == "blocks" else member_loop.run, "run", {})
     module.put("kernel", _ENTRY)
-    return module.text
+    return module
 
 
 def carried(stepper: Stepper, model: Model) -> int:
@@ -210,10 +222,11 @@ def _module(lane: str, settings: Mapping[str, object]) -> Module:
     return Module("kernel", settings, () if lane == "plain" else primitives.NAMES)
 
 
-def _in_lane(text: str, lane: str, kinds: str) -> Kernel:
+def _in_lane(module: Module, lane: str, kinds: str) -> Kernel:
     if lane == "plain":
-        namespace: dict[str, Any] = {"divided": divided, "vector": coordinates.vector}
-        exec(compile(with_quotients(_PLAIN + text), "<kernel>", "exec"), namespace)
-        plain: Kernel = namespace["kernel"]
+        namespace: dict[str, Any] = {"divided": divided, "math": math, "vector": coordinates.vector}
+        for part in (_PLAIN, *module.parts.values()):
+            exec(plain_code(part), namespace)
+        plain: Kernel = namespace[module.entry]
         return plain
-    return load(text, kinds)
+    return load(module.text, kinds)

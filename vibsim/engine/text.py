@@ -12,6 +12,7 @@ import math
 import types
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
+from functools import cache, lru_cache
 from typing import Any
 
 from vibsim.core.errors import SimulationError
@@ -69,7 +70,11 @@ def collect(
 
     Raises `SimulationError` where it uses something that cannot enter a kernel.
     """
-    enter(module, function, definition(function, name), name, renamed, is_called=is_called)
+    used = _names(function, name)
+    answers = {k: v for k, v in module.settings.items() if isinstance(v, bool) and k in used}
+    others = {old: new for old, new in renamed.items() if old in used}
+    text = _text(function, name, frozenset(answers.items()), frozenset(others.items()))
+    _put(module, function, text, name, renamed, is_called=is_called)
 
 
 def definition(function: Callable[..., Any], name: str) -> ast.FunctionDef:
@@ -79,7 +84,7 @@ def definition(function: Callable[..., Any], name: str) -> ast.FunctionDef:
     """
     if not isinstance(function, types.FunctionType):
         raise SimulationError(f"{name} is no plain Python function, so it cannot enter a kernel")
-    tree = ast.parse(inspect.cleandoc("\n" + inspect.getsource(function))).body[0]
+    tree = ast.parse(_source(function)).body[0]
     if not isinstance(tree, ast.FunctionDef):
         raise SimulationError(f"{name} is no function with a name, so it cannot enter a kernel")
     return tree
@@ -91,20 +96,83 @@ def enter(
     tree: ast.FunctionDef,
     name: str,
     renamed: Mapping[str, str],
+) -> None:
+    """Write the text `tree`, which is that of `function` or a part of it, under `name`: see `collect`."""
+    _put(module, function, _text_of(function, tree, name, module.settings, renamed), name, renamed)
+
+
+@dataclass(frozen=True)
+class _Text:
+    """A function as it stands in a kernel."""
+
+    body: str
+    """Without a mark that says how it is compiled."""
+    used: tuple[str, ...]
+    """Names that are not its own, as the module has them that it comes from."""
+    is_marked: bool
+    has_loop: bool
+
+
+# kernels have most of their functions in common, and to parse one takes milliseconds
+
+
+@cache
+def _source(function: Callable[..., Any]) -> str:
+    return inspect.cleandoc("\n" + inspect.getsource(function))
+
+
+@cache
+def _names(function: Callable[..., Any], name: str) -> frozenset[str]:
+    """Return every name in the text of a function."""
+    nodes = ast.walk(definition(function, name))
+    return frozenset(node.id for node in nodes if isinstance(node, ast.Name))
+
+
+@cache
+def _text(
+    function: Callable[..., Any],
+    name: str,
+    settings: frozenset[tuple[str, bool]],
+    renamed: frozenset[tuple[str, str]],
+) -> _Text:
+    return _text_of(function, definition(function, name), name, dict(settings), dict(renamed))
+
+
+def _text_of(
+    function: Callable[..., Any],
+    tree: ast.FunctionDef,
+    name: str,
+    settings: Mapping[str, object],
+    renamed: Mapping[str, str],
+) -> _Text:
+    _strip(tree, name)
+    is_marked, tree.decorator_list = bool(tree.decorator_list), []
+    tree = _Settled(settings).visit(tree)
+    arguments = {argument.arg for argument in tree.args.args}
+    local = (arguments | set(function.__code__.co_varnames)) - set(HANDED)
+    names = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id not in local]
+    used = tuple(sorted({node.id for node in names}))
+    has_loop = any(isinstance(node, ast.For | ast.While) for node in ast.walk(tree))
+    for node in names:
+        node.id = renamed.get(node.id, node.id)
+    return _Text(ast.unparse(tree), used, is_marked, has_loop)
+
+
+def _put(
+    module: Module,
+    function: Callable[..., Any],
+    text: _Text,
+    name: str,
+    renamed: Mapping[str, str],
     *,
     is_called: bool = False,
 ) -> None:
-    """Write the text `tree`, which is that of `function` or a part of it, under `name`: see `collect`."""
-    _strip(tree, name)
-    tree = _Settled(module.settings).visit(tree)
-    arguments = {argument.arg for argument in tree.args.args}
-    local = (arguments | set(function.__code__.co_varnames)) - set(HANDED)
-    mark = _mark(module, function, tree, is_called)
-    names = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id not in local]
-    for other in sorted({node.id for node in names} & function.__globals__.keys()):
-        value, new = function.__globals__[other], renamed.get(other, other)
-        if other in module.given:
+    """Put a function into a module, after whatever it uses."""
+    mark = _mark(module, function, text, name, is_called)
+    for other in text.used:
+        if other not in function.__globals__ or other in module.given:
             continue
+        value, new = function.__globals__[other], renamed.get(other, other)
         if other in module.settings:
             module.put(other, f"{other} = {module.settings[other]!r}")
         elif isinstance(value, types.FunctionType):
@@ -117,25 +185,21 @@ def enter(
             raise SimulationError(
                 f"{name} uses {other}, which is no number, tuple of numbers or plain function"
             )
-    for node in names:
-        node.id = renamed.get(node.id, node.id)
-    module.put(name, f"@{mark}\n{ast.unparse(tree)}")
+    module.put(name, f"@{mark}\n{text.body}")
 
 
 def _mark(
-    module: Module, function: Callable[..., Any], tree: ast.FunctionDef, is_called: bool
+    module: Module, function: Callable[..., Any], text: _Text, name: str, is_called: bool
 ) -> str:
     """Say how a function is compiled: into its callers, or for itself."""
-    if tree.name == module.entry:
+    if name == module.entry:
         return "entry"
-    is_marked = is_called or bool(tree.decorator_list)
-    tree.decorator_list = []
-    if known := module.parts.get(tree.name):
+    if known := module.parts.get(name):
         # another function that uses it has brought it already
         return known.partition("\n")[0].removeprefix("@")
-    has_loop = any(isinstance(node, ast.For | ast.While) for node in ast.walk(tree))
     is_elementary = function.__module__.startswith("vibsim.elementary")
-    return "called" if is_marked or (has_loop and is_elementary) else "compiled"
+    is_alone = is_called or text.is_marked or (text.has_loop and is_elementary)
+    return "called" if is_alone else "compiled"
 
 
 def _is_constant(value: object) -> bool:
@@ -201,3 +265,9 @@ def with_quotients(text: str) -> ast.Module:
     """Return a module for plain Python in which division by zero is no error, as in compiled code."""
     tree: ast.Module = _Quotients().visit(ast.parse(text))
     return ast.fix_missing_locations(tree)
+
+
+@lru_cache(maxsize=4096)
+def plain_code(text: str) -> types.CodeType:
+    """Return the code of `with_quotients`; kernels have most of their parts in common."""
+    return compile(with_quotients(text), "<kernel>", "exec")

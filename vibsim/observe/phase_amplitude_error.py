@@ -8,6 +8,7 @@ found at some time, or at some level, does not exist for that scheme and member.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
@@ -29,7 +30,7 @@ from vibsim.models.shared.phase_amplitude_names import (
 from vibsim.observe.member_block import MemberBlock
 from vibsim.observe.oscillation import period_scale
 from vibsim.observe.thresholds import MOST_UNASKED, WINDOW_POINTS
-from vibsim.observe.waveform_fit import shift, strides, template
+from vibsim.observe.waveform_fit import SAMPLES_AT_A_TIME, shift, strides, template
 
 if TYPE_CHECKING:
     from vibsim.comparison.quantity_comparison import Comparison
@@ -145,9 +146,15 @@ def _told(
     spacing = np.broadcast_to(grid.spacing, block.shape).ravel()
     of, stride = template(u, v, a, spacing), strides(period, spacing, shape[-1])
     told = []
-    for level in range(len(grid.levels)):
-        moved, moving = (_rows(found[name].values[level]) for name in (position, speed))
-        told.append(shift(moved, moving, of, period, stride).reshape(2, *shape))
+    # a level of a few members costs as much as all of them together
+    together = max(SAMPLES_AT_A_TIME // math.prod(shape), 1)
+    for start in range(0, len(grid.levels), together):
+        series = [found[name].values[start : start + together] for name in (position, speed)]
+        moved, moving = (_rows(np.stack(rows)) for rows in series)
+        count = len(series[0])
+        scales = np.tile(period, count), np.tile(stride, count)
+        parts = shift(moved, moving, of.repeated(count), *scales)
+        told += list(np.moveaxis(parts.reshape(2, count, *shape), 1, 0))
     # what is missing at one level is taken out of all
     every = np.all([np.isfinite(time).all(axis=-1) for time, _ in told], axis=0)
     for parts in told:

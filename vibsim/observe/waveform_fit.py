@@ -35,6 +35,7 @@ from vibsim.core.array_types import Floats, Integers
 from vibsim.observe import thresholds as th
 
 NUMBERS_AT_A_TIME = 2**18  # numbers of one kind that are worked on at a time
+SAMPLES_AT_A_TIME = NUMBERS_AT_A_TIME // th.WINDOW_POINTS  # each has a window of its own
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,12 @@ class Template:
         position = c[0] + y * (c[1] + y * (c[2] + y * (c[3] + y * (c[4] + y * c[5]))))
         slope = c[1] + y * (2 * c[2] + y * (3 * c[3] + y * (4 * c[4] + y * (5 * c[5]))))
         return position, slope / self.spacing[:, None]
+
+    def repeated(self, count: int) -> Template:
+        """Return the same motions so many times one after the other, shape (count r, t)."""
+        position, velocity = (np.tile(x, (count, 1)) for x in (self.position, self.velocity))
+        coefficients = np.tile(self.coefficients, (1, count, 1))
+        return Template(position, velocity, np.tile(self.spacing, count), coefficients)
 
 
 def template(position: Floats, velocity: Floats, acceleration: Floats, spacing: Floats) -> Template:
@@ -130,11 +137,11 @@ def shift(
 
 def _pieces(rows: Integers, points: int) -> Iterator[tuple[Integers, Integers]]:
     """Yield rows and samples that are worked on together."""
-    piece = max(NUMBERS_AT_A_TIME // th.WINDOW_POINTS, 1)
-    step = max(piece // points, 1)
+    step = max(SAMPLES_AT_A_TIME // points, 1)
     for first in range(0, len(rows), step):
-        for start in range(0, points, piece):
-            yield rows[first : first + step], np.arange(start, min(start + piece, points))
+        for start in range(0, points, SAMPLES_AT_A_TIME):
+            stop = min(start + SAMPLES_AT_A_TIME, points)
+            yield rows[first : first + step], np.arange(start, stop)
 
 
 def _fitted(

@@ -8,6 +8,9 @@ Two things are no part of it, because what comes out of them is in every digest 
 (`_PLANNING`), whose outcome a job compares with the digest that it was given, before it starts; and the lists of all
 models and schemes (`_LISTS`), of which a job uses its own entries (`vibsim.plan.build`). What only describes
 types runs nothing.
+
+To read 300 modules takes most of the time of a plan, so what each of them imports is kept in the private cache, under
+the digest of the whole package.
 """
 
 from __future__ import annotations
@@ -15,11 +18,14 @@ from __future__ import annotations
 import ast
 import hashlib
 import importlib
-from collections.abc import Iterable, Iterator
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
 import vibsim
+from vibsim.core import private_cache
 
 PACKAGE = Path(vibsim.__file__).parent
 _LISTS = ("vibsim.models", "vibsim.schemes")
@@ -57,7 +63,8 @@ def reached(*names: str) -> set[str]:
     while todo:
         module = todo.pop()
         done.add(module)
-        todo |= {found for found in _imports(module) - done if found not in (*_LISTS, *_PLANNING)}
+        imports = _of_all_modules().get(module) or _imports(module)
+        todo |= {found for found in imports - done if found not in (*_LISTS, *_PLANNING)}
     return done
 
 
@@ -106,6 +113,32 @@ def _tree(module: str) -> ast.Module:
 
 
 @cache
+def _of_all_modules() -> Mapping[str, frozenset[str]]:
+    """Return `_imports` of every module of the package that can be read."""
+
+    def make() -> Mapping[str, frozenset[str]]:
+        found = {}
+        for file in PACKAGE.rglob("*.py"):
+            parts = file.relative_to(PACKAGE.parent).with_suffix("").parts
+            module = ".".join(parts).removesuffix(".__init__")
+            # a file that nothing uses may be half written
+            with suppress(SyntaxError):
+                found[module] = _imports(module)
+        return found
+
+    def dump(found: Mapping[str, frozenset[str]]) -> bytes:
+        return json.dumps({module: sorted(names) for module, names in found.items()}).encode()
+
+    def kept(content: bytes) -> Mapping[str, frozenset[str]] | None:
+        try:
+            return {module: frozenset(names) for module, names in json.loads(content).items()}
+        except (ValueError, TypeError, AttributeError):
+            return None
+
+    return private_cache.kept("imports", everything(), make, dump, kept)
+
+
+@cache
 def _imports(module: str) -> frozenset[str]:
     """Name the modules that `module` hands work to, and the packages that Python runs before it."""
     parts = module.split(".")
@@ -130,11 +163,11 @@ def _run(tree: ast.AST, types: bool = False) -> Iterator[ast.AST]:
     while todo:
         node = todo.pop()
         yield node
-        is_for_types = isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
-        if isinstance(node, ast.If) and is_for_types and not types:
-            todo.extend(node.orelse)
-        else:
-            todo.extend(ast.iter_child_nodes(node))
+        match node:
+            case ast.If(test=ast.Name(id="TYPE_CHECKING")) if not types:
+                todo.extend(node.orelse)
+            case _:
+                todo.extend(ast.iter_child_nodes(node))
 
 
 def _bound(node: ast.AST) -> Iterator[tuple[str, tuple[str, str]]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
@@ -85,30 +86,37 @@ class Orders:
             return special.of(quantity, model)
         if self.velocity_dependent is not None and depends_on_velocity(model):
             return self.velocity_dependent.of(quantity, model)
-        is_simple = model.linear and model.conservative
-        linear = self.position if self.position_linear is None else self.position_linear
-        position = linear if is_simple else self.position
-        energy = self.energy_linear if is_simple else self.energy
-        given = self.energy_d2t_linear if is_simple else self.energy_d2t
-        energy_d2t = min(energy, 2.0) if given is None else given
-        velocity_d2t = min(position, 2.0) if self.velocity_d2t is None else self.velocity_d2t
-        of_both = min(position, self.velocity)
-        moving = set(model.velocities)
-        outputs = {
-            row.name: position if moving.isdisjoint(names_in(tree(model, row.formula))) else of_both
-            for row in model.outputs
-        }
-        return {
-            **outputs,
-            **dict.fromkeys(BUDGET, min(of_both, ORDER_OF_WORK)),
-            **dict.fromkeys(model.positions, position),
-            **dict.fromkeys(model.velocities, self.velocity),
-            "kinetic_energy": self.velocity,
-            "potential_energy": position,
-            **dict.fromkeys((f"{name}_d2t" for name in model.velocities), velocity_d2t),
-            "energy_d2t": energy_d2t,
-            "energy_deviation_d2t": energy_d2t,
-        }.get(quantity, energy)
+        of_quantity, of_others = _of_quantities(self, model)
+        return of_quantity.get(quantity, of_others)
+
+
+@cache
+def _of_quantities(orders: Orders, model: Model) -> tuple[Mapping[str, float], float]:
+    """Return the orders of quantities of a model, and that of its energy and whatever is not named."""
+    is_simple = model.linear and model.conservative
+    linear = orders.position if orders.position_linear is None else orders.position_linear
+    position = linear if is_simple else orders.position
+    energy = orders.energy_linear if is_simple else orders.energy
+    given = orders.energy_d2t_linear if is_simple else orders.energy_d2t
+    energy_d2t = min(energy, 2.0) if given is None else given
+    velocity_d2t = min(position, 2.0) if orders.velocity_d2t is None else orders.velocity_d2t
+    of_both = min(position, orders.velocity)
+    moving = set(model.velocities)
+    outputs = {
+        row.name: position if moving.isdisjoint(names_in(tree(model, row.formula))) else of_both
+        for row in model.outputs
+    }
+    return {
+        **outputs,
+        **dict.fromkeys(BUDGET, min(of_both, ORDER_OF_WORK)),
+        **dict.fromkeys(model.positions, position),
+        **dict.fromkeys(model.velocities, orders.velocity),
+        "kinetic_energy": orders.velocity,
+        "potential_energy": position,
+        **dict.fromkeys((f"{name}_d2t" for name in model.velocities), velocity_d2t),
+        "energy_d2t": energy_d2t,
+        "energy_deviation_d2t": energy_d2t,
+    }, energy
 
 
 def same_orders(order: float, **others: Any) -> Orders:

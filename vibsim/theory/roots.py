@@ -37,6 +37,8 @@ GRID = np.concatenate([0.02 * np.arange(1, 401), np.geomspace(8.0, 1000.0, 61)[1
 _REFINEMENTS = 3
 _LARGER = 1e-6
 """Growth per period by which a parasitic root outgrows the principal pair."""
+_FEW = 64
+"""So many values of p at most are remembered: all levels and parts of a sweep ask for the same ones."""
 _PARTS = 65
 _ROUNDS = 9
 _FAR = np.geomspace(GRID[-1], 1e8, 101)[1:]
@@ -129,10 +131,17 @@ def phase_error_per_period(stepper: Stepper, p: ArrayLike) -> Floats:
 
 
 def roots(stepper: Stepper, p: ArrayLike) -> Roots:
-    """Return what the roots of a scheme say for each ``p = w dt``."""
+    """Return what the roots of a scheme say for each ``p = w dt``; the arrays are read-only."""
     steps = np.asarray(p, dtype=float)
+    found = _of_few if steps.size <= _FEW else _of_bytes
+    columns = found(stepper, steps.tobytes())
+    return Roots(*(column.reshape(steps.shape) for column in columns))
+
+
+def _of_bytes(stepper: Stepper, p: bytes) -> tuple[NDArray[Any], ...]:
+    """Return the columns of `Roots` for the floats in `p`, each of shape (k,)."""
     with np.errstate(all="ignore"):
-        trace, determinant, other = _quadratic(stepper, np.atleast_1d(steps).ravel())
+        trace, determinant, other = _quadratic(stepper, np.frombuffer(p))
         excess = determinant - trace * trace * 0.25
         is_complex = excess.high > 0
         angle = np.where(
@@ -147,7 +156,12 @@ def roots(stepper: Stepper, p: ArrayLike) -> Roots:
             np.log1p((larger - 1.0).rounded),
         )
     columns = (rate, angle, is_complex, np.abs(other), np.abs(np.angle(other)))
-    return Roots(*(np.asarray(column).reshape(steps.shape) for column in columns))
+    for column in columns:
+        column.flags.writeable = False
+    return columns
+
+
+_of_few = lru_cache(maxsize=1024)(_of_bytes)
 
 
 def _quadratic(stepper: Stepper, p: Floats) -> tuple[Doubled, Doubled, Complexes]:
