@@ -64,9 +64,9 @@ def test_points_of_a_periodic_grid_nest_by_their_number() -> None:
 
 
 def test_numbers_of_points_that_do_not_nest_are_refused() -> None:
-    counts = [8, 13, 21]
+    counts = [32, 52, 84]
     h = [1 / n for n in counts]
-    with pytest.raises(InputError, match=r"axis 0: lengths \[9, 14, 22\].*restrict: linear"):
+    with pytest.raises(InputError, match=r"axis 0: lengths \[33, 53, 85\].*restrict: linear"):
         judge(h, arrays(nodes, 2.0, counts), order=2)
     assert judge(h, arrays(nodes, 2.0, counts), order=2, restrict="cubic").status == "PASS"
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from vibsim import judge
-from vibsim.convergence.assessment import Assessment, Ladder
+from vibsim.convergence.assessment import Assessment
+from vibsim.convergence.error_model.posterior import Ladder
 from vibsim.convergence.study import outcomes
 from vibsim.core.vocabulary import REASON_NAMES, REASONS, STATUSES
 
@@ -17,7 +18,7 @@ H = [0.4, 0.2, 0.1, 0.05]
 
 def decided(ladder: Ladder, reason: str, *, known: bool) -> Assessment:
     """An assessment with all of its numbers, or with none."""
-    shape, n = ladder.size.shape, len(ladder.h)
+    shape, n = ladder.numbers.shape, len(ladder.h)
     number = np.full(shape, 1.5 if known else np.nan)
     weights = np.full((*shape, n), 0.0 if known else np.nan)
     weights[..., -1] += 1.0
@@ -32,6 +33,7 @@ def decided(ladder: Ladder, reason: str, *, known: bool) -> Assessment:
         error=1e-3 * number,
         error_bound=2e-3 * number,
         weights=weights,
+        best_bound=1e-3 * number,
     )
 
 

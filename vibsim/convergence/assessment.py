@@ -34,8 +34,10 @@ INTERVAL = 0.95
 """Probability of the interval of an order."""
 BOUND = 2.5
 """Standard deviations in the bound of an error. The posterior has longer tails than a normal one: these are 95 %."""
-BLOCK = 256
-"""Ladders that are judged together: all hypotheses on them take some 30 MB."""
+BLOCK = 16
+"""So many ladders are judged together, always: then the last digits of one do not depend on those beside it."""
+LARGEST_RATIO = 1e60
+"""Of a difference to the next finer one, and of noise to the largest difference: more says no more."""
 NOISE_FACTOR = 10.0
 """Noise may be so many times its prediction where levels are said to differ by nothing else."""
 
@@ -87,13 +89,15 @@ def assess(
         reason[finite] = REASON_NAMES.index("too_few_levels")
     else:
         every = np.flatnonzero(finite)
-        for rows in (every[i : i + BLOCK] for i in range(0, len(every), BLOCK)):
-            part, size = _scaled(ladder, rows)
+        for start in range(0, len(every), BLOCK):
+            # a block that is not full has its first ladder several times
+            rows = every[start + np.arange(BLOCK) * (np.arange(BLOCK) < len(every) - start)]
+            part, size, factors = _scaled(ladder, rows)
             believed = posterior(part, expected)
             sides = _sides(believed, expected, at_least, tolerance)
             exact = _is_only_noise(part)
             reason[rows] = _reasons(part, believed, sides, exact)
-            for name, value in _numbers(part, believed, expected, exact).items():
+            for name, value in _numbers(part, believed, expected, exact, factors).items():
                 in_units = name in ("error", "error_bound", "best_bound")
                 found[name][rows] = value * size if in_units else value
     status = np.array(
@@ -110,14 +114,29 @@ def _nothing(count: int, levels: int) -> dict[str, np.ndarray]:
     return {**unknown, **window, "weights": np.full((count, levels), np.nan)}
 
 
-def _scaled(ladder: Ladder, rows: Integers) -> tuple[Ladder, Floats]:
-    """Return some of the ladders over the norm of their largest row, and that norm."""
-    gram = ladder.gram[rows]
-    size = np.sqrt(np.max(np.diagonal(gram, axis1=1, axis2=2), axis=-1))
+def _scaled(ladder: Ladder, rows: Integers) -> tuple[Ladder, Floats, Floats]:
+    """Return some of the ladders over the norm of their largest row, that norm, and a factor on every difference.
+
+    Squares of differences that are too large or small for each other would overflow or vanish: coarse levels that have
+    blown up so far are brought nearer.
+    """
+    gram, count = ladder.gram[rows], len(ladder.h) - 1
+    norms = np.sqrt(np.diagonal(gram, axis1=1, axis2=2))
+    factors = np.ones_like(norms)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for k in range(count - 2, -1, -1):
+            ratio = norms[:, k] / np.max((norms * factors)[:, k + 1 : count], axis=-1)
+            factors[:, k] = np.where(ratio > LARGEST_RATIO, LARGEST_RATIO / ratio, 1.0)
+    # beside differences of 0 any size will do
+    factors = np.where(factors > 0.0, factors, 1.0)
+    size = np.max(norms * factors, axis=-1)
     size = np.where(size > 0.0, size, 1.0)
-    gram = gram / size[:, None, None] / size[:, None, None]
-    floor = ladder.floor[rows] / size[:, None]
-    return Ladder(ladder.h, gram, floor, ladder.numbers[rows], ladder.exact_known), size
+    over = factors / size[:, None]
+    gram = gram * over[:, :, None] * over[:, None, :]
+    # squares of what is larger would overflow
+    floor = np.minimum(ladder.floor[rows] / size[:, None], LARGEST_RATIO)
+    part = Ladder(ladder.h, gram, floor, ladder.numbers[rows], ladder.exact_known)
+    return part, size, factors[:, :count]
 
 
 def _is_only_noise(ladder: Ladder) -> Flags:
@@ -152,7 +171,7 @@ def _reasons(
 
 
 def _numbers(
-    ladder: Ladder, believed: Posterior, expected: float | None, exact: Flags
+    ladder: Ladder, believed: Posterior, expected: float | None, exact: Flags, factors: Floats
 ) -> dict[str, np.ndarray]:
     """Return what an `Assessment` holds beside status and reason, for ladders of three levels and more."""
     n, orders = len(ladder.h), local_orders(ladder)
@@ -162,7 +181,7 @@ def _numbers(
     window = {"first": np.where(exact, 0, first), "last": np.where(exact, n - 1, last)}
     if ladder.exact_known:
         believed = posterior(_without_exact(ladder), expected)
-    best = _best(ladder, believed, orders, exact)
+    best = _best(ladder, believed, orders, exact, factors)
     return {"order": order, "low": low, "high": high, **window, **best}
 
 
@@ -211,7 +230,9 @@ def _interval(believed: Posterior, order: Floats) -> tuple[Floats, Floats]:
     return np.fmin(low, order), np.fmax(high, order)
 
 
-def _best(ladder: Ladder, believed: Posterior, orders: Floats, exact: Flags) -> dict[str, Floats]:
+def _best(
+    ladder: Ladder, believed: Posterior, orders: Floats, exact: Flags, factors: Floats
+) -> dict[str, Floats]:
     """Return the best value, its bound, and the error of the finest level.
 
     Three levels have the extrapolation by their own order, more levels the mean over all hypotheses. Where levels
@@ -233,13 +254,13 @@ def _best(ladder: Ladder, believed: Posterior, orders: Floats, exact: Flags) -> 
     spread = np.where(exact, differences[:, -1, -1], spread)
     weights = np.zeros((len(path), n))
     weights[:, -1] = 1.0
-    weights[:, :-1] += path
-    weights[:, 1:] -= path
+    weights[:, :-1] += path * factors
+    weights[:, 1:] -= path * factors
     bound = BOUND * np.sqrt(np.maximum(spread, 0.0) + floor**2)
     if ladder.exact_known:
         error = np.sqrt(ladder.gram[:, -1, -1])
         largest = error + floor
     else:
-        error = np.sqrt(np.einsum("ci,cij,cj->c", path, differences, path))
+        error = np.sqrt(np.maximum(np.einsum("ci,cij,cj->c", path, differences, path), 0.0))
         largest = error + bound
     return {"weights": weights, "best_bound": bound, "error": error, "error_bound": largest}

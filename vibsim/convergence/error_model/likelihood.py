@@ -58,7 +58,8 @@ def evidence(window: Window, gram: Floats, points: Floats) -> tuple[Floats, Floa
         0.0,
     )
     log -= 0.5 * (n - 1.0) * ((w - 1) * np.log(2.0 * np.pi * last / n) + log_det)
-    log -= np.where(n > 1.0, 0.5 * n * rest / last, 0.0)
+    with np.errstate(over="ignore"):
+        log -= np.where(n > 1.0, 0.5 * n * rest / last, 0.0)
     return log, trace / w
 
 
@@ -100,14 +101,13 @@ def noise(sizes: Floats, gram: Floats, points: Floats, floor: Floats) -> Floats:
         of_level[: len(sizes)] = (sizes / sizes[-1]) ** (-2.0 * growth)
         precision, log_det = inverse((rows * of_level) @ rows.T)
         trace = sum_of_products(precision[None], gram)[:, 0]
-        decades = np.log10(
-            np.sqrt(trace / len(rows)) / np.maximum(floor[:, -1], TINY)
-        ) / math.log10(priors.PREDICTION)
+        size = 0.5 * np.log10(trace / len(rows)) - np.log10(np.maximum(floor[:, -1], TINY))
+        decades = size / math.log10(priors.PREDICTION)
         expected = -0.5 * decades**2 - math.log(
             math.sqrt(2.0 * np.pi) * math.log(priors.PREDICTION)
         )
-        size = np.logaddexp(expected, math.log(priors.UNEXPECTED) - priors.PRICE)
-        found.append(scale_free(trace, log_det, points, len(rows)) + size)
+        of_size = np.logaddexp(expected, math.log(priors.UNEXPECTED) - priors.PRICE)
+        found.append(scale_free(trace, log_det, points, len(rows)) + of_size)
     return _log_mean(np.stack(found, axis=-1))
 
 

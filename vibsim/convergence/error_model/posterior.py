@@ -29,6 +29,8 @@ from vibsim.core.array_types import Flags, Floats
 
 UNTHINKABLE = -1e6
 """Log evidence of what cannot be."""
+NEGLIGIBLE = -20.0
+"""Log probability, over the largest so far, of hypotheses that are left out."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,8 @@ class _Sums:
         for name, value in self.values.items():
             self.values[name] = value * factor.reshape(-1, *[1] * (value.ndim - 1))
         self.top = top
-        return np.asarray(np.exp(log - top[:, None]))
+        less = log - top[:, None]
+        return np.where(less > NEGLIGIBLE, np.exp(less), 0.0)
 
     def put(self, name: str, value: Floats) -> None:
         self.values[name] = self.values[name] + value if name in self.values else value
@@ -126,14 +129,17 @@ class _Fit:
         )
         self.orders = local_orders(ladder)
         n = len(ladder.h)
+        # the finest and longest first: what follows is mostly negligible beside them
         self.windows = [
             (last - rows, last)
-            for last in range(2, n)
-            for rows in range(2, min(priors.LONGEST_WINDOW, last) + 1)
+            for last in range(n - 1, 1, -1)
+            for rows in range(min(priors.LONGEST_WINDOW, last), 1, -1)
         ]
-        # rounding is part of every row
-        largest = np.max(np.diagonal(ladder.gram, axis1=1, axis2=2), axis=-1, keepdims=True)
-        self.rounding = priors.ROUNDING * (ladder.floor**2 + (priors.EPSILON**2 * largest + TINY))
+        # rounding is part of every row; that of a level is relative to what differs from there on
+        squares = np.diagonal(ladder.gram, axis1=1, axis2=2)[:, : n - 1]
+        largest = np.maximum.accumulate(squares[:, ::-1], axis=-1)[:, ::-1]
+        largest = np.concatenate([largest, largest[:, -1:]], axis=-1)
+        self.rounding = priors.ROUNDING * (ladder.floor**2 + priors.EPSILON**2 * largest + TINY)
         self.differences = self.rows(0, n - 1)
         self.alone_rows = any_size(self.differences, self.points) - priors.PRICE
         self.sums = _Sums(len(ladder.gram))
@@ -214,8 +220,13 @@ class _Fit:
             path[:, start:end] = -np.sum(window.gains, axis=1)
             path[:, end:] = 1.0
             squared = mean_square(path, self.differences) + scale * np.sum(window.left, axis=(1, 2))
-            put("path", weights @ path)
-            put("path_squared", np.sum(weights * squared, axis=-1))
+            self.put_path(index, weights @ path, np.sum(weights * squared, axis=-1))
+
+    def put_path(self, index: int, path: Floats, squared: Floats) -> None:
+        """Add to the expression of the limit in the differences, and to its square, of a window."""
+        of_window = np.arange(len(self.windows)) == index
+        self.sums.put("path", path[:, None] * of_window[:, None])
+        self.sums.put("path_squared", squared[:, None] * of_window)
 
     def add_any_power(self, index: int, sizes: Floats, inside: Floats, rest: Floats) -> None:
         """Add the hypotheses of one power of any value, close to that of the finest differences of the window."""
@@ -245,8 +256,8 @@ class _Fit:
             path[..., end:] = 1.0
             squared = np.einsum("cpi,cij,cpj->cp", path, self.differences, path)
             squared += trace / len(rows) * (1.0 - np.sum(gains * c, axis=-1))
-            self.sums.put("path", np.einsum("cp,cpi->ci", weights, path))
-            self.sums.put("path_squared", np.sum(weights * squared, axis=-1))
+            mean = np.einsum("cp,cpi->ci", weights, path)
+            self.put_path(index, mean, np.sum(weights * squared, axis=-1))
 
     def add_no_expansion(self) -> None:
         """Add the hypotheses without an expansion: rows of any size, behind which all may be noise."""
@@ -286,8 +297,11 @@ class _Fit:
         if self.ladder.exact_known:
             values["path"], values["path_squared"] = self.alone_rows * np.nan, total * np.nan
         else:
-            values["path"] /= expansion[:, None]
-            values["path_squared"] /= expansion
+            # a coarse level may have blown up: what cannot be is not multiplied by it
+            likely = values["window"] > math.exp(NEGLIGIBLE)
+            expansion = np.maximum(np.sum(values["window"] * likely, axis=-1), TINY) * total
+            values["path"] = np.sum(values["path"] * likely[..., None], axis=1) / expansion[:, None]
+            values["path_squared"] = np.sum(values["path_squared"] * likely, axis=1) / expansion
         return Posterior(
             powers=self.powers,
             windows=self.windows,

@@ -37,4 +37,6 @@ ELSEWHERE = 0.02  # prior of a limit that is not the exact solution [chosen]
 LONGEST_WINDOW = 5  # rows: more add nothing [chosen]
 DOMINATES = 0.1  # a power dominates where no other one has more than this part of it [chosen]
 ROUNDING = 0.1  # square of the noise that a level has at least, over its prediction [chosen]
-EPSILON = 2.0**-53  # the least noise of a level, over the largest difference [arithmetic]
+EPSILON = (
+    2.0**-53
+)  # the least noise of a level, over the largest difference from there on [arithmetic]

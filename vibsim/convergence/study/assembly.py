@@ -111,14 +111,13 @@ def _hidden(question: Question, common: CommonValues, one: Outcome) -> bool:
 
 
 def _best_bound(one: Outcome, best: float | None) -> float | None:
-    """Return how far the extrapolated number may be from the limit: what the bound of the error leaves beside it."""
+    """Return how far the extrapolated number may be from the limit, or from the exact value where that is known."""
     if best is None:
         return None
-    finest = one.values[one.finite[-1]]
     if one.exact_known:
-        # the bound of the error is then that of a known error, and says nothing of the extrapolation
-        return _known(abs(best - (finest - one.error)) + one.floor)
-    return _known(max(one.error_bound - abs(finest - best), one.floor))
+        exact = one.values[one.finite[-1]] - one.error
+        return _known(abs(best - exact) + one.floor)
+    return _known(max(one.best_bound, one.floor))
 
 
 def _gci(one: Outcome, h: Floats) -> float:

@@ -203,12 +203,14 @@ def verdicts(
     count, inner = (shape[0], shape[1:]) if members else (1, shape)
     ladders = np.swapaxes(common.values.reshape(n, count, -1), 0, 1)
     limits = None if truth is None else truth.reshape(count, -1)
-    found = outcomes(question, steps.h, ladders, common.epsilon, limits)
     shown = common.dims[1:] if members else common.dims
-    return [
-        verdict(question, steps, common, one, (ladder.reshape(n, *inner), shown))
-        for one, ladder in zip(found, ladders, strict=True)
-    ]
+    # numbers near the ends of double precision: what cannot be said of them is not stated
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        found = outcomes(question, steps.h, ladders, common.epsilon, limits)
+        return [
+            verdict(question, steps, common, one, (ladder.reshape(n, *inner), shown))
+            for one, ladder in zip(found, ladders, strict=True)
+        ]
 
 
 def _levels(values: Any, members: bool) -> list[GridValues]:

@@ -68,7 +68,8 @@ def measurement(
     norms = _rms(scaled)
     rows = scaled[:, :-1] - scaled[:, 1:]
     if exact is not None:
-        true_error = scaled[:, -1] - exact / scale[:, None]
+        with np.errstate(over="ignore"):
+            true_error = scaled[:, -1] - exact / scale[:, None]
         rows = np.concatenate([rows, true_error[:, None]], axis=1)
     with np.errstate(over="ignore"):
         gram = np.matmul(rows, np.swapaxes(rows, 1, 2)) / points

@@ -55,6 +55,8 @@ class Outcome:
     error_bound: float = np.nan
     best: Floats | None = None
     """Extrapolated values, shape (points,)."""
+    best_bound: float = np.nan
+    """How far they are from the limit at most, in the norm."""
 
 
 def outcomes(
@@ -175,7 +177,8 @@ def _measured(
 def _distances(part: Floats, limit: Floats, is_number: bool, scale: float) -> Floats:
     """Return the distances of all levels from a limit: with their sign of numbers, else root mean squares."""
     if is_number:
-        return np.asarray(part[:, 0] - limit[0])
+        with np.errstate(over="ignore"):
+            return np.asarray(part[:, 0] - limit[0])
     return np.asarray(scale * np.sqrt(np.mean(((part - limit) / scale) ** 2, axis=1)))
 
 
@@ -209,6 +212,7 @@ def _decided(
         error_bound=bound,
         errors=errors,
         best=best,
+        best_bound=float(decided.best_bound[k]) * scale,
     )
 
 
