@@ -22,12 +22,10 @@ import numpy as np
 from vibsim.apriori.formal_orders import columns_of, even_powers, formal_orders, relative_floors
 from vibsim.checks.fields import REASON, STATUS, Field
 from vibsim.checks.outcome import (
-    FAIL,
-    INCONCLUSIVE,
-    PASS,
     PRE_ASYMPTOTIC,
     ROUND_OFF,
     Judged,
+    as_expected,
 )
 from vibsim.comparison.order_evidence import (
     CAUSES,
@@ -49,7 +47,7 @@ from vibsim.convergence.thresholds import (
 from vibsim.convergence.verdict import Judgement
 from vibsim.core.array_types import Codes, Floats
 from vibsim.core.record import Record, Variable, attributes
-from vibsim.core.vocabulary import REASON_NAMES, STATUSES, TYPICAL_NORM
+from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.models.shared.phase_amplitude_names import AMPLITUDE, PHASE
 from vibsim.observe.member_block import MemberBlock
 
@@ -115,17 +113,12 @@ def judge(
     experiment: Experiment, record: Record, check: ConvergesCheck, found: Mapping[str, Any]
 ) -> Judged:
     """Compare the verdict on a quantity, of every scheme and member, with the expected one."""
-    status, reason, expect = found["status"], found["reason"], check.expect
-    order = expected_order(experiment, record, check)
-    as_expected = status == STATUSES.index(expect.status)
-    if expect.reason is not None:
-        as_expected &= reason == REASON_NAMES.index(expect.reason)
-    open_ = status == INCONCLUSIVE
+    reason, order = found["reason"], expected_order(experiment, record, check)
     return Judged(
         reason,
         away=np.abs(found["order"] - order),
-        compared=np.where(as_expected, PASS, np.where(open_, INCONCLUSIVE, FAIL)),
-        facts={"expected": (EXPECTED, np.broadcast_to(order, status.shape))},
+        compared=as_expected(check.expect, reason),
+        facts={"expected": (EXPECTED, np.broadcast_to(order, reason.shape))},
     )
 
 

@@ -65,7 +65,7 @@ def results(record: Record, check: Mapping[str, Any], unit: str) -> Table | None
         [Column("order", form="order"), Column("interval"), Column("levels")] if has_order else []
     )
     # how far apart two solutions are has no digits worth reading, a number that a check names may have
-    form = "small" if check.get("kind") == "equal" else "value"
+    form = "small" if check.get("kind") in ("equal", "accurate") else "value"
     columns += [Column("value", unit, form)] if has_value else []
 
     def cells(result: Mapping[str, Any]) -> Iterator[Cell]:
