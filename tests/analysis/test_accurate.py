@@ -255,6 +255,55 @@ def test_a_start_of_first_order_is_less_accurate_than_the_estimate_of_a_right_on
     assert facts(true)["error"] < facts(low)["error_bound"]
 
 
+# -- beside the verdict on an order ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("with_exact", [True, False])
+def test_a_verdict_on_an_order_states_the_same_error(with_exact: bool) -> None:
+    checks = ({"converges": "theta"}, {"converges": "theta", "norm": "linf", "order": 3}, SMALL)
+    passed, failed, accurate = asked(PENDULUM, *checks, with_exact=with_exact)
+    names = ("error", "error_bound", "relative_error")
+    for found in (passed, failed):
+        assert [facts(found)[name] for name in names] == [facts(accurate)[name] for name in names]
+        assert (facts(found)["best"], facts(found)["best_bound"]) == (None, None)
+        assert found.results[0].value is None
+    told = facts(accurate)
+    size = f"{told['error']:.2g} rad sqrt(s) ({told['relative_error']:.2g} of its size)"
+    for found in (passed, failed):
+        assert f"The error of the finest level is {size}." in found.text
+
+
+def test_a_bound_with_other_digits_is_stated() -> None:
+    content = {**PENDULUM, "schemes": ["forward_euler"], "levels": [12, 13, 14]}
+    (found,) = asked(content, {"converges": "theta"}, with_exact=False)
+    told = facts(found)
+    assert found.status == "PASS"
+    assert f"of its size), at most {told['error_bound']:.2g}." in found.text
+
+
+def test_an_error_is_stated_where_it_is_believed_alone() -> None:
+    coarse = {**PENDULUM, "levels": [4, 5, 6], "schemes": ["rk4"]}
+    for with_exact in (True, False):
+        (found,) = asked(coarse, {"converges": "theta"}, with_exact=with_exact)
+        assert found.reason == "pre_asymptotic"
+        assert "error of the finest level" not in found.text
+        assert (facts(found)["error"] is not None) == with_exact
+    far = {**SPRING, "time": {"end": 200.0}, "levels": [3, 4, 5, 6]}
+    (found,) = asked(far, {"converges": "u"})
+    assert (found.reason, facts(found)["error"]) == ("unstable", None)
+
+
+def test_an_error_has_variables_of_its_own() -> None:
+    experiment = Experiment.from_dict({**SPRING, "checks": [{"id": "own", "converges": "u"}]})
+    levels = [simulate(experiment, level) for level in experiment.levels]
+    data = analyse(experiment, levels)
+    (found,) = verdicts(experiment, data)
+    for name in ("error", "error_bound", "relative_error"):
+        variable = data[f"check_own_{name}"]
+        assert variable.dims == ("scheme", "case")
+        assert float(variable[0, 0]) == facts(found)[name]
+
+
 # -- beside other checks -----------------------------------------------------------------------------------------------
 
 

@@ -213,6 +213,7 @@ def story(**changes: Any) -> _Phrases:
         "has_exact": True,
         "corner": None,
         "parts": "",
+        "error": "",
         "cause": "none",
         "more": -1,
         "readable": -1,

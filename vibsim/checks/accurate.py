@@ -100,6 +100,30 @@ def facts_of_error(found: FinestError) -> dict[str, Any]:
     return {"error": found.error, "error_bound": found.bound, "relative_error": relative}
 
 
+def known_error(q: Comparison) -> dict[str, Any]:
+    """Return the values of `ERROR` where the error of a quantity can be believed, NaN elsewhere."""
+    found, reason = error_of_finest(q), judgement(q, TYPICAL_NORM).reason
+    decides = found.is_true & ~np.isin(reason, (UNSTABLE, NON_FINITE, NOT_APPLICABLE))
+    decides |= np.isin(reason, ORDER_KNOWN)
+    facts = facts_of_error(found)
+    return {name: np.where(decides, values, np.nan) for name, values in facts.items()}
+
+
+def error_in_words(f: Found, quantity: str) -> str:
+    """Say how large the error of the finest level is; empty where that is not known."""
+    error, most, relative = (f.fact(name) for name in ERROR)
+    if not math.isfinite(most):
+        return ""
+    unit, number = unit_of_norm(f.record, quantity), f.notation.number
+    told = f" The error of the finest level is {number(error, 2)} {unit}".rstrip()
+    if math.isfinite(relative):
+        told += f" ({number(relative, 2)} of its size)"
+    # of a true error the bound has the same digits
+    if number(most, 2) != number(error, 2):
+        told += f", at most {number(most, 2)}"
+    return f"{told}."
+
+
 def _level_needed(last: int, found: FinestError, judged: Judgement, check: AccurateCheck) -> Codes:
     """Return the finer level whose bound is probably as asked, shape (scheme, case); -1 where none is known."""
     with np.errstate(all="ignore"):

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.apriori.formal_orders import columns_of, even_powers, formal_orders, relative_floors
+from vibsim.checks.accurate import ERROR, known_error
 from vibsim.checks.fields import REASON, STATUS, Field
 from vibsim.checks.outcome import (
     PRE_ASYMPTOTIC,
@@ -74,8 +75,14 @@ FIELDS = {
     ),
     "readable_level_compensated": Field("the same in compensated arithmetic", np.int8, none=-1),
     "cause": Field("why the order is another one, as far as it is known", np.int8, CAUSES),
+    **ERROR,
 }
-EXPECTED = Field("order that is expected; none where the quantity is to be exact")
+BESIDE = {
+    "expected": Field("order that is expected; none where the quantity is to be exact"),
+    "best": Field("the number extrapolated over the levels; none of a series"),
+    "best_bound": Field("bound of its error"),
+}
+"""Facts that are not measured by the check."""
 
 UNKNOWN = -1
 MOST = 12
@@ -106,6 +113,7 @@ def measure(
             quantity, judged, norm, order, "compensated"
         ),
         "cause": causes(quantity, compared, judged, norm, order, check.tolerance),
+        **known_error(quantity),
     }
 
 
@@ -114,11 +122,16 @@ def judge(
 ) -> Judged:
     """Compare the verdict on a quantity, of every scheme and member, with the expected one."""
     reason, order = found["reason"], expected_order(experiment, record, check)
+    none = np.full((1, 1), np.nan)
+    beside: dict[str, Floats] = {"expected": order, "best": none, "best_bound": none}
     return Judged(
         reason,
         away=np.abs(found["order"] - order),
         compared=as_expected(check.expect, reason),
-        facts={"expected": (EXPECTED, np.broadcast_to(order, reason.shape))},
+        facts={
+            name: (BESIDE[name], np.broadcast_to(values, reason.shape))
+            for name, values in beside.items()
+        },
     )
 
 
