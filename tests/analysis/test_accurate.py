@@ -10,6 +10,8 @@ import pytest
 import xarray
 
 from vibsim import Experiment, Verdict, analyse, simulate, verdicts
+from vibsim.analysis.blockwise import kept
+from vibsim.core.record import Record
 
 Content = dict[str, Any]
 
@@ -118,7 +120,7 @@ def test_a_small_error_passes_and_a_large_one_fails_with_the_level_that_reaches_
     assert [(v.status, v.reason) for v in (a_little_less, failed)] == [("FAIL", "mismatch")] * 2
     # a factor of 10 is two levels of second order
     assert facts(a_little_less)["level_needed"] == 11
-    assert "Add levels 10 to 11" in a_little_less.advice
+    assert "Add levels 10 and 11" in a_little_less.advice
     more = {**PENDULUM, "levels": [6, 7, 8, 9, 10, 11]}
     assert [v.status for v in asked(more, a_little, with_exact=with_exact)] == ["PASS"]
 
@@ -342,6 +344,42 @@ def test_a_member_alone_and_in_a_sweep_has_the_same_error() -> None:
         (alone,) = asked(SPRING, check, with_exact=with_exact)
         (among,) = asked(sweep, check, with_exact=with_exact)
         assert facts(alone) == next(r.facts for r in among.results if r.case == 1)
+
+
+FRICTION: Content = {
+    **SPRING,
+    "model": {"kind": "sliding_box", "alpha": 0.5, "mu": 0.1},
+    "initial": {"u": 2.0},
+    "sweep": {"model.mu": [0.05, 0.1, 0.15]},
+    "levels": [7, 8, 9, 10],
+}
+
+
+@pytest.mark.parametrize("content", [FRICTION, {**SPRING, "sweep": {"model.w": [0.5, 1.0, 2.0]}}])
+def test_a_large_sweep_says_the_same_as_a_small_one(
+    monkeypatch: pytest.MonkeyPatch, content: Content
+) -> None:
+    """Where no series are kept, and of what is kept of a range of members alone. Of friction nothing is known."""
+    checks = [
+        {"accurate": "u", "relative": 1e-3},
+        {"accurate": "v", "absolute": 1e-6},
+        {"converges": "u"},
+    ]
+    content = {**content, "samples": "common", "schemes": ["central", "rk2"], "checks": checks}
+    whole = judged(content)
+    basis = "extrapolated" if content["model"]["kind"] == "sliding_box" else "exact"
+    assert {row.facts["basis"] for row in whole[0].results} == {basis}
+    monkeypatch.setattr("vibsim.experiment.storage.LEAN", 0)
+    experiment = Experiment.from_dict(content)
+    lean = analyse(experiment, list(levels_of(content).values()))
+    assert lean.attrs["storage"] == "lean"
+    thin: list[Record] = []
+    list(kept(experiment, [Record.from_xarray(lean)], thin))
+    for found in (verdicts(experiment, lean), verdicts(experiment, thin[0])):
+        assert [one.text for one in found[:2]] == [one.text for one in whole[:2]]
+        for one, other in zip(whole, found, strict=True):
+            assert one.status == other.status
+            assert list(one.results) == list(other.results)
 
 
 # -- many ladders ------------------------------------------------------------------------------------------------------

@@ -262,8 +262,9 @@ class _Phrases:
 
     def _add(self, last: int) -> str:
         finer = list(range(self.level + 1, last + 1))
-        names = f"level {last}" if len(finer) == 1 else f"levels {finer[0]} to {last}"
-        return f"dd {names} to `levels:` ({cost_in_words(self.f.experiment, finer)})"
+        names = {1: f"level {last}", 2: f"levels {finer[0]} and {last}"}
+        which = names.get(len(finer), f"levels {finer[0]} to {last}")
+        return f"dd {which} to `levels:` ({cost_in_words(self.f.experiment, finer)})"
 
     def finer(self) -> str:
         """Name the level that is probably as accurate as asked, where one is known."""

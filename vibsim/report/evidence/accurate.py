@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vibsim.checks.value import unit_of_norm
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.report import data, style
@@ -32,7 +33,10 @@ def picture(record: Record, check: AccurateCheck, name: str, member: Member) -> 
         return None
     shown, most = errors / whole, bound / whole
     what = words.symbol(check.accurate)
-    title = f"error of {what} / {what}" if check.is_relative else f"error of {what}"
+    title = f"relative error of {what}"
+    if not check.is_relative:
+        unit = data.pretty_unit(unit_of_norm(record, check.accurate))
+        title = style.label(f"error of {what}", unit)
     figure = style.canvas(1.0)
     ax = frame.panel(figure, title, "level")
     frame.level_axis(ax, levels)
