@@ -104,7 +104,7 @@ _BY_KIND = {
         "maximum shows it at every time.",
     ),
     "accurate": Reason(
-        "The error of the finest level is as small as asked.",
+        "The error of the finest level is as the check expects.",
         "An error that is known: the true one, or an estimate on levels that show their order. The bound is a tested "
         "estimate, not a proof.",
     ),
