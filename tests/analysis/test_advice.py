@@ -16,6 +16,7 @@ from level_records import experiment, level_records, standard_error
 
 from vibsim import Experiment, analyse, simulate
 from vibsim.analysis import analyse_records, verdicts
+from vibsim.checks.accurate import BASES
 from vibsim.checks.fields import name_of
 from vibsim.checks.order_context import Corner
 from vibsim.checks.order_text import _Phrases, in_words
@@ -30,6 +31,7 @@ SCHEMA = Path(__file__).parents[2] / "workflow/schemas/experiment.schema.json"
 GOOD = {name for name, status in REASONS.items() if status == "PASS"}
 KINDS: dict[str, dict[str, Any]] = {
     "converges": {"converges": "theta"},
+    "accurate": {"accurate": "theta", "absolute": 2.0},
     "value": {"value": "period", "equals": 1.0},
     "best": {"value": "period", "equals": 1.0, "at": {"level": "best"}},
     "stable": {"stable": True},
@@ -38,6 +40,8 @@ KINDS: dict[str, dict[str, Any]] = {
 }
 MAKES = {
     "converges": set(REASON_NAMES) - {"match", "mismatch"},
+    "accurate": set(REASON_NAMES)
+    - {"asymptotic", "exact", "order_low", "order_high", "wrong_limit"},
     "value": {"match", "mismatch", "non_finite", "not_applicable"},
     "best": {"mismatch", "non_finite", "not_applicable", "pre_asymptotic"},
     "stable": {"match", "mismatch", "non_finite", "unstable"},
@@ -105,7 +109,7 @@ def made(kind: str, reason: str, **more: Any) -> tuple[Any, Record]:
     exp, record = analysed(json.dumps(KINDS[kind] | more))
     code = REASON_NAMES.index(reason)
     status = STATUSES.index(REASONS[reason])
-    broken = {"non_finite"} if kind != "converges" else set()
+    broken = {"non_finite"} if kind not in ("converges", "accurate") else set()
     if reason in broken:
         row = record.variable("status")
         table = {
@@ -115,6 +119,13 @@ def made(kind: str, reason: str, **more: Any) -> tuple[Any, Record]:
         record = Record(record.coords, table, record.attrs)
     if kind in {"converges", "stable"}:
         return exp, changed(record, reason=code, status=status)
+    if kind == "accurate":
+        is_known = reason in ("match", "mismatch")
+        error = 3.0 if reason == "mismatch" else 1.0
+        of_order = REASON_NAMES.index("asymptotic") if is_known else code
+        basis = BASES.index("none" if reason == "not_applicable" else "extrapolated")
+        numbers = {"error": error, "error_bound": error + 0.1, "order_reason": of_order}
+        return exp, changed(record, basis=basis, **numbers)
     numbers = {
         "match": {"value": 1.0, "distance": 1.0, "allowed": 2.0, "drift": DRIFTS.index("linear")},
         "mismatch": {
@@ -202,6 +213,7 @@ def story(**changes: Any) -> _Phrases:
         "has_exact": True,
         "corner": None,
         "parts": "",
+        "error": "",
         "cause": "none",
         "more": -1,
         "readable": -1,

@@ -148,7 +148,8 @@ def test_what_bounded_storage_keeps_of_a_member(monkeypatch: pytest.MonkeyPatch)
     record = analyse_records(experiment, simulated(experiment))
     everything = (*record.coords.values(), *record.variables.values())
     size = sum(v.values.nbytes for v in everything if "case" in v.dims) / experiment.members
-    assert size < 940
+    # of these the three numbers on the error of the finest level
+    assert size < 940 + 3 * 8
 
 
 def test_verdicts_need_only_what_is_kept_of_parts() -> None:

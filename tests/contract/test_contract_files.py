@@ -299,6 +299,8 @@ def test_summary_csv_has_a_line_for_every_check(runs: Runs) -> None:
     (order,) = (r for r in rows if (r["experiment"], r["check"]) == ("tiny", "order"))
     assert float(order["order"]) == pytest.approx(2, abs=0.05)
     assert float(order["order_low"]) < 2 < float(order["order_high"])
+    assert 0 < float(order["error"]) <= float(order["error_bound"])
+    assert 0 < float(order["relative_error"]) < 1
 
 
 def test_tables_are_rectangular(runs: Runs) -> None:

@@ -23,6 +23,7 @@ SPRING: dict[str, Any] = {
 }
 STABLE = {"stable": True, "schemes": ["central"], "level": 7}
 CONSERVES = {"conserves": "energy", "drift": "bounded", "schemes": ["central"], "level": 7}
+ACCURATE = {"accurate": "u", "relative": 1e-3, "schemes": ["central"]}
 EQUAL = {"equal": ["rk4", "other"], "quantity": "v", "atol": 1e-12, "level": 7}
 
 
@@ -32,6 +33,14 @@ def spring(*checks: dict[str, Any], **changes: Any) -> Experiment:
 
 def fault_of(check: dict[str, Any], **changes: Any) -> Any:
     return only_fault(**(SPRING | {"checks": [check]} | changes))
+
+
+@pytest.mark.parametrize("given", [{}, {"relative": 1.0, "absolute": 1.0}])
+def test_an_accuracy_is_relative_or_absolute(given: dict[str, float]) -> None:
+    fault = fault_of({"accurate": "u", **given})
+    assert fault.key == "checks[0]"
+    assert "exactly one of relative, absolute" in fault.rule
+    assert (fault.rule.endswith("none of them")) == (not given)
 
 
 @pytest.mark.parametrize("check", [STABLE, CONSERVES, EQUAL])
@@ -62,6 +71,31 @@ def test_defaults_of_the_checks() -> None:
 @pytest.mark.parametrize(
     ("check", "key", "rule", "hint"),
     [
+        (ACCURATE | {"accurate": "uu"}, "accurate", "unknown quantity", "did you mean 'u'?"),
+        (ACCURATE | {"accurate": "u_phase"}, "accurate", "unknown quantity", ""),
+        (ACCURATE | {"relative": 0.0}, "relative", "must be greater than 0", ""),
+        (ACCURATE | {"relative": -1}, "relative", "must be greater than 0", ""),
+        (ACCURATE | {"relative": ".inf"}, "relative", "", ""),
+        (ACCURATE | {"relatve": 1.0}, "relatve", "unknown key", "did you mean 'relative'?"),
+        (
+            ACCURATE | {"schemes": ["centrl"]},
+            "schemes[0]",
+            "not a scheme",
+            "did you mean 'central'?",
+        ),
+        (
+            ACCURATE | {"accurate": "u_phase_error"},
+            "relative",
+            "is an error itself",
+            "give `absolute:`",
+        ),
+        (ACCURATE | {"accurate": "v_d2t"}, "schemes[0]", "has no v_d2t", ""),
+        (
+            ACCURATE | {"expect": {"status": "PASS", "reason": "mismatch"}},
+            "expect.reason",
+            "reason of status FAIL",
+            "",
+        ),
         ({"stable": "yes"}, "stable", "must be true or false", ""),
         ({"stable": True, "scheme": "x"}, "scheme", "unknown key", "did you mean 'schemes'?"),
         (STABLE | {"schemes": ["centrl"]}, "schemes[0]", "not a scheme", "did you mean 'central'?"),

@@ -24,11 +24,13 @@ SPRING = {
 }
 KINDS = {
     "converges": {"converges": "u"},
+    "accurate": {"accurate": "u", "relative": 1e-3},
     "value": {"value": "error_linf", "quantity": "u", "below": 1.0},
     "stable": {"stable": True},
     "conserves": {"conserves": "energy", "drift": "linear"},
     "equal": {"equal": ["rk4", "discrete"], "quantity": "u"},
 }
+ACCURATE = KINDS["accurate"]
 BEHAVIOUR = ("stable", "conserves", "equal")
 
 
@@ -65,6 +67,15 @@ def test_the_member_that_decides_is_drawn(kind):
     _, _, (found,) = run(KINDS[kind], sweep={"initial.u": [0.5, 1.0, 2.0]})
     assert samples.element(found)
     assert "initial.u = " in found.caption
+
+
+def test_the_error_of_every_level_is_marked_and_the_finest_one_counts():
+    _, record, (found,) = run(ACCURATE)
+    errors = record["u_error_norm"][0, 0, :, 1]
+    shown = [y for _, y in dots(found)]
+    assert len(shown) == 4
+    assert sorted(shown) == pytest.approx(sorted(errors / record["check_check_1_size"][0, 0]))
+    assert "filled at the finest level" in found.caption
 
 
 def test_the_means_of_a_linear_drift_climb_by_two():

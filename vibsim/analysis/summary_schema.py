@@ -12,7 +12,7 @@ import numpy as np
 
 from vibsim.checks.fields import MEMBERS, Field, stated
 from vibsim.checks.kinds import KINDS
-from vibsim.checks.order import EXPECTED
+from vibsim.checks.order import BESIDE
 from vibsim.checks.tolerance import BOUND
 from vibsim.core.vocabulary import BY_TOLERANCE, FORMAT, REASON_NAMES, STATUSES
 
@@ -52,7 +52,7 @@ def schema() -> dict[str, Any]:
     for kind, row in KINDS.items():
         of_kind = {name: _fact(field) for name, field in stated(row.fields).items()}
         if kind == "converges":
-            of_kind["expected"] = _fact(EXPECTED)
+            of_kind |= {name: _fact(field) for name, field in BESIDE.items()}
         facts.append(_object(of_kind, title=f"facts of a check `{kind}`"))
     reached = {"error_bound": _fact(BOUND), "state": TEXT}
     facts.append(_object(reached, title=f"facts of the check `{BY_TOLERANCE}`"))

@@ -20,14 +20,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vibsim.apriori.formal_orders import columns_of, even_powers, formal_orders, relative_floors
+from vibsim.checks.accurate import ERROR, known_error
 from vibsim.checks.fields import REASON, STATUS, Field
 from vibsim.checks.outcome import (
-    FAIL,
-    INCONCLUSIVE,
-    PASS,
     PRE_ASYMPTOTIC,
     ROUND_OFF,
     Judged,
+    as_expected,
 )
 from vibsim.comparison.order_evidence import (
     CAUSES,
@@ -49,7 +48,7 @@ from vibsim.convergence.thresholds import (
 from vibsim.convergence.verdict import Judgement
 from vibsim.core.array_types import Codes, Floats
 from vibsim.core.record import Record, Variable, attributes
-from vibsim.core.vocabulary import REASON_NAMES, STATUSES, TYPICAL_NORM
+from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.models.shared.phase_amplitude_names import AMPLITUDE, PHASE
 from vibsim.observe.member_block import MemberBlock
 
@@ -76,8 +75,14 @@ FIELDS = {
     ),
     "readable_level_compensated": Field("the same in compensated arithmetic", np.int8, none=-1),
     "cause": Field("why the order is another one, as far as it is known", np.int8, CAUSES),
+    **ERROR,
 }
-EXPECTED = Field("order that is expected; none where the quantity is to be exact")
+BESIDE = {
+    "expected": Field("order that is expected; none where the quantity is to be exact"),
+    "best": Field("the number extrapolated over the levels; none of a series"),
+    "best_bound": Field("bound of its error"),
+}
+"""Facts that are not measured by the check."""
 
 UNKNOWN = -1
 MOST = 12
@@ -108,6 +113,7 @@ def measure(
             quantity, judged, norm, order, "compensated"
         ),
         "cause": causes(quantity, compared, judged, norm, order, check.tolerance),
+        **known_error(quantity),
     }
 
 
@@ -115,17 +121,17 @@ def judge(
     experiment: Experiment, record: Record, check: ConvergesCheck, found: Mapping[str, Any]
 ) -> Judged:
     """Compare the verdict on a quantity, of every scheme and member, with the expected one."""
-    status, reason, expect = found["status"], found["reason"], check.expect
-    order = expected_order(experiment, record, check)
-    as_expected = status == STATUSES.index(expect.status)
-    if expect.reason is not None:
-        as_expected &= reason == REASON_NAMES.index(expect.reason)
-    open_ = status == INCONCLUSIVE
+    reason, order = found["reason"], expected_order(experiment, record, check)
+    none = np.full((1, 1), np.nan)
+    beside: dict[str, Floats] = {"expected": order, "best": none, "best_bound": none}
     return Judged(
         reason,
         away=np.abs(found["order"] - order),
-        compared=np.where(as_expected, PASS, np.where(open_, INCONCLUSIVE, FAIL)),
-        facts={"expected": (EXPECTED, np.broadcast_to(order, status.shape))},
+        compared=as_expected(check.expect, reason),
+        facts={
+            name: (BESIDE[name], np.broadcast_to(values, reason.shape))
+            for name, values in beside.items()
+        },
     )
 
 

@@ -19,6 +19,7 @@ from vibsim.apriori.formal_orders import (
     special_orders,
     stability_limits,
 )
+from vibsim.checks.accurate import error_in_words
 from vibsim.checks.phase_amplitude_text import parts_in_words
 from vibsim.checks.sentences import Found, cost_in_words, growth_in_words
 from vibsim.checks.stable import ALIKE
@@ -75,6 +76,8 @@ class OrderContext:
         self.has_exact = has_exact(record, quantity, scheme, case)
         self.cost = partial(cost_in_words, experiment)
         self.parts = parts_in_words(f, quantity)
+        self.error = error_in_words(f, quantity)
+        """How large the error of the finest level is; empty where it is not known."""
 
         self.scheme, self.kind = f.scheme_name, experiment.schemes[scheme].kind
         method = SCHEMES[self.kind]

@@ -53,7 +53,7 @@ PULSE = (
 DIAGNOSES: Words = {
     "asymptotic": (
         "{subject} converges with {measured}, as {whose} (order {expected}). The rescaled differences "
-        "coincide.{doubt}{unseen}",
+        "coincide.{error}{doubt}{unseen}",
         "",
     ),
     "exact": (
@@ -61,7 +61,8 @@ DIAGNOSES: Words = {
         "",
     ),
     "wrong_limit": (
-        "The levels of {what} approach each other, but not the exact solution. The remaining error is too large.",
+        "The levels of {what} approach each other, but not the exact solution. The remaining error is too large."
+        "{error}",
         "Check `model:` and `initial:` against the intended equation. Finer levels will not help.",
     ),
     "unstable, beyond the limit": (
@@ -250,7 +251,7 @@ def in_words(s: _Phrases) -> Description:
     """Fill the templates of the diagnosis."""
     sentence, advice = DIAGNOSES[_diagnosis(s)]
     if s.reason in ("order_low", "order_high"):
-        sentence = f"{{other_order}}{sentence}{{parts}}"
+        sentence = f"{{other_order}}{sentence}{{parts}}{{error}}"
     template = Template(s, s.notation)
     return Description(template.format(sentence), template.format(advice))
 

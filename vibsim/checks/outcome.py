@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibsim.checks.fields import Facts, facts_of
-from vibsim.core.array_types import Floats, Integers
+from vibsim.core.array_types import Codes, Flags, Floats, Integers
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import REASON_NAMES, REASONS, SEVERITY, STATUSES, decisive_number
 from vibsim.experiment.data import schemes_of
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.checks import ClaimCheck, Measurement
+    from vibsim.experiment.schema.checks import ClaimCheck, Expect, Measurement
 
 PASS, FAIL, INCONCLUSIVE = map(STATUSES.index, ("PASS", "FAIL", "INCONCLUSIVE"))
 """Index into `STATUSES`."""
@@ -228,6 +228,19 @@ class Results(Sequence[Result]):
         )
 
 
+def is_open(reason: Codes) -> Flags:
+    """Say where a reason, index into `REASON_NAMES`, is that of a verdict which decides nothing."""
+    return np.asarray(STATUS_OF[reason] == INCONCLUSIVE)
+
+
+def as_expected(expect: Expect, reason: Codes) -> Codes:
+    """Return the statuses of results with these reasons, compared with the expected verdict."""
+    right = STATUS_OF[reason] == STATUSES.index(expect.status)
+    if expect.reason is not None:
+        right &= reason == REASON_NAMES.index(expect.reason)
+    return np.where(right, PASS, np.where(is_open(reason), INCONCLUSIVE, FAIL))
+
+
 def compared_reason(check: Measurement | None, status: str, measured: str, reason: str) -> str:
     """Return the measured reason where a PASS was expected, else whether the outcome is the expected one.
 
@@ -239,8 +252,8 @@ def compared_reason(check: Measurement | None, status: str, measured: str, reaso
         Status compared with what was expected, and the measured one.
     """
     expects_pass = True
-    if check is not None and check.kind == "converges":
-        expects_pass = check.expect.status == "PASS"
+    if check is not None and check.expected_verdict is not None:
+        expects_pass = check.expected_verdict.status == "PASS"
     elif check is not None and check.kind == "stable":
         expects_pass = check.stable
     if status == "PASS" and not expects_pass:

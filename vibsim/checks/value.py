@@ -222,10 +222,19 @@ def unit_of(experiment: Experiment, record: Record, check: ValueCheck) -> str:
     unit = of_time.get(measure, "") if time else ""
     if measure not in ("quantity", "l1", "l2", "position"):
         return unit
-    kept = record.attrs.get(UNITS)
-    known = units_in(record) if kept is None else json.loads(str(kept))
     of = experiment.model.definition.position if measure == "position" else check.quantity
-    return f"{known.get(of or '', '')} {unit}".strip()
+    return f"{_known_units(record).get(of or '', '')} {unit}".strip()
+
+
+def unit_of_norm(record: Record, quantity: str) -> str:
+    """Return the unit of the L2 norm over time of a quantity; empty where it has none."""
+    return f"{_known_units(record).get(quantity, '')} {'sqrt(s)' if has_time_unit(record) else ''}".strip()
+
+
+def _known_units(record: Record) -> dict[str, str]:
+    kept = record.attrs.get(UNITS)
+    found: dict[str, str] = units_in(record) if kept is None else json.loads(str(kept))
+    return found
 
 
 def units_in(record: Record) -> dict[str, str]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from vibsim.apriori.formal_orders import columns_of
-from vibsim.checks import equal, tolerance, value
+from vibsim.checks import accurate, equal, tolerance, value
 from vibsim.checks.kinds import KINDS
 from vibsim.checks.outcome import Result, compared_reason, truth
 from vibsim.checks.sentences import PLAIN, Description, Found, Notation
@@ -20,7 +20,7 @@ from vibsim.core.vocabulary import BY_TOLERANCE, worst
 
 if TYPE_CHECKING:
     from vibsim.experiment import Check, Experiment
-    from vibsim.experiment.schema.checks import Measurement
+    from vibsim.experiment.schema.checks import Expect, Measurement
 
 CORRECT = "Correct `expect:`, or find out why the outcome differs."
 
@@ -33,8 +33,11 @@ def expectation(experiment: Experiment, check: Check | None, notation: Notation 
         case "claim":
             return "true" if check.holds else "false"
         case "converges":
-            expect = check.expect
-            return expect.status if expect.reason is None else f"{expect.status} ({expect.reason})"
+            return _verdict(check.expect)
+        case "accurate" if check.expect.status != "PASS":
+            return _verdict(check.expect)
+        case "accurate":
+            return accurate.rule(check, notation)
         case "value":
             return value.rule(check, notation)
         case "stable":
@@ -42,6 +45,10 @@ def expectation(experiment: Experiment, check: Check | None, notation: Notation 
         case "conserves":
             return check.drift
     return f"equal to {equal.other_solution(check)}"
+
+
+def _verdict(expect: Expect) -> str:
+    return expect.status if expect.reason is None else f"{expect.status} ({expect.reason})"
 
 
 @dataclass(frozen=True)
@@ -100,10 +107,13 @@ class Wording:
         """
         check, status, total = self._measured, _status(counts), sum(counts.values())
         told = self.sentence(result)
-        if check is not None and check.kind == "converges":
+        expect = None if check is None else check.expected_verdict
+        if expect is not None:
             reason = compared_reason(check, status, result.status, result.reason)
-            expected = expectation(self.experiment, check)
-            if reason == "match":
+            expected = _verdict(expect)
+            if expect.status == "PASS" and reason == result.reason:
+                pass
+            elif reason == "match":
                 told += f" The check detected {expected}, as intended."
             elif reason == "mismatch":
                 told += f" The check expects {expected}."

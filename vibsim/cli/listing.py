@@ -91,6 +91,8 @@ def _checks() -> Iterable[tuple[str, str]]:
     value = "{value: NAME, quantity:, at:, equals | below | above:}"
     text = "a statement of a source, with the check that decides it"
     yield "converges", "a quantity converges with an order: {converges: q, order: scheme | number}"
+    accurate = "{accurate: q, relative | absolute: number}"
+    yield "accurate", f"the error of the finest level is small enough: {accurate}"
     yield "claim", f"{text}: {{claim:, that:, holds:}}"
     yield "stable", "schemes are stable, or not: {stable: true | false, schemes:, level:, case:}"
     yield "conserves", f"how the energy drifts: {drifts}"

@@ -54,6 +54,7 @@ DECISIVE: Mapping[str, str] = MappingProxyType(
         "stable": "growth",
         "conserves": "energy_error",
         "equal": "distance",
+        "accurate": "error",
         BY_TOLERANCE: "error_bound",
     }
 )

@@ -80,10 +80,10 @@ PART_SAMPLES = 2**17
 """Samples of one variable that an analysis takes at a time (`vibsim.analysis`)."""
 RANGES_HELD = 3
 """Ranges of members that an analysis holds at a time: one for each of two threads, and one that is written."""
-RESULT = 100
+RESULT = 124
 """Bytes that an analysis keeps of each scheme and member until its end."""
 
-ANALYSIS_BYTES = (116, 190)
+ANALYSIS_BYTES = (140, 190)
 """Bytes that an analysis writes of a scheme and member: once, and for each level; two norms, and no series."""
 COMPARED_SERIES = (-48, 184)
 """Bytes beside these of a scheme, member and sample, where an analysis writes series."""

@@ -13,6 +13,7 @@ from vibsim.experiment.rules.checks import check_published, finish_checks
 from vibsim.experiment.rules.levels import rising_levels
 from vibsim.experiment.rules.members import update_tables
 from vibsim.experiment.schema.checks import (
+    AccurateCheck,
     Check,
     ClaimCheck,
     ConvergesCheck,
@@ -107,7 +108,8 @@ def _of_member(check: Check, unit: float) -> Check:
         return check.model_copy(update={"that": _of_member(check.that, unit)})
     if isinstance(check, ValueCheck):
         return check.model_copy(update={"at": _at_of_member(check.at, unit)})
-    return check if isinstance(check, ConvergesCheck) else check.model_copy(update={"case": None})
+    of_every = isinstance(check, ConvergesCheck | AccurateCheck)
+    return check if of_every else check.model_copy(update={"case": None})
 
 
 def _at_of_member(at: AnyAt, unit: float) -> AnyAt:

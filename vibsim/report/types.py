@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from vibsim.experiment import Check, Experiment
     from vibsim.experiment.data import SchemeSpec, TableSpec
     from vibsim.experiment.schema.checks import (
+        AccurateCheck,
         ConservesCheck,
         ConvergesCheck,
         EqualCheck,
@@ -25,11 +26,12 @@ if TYPE_CHECKING:
     from vibsim.plan import Plan
 else:
     Environment = Axes = Figure = Bbox = Check = Experiment = SchemeSpec = TableSpec = object
-    ConservesCheck = ConvergesCheck = EqualCheck = Measurement = StableCheck = ValueCheck = object
+    AccurateCheck = ConservesCheck = ConvergesCheck = EqualCheck = object
+    Measurement = StableCheck = ValueCheck = object
     PublishedRow = PublishedTable = Axis = Plan = object
 
 __all__ = [
-    "Axes", "Axis", "Bbox", "Check", "ConservesCheck", "ConvergesCheck", "Environment", "EqualCheck", "Experiment",
-    "Figure", "Measurement", "Plan", "PublishedRow", "PublishedTable", "SchemeSpec", "StableCheck", "TableSpec",
-    "ValueCheck",
+    "AccurateCheck", "Axes", "Axis", "Bbox", "Check", "ConservesCheck", "ConvergesCheck", "Environment", "EqualCheck",
+    "Experiment", "Figure", "Measurement", "Plan", "PublishedRow", "PublishedTable", "SchemeSpec", "StableCheck",
+    "TableSpec", "ValueCheck",
 ]  # fmt: skip

@@ -21,6 +21,7 @@ from vibsim.experiment.rules.check_places import (
 from vibsim.experiment.rules.size_limits import Setting
 from vibsim.experiment.schema.checks import (
     SOLUTIONS,
+    AccurateCheck,
     Check,
     ClaimCheck,
     ConservesCheck,
@@ -133,6 +134,8 @@ def _check(check: Check, scope: Scope) -> None:
     match inner:
         case ConvergesCheck():
             _converges(inner, scope)
+        case AccurateCheck():
+            _accurate(inner, scope)
         case ValueCheck():
             _value(inner, scope)
         case ConservesCheck():
@@ -153,22 +156,45 @@ def _quantity_of_schemes(name: str, key: str, schemes: Sequence[str] | None, sco
 def _converges(check: ConvergesCheck, scope: Scope) -> None:
     _expect(check.expect, scope.at("expect"))
     name, model = check.converges, scope.setting.model
-    if not is_error_part(name):
-        _quantity_of_schemes(name, "converges", check.schemes, scope)
-    elif model is not None and name not in error_parts(model):
-        rule, hint = "unknown quantity", nearest(name, error_parts(model))
-        if not has_error_parts(model):
-            what = "events" if model.events is not None else "a force with corners"
-            rule = f"does not exist: {model.kind} has {what}, and only a smooth motion has a phase and an amplitude"
-            hint = f"ask for {model.position}"
-        scope.at("converges").refuse(rule, hint, name)
-    elif model is not None and check.order == "scheme" and (reason := why_not_free(model)):
+    _convergent(name, "converges", check.schemes, scope)
+    if not is_error_part(name) or model is None or name not in error_parts(model):
+        return
+    if check.order == "scheme" and (reason := why_not_free(model)):
         rule = (
             f"theory knows the order of {name} on linear models without forces in time only, and "
             f"{model.kind} {reason}"
         )
         place = scope.at("order" if "order" in check.model_fields_set else "converges")
         place.refuse(rule, "give `order:` as a number")
+
+
+def _accurate(check: AccurateCheck, scope: Scope) -> None:
+    _expect(check.expect, scope.at("expect"))
+    _convergent(check.accurate, "accurate", check.schemes, scope)
+    keys = ("relative", "absolute")
+    if any(scope.at(key).is_faulty for key in keys):
+        return
+    given = [key for key in keys if getattr(check, key) is not None]
+    if len(given) != 1:
+        found = " and ".join(given) or "none of them"
+        scope.refuse(f"must have exactly one of relative, absolute; has {found}")
+    elif check.is_relative and is_error_part(check.accurate):
+        rule = f"is a part of the solution, and {check.accurate} is an error itself"
+        scope.at("relative").refuse(rule, "give `absolute:`", at_key=True)
+
+
+def _convergent(name: str, key: str, schemes: Sequence[str] | None, scope: Scope) -> None:
+    """Check that the quantity under a key is one that levels can be compared by."""
+    model = scope.setting.model
+    if not is_error_part(name):
+        _quantity_of_schemes(name, key, schemes, scope)
+    elif model is not None and name not in error_parts(model):
+        rule, hint = "unknown quantity", nearest(name, error_parts(model))
+        if not has_error_parts(model):
+            what = "events" if model.events is not None else "a force with corners"
+            rule = f"does not exist: {model.kind} has {what}, and only a smooth motion has a phase and an amplitude"
+            hint = f"ask for {model.position}"
+        scope.at(key).refuse(rule, hint, name)
 
 
 def _expect(expect: Expect, scope: Scope) -> None:

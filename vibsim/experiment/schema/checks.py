@@ -42,6 +42,17 @@ _EVERY_CASE = "Index of a member of the sweep, from 0; every one when left out."
 _Case = Annotated[Index | None, Field(description=_EVERY_CASE)]
 
 
+class Expect(Section):
+    """The verdict that a check should get."""
+
+    stand_ins = MappingProxyType({})
+
+    status: Status = "PASS"
+    """The expected status."""
+    reason: Annotated[str, Field(json_schema_extra={"enum": list(REASONS)})] | None = None
+    """The expected reason; any reason when left out."""
+
+
 class MeasuringCheck(Section):
     """What every check that measures something has."""
 
@@ -63,6 +74,12 @@ class MeasuringCheck(Section):
     def member(self) -> int | None:
         """The member of the sweep that the check speaks of; None for every one."""
         found: int | None = getattr(self, "case", None)
+        return found
+
+    @property
+    def expected_verdict(self) -> Expect | None:
+        """The verdict that passes, of a check that may say so; None of the others."""
+        found: Expect | None = getattr(self, "expect", None)
         return found
 
 
@@ -120,17 +137,6 @@ class EqualCheck(MeasuringCheck):
     def second(self) -> str:
         """What it must equal: a scheme, or one of `SOLUTIONS`."""
         return self.equal[1]
-
-
-class Expect(Section):
-    """The verdict that a check should get."""
-
-    stand_ins = MappingProxyType({})
-
-    status: Status = "PASS"
-    """The expected status."""
-    reason: Annotated[str, Field(json_schema_extra={"enum": list(REASONS)})] | None = None
-    """The expected reason; any reason when left out."""
 
 
 def _order(value: Any) -> Any:
@@ -221,6 +227,43 @@ class ConvergesCheck(MeasuringCheck):
         return self.converges
 
 
+class AccurateCheck(MeasuringCheck):
+    """The error of the finest level, in the L2 norm over time, is small enough."""
+
+    kind: ClassVar[Literal["accurate"]] = "accurate"
+    stand_ins = MappingProxyType({"accurate": STAND_IN})
+    accurate: Text
+    """The quantity: one that `converges` may be about."""
+    relative: Positive | None = None
+    """The error must be below this part of the solution, both in the L2 norm over time."""
+    absolute: Positive | None = None
+    """The error must be below this, in the unit of the quantity times the square root of s."""
+    schemes: _Schemes = None
+    expect: Expect = Expect()
+    """The verdict that passes; PASS when left out."""
+
+    @property
+    def about(self) -> str | None:
+        """The quantity that must be known over time."""
+        return self.accurate
+
+    @property
+    def key(self) -> str:
+        """The key that says how accurate."""
+        return "relative" if self.is_relative else "absolute"
+
+    @property
+    def is_relative(self) -> bool:
+        """Whether the error counts as a part of the solution."""
+        return self.relative is not None
+
+    @property
+    def accuracy(self) -> float:
+        """The error that is allowed; NaN where the file does not say."""
+        given = self.absolute if self.relative is None else self.relative
+        return math.nan if given is None else given
+
+
 DEFAULT_RTOL, DEFAULT_ATOL = 1e-9, 1e-12
 """Tolerances of ``equals`` where a check gives none; the second of numbers without a unit, and of 0, alone."""
 PLAIN = ("none", "count")
@@ -282,11 +325,19 @@ def _one_of(members: Mapping[str, type[Section]]) -> Any:
 
 
 MEASURED: Mapping[str, type[Section]] = MappingProxyType(
-    {row.kind: row for row in (ConvergesCheck, ValueCheck, StableCheck, ConservesCheck, EqualCheck)}
+    {
+        row.kind: row
+        for row in (
+            *(ConvergesCheck, AccurateCheck, ValueCheck),
+            *(StableCheck, ConservesCheck, EqualCheck),
+        )
+    }
 )
 """The checks that measure something, by their leading key."""
 
-Measurement = ConvergesCheck | ValueCheck | StableCheck | ConservesCheck | EqualCheck
+Measurement = (
+    ConvergesCheck | AccurateCheck | ValueCheck | StableCheck | ConservesCheck | EqualCheck
+)
 if TYPE_CHECKING:
     Measured = Measurement
 else:

@@ -18,7 +18,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import DECISIVE
 from vibsim.report import style, sweep_layout
 from vibsim.report.data import Member, case_name, is_lean, pick, place_of, unit
-from vibsim.report.evidence import energy, equal, frame, order, stable, value
+from vibsim.report.evidence import accurate, energy, equal, frame, order, stable, value
 from vibsim.report.evidence.frame import GrowthScale, evidence, usable
 from vibsim.report.style import Picture
 from vibsim.report.text import words
@@ -54,6 +54,8 @@ def _draw(
     measured, name = asserted.measured, asserted.id
     if measured.kind == "converges":
         return order.picture(record, measured, member)
+    if measured.kind == "accurate":
+        return accurate.picture(record, measured, name, member)
     if measured.kind == "value":
         return value.picture(experiment, record, measured, name, member)
     if is_lean(record):

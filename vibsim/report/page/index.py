@@ -13,7 +13,7 @@ from vibsim import store
 from vibsim.core.errors import FileError
 from vibsim.core.vocabulary import SEVERITY, worst
 from vibsim.report.page.page import environment
-from vibsim.report.tables.checks import measured_order, number_of
+from vibsim.report.tables.checks import error_of, measured_order, number_of
 from vibsim.report.tables.table import Column, Table, to_csv
 from vibsim.report.text import words
 
@@ -23,7 +23,8 @@ ORDER = ("FAIL", *UNREADABLE, "INCONCLUSIVE", "PASS")
 """The order in which the sentence counts experiments."""
 HEADERS = (
     "collection", "experiment", "title", "experiment status", "check", "kind", "text", "quantity", "expected",
-    "status", "reason", "scheme", "case", "order", "order_low", "order_high", "levels", "value", "advice", "failures",
+    "status", "reason", "scheme", "case", "order", "order_low", "order_high", "levels", "value",
+    "error", "error_bound", "relative_error", "advice", "failures",
 )  # fmt: skip
 
 
@@ -110,7 +111,7 @@ def _lines(row: Row) -> Iterator[tuple[Any, ...]]:
     """Yield one line per check, with the worst of its results; one line for an experiment that cannot be read."""
     head = (row.collection, row.name, row.title, row.status)
     if not row.checks:
-        yield (*head, *[None] * 5, row.status, row.why, *[None] * 8, row.broken)
+        yield (*head, *[None] * 5, row.status, row.why, *[None] * 11, row.broken)
     of_check = ("id", "kind", "text", "quantity", "expected", "status", "reason")
     for check in row.checks:
         results = check.get("results") or [{}]
@@ -120,5 +121,6 @@ def _lines(row: Row) -> Iterator[tuple[Any, ...]]:
             decides.get("case"),
             *measured_order(decides),
             number_of(decides),
+            *error_of(decides),
         )
         yield (*head, *map(check.get, of_check), *measured, check.get("advice"), row.broken)

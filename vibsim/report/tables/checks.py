@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+from vibsim.checks.accurate import ERROR
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import decisive_number
 from vibsim.report import data
@@ -26,13 +27,19 @@ def number_of(result: Mapping[str, Any]) -> float | None:
     return decisive_number(result.get("facts") or {})
 
 
+def error_of(result: Mapping[str, Any]) -> tuple[Cell, ...]:
+    """Return the error of the finest level, its bound, and the error over the size of the solution."""
+    return tuple(words.fact(result, name) for name in ERROR)
+
+
 def checks(summary: Mapping[str, Any]) -> Table:
     """Return every check with every result that the summary lists."""
     columns = (
         Column("check"), Column("kind"), Column("quantity"), Column("status"), Column("reason"), Column("expected"),
         Column("scheme"), Column("case", form="integer"), Column("measured status"), Column("measured reason"),
         Column("order", form="order"), Column("order, low", form="order"), Column("order, high", form="order"),
-        Column("levels"), Column("value", form="full"),
+        Column("levels"), Column("value", form="full"), Column("error", form="full"),
+        Column("error, at most", form="full"), Column("relative error", form="full"),
     )  # fmt: skip
     of_check = ("id", "kind", "quantity", "status", "reason", "expected")
     of_result = ("scheme", "case", "status", "reason")
@@ -42,6 +49,7 @@ def checks(summary: Mapping[str, Any]) -> Table:
             *map(result.get, of_result),
             *measured_order(result),
             number_of(result),
+            *error_of(result),
         )
         for check in summary["checks"]
         for result in check.get("results") or [{}]
@@ -65,7 +73,7 @@ def results(record: Record, check: Mapping[str, Any], unit: str) -> Table | None
         [Column("order", form="order"), Column("interval"), Column("levels")] if has_order else []
     )
     # how far apart two solutions are has no digits worth reading, a number that a check names may have
-    form = "small" if check.get("kind") == "equal" else "value"
+    form = "small" if check.get("kind") in ("equal", "accurate") else "value"
     columns += [Column("value", unit, form)] if has_value else []
 
     def cells(result: Mapping[str, Any]) -> Iterator[Cell]:

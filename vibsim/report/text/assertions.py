@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from vibsim.checks.accurate import rule
 from vibsim.checks.value import SAMPLED, what
 from vibsim.report.text import words
 from vibsim.report.types import Check, Measurement
@@ -70,6 +71,9 @@ def _measured(check: Measurement) -> str:
                 f"{words.title(check.converges)} converges with {order} ± {check.tolerance:g} ({check.norm} norm{only})"
                 f"{'' if check.expect.status == 'PASS' else trap}"
             )
+        case "accurate":
+            only = f" ({_listed(check.schemes)})" if check.schemes else ""
+            return f"{words.title(check.accurate)} is {rule(check, words.PAGE)} at the finest level{only}"
         case "value":
             bounds = (
                 ("equals", check.equals),

@@ -103,6 +103,11 @@ _BY_KIND = {
         "A run of many periods, because an oscillation hides a slow drift at first. The figure of the running "
         "maximum shows it at every time.",
     ),
+    "accurate": Reason(
+        "The error of the finest level is as the check expects.",
+        "An error that is known: the true one, or an estimate on levels that show their order. The bound is a tested "
+        "estimate, not a proof.",
+    ),
     "equal": Reason(
         "The two solutions are as close as the check expects.",
         "A distance well below the allowed one at every stored time. Without `atol`, the rounding errors of both are "

@@ -1,0 +1,285 @@
+"""The check ``accurate``: whether the error of the finest level is as small as asked.
+
+The error is that of the L2 norm over time. Where the exact solution is known it is the true one. Elsewhere it is
+estimated by extrapolation, and decides only where the order of the quantity is known: a bound that rests on levels
+whose errors fall by no known power bounds nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vibsim.checks.fields import LEVEL, Field
+from vibsim.checks.outcome import (
+    MATCH,
+    MISMATCH,
+    NON_FINITE,
+    NOT_APPLICABLE,
+    PRE_ASYMPTOTIC,
+    ROUND_OFF,
+    UNSTABLE,
+    Judged,
+    as_expected,
+    is_open,
+)
+from vibsim.checks.sentences import NOT_FINITE, PLAIN, Description, Found, Notation, cost_in_words
+from vibsim.checks.value import unit_of_norm
+from vibsim.comparison.finest_error import FinestError, error_of_finest
+from vibsim.comparison.order_evidence import judgement
+from vibsim.comparison.quantity_comparison import Comparison
+from vibsim.convergence.verdict import Judgement
+from vibsim.core.array_types import Codes
+from vibsim.core.record import Record
+from vibsim.core.vocabulary import REASON_NAMES, TYPICAL_NORM
+from vibsim.observe.member_block import MemberBlock
+
+if TYPE_CHECKING:
+    from vibsim.experiment import Experiment
+    from vibsim.experiment.schema.checks import AccurateCheck
+
+BASES = ("none", "exact", "extrapolated")
+"""What an error is measured against; files hold a position here."""
+NONE, EXACT, EXTRAPOLATED = range(len(BASES))
+ERROR = {
+    "error": Field("L2 norm over time of the error of the finest level"),
+    "error_bound": Field("upper bound of that error"),
+    "relative_error": Field("that error over the norm of the solution"),
+}
+"""Facts on the error of the finest level, of every check that states it."""
+FIELDS = {
+    **ERROR,
+    "size": Field("L2 norm over time of the solution"),
+    "accuracy": Field("error that is allowed, relative or absolute as the check asks", dims=()),
+    "basis": Field("what the error is measured against", np.int8, BASES),
+    "order_reason": Field("reason of the verdict on the promised order", np.int8, REASON_NAMES),
+    "level": LEVEL,
+    "level_needed": Field(
+        "level that probably reaches the accuracy by the measured order, -1 unknown",
+        np.int16,
+        none=-1,
+    ),
+}
+ORDER_KNOWN = [
+    REASON_NAMES.index(reason) for reason in ("asymptotic", "exact", "order_low", "order_high")
+]
+"""Reasons of verdicts on an order that say by which power errors fall."""
+MOST = 12
+"""More levels than that are no prediction."""
+FINER = 2
+"""So many finer levels are advised."""
+
+
+def measure(
+    block: MemberBlock, compared: Mapping[str, Comparison], check: AccurateCheck
+) -> Mapping[str, Any]:
+    """Return what a check measures."""
+    quantity = compared[check.accurate]
+    found, judged = error_of_finest(quantity), judgement(quantity, TYPICAL_NORM)
+    # a scheme that chooses its own steps has no order, and may have a true error all the same
+    has_none = (judged.reason == NOT_APPLICABLE) & ~(block.adaptive[:, None] & found.is_true)
+    basis = np.select([has_none, found.is_true], [NONE, EXACT], EXTRAPOLATED)
+    return {
+        **facts_of_error(found),
+        "size": found.size,
+        "accuracy": check.accuracy,
+        "basis": basis,
+        "order_reason": judged.reason,
+        "level": block.grid.levels[-1],
+        "level_needed": _level_needed(block.grid.levels[-1], found, judged, check),
+    }
+
+
+def facts_of_error(found: FinestError) -> dict[str, Any]:
+    """Return the values of `ERROR`."""
+    with np.errstate(all="ignore"):
+        relative = np.where(found.size > 0.0, found.error / found.size, np.nan)
+    return {"error": found.error, "error_bound": found.bound, "relative_error": relative}
+
+
+def known_error(q: Comparison) -> dict[str, Any]:
+    """Return the values of `ERROR` where the error of a quantity can be believed, NaN elsewhere."""
+    found, reason = error_of_finest(q), judgement(q, TYPICAL_NORM).reason
+    decides = found.is_true & ~np.isin(reason, (UNSTABLE, NON_FINITE, NOT_APPLICABLE))
+    decides |= np.isin(reason, ORDER_KNOWN)
+    facts = facts_of_error(found)
+    return {name: np.where(decides, values, np.nan) for name, values in facts.items()}
+
+
+def error_in_words(f: Found, quantity: str) -> str:
+    """Say how large the error of the finest level is; empty where that is not known."""
+    error, most, relative = (f.fact(name) for name in ERROR)
+    if not math.isfinite(most):
+        return ""
+    unit, number = unit_of_norm(f.record, quantity), f.notation.number
+    told = f" The error of the finest level is {number(error, 2)} {unit}".rstrip()
+    if math.isfinite(relative):
+        told += f" ({number(relative, 2)} of its size)"
+    # of a true error the bound has the same digits
+    if number(most, 2) != number(error, 2):
+        told += f", at most {number(most, 2)}"
+    return f"{told}."
+
+
+def _level_needed(last: int, found: FinestError, judged: Judgement, check: AccurateCheck) -> Codes:
+    """Return the finer level whose bound is probably as asked, shape (scheme, case); -1 where none is known."""
+    with np.errstate(all="ignore"):
+        asked = check.accuracy * (found.size if check.is_relative else 1.0)
+        steps = np.ceil(np.log2(found.bound / asked) / judged.order)
+        # neither round-off nor another limit vanishes with the step
+        known = (judged.order > 0.0) & (steps >= 1.0) & (steps <= MOST)
+        known &= (found.round_off < asked) & (judged.reason != REASON_NAMES.index("wrong_limit"))
+    return np.where(known, last + np.where(known, steps, 0.0), -1.0).astype(np.int16)
+
+
+def judge(
+    experiment: Experiment, record: Record, check: AccurateCheck, found: Mapping[str, Any]
+) -> Judged:
+    """Compare the error of the finest level with what is asked."""
+    error, bound, order_reason = found["error"], found["error_bound"], found["order_reason"]
+    is_true, size = found["basis"] == EXACT, found["size"]
+    asked = found["accuracy"] * (size if check.is_relative else np.ones_like(size))
+    # as far below the error as the bound is above it
+    least = np.maximum(2.0 * error - bound, 0.0)
+    decides = is_true | np.isin(order_reason, ORDER_KNOWN)
+    cases = [
+        (np.isin(order_reason, (UNSTABLE, NON_FINITE)), order_reason),
+        ((found["basis"] == NONE) | ~(asked > 0.0), NOT_APPLICABLE),
+        (decides & (bound < asked), MATCH),
+        (decides & (least > asked), MISMATCH),
+        (is_true, ROUND_OFF),
+        (is_open(order_reason), order_reason),
+    ]
+    reason = np.select([mask for mask, _ in cases], [code for _, code in cases], PRE_ASYMPTOTIC)
+    with np.errstate(all="ignore"):
+        away = bound / asked
+    return Judged(reason, away, as_expected(check.expect, reason))
+
+
+def rule(check: AccurateCheck, notation: Notation = PLAIN) -> str:
+    """Say what an error should be."""
+    asked = notation.number(check.accuracy)
+    return f"accurate to {asked} of its size" if check.is_relative else f"accurate to {asked}"
+
+
+def describe(f: Found, check: AccurateCheck) -> Description:
+    """Say how large the error is, and what to change where that is not as asked."""
+    s = _Phrases(f, check)
+    what = s.what
+    match f.reason:
+        case "match":
+            return Description(
+                f"{s.subject} is accurate to {s.error()} at level {s.level} (at most {s.most()}), as asked "
+                f"({s.asked}).",
+                "",
+                f"{s.error()} at level {s.level}, at most {s.most()}",
+            )
+        case "mismatch":
+            return Description(
+                f"{s.subject} is not as accurate as asked ({s.asked}). The error at level {s.level} is {s.error()}, at "
+                f"least {s.least()}.",
+                s.finer(),
+            )
+        case "unstable":
+            return Description(
+                f"{s.subject} is unstable, so it is not accurate.",
+                "Start `levels:` at a finer level, or take another scheme (`schemes:`).",
+            )
+        case "non_finite":
+            return Description(NOT_FINITE[0].format(s.subject), NOT_FINITE[1])
+        case "not_applicable" if f.word("basis") == "none":
+            return Description(
+                f"{s.subject} has no error to judge here, because it does not change, does not exist, or its scheme "
+                "chooses its own steps.",
+                "Choose a quantity (`accurate:`), `initial:` values and `schemes:` with a motion to judge.",
+            )
+        case "not_applicable":
+            return Description(
+                f"The solution for {what} is 0, so there is no relative error.",
+                "Give `absolute:` in place of `relative:`.",
+            )
+        case "round_off":
+            if f.word("basis") == "exact":
+                return Description(
+                    f"{s.open()} Round-off alone may be as large.",
+                    f"Change `{check.key}:`, or take an arithmetic with less round-off (`arithmetic: compensated`).",
+                )
+    if is_known_order(f.word("order_reason")):
+        return Description(s.open(), s.finer())
+    return Description(
+        f"{s.subject} may or may not be as accurate as asked ({s.asked}). The order is not known, so the estimate of "
+        f"the error at level {s.level}{s.estimate()} cannot be trusted.",
+        s.more_levels(),
+    )
+
+
+def is_known_order(reason: str) -> bool:
+    """Say whether a verdict on an order with this reason says by which power errors fall."""
+    return REASON_NAMES.index(reason) in ORDER_KNOWN
+
+
+class _Phrases:
+    """Parts of sentences on an error."""
+
+    def __init__(self, f: Found, check: AccurateCheck) -> None:
+        self.f, self.check = f, check
+        self.what = f.notation.quantity(check.accurate)
+        self.subject = f.notation.opening(self.what)
+        self.level: int = f.fact("level")
+        self.asked = f.notation.number(check.accuracy)
+
+    def _counted(self, error: float) -> str:
+        """Write an error as the check counts it."""
+        if self.check.is_relative:
+            size = self.f.fact("size")
+            return self.f.notation.number(error / size if size > 0.0 else math.nan, 2)
+        unit = unit_of_norm(self.f.record, self.check.accurate)
+        return f"{self.f.notation.number(error, 2)} {unit}".rstrip()
+
+    def error(self) -> str:
+        """Say how large the error is."""
+        told = self._counted(self.f.fact("error"))
+        return f"{told} of its size" if self.check.is_relative else told
+
+    def most(self) -> str:
+        return self._counted(self.f.fact("error_bound"))
+
+    def least(self) -> str:
+        return self._counted(max(2.0 * self.f.fact("error") - self.f.fact("error_bound"), 0.0))
+
+    def open(self) -> str:
+        """Say that what is asked lies between the bounds of the error."""
+        return (
+            f"{self.subject} may or may not be as accurate as asked ({self.asked}). The error at level {self.level} is "
+            f"{self.error()}, between {self.least()} and {self.most()}."
+        )
+
+    def estimate(self) -> str:
+        return f" ({self.error()})" if math.isfinite(self.f.fact("error")) else ""
+
+    def _add(self, last: int) -> str:
+        finer = list(range(self.level + 1, last + 1))
+        names = {1: f"level {last}", 2: f"levels {finer[0]} and {last}"}
+        which = names.get(len(finer), f"levels {finer[0]} to {last}")
+        return f"dd {which} to `levels:` ({cost_in_words(self.f.experiment, finer)})"
+
+    def finer(self) -> str:
+        """Name the level that is probably as accurate as asked, where one is known."""
+        change, needed = f"hange `{self.check.key}:`", self.f.fact("level_needed")
+        if self.f.word("order_reason") == "wrong_limit":
+            return "Check `model:` and `initial:` against the intended equation. Finer levels will not help."
+        if needed < 0:
+            return f"Take finer `levels:` or a scheme of higher order (`schemes:`), or c{change}."
+        return (
+            f"A{self._add(needed)}, which probably reaches it by the measured order, or c{change}."
+        )
+
+    def more_levels(self) -> str:
+        """Say what shows an order."""
+        ask = f"The check `{{converges: {self.check.accurate}}}` says what its order needs"
+        if self.f.reason in ("pre_asymptotic", "too_few_levels", "oscillating"):
+            return f"A{self._add(self.level + FINER)}. {ask}."
+        return f"{ask}. The bound of the error rests on it."
