@@ -300,7 +300,7 @@ CASES: list[tuple[dict[str, Any], str, str, str]] = [
     (
         check(foo=1),
         "checks[0]",
-        "must be a mapping with the key converges, value, stable, conserves, equal or claim",
+        "must be a mapping with the key converges, accurate, value, stable, conserves, equal or claim",
         "",
     ),
     ({"checks": ["theta"]}, "checks[0]", "must be a mapping with the key converges", ""),
