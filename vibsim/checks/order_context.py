@@ -27,7 +27,6 @@ from vibsim.comparison.exact_availability import has_exact
 from vibsim.core.record import Record
 from vibsim.models.shared.phase_amplitude_names import is_error_part, whole_of
 from vibsim.observe.member_block import fastest
-from vibsim.schemes import SCHEMES
 
 if TYPE_CHECKING:
     from vibsim.experiment.schema.checks import ConvergesCheck
@@ -78,7 +77,7 @@ class OrderContext:
         self.parts = parts_in_words(f, quantity)
 
         self.scheme, self.kind = f.scheme_name, experiment.schemes[scheme].kind
-        method = SCHEMES[self.kind]
+        method = experiment.schemes[scheme].method
         self.options = options_of(experiment, columns, scheme, case)
         self.expected = f.of_member(expected_order(experiment, record, check))
         """The order that was expected; infinite where the quantity was to be exact."""
