@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import copy
+import linecache
 import pickle
+import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,10 +16,10 @@ import pytest
 
 from vibsim import Experiment, analyse, best, simulate, verdicts
 from vibsim.core import registry
-from vibsim.core.errors import Fault, InputError
+from vibsim.core.errors import Fault, InputError, SimulationError
 from vibsim.experiment import canonical
 from vibsim.models import MODELS, Model, Parameter, State
-from vibsim.schemes import SCHEMES, Flag, Scheme
+from vibsim.schemes import SCHEMES, Flag, Scheme, Stepper
 from vibsim.schemes.orders import same_orders
 from vibsim.schemes.runge_kutta import Tableau, from_tableau
 
@@ -190,3 +193,31 @@ def test_an_object_that_is_no_sound_model_or_scheme_is_refused(
     (fault,) = faults(**changes)
     assert rule in fault.rule
     assert fault.file in ("in memory, one of the models", "in memory, one of the schemes")
+
+
+def test_a_scheme_whose_text_is_not_known_is_refused_by_name() -> None:
+    names: dict[str, Any] = {}
+    exec("def start(variant, u, v, dt, p, acceleration):\n    return u, v\n", names)
+    exec("def step(state, t, dt, p, acceleration):\n    return state, state[1]\n", names)
+    stepper = Stepper(names["start"], names["step"])
+    with pytest.raises(SimulationError, match="is not known: write it in a file"):
+        simulate(build(schemes=[replace(RALSTON, stepper=lambda options: stepper)]), 6)
+
+
+@pytest.mark.parametrize("name", ["models", "schemes"])
+def test_the_code_of_the_pages_runs_and_keeps_its_promise(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = Path(__file__).parents[2] / "docs" / f"{name}.md"
+    blocks = re.findall(r"^```python\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE)
+    names: dict[str, object] = {"__name__": "page"}
+    for i, block in enumerate(blocks):
+        if "_scheme(" in block:
+            # from a file of vibsim
+            continue
+        file = f"<{page.name}, block {i + 1}>"
+        linecache.cache[file] = (len(block), None, block.splitlines(keepends=True), file)
+        exec(compile(block, file, "exec"), names)
+    statuses = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
+    assert statuses
+    assert set(statuses) == {"PASS"}
