@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import jsonschema
+import netCDF4
 import numpy as np
 import pytest
 import yaml
@@ -91,6 +92,8 @@ def test_the_example_runs_and_an_edit_of_its_code_makes_results_again(
     results = ("--results", tmp_path / "results", "--cores", 2)
     ended = vibsim(here, "run", file, *results)
     assert ended.returncode == 0, ended.stdout + ended.stderr
+    with netCDF4.Dataset(tmp_path / "results/adhoc/cart/level_05.nc") as made:
+        assert '"vibsim-cart": "1.0"' in str(made.__dict__).replace('\\"', '"')
     summary = json.loads((tmp_path / "results/adhoc/cart/summary.json").read_text())
     assert [check["status"] for check in summary["checks"]] == ["PASS", "PASS", "PASS"]
     assert "nothing to do" in vibsim(here, "run", file, *results).stdout

@@ -89,6 +89,18 @@ def test_a_model_and_a_scheme_in_memory_have_everything_that_registered_ones_hav
     assert best(experiment).sizes["case"] == 2
 
 
+def test_a_natural_frequency_may_be_a_number() -> None:
+    """Where it depends on no parameter, nobody thinks of arrays."""
+    model = replace(RAYLEIGH, natural_frequency=lambda parameters: 1.0)
+    time = {"periods": 2, "steps_per_period": 4}
+    sweep = {"model.mu": [0.1, 0.2]}
+    found, expected = (build(model=m, time=time, sweep=sweep) for m in (model, RAYLEIGH))
+    levels = [simulate(found, level) for level in found.levels]
+    (verdict,) = verdicts(found, analyse(found, levels))
+    assert verdict.status == "PASS"
+    assert np.array_equal(levels[0].u, simulate(expected, 6).u)
+
+
 @pytest.mark.parametrize(
     "made",
     [
@@ -180,6 +192,15 @@ def test_a_message_offers_what_is_in_memory() -> None:
         ({"schemes": [RALSTON, replace(RALSTON, title="Another")]}, "the name is taken"),
         ({"model": replace(RAYLEIGH, kind="Lord Rayleigh")}, "must consist of a to z"),
         ({"model": replace(RAYLEIGH, acceleration="nu*v")}, "unknown name 'nu'"),
+        *(
+            (
+                {"model": replace(RAYLEIGH, parameters=(Parameter(name, 1.0, "1", "x"),))},
+                f"'{name}'",
+            )
+            for name in ("lambda", "sin", "pi", "t", "u", "energy", "2nd", "case")
+        ),
+        ({"model": replace(MODELS["pendulum"], kind="mine")}, "another kind, pendulum"),
+        ({"model": replace(MODELS["oscillator"], kind="mine")}, "another kind, oscillator"),
         ({"model": replace(RAYLEIGH, dissipation="v*")}, "formula of dissipation"),
         ({"model": replace(RAYLEIGH, states=RAYLEIGH.states[:1])}, "a position, a velocity"),
         ({"schemes": [replace(RALSTON, adaptive=True)]}, "cannot be added"),

@@ -6,6 +6,7 @@ Newton's method differentiates it, a report prints it.
 
 from __future__ import annotations
 
+import keyword
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -14,7 +15,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, Literal
 
 from vibsim.core.array_types import Floats
-from vibsim.formula import Expression, ExpressionError, parse
+from vibsim.formula import CONSTANTS, FUNCTIONS, Expression, ExpressionError, parse
 from vibsim.models.events import Events
 from vibsim.models.table import Lookup, Table
 
@@ -212,6 +213,10 @@ def tree(model: Model, formula: Formula) -> Expression:
     return parse(formula, (*(state.name for state in model.states), "t", *parameter_names(model)))
 
 
+_TAKEN = ("t", "scheme", "case", "level", "status", "end")
+"""Names that files and formulas have for something else."""
+
+
 def fault_of(model: object) -> str:
     """Say why an object from elsewhere is no model; nothing where it is one."""
     if not isinstance(model, Model):
@@ -220,6 +225,13 @@ def fault_of(model: object) -> str:
         return "its kind must consist of a to z, 0 to 9 and _"
     if not model.states or len(model.states) != 2 * len(model.accelerations):
         return "it must have a position, a velocity and an acceleration for each coordinate"
+    rows: list[State | Parameter | Output] = [*model.states, *model.parameters, *model.outputs]
+    names = [row.name for row in rows]
+    stored = [*quantities(model, own_velocity=True), *parameter_names(model), *_TAKEN]
+    for name in names:
+        is_word = keyword.iskeyword(name) or name in FUNCTIONS or name in CONSTANTS
+        if is_word or not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name) or stored.count(name) > 1:
+            return f"'{name}' cannot be the name of a state, a parameter or an output of it, or is one twice"
     outputs = {output.name: output.formula for output in model.outputs}
     formulas = {
         "kinetic_energy": model.kinetic_energy,
@@ -236,6 +248,14 @@ def fault_of(model: object) -> str:
             return f"its formula of {name}, {error.text}: {error.rule}"
         except TypeError as error:
             return f"its formula of {name} cannot be read: {error}"
+    # what stands in its place in an experiment
+    made = {
+        "variant": model.variant and model.variant(frozenset()),
+        "written": model.written and model.written({}, ()),
+    }
+    for name, other in made.items():
+        if other is not None and other.kind != model.kind:
+            return f"its {name} makes a model of another kind, {other.kind}: leave it out, or write one"
     return ""
 
 

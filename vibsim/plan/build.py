@@ -8,11 +8,11 @@ which samples it keeps. The start of a job costs as much as many cheap levels, w
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from typing import Any
 
-from vibsim.core.registry import Registry
+from vibsim.core.registry import Registry, offers
 from vibsim.experiment import Experiment, canonical
 from vibsim.experiment.cost import JOB_SECONDS, analysis_disk, analysis_memory, load_of
 from vibsim.experiment.storage import is_bounded, sampling, stored_series
@@ -44,6 +44,7 @@ DIVISIBLE_MEMBERS = 128
 def build(experiment: Experiment) -> Plan:
     """Return the plan of `experiment`, which has at least one level."""
     content: dict[str, Any] = json.loads(json.dumps(canonical(experiment), allow_nan=False))
+    packages = tuple(_offered(experiment.model.kind, _kinds(experiment)))
     values = cache(lambda start, stop: values_digest(experiment, start, stop))
     levels = tuple(_level(experiment, content, level, values) for level in experiment.levels)
     groups, trajectories = _groups(levels), experiment.trajectories
@@ -72,9 +73,9 @@ def build(experiment: Experiment) -> Plan:
         extrapolation=extrapolation,
         report=_job("report", content, {"analysis": analysis}, DRAWING),
         content=content,
-        versions=versions(NUMERICAL),
+        versions={**versions(NUMERICAL), **_versions_of(packages)},
         inputs=tuple((t.file, t.content) for t in experiment.model.tables.values()),
-        packages=tuple(_offered(experiment.model.kind, _kinds(experiment))),
+        packages=packages,
     )
 
 
@@ -119,6 +120,12 @@ def _offered(model: str, schemes: tuple[str, ...]) -> Iterator[tuple[str, str, s
     for registry, kind in pairs:
         if kind not in registry.built_in:
             yield registry.group, kind, code_digest.of_offer(registry.group, kind)
+
+
+def _versions_of(packages: Iterable[tuple[str, str, str]]) -> dict[str, str]:
+    """Return the versions of the packages that offer models and schemes, for who asks what made a result."""
+    points = (offers(group)[kind] for group, kind, _ in packages)
+    return {point.dist.name: point.dist.version for point in points if point.dist}
 
 
 def _kinds(experiment: Experiment) -> tuple[str, ...]:
