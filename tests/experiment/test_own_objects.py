@@ -203,6 +203,8 @@ def test_a_message_offers_what_is_in_memory() -> None:
         ({"model": replace(MODELS["oscillator"], kind="mine")}, "another kind, oscillator"),
         ({"model": replace(RAYLEIGH, dissipation="v*")}, "formula of dissipation"),
         ({"model": replace(RAYLEIGH, states=RAYLEIGH.states[:1])}, "a position, a velocity"),
+        ({"model": replace(RAYLEIGH, parameters=[*RAYLEIGH.parameters])}, "write tuples"),
+        ({"schemes": [replace(RALSTON, options=[])]}, "write tuples"),
         ({"schemes": [replace(RALSTON, adaptive=True)]}, "cannot be added"),
         ({"schemes": [replace(RALSTON, stepper=lambda options: None)]}, "its stepper must"),
         ({"schemes": [replace(RALSTON, orders=lambda options: 2)]}, "its orders must"),

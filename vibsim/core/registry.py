@@ -26,6 +26,15 @@ class _HasKind(Protocol):
 Entry = TypeVar("Entry", bound=_HasKind)
 
 
+def hash_fault(entry: object) -> str:
+    """Say why what is worked out of an entry cannot be kept for the next time; nothing where it can."""
+    try:
+        hash(entry)
+    except TypeError as error:
+        return f"it must have a hash: write tuples instead of lists ({error})"
+    return ""
+
+
 class Registry(Mapping[str, Entry]):
     """Models or schemes by kind. Counting and naming them imports no package, but its values do."""
 

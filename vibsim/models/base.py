@@ -15,6 +15,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, Literal
 
 from vibsim.core.array_types import Floats
+from vibsim.core.registry import hash_fault
 from vibsim.formula import CONSTANTS, FUNCTIONS, Expression, ExpressionError, parse
 from vibsim.models.events import Events
 from vibsim.models.table import Lookup, Table
@@ -223,6 +224,8 @@ def fault_of(model: object) -> str:
         return f"is no vibsim.models.Model, but of the type {type(model).__name__}"
     if not re.fullmatch("[a-z0-9_]+", model.kind):
         return "its kind must consist of a to z, 0 to 9 and _"
+    if fault := hash_fault(model):
+        return fault
     if not model.states or len(model.states) != 2 * len(model.accelerations):
         return "it must have a position, a velocity and an acceleration for each coordinate"
     rows: list[State | Parameter | Output] = [*model.states, *model.parameters, *model.outputs]
@@ -246,8 +249,6 @@ def fault_of(model: object) -> str:
             tree(model, formula)
         except ExpressionError as error:
             return f"its formula of {name}, {error.text}: {error.rule}"
-        except TypeError as error:
-            return f"its formula of {name} cannot be read: {error}"
     # what stands in its place in an experiment
     made = {
         "variant": model.variant and model.variant(frozenset()),

@@ -16,6 +16,7 @@ from functools import partial
 from typing import Any
 
 from vibsim.core.array_types import Floats
+from vibsim.core.registry import hash_fault
 from vibsim.models.base import BUDGET, Model
 from vibsim.models.events import TREATMENTS
 from vibsim.schemes.orders import Beginning, Orders, depends_on_velocity
@@ -279,6 +280,8 @@ def fault_of(scheme: object) -> str:
         return f"is no vibsim.schemes.Scheme, but of the type {type(scheme).__name__}"
     if not re.fullmatch("[a-z0-9_]+", scheme.kind):
         return "its kind must consist of a to z, 0 to 9 and _"
+    if fault := hash_fault(scheme):
+        return fault
     if scheme.adaptive:
         return "a scheme that chooses its own steps cannot be added"
     options = scheme.defaults()
