@@ -12,9 +12,8 @@ from experiment_files import GOOD, build, content, faults_of, file_faults, only_
 
 from vibsim.analysis import analyse_records
 from vibsim.core.errors import InputError
-from vibsim.experiment import VALUES, Experiment, reading
+from vibsim.experiment import VALUES, Experiment, kinds
 from vibsim.experiment.rules import checks as check_rules
-from vibsim.experiment.rules import schemes as scheme_rules
 from vibsim.models import MODELS, quantities
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import simulate_record
@@ -455,7 +454,7 @@ def test_an_extremum_that_is_accepted_is_measured(name: str, quantity: str) -> N
 
 def change_model(monkeypatch: pytest.MonkeyPatch, kind: str = "pendulum", **changes: Any) -> None:
     models = {**MODELS, kind: replace(MODELS[kind], variant=None, **changes)}
-    monkeypatch.setattr(reading, "MODELS", models)
+    monkeypatch.setattr(kinds, "MODELS", models)
 
 
 @pytest.mark.parametrize("name", [name for name, row in VALUES.items() if row.needs_exact])
@@ -492,7 +491,7 @@ def test_a_scheme_that_cannot_treat_the_model_is_refused(
 ) -> None:
     central = SCHEMES["central"]
     schemes = {"central": replace(central, velocity_forces=False, damped=())}
-    monkeypatch.setattr(scheme_rules, "SCHEMES", schemes)
+    monkeypatch.setattr(kinds, "SCHEMES", schemes)
     build()
     change_model(monkeypatch, acceleration="-(g/L)*sin(theta) - m*omega")
     (fault,) = file_faults(tmp_path, GOOD)

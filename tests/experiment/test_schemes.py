@@ -13,8 +13,7 @@ import pytest
 from experiment_files import GOOD, build, faults_of, file_faults, only_fault
 
 from vibsim import plan
-from vibsim.experiment import Experiment, canonical, reading, restore
-from vibsim.experiment.rules import schemes as scheme_rules
+from vibsim.experiment import Experiment, canonical, kinds, restore
 from vibsim.experiment.schema.sweep import tolerance_name
 from vibsim.models import MODELS
 from vibsim.schemes import FIXED_STEP, SCHEMES, AnyOption, Flag, NumberOption, Option
@@ -196,9 +195,9 @@ def test_a_scheme_for_forces_without_velocity_names_those_that_can(
 ) -> None:
     schemes = dict(SCHEMES) | {"central": SCHEMES["central"]}
     model = replace(MODELS["pendulum"], variant=None, acceleration="-(g/L)*sin(theta) - 0.1*omega")
-    monkeypatch.setattr(scheme_rules, "SCHEMES", schemes)
+    monkeypatch.setattr(kinds, "SCHEMES", schemes)
     build()
-    monkeypatch.setattr(reading, "MODELS", {"pendulum": model})
+    monkeypatch.setattr(kinds, "MODELS", {"pendulum": model})
     (fault,) = file_faults(tmp_path, GOOD)
     rule = "cannot treat pendulum, whose acceleration depends on omega otherwise than by linear or quadratic damping"
     assert fault.rule == rule

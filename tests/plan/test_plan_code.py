@@ -151,7 +151,7 @@ def test_another_entry_under_the_same_name_changes_the_simulation(
     """The lists of all schemes and models count by the entries that they give."""
     before = build.code_of("pendulum", ("rk4",))
     swapped = {**SCHEMES, "rk4": SCHEMES["rk2"]}
-    monkeypatch.setattr(build, "SCHEMES", swapped)
+    monkeypatch.setattr(build.SCHEMES, "built_in", swapped)
     build.code_of.cache_clear()
     assert build.code_of("pendulum", ("rk4",)) != before
     build.code_of.cache_clear()

@@ -40,7 +40,6 @@ from vibsim.observe.member_block import CENTRED, MemberBlock, block_of
 from vibsim.observe.missed_pulses import missed_variables
 from vibsim.observe.stiffness import applies as motion_decides
 from vibsim.observe.stiffness import is_damped
-from vibsim.schemes import SCHEMES
 from vibsim.simulation.reference.one_sided_forces import varies_in_time
 from vibsim.simulation.scaled import in_scales
 
@@ -169,7 +168,7 @@ def _widened(block: MemberBlock, variable: Variable) -> Variable:
     """Give swept words the same width in every part of a sweep."""
     if variable.values.dtype.kind != "U" or "sweep_key" not in variable.attrs:
         return variable
-    schemes = (SCHEMES[scheme.kind] for scheme in block.experiment.schemes)
+    schemes = (scheme.method for scheme in block.experiment.schemes)
     words = [choice for scheme in schemes for option in scheme.words for choice in option.choices]
     width = max(map(len, (*words, *TREATMENTS)))
     return Variable(variable.dims, variable.values.astype(f"U{width}"), variable.attrs)

@@ -20,7 +20,7 @@ from vibsim.formula import values
 from vibsim.models import Model, tree
 from vibsim.models.shared.free import free_oscillation, why_not_free
 from vibsim.models.shared.phase_amplitude_names import PHASE, is_error_part, whole_of
-from vibsim.schemes import SCHEMES, Options, Scheme
+from vibsim.schemes import Options, Scheme
 from vibsim.schemes.base import ORDER_AT_CORNERS, is_on_the_mesh
 from vibsim.schemes.orders import Beginning, depends_on_velocity, is_autonomous
 from vibsim.simulation.members import numbers_of
@@ -63,7 +63,7 @@ def beginning_matters(experiment: Experiment) -> bool:
     # a swept option is another one in every member
     return options_swept(experiment) or any(
         orders.from_rest is not None or orders.from_balance is not None
-        for orders in (SCHEMES[s.kind].orders(s.options) for s in experiment.schemes)
+        for orders in (s.method.orders(s.options) for s in experiment.schemes)
     )
 
 
@@ -139,10 +139,10 @@ def part_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floa
     motion = free_oscillation(model, initial, parameters)
     found = np.full((len(experiment.schemes), len(motion.frequency)), np.nan)
     for s, spec in enumerate(experiment.schemes):
-        if SCHEMES[spec.kind].adaptive:
+        if spec.adaptive:
             continue
         for options, cases in plan.option_groups(experiment, s, columns):
-            stepper = SCHEMES[spec.kind].stepper_for(model, options)
+            stepper = spec.method.stepper_for(model, options)
             damping = motion.damping[cases]
             # worked out once for each damping
             for value in np.unique(damping[np.isfinite(damping)]).tolist():
@@ -248,7 +248,7 @@ def _each(
     rows = []
     for i, scheme in enumerate(experiment.schemes):
         groups = plan.option_groups(experiment, i, columns)
-        values = [np.asarray(promise(SCHEMES[scheme.kind], o), dtype=float) for o, _ in groups]
+        values = [np.asarray(promise(scheme.method, o), dtype=float) for o, _ in groups]
         count = sum(len(cases) for _, cases in groups) if len(groups) > 1 else 1
         row = np.empty((count, *values[0].shape))
         for value, (_, cases) in zip(values, groups, strict=True):

@@ -27,7 +27,6 @@ from vibsim.comparison.exact_availability import has_exact
 from vibsim.core.record import Record
 from vibsim.models.shared.phase_amplitude_names import is_error_part, whole_of
 from vibsim.observe.member_block import fastest
-from vibsim.schemes import SCHEMES
 
 if TYPE_CHECKING:
     from vibsim.experiment.schema.checks import ConvergesCheck
@@ -80,7 +79,7 @@ class OrderContext:
         """How large the error of the finest level is; empty where it is not known."""
 
         self.scheme, self.kind = f.scheme_name, experiment.schemes[scheme].kind
-        method = SCHEMES[self.kind]
+        method = experiment.schemes[scheme].method
         self.options = options_of(experiment, columns, scheme, case)
         self.promised = f.of_member(formal_orders(experiment, quantity, columns))
         """The order that the scheme promises, ..."""

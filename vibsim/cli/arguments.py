@@ -13,7 +13,7 @@ from typing import Any
 import vibsim
 
 _NAMES = "experiment (name or collection/name), one member of its sweep (NAME@CASE), collection, or FILE.yaml"
-LISTS = ("models", "schemes", "checks", "experiments")
+LISTS = ("models", "schemes", "checks", "experiments", "schema")
 RESTRICTIONS = ("subset", "mean", "linear", "cubic")
 _Row = tuple[str, dict[str, Any]]
 """An option with what `argparse` takes of it."""
@@ -69,7 +69,12 @@ def _commands() -> Iterator[tuple[str, str, str, Sequence[_Row]]]:
     yield "plan", "plan", text, (results, files, _flag("--json", "print the plans as JSON"))
     yield "judge", "judge", "Judge whether the results of any solver converge.", tuple(_judge())
     what: _Row = "what", {"choices": LISTS}
-    yield "list", "listing", "List what there is to choose from.", (what,)
+    yield (
+        "list",
+        "listing",
+        "List what there is to choose from, or print the JSON Schema of experiment files.",
+        (what,),
+    )
 
     digest = "refuse when the experiment or the code is not the one with this digest"
     discard = "delete a damaged or outdated input, so that the next run makes it again"

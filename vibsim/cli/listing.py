@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 def list_(options: Namespace) -> int:
     """Print the names and what they mean."""
+    if options.what == "schema":
+        return _schema()
     rows = {
         "models": _models,
         "schemes": _schemes,
@@ -23,6 +25,16 @@ def list_(options: Namespace) -> int:
     width = max((len(name) for name, _ in table), default=0)
     for name, text in table:
         print(f"{name.ljust(width)}  {text}".rstrip())
+    return 0
+
+
+def _schema() -> int:
+    """Print the JSON Schema of experiment files, with what installed packages offer."""
+    import json
+
+    from vibsim.experiment.schema.document import installed_schema
+
+    print(json.dumps(installed_schema(), indent=2, ensure_ascii=False))
     return 0
 
 

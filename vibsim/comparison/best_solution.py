@@ -22,7 +22,6 @@ from vibsim.core.array_types import Floats, Integers
 from vibsim.core.record import Attribute, Record, Variable, attributes
 from vibsim.core.vocabulary import MEMBER, SERIES
 from vibsim.observe.common_grid import Grid, check_belonging, common_grid, take
-from vibsim.schemes import SCHEMES
 from vibsim.simulation import Members, members
 from vibsim.simulation.scaled import in_scales
 
@@ -82,9 +81,9 @@ def extrapolated(
 
 def methods(experiment: Experiment, scheme: int, group: Members) -> list[tuple[Method, Integers]]:
     """Return the methods of one scheme, which differ where options are swept, and the members that have each."""
-    model, kind = experiment.model.definition, experiment.schemes[scheme].kind
+    model, method = experiment.model.definition, experiment.schemes[scheme].method
     return [
-        (Method(model, SCHEMES[kind], options), where)
+        (Method(model, method, options), where)
         for options, where in plan.option_groups(experiment, scheme, group.columns)
     ]
 

@@ -24,7 +24,6 @@ from vibsim.observe.common_grid import whole
 from vibsim.observe.member_block import CENTRED, MemberBlock, energy_at_start, plain_name, stored
 from vibsim.observe.predicted_oscillation import is_simple, natural_frequency, steppers
 from vibsim.observe.sensitivity import in_columns
-from vibsim.schemes import SCHEMES
 
 if TYPE_CHECKING:
     from vibsim.experiment.schema.checks import EqualCheck
@@ -74,7 +73,7 @@ def rounding(block: MemberBlock, level: int, name: str, scheme: int, floor: Floa
     found = np.full(block.shape[1:], np.nan)
     steps, numbers = _numbers(block, level)
     for options, where in steppers(block, scheme):
-        stepper = SCHEMES[block.experiment.schemes[scheme].kind].stepper(options)
+        stepper = block.experiment.schemes[scheme].method.stepper(options)
         w, dt, u, v = (x[where] for x in numbers)
         bounds = theory.rounding_bound(stepper, w, dt, u, v, steps)
         # the centred difference divides the rounding errors of two positions by 2 dt
@@ -97,7 +96,7 @@ def discrete(block: MemberBlock, level: int, name: str) -> Floats:
     for i, scheme in enumerate(block.experiment.schemes):
         for options, where in steppers(block, i):
             w, dt, u, v = (x[where] for x in numbers)
-            stepper = SCHEMES[scheme.kind].stepper(options)
+            stepper = scheme.method.stepper(options)
             states = theory.discrete(stepper, w, dt, u, v, n, steps=steps)
             found[i, where] = states[int(name == model.velocity)]
     return found

@@ -84,7 +84,13 @@ def definition(function: Callable[..., Any], name: str) -> ast.FunctionDef:
     """
     if not isinstance(function, types.FunctionType):
         raise SimulationError(f"{name} is no plain Python function, so it cannot enter a kernel")
-    tree = ast.parse(_source(function)).body[0]
+    try:
+        text = _source(function)
+    except OSError:
+        # typed into an interpreter, or made by exec
+        rule = f"the text of {name} is not known: write it in a file, or in a cell of a notebook"
+        raise SimulationError(rule) from None
+    tree = ast.parse(text).body[0]
     if not isinstance(tree, ast.FunctionDef):
         raise SimulationError(f"{name} is no function with a name, so it cannot enter a kernel")
     return tree

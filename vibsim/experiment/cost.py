@@ -222,7 +222,6 @@ def load_of(experiment: ExperimentSpec, level: int) -> Load:
     """Return what one member of `experiment` costs at `level`."""
     from vibsim.experiment.storage import extrema_kept, is_bounded, sampling, stored_series
     from vibsim.models import has_solution
-    from vibsim.schemes import SCHEMES
     from vibsim.schemes.adaptive import seconds
 
     model, steps = experiment.model.definition, experiment.steps(level)
@@ -230,7 +229,7 @@ def load_of(experiment: ExperimentSpec, level: int) -> Load:
     # members of such a model are stepped one by one
     alone = COUPLED if model.coordinates > 1 or model.lookup is not None else None
     alone = EVENTFUL if model.events is not None else alone
-    kinds = [SCHEMES[experiment.schemes[i].kind] for i in experiment.ladder]
+    kinds = [experiment.schemes[i].method for i in experiment.ladder]
     works = [work(kind.force_evaluations, kind.explicit, alone) for kind in kinds]
     # of a member that is not swept
     turns = experiment.time.end * float(model.natural_frequency(experiment.model.parameters))

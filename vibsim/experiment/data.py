@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import AfterValidator, Field, PrivateAttr, StrictBool
 
@@ -30,7 +30,7 @@ from vibsim.experiment.schema.published import PublishedTable
 from vibsim.experiment.schema.sweep import Axis
 from vibsim.models import MODELS, Model, centred, natural_end, quantities
 from vibsim.models.table import Table
-from vibsim.schemes import SCHEMES
+from vibsim.schemes import SCHEMES, Scheme
 
 Numbers = Annotated[dict[str, float], AfterValidator(FrozenDict)]
 Options = Annotated[dict[str, StrictBool | float | str], AfterValidator(FrozenDict)]
@@ -81,10 +81,21 @@ class ModelSpec(Section):
     terms: tuple[Text, ...] = ()
     """Which of `vibsim.models.Model.optional` the equation has: those that are not neutral, or are swept."""
 
+    _own: Model | None = PrivateAttr(default=None)
+
+    def hold(self, model: Model) -> None:
+        """Take the model of this kind, where a program hands it over and none is registered."""
+        self._own = model
+
+    @property
+    def base(self) -> Model:
+        """The model of this kind, without what the section says of it."""
+        return self._own or MODELS[self.kind]
+
     @property
     def definition(self) -> Model:
         """The equation of motion that this section describes."""
-        model = MODELS[self.kind]
+        model = self.base
         if model.written is not None:
             declared = (key.partition(".") for key in self.parameters)
             names = (name for section, _, name in declared if section == DECLARED)
@@ -124,16 +135,26 @@ class SchemeSpec(Section):
     """The label, else the kind."""
     kind: Text
     options: Options
+    _own: Scheme | None = PrivateAttr(default=None)
+
+    def hold(self, scheme: Scheme) -> None:
+        """Take the scheme of this kind, where a program hands it over and none is registered."""
+        self._own = scheme
+
+    @property
+    def method(self) -> Scheme:
+        """The scheme of this kind, which is the same with any options."""
+        return self._own or SCHEMES[self.kind]
 
     @property
     def adaptive(self) -> bool:
         """Whether it chooses its own steps, outside the ladder."""
-        return SCHEMES[self.kind].adaptive
+        return self.method.adaptive
 
     @property
     def own_velocity(self) -> bool:
         """Whether it has another velocity than the centred difference ``[D_2t u]``, which is then kept beside it."""
-        return not self.adaptive and SCHEMES[self.kind].stepper(self.options).own_velocity
+        return not self.adaptive and self.method.stepper(self.options).own_velocity
 
 
 class Sweep(Section):
@@ -202,6 +223,13 @@ class ExperimentSpec(Section):
     scaling: Scaling | None = None
     """Present where the run is made in the characteristic units of the model."""
     _file: Path | None = PrivateAttr(default=None)
+
+    @classmethod
+    def made_of(cls, spec: ExperimentSpec) -> Self:
+        """Return the experiment of this class with the fields of `spec`, which are checked already."""
+        found: Any = cls.model_construct(**spec.__dict__)
+        made: Self = found
+        return made
 
     @property
     def file(self) -> Path | None:

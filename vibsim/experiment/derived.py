@@ -88,7 +88,7 @@ def _filled(swept: dict[str, Any], section: str, values: Mapping[str, Any]) -> F
 def _scheme(swept: dict[str, Any], scheme: SchemeSpec) -> SchemeSpec:
     found = _filled(swept, f"schemes.{scheme.name}", scheme.options)
     options = {name: as_option(scheme.options[name], value) for name, value in found.items()}
-    return SchemeSpec(name=scheme.name, kind=scheme.kind, options=options)
+    return scheme.model_copy(update={"options": FrozenDict(options)})
 
 
 def _published_of(

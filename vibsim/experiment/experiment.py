@@ -7,15 +7,62 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from vibsim.experiment.collection import ADHOC
 from vibsim.experiment.data import ExperimentSpec
 from vibsim.experiment.schema.checks import Check
 
+if TYPE_CHECKING:
+    from vibsim.models import Model
+    from vibsim.schemes import Scheme
+
 
 class Experiment(ExperimentSpec):
-    """One experiment. Build it with `from_yaml` or `from_dict`, which check everything."""
+    """One experiment. Build it from a file, from what a file would hold, or from models and schemes of your own."""
+
+    def __init__(
+        self,
+        *,
+        model: Model | Mapping[str, Any] | str,
+        schemes: Sequence[Scheme | Mapping[str, Any] | str],
+        parameters: Mapping[str, Any] | None = None,
+        title: str = "",
+        name: str = "experiment",
+        collection: str = ADHOC,
+        **sections: Any,
+    ) -> None:
+        """Build an experiment in memory; everything is checked as in a file.
+
+        Parameters
+        ----------
+        model
+            A model, the name of a registered one, or what a file has under ``model``, whose ``kind`` may be a model.
+        schemes
+            A list of schemes, each likewise.
+        parameters
+            What a file has under ``model`` beside ``kind``: parameters that are not to have their default.
+        title
+            A line for pages and messages.
+        sections
+            The other sections of a file by their names: ``initial``, ``time``, ``levels``, ``sweep``, ``checks``, ...
+
+        Raises
+        ------
+        InputError
+            With every fault.
+        """
+        from vibsim.experiment.reading import from_objects
+
+        section = dict(model) if isinstance(model, Mapping) else {"kind": model}
+        content = {
+            "title": title or "An experiment in memory",
+            "model": {**section, **(parameters or {})},
+            "schemes": schemes,
+            **sections,
+        }
+        found = from_objects(type(self), content, name, collection)
+        self.__setstate__(found.__getstate__())
 
     @classmethod
     def from_yaml(
@@ -99,7 +146,7 @@ def restore(content: Mapping[str, Any], file: Path | None = None) -> Experiment:
     data = dict(content)
     data["sweep"] = data["sweep"] and {"axes": data["sweep"]}
     data["checks"] = [_without_kind(check) for check in data["checks"]]
-    experiment = Experiment.model_validate(data)
+    experiment = Experiment.made_of(ExperimentSpec.model_validate(data))
     experiment._file = file
     if experiment.model.tables:
         from vibsim.experiment.tables.file import attach

@@ -8,9 +8,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from vibsim.core.errors import Fault, InputError, nearest
+from vibsim.experiment.kinds import Kinds
 from vibsim.experiment.yaml.parse import MAX_FAULTS, Path_, Source, dotted
-from vibsim.models import MODELS
-from vibsim.schemes import SCHEMES
 
 MAX_VALUE = 60
 MISSING = "required key is missing"
@@ -41,10 +40,11 @@ _FORMS = {
 
 
 class Report:
-    """The faults of one input."""
+    """The faults of one input, and the kinds that it may name."""
 
-    def __init__(self, source: Source) -> None:
+    def __init__(self, source: Source, kinds: Kinds | None = None) -> None:
         self.source = source
+        self.kinds = kinds or Kinds()
         self.faults: set[Fault] = set(source.faults)
         self.faulty: set[Path_] = set()
         """Places of malformed values; nothing more is said about them."""
@@ -129,7 +129,7 @@ class Report:
 
     def _add_kind(self, path: Path_, value: object) -> None:
         """Note that a model or a scheme has no kind that exists."""
-        kinds = sorted(MODELS if path[0] == "model" else SCHEMES)
+        kinds = sorted(self.kinds.names(path[0]))
         if not isinstance(value, dict):
             hint = f"e.g. {{kind: {kinds[0]}}}"
             self.add(path, "must be a mapping with the key kind", hint, value)

@@ -11,8 +11,9 @@ from typing import Any
 
 from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.experiment.collection import collection_of
-from vibsim.experiment.data import AnyExperiment, ModelSpec
+from vibsim.experiment.data import AnyExperiment, ExperimentSpec, ModelSpec
 from vibsim.experiment.faults import MISSING, Report, shorten
+from vibsim.experiment.kinds import Kinds
 from vibsim.experiment.rules import members, size_limits, timing
 from vibsim.experiment.rules import schemes as scheme_rules
 from vibsim.experiment.rules.checks import check_published, finish_checks
@@ -28,6 +29,7 @@ from vibsim.experiment.schema.published import claims
 from vibsim.experiment.validation import read_document
 from vibsim.experiment.yaml.parse import MAX_DEPTH, Source, read
 from vibsim.models import MODELS, Model
+from vibsim.schemes import SCHEMES, Scheme
 
 MAX_NAME = 100
 MAX_REPEATS = 20
@@ -53,6 +55,33 @@ def from_content(
     return build(kind, Source(name, _plain(data, name)), collection, name)
 
 
+def from_objects(
+    kind: type[AnyExperiment], data: Mapping[str, Any], name: str, collection: str
+) -> AnyExperiment:
+    """Build an experiment from what a file would hold, with models and schemes themselves in place of their kinds."""
+    given: dict[type[Model | Scheme], list[Any]] = {Model: [], Scheme: []}
+
+    def named(section: Any) -> Any:
+        """Return a section as a file would have it, and keep the model or the scheme that it holds."""
+        if isinstance(section, Mapping):
+            return {**section, "kind": named(section.get("kind"))} if "kind" in section else section
+        for type_, objects in given.items():
+            if isinstance(section, type_):
+                objects.append(section)
+                return section.kind
+        return section
+
+    schemes = data["schemes"]
+    are_listed = isinstance(schemes, list | tuple)
+    content = {
+        **data,
+        "model": named(data["model"]),
+        "schemes": [named(scheme) for scheme in schemes] if are_listed else schemes,
+    }
+    kinds = Kinds(MODELS.own(given[Model]), SCHEMES.own(given[Scheme]))
+    return build(kind, Source(name, _plain(content, name)), collection, name, kinds=kinds)
+
+
 def _plain(data: Any, name: str, depth: int = 0) -> Any:
     """Return `data` with Python's own numbers, lists and dictionaries."""
     if depth > MAX_DEPTH:
@@ -72,16 +101,23 @@ def _plain(data: Any, name: str, depth: int = 0) -> Any:
 
 
 def build(
-    kind: type[AnyExperiment], source: Source, collection: str, name: str, file: Path | None = None
+    kind: type[AnyExperiment],
+    source: Source,
+    collection: str,
+    name: str,
+    file: Path | None = None,
+    kinds: Kinds | None = None,
 ) -> AnyExperiment:
     """Validate what `source` holds and fill in every default; `kind` is the class of what is built.
+
+    `kinds` says which models and schemes it may name, by default those that are registered.
 
     Raises
     ------
     InputError
         With every fault of the file.
     """
-    report = Report(source)
+    report = Report(source, kinds)
     for what, text in (("experiment", name), ("collection", collection)):
         _check_name(f"the name of the {what}, '{shorten(text)}',", text, report)
     document = read_document(source, report)
@@ -89,14 +125,14 @@ def build(
     # a model section with a fault elsewhere still names its model
     section = source.data.get("model")
     named = section.get("kind") if isinstance(section, Mapping) else None
-    of_kind = MODELS.get(named) if isinstance(named, str) else None
+    of_kind = report.kinds.model(named)
     equation = read_equation(
         document.model, of_kind, swept, file.parent if file else Path(), report
     )
     model, parameters = equation.model, equation.parameters
     levels = _levels(document, source, report)
     schemes = tuple(scheme_rules.finish_schemes(document.schemes, model, report))
-    knows_schemes = scheme_rules.are_known(document.schemes)
+    knows_schemes = scheme_rules.are_known(document.schemes, report.kinds)
     time = timing.time_spec(document.time, model, parameters, report)
     initial = _initial(document.initial, model or of_kind, parameters, report)
     order = source.data.get("sweep")
@@ -127,7 +163,7 @@ def build(
     report.raise_any()
     assert model is not None
     assert numbers.time is not None
-    experiment = kind(
+    spec = ExperimentSpec(
         collection=collection,
         name=name,
         title=document.title,
@@ -152,6 +188,9 @@ def build(
         units=document.units,
         scaling=numbers.scaling,
     )
+    if model.kind in report.kinds.own_models:
+        spec.model.hold(report.kinds.own_models[model.kind])
+    experiment = kind.made_of(spec)
     experiment._file = file
     size_limits.check_files(experiment, report)
     report.raise_any()

@@ -24,7 +24,7 @@ from vibsim.experiment.schema.fields import DECLARED, FORMULA_NOTE, MAX_FORMULAS
 from vibsim.experiment.schema.unit_text import NAME, UnitError, factors, split
 from vibsim.experiment.yaml.parse import Path_
 from vibsim.formula import CONSTANTS, FUNCTIONS, ExpressionError, constant
-from vibsim.models import MODELS, Model
+from vibsim.models import Model
 
 MAX_OWN = 50
 """Units of one file."""
@@ -49,7 +49,7 @@ class Units:
         """Names of units whose definition is refused; nothing is said about what is measured in them."""
         section = data.get("model")
         kind = section.get("kind") if isinstance(section, dict) else None
-        self.model = MODELS.get(kind) if isinstance(kind, str) else None
+        self.model = report.kinds.model(kind)
         self.units, self.texts = _wanted_units(self.model)
         if isinstance(data.get("units"), dict):
             self._define_all(data["units"])

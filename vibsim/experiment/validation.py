@@ -14,7 +14,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import Discriminator, Tag, TypeAdapter, ValidationError
 
 from vibsim.experiment.faults import MISSING, Report
-from vibsim.experiment.schema.document import Document
+from vibsim.experiment.schema.document import Document, OneOf
 from vibsim.experiment.schema.fields import STAND_IN, Section
 from vibsim.experiment.units import Units
 from vibsim.experiment.yaml.parse import Path_, Source
@@ -87,6 +87,8 @@ class _Reader:
         if path in self.report.faulty:
             return _FAULTY
         form = form.of(written)
+        if form.one_of and (made := form.one_of.section_of(written, self.report.kinds)):
+            form = _form(made)
         if form.section is not None and isinstance(written, Mapping):
             return self.section(path, written, form.section)
         if form.entries is None or (written is None and form.is_optional):
@@ -150,6 +152,7 @@ class _Form:
         self.section: Any = bare if _is_section(bare) else None
         """The class of the mapping that may stand there."""
         which: Any = next((m for m in metadata if isinstance(m, Discriminator)), None)
+        self.one_of = next((m for m in metadata if isinstance(m, OneOf)), None)
         self.tag_of = which.discriminator if which else None
         marked = ((m, mark) for m in (parts if which else ()) for mark in m.__metadata__)
         self.members = {mark.tag: _Form(m) for m, mark in marked if isinstance(mark, Tag)}
@@ -177,6 +180,11 @@ class _Form:
 @cache
 def _validator(annotation: Any) -> TypeAdapter[Any]:
     return TypeAdapter(annotation)
+
+
+@cache
+def _form(annotation: Any) -> _Form:
+    return _Form(annotation)
 
 
 @cache

@@ -1,10 +1,8 @@
-"""The registry of models; a model is one file of this package and one line here."""
+"""The registry of models; a model is one file of this package and one line here, or comes with an installed package."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
-
+from vibsim.core.registry import Registry
 from vibsim.models.base import (
     BUDGET,
     ENERGIES,
@@ -14,6 +12,7 @@ from vibsim.models.base import (
     Parameter,
     State,
     centred,
+    fault_of,
     has_budget,
     has_solution,
     natural_end,
@@ -47,7 +46,7 @@ _ALL = (
     DUFFING,
     ELASTIC_PENDULUM,
 )
-MODELS: Mapping[str, Model] = MappingProxyType({model.kind: model for model in _ALL})
+MODELS = Registry[Model]("vibsim.models", _ALL, fault_of)
 
 __all__ = [
     "BUDGET",

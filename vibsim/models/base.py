@@ -6,14 +6,17 @@ Newton's method differentiates it, a report prints it.
 
 from __future__ import annotations
 
+import keyword
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING, Any, Literal
 
 from vibsim.core.array_types import Floats
-from vibsim.formula import Expression, parse
+from vibsim.core.registry import hash_fault
+from vibsim.formula import CONSTANTS, FUNCTIONS, Expression, ExpressionError, parse
 from vibsim.models.events import Events
 from vibsim.models.table import Lookup, Table
 
@@ -209,6 +212,52 @@ def tree(model: Model, formula: Formula) -> Expression:
     if not isinstance(formula, str):
         return formula
     return parse(formula, (*(state.name for state in model.states), "t", *parameter_names(model)))
+
+
+_TAKEN = ("t", "scheme", "case", "level", "status", "end")
+"""Names that files and formulas have for something else."""
+
+
+def fault_of(model: object) -> str:
+    """Say why an object from elsewhere is no model; nothing where it is one."""
+    if not isinstance(model, Model):
+        return f"is no vibsim.models.Model, but of the type {type(model).__name__}"
+    if not re.fullmatch("[a-z0-9_]+", model.kind):
+        return "its kind must consist of a to z, 0 to 9 and _"
+    if fault := hash_fault(model):
+        return fault
+    if not model.states or len(model.states) != 2 * len(model.accelerations):
+        return "it must have a position, a velocity and an acceleration for each coordinate"
+    rows: list[State | Parameter | Output] = [*model.states, *model.parameters, *model.outputs]
+    names = [row.name for row in rows]
+    stored = [*quantities(model, own_velocity=True), *parameter_names(model), *_TAKEN]
+    for name in names:
+        is_word = keyword.iskeyword(name) or name in FUNCTIONS or name in CONSTANTS
+        if is_word or not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name) or stored.count(name) > 1:
+            return f"'{name}' cannot be the name of a state, a parameter or an output of it, or is one twice"
+    outputs = {output.name: output.formula for output in model.outputs}
+    formulas = {
+        "kinetic_energy": model.kinetic_energy,
+        "potential_energy": model.potential_energy,
+        "dissipation": model.dissipation or "0",
+        "driving": model.driving or "0",
+    }
+    pairs = zip(model.positions, model.accelerations, strict=True)
+    formulas |= {f"the acceleration of {name}": formula for name, formula in pairs}
+    for name, formula in (formulas | outputs).items():
+        try:
+            tree(model, formula)
+        except ExpressionError as error:
+            return f"its formula of {name}, {error.text}: {error.rule}"
+    # what stands in its place in an experiment
+    made = {
+        "variant": model.variant and model.variant(frozenset()),
+        "written": model.written and model.written({}, ()),
+    }
+    for name, other in made.items():
+        if other is not None and other.kind != model.kind:
+            return f"its {name} makes a model of another kind, {other.kind}: leave it out, or write one"
+    return ""
 
 
 def declared_parameters(names: Iterable[str]) -> tuple[Parameter, ...]:

@@ -34,7 +34,6 @@ from vibsim.formula import derivative, plus, values
 from vibsim.models.base import tree
 from vibsim.observe import thresholds as th
 from vibsim.observe.member_block import CENTRED, MemberBlock, energy_at_start, stored
-from vibsim.schemes import SCHEMES
 from vibsim.schemes.base import UNIT_ROUND_OFF, round_off
 
 NONE, BOUNDED, LINEAR, QUADRATIC, EXPONENTIAL, UNCLEAR = range(len(DRIFTS))
@@ -120,7 +119,7 @@ def _of_steps(block: MemberBlock, level: int) -> Floats:
     radian are differences of numbers p^2 large, which are rounded otherwise each time: ``N^(1/2) p^2``. Centred
     differences have a prediction of their own for each way of writing them.
     """
-    kinds = [SCHEMES[scheme.kind] for scheme in block.experiment.schemes]
+    kinds = [scheme.method for scheme in block.experiment.schemes]
     plain = np.array([kind.round_off is round_off for kind in kinds])
     index = block.grid.levels.index(level)
     p, steps = block.omega_dt[:, index], block.grid.steps[index]

@@ -28,7 +28,6 @@ from vibsim.observe.missed_pulses import Missed, missed_pulses
 from vibsim.observe.sensitivity import in_columns, sensitivity
 from vibsim.observe.stiffness import decay_rate, stiffest
 from vibsim.observe.thresholds import FEW_RADIANS
-from vibsim.schemes import SCHEMES
 from vibsim.simulation import Members, members
 
 if TYPE_CHECKING:
@@ -211,7 +210,7 @@ def block_of(experiment: Experiment, records: Mapping[int, Record]) -> MemberBlo
         group=group,
         failed=by_level([row["status"] for row in rows]) != 0,
         stability_limit=stability_limits(experiment, columns),
-        adaptive=np.array([SCHEMES[scheme.kind].adaptive for scheme in experiment.schemes]),
+        adaptive=np.array([scheme.adaptive for scheme in experiment.schemes]),
         left_to_the_mesh=left_to_the_mesh(experiment, columns),
         corners=corners_of(model, finest, group, grid.dt[0]),
         missed=missed_pulses(model, finest, group),

@@ -29,7 +29,6 @@ from vibsim.experiment.storage import FEWEST_EXTREMA
 from vibsim.observe import thresholds as th
 from vibsim.observe.member_block import MemberBlock, stored
 from vibsim.observe.predicted_oscillation import is_simple, natural_frequency
-from vibsim.schemes import SCHEMES
 
 
 def growth_factor(record: Record) -> Floats:
@@ -166,7 +165,7 @@ def energy_error_d2t(block: MemberBlock, record: Record) -> Floats:
 
 def force_evaluations(block: MemberBlock, level: int) -> Floats:
     """Return the number of evaluations of the acceleration; of an implicit scheme one for each step and stage."""
-    counts = [SCHEMES[scheme.kind].force_evaluations for scheme in block.experiment.schemes]
+    counts = [scheme.method.force_evaluations for scheme in block.experiment.schemes]
     return _own_or(block, level, "force_evaluations_total", np.array(counts, dtype=float))
 
 

@@ -15,7 +15,7 @@ from vibsim import plan, theory
 from vibsim.apriori.formal_orders import limit_of
 from vibsim.core.array_types import Floats, Integers
 from vibsim.observe.member_block import MemberBlock
-from vibsim.schemes import SCHEMES, Options, Scheme
+from vibsim.schemes import Options, Scheme
 
 
 def is_simple(block: MemberBlock) -> bool:
@@ -38,7 +38,7 @@ def of_schemes(
     found = np.full(block.shape, np.nan)
     for i, scheme in enumerate(block.experiment.schemes):
         for options, where in steppers(block, i):
-            found[i, where] = function(SCHEMES[scheme.kind], options, where)
+            found[i, where] = function(scheme.method, options, where)
     return found
 
 

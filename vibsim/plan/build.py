@@ -8,10 +8,11 @@ which samples it keeps. The start of a job costs as much as many cheap levels, w
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from typing import Any
 
+from vibsim.core.registry import Registry, offers
 from vibsim.experiment import Experiment, canonical
 from vibsim.experiment.cost import JOB_SECONDS, analysis_disk, analysis_memory, load_of
 from vibsim.experiment.storage import is_bounded, sampling, stored_series
@@ -43,6 +44,7 @@ DIVISIBLE_MEMBERS = 128
 def build(experiment: Experiment) -> Plan:
     """Return the plan of `experiment`, which has at least one level."""
     content: dict[str, Any] = json.loads(json.dumps(canonical(experiment), allow_nan=False))
+    packages = tuple(_offered(experiment.model.kind, _kinds(experiment)))
     values = cache(lambda start, stop: values_digest(experiment, start, stop))
     levels = tuple(_level(experiment, content, level, values) for level in experiment.levels)
     groups, trajectories = _groups(levels), experiment.trajectories
@@ -71,8 +73,9 @@ def build(experiment: Experiment) -> Plan:
         extrapolation=extrapolation,
         report=_job("report", content, {"analysis": analysis}, DRAWING),
         content=content,
-        versions=versions(NUMERICAL),
+        versions={**versions(NUMERICAL), **_versions_of(packages)},
         inputs=tuple((t.file, t.content) for t in experiment.model.tables.values()),
+        packages=packages,
     )
 
 
@@ -100,7 +103,33 @@ def code_of(model: str, schemes: tuple[str, ...]) -> str:
         *(code_digest.home(SCHEMES[kind], "vibsim.schemes") for kind in schemes),
     ]
     used = code_digest.used_by("vibsim.cli.jobs.simulate", *(module for module, _ in homes))
-    return digest_of({"used": used, "entries": homes})
+    own = {"used": used, "entries": homes}
+    packages = [digest for _, _, digest in _offered(model, schemes)]
+    if packages:
+        # which modules of vibsim they use is not looked for
+        own |= {"packages": packages, "vibsim": code_digest.everything()}
+    return digest_of(own)
+
+
+def _offered(model: str, schemes: tuple[str, ...]) -> Iterator[tuple[str, str, str]]:
+    """Yield group, kind and digest of a model and schemes, as far as installed packages offer them."""
+    pairs: list[tuple[Registry[Any], str]] = [
+        (MODELS, model),
+        *((SCHEMES, kind) for kind in schemes),
+    ]
+    for registry, kind in pairs:
+        if kind not in registry.built_in:
+            yield registry.group, kind, code_digest.of_offer(registry.group, kind)
+
+
+def _versions_of(packages: Iterable[tuple[str, str, str]]) -> dict[str, str]:
+    """Return the versions of the packages that offer models and schemes, for who asks what made a result."""
+    points = (offers(group)[kind] for group, kind, _ in packages)
+    return {point.dist.name: point.dist.version for point in points if point.dist}
+
+
+def _kinds(experiment: Experiment) -> tuple[str, ...]:
+    return tuple(sorted({scheme.kind for scheme in experiment.schemes}))
 
 
 def _level(
@@ -112,7 +141,7 @@ def _level(
     """Return the files of a level; `values` gives the digest of a range of members."""
     load, members = load_of(experiment, level), experiment.members
     every = sampling(experiment, level)
-    kinds = tuple(sorted({scheme.kind for scheme in experiment.schemes}))
+    kinds = _kinds(experiment)
     shared = digest_of(
         {
             "job": "simulate",

@@ -111,7 +111,9 @@ def _key(choice: Choice) -> str:
 
 
 def _has_inputs(plan: Plan, choice: Choice) -> bool:
-    """Tell whether every table is the file that the plan was made from."""
+    """Tell whether tables and packages of models and schemes are those that the plan was made from."""
+    if any(code_digest.of_offer(group, kind) != digest for group, kind, digest in plan.packages):
+        return False
     for path, digest in plan.inputs:
         try:
             content = content_of(choice.file.parent / path, MOST_BYTES)

@@ -11,6 +11,7 @@ types runs nothing.
 
 To read 300 modules takes most of the time of a plan, so what each of them imports is kept in the private cache, under
 the digest of the whole package.
+Of a package that offers a model or a scheme (`vibsim.core.registry`) all files count, for what uses them.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from __future__ import annotations
 import ast
 import hashlib
 import importlib
+import importlib.util
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -25,10 +27,13 @@ from functools import cache
 from pathlib import Path
 
 import vibsim
-from vibsim.core import private_cache
+from vibsim.core import private_cache, registry
+from vibsim.core.errors import VibsimError
 
 PACKAGE = Path(vibsim.__file__).parent
 _LISTS = ("vibsim.models", "vibsim.schemes")
+_LOOKUP = "vibsim.core.registry"
+"""By which every job finds its entries of the lists."""
 _PLANNING = (
     "vibsim.cli",
     "vibsim.cli.arguments",
@@ -59,7 +64,7 @@ def used_by(*names: str) -> str:
 
 def reached(*names: str) -> set[str]:
     """Name the modules that the modules `names` can run, and themselves."""
-    todo, done = set(names), set[str]()
+    todo, done = {_LOOKUP, *names}, set[str]()
     while todo:
         module = todo.pop()
         done.add(module)
@@ -70,8 +75,28 @@ def reached(*names: str) -> set[str]:
 
 def of_folder(name: str) -> str:
     """Return the digest of every file of package `name`."""
-    folder = _file(name).parent
-    return _digest(p for p in folder.rglob("*") if p.is_file() and "__pycache__" not in p.parts)
+    return _digest(_files_in(_file(name).parent))
+
+
+def of_offer(group: str, kind: str) -> str:
+    """Return the digest of the package that offers a model or a scheme; empty where none does.
+
+    Of all files of the outermost package that the module of the entry point stands in, or of the module alone.
+    """
+    point = registry.offers(group).get(kind)
+    if point is None:
+        return ""
+    digest = hashlib.sha256(f"{registry.package_of(point)}\n{point.value}\n".encode())
+    parts = point.module.split(".")
+    for size in range(1, len(parts) + 1):
+        # a namespace has no file
+        spec = importlib.util.find_spec(".".join(parts[:size]))
+        if spec is not None and spec.has_location and spec.origin is not None:
+            file = Path(spec.origin)
+            files = _files_in(file.parent) if spec.submodule_search_locations else [file]
+            digest.update(_digest(files, file.parent).encode())
+            return digest.hexdigest()
+    raise VibsimError(f"the code of {registry.package_of(point)} cannot be found: {point.module}")
 
 
 def home(item: object, package: str) -> tuple[str, str]:
@@ -84,11 +109,17 @@ def home(item: object, package: str) -> tuple[str, str]:
     return package, ""
 
 
-def _digest(files: Iterable[Path]) -> str:
+def _files_in(folder: Path) -> Iterator[Path]:
+    """Yield every file in a folder that is not made by Python."""
+    return (p for p in folder.rglob("*") if p.is_file() and "__pycache__" not in p.parts)
+
+
+def _digest(files: Iterable[Path], folder: Path | None = None) -> str:
+    """Return the digest of files with their places in `folder`, by default that of this package."""
     digest = hashlib.sha256()
     for file in sorted(files):
         content = file.read_bytes()
-        name = file.relative_to(PACKAGE).as_posix()
+        name = file.relative_to(folder or PACKAGE).as_posix()
         digest.update(f"{name} {len(content)}\n".encode())
         digest.update(content)
     return digest.hexdigest()

@@ -99,6 +99,8 @@ class Plan:
     """Versions of the libraries that the numbers depend on."""
     inputs: tuple[tuple[str, str], ...] = ()
     """Every other file that the experiment was read from: its path from there, and the SHA-256 of its bytes."""
+    packages: tuple[tuple[str, str, str], ...] = ()
+    """Group, kind and digest of the code of every model and scheme that an installed package offers."""
     file: str = ""
     """Where the experiment was read, as a command line names it; no digest depends on it."""
 

@@ -10,7 +10,6 @@ from vibsim.experiment.storage import asked
 from vibsim.report.data import Member, case_name, due, flags, formal_orders, swept
 from vibsim.report.finest_level import deviation
 from vibsim.report.types import ConvergesCheck, Experiment
-from vibsim.schemes import SCHEMES
 
 
 def promises(experiment: Experiment, record: Record, quantity: str) -> list[tuple[float, float]]:
@@ -85,4 +84,4 @@ def members(record: Record, quantity: str) -> list[Member]:
 
 def with_levels(experiment: Experiment, found: list[Member]) -> list[Member]:
     """Leave out schemes that choose their own steps, which no level changes, unless there are no others."""
-    return [m for m in found if not SCHEMES[experiment.schemes[m.scheme].kind].adaptive] or found
+    return [m for m in found if not experiment.schemes[m.scheme].adaptive] or found

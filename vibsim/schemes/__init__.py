@@ -1,12 +1,22 @@
-"""The registry of schemes; a family of schemes is one file of this package and one line here."""
+"""The registry of schemes; a family is one file of this package and one line here, or that of an installed package."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from vibsim.core.registry import Registry
 from vibsim.schemes.adaptive import ADAPTIVE
-from vibsim.schemes.base import AnyOption, Flag, NumberOption, Option, Options, Scheme, Stepper
+from vibsim.schemes.base import (
+    AnyOption,
+    Flag,
+    NumberOption,
+    Option,
+    Options,
+    Scheme,
+    Stepper,
+    fault_of,
+)
 from vibsim.schemes.central import CENTRED
 from vibsim.schemes.composition import COMPOSITIONS
 from vibsim.schemes.implicit import GAUSS4, IMPLICIT
@@ -14,27 +24,23 @@ from vibsim.schemes.multistep import ADAMS_BASHFORTH
 from vibsim.schemes.newmark import NEWMARK
 from vibsim.schemes.runge_kutta import RKN4, RUNGE_KUTTA
 
-SCHEMES: Mapping[str, Scheme] = MappingProxyType(
-    {
-        scheme.kind: scheme
-        for scheme in (
-            *CENTRED,
-            *RUNGE_KUTTA,
-            *ADAMS_BASHFORTH,
-            *COMPOSITIONS,
-            RKN4,
-            *IMPLICIT,
-            *NEWMARK,
-            GAUSS4,
-            *ADAPTIVE,
-        )
-    }
+_ALL = (
+    *CENTRED,
+    *RUNGE_KUTTA,
+    *ADAMS_BASHFORTH,
+    *COMPOSITIONS,
+    RKN4,
+    *IMPLICIT,
+    *NEWMARK,
+    GAUSS4,
+    *ADAPTIVE,
 )
+SCHEMES = Registry[Scheme]("vibsim.schemes", _ALL, fault_of)
 
 FIXED_STEP: Mapping[str, Scheme] = MappingProxyType(
-    {kind: scheme for kind, scheme in SCHEMES.items() if not scheme.adaptive}
+    {scheme.kind: scheme for scheme in _ALL if not scheme.adaptive}
 )
-"""Schemes that take equal steps, and so have levels and orders."""
+"""Schemes of vibsim that take equal steps, and so have levels and orders."""
 
 __all__ = [
     "FIXED_STEP",

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import inspect
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 from vibsim.core.array_types import Floats
+from vibsim.core.registry import hash_fault
 from vibsim.models.base import BUDGET, Model
 from vibsim.models.events import TREATMENTS
 from vibsim.schemes.orders import Beginning, Orders, depends_on_velocity
@@ -270,3 +272,21 @@ class Scheme:
         """Tell whether every step has a smooth force: between two corners, and without a look back across one."""
         is_multistep = self.family == "multistep"
         return model.lookup is None or (model.lookup.is_met and not is_multistep)
+
+
+def fault_of(scheme: object) -> str:
+    """Say why an object from elsewhere is no scheme that can be added; nothing where it is one."""
+    if not isinstance(scheme, Scheme):
+        return f"is no vibsim.schemes.Scheme, but of the type {type(scheme).__name__}"
+    if not re.fullmatch("[a-z0-9_]+", scheme.kind):
+        return "its kind must consist of a to z, 0 to 9 and _"
+    if fault := hash_fault(scheme):
+        return fault
+    if scheme.adaptive:
+        return "a scheme that chooses its own steps cannot be added"
+    options = scheme.defaults()
+    if not isinstance(scheme.stepper(options), Stepper):
+        return "its stepper must return a vibsim.schemes.Stepper"
+    if not isinstance(scheme.orders(options), Orders):
+        return "its orders must return a vibsim.schemes.orders.Orders"
+    return ""

@@ -11,7 +11,6 @@ import numpy as np
 from vibsim import plan
 from vibsim.core.array_types import Integers
 from vibsim.engine import Trajectories, integrate
-from vibsim.schemes import SCHEMES
 from vibsim.simulation import adaptive
 from vibsim.simulation.members import Members
 
@@ -40,7 +39,7 @@ def solve(
     parameters = np.stack(numbers, axis=-1) if numbers else np.empty((len(group.end), 0))
     rows = []
     for i, scheme in enumerate(experiment.schemes):
-        method, runs = SCHEMES[scheme.kind], []
+        method, runs = scheme.method, []
         for options, members in plan.option_groups(experiment, i, group.columns):
             for where in adaptive.pieces(members, steps) if method.adaptive else (members,):
                 run = (adaptive.integrate if method.adaptive else integrate)(
@@ -64,7 +63,7 @@ def solve(
 
 def has_adaptive(experiment: Experiment) -> bool:
     """Tell whether a scheme of `experiment` chooses its own steps."""
-    return any(SCHEMES[scheme.kind].adaptive for scheme in experiment.schemes)
+    return any(scheme.adaptive for scheme in experiment.schemes)
 
 
 def _in_order(runs: Sequence[tuple[Trajectories, Integers]]) -> Trajectories:

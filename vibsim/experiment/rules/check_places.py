@@ -12,7 +12,6 @@ from vibsim.experiment.rules.size_limits import Setting
 from vibsim.experiment.schema.checks import At
 from vibsim.experiment.value_names import Value
 from vibsim.experiment.yaml.parse import Path_
-from vibsim.schemes import SCHEMES
 
 
 @dataclass(frozen=True)
@@ -46,9 +45,11 @@ class Scope:
 def known_scheme(name: str, scope: Scope, more: tuple[str, ...] = ()) -> None:
     """Check that a scheme of the experiment is named; `more`: other words that were right there."""
     known = scope.setting.names
+    if not known or name in known:
+        return
     # where a scheme of the list is itself unknown, its right name may be meant
-    broken = any(other not in SCHEMES for other in known) and name in SCHEMES
-    if known and name not in known and not broken:
+    kinds = scope.report.kinds.names("schemes")
+    if name not in kinds or all(other in kinds for other in known):
         scope.refuse("not a scheme of this experiment", nearest(name, (*known, *more)), name)
 
 

@@ -79,5 +79,5 @@ def _refusal(model: Model) -> tuple[str, str]:
     if model.formulas:
         why = "its spring has no stiffness at u = 0, by which time would be measured"
         return f"{rule}: {why}", "leave it out"
-    able = [row.kind for row in MODELS.values() if row.scales and row.scales.parameters]
+    able = [row.kind for row in MODELS.built_in.values() if row.scales and row.scales.parameters]
     return rule, "choose from " + ", ".join(able)

@@ -8,11 +8,12 @@ from typing import Any
 from vibsim.core.errors import nearest
 from vibsim.experiment.data import SchemeSpec
 from vibsim.experiment.faults import Report
+from vibsim.experiment.kinds import Kinds
 from vibsim.experiment.schema.checks import SOLUTIONS
 from vibsim.experiment.schema.model_and_schemes import TOLERANCE
 from vibsim.experiment.schema.sweep import tolerance_name
-from vibsim.models import MODELS, Model
-from vibsim.schemes import FIXED_STEP, SCHEMES
+from vibsim.models import Model
+from vibsim.schemes import FIXED_STEP
 from vibsim.schemes.base import EVENTS, VECTOR
 
 
@@ -23,25 +24,27 @@ def finish_schemes(
     found: list[SchemeSpec] = []
     first: dict[str, int] = {}
     for i, section in enumerate(sections):
-        if isinstance(section, str) and section not in SCHEMES:
-            hint = nearest(section, sorted(SCHEMES))
+        if isinstance(section, str) and report.kinds.scheme(section) is None:
+            hint = nearest(section, sorted(report.kinds.names("schemes")))
             report.add(("schemes", i), "unknown scheme", hint, section)
         elif section is not None:
-            several = _specs(section, model)
+            several = _specs(section, model, report.kinds)
             found.extend(several)
             if model is not None:
                 _check_events(section, i, model, report)
                 _check_forces(several[0].kind, i, model, report)
             _check_names(several, i, first, report)
-    if are_known(sections) and all(spec.adaptive for spec in found):
+    if are_known(sections, report.kinds) and all(spec.adaptive for spec in found):
         rule = "at least one scheme must take equal steps, on the levels that are compared"
         report.add(("schemes",), rule, "choose from " + ", ".join(FIXED_STEP), at_key=True)
     return found
 
 
-def _specs(section: Any, model: Model | None) -> list[SchemeSpec]:
+def _specs(section: Any, model: Model | None, kinds: Kinds) -> list[SchemeSpec]:
     kind = section if isinstance(section, str) else section.kind
-    options: dict[str, Any] = {row.name: row.default for row in SCHEMES[kind].options_on(model)}
+    scheme = kinds.scheme(kind)
+    assert scheme is not None
+    options: dict[str, Any] = {row.name: row.default for row in scheme.options_on(model)}
     name = kind
     if not isinstance(section, str):
         name = section.label or kind
@@ -49,7 +52,10 @@ def _specs(section: Any, model: Model | None) -> list[SchemeSpec]:
         options |= {key: value for key, value in given.items() if value is not None}
     several = options.get(TOLERANCE)
     if not isinstance(several, tuple):
-        return [SchemeSpec(name=name, kind=kind, options=options)]
+        spec = SchemeSpec(name=name, kind=kind, options=options)
+        if kind in kinds.own_schemes:
+            spec.hold(scheme)
+        return [spec]
     return [
         SchemeSpec(name=tolerance_name(name, one), kind=kind, options={**options, TOLERANCE: one})
         for one in several
@@ -71,12 +77,14 @@ def _check_names(several: list[SchemeSpec], i: int, first: dict[str, int], repor
 
 def _check_forces(kind: str, i: int, model: Model, report: Report) -> None:
     """Refuse a scheme that cannot treat the forces of the model."""
-    if SCHEMES[kind].treats(model):
+    method = report.kinds.scheme(kind)
+    assert method is not None
+    if method.treats(model):
         return
-    able = [other for other, scheme in SCHEMES.items() if scheme.treats(model)]
+    able = [other for other, row in report.kinds.all_schemes().items() if row.treats(model)]
     rule = f"cannot treat {model.kind}, whose acceleration depends on {model.velocity}"
-    damped = [other for other, _ in SCHEMES[kind].damped if not other.startswith(VECTOR)]
-    if model.events is not None and SCHEMES[kind].adaptive:
+    damped = [other for other, _ in method.damped if not other.startswith(VECTOR)]
+    if model.events is not None and method.adaptive:
         rule = f"cannot treat {model.kind}: it takes its own steps across events, where the motion is not smooth"
     elif damped:
         rule += f" otherwise than by {' or '.join(damped)} damping"
@@ -90,13 +98,13 @@ def _check_events(section: Any, i: int, model: Model, report: Report) -> None:
     is_unsure = any(fault.key.split(".")[0] == "model" for fault in report.faults)
     if given is None or is_unsure or model.events is not None:
         return
-    able = [kind for kind, other in MODELS.items() if other.events is not None]
+    able = [kind for kind, other in report.kinds.all_models().items() if other.events is not None]
     hint = f"models with events are {', '.join(able)}, and oscillator with damping: {{coulomb: c}}"
     rule = f"{model.kind} has no events here: its motion is smooth"
     report.add(("schemes", i, EVENTS.name), rule, hint, given)
 
 
-def are_known(sections: Sequence[Any]) -> bool:
+def are_known(sections: Sequence[Any], kinds: Kinds) -> bool:
     """Tell whether nothing is wrong with any scheme."""
-    known = (s is not None and (not isinstance(s, str) or s in SCHEMES) for s in sections)
-    return bool(sections) and all(known)
+    found = (kinds.scheme(s) if isinstance(s, str) else s for s in sections)
+    return bool(sections) and all(section is not None for section in found)

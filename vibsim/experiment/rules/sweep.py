@@ -61,7 +61,7 @@ def read_sweep(
     section = document.sweep
     if section is None:
         return Sweep(axes=()), _is_wellformed(report)
-    types = sweep_types(model, ((scheme.name, scheme.kind) for scheme in schemes))
+    types = sweep_types(model, ((scheme.name, scheme.method) for scheme in schemes))
     reader = _SweepReader(document.time, model, types, lacks_scheme, report)
     found: list[Axis | None] = []
     for key in order:

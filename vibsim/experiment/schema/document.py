@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Discriminator, Field, StrictBool, WithJsonSchema
+from pydantic import ConfigDict, Discriminator, Field, StrictBool, WithJsonSchema, create_model
 from pydantic.json_schema import GenerateJsonSchema
 
+from vibsim.experiment.kinds import Kinds
 from vibsim.experiment.schema.checks import Check
 from vibsim.experiment.schema.fields import (
     MAX_ENTRIES,
@@ -28,9 +29,9 @@ from vibsim.experiment.schema.fields import (
 )
 from vibsim.experiment.schema.model_and_schemes import model_section, scheme_section
 from vibsim.experiment.schema.published import PublishedTable
-from vibsim.experiment.schema.sweep import SweepSection
-from vibsim.models import MODELS
-from vibsim.schemes import SCHEMES
+from vibsim.experiment.schema.sweep import SweepSection, swept_options
+from vibsim.models import MODELS, Model
+from vibsim.schemes import SCHEMES, Scheme
 
 
 def _kind(value: Any) -> str | None:
@@ -40,15 +41,36 @@ def _kind(value: Any) -> str | None:
     return tag(kind) if isinstance(kind, str) else None
 
 
-_SCHEME_NAME = Annotated[
-    str,
-    Field(json_schema_extra={"enum": sorted(SCHEMES)}, description="A scheme with its defaults."),
-]
-_SCHEME_SECTIONS = {kind: scheme_section(scheme) for kind, scheme in SCHEMES.items()}
-AnyModel: Any = tagged(
-    {kind: model_section(model) for kind, model in MODELS.items()}, Discriminator(_kind)
-)
-AnyScheme: Any = tagged({"name": _SCHEME_NAME, **_SCHEME_SECTIONS}, Discriminator(_kind))
+class OneOf:
+    """Marks the union of the sections of all models of vibsim, or of all schemes; one that is no part of it is made."""
+
+    def __init__(self, section: Literal["model", "schemes"]) -> None:
+        self.section = section
+
+    def section_of(self, written: Any, kinds: Kinds) -> type[Section] | None:
+        """Return the class of a section with a kind that is no part of the union; None where there is none."""
+        kind = written.get("kind") if isinstance(written, Mapping) else None
+        if self.section == "model":
+            model = kinds.model(kind)
+            return None if model is None else model_section(model)
+        scheme = kinds.scheme(kind)
+        return None if scheme is None else scheme_section(scheme)
+
+
+def _any_model(models: Mapping[str, Model]) -> Any:
+    sections = {kind: model_section(model) for kind, model in models.items()}
+    return Annotated[tagged(sections, Discriminator(_kind)), OneOf("model")]
+
+
+def _any_scheme(schemes: Mapping[str, Scheme]) -> Any:
+    about = "A scheme with its defaults."
+    name = Annotated[str, Field(json_schema_extra={"enum": sorted(schemes)}, description=about)]
+    sections = {kind: scheme_section(scheme) for kind, scheme in schemes.items()}
+    return Annotated[tagged({"name": name, **sections}, Discriminator(_kind)), OneOf("schemes")]
+
+
+AnyModel: Any = _any_model(MODELS.built_in)
+AnyScheme: Any = _any_scheme(SCHEMES.built_in)
 
 
 def _without(*keys: str) -> dict[str, Any]:
@@ -103,9 +125,9 @@ Levels: Any = by_shape(LevelRange, _LevelList)
 Samples: Any = by_shape(Every, Literal["auto", "common", "all"])
 
 
-def _initial_schema() -> dict[str, Any]:
+def _initial_schema(models: Iterable[Model]) -> dict[str, Any]:
     """Describe the initial values of every model's states, for editors."""
-    states = {state.name: state for model in MODELS.values() for state in model.states}
+    states = {state.name: state for model in models for state in model.states}
     properties = {
         name: {
             "type": ["number", "string"],
@@ -140,7 +162,9 @@ class Document(Section):
     """Units of the file's own, such as ``rod: 4.9 m``: every number with a unit may name them."""
     model: AnyModel
     """The equation of motion and its parameters."""
-    initial: Annotated[dict[str, Number], WithJsonSchema(_initial_schema())] = Field({})
+    initial: Annotated[
+        dict[str, Number], WithJsonSchema(_initial_schema(MODELS.built_in.values()))
+    ] = Field({})
     """Initial values of the states; 0 for those left out."""
     time: TimeSection
     """The time interval and the number of steps."""
@@ -172,6 +196,32 @@ class _Generator(GenerateJsonSchema):
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema (draft 2020-12) of an experiment file."""
+    """Return the JSON Schema (draft 2020-12) of an experiment file with the models and schemes of vibsim."""
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
     return head | Document.model_json_schema(schema_generator=_Generator)
+
+
+def installed_schema() -> dict[str, Any]:
+    """Return the same with the models and schemes of every package that is installed beside vibsim."""
+    any_scheme: Any = _any_scheme(SCHEMES)
+    initial = WithJsonSchema(_initial_schema(MODELS.values()))
+    rows: dict[str, tuple[Any, Any]] = {
+        "model": (_any_model(MODELS), ...),
+        "initial": (Annotated[dict[str, Number], initial], {}),
+        "schemes": (
+            Annotated[tuple[any_scheme, ...], Field(min_length=1), short(MAX_ENTRIES)],
+            ...,
+        ),
+    }
+    told = {name: Document.model_fields[name].description for name in rows}
+    fields: dict[str, Any] = {
+        name: (kind, Field(default, description=told[name]))
+        for name, (kind, default) in rows.items()
+    }
+    doc = Document.__doc__
+    whole = create_model("Document", __base__=Document, __doc__=doc, **fields)
+    whole.model_config["use_attribute_docstrings"] = False
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
+    found = head | whole.model_json_schema(schema_generator=_Generator)
+    found["$defs"]["SweepSection"]["patternProperties"] = swept_options(SCHEMES.values())
+    return found

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -40,7 +41,7 @@ from vibsim.experiment.schema.fields import (
 )
 from vibsim.experiment.schema.sweep import tolerance_name
 from vibsim.models import FormulaField, Model, Parameter
-from vibsim.schemes import SCHEMES, AnyOption, Flag, NumberOption, Option, Scheme
+from vibsim.schemes import AnyOption, Flag, NumberOption, Option, Scheme
 from vibsim.schemes.base import EVENTS
 
 TOLERANCE = "tolerance"
@@ -52,6 +53,7 @@ def _class_name(kind: str) -> str:
     return kind.title().replace("_", "")
 
 
+@cache
 def scheme_section(scheme: Scheme) -> type[Section]:
     """Return the class of an entry that is a mapping."""
     label = "Name of the scheme in this experiment, if not its kind."
@@ -98,16 +100,16 @@ def _type(option: AnyOption, scheme: Scheme) -> Any:
     return tagged({"one": value, "several": several}, Discriminator(_one_or_several))
 
 
-def sweep_types(model: Model | None, schemes: Iterable[tuple[str, str]]) -> dict[str, Any]:
-    """Return the type of everything that can be swept, by dotted key; `schemes` are pairs of a name and a kind."""
+def sweep_types(model: Model | None, schemes: Iterable[tuple[str, Scheme]]) -> dict[str, Any]:
+    """Return the type of everything that can be swept, by dotted key; `schemes` have their names before them."""
     found: dict[str, Any] = {}
     if model is not None:
         for state in model.states if model.start is None else ():
             found[f"initial.{state.name}"] = _bounded(ge=state.minimum)
         found |= {f"model.{row.key}": _parameter_type(row) for row in model.parameters}
     found["time.end"] = Positive
-    for name, kind in schemes:
-        for option in SCHEMES[kind].options_on(model):
+    for name, scheme in schemes:
+        for option in scheme.options_on(model):
             found[f"schemes.{name}.{option.name}"] = _option_type(option)
     return found
 
@@ -182,6 +184,7 @@ def _formula_type(model: Model, field: FormulaField) -> Any:
     return by_shape(create_model(name, __base__=MadeSection, **fields), FormulaText)
 
 
+@cache
 def model_section(model: Model) -> type[Section]:
     """Return the class of the section of a model."""
     fields: dict[str, Any] = {"kind": (Literal[model.kind], Field(description=model.title))}

@@ -7,7 +7,7 @@ several keys (``sample``). The numbers come from `vibsim.experiment.sweep_column
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -24,7 +24,7 @@ from vibsim.experiment.schema.fields import (
     tagged,
     whole,
 )
-from vibsim.schemes import SCHEMES, NumberOption, Option
+from vibsim.schemes import SCHEMES, NumberOption, Option, Scheme
 from vibsim.schemes.base import EVENTS
 
 FLAGS: Mapping[bool, str] = {False: "false", True: "true"}
@@ -204,21 +204,21 @@ class Sample(_Scattered):
     """Least and largest value of every parameter, by dotted path."""
 
 
-def _options() -> dict[str, Any]:
-    """Describe the options of every scheme that take a list of words or flags, for editors."""
+def swept_options(schemes: Iterable[Scheme]) -> dict[str, Any]:
+    """Describe the options of schemes that take a list of words or flags, for editors."""
     words: dict[str, list[str | bool]] = {}
-    every = (option for scheme in SCHEMES.values() for option in scheme.options)
+    every = (option for scheme in schemes for option in scheme.options)
     for option in (*every, EVENTS):
         if not isinstance(option, NumberOption):
             choices = option.choices if isinstance(option, Option) else (False, True)
             words.setdefault(option.name, []).extend(choices)
     return {
         rf"^schemes\..+\.{name}$": {
-            "type": "array",
             "items": {"enum": list(dict.fromkeys(choices))},
             "minItems": 1,
+            "type": "array",
         }
-        for name, choices in words.items()
+        for name, choices in sorted(words.items())
     }
 
 
@@ -227,7 +227,10 @@ class SweepSection(Section):
 
     model_config = ConfigDict(
         extra="allow",
-        json_schema_extra={"minProperties": 1, "patternProperties": _options()},
+        json_schema_extra={
+            "minProperties": 1,
+            "patternProperties": swept_options(SCHEMES.built_in.values()),
+        },
     )
     __pydantic_extra__: dict[str, _Values]
     stand_ins = MappingProxyType({})

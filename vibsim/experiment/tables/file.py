@@ -19,7 +19,6 @@ from vibsim.experiment.data import ExperimentSpec
 from vibsim.experiment.schema.fields import TABLE
 from vibsim.experiment.tables import csv_text
 from vibsim.experiment.yaml.file_content import MOST_BYTES, content_of
-from vibsim.models import MODELS
 from vibsim.models.table import FEWEST_POINTS, Table
 
 ENDINGS = (".csv", ".nc")
@@ -201,7 +200,7 @@ def attach(experiment: ExperimentSpec) -> None:
         Where one cannot be read, or has other numbers than it had.
     """
     folder = experiment.file.parent if experiment.file else Path()
-    keys = {row.name: row.table or ("", "") for row in MODELS[experiment.model.kind].formulas}
+    keys = {row.name: row.table or ("", "") for row in experiment.model.base.formulas}
     for name, spec in experiment.model.tables.items():
         try:
             table, content = read(folder / spec.file, keys[name], (spec.place, spec.value))

@@ -22,7 +22,6 @@ from vibsim.report.style import Picture
 from vibsim.report.tables.theory import predicted
 from vibsim.report.text import words
 from vibsim.report.types import Axes, Experiment
-from vibsim.schemes import SCHEMES
 
 CURVE_POINTS = 240  # points of a curve
 SMALLEST = 1e-13  # growth and phase error below this are round-off of what they are taken from
@@ -145,7 +144,7 @@ def _theory(experiment: Experiment, s: int, grid: Floats) -> tuple[Floats, Float
     spec = experiment.schemes[s]
     axes = experiment.sweep.axes if experiment.sweep else ()
     varied = any(key.startswith(f"schemes.{spec.name}.") for axis in axes for key in axis.keys)
-    scheme = SCHEMES[spec.kind]
+    scheme = spec.method
     if varied or scheme.adaptive:
         return None
     stepper = scheme.stepper(experiment.schemes[s].options)

@@ -11,7 +11,6 @@ from vibsim import theory
 from vibsim.formula import Binary, Expression, Name, Negate, literal, names_in, parse
 from vibsim.report.tables.table import Cell, Column, Table
 from vibsim.report.types import Experiment
-from vibsim.schemes import SCHEMES
 from vibsim.theory import Miss, Residual
 from vibsim.theory.degrees import HIGHEST_DEGREE, applies
 
@@ -45,7 +44,7 @@ def table(experiment: Experiment) -> Table | None:
     for spec in experiment.schemes:
         if spec.adaptive or any(key.startswith(f"schemes.{spec.name}.") for key in keys):
             continue
-        stepper = SCHEMES[spec.kind].stepper_for(model, spec.options)
+        stepper = spec.method.stepper_for(model, spec.options)
         degree = theory.exact_degree(stepper, model)
         if degree == HIGHEST_DEGREE:
             rows.append((spec.name, degree, None, EXACT, EXACT, "–"))

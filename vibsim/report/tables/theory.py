@@ -20,7 +20,6 @@ from vibsim.report.data import known, swept, whole
 from vibsim.report.tables.table import Cell, Column, Table, Written
 from vibsim.report.text import words
 from vibsim.report.types import Experiment
-from vibsim.schemes import SCHEMES
 
 LIMITS = {0.0: "never", math.inf: "any"}  # words for limits of stability that are no number
 EDGE = 1e-9  # relative distance within which a step counts as lying on the limit of stability
@@ -66,7 +65,7 @@ def _scheme(
     experiment: Experiment, record: Record, s: int, quantities: list[str]
 ) -> Iterator[Cell]:
     spec = experiment.schemes[s]
-    scheme = SCHEMES[spec.kind]
+    scheme = spec.method
     words_of = ["adaptive" if scheme.adaptive else "explicit" if scheme.explicit else "implicit"]
     words_of += ["s"] if scheme.symplectic else []
     named = spec.name if spec.name.startswith(spec.kind) else f"{spec.name} ({spec.kind})"

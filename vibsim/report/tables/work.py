@@ -20,7 +20,6 @@ from vibsim.report.data import Member, at, case_name, unit, whole
 from vibsim.report.tables.table import Cell, Column, Table
 from vibsim.report.text import words
 from vibsim.report.types import Experiment
-from vibsim.schemes import SCHEMES
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,7 @@ def lines(experiment: Experiment, record: Record, case: int) -> list[Line]:
         return []
     found, families = [], dict[str, list[int]]()
     for s, spec in enumerate(experiment.schemes):
-        if SCHEMES[spec.kind].adaptive:
+        if spec.adaptive:
             families.setdefault(spec.kind, []).append(s)
         else:
             found.append(_of_levels(experiment, record, s, case))

@@ -1,0 +1,246 @@
+"""Experiments with models and schemes that a program hands over, without any file or registration."""
+
+from __future__ import annotations
+
+import copy
+import linecache
+import pickle
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vibsim import Experiment, analyse, best, simulate, verdicts
+from vibsim.core import registry
+from vibsim.core.errors import Fault, InputError, SimulationError
+from vibsim.experiment import canonical
+from vibsim.models import MODELS, Model, Parameter, State
+from vibsim.schemes import SCHEMES, Flag, Scheme, Stepper
+from vibsim.schemes.orders import same_orders
+from vibsim.schemes.runge_kutta import Tableau, from_tableau
+
+RAYLEIGH = Model(
+    kind="rayleigh",
+    title="Rayleigh's oscillator",
+    source="Rayleigh, The Theory of Sound, section 68a",
+    equation="u'' - mu (1 - u'^2) u' + u = 0",
+    states=(State("u", "1", "position"), State("v", "1", "velocity")),
+    parameters=(Parameter("mu", 1.0, "1", "strength", minimum=0.0),),
+    acceleration="mu*(1 - v**2)*v - u",
+    kinetic_energy="v**2/2",
+    potential_energy="u**2/2",
+    energy_unit="1",
+    linear=False,
+    conservative=False,
+    natural_frequency=lambda parameters: np.ones_like(parameters["mu"]),
+    dissipation="-mu*(1 - v**2)*v**2",
+)
+RALSTON = Scheme(
+    kind="ralston",
+    title="Ralston's method",
+    source="Ralston 1962",
+    family="Runge-Kutta",
+    stepper=lambda options: from_tableau(Tableau((("2/3",),), ("1/4", "3/4"))),
+    orders=lambda options: same_orders(2, energy_linear=3, energy_d2t_linear=3),
+    force_evaluations=2,
+)
+
+
+def build(**changes: Any) -> Experiment:
+    sections: dict[str, Any] = {
+        "model": RAYLEIGH,
+        "schemes": [RALSTON],
+        "initial": {"u": 0.1},
+        "time": {"end": 10.0},
+        "levels": [6, 7, 8, 9],
+    }
+    return Experiment(**{**sections, **changes})
+
+
+def faults(**changes: Any) -> list[Fault]:
+    with pytest.raises(InputError) as refused:
+        build(**changes)
+    return list(refused.value.faults)
+
+
+@pytest.fixture(autouse=True)
+def _without_packages(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let no test pass because of an installed package; messages alone name what those offer."""
+    monkeypatch.setattr(registry, "offers", lambda group: {})
+
+
+def test_a_model_and_a_scheme_in_memory_have_everything_that_registered_ones_have() -> None:
+    experiment = build(
+        parameters={"mu": 0.5},
+        schemes=[RALSTON, {"kind": RALSTON, "label": "again"}, "rk4"],
+        sweep={"model.mu": [0.2, 0.5]},
+        checks=[{"converges": "u", "order": "scheme"}, {"stable": True}],
+    )
+    levels = [simulate(experiment, level) for level in experiment.levels]
+    ralston, again, rk4 = levels[0].u.values
+    assert np.array_equal(ralston, again)
+    assert not np.array_equal(ralston, rk4)
+    found = verdicts(experiment, analyse(experiment, levels))
+    assert [verdict.status for verdict in found] == ["PASS", "PASS"]
+    assert best(experiment).sizes["case"] == 2
+
+
+def test_a_natural_frequency_may_be_a_number() -> None:
+    """Where it depends on no parameter, nobody thinks of arrays."""
+    model = replace(RAYLEIGH, natural_frequency=lambda parameters: 1.0)
+    time = {"periods": 2, "steps_per_period": 4}
+    sweep = {"model.mu": [0.1, 0.2]}
+    found, expected = (build(model=m, time=time, sweep=sweep) for m in (model, RAYLEIGH))
+    levels = [simulate(found, level) for level in found.levels]
+    (verdict,) = verdicts(found, analyse(found, levels))
+    assert verdict.status == "PASS"
+    assert np.array_equal(levels[0].u, simulate(expected, 6).u)
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda e: e.alone(1),
+        lambda e: e.with_levels([5, 6]),
+        lambda e: e.model_copy(),
+        copy.deepcopy,
+    ],
+    ids=["alone", "with_levels", "model_copy", "deepcopy"],
+)
+def test_an_experiment_made_of_another_one_keeps_its_objects(
+    made: Callable[[Experiment], Experiment],
+) -> None:
+    found = made(build(sweep={"model.mu": [0.2, 0.5]}))
+    assert type(found) is Experiment
+    assert found.model.definition.acceleration == RAYLEIGH.acceleration
+    assert found.schemes[0].method.title == RALSTON.title
+    assert simulate(found, 6).u.sizes["t"] == 65
+
+
+def test_with_registered_names_it_is_the_experiment_of_a_file() -> None:
+    sections: dict[str, Any] = {
+        "title": "Pendulum",
+        "initial": {"theta": "pi/3"},
+        "time": {"end": 10.0},
+        "levels": [4, 5],
+        "schemes": ["rk4"],
+    }
+    ours = Experiment(model="pendulum", parameters={"L": 2.0}, **sections)
+    written = Experiment(model={"kind": MODELS["pendulum"], "L": 2.0}, **sections)
+    of_file = Experiment.from_dict({"model": {"kind": "pendulum", "L": 2.0}, **sections})
+    assert ours == of_file
+    assert canonical(ours) == canonical(of_file) == canonical(written)
+    assert pickle.loads(pickle.dumps(ours)) == of_file
+
+
+def test_two_experiments_may_have_different_models_of_one_name() -> None:
+    stronger = replace(RAYLEIGH, acceleration="2*mu*(1 - v**2)*v - u")
+    first, second = build(), build(model=stronger)
+    before = simulate(first, 6).u.values
+    assert simulate(second, 6).u.values[0, 0, -1] != before[0, 0, -1]
+    assert np.array_equal(simulate(first, 6).u.values, before)
+    assert first != second
+
+
+def test_options_of_a_scheme_in_memory_are_validated_and_swept() -> None:
+    scheme = replace(RALSTON, options=(Flag("careful", "nothing"),))
+    section = {"kind": scheme, "careful": True}
+    assert build(schemes=[section]).schemes[0].options == {"careful": True}
+    swept = build(schemes=[scheme], sweep={"schemes.ralston.careful": [True, False]})
+    assert swept.members == 2
+    (fault,) = faults(schemes=[{"kind": scheme, "carful": True}])
+    assert (fault.key, fault.hint) == ("schemes[0].carful", "did you mean 'careful'?")
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "rule"),
+    [
+        ({"parameters": {"nu": 1.0}}, "model.nu", "unknown key"),
+        ({"parameters": {"mu": -1.0}}, "model.mu", "must be at least 0"),
+        ({"parameters": {"mu": "1 kg"}}, "model.mu", "must be a plain number, but kg is a mass"),
+        ({"initial": {"x": 1.0}}, "initial.x", "unknown state"),
+        ({"schemes": ["central"]}, "schemes[0]", "cannot treat rayleigh"),
+        ({"schemes": RALSTON}, "schemes", "must be a list"),
+        ({"schemes": [42]}, "schemes[0]", "must be a mapping with the key kind"),
+        ({"model": 42}, "model.kind", "unknown model"),
+        ({"checks": [{"converges": "w"}]}, "checks[0].converges", "unknown quantity"),
+        ({"steps": 3}, "steps", "unknown key"),
+    ],
+)
+def test_everything_is_checked_as_in_a_file(changes: dict[str, Any], key: str, rule: str) -> None:
+    (fault,) = faults(**changes)
+    assert fault.key == key
+    assert rule in fault.rule
+
+
+def test_a_message_offers_what_is_in_memory() -> None:
+    assert faults(schemes=[RALSTON, "ralstn"])[0].hint == "did you mean 'ralston'?"
+    (fault,) = faults(schemes=[replace(RALSTON, velocity_forces=False)])
+    assert "rk4" in fault.hint
+    assert "ralston" not in fault.hint
+
+
+@pytest.mark.parametrize(
+    ("changes", "rule"),
+    [
+        ({"model": replace(RAYLEIGH, kind="pendulum")}, "the name is taken"),
+        ({"schemes": [replace(SCHEMES["rk2"], kind="rk4")]}, "the name is taken"),
+        ({"schemes": [RALSTON, replace(RALSTON, title="Another")]}, "the name is taken"),
+        ({"model": replace(RAYLEIGH, kind="Lord Rayleigh")}, "must consist of a to z"),
+        ({"model": replace(RAYLEIGH, acceleration="nu*v")}, "unknown name 'nu'"),
+        *(
+            (
+                {"model": replace(RAYLEIGH, parameters=(Parameter(name, 1.0, "1", "x"),))},
+                f"'{name}'",
+            )
+            for name in ("lambda", "sin", "pi", "t", "u", "energy", "2nd", "case")
+        ),
+        ({"model": replace(MODELS["pendulum"], kind="mine")}, "another kind, pendulum"),
+        ({"model": replace(MODELS["oscillator"], kind="mine")}, "another kind, oscillator"),
+        ({"model": replace(RAYLEIGH, dissipation="v*")}, "formula of dissipation"),
+        ({"model": replace(RAYLEIGH, states=RAYLEIGH.states[:1])}, "a position, a velocity"),
+        ({"model": replace(RAYLEIGH, parameters=[*RAYLEIGH.parameters])}, "write tuples"),
+        ({"schemes": [replace(RALSTON, options=[])]}, "write tuples"),
+        ({"schemes": [replace(RALSTON, adaptive=True)]}, "cannot be added"),
+        ({"schemes": [replace(RALSTON, stepper=lambda options: None)]}, "its stepper must"),
+        ({"schemes": [replace(RALSTON, orders=lambda options: 2)]}, "its orders must"),
+    ],
+)
+def test_an_object_that_is_no_sound_model_or_scheme_is_refused(
+    changes: dict[str, Any], rule: str
+) -> None:
+    (fault,) = faults(**changes)
+    assert rule in fault.rule
+    assert fault.file in ("in memory, one of the models", "in memory, one of the schemes")
+
+
+def test_a_scheme_whose_text_is_not_known_is_refused_by_name() -> None:
+    names: dict[str, Any] = {}
+    exec("def start(variant, u, v, dt, p, acceleration):\n    return u, v\n", names)
+    exec("def step(state, t, dt, p, acceleration):\n    return state, state[1]\n", names)
+    stepper = Stepper(names["start"], names["step"])
+    with pytest.raises(SimulationError, match="is not known: write it in a file"):
+        simulate(build(schemes=[replace(RALSTON, stepper=lambda options: stepper)]), 6)
+
+
+@pytest.mark.parametrize("name", ["models", "schemes"])
+def test_the_code_of_the_pages_runs_and_keeps_its_promise(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = Path(__file__).parents[2] / "docs" / f"{name}.md"
+    blocks = re.findall(r"^```python\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE)
+    names: dict[str, object] = {"__name__": "page"}
+    for i, block in enumerate(blocks):
+        if "_scheme(" in block:
+            # from a file of vibsim
+            continue
+        file = f"<{page.name}, block {i + 1}>"
+        linecache.cache[file] = (len(block), None, block.splitlines(keepends=True), file)
+        exec(compile(block, file, "exec"), names)
+    statuses = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
+    assert statuses
+    assert set(statuses) == {"PASS"}

@@ -1,0 +1,45 @@
+"""The models and schemes that an experiment may name: registered ones, and those that a program hands over."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from vibsim.models import MODELS, Model
+from vibsim.schemes import SCHEMES, Scheme
+
+
+@dataclass(frozen=True)
+class Kinds:
+    """What ``kind`` may name."""
+
+    own_models: Mapping[str, Model] = field(default_factory=dict)
+    """Given in memory, by kind; they come before those that are registered."""
+    own_schemes: Mapping[str, Scheme] = field(default_factory=dict)
+
+    def model(self, kind: Any) -> Model | None:
+        """Return the model of a kind; None where there is none."""
+        if not isinstance(kind, str):
+            return None
+        return self.own_models.get(kind) or MODELS.get(kind)
+
+    def scheme(self, kind: Any) -> Scheme | None:
+        """Return the scheme of a kind; None where there is none."""
+        if not isinstance(kind, str):
+            return None
+        return self.own_schemes.get(kind) or SCHEMES.get(kind)
+
+    def names(self, section: str | int) -> tuple[str, ...]:
+        """Name every kind of the section ``model`` or ``schemes``; nothing is imported for that."""
+        if section == "model":
+            return (*MODELS, *self.own_models)
+        return (*SCHEMES, *self.own_schemes)
+
+    def all_models(self) -> dict[str, Model]:
+        """Return every model: for messages, as it imports every package that offers one."""
+        return {**MODELS, **self.own_models}
+
+    def all_schemes(self) -> dict[str, Scheme]:
+        """Return every scheme, likewise."""
+        return {**SCHEMES, **self.own_schemes}
