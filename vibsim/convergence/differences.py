@@ -101,7 +101,7 @@ def target_ratio(order: Floats | float, levels: Sequence[float]) -> Floats:
     """
     first, second, third = levels
     p = np.asarray(order, dtype=np.float64) * np.log(2.0)
-    flat = np.abs(p) < 1e-12
+    flat = np.abs(p) < 1e-290
     safe = np.where(flat, 1.0, p)
     ratio = np.expm1(safe * (second - first)) / -np.expm1(-safe * (third - second))
     return np.asarray(np.where(flat, (second - first) / (third - second), ratio))
