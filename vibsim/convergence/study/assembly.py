@@ -35,7 +35,7 @@ def verdict(
     hidden = _hidden(question, common, one)
     reason = "not_applicable" if hidden else one.reason
     status = REASONS[reason]
-    best = float(one.best[0]) if one.best is not None and not dims else None
+    best = _known(float(one.best[0])) if one.best is not None and not dims else None
     best_bound = _best_bound(one, best)
     size = one.size if one.size > 0.0 else np.nan
     relative = abs(one.error) / size
