@@ -195,7 +195,7 @@ def test_numbers_of_cells_in_place_of_step_sizes_are_suspected() -> None:
     verdict = judge([1 / h for h in H], numbers(2.0), order=2)
     assert verdict.status != "PASS"
     assert verdict.order == pytest.approx(-2.0, abs=1e-5)
-    assert "no number of cells or steps" in verdict.advice
+    assert "not a number of cells or steps" in verdict.advice
 
 
 def test_three_levels_have_an_order_and_a_best_value_whatever_the_status() -> None:

@@ -7,6 +7,7 @@ A power *dominates* where no other one has more than a tenth of it. The table of
 | a value that is not finite | FAIL ``non_finite`` |
 | fewer than three levels | INCONCLUSIVE ``too_few_levels`` |
 | all differences are noise as expected, but not the distance from the exact solution | FAIL ``wrong_limit`` |
+| the levels have a limit, surely, of which the exact solution is `MISSED` bounds away | FAIL ``wrong_limit`` |
 | all differences are noise as expected | PASS ``exact`` |
 | the limit is another one than the exact solution, surely | FAIL ``wrong_limit`` |
 | a power within the tolerance of the expected one dominates, surely | PASS ``asymptotic`` |
@@ -32,12 +33,18 @@ RISK = 0.01
 """Accepted probability that a verdict is wrong."""
 INTERVAL = 0.95
 """Probability of the interval of an order."""
-BOUND = 2.5
-"""Standard deviations in the bound of an error. The posterior has longer tails than a normal one: these are 95 %."""
+BOUND = 4.0
+"""Standard deviations in the bound of an error: of the tails that the posterior has, these are 95 % (four seeds)."""
 BLOCK = 16
 """So many ladders are judged together, always: then the last digits of one do not depend on those beside it."""
 LARGEST_RATIO = 1e60
 """Of a difference to the next finer one, and of noise to the largest difference: more says no more."""
+MISSED = 3.0
+"""A limit is missed that is so many bounds of the best value away from it,"""
+MISSED_SHARE = 0.5
+"""and at least so large a part of the estimated error of the finest level."""
+STATED_NOISE_FACTOR = 2.0
+"""The same as `NOISE_FACTOR` of noise that a user states: differences of normal noise exceed it in one of 200."""
 NOISE_FACTOR = 10.0
 """Noise may be so many times its prediction where levels are said to differ by nothing else."""
 
@@ -65,6 +72,7 @@ def assess(
     expected: float | None = None,
     at_least: float | None = None,
     tolerance: float = ORDER_TOLERANCE,
+    noise_factor: float = NOISE_FACTOR,
 ) -> Assessment:
     """Decide whether ladders converge as expected.
 
@@ -78,6 +86,8 @@ def assess(
         The least order that is expected. Without either, any order will do that can be believed.
     tolerance
         How far from `expected`, or below `at_least`, an order may be.
+    noise_factor
+        Noise may be so many times `Ladder.floor` where levels are said to differ by nothing else.
     """
     n, count = len(ladder.h), len(ladder.gram)
     finite = np.all(np.isfinite(ladder.gram), axis=(-2, -1)) & np.all(
@@ -95,9 +105,17 @@ def assess(
             part, size, factors = _scaled(ladder, rows)
             believed = posterior(part, expected)
             sides = _sides(believed, expected, at_least, tolerance)
-            exact = _is_only_noise(part)
-            reason[rows] = _reasons(part, believed, sides, exact)
-            for name, value in _numbers(part, believed, expected, exact, factors).items():
+            exact = _is_only_noise(part, noise_factor)
+            # what the levels say of the limit without the exact solution
+            of_limit, missed = believed, np.zeros(len(rows), dtype=bool)
+            if part.exact_known:
+                of_limit = posterior(_without_exact(part), expected)
+                _, settled, _ = _sides(of_limit, expected, at_least, tolerance)
+                missed = exact & _is_away(part, noise_factor)
+                missed |= (settled > 1.0 - RISK) & _is_missed(part, of_limit)
+            reason[rows] = _reasons(believed, sides, exact, missed)
+            numbers = _numbers(part, believed, of_limit, exact, factors)
+            for name, value in numbers.items():
                 in_units = name in ("error", "error_bound", "best_bound")
                 found[name][rows] = value * size if in_units else value
     status = np.array(
@@ -139,25 +157,46 @@ def _scaled(ladder: Ladder, rows: Integers) -> tuple[Ladder, Floats, Floats]:
     return part, size, factors[:, :count]
 
 
-def _is_only_noise(ladder: Ladder) -> Flags:
+def _is_only_noise(ladder: Ladder, factor: float) -> Flags:
     """Say where all levels differ by no more than the noise that is expected of them."""
     n = len(ladder.h)
     d = np.sqrt(np.diagonal(ladder.gram, axis1=1, axis2=2))[:, : n - 1]
-    allowed = NOISE_FACTOR * (ladder.floor[:, :-1] + ladder.floor[:, 1:])
+    allowed = factor * (ladder.floor[:, :-1] + ladder.floor[:, 1:])
     return np.asarray(np.all(d <= allowed, axis=-1))
 
 
+def _is_away(ladder: Ladder, factor: float) -> Flags:
+    """Say where the finest level is further from the exact solution than noise explains."""
+    return np.asarray(np.sqrt(ladder.gram[:, -1, -1]) > factor * ladder.floor[:, -1])
+
+
+def _is_missed(ladder: Ladder, of_limit: Posterior) -> Flags:
+    """Say where the exact solution is far outside of the bound of the best value."""
+    # the best value less the exact one, in the rows
+    path = np.concatenate([of_limit.path, np.ones((len(of_limit.path), 1))], axis=-1)
+    distance = np.sqrt(np.maximum(np.einsum("ci,cij,cj->c", path, ladder.gram, path), 0.0))
+    bound = BOUND * np.sqrt(_variance(ladder, of_limit) + ladder.floor[:, -1] ** 2)
+    path, differences = of_limit.path, ladder.gram[:, :-1, :-1]
+    error = np.sqrt(np.maximum(np.einsum("ci,cij,cj->c", path, differences, path), 0.0))
+    return np.asarray((distance > MISSED * bound) & (distance > MISSED_SHARE * error))
+
+
+def _variance(ladder: Ladder, of_limit: Posterior) -> Floats:
+    """Return the mean square distance of the limit from its mean over all hypotheses."""
+    path, n = of_limit.path, len(ladder.h)
+    differences = ladder.gram[:, : n - 1, : n - 1]
+    mean = np.einsum("ci,cij,cj->c", path, differences, path)
+    return np.asarray(np.maximum(of_limit.path_squared - mean, 0.0))
+
+
 def _reasons(
-    ladder: Ladder, p: Posterior, sides: tuple[Floats, Floats, Floats], exact: Flags
+    p: Posterior, sides: tuple[Floats, Floats, Floats], exact: Flags, missed: Flags
 ) -> Integers:
     """Return the reasons of the verdicts, as positions in `REASON_NAMES`; see the head of this module."""
     lower, right, higher = sides
-    away = np.zeros(len(exact), dtype=bool)
-    if ladder.exact_known:
-        away = np.sqrt(ladder.gram[:, -1, -1]) > NOISE_FACTOR * ladder.floor[:, -1]
     another = (lower + higher > 1.0 - RISK) & (right < RISK)
     cases = [
-        (exact & away, "wrong_limit"),
+        (missed, "wrong_limit"),
         (exact, "exact"),
         (p.elsewhere > 1.0 - RISK, "wrong_limit"),
         (right > 1.0 - RISK, "asymptotic"),
@@ -171,7 +210,7 @@ def _reasons(
 
 
 def _numbers(
-    ladder: Ladder, believed: Posterior, expected: float | None, exact: Flags, factors: Floats
+    ladder: Ladder, believed: Posterior, of_limit: Posterior, exact: Flags, factors: Floats
 ) -> dict[str, np.ndarray]:
     """Return what an `Assessment` holds beside status and reason, for ladders of three levels and more."""
     n, orders = len(ladder.h), local_orders(ladder)
@@ -179,9 +218,7 @@ def _numbers(
     order = np.where(exact, np.nan, _finest_order(orders, last))
     low, high = (np.where(exact, np.nan, end) for end in _interval(believed, order))
     window = {"first": np.where(exact, 0, first), "last": np.where(exact, n - 1, last)}
-    if ladder.exact_known:
-        believed = posterior(_without_exact(ladder), expected)
-    best = _best(ladder, believed, orders, exact, factors)
+    best = _best(ladder, of_limit, orders, exact, factors)
     return {"order": order, "low": low, "high": high, **window, **best}
 
 
@@ -194,18 +231,24 @@ def _sides(
     believed: Posterior, expected: float | None, at_least: float | None, tolerance: float
 ) -> tuple[Floats, Floats, Floats]:
     """Return the probabilities that a lower power dominates, one that is expected, and a higher one."""
-    powers, alone = believed.powers, believed.alone
+    powers, alone, mixed = believed.powers, believed.alone, believed.of_pairs
+    margin = tolerance + 1e-9
     if expected is not None:
-        below, above = powers < expected - tolerance - 1e-9, powers > expected + tolerance + 1e-9
+        least, most = expected - margin, expected + margin
     elif at_least is not None:
-        below, above = powers < at_least - tolerance - 1e-9, np.zeros(len(powers), dtype=bool)
+        least, most = at_least - margin, np.inf
     else:
         # the neighbourhood that holds most
-        near = np.abs(powers[:, None] - powers) <= tolerance + 1e-9
-        right = np.max(alone @ near, axis=-1)
+        right = np.max(alone @ (np.abs(powers[:, None] - powers) <= margin), axis=-1)
         return np.zeros(len(alone)), right, np.zeros(len(alone))
-    parts = (below, ~below & ~above, above)
-    lower, right, higher = (np.sum(alone[:, part], axis=-1) for part in parts)
+    low, high = powers < least, powers > most
+    lower, right, higher = (np.sum(alone[:, part], axis=-1) for part in (low, ~low & ~high, high))
+    # two powers of one size are no order, but tell of one that both are below, or above
+    first, second = believed.pairs.T
+    lower = lower + np.sum(mixed[:, second < least], axis=-1)
+    higher = higher + np.sum(mixed[:, first > most], axis=-1)
+    if expected is None:
+        right = right + np.sum(mixed[:, first >= least], axis=-1)
     return lower, right, higher
 
 
@@ -241,7 +284,7 @@ def _best(
     n = len(ladder.h)
     path = believed.path
     differences = ladder.gram[:, : n - 1, : n - 1]
-    spread = believed.path_squared - np.einsum("ci,cij,cj->c", path, differences, path)
+    spread = _variance(ladder, believed)
     floor = ladder.floor[:, -1]
     if n == 3:
         p, ratio = orders[:, 0], ladder.h[1] / ladder.h[2]
@@ -256,7 +299,7 @@ def _best(
     weights[:, -1] = 1.0
     weights[:, :-1] += path * factors
     weights[:, 1:] -= path * factors
-    bound = BOUND * np.sqrt(np.maximum(spread, 0.0) + floor**2)
+    bound = BOUND * np.sqrt(spread + floor**2)
     if ladder.exact_known:
         error = np.sqrt(ladder.gram[:, -1, -1])
         largest = error + floor

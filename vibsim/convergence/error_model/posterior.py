@@ -60,6 +60,9 @@ class Posterior:
     alone: Floats  # that this power dominates, shape (ladder, power)
     lowest: Floats  # that this is the lowest power of weight, shape (ladder, power)
     highest: Floats  # that this is the highest one, shape (ladder, power)
+    # that two powers are of one size, shape (ladder, pair), and these powers, shape (pair, 2)
+    of_pairs: Floats
+    pairs: Floats
     window: Floats  # that the expansion holds in this window, shape (ladder, window)
     alternating: Floats  # that errors change their sign from level to level
     scattered: Floats  # that there is no expansion, and no noise either
@@ -306,6 +309,8 @@ class _Fit:
             powers=self.powers,
             windows=self.windows,
             alone=any_power + first @ lower + second @ higher,
+            of_pairs=pairs - first - second,
+            pairs=np.stack([p[terms.starts] for p in (terms.lower, terms.higher)], axis=-1),
             lowest=any_power + (pairs - second) @ lower + second @ higher,
             highest=any_power + first @ lower + (pairs - first) @ higher,
             **values,

@@ -64,6 +64,8 @@ def verdict(
         is_proportional=steps.is_proportional,
         interpolation=(common.kind, common.interpolation_order or 0) if hidden else None,
         notes=common.notes,
+        parts=common.parts,
+        is_constant=len(one.finite) > 1 and not np.any(one.differences),
     )
     sentence, advice = describe(facts)
     return LadderVerdict(

@@ -34,7 +34,9 @@ class CommonValues:
     interpolation_order: int | None
     """Order of the error of an interpolation; None where no value was interpolated."""
     notes: tuple[str, ...] = ()
-    """What a reader must know of the points."""
+    """What else may be wrong with the points, for a verdict that does not pass."""
+    parts: tuple[str, ...] = ()
+    """Which part of the points is compared, where it is not all of them."""
 
 
 def common_values(
@@ -66,7 +68,7 @@ def common_values(
     refined = _refined(first.dims, dims)
     arrays = [_transposed(level, first.dims) for level in levels]
     coords: dict[str, NDArray[Any]] = {}
-    notes, interpolated = [], False
+    notes, parts, interpolated = [], [], False
     for axis, dim in enumerate(first.dims):
         lengths = [array.shape[axis] for array in arrays]
         of_levels = [level.coords.get(dim) for level in levels]
@@ -80,9 +82,12 @@ def common_values(
             coords[dim] = found.coordinate
         interpolated |= found.interpolated
         notes += [found.note] if found.note else []
+        parts += [found.part] if found.part else []
     order = restriction.INTERPOLATION_ORDERS[kind] if interpolated else None
     epsilon = np.array([level.epsilon for level in levels])
-    return CommonValues(np.stack(arrays), first.dims, coords, epsilon, kind, order, tuple(notes))
+    return CommonValues(
+        np.stack(arrays), first.dims, coords, epsilon, kind, order, tuple(notes), tuple(parts)
+    )
 
 
 def _listed(dims: Sequence[str]) -> str:

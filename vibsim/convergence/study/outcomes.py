@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vibsim.convergence.assessment import Assessment, assess
+from vibsim.convergence.assessment import NOISE_FACTOR, STATED_NOISE_FACTOR, Assessment, assess
 from vibsim.convergence.differences import order_of_differences
 from vibsim.convergence.study.measurement import Measurement, finite_levels, measurement
 from vibsim.core.array_types import Flags, Floats, Integers
@@ -108,6 +108,7 @@ def _with_finite(
             expected=question.order,
             at_least=question.at_least,
             tolerance=ORDER_TOLERANCE,
+            noise_factor=STATED_NOISE_FACTOR if question.noise else NOISE_FACTOR,
         )
     found = []
     for k in range(len(values)):

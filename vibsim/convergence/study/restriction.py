@@ -32,6 +32,10 @@ Coordinate = NDArray[Any] | None
 """Points of a dimension, shape (length,); None where there are none but their count."""
 
 
+FEWEST_POINTS = 3
+"""Common points along a dimension: fewer show only what is prescribed at its ends."""
+
+
 @dataclass(frozen=True)
 class Restriction:
     """Weighted sums of the values of a level along a dimension."""
@@ -66,7 +70,9 @@ class Common:
     interpolated: bool = False
     """Whether a value is not one of its level."""
     note: str = ""
-    """What a reader must know of these points."""
+    """What else may be wrong with these points, for a verdict that does not pass."""
+    part: str = ""
+    """Which part of the points is compared, where it is not all of them."""
 
 
 def common(
@@ -216,19 +222,19 @@ def _subset(dim: str, coordinates: Sequence[Coordinate], lengths: Sequence[int])
         index, distance = _nearest(coarse, fine)
         there &= distance <= spacing_tolerance(fine, epsilon)
         places.append(index)
-    if not there.any():
+    count = int(there.sum())
+    if count < min(FEWEST_POINTS, lengths[0]):
         rule = "the levels have no point in common"
-        raise refused(
-            dim,
-            "coordinates",
-            rule,
-            "use restrict: linear or cubic, or mean for averages of cells",
-        )
-    note = ""
-    if there.sum() < lengths[0]:
-        note = f"The levels have {there.sum()} of the {lengths[0]} points of the coarsest one in common along {dim}."
-    found = tuple(Restriction(i[there][:, None], np.ones((int(there.sum()), 1))) for i in places)
-    return Common(found, coarse[there], note=note)
+        if count:
+            rule = f"the levels have {count} of the {lengths[0]} points of the coarsest one in common; "
+            rule += f"{FEWEST_POINTS} are needed at least"
+        hint = "use restrict: linear or cubic, or mean for averages of cells"
+        raise refused(dim, "coordinates", rule, hint)
+    part = ""
+    if count < lengths[0]:
+        part = f"The levels have {there.sum()} of the {lengths[0]} points of the coarsest one in common along {dim}."
+    found = tuple(Restriction(i[there][:, None], np.ones((count, 1))) for i in places)
+    return Common(found, coarse[there], part=part)
 
 
 def _nearest(targets: NDArray[Any], points: NDArray[Any]) -> tuple[Integers, Floats]:
@@ -280,10 +286,10 @@ def _interpolations(
         weights, indices, between = _polynomials(targets, fine.astype(np.float64), width, tolerance)
         interpolated |= between
         found.append(Restriction(indices, weights))
-    note = ""
+    part = ""
     if not inside.all():
-        note = f"Of the {len(coarse)} points of the coarsest level along {dim}, {inside.sum()} lie within all levels."
-    return Common(tuple(found), targets if has_points else None, interpolated, note)
+        part = f"Of the {len(coarse)} points of the coarsest level along {dim}, {inside.sum()} lie within all levels."
+    return Common(tuple(found), targets if has_points else None, interpolated, part=part)
 
 
 def _polynomials(

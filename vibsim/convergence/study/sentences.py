@@ -39,6 +39,11 @@ class Facts:
     interpolation: tuple[str, int] | None = None
     """Kind and order of an interpolation that hides the order."""
     notes: tuple[str, ...] = ()
+    """What else may be wrong, where it does not pass."""
+    parts: tuple[str, ...] = ()
+    """Which part of the points is compared."""
+    is_constant: bool = False
+    """Whether all levels are the same, to the last digit."""
 
 
 PLAIN_DIGITS = 5
@@ -84,8 +89,8 @@ SENTENCES: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
         "growing": (
             "The differences of {quantity} grow towards the finer levels{estimate}.",
-            "Check that {size} is a step size and no number of cells or steps, whose reciprocal is one. If it is, add "
-            "a finer level, such as {size} = {finer}.",
+            "Check that {size} is a step size, not a number of cells or steps. If it is a step size, add a finer "
+            "level, such as {size} = {finer}.",
         ),
         "round_off": (
             "The differences of {quantity} have reached {floor}, so they do not show its order{estimate}.",
@@ -125,7 +130,14 @@ def describe(facts: Facts) -> tuple[str, str]:
         key = "growing"
     phrases = _phrases(facts)
     sentence, advice = (template.format_map(phrases) for template in SENTENCES[key])
-    more = [_error(facts), _best(facts), _together(facts)]
+    more = [
+        _interval(facts),
+        _error(facts),
+        _best(facts),
+        _together(facts),
+        *facts.parts,
+        _constant(facts),
+    ]
     if facts.status == "PASS":
         return _joined([sentence, *more]), ""
     return _joined([sentence, *more]), _joined([advice, *facts.notes])
@@ -184,16 +196,34 @@ def _wanted(facts: Facts) -> str:
     return f"at least {facts.at_least:g}" if facts.at_least is not None else "another one"
 
 
+def _interval(facts: Facts) -> str:
+    """Say between which orders the levels leave it open."""
+    if facts.reason != "pre_asymptotic" or facts.low is None or facts.high is None:
+        return ""
+    return f"They are consistent with orders from {facts.low:.2f} to {facts.high:.2f}."
+
+
+def _constant(facts: Facts) -> str:
+    """Doubt levels that do not differ at all."""
+    if facts.reason != "exact" or not facts.is_constant:
+        return ""
+    return (
+        f"All levels are the same to the last digit. Check that the solver used {facts.sizes[0]}."
+    )
+
+
 def _error(facts: Facts) -> str:
     """Say the error of the finest level with its bound."""
     if facts.error is None:
         return ""
+    if facts.reason == "exact" and facts.error_bound is not None:
+        return f"The error of the finest level is at most {at_most(facts.error_bound)}."
     size = number(abs(facts.error), 2)
     share = percent(facts.relative_error)
     share = f" ({share})" if share else ""
     bound = facts.error_bound
-    at_most = "" if facts.is_exact_known or bound is None else f", at most {number(bound, 2)}"
-    return f"The error of the finest level is {size}{share}{at_most}."
+    limit = "" if facts.is_exact_known or bound is None else f", at most {at_most(bound)}"
+    return f"The error of the finest level is {size}{share}{limit}."
 
 
 def _best(facts: Facts) -> str:
@@ -233,6 +263,17 @@ def number(value: float | None, digits: int) -> str:
     return f"{mantissa}e{int(exponent)}" if has_power else mantissa
 
 
+def at_most(bound: float) -> str:
+    """Write a bound with two digits, rounded up."""
+    if not 0.0 < bound < math.inf:
+        return number(bound, 2)
+    text = number(bound, 2)
+    if float(text) >= bound:
+        return text
+    power = math.floor(math.log10(bound)) - 1
+    return number((round(bound / 10.0**power) + 1) * 10.0**power, 2)
+
+
 def percent(share: float | None) -> str:
     """Write a share in percent; empty where an error is as large as what it belongs to."""
     return f"{number(100.0 * share, 2)} %" if share and share < 1.0 else ""
@@ -245,9 +286,9 @@ def with_bound(value: float, bound: float) -> str:
     places = max(1 - math.floor(math.log10(bound)), 0)
     largest = max(abs(value), bound)
     if 1e-3 <= largest < 1e7 and places <= MOST_DIGITS:
-        return f"{value:.{places}f}, within {number(bound, 2)}"
+        return f"{value:.{places}f}, within {at_most(bound)}"
     digits = 2 + max(math.floor(math.log10(largest)) - math.floor(math.log10(bound)), 0)
-    return f"{number(value, min(digits, MOST_DIGITS))}, within {number(bound, 2)}"
+    return f"{number(value, min(digits, MOST_DIGITS))}, within {at_most(bound)}"
 
 
 def listed(sizes: Sequence[float]) -> str:

@@ -1,0 +1,90 @@
+"""Studies in which an independent user saw a wrong or useless verdict."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray
+
+from vibsim import InputError, judge
+
+H = [0.1, 0.05, 0.025, 0.0125]
+
+
+def on_grids(counts: list[int], power: float) -> list[xarray.DataArray]:
+    grids = [np.linspace(0.0, 1.0, n + 1) for n in counts]
+    return [
+        xarray.DataArray(np.sin(np.pi * x) * (1 + (1 / (len(x) - 1)) ** power), {"x": x}, ["x"])
+        for x in grids
+    ]
+
+
+def test_grids_that_share_their_ends_only_are_refused() -> None:
+    counts = [10, 14, 23, 37]
+    with pytest.raises(InputError, match=r"have 2 of the 11 points.*3 are needed.*linear or cubic"):
+        judge([1 / n for n in counts], on_grids(counts, 1.0), order=2)
+
+
+def test_a_verdict_says_which_part_of_the_points_is_compared() -> None:
+    counts = [12, 18, 27 * 2]
+    verdict = judge([1 / n for n in counts], on_grids(counts, 2.0), order=2)
+    assert "have 7 of the 13 points of the coarsest one in common along x" in verdict.sentence
+
+
+@pytest.mark.parametrize("noise", [1e-4, 1e-3, 4e-3])
+def test_stated_noise_does_not_excuse_differences_that_fall(noise: float) -> None:
+    verdict = judge(H, [1 + h for h in H], order=2, noise=noise)
+    assert verdict.status != "PASS"
+
+
+def test_what_noise_explains_has_a_bound_and_not_the_error_0() -> None:
+    verdict = judge(H, [1.001, 1.002, 0.9995, 1.0], order=2, noise=1e-3)
+    assert verdict.reason == "exact"
+    assert verdict.error_bound is not None
+    assert verdict.error_bound >= 1e-3
+    assert "The error of the finest level is at most" in verdict.sentence
+
+
+def test_levels_that_are_the_same_are_doubted() -> None:
+    verdict = judge(H, [1.5, 1.5, 1.5, 1.5], order=2)
+    assert verdict.reason == "exact"
+    assert (
+        "All levels are the same to the last digit. Check that the solver used h."
+        in verdict.sentence
+    )
+
+
+@pytest.mark.parametrize("h", [H, H[:3], [0.1, 0.07, 0.03]])
+@pytest.mark.parametrize("order", [None, 2.0])
+def test_an_exact_value_beside_a_clear_limit_is_missed(h: list[float], order: float | None) -> None:
+    values = [1 + 0.7 * x**2 for x in h]
+    assert judge(h, values, order=order).status == "PASS"
+    assert judge(h, values, order=order, exact=1.0).status == "PASS"
+    assert judge(h, values, order=order, exact=1.001).reason == "wrong_limit"
+
+
+def test_two_powers_below_the_expected_one_are_not_that_one() -> None:
+    h = [0.1, 0.05, 0.025, 0.0125]
+    values = [1 + x + 0.4 * x**0.5 for x in h]
+    assert judge(h, values, order=2).reason == "order_low"
+    assert judge(h, values, at_least=0.5).status == "PASS"
+
+
+def test_printed_bounds_hold() -> None:
+    """The bounds of sentences are not below those of the numbers."""
+    rng = np.random.default_rng(3)
+    for _ in range(60):
+        p, size = rng.choice([1.0, 2.0, 4.0]), 10.0 ** rng.uniform(-3, 3)
+        verdict = judge(H, [size * (2 + h**p + 0.3 * h ** (p + 1)) for h in H], order=p)
+        if "at most " not in verdict.sentence:
+            continue
+        stated = float(verdict.sentence.split("at most ")[1].split()[0].rstrip("."))
+        assert verdict.error_bound is not None
+        assert stated >= verdict.error_bound * (1 - 1e-12)
+        assert stated <= 1.2 * verdict.error_bound
+
+
+def test_what_is_not_settled_says_the_orders_that_are_possible() -> None:
+    verdict = judge(H, [1 + h + 10 * h**2 for h in H], order=2)
+    assert verdict.reason == "pre_asymptotic"
+    assert "They are consistent with orders from 1.00 to 2.00." in verdict.sentence
