@@ -185,7 +185,7 @@ def test_probabilities_add_up_to_one() -> None:
         p = posterior(ladder(HALVED, series(HALVED, (1.0, 2.0, SHAPE)), exact=exact), 2.0)
         whole = p.expansion + p.alternating + p.scattered + p.noise + p.elsewhere
         assert whole == pytest.approx(1.0, abs=1e-9)
-        assert np.all(p.mixed >= -1e-9)
+        assert np.all(p.of_pairs >= -1e-9)
 
 
 # ---- How often it is right
@@ -222,6 +222,10 @@ def of_group(group: Group) -> tuple[Ladder, Floats]:
     return Ladder(2.0 ** -np.array(group.levels), gram, floor, points <= 2, group.known), errors
 
 
+def rms(values: Floats) -> float:
+    return math.sqrt(np.mean(values**2))
+
+
 def counted(
     seed: int, number: int = 42, size: int = 12, orders: tuple[float, ...] = (1.0, 2.0, 3.0, 4.0)
 ) -> Counts:
@@ -246,12 +250,11 @@ def counted(
                 total["decidable"] += mine and one.decidable
                 total["left_open"] += mine and one.decidable and status == OPEN
                 if passed and mine:
-                    size_of = lambda x: math.sqrt(np.mean(x**2))  # noqa: E731
                     within.append(
                         (
                             a.low[i] - 1e-9 <= one.order <= a.high[i] + 1e-9,
-                            size_of(errors[i, -1]) <= a.error_bound[i],
-                            size_of(a.weights[i] @ errors[i]) <= a.best_bound[i],
+                            rms(errors[i, -1]) <= a.error_bound[i],
+                            rms(a.weights[i] @ errors[i]) <= a.best_bound[i],
                         )
                     )
     return Counts(

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import vibsim
+from vibsim.core.vocabulary import RESTRICTIONS
 
 _NAMES = "experiment (name or collection/name), one member of its sweep (NAME@CASE), collection, or FILE.yaml"
 LISTS = ("models", "schemes", "checks", "experiments", "schema")
-RESTRICTIONS = ("subset", "mean", "linear", "cubic")
 _Row = tuple[str, dict[str, Any]]
 """An option with what `argparse` takes of it."""
 

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibsim.convergence.error_model.posterior import Ladder, Posterior, local_orders, posterior
+from vibsim.convergence.error_model.posterior import Ladder, Posterior, posterior
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
 from vibsim.core.vocabulary import ORDER_TOLERANCE, REASON_NAMES, REASONS, STATUSES
 
@@ -174,11 +174,15 @@ def _is_missed(ladder: Ladder, of_limit: Posterior) -> Flags:
     """Say where the exact solution is far outside of the bound of the best value."""
     # the best value less the exact one, in the rows
     path = np.concatenate([of_limit.path, np.ones((len(of_limit.path), 1))], axis=-1)
-    distance = np.sqrt(np.maximum(np.einsum("ci,cij,cj->c", path, ladder.gram, path), 0.0))
+    distance = _norm(path, ladder.gram)
     bound = BOUND * np.sqrt(_variance(ladder, of_limit) + ladder.floor[:, -1] ** 2)
-    path, differences = of_limit.path, ladder.gram[:, :-1, :-1]
-    error = np.sqrt(np.maximum(np.einsum("ci,cij,cj->c", path, differences, path), 0.0))
+    error = _norm(of_limit.path, ladder.gram[:, :-1, :-1])
     return np.asarray((distance > MISSED * bound) & (distance > MISSED_SHARE * error))
+
+
+def _norm(path: Floats, gram: Floats) -> Floats:
+    """Return the norm of a combination of rows with this Gram matrix, shape (ladder,)."""
+    return np.asarray(np.sqrt(np.maximum(np.einsum("ci,cij,cj->c", path, gram, path), 0.0)))
 
 
 def _variance(ladder: Ladder, of_limit: Posterior) -> Floats:
@@ -213,12 +217,12 @@ def _numbers(
     ladder: Ladder, believed: Posterior, of_limit: Posterior, exact: Flags, factors: Floats
 ) -> dict[str, np.ndarray]:
     """Return what an `Assessment` holds beside status and reason, for ladders of three levels and more."""
-    n, orders = len(ladder.h), local_orders(ladder)
+    n, orders = len(ladder.h), believed.orders
     first, last = np.array(believed.windows)[np.argmax(believed.window, axis=-1)].T
     order = np.where(exact, np.nan, _finest_order(orders, last))
     low, high = (np.where(exact, np.nan, end) for end in _interval(believed, order))
     window = {"first": np.where(exact, 0, first), "last": np.where(exact, n - 1, last)}
-    best = _best(ladder, of_limit, orders, exact, factors)
+    best = _best(ladder, of_limit, exact, factors)
     return {"order": order, "low": low, "high": high, **window, **best}
 
 
@@ -273,21 +277,19 @@ def _interval(believed: Posterior, order: Floats) -> tuple[Floats, Floats]:
     return np.fmin(low, order), np.fmax(high, order)
 
 
-def _best(
-    ladder: Ladder, believed: Posterior, orders: Floats, exact: Flags, factors: Floats
-) -> dict[str, Floats]:
+def _best(ladder: Ladder, of_limit: Posterior, exact: Flags, factors: Floats) -> dict[str, Floats]:
     """Return the best value, its bound, and the error of the finest level.
 
     Three levels have the extrapolation by their own order, more levels the mean over all hypotheses. Where levels
     differ by noise alone, the finest one is the best.
     """
     n = len(ladder.h)
-    path = believed.path
+    path = of_limit.path
     differences = ladder.gram[:, : n - 1, : n - 1]
-    spread = _variance(ladder, believed)
+    spread = _variance(ladder, of_limit)
     floor = ladder.floor[:, -1]
     if n == 3:
-        p, ratio = orders[:, 0], ladder.h[1] / ladder.h[2]
+        p, ratio = of_limit.orders[:, 0], ladder.h[1] / ladder.h[2]
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
             step = np.where(p > 0.0, -1.0 / (ratio**p - 1.0), np.nan)
         other = np.stack([np.zeros_like(step), step], axis=-1) - path
@@ -304,6 +306,6 @@ def _best(
         error = np.sqrt(ladder.gram[:, -1, -1])
         largest = error + floor
     else:
-        error = np.sqrt(np.maximum(np.einsum("ci,cij,cj->c", path, differences, path), 0.0))
+        error = _norm(path, differences)
         largest = error + bound
     return {"weights": weights, "best_bound": bound, "error": error, "error_bound": largest}

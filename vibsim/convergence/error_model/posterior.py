@@ -56,6 +56,7 @@ class Posterior:
     """What is believed of ladders: probabilities, of shape (ladder,) where no other is given."""
 
     powers: Floats  # the powers that are looked at, increasing, shape (power,)
+    orders: Floats  # of every three successive levels, shape (ladder, n-2); see `local_orders`
     windows: list[tuple[int, int]]  # coarsest and finest level
     alone: Floats  # that this power dominates, shape (ladder, power)
     lowest: Floats  # that this is the lowest power of weight, shape (ladder, power)
@@ -77,11 +78,6 @@ class Posterior:
     def expansion(self) -> Floats:
         """Return the probability of an expansion in one or two powers."""
         return np.asarray(np.sum(self.window, axis=-1))
-
-    @property
-    def mixed(self) -> Floats:
-        """Return the probability that two powers are of one size."""
-        return np.asarray(self.expansion - np.sum(self.alone, axis=-1))
 
 
 def local_orders(ladder: Ladder) -> Floats:
@@ -307,6 +303,7 @@ class _Fit:
             values["path_squared"] = np.sum(values["path_squared"] * likely, axis=1) / expansion
         return Posterior(
             powers=self.powers,
+            orders=self.orders,
             windows=self.windows,
             alone=any_power + first @ lower + second @ higher,
             of_pairs=pairs - first - second,

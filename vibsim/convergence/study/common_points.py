@@ -30,7 +30,7 @@ class CommonValues:
     epsilon: Floats
     """Relative spacing of the precision of every level, shape (n,)."""
     kind: str
-    """One of `restriction.RESTRICTIONS`."""
+    """One of `vibsim.core.vocabulary.RESTRICTIONS`."""
     interpolation_order: int | None
     """Order of the error of an interpolation; None where no value was interpolated."""
     notes: tuple[str, ...] = ()
@@ -49,7 +49,7 @@ def common_values(
     levels
         All with the same dimensions, in any order.
     kind
-        How: one of `restriction.RESTRICTIONS`.
+        How: one of `vibsim.core.vocabulary.RESTRICTIONS`.
     dims
         Names of the dimensions that are refined; None for all. The others must be the same on every level.
     fixed

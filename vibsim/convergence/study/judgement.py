@@ -13,8 +13,8 @@ from vibsim.convergence.study.grid_values import GridValues, grid_values
 from vibsim.convergence.study.outcomes import Question, outcomes
 from vibsim.convergence.study.refinement import refinement
 from vibsim.convergence.study.refusal import chosen, number, refused
-from vibsim.convergence.study.restriction import RESTRICTIONS
 from vibsim.convergence.study.verdict import LadderVerdict
+from vibsim.core.vocabulary import RESTRICTIONS
 
 Sizes = Sequence[float] | Mapping[str, Sequence[float]]
 Exact = Any | Callable[..., Any]

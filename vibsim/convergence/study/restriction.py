@@ -25,7 +25,6 @@ from vibsim.core.array_types import Flags, Floats, Integers
 
 EQUAL = 1e-9
 """Two points whose distance is less than this part of the spacing are one."""
-RESTRICTIONS = ("subset", "mean", "linear", "cubic")
 INTERPOLATION_ORDERS: Mapping[str, int] = MappingProxyType({"linear": 2, "cubic": 4})
 """Of which order the error of an interpolation is, which is the number of points it takes."""
 Coordinate = NDArray[Any] | None
@@ -85,7 +84,7 @@ def common(
     dim
         Name of the dimension.
     kind
-        One of `RESTRICTIONS`.
+        One of `vibsim.core.vocabulary.RESTRICTIONS`.
     coordinates
         Of every level; None where it has none.
     lengths
