@@ -68,15 +68,15 @@ class Read:
 @contextmanager
 def reading() -> Iterator[Read]:
     """Keep what the rules read of u."""
-    read, collect = Read(), order_evidence.evidence
+    read, collect = Read(), order_evidence.evidences
 
-    def kept(q: Any, norm: str, order: Any, tolerance: float) -> Any:
-        evidence = collect(q, norm, order, tolerance)
-        if q.name == "u" and norm == "l2":
-            read.found.append((q, evidence))
-        return evidence
+    def kept(q: Any, norms: Any, order: Any, tolerance: float) -> Any:
+        found = collect(q, norms, order, tolerance)
+        if q.name == "u" and "l2" in norms:
+            read.found.append((q, found[list(norms).index("l2")]))
+        return found
 
-    with patch.object(order_evidence, "evidence", kept):
+    with patch.object(order_evidence, "evidences", kept):
         yield read
 
 
@@ -92,10 +92,10 @@ def ladder_of(group: Group, read: Read) -> Ladder:
     return Ladder(h, gram, evidence.floor[0], evidence.numbers[0], group.known)
 
 
-def compare(seed: int, folder: Path) -> tuple[Counts, Counts]:
+def compare(seed: int, folder: Path, number: int = 42, size: int = 55) -> tuple[Counts, Counts]:
     """Return the counts of the rules and of the error model on the ladders of a seed."""
     by_rules, by_model = Counts(), Counts()
-    for group in groups(seed):
+    for group in groups(seed, number, size):
         if len(group.levels) < 3:
             continue
         with reading() as read:

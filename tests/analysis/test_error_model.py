@@ -6,12 +6,16 @@ import datetime
 import math
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
+from side_by_side import compare
 from synthetic import EPSILON, TOLERANCE, Group, groups
 
 from vibsim.convergence.assessment import Assessment, assess
+from vibsim.convergence.error_model import kernel, likelihood
+from vibsim.convergence.error_model.hypotheses import hypotheses_of
 from vibsim.convergence.error_model.posterior import Ladder, posterior
 from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import REASON_NAMES, STATUSES
@@ -180,12 +184,52 @@ def test_units_do_not_matter(factor: float) -> None:
     np.testing.assert_allclose(other.weights, one.weights, rtol=1e-6)
 
 
+@pytest.mark.parametrize("kind", ["two_shapes", "one_shape"])
+def test_rounding_of_steep_differences_is_no_evidence(kind: str) -> None:
+    """Behind levels that have blown up, what rows have across the last one may be rounded to less than nothing."""
+    rows = np.array([1e7, 1e3, 1.0])
+    gram = np.outer(rows, rows)[None]
+    rounded = gram * (1.0 - np.diag([1e-16, 0.0, 0.0]))
+    none = np.empty((1, 0))
+    for table in getattr(hypotheses_of((8.0, 4.0, 2.0, 1.0), 6.0), kind):
+        one, other = (
+            likelihood.weights(table, g, np.array([2.0]), none)[0] for g in (gram, rounded)
+        )
+        assert other == pytest.approx(one, abs=1e-6)
+
+
 def test_probabilities_add_up_to_one() -> None:
     for exact in (None, np.cos(T)):
         p = posterior(ladder(HALVED, series(HALVED, (1.0, 2.0, SHAPE)), exact=exact), 2.0)
-        whole = p.expansion + p.alternating + p.scattered + p.noise + p.elsewhere
+        whole = p.expansion + p.alternating + p.scattered + p.noise
         assert whole == pytest.approx(1.0, abs=1e-9)
         assert np.all(p.of_pairs >= -1e-9)
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["exact", "unknown"])
+def test_a_ladder_is_judged_the_same_alone_and_among_others(known: bool) -> None:
+    """Bit by bit, so that sweeps may be divided at will."""
+    group = next(g for g in groups(7, size=20) if len(g.levels) == 5 and g.known == known)
+    given, _ = of_group(group)
+    among = vars(assess(given, expected=2.0))
+    for i in range(3):
+        one = slice(i, i + 1)
+        alone = Ladder(given.h, given.gram[one], given.floor[one], given.numbers[one], known)
+        for name, values in vars(assess(alone, expected=2.0)).items():
+            np.testing.assert_array_equal(values[0], among[name][i], err_msg=name)
+
+
+def test_the_compiled_loop_has_the_bits_of_its_text(monkeypatch: pytest.MonkeyPatch) -> None:
+    for given in (
+        ladder(HALVED, numbers(HALVED, (1.0, 2.0), (0.1, 3.0))),
+        ladder(HALVED, series(HALVED, (1.0, 2.0, SHAPE), (0.5, 3.0, OTHER_SHAPE))),
+    ):
+        compiled = assess(given, expected=2.0)
+        with monkeypatch.context() as plain:
+            plain.setattr(likelihood, "weigh", lambda: kernel.kernel)
+            by_text = assess(given, expected=2.0)
+        for name, values in vars(by_text).items():
+            np.testing.assert_array_equal(vars(compiled)[name], values, err_msg=name)
 
 
 # ---- How often it is right
@@ -271,6 +315,12 @@ def check(c: Counts) -> None:
     assert c.left_open <= 0.12 * c.decidable, c
     margin = 2.0 * math.sqrt(0.05 * 0.95 / c.right)
     assert min(c.intervals, c.errors, c.best) >= 0.95 - margin, c
+
+
+def test_rules_and_error_model_can_be_compared(tmp_path: Path) -> None:
+    rules, model = compare(HELD_OUT, tmp_path, number=5, size=6)
+    assert rules.decidable == model.decidable > 0
+    assert rules.right > 0 < model.right
 
 
 def test_verdicts_on_random_ladders_are_right() -> None:

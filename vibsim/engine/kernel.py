@@ -27,12 +27,12 @@ from vibsim.engine.formulas import (
     put_functions,
     put_parameters,
 )
-from vibsim.engine.kernel_cache import Kernel, load
 from vibsim.engine.stages import stages
 from vibsim.engine.text import Module, collect, divided, plain_code
 from vibsim.models import Model, has_budget
 from vibsim.models.base import Formula
 from vibsim.models.events import Friction
+from vibsim.native.kernel_cache import Kernel, load
 from vibsim.schemes.base import HANDED, Stepper, handed
 
 LANES = ("plain", "scalar", "blocks")

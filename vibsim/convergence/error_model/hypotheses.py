@@ -1,11 +1,10 @@
-"""What hypotheses on the error expect of the rows of a window of levels: their covariance, for all at once."""
+"""What hypotheses on errors expect of the rows of a window of levels, for all hypotheses at once."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from itertools import product
 from typing import NamedTuple
 
@@ -24,24 +23,30 @@ class Terms:
     share: Floats  # size of the second power over the first at the finest level of the window, with its sign
     log_prior: Floats
 
-    @cached_property
-    def starts(self) -> Integers:
+    @property
+    def new(self) -> Integers:
         """First hypothesis of every pair of powers."""
-        new = (np.diff(self.lower) != 0.0) | (np.diff(self.higher) != 0.0)
-        return np.flatnonzero(np.concatenate([[True], new]))
+        differs = (np.diff(self.lower) != 0.0) | (np.diff(self.higher) != 0.0)
+        return np.flatnonzero(np.concatenate([[True], differs]))
 
 
 @dataclass(frozen=True)
-class Window:
-    """What hypotheses say about the w rows of a window; arrays of shape (hypothesis, ...)."""
+class Table:
+    """What the hypotheses on the w rows of a window say, laid out for `kernel`.
 
-    terms: Terms
-    precision: Floats  # K^-1, shape (hypothesis, w, w)
-    log_det: Floats  # log det K
-    gains: Floats  # the first and second power, from the rows, shape (hypothesis, 2, w)
-    left: Floats  # their covariance that the rows leave, over the scale, shape (hypothesis, 2, 2)
-    # of one shape: precision and log determinant of what the rows but the last are off the last one
-    across: tuple[Floats, Floats] | None = None
+    The evidence of rows with N points is ``(root/tr(K^-1 G))^(N w/2)`` with ``root = (prior/det(K)^(N/2))^(2/(N w))``,
+    but for factors that all hypotheses on w rows share. The gains make both powers, at the finest level, of the rows.
+    """
+
+    # forms of the precision K^-1, of the square of the first power, of the second, and of the limit without the
+    # differences behind the window; shape (4, packed, hypothesis)
+    forms: Floats
+    # root for one point and for two; variances over the scale that the rows leave to the first power, the second, and
+    # both together; the expression of both in the rows, with a minus; shape (5 + w, hypothesis)
+    columns: Floats
+    pair: Integers  # position of its pair of powers, shape (hypothesis,)
+    # of one shape: form of the precision of what the other rows are beside multiples of the last one, over `TAIL`
+    beside: Floats | None = None
 
 
 @lru_cache
@@ -61,12 +66,84 @@ def two_powers(signs: tuple[float, ...], promised: float | None) -> Terms:
     return Terms(lower, higher, share, np.log(prior))
 
 
-def levels_to_rows(count: int) -> Floats:
-    """Return the matrix that makes differences of the values of the levels."""
-    return np.eye(count - 1, count) - np.eye(count - 1, count, 1)
+def pure(powers: tuple[float, ...]) -> Terms:
+    """Return the hypotheses of one power."""
+    p = np.array(powers)
+    return Terms(p, p, np.zeros(len(p)), np.full(len(p), -math.log(len(p))))
 
 
-def _errors(terms: Terms, sizes: Floats) -> tuple[Floats, Floats, Floats]:
+def between(levels: Floats) -> Floats:
+    """Return the differences of what belongs to levels, along the last axis."""
+    return np.asarray(levels[..., :-1] - levels[..., 1:])
+
+
+def noise_of_rows(variance: Floats) -> Floats:
+    """Return the covariance of the differences of levels with independent noise, shape (..., row, row)."""
+    count = variance.shape[-1] - 1
+    found = np.zeros((*variance.shape[:-1], count, count))
+    every = np.arange(count)
+    found[..., every, every] = variance[..., :-1] + variance[..., 1:]
+    found[..., every[1:], every[:-1]] = found[..., every[:-1], every[1:]] = -variance[..., 1:-1]
+    return found
+
+
+def outer(one: Floats, other: Floats) -> Floats:
+    """Return the outer products of the vectors along the last axis."""
+    return np.asarray(one[..., :, None] * other[..., None, :])
+
+
+def packed(matrices: Floats) -> Floats:
+    """Return the entries (i, j), i <= j, of symmetric matrices, shape (..., packed)."""
+    i, j = np.triu_indices(matrices.shape[-1])
+    return np.ascontiguousarray(matrices[..., i, j])
+
+
+def form(matrices: Floats) -> Floats:
+    """Return what to multiply packed Gram matrices with, and sum up, for ``tr(M G)``."""
+    i, j = np.triu_indices(matrices.shape[-1])
+    return np.where(i == j, 1.0, 2.0) * packed(matrices)
+
+
+def times(matrices: Floats, vectors: Floats) -> Floats:
+    """Return products of matrices and vectors, shape (..., i), added up in the order of the columns."""
+    found = matrices[..., 0] * vectors[..., None, 0]
+    for k in range(1, vectors.shape[-1]):
+        found = found + matrices[..., k] * vectors[..., None, k]
+    return np.asarray(found)
+
+
+def inverse(covariance: Floats) -> tuple[Floats, Floats]:
+    """Return inverse and log determinant of covariances, entry by entry, which gives the same bits everywhere."""
+    # by Cholesky, L L^T, of matrices scaled so that sizes of rows do not matter
+    scale = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
+    a = covariance / outer(scale, scale)
+    w = a.shape[-1]
+    # of L^-1: row i is (e_i - sum_j L_ij row_j)/L_ii
+    lower, inverted = np.zeros_like(a), np.zeros_like(a)
+    log_det = np.zeros_like(scale[..., 0])
+    for i in range(w):
+        row = np.zeros_like(a[..., 0, :])
+        row[..., i] = 1.0
+        rest = a[..., i, i]
+        for j in range(i):
+            entry = a[..., i, j]
+            for k in range(j):
+                entry = entry - lower[..., i, k] * lower[..., j, k]
+            lower[..., i, j] = entry / lower[..., j, j]
+            rest = rest - lower[..., i, j] ** 2
+            row = row - lower[..., i, j, None] * inverted[..., j, :]
+        lower[..., i, i] = np.sqrt(np.maximum(rest, ROUNDED))
+        inverted[..., i, :] = row / lower[..., i, i, None]
+        log_det = log_det + 2.0 * np.log(lower[..., i, i] * scale[..., i])
+    precision = sum(outer(inverted[..., i, :], inverted[..., i, :]) for i in range(w))
+    return precision / outer(scale, scale), log_det
+
+
+ROUNDED = 1e-16
+"""What rounding leaves of a variance of 1 at least."""
+
+
+def _sizes(terms: Terms, sizes: Floats) -> tuple[Floats, Floats, Floats]:
     """Return the error of each level by the first power, the second, and the square of both; (hypothesis, level).
 
     Sizes are over that of the finest level of the window; the share is that at the same level.
@@ -76,86 +153,107 @@ def _errors(terms: Terms, sizes: Floats) -> tuple[Floats, Floats, Floats]:
     return first, second, first**2 + (terms.share[:, None] * second) ** 2
 
 
-def inverse(covariance: Floats) -> tuple[Floats, Floats]:
-    """Return inverse and log determinant of covariances, scaled so that sizes of rows do not matter."""
-    scale = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
-    both = scale[..., :, None] * scale[..., None, :]
-    scaled = covariance / both
-    return np.linalg.inv(scaled) / both, np.linalg.slogdet(scaled)[1] + 2.0 * np.sum(
-        np.log(scale), axis=-1
-    )
+def _table(
+    terms: Terms,
+    signal: Floats,
+    variance: Floats,
+    c: tuple[Floats, Floats],
+    prior: tuple[Floats, Floats, Floats],
+    beside: tuple[Floats, Floats] | None = None,
+) -> Table:
+    """Lay hypotheses out.
+
+    Parameters
+    ----------
+    signal
+        Covariance that both powers give the rows, shape (hypothesis, row, row).
+    variance
+        That of the noise of each level, shape (hypothesis, level).
+    c
+        Both powers in the rows, at size 1, each of shape (hypothesis, row).
+    prior
+        Variance of the first power, covariance, and variance of the second, each of shape (hypothesis,).
+    """
+    precision, log_det = inverse(signal + noise_of_rows(variance))
+    finest = np.flatnonzero(variance[0])[-1]
+    own_noise = variance[:, finest]
+    w = precision.shape[-1]
+    one, both, other = (x[:, None] for x in prior)
+    rows = (one * c[0] + both * c[1], both * c[0] + other * c[1])
+    gains = [times(precision, row) for row in rows]
+    left = [
+        x - np.sum(gain * row, axis=-1)
+        for x, gain, row in zip(prior[::2], gains, rows, strict=True)
+    ]
+    # the limit is off the finest level by both powers there, and by its noise
+    to_limit = rows[0] + rows[1]
+    to_limit[:, finest - 1] -= own_noise
+    path = -times(precision, to_limit)
+    whole = prior[0] + 2.0 * prior[1] + prior[2] + own_noise
+    left_whole = whole + np.sum(path * to_limit, axis=-1)
+    forms = np.stack([form(x) for x in (precision, *(outer(g, g) for g in (*gains, path)))])
+    if beside is None:
+        roots = [np.exp((2.0 / n * terms.log_prior - log_det) / w) for n in (1, 2)]
+        of_beside = None
+    else:
+        # one dimension along the last row, all others across it
+        log_det_beside, precision_beside = beside
+        roots = [
+            np.exp((2.0 * terms.log_prior - log_det - (n - 1) * log_det_beside) / w) for n in (1, 2)
+        ]
+        of_beside = np.ascontiguousarray(form(precision_beside).T)
+    columns = np.stack([*roots, *left, left_whole, *path.T])
+    pair = np.searchsorted(terms.new, np.arange(len(terms.lower)), side="right") - 1
+    layout = np.ascontiguousarray(np.swapaxes(forms, 1, 2))
+    return Table(layout, np.ascontiguousarray(columns), pair, of_beside)
 
 
-def _window(
-    sizes: Floats, terms: Terms, *, alternating: bool = False
-) -> Iterator[tuple[int, Window]]:
-    """Yield position in `FINEST_NOISE` and the hypotheses of two shapes on the rows between levels of these sizes."""
-    rows, prior = levels_to_rows(len(sizes)), _size_of_powers(terms)
-    first, second, squares = _errors(terms, sizes)
+def _two_shapes(sizes: Floats, terms: Terms, *, alternating: bool = False) -> list[Table]:
+    """Return the hypotheses of two shapes on the rows between levels of these sizes, for each of `FINEST_NOISE`."""
+    first, second, squares = _sizes(terms, sizes)
     if alternating:
         first, second = (x * (-1.0) ** np.arange(len(sizes)) for x in (first, second))
-    c = np.stack([first @ rows.T, second @ rows.T], axis=-1)
-    signal = c @ prior @ np.swapaxes(c, -1, -2)
+    c = between(first), between(second)
+    square = terms.share**2
+    signal = outer(c[0], c[0]) + square[:, None, None] * outer(c[1], c[1])
+    prior = np.ones_like(square), np.zeros_like(square), square
     finest = np.flatnonzero(sizes)[-1]
-    for i, noise in enumerate(priors.FINEST_NOISE):
-        share = np.full(len(sizes), priors.MISFIT**2)
-        share[finest] += noise**2
-        precision, log_det = inverse(signal + (rows * (squares * share)[:, None]) @ rows.T)
-        yield i, _with_gains(terms, precision, log_det, c, prior)
+    found = []
+    for noise in priors.FINEST_NOISE:
+        part = np.full(len(sizes), priors.MISFIT**2)
+        part[finest] += noise**2
+        found.append(_table(terms, signal, squares * part, c, prior))
+    return found
 
 
-def _size_of_powers(terms: Terms) -> Floats:
-    """Return the prior covariance of unrelated A and B over the square of the size of A, shape (hypothesis, 2, 2)."""
-    prior = np.zeros((len(terms.share), 2, 2))
-    prior[:, 0, 0], prior[:, 1, 1] = 1.0, terms.share**2
-    return prior
-
-
-def _with_gains(
-    terms: Terms,
-    precision: Floats,
-    log_det: Floats,
-    c: Floats,
-    prior: Floats,
-    across: tuple[Floats, Floats] | None = None,
-) -> Window:
-    gains = prior @ np.swapaxes(c, -1, -2) @ precision
-    left = prior - gains @ c @ prior
-    return Window(terms, precision, log_det, gains, left, across)
-
-
-def _one_shape(sizes: Floats, terms: Terms) -> Iterator[tuple[float, Window]]:
-    """Yield the log prior and the hypotheses of one shape, whose sizes are off by chance, for each of `JITTERS`."""
-    rows = levels_to_rows(len(sizes))
-    first, second, squares = _errors(terms, sizes)
-    share = terms.share[:, None]
-    c = (first + share * second) @ rows.T
-    both = np.stack([np.ones_like(terms.share), terms.share], axis=-1)[:, :, None]
-    prior = both @ np.swapaxes(both, -1, -2)
-    powers = np.stack([first @ rows.T, second @ rows.T], axis=-1)
-    noise = (rows * squares[:, None]) @ rows.T
-    # what the other rows are off a multiple of the last one
-    last = c[:, -1]
-    off = np.zeros((len(c), len(rows) - 1, len(rows)))
-    off[:, np.arange(len(rows) - 1), np.arange(len(rows) - 1)] = 1.0
-    off[:, :, -1] = -c[:, :-1] / last[:, None]
-    beside = off @ noise @ np.swapaxes(off, -1, -2) * (priors.MISFIT / last[:, None, None]) ** 2
-    across = inverse(beside)
-    signal = c[:, :, None] * c[:, None, :]
-    for jitter, chance in zip(priors.JITTERS, priors.JITTER_PRIORS, strict=True):
-        precision, log_det = inverse(signal + jitter**2 * noise)
-        yield (
-            math.log(priors.ONE_SHAPE_PRIOR * chance),
-            _with_gains(terms, precision, log_det, powers, prior, across),
-        )
+def _one_shape(sizes: Floats, terms: Terms) -> list[Table]:
+    """Return the hypotheses of one shape, whose sizes are off by chance, for each of `JITTERS`."""
+    first, second, squares = _sizes(terms, sizes)
+    powers = between(first), between(second)
+    c = powers[0] + terms.share[:, None] * powers[1]
+    noise = noise_of_rows(squares)
+    # what the other rows are beside a multiple of the last one
+    part = c[:, :-1] / c[:, -1:]
+    across = noise[:, :-1, :-1] + outer(part, part) * noise[:, -1:, -1:]
+    mixed = outer(part, noise[:, -1, :-1])
+    across = across - mixed - np.swapaxes(mixed, 1, 2)
+    variance = priors.TAIL * (priors.MISFIT / c[:, -1, None, None]) ** 2
+    precision, log_det = inverse(variance * across)
+    beside = log_det, precision
+    ones = np.ones_like(terms.share)
+    prior = ones, terms.share, terms.share**2
+    return [
+        _table(terms, outer(c, c), jitter**2 * squares, powers, prior, beside)
+        for jitter in priors.JITTERS
+    ]
 
 
 class Hypotheses(NamedTuple):
     """All hypotheses on the rows of a window."""
 
-    two_shapes: list[tuple[int, Window]]
-    one_shape: list[tuple[float, Window]]
-    alternating: list[tuple[int, Window]]
+    two_shapes: list[Table]
+    one_shape: list[Table]
+    alternating: list[Table]
 
 
 @lru_cache(maxsize=24)
@@ -163,13 +261,7 @@ def hypotheses_of(sizes: tuple[float, ...], promised: float | None) -> Hypothese
     """Return the hypotheses for levels of these sizes; windows of ladders of one ratio share them."""
     relative = np.array(sizes)
     return Hypotheses(
-        list(_window(relative, two_powers((1.0,), promised))),
-        list(_one_shape(relative, two_powers((1.0, -1.0), promised))),
-        list(_window(relative, _pure(priors.POWERS), alternating=True)),
+        _two_shapes(relative, two_powers((1.0,), promised)),
+        _one_shape(relative, two_powers((1.0, -1.0), promised)),
+        _two_shapes(relative, pure(priors.POWERS), alternating=True),
     )
-
-
-def _pure(powers: tuple[float, ...]) -> Terms:
-    """Return the hypotheses of one power."""
-    p = np.array(powers)
-    return Terms(p, p, np.zeros(len(p)), np.full(len(p), -math.log(len(p))))

@@ -1,4 +1,4 @@
-"""How likely the rows of ladders are under a hypothesis: logarithms of evidence, shape (ladder, hypothesis)."""
+"""How likely the rows of ladders are under hypotheses: logarithms of evidence, shape (ladder, ...)."""
 
 from __future__ import annotations
 
@@ -7,24 +7,23 @@ import math
 import numpy as np
 
 from vibsim.convergence.error_model import priors
-from vibsim.convergence.error_model.hypotheses import Window, inverse, levels_to_rows
+from vibsim.convergence.error_model.hypotheses import (
+    Table,
+    form,
+    inverse,
+    noise_of_rows,
+    outer,
+    packed,
+)
+from vibsim.convergence.error_model.kernel import weigh
 from vibsim.core.array_types import Floats
 
 TINY = 1e-300
 """Less is nothing."""
+UNTHINKABLE = -1e6
+"""Log evidence of what cannot be."""
 LOG_GAMMA = np.array([math.inf, *(math.lgamma(0.5 * n) for n in range(1, 200))])
 """The logarithm of Gamma(n/2), by n."""
-
-
-def sum_of_products(matrices: Floats, gram: Floats) -> Floats:
-    """Return ``tr(M G)`` for every ladder and hypothesis, shape (ladder, hypothesis); never negative."""
-    count, w = len(matrices), gram.shape[-1]
-    return np.maximum(gram.reshape(len(gram), w * w) @ matrices.reshape(count, w * w).T, TINY)
-
-
-def mean_square(gains: Floats, gram: Floats) -> Floats:
-    """Return the mean square of what the gains make of the rows, shape (ladder, hypothesis)."""
-    return sum_of_products(gains[:, :, None] * gains[:, None, :], gram)
 
 
 def scale_free(trace: Floats, log_det: Floats | float, points: Floats, rows: int) -> Floats:
@@ -38,29 +37,61 @@ def scale_free(trace: Floats, log_det: Floats | float, points: Floats, rows: int
     )
 
 
-def evidence(window: Window, gram: Floats, points: Floats) -> tuple[Floats, Floats]:
-    """Return the log evidence of the rows of a window, and the square of their scale, shape (ladder, hypothesis)."""
-    w, n = gram.shape[-1], points[:, None]
-    if window.across is None:
-        trace = sum_of_products(window.precision, gram)
-        return scale_free(trace, window.log_det, n, w), trace / w
-    # one dimension along the last row, the others across it
-    last = np.maximum(gram[:, -1, -1], TINY)[:, None]
-    along = gram[:, -1, :, None] * gram[:, -1, None, :] / last[..., None]
-    trace = sum_of_products(window.precision, along)
-    log = scale_free(trace, window.log_det, np.ones(1), w)
-    # the last row has any direction
-    log += math.log(2.0) + 0.5 * np.log(last) + scale_free(last, 0.0, n, 1)
-    precision, log_det = window.across
-    rest = np.maximum(
-        (gram - along)[:, :-1, :-1].reshape(len(gram), -1)
-        @ precision.reshape(len(precision), -1).T,
-        0.0,
-    )
-    log -= 0.5 * (n - 1.0) * ((w - 1) * np.log(2.0 * np.pi * last / n) + log_det)
-    with np.errstate(over="ignore"):
-        log -= np.where(n > 1.0, 0.5 * n * rest / last, 0.0)
-    return log, trace / w
+def log_sum(logs: Floats) -> Floats:
+    """Return the log of the sum of exponentials over the last axis."""
+    largest = np.max(logs, axis=-1)
+    return np.asarray(largest + np.log(np.sum(np.exp(logs - largest[..., None]), axis=-1)))
+
+
+def weights(
+    table: Table, gram: Floats, points: Floats, behind: Floats
+) -> tuple[Floats, dict[str, Floats]]:
+    """Weigh the hypotheses of a table on the rows of a window.
+
+    Parameters
+    ----------
+    gram
+        Of the w rows, shape (ladder, w, w).
+    points
+        N, shape (ladder,).
+    behind
+        See `vibsim.convergence.error_model.kernel.kernel`; over the square of the last row.
+
+    Returns
+    -------
+    tuple
+        The log of their evidence, with priors, summed up, shape (ladder,), and the means of what `kernel` finds.
+    """
+    count, w = len(gram), gram.shape[-1]
+    last = np.maximum(gram[:, -1, -1], TINY)
+    relative = gram / last[:, None, None]
+    read, dimensions, rest = relative, points, np.zeros(count)
+    beside, across = np.empty((0, len(table.pair))), np.empty((count, 0))
+    powers = np.stack([points * w, np.zeros(count)], axis=-1)
+    if table.beside is not None:
+        # one dimension along the last row, which may have any direction, and the others across it, of a Student's t
+        read, dimensions = outer(relative[:, -1], relative[:, -1]), np.ones(count)
+        beside, across = table.beside, packed((relative - read)[:, :-1, :-1])
+        free = (points - 1.0) * (w - 1)
+        powers = np.stack([dimensions * w, (free + priors.TAIL) * (free > 0.0)], axis=-1)
+        rest = math.log(2.0) + 0.5 * np.log(last) + scale_free(last, 0.0, points, 1)
+        rest += LOG_GAMMA[(free + priors.TAIL).astype(np.int64)] - math.lgamma(0.5 * priors.TAIL)
+        rest -= 0.5 * free * np.log(np.pi * last / points)
+        across = across * points[:, None]
+    pairs = int(table.pair[-1]) + 1
+    found = np.empty((count, 3 + w + 3 * pairs))
+    weigh()(
+        packed(relative), packed(read), points.astype(np.int64), powers.astype(np.int64), across, behind,
+        table.forms, beside, table.columns, table.pair, pairs, np.empty((2, len(table.pair))), found,
+    )  # fmt: skip
+    # rows that are nowhere near any hypothesis have no weight at all
+    top, total = np.maximum(found[:, 0], TINY), np.maximum(found[:, 1], TINY)
+    log = rest + scale_free(last / top, 0.0, dimensions, w) + np.log(total)
+    found[:, 2:] /= total[:, None]
+    path, pair = found[:, 3 : 3 + w], found[:, 3 + w :].reshape(count, 3, pairs)
+    names = ("pairs", "first_alone", "second_alone")
+    means = {"path": path, "path_squared": found[:, 2] * last}
+    return log, means | {name: pair[:, i] for i, name in enumerate(names)}
 
 
 def any_size(gram: Floats, points: Floats) -> Floats:
@@ -73,16 +104,8 @@ def any_size(gram: Floats, points: Floats) -> Floats:
         variance = part**2 * own[:, :-1] / n
         log = -0.5 * (n - 1.0) * np.log(2.0 * np.pi * variance) - 0.5 * np.log(own[:, :-1])
         found.append(log - np.where(n > 1.0, 0.5 * np.maximum(across, 0.0) / variance, 0.0))
-    log = _log_mean(np.stack(found, axis=-1)) + math.log(0.5)
+    log = log_sum(np.stack(found, axis=-1)) + math.log(0.5 / len(found))
     return np.concatenate([log, scale_free(own[:, -1:], 0.0, n, 1)], axis=-1)
-
-
-def _log_mean(logs: Floats) -> Floats:
-    """Return the log of the mean of exponentials over the last axis."""
-    largest = np.max(logs, axis=-1, keepdims=True)
-    return np.asarray(
-        (largest + np.log(np.mean(np.exp(logs - largest), axis=-1, keepdims=True)))[..., 0]
-    )
 
 
 def noise(sizes: Floats, gram: Floats, points: Floats, floor: Floats) -> Floats:
@@ -93,22 +116,22 @@ def noise(sizes: Floats, gram: Floats, points: Floats, floor: Floats) -> Floats:
     count = gram.shape[-1]
     if not count:
         return np.zeros(len(gram))
-    # the exact solution, if it is known, is a level more, which has no noise
-    rows = levels_to_rows(count + 1)
+    entries = packed(gram)
     found = []
     for growth in priors.GROWTHS:
+        # the exact solution, if it is known, is a level more, which has no noise
         of_level = np.zeros(count + 1)
         of_level[: len(sizes)] = (sizes / sizes[-1]) ** (-2.0 * growth)
-        precision, log_det = inverse((rows * of_level) @ rows.T)
-        trace = sum_of_products(precision[None], gram)[:, 0]
-        size = 0.5 * np.log10(trace / len(rows)) - np.log10(np.maximum(floor[:, -1], TINY))
+        precision, log_det = inverse(noise_of_rows(of_level))
+        trace = np.maximum(np.sum(entries * form(precision), axis=-1), TINY)
+        size = 0.5 * np.log10(trace / count) - np.log10(np.maximum(floor[:, -1], TINY))
         decades = size / math.log10(priors.PREDICTION)
         expected = -0.5 * decades**2 - math.log(
             math.sqrt(2.0 * np.pi) * math.log(priors.PREDICTION)
         )
         of_size = np.logaddexp(expected, math.log(priors.UNEXPECTED) - priors.PRICE)
-        found.append(scale_free(trace, log_det, points, len(rows)) + of_size)
-    return _log_mean(np.stack(found, axis=-1))
+        found.append(scale_free(trace, log_det, points, count) + of_size)
+    return log_sum(np.stack(found, axis=-1)) - math.log(len(found))
 
 
 def noise_of_finest(floor: Floats, last: Floats) -> tuple[Floats, Floats]:
@@ -118,5 +141,5 @@ def noise_of_finest(floor: Floats, last: Floats) -> tuple[Floats, Floats]:
     """
     share = floor / np.sqrt(np.maximum(last, TINY))
     noisy = np.clip(share / (0.3 * priors.FINEST_NOISE[1]), priors.UNEXPECTED, 0.999)
-    drowned = np.where(share > 1.0, -20.0, 0.0)
+    drowned = np.where(share > 1.0, math.log(priors.UNEXPECTED) - priors.PRICE, 0.0)
     return np.log(1.0 - noisy) + drowned, np.log(noisy) + drowned

@@ -10,27 +10,30 @@ import numpy as np
 from vibsim.convergence.differences import order_of_differences, safe_ratio
 from vibsim.convergence.error_model import priors
 from vibsim.convergence.error_model.hypotheses import (
-    Window,
+    between,
+    form,
     hypotheses_of,
     inverse,
-    levels_to_rows,
+    noise_of_rows,
+    outer,
+    packed,
+    times,
     two_powers,
 )
 from vibsim.convergence.error_model.likelihood import (
     TINY,
+    UNTHINKABLE,
     any_size,
-    evidence,
-    mean_square,
+    log_sum,
     noise,
     noise_of_finest,
     scale_free,
+    weights,
 )
 from vibsim.core.array_types import Flags, Floats
 
-UNTHINKABLE = -1e6
-"""Log evidence of what cannot be."""
-NEGLIGIBLE = -20.0
-"""Log probability, over the largest so far, of hypotheses that are left out."""
+LIKELY = 1e-3
+"""Probability of a window of which the limit is believed."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +71,6 @@ class Posterior:
     alternating: Floats  # that errors change their sign from level to level
     scattered: Floats  # that there is no expansion, and no noise either
     noise: Floats  # that all but some coarse levels are noise
-    elsewhere: Floats  # that the limit is not the exact solution; 0 where that is not known
     # the limit less the finest level: the mean of its expression in the differences, shape (ladder, row), and its mean
     # square; given the expansion, and where the exact solution is not known
     path: Floats
@@ -102,18 +104,22 @@ class _Sums:
         self.top = np.full(ladders, -np.inf)
         self.values: dict[str, Floats] = {}
 
-    def add(self, log: Floats) -> Floats:
-        """Return the weights of hypotheses, shape (ladder, hypothesis), and scale down what was summed before."""
-        top = np.maximum(self.top, np.max(log, axis=-1))
-        factor = np.exp(self.top - top)
-        for name, value in self.values.items():
-            self.values[name] = value * factor.reshape(-1, *[1] * (value.ndim - 1))
-        self.top = top
-        less = log - top[:, None]
-        return np.where(less > NEGLIGIBLE, np.exp(less), 0.0)
+    def add(self, log: Floats, **means: Floats) -> None:
+        """Add means, of shape (ladder, ...), with weights of these logs, shape (ladder,)."""
+        top = np.maximum(self.top, log)
+        if np.any(top > self.top):
+            factor = np.exp(self.top - top)
+            for name, value in self.values.items():
+                self.values[name] = _by_ladder(factor, value) * value
+            self.top = top
+        weight = np.exp(log - top)
+        for name, mean in means.items():
+            value = _by_ladder(weight, mean) * mean
+            self.values[name] = self.values[name] + value if name in self.values else value
 
-    def put(self, name: str, value: Floats) -> None:
-        self.values[name] = self.values[name] + value if name in self.values else value
+
+def _by_ladder(factor: Floats, values: Floats) -> Floats:
+    return factor.reshape(-1, *[1] * (values.ndim - 1))
 
 
 class _Fit:
@@ -128,7 +134,6 @@ class _Fit:
         )
         self.orders = local_orders(ladder)
         n = len(ladder.h)
-        # the finest and longest first: what follows is mostly negligible beside them
         self.windows = [
             (last - rows, last)
             for last in range(n - 1, 1, -1)
@@ -156,115 +161,114 @@ class _Fit:
             smallest = np.minimum(smallest, self.rows(end, end, with_exact=True)[:, 0, 0])
         noisy = noise_of_finest(ladder.floor[:, end], smallest)
         sizes = ladder.h[start : end + 1] / ladder.h[end]
-        inside = self.rows(start, end)
-        relative = sizes
-        of_window = hypotheses_of(tuple(sizes), self.promised)
+        inside, behind = self.rows(start, end), np.empty((len(rest), 0))
         if ladder.exact_known:
-            apart = rest + self.error_of(end) + math.log(priors.ELSEWHERE)
-            for i, window in of_window.two_shapes:
-                log, _ = evidence(window, inside, self.points)
-                weights = self.sums.add(log + window.terms.log_prior + (apart + noisy[i])[:, None])
-                self.sums.put("elsewhere", np.sum(weights, axis=-1))
             inside = self.rows(start, end, with_exact=True)
-            relative = np.append(sizes, 0.0)
-            of_window = hypotheses_of(tuple(relative), self.promised)
-        self.add_any_power(index, relative, inside, rest + noisy[0])
-        for i, window in of_window.two_shapes:
-            self.add_hypotheses(index, window, inside, (rest + noisy[i])[:, None])
-        for log_prior, window in of_window.one_shape:
-            self.add_hypotheses(index, window, inside, (rest + noisy[0] + log_prior)[:, None])
-        for i, window in of_window.alternating:
-            log, _ = evidence(window, inside, self.points)
-            log += (
-                window.terms.log_prior + (rest + noisy[i])[:, None] + math.log(priors.ALTERNATING)
-            )
-            self.sums.put("alternating", np.sum(self.sums.add(log), axis=-1))
+            sizes = np.append(sizes, 0.0)
+        else:
+            behind = self.behind(start, end)
+        of_window = hypotheses_of(tuple(sizes), self.promised)
+        self.add_any_power(index, sizes, inside, rest + noisy[0])
+        tables = [(table, noisy[i]) for i, table in enumerate(of_window.two_shapes)]
+        tables += [
+            (table, noisy[0] + math.log(priors.ONE_SHAPE_PRIOR * chance))
+            for table, chance in zip(of_window.one_shape, priors.JITTER_PRIORS, strict=True)
+        ]
+        for table, prior in tables:
+            log, means = weights(table, inside, self.points, behind)
+            self.add(index, log + rest + prior, **means)
+        for i, table in enumerate(of_window.alternating):
+            log, _ = weights(table, inside, self.points, behind[:, :0])
+            log += rest + noisy[i] + math.log(priors.ALTERNATING)
+            self.sums.add(log, alternating=np.ones(len(log)))
 
     def rows(self, start: int, end: int, *, with_exact: bool = False) -> Floats:
         """Return the Gram matrix of the differences between two levels, and of the true error of the second one."""
-        picked = np.zeros((end - start + with_exact, self.ladder.gram.shape[-1]))
-        picked[np.arange(end - start), np.arange(start, end)] = 1.0
-        if with_exact:
-            picked[-1, end:] = 1.0
-        levels = levels_to_rows(end - start + 2)[: len(picked), : end - start + 1]
-        noise = (levels * self.rounding[:, None, start : end + 1]) @ levels.T
-        return np.asarray(picked @ self.ladder.gram @ picked.T + noise)
+        gram = self.ladder.gram
+        noise = noise_of_rows(self.rounding[:, start : end + 1])
+        if not with_exact:
+            return np.asarray(gram[:, start:end, start:end] + noise)
+        count = end - start
+        found = np.zeros((len(gram), count + 1, count + 1))
+        found[:, :count, :count] = gram[:, start:end, start:end] + noise
+        # the error of a level is the sum of all finer differences and of the error of the finest one
+        with_error = np.sum(gram[:, :, end:], axis=-1)
+        found[:, :count, count] = found[:, count, :count] = with_error[:, start:end]
+        found[:, count, count] = np.sum(with_error[:, end:], axis=-1) + self.rounding[:, end]
+        if count:
+            found[:, count - 1, count] -= self.rounding[:, end]
+            found[:, count, count - 1] -= self.rounding[:, end]
+        return found
+
+    def behind(self, start: int, end: int) -> Floats:
+        """Return what `kernel` reads of the differences behind a window."""
+        with_rest = np.sum(self.differences[:, :, end:], axis=-1)
+        own = np.sum(with_rest[:, end:], axis=-1, keepdims=True)
+        last = np.maximum(self.differences[:, end - 1, end - 1], TINY)
+        return np.asarray(np.concatenate([with_rest[:, start:end], own], axis=-1) / last[:, None])
 
     def error_of(self, level: int) -> Floats:
         """Return the evidence of the true error of a level, if that may have any size."""
         squared = self.rows(level, level, with_exact=True)[:, 0, 0]
         return scale_free(np.maximum(squared, TINY), 0.0, self.points, 1) - priors.PRICE
 
-    def add_hypotheses(self, index: int, window: Window, inside: Floats, rest: Floats) -> None:
-        """Add hypotheses on the rows of a window, with the evidence of all other rows."""
-        terms, ladder, put = window.terms, self.ladder, self.sums.put
-        (start, end), n = self.windows[index], len(self.ladder.h)
-        log, scale = evidence(window, inside, self.points)
-        weights = self.sums.add(log + terms.log_prior + rest)
-        first, second = (
-            mean_square(window.gains[:, i], inside) + scale * window.left[:, i, i] for i in range(2)
-        )
-        share = np.sqrt(second / np.maximum(first, TINY)) * (terms.share != 0.0)
-        for name, part in (
-            ("pairs", weights),
-            ("first_alone", weights * (share < priors.DOMINATES)),
-            ("second_alone", weights * (share > 1.0 / priors.DOMINATES)),
-        ):
-            put(name, np.add.reduceat(part, terms.starts, axis=-1))
-        all_windows = np.zeros((len(weights), len(self.windows)))
-        all_windows[:, index] = np.sum(weights, axis=-1)
-        put("window", all_windows)
-        if not ladder.exact_known:
-            path = np.zeros((len(terms.lower), n - 1))
-            path[:, start:end] = -np.sum(window.gains, axis=1)
-            path[:, end:] = 1.0
-            squared = mean_square(path, self.differences) + scale * np.sum(window.left, axis=(1, 2))
-            self.put_path(index, weights @ path, np.sum(weights * squared, axis=-1))
-
-    def put_path(self, index: int, path: Floats, squared: Floats) -> None:
-        """Add to the expression of the limit in the differences, and to its square, of a window."""
+    def add(
+        self, index: int, log: Floats, *, path: Floats, path_squared: Floats, **means: Floats
+    ) -> None:
+        """Add hypotheses on the rows of a window to all sums."""
         of_window = np.arange(len(self.windows)) == index
-        self.sums.put("path", path[:, None] * of_window[:, None])
-        self.sums.put("path_squared", squared[:, None] * of_window)
+        chosen = np.broadcast_to(of_window, (len(log), len(of_window)))
+        if not self.ladder.exact_known:
+            (start, end), n = self.windows[index], len(self.ladder.h)
+            whole = np.zeros((len(log), n - 1))
+            whole[:, start:end] = path
+            whole[:, end:] = 1.0
+            means["path"] = whole[:, None] * of_window[:, None]
+            means["path_squared"] = path_squared[:, None] * of_window
+        self.sums.add(log, window=chosen.astype(np.float64), **means)
 
     def add_any_power(self, index: int, sizes: Floats, inside: Floats, rest: Floats) -> None:
         """Add the hypotheses of one power of any value, close to that of the finest differences of the window."""
-        rows = levels_to_rows(len(sizes))
-        (start, end), n = self.windows[index], len(self.ladder.h)
-        order = self.orders[:, end - 2]
+        w = len(sizes) - 1
+        order = self.orders[:, self.windows[index][1] - 2]
         usable = (order > 0.0) & (order < priors.HIGHEST)
-        powers = np.maximum(np.where(usable, order, 1.0)[:, None] + priors.AROUND, TINY)
+        order = np.where(usable, order, 1.0)
+        powers = np.maximum(order[:, None] + priors.AROUND, TINY)
         errors = sizes ** powers[..., None]
-        c = errors @ rows.T
-        noise = (rows * (priors.MISFIT * errors[..., None, :]) ** 2) @ rows.T
-        precision, log_det = inverse(c[..., :, None] * c[..., None, :] + noise)
-        trace = np.maximum(np.einsum("cpij,cij->cp", precision, inside), TINY)
-        log = scale_free(trace, log_det, self.points[:, None], len(rows)) + rest[:, None]
+        c = between(errors)
+        precision, log_det = inverse(outer(c, c) + noise_of_rows((priors.MISFIT * errors) ** 2))
+        trace = np.maximum(np.sum(form(precision) * packed(inside)[:, None], axis=-1), TINY)
+        log = scale_free(trace, log_det, self.points[:, None], w) + rest[:, None]
         log += np.log(priors.OTHER_PRIOR / priors.HIGHEST * np.gradient(priors.AROUND))
-        weights = self.sums.add(np.where(usable[:, None], log, UNTHINKABLE))
-        mass = np.sum(weights, axis=-1)
-        nearest = np.argmin(np.abs(np.where(usable, order, 1.0)[:, None] - self.powers), axis=-1)
-        self.sums.put(
-            "any_power", mass[:, None] * (np.arange(len(self.powers)) == nearest[:, None])
+        log = np.where(usable[:, None], log, UNTHINKABLE)
+        total = log_sum(log)
+        weight = np.exp(log - total[:, None])
+        gains = times(precision, c)
+        left = 1.0 - np.sum(gains * c, axis=-1)
+        behind = (
+            self.behind(*self.windows[index]) * inside[:, -1:, -1]
+            if not self.ladder.exact_known
+            else None
         )
-        self.sums.put("window", mass[:, None] * (np.arange(len(self.windows)) == index))
-        if not self.ladder.exact_known:
-            gains = np.einsum("cpi,cpij->cpj", c, precision)
-            path = np.zeros((*powers.shape, n - 1))
-            path[..., start:end] = -gains
-            path[..., end:] = 1.0
-            squared = np.einsum("cpi,cij,cpj->cp", path, self.differences, path)
-            squared += trace / len(rows) * (1.0 - np.sum(gains * c, axis=-1))
-            mean = np.einsum("cp,cpi->ci", weights, path)
-            self.put_path(index, mean, np.sum(weights * squared, axis=-1))
+        path, squared = np.zeros((len(log), w)), np.zeros(len(log))
+        if behind is not None:
+            path = -np.sum(weight[..., None] * gains, axis=1)
+            of_each = np.sum(form(outer(gains, gains)) * packed(inside)[:, None], axis=-1)
+            of_each += trace / w * left + behind[:, -1:]
+            of_each -= 2.0 * np.sum(gains * behind[:, None, :-1], axis=-1)
+            squared = np.sum(weight * of_each, axis=-1)
+        nearest = np.argmin(np.abs(order[:, None] - self.powers), axis=-1)
+        of_power = (np.arange(len(self.powers)) == nearest[:, None]).astype(np.float64)
+        self.add(index, total, path=path, path_squared=squared, any_power=of_power)
 
     def add_no_expansion(self) -> None:
         """Add the hypotheses without an expansion: rows of any size, behind which all may be noise."""
         ladder, n = self.ladder, len(self.ladder.h)
+        ones = np.ones(len(ladder.gram))
         scattered = np.sum(self.alone_rows, axis=-1)
         if ladder.exact_known:
             scattered = scattered + self.error_of(0)
-        self.sums.put("scattered", self.sums.add(scattered[:, None])[:, 0])
+        self.sums.add(scattered, scattered=ones)
         for k in range(n - 1):
             log = np.sum(self.alone_rows[:, :k], axis=-1)
             log += noise(
@@ -273,13 +277,12 @@ class _Fit:
                 self.points,
                 ladder.floor[:, k:],
             )
-            self.sums.put("noise", self.sums.add(log[:, None])[:, 0])
+            self.sums.add(log, noise=ones)
 
     def posterior(self) -> Posterior:
         """Return what is believed, after all hypotheses were added."""
         values = self.sums.values
-        values.setdefault("elsewhere", np.zeros(len(self.points)))
-        names = ("alternating", "scattered", "noise", "elsewhere")
+        names = ("alternating", "scattered", "noise")
         expansion = np.maximum(np.sum(values["window"], axis=-1), TINY)
         total = expansion + sum(values[name] for name in names)
         pairs, first, second, any_power = (
@@ -287,17 +290,15 @@ class _Fit:
             for name in ("pairs", "first_alone", "second_alone", "any_power")
         )
         terms = two_powers((1.0,), self.promised)
-        lower, higher = (
-            (p[terms.starts, None] == self.powers).astype(np.float64)
-            for p in (terms.lower, terms.higher)
-        )
+        of_pairs = np.stack([terms.lower[terms.new], terms.higher[terms.new]], axis=-1)
+        lower, higher = (p[:, None] == self.powers for p in of_pairs.T)
         for name in (*names, "window"):
-            values[name] = values[name] / total.reshape(-1, *[1] * (values[name].ndim - 1))
+            values[name] = values[name] / _by_ladder(total, values[name])
         if self.ladder.exact_known:
             values["path"], values["path_squared"] = self.alone_rows * np.nan, total * np.nan
         else:
-            # a coarse level may have blown up: what cannot be is not multiplied by it
-            likely = values["window"] > math.exp(NEGLIGIBLE)
+            # what hardly can be has limits far away
+            likely = values["window"] > LIKELY
             expansion = np.maximum(np.sum(values["window"] * likely, axis=-1), TINY) * total
             values["path"] = np.sum(values["path"] * likely[..., None], axis=1) / expansion[:, None]
             values["path_squared"] = np.sum(values["path_squared"] * likely, axis=1) / expansion
@@ -305,13 +306,21 @@ class _Fit:
             powers=self.powers,
             orders=self.orders,
             windows=self.windows,
-            alone=any_power + first @ lower + second @ higher,
+            alone=any_power + _of_powers(first, lower) + _of_powers(second, higher),
             of_pairs=pairs - first - second,
-            pairs=np.stack([p[terms.starts] for p in (terms.lower, terms.higher)], axis=-1),
-            lowest=any_power + (pairs - second) @ lower + second @ higher,
-            highest=any_power + first @ lower + (pairs - first) @ higher,
+            pairs=of_pairs,
+            lowest=any_power + _of_powers(pairs - second, lower) + _of_powers(second, higher),
+            highest=any_power + _of_powers(first, lower) + _of_powers(pairs - first, higher),
             **values,
         )
+
+
+def _of_powers(of_pairs: Floats, chosen: Flags) -> Floats:
+    """Return the sums over the pairs that have each power, shape (ladder, power)."""
+    found = np.zeros((len(of_pairs), chosen.shape[1]))
+    for pair, power in zip(*np.nonzero(chosen), strict=True):
+        found[:, power] += of_pairs[:, pair]
+    return found
 
 
 def posterior(ladder: Ladder, promised: float | None = None) -> Posterior:
