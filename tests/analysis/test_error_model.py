@@ -198,6 +198,13 @@ def test_rounding_of_steep_differences_is_no_evidence(kind: str) -> None:
         assert other == pytest.approx(one, abs=1e-6)
 
 
+def test_levels_with_another_limit_have_their_own_order() -> None:
+    a = assess(ladder(HALVED, numbers(HALVED, (1.0, 2.0)), exact=1.001), expected=2.0)
+    assert found(a) == (FAILS, "wrong_limit")
+    assert a.low[0] == pytest.approx(2.0, abs=0.05)
+    assert a.high[0] == pytest.approx(2.0, abs=0.05)
+
+
 def test_probabilities_add_up_to_one() -> None:
     for exact in (None, np.cos(T)):
         p = posterior(ladder(HALVED, series(HALVED, (1.0, 2.0, SHAPE)), exact=exact), 2.0)

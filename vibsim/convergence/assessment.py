@@ -115,7 +115,7 @@ def assess(
                 missed = exact & _is_away(part, noise_factor)
                 missed |= (settled > 1.0 - RISK) & _is_missed(part, of_limit)
             reason[rows] = _reasons(believed, sides, exact, missed)
-            numbers = _numbers(part, believed, of_limit, exact, factors)
+            numbers = _numbers(part, believed, of_limit, exact, missed, factors)
             for name, value in numbers.items():
                 in_units = name in ("error", "error_bound", "best_bound")
                 found[name][rows] = value * size if in_units else value
@@ -231,13 +231,20 @@ def _sums(values: Floats, chosen: Flags) -> Floats:
 
 
 def _numbers(
-    ladder: Ladder, believed: Posterior, of_limit: Posterior, exact: Flags, factors: Floats
+    ladder: Ladder,
+    believed: Posterior,
+    of_limit: Posterior,
+    exact: Flags,
+    missed: Flags,
+    factors: Floats,
 ) -> dict[str, np.ndarray]:
     """Return what an `Assessment` holds beside status and reason, for ladders of three levels and more."""
     n, orders = len(ladder.h), believed.orders
     first, last = np.array(believed.windows)[np.argmax(believed.window, axis=-1)].T
     order = np.where(exact, np.nan, _finest_order(orders, last))
-    low, high = (np.where(exact, np.nan, end) for end in _interval(believed, order))
+    # where the exact solution is missed, the levels alone have an order
+    ends = zip(_interval(of_limit, order), _interval(believed, order), strict=True)
+    low, high = (np.where(exact, np.nan, np.where(missed, a, b)) for a, b in ends)
     window = {"first": np.where(exact, 0, first), "last": np.where(exact, n - 1, last)}
     best = _best(ladder, of_limit, exact, factors)
     return {"order": order, "low": low, "high": high, **window, **best}
