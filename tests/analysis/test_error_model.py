@@ -135,9 +135,9 @@ def test_without_an_expectation_any_order_will_do() -> None:
 
 
 def test_a_scheme_is_given_the_benefit_of_its_promise() -> None:
-    """Three numbers with the order 2.011 are enough for a promised order of 2, but not without a promise."""
+    """Three numbers with the order 2.007 are enough for a promised order of 2, but not without a promise."""
     h = np.array([4.0, 2.0, 1.0])
-    given = ladder(h, [1.0 + 0.01 * (1.0 + 4.03), 1.0 + 0.01, 1.0])
+    given = ladder(h, [1.0 + 0.01 * (1.0 + 4.02), 1.0 + 0.01, 1.0])
     assert found(assess(given, expected=2.0)) == (PASSES, "asymptotic")
     assert found(assess(given)) == (OPEN, "pre_asymptotic")
 

@@ -12,7 +12,7 @@ from functools import cache
 from inspect import getsource
 from typing import TYPE_CHECKING
 
-from vibsim.convergence.error_model.priors import DOMINATES
+from vibsim.convergence.error_model.priors import DOMINATES, LEAST
 
 if TYPE_CHECKING:
     from vibsim.core.array_types import Floats, Integers
@@ -28,8 +28,9 @@ def weigh() -> Kernel:
     """Return `kernel`, compiled."""
     from vibsim.native.kernel_cache import load
 
-    parts = ["import math", f"DOMINATES = {DOMINATES}", f"NEGLIGIBLE = {NEGLIGIBLE}"]
-    for mark, function in (("called", largest), ("entry", kernel)):
+    parts = ["import math"]
+    parts += [f"{name} = {globals()[name]}" for name in ("DOMINATES", "LEAST", "NEGLIGIBLE")]
+    for mark, function in (("called", largest), ("called", to_half_power), ("entry", kernel)):
         tree = ast.parse(getsource(function)).body[0]
         assert isinstance(tree, ast.FunctionDef)
         del tree.body[0]  # the docstring
@@ -50,6 +51,23 @@ def largest(room: Floats) -> float:
     for h in range(count - 3, count):
         a = max(a, room[0, h])
     return max(a, b, c, d)
+
+
+def to_half_power(room: Floats, power: int) -> None:
+    """Multiply the first row with the second to the power of half a whole number; the second is lost."""
+    count = room.shape[1]
+    if power % 2 == 1:
+        for h in range(count):
+            room[0, h] *= math.sqrt(room[1, h])
+    left = power // 2
+    while left > 0:
+        if left % 2 == 1:
+            for h in range(count):
+                room[0, h] *= room[1, h]
+        left = left // 2
+        if left > 0:
+            for h in range(count):
+                room[1, h] *= room[1, h]
 
 
 def kernel(
@@ -113,12 +131,7 @@ def kernel(
         for h in range(count):
             room[1, h] = room[0, h] / top
             room[0, h] = 1.0
-        for _ in range(powers[ladder, 0] // 2):
-            for h in range(count):
-                room[0, h] *= room[1, h]
-        if powers[ladder, 0] % 2 == 1:
-            for h in range(count):
-                room[0, h] *= math.sqrt(room[1, h])
+        to_half_power(room, powers[ladder, 0])
         if powers[ladder, 1] > 0:
             for h in range(count):
                 room[1, h] = 1.0
@@ -126,13 +139,8 @@ def kernel(
                 for h in range(count):
                     room[1, h] += across[ladder, k] * beside[k, h]
             for h in range(count):
-                room[1, h] = max(room[1, h], 1.0)
-            for _ in range(powers[ladder, 1] // 2):
-                for h in range(count):
-                    room[0, h] /= room[1, h]
-            if powers[ladder, 1] % 2 == 1:
-                for h in range(count):
-                    room[0, h] /= math.sqrt(room[1, h])
+                room[1, h] = 1.0 / max(room[1, h], 1.0)
+            to_half_power(room, powers[ladder, 1])
         most = largest(room)
         found[ladder, 0] = top
         for i in range(1, found.shape[1]):
@@ -149,18 +157,19 @@ def kernel(
                 for k in range(packed):
                     one += gram[ladder, k] * forms[1, k, h]
                     other += gram[ladder, k] * forms[2, k, h]
-                place = 3 + w + pair[h]
-                found[ladder, place] += weight
-                if other < DOMINATES * DOMINATES * one:
-                    found[ladder, place + pairs] += weight
-                if other * DOMINATES * DOMINATES > one:
-                    found[ladder, place + 2 * pairs] += weight
-                found[ladder, 1] += weight
-                if behind.shape[1] > 0:
-                    square = trace / w * columns[4, h] + behind[ladder, w]
-                    for k in range(packed):
-                        square += gram[ladder, k] * forms[3, k, h]
-                    for i in range(w):
-                        square += 2.0 * columns[5 + i, h] * behind[ladder, i]
-                        found[ladder, 3 + i] += weight * columns[5 + i, h]
-                    found[ladder, 2] += weight * square
+                if one + other > LEAST * trace / w:
+                    place = 3 + w + pair[h]
+                    found[ladder, place] += weight
+                    if other < DOMINATES * DOMINATES * one:
+                        found[ladder, place + pairs] += weight
+                    if other * DOMINATES * DOMINATES > one:
+                        found[ladder, place + 2 * pairs] += weight
+                    found[ladder, 1] += weight
+                    if behind.shape[1] > 0:
+                        square = trace / w * columns[4, h] + behind[ladder, w]
+                        for k in range(packed):
+                            square += gram[ladder, k] * forms[3, k, h]
+                        for i in range(w):
+                            square += 2.0 * columns[5 + i, h] * behind[ladder, i]
+                            found[ladder, 3 + i] += weight * columns[5 + i, h]
+                        found[ladder, 2] += weight * square

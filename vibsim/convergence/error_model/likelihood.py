@@ -70,8 +70,10 @@ def weights(
     powers = np.stack([points * w, np.zeros(count)], axis=-1)
     if table.beside is not None:
         # one dimension along the last row, which may have any direction, and the others across it, of a Student's t
-        read, dimensions = outer(relative[:, -1], relative[:, -1]), np.ones(count)
-        beside, across = table.beside, packed((relative - read)[:, :-1, :-1])
+        along = outer(relative[:, -1], relative[:, -1])
+        beside, across = table.beside, packed((relative - along)[:, :-1, :-1])
+        # numbers have nothing across
+        read, dimensions = np.where(points[:, None, None] > 1.0, along, relative), np.ones(count)
         free = (points - 1.0) * (w - 1)
         powers = np.stack([dimensions * w, (free + priors.TAIL) * (free > 0.0)], axis=-1)
         rest = math.log(2.0) + 0.5 * np.log(last) + scale_free(last, 0.0, points, 1)

@@ -223,6 +223,9 @@ class _Fit:
             whole = np.zeros((len(log), n - 1))
             whole[:, start:end] = path
             whole[:, end:] = 1.0
+            # the limit is known no better than the noise behind the window
+            if end < n - 1:
+                path_squared = path_squared + self.differences[:, end, end]
             means["path"] = whole[:, None] * of_window[:, None]
             means["path_squared"] = path_squared[:, None] * of_window
         self.sums.add(log, window=chosen.astype(np.float64), **means)
