@@ -205,6 +205,30 @@ def test_levels_with_another_limit_have_their_own_order() -> None:
     assert a.high[0] == pytest.approx(2.0, abs=0.05)
 
 
+def test_the_bound_of_noise_is_as_large_as_the_noise() -> None:
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        h = 0.1 * 0.5 ** np.arange(6)
+        values = [np.cos(T) + 1e-3 * rng.normal(size=T.size) for _ in h]
+        a = assess(ladder(h, values), expected=2.0)
+        true = rms(values[-1] - np.cos(T))
+        assert true / 3.0 < a.error_bound[0] < 100.0 * true, seed
+
+
+def test_many_levels_can_be_judged() -> None:
+    """More than a table of logarithms would hold."""
+    h = 0.1 * 0.9 ** np.arange(101)
+    given = ladder(h, series(h, (1.0, 2.0, SHAPE)))
+    assert found(assess(given, expected=2.0)) == (PASSES, "asymptotic")
+
+
+def test_a_wrong_limit_is_told_whatever_order_is_expected() -> None:
+    values = series(HALVED, (1.0, 1.0, SHAPE))
+    for order in (1.0, 2.0):
+        given = ladder(HALVED, values, exact=np.cos(T) + 0.3)
+        assert found(assess(given, expected=order)) == (FAILS, "wrong_limit")
+
+
 def test_probabilities_add_up_to_one() -> None:
     for exact in (None, np.cos(T)):
         p = posterior(ladder(HALVED, series(HALVED, (1.0, 2.0, SHAPE)), exact=exact), 2.0)

@@ -88,3 +88,9 @@ def test_what_is_not_settled_says_the_orders_that_are_possible() -> None:
     verdict = judge(H, [1 + h + 10 * h**2 for h in H], order=2)
     assert verdict.reason == "pre_asymptotic"
     assert "They are consistent with orders from 1.00 to 2.00." in verdict.sentence
+
+
+def test_an_exact_value_may_be_any_distance_away() -> None:
+    for size, exact in ((1e-200, 1.0), (1e-100, 1e300)):
+        verdict = judge(H, [size * (1 + h * h) for h in H], exact=exact, order=2)
+        assert (verdict.status, verdict.reason) == ("FAIL", "wrong_limit")

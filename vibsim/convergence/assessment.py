@@ -7,11 +7,11 @@ A power *dominates* where no other one has more than a tenth of it. The table of
 | a value that is not finite | FAIL ``non_finite`` |
 | fewer than three levels | INCONCLUSIVE ``too_few_levels`` |
 | all differences are noise as expected, but not the distance from the exact solution | FAIL ``wrong_limit`` |
-| the levels have a limit, surely, of which the exact solution is `MISSED` bounds away | FAIL ``wrong_limit`` |
+| the levels show some order, surely, and the exact solution is far from their limit (`MISSED`) | FAIL ``wrong_limit`` |
 | all differences are noise as expected | PASS ``exact`` |
 | a power within the tolerance of the expected one dominates, surely | PASS ``asymptotic`` |
-| another one dominates, surely, and the expected one does not | FAIL ``order_low``, ``order_high`` |
-| noise is more probable than all else | INCONCLUSIVE ``round_off`` |
+| others dominate, surely, the expected one does not, and one is definite | FAIL ``order_low``, ``order_high`` |
+| noise is more probable than errors that alternate, and than all else | INCONCLUSIVE ``round_off`` |
 | errors that change their sign from level to level are | INCONCLUSIVE ``oscillating`` |
 | anything else | INCONCLUSIVE ``pre_asymptotic`` |
 
@@ -40,7 +40,7 @@ BOUND = 3.0
 BLOCK = 256
 """So many ladders are judged together at most."""
 LARGEST_RATIO = 1e60
-"""Of a difference to the next finer one, and of noise to the largest difference: more says no more."""
+"""Of a difference to the largest finer one, and of noise to the largest difference: more says no more."""
 MISSED = 3.0
 """A limit is missed that is so many bounds of the best value away from it,"""
 MISSED_SHARE = 0.5
@@ -111,7 +111,7 @@ def assess(
             of_limit, missed = believed, np.zeros(len(rows), dtype=bool)
             if part.exact_known:
                 of_limit = posterior(_without_exact(part), expected)
-                _, settled, _ = _sides(of_limit, expected, at_least, tolerance)
+                _, settled, _ = _sides(of_limit, None, None, tolerance)
                 missed = exact & _is_away(part, noise_factor)
                 missed |= (settled > 1.0 - RISK) & _is_missed(part, of_limit)
             reason[rows] = _reasons(believed, sides, exact, missed)

@@ -13,17 +13,17 @@ size. They integrate out, and the rows X have the evidence
 
 for w rows and N independent points, with the Gram matrix ``G_kl = <d_k, d_l>`` of the rows and the covariance K that
 the hypothesis gives them. G is all that is read of the data. Without logarithms, and but for what all hypotheses on w
-rows share, this is ``(root/tr(K^-1 G))^(n/2)`` with ``root = det(K)^(-1/w)``. Three kinds of hypotheses compete:
+rows share, this is a power of one ratio (see `hypotheses.Table`). Three kinds of hypotheses compete:
 
 - *two shapes*: A and B are unrelated. ``K = c(p) c(p)^T + s^2 c(q) c(q)^T + noise``;
 - *one shape*: B is a multiple of A, and the error of every level is off by a factor of its own (`JITTERS`), as where
-  events fall between grid points. K is one-dimensional, along the last row; what the rows have across it follows
-  Student's t with the size `MISFIT` and `TAIL` degrees of freedom;
-- *no expansion*: every row has a size of its own, from the first to one behind which all rows are noise.
+  events fall between grid points. The rows are read along the last one only, as numbers; what they have across it
+  follows Student's t with the size `MISFIT` and `TAIL` degrees of freedom;
+- *no expansion*: every row has a size of its own, all of them or up to one behind which all rows are noise.
 
 Rows before a window are coarse levels that the expansion does not reach: each has a size of its own, for the price
-`PRICE`. Rows behind it are noise that grows as the steps shrink; noise as large as its prediction costs nothing more.
+`PRICE`. Rows behind it are noise that grows as the steps shrink; noise as large as its prediction costs least.
 
 `hypotheses` lays the matrices of all hypotheses out in tables, `kernel` is the loop over ladders and hypotheses,
-`likelihood` makes logarithms of evidence of it, `posterior` adds the windows up, and `priors` holds every number.
+`likelihood` makes logarithms of evidence of it, `posterior` adds the windows up, and `priors` holds the numbers.
 """

@@ -24,7 +24,7 @@ class Terms:
     log_prior: Floats
 
     @property
-    def new(self) -> Integers:
+    def first_of_pairs(self) -> Integers:
         """First hypothesis of every pair of powers."""
         differs = (np.diff(self.lower) != 0.0) | (np.diff(self.higher) != 0.0)
         return np.flatnonzero(np.concatenate([[True], differs]))
@@ -35,14 +35,14 @@ class Table:
     """What the hypotheses on the w rows of a window say, laid out for `kernel`.
 
     The evidence of rows with N points is ``(root/tr(K^-1 G))^(N w/2)`` with ``root = (prior/det(K)^(N/2))^(2/(N w))``,
-    but for factors that all hypotheses on w rows share. The gains make both powers, at the finest level, of the rows.
+    but for factors that all hypotheses on w rows share; of one shape see `_table`.
     """
 
     # forms of the precision K^-1, of the square of the first power, of the second, and of the limit without the
     # differences behind the window; shape (4, packed, hypothesis)
     forms: Floats
     # root for one point and for two; variances over the scale that the rows leave to the first power, the second, and
-    # both together; the expression of both in the rows, with a minus; shape (5 + w, hypothesis)
+    # the limit; the limit less the finest level, as weights of the rows; shape (5 + w, hypothesis)
     columns: Floats
     pair: Integers  # position of its pair of powers, shape (hypothesis,)
     # of one shape: form of the precision of what the other rows are beside multiples of the last one, over `TAIL`
@@ -144,7 +144,7 @@ ROUNDED = 1e-16
 
 
 def _sizes(terms: Terms, sizes: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the error of each level by the first power, the second, and the square of both; (hypothesis, level).
+    """Return the error of each level by the first power, the second, and the sum of their squares; (hypothesis, level).
 
     Sizes are over that of the finest level of the window; the share is that at the same level.
     """
@@ -182,7 +182,7 @@ def _table(
     rows = (one * c[0] + both * c[1], both * c[0] + other * c[1])
     gains = [times(precision, row) for row in rows]
     left = [
-        x - np.sum(gain * row, axis=-1)
+        np.maximum(x - np.sum(gain * row, axis=-1), 0.0)
         for x, gain, row in zip(prior[::2], gains, rows, strict=True)
     ]
     # the limit is off the finest level by both powers there, and by its noise
@@ -190,7 +190,7 @@ def _table(
     to_limit[:, finest - 1] -= own_noise
     path = -times(precision, to_limit)
     whole = prior[0] + 2.0 * prior[1] + prior[2] + own_noise
-    left_whole = whole + np.sum(path * to_limit, axis=-1)
+    left_whole = np.maximum(whole + np.sum(path * to_limit, axis=-1), 0.0)
     forms = np.stack([form(x) for x in (precision, *(outer(g, g) for g in (*gains, path)))])
     if beside is None:
         roots = [np.exp((2.0 / n * terms.log_prior - log_det) / w) for n in (1, 2)]
@@ -203,7 +203,7 @@ def _table(
         ]
         of_beside = np.ascontiguousarray(form(precision_beside).T)
     columns = np.stack([*roots, *left, left_whole, *path.T])
-    pair = np.searchsorted(terms.new, np.arange(len(terms.lower)), side="right") - 1
+    pair = np.searchsorted(terms.first_of_pairs, np.arange(len(terms.lower)), side="right") - 1
     layout = np.ascontiguousarray(np.swapaxes(forms, 1, 2))
     return Table(layout, np.ascontiguousarray(columns), pair, of_beside)
 
@@ -256,7 +256,7 @@ class Hypotheses(NamedTuple):
     alternating: list[Table]
 
 
-@lru_cache(maxsize=24)
+@lru_cache(maxsize=48)
 def hypotheses_of(sizes: tuple[float, ...], promised: float | None) -> Hypotheses:
     """Return the hypotheses for levels of these sizes; windows of ladders of one ratio share them."""
     relative = np.array(sizes)

@@ -9,9 +9,6 @@ import numpy as np
 from vibsim.convergence.error_model import priors
 from vibsim.convergence.error_model.hypotheses import (
     Table,
-    form,
-    inverse,
-    noise_of_rows,
     outer,
     packed,
 )
@@ -22,18 +19,19 @@ TINY = 1e-300
 """Less is nothing."""
 UNTHINKABLE = -1e6
 """Log evidence of what cannot be."""
-LOG_GAMMA = np.array([math.inf, *(math.lgamma(0.5 * n) for n in range(1, 200))])
-"""The logarithm of Gamma(n/2), by n."""
+
+
+def log_gamma(n: Floats) -> Floats:
+    """Return the logarithm of Gamma(n/2) for positive whole n."""
+    values, place = np.unique(n, return_inverse=True)
+    return np.array([math.lgamma(0.5 * x) for x in values])[place].reshape(n.shape)
 
 
 def scale_free(trace: Floats, log_det: Floats | float, points: Floats, rows: int) -> Floats:
     """Return the evidence of rows of any size; see the head of this module."""
     n = points * rows
     return np.asarray(
-        math.log(0.5)
-        + LOG_GAMMA[np.asarray(n, dtype=np.int64)]
-        - 0.5 * n * np.log(np.pi * trace)
-        - 0.5 * points * log_det
+        math.log(0.5) + log_gamma(n) - 0.5 * n * np.log(np.pi * trace) - 0.5 * points * log_det
     )
 
 
@@ -77,7 +75,7 @@ def weights(
         free = (points - 1.0) * (w - 1)
         powers = np.stack([dimensions * w, (free + priors.TAIL) * (free > 0.0)], axis=-1)
         rest = math.log(2.0) + 0.5 * np.log(last) + scale_free(last, 0.0, points, 1)
-        rest += LOG_GAMMA[(free + priors.TAIL).astype(np.int64)] - math.lgamma(0.5 * priors.TAIL)
+        rest += log_gamma(free + priors.TAIL) - math.lgamma(0.5 * priors.TAIL)
         rest -= 0.5 * free * np.log(np.pi * last / points)
         across = across * points[:, None]
     pairs = int(table.pair[-1]) + 1
@@ -118,14 +116,24 @@ def noise(sizes: Floats, gram: Floats, points: Floats, floor: Floats) -> Floats:
     count = gram.shape[-1]
     if not count:
         return np.zeros(len(gram))
-    entries = packed(gram)
+    # Values of levels, over that of the exact solution, which has no noise, or else of the coarsest level; of these
+    # differences ``tr(K^-1 G)`` is the sum of squared distances from the weighted mean, over the variances
+    known = len(sizes) == count
+    levels = np.zeros((len(gram), count + 1, count + 1))
+    if known:
+        levels[:, :count, :count] = gram[:, ::-1, ::-1].cumsum(axis=1).cumsum(axis=2)[:, ::-1, ::-1]
+    else:
+        levels[:, 1:, 1:] = gram.cumsum(axis=1).cumsum(axis=2)
     found = []
     for growth in priors.GROWTHS:
-        # the exact solution, if it is known, is a level more, which has no noise
-        of_level = np.zeros(count + 1)
-        of_level[: len(sizes)] = (sizes / sizes[-1]) ** (-2.0 * growth)
-        precision, log_det = inverse(noise_of_rows(of_level))
-        trace = np.maximum(np.sum(entries * form(precision), axis=-1), TINY)
+        variance = (sizes / sizes[-1]) ** (-2.0 * growth)
+        weights, log_det = 1.0 / variance, np.sum(np.log(variance))
+        own = levels[:, : len(sizes), : len(sizes)]
+        trace = np.sum(np.diagonal(own, axis1=1, axis2=2) * weights, axis=-1)
+        if not known:
+            trace -= np.sum(own * outer(weights, weights), axis=(1, 2)) / np.sum(weights)
+            log_det += np.log(np.sum(weights))
+        trace = np.maximum(trace, TINY)
         size = 0.5 * np.log10(trace / count) - np.log10(np.maximum(floor[:, -1], TINY))
         decades = size / math.log10(priors.PREDICTION)
         expected = -0.5 * decades**2 - math.log(

@@ -33,7 +33,7 @@ from vibsim.convergence.error_model.likelihood import (
 from vibsim.core.array_types import Flags, Floats
 
 LIKELY = 1e-3
-"""Probability of a window of which the limit is believed."""
+"""Probability of a window, over that of the most probable one, from which on its limit counts."""
 
 
 @dataclass(frozen=True)
@@ -143,6 +143,7 @@ class _Fit:
         squares = np.diagonal(ladder.gram, axis1=1, axis2=2)[:, : n - 1]
         largest = np.maximum.accumulate(squares[:, ::-1], axis=-1)[:, ::-1]
         largest = np.concatenate([largest, largest[:, -1:]], axis=-1)
+        # it is added to the rows, so that no difference is smaller
         self.rounding = priors.ROUNDING * (ladder.floor**2 + priors.EPSILON**2 * largest + TINY)
         self.differences = self.rows(0, n - 1)
         self.alone_rows = any_size(self.differences, self.points) - priors.PRICE
@@ -167,7 +168,8 @@ class _Fit:
             sizes = np.append(sizes, 0.0)
         else:
             behind = self.behind(start, end)
-        of_window = hypotheses_of(tuple(sizes), self.promised)
+        # with a few digits less windows of one ratio are the same
+        of_window = hypotheses_of(tuple(np.round(sizes, 12)), self.promised)
         self.add_any_power(index, sizes, inside, rest + noisy[0])
         tables = [(table, noisy[i]) for i, table in enumerate(of_window.two_shapes)]
         tables += [
@@ -293,7 +295,9 @@ class _Fit:
             for name in ("pairs", "first_alone", "second_alone", "any_power")
         )
         terms = two_powers((1.0,), self.promised)
-        of_pairs = np.stack([terms.lower[terms.new], terms.higher[terms.new]], axis=-1)
+        of_pairs = np.stack(
+            [terms.lower[terms.first_of_pairs], terms.higher[terms.first_of_pairs]], axis=-1
+        )
         lower, higher = (p[:, None] == self.powers for p in of_pairs.T)
         for name in (*names, "window"):
             values[name] = values[name] / _by_ladder(total, values[name])
@@ -301,7 +305,7 @@ class _Fit:
             values["path"], values["path_squared"] = self.alone_rows * np.nan, total * np.nan
         else:
             # what hardly can be has limits far away
-            likely = values["window"] > LIKELY
+            likely = values["window"] > LIKELY * np.max(values["window"], axis=-1, keepdims=True)
             expansion = np.maximum(np.sum(values["window"] * likely, axis=-1), TINY) * total
             values["path"] = np.sum(values["path"] * likely[..., None], axis=1) / expansion[:, None]
             values["path_squared"] = np.sum(values["path_squared"] * likely, axis=1) / expansion

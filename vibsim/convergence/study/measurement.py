@@ -70,6 +70,8 @@ def measurement(
     if exact is not None:
         with np.errstate(over="ignore"):
             true_error = scaled[:, -1] - exact / scale[:, None]
+        # an exact value that is further away is just as wrong, and its square would overflow
+        true_error = np.clip(true_error, -FURTHEST, FURTHEST)
         rows = np.concatenate([rows, true_error[:, None]], axis=1)
     with np.errstate(over="ignore"):
         gram = np.matmul(rows, np.swapaxes(rows, 1, 2)) / points
@@ -87,6 +89,10 @@ def measurement(
     return Measurement(
         ladder, scale, norms[:, -1], norms * scale[:, None], gram[:, : n - 1, : n - 1]
     )
+
+
+FURTHEST = 1e100
+"""Distance from the exact solution, over the size of the values, beyond which it is all the same."""
 
 
 def _rms(values: Floats) -> Floats:
