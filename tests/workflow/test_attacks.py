@@ -186,7 +186,8 @@ def without_cache(kind: str, folder: Path) -> dict[str, str]:
     return {"no home": NOWHERE, "shared": {"VIBSIM_CACHE_DIR": str(shared)}}[kind]
 
 
-@pytest.mark.parametrize("kind", [pytest.param("no home", marks=pytest.mark.slow), "shared"])
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["no home", "shared"])
 def test_a_run_without_a_private_cache_says_so_and_leaves_no_code(
     tmp_path: Path, finished: Place, kind: str
 ) -> None:

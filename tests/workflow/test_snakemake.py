@@ -27,11 +27,14 @@ def by_hand(place: Place, *options: str) -> subprocess.CompletedProcess[str]:
     return snakemake("--configfile", config, "--cores", 2, *options)
 
 
-def test_snakemake_by_hand_agrees_with_a_run_and_is_on_record(place: Place) -> None:
+def test_snakemake_by_hand_has_nothing_to_do_after_a_run(place: Place) -> None:
     ended = by_hand(place)
     assert ended.returncode == 0, ended.stderr
     assert "Nothing to be done" in ended.stdout + ended.stderr
-    # every kind of job works
+
+
+@pytest.mark.slow
+def test_every_kind_of_job_works_by_hand_and_is_on_record(place: Place) -> None:
     place.change("8, 9]", "8, 9, 10]")
     assert by_hand(place).returncode == 0
     ended = place.run("--dry-run")
