@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 
@@ -9,3 +10,14 @@ import sys
 # workflow compiles 300 modules: 20 s and 0.5 s. Copies of the package that tests change are in folders of their own.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+
+# Each worker has a core. The threads of numpy's matrix products wait for the next product in a loop, which takes the
+# core of the other worker: with them the tests of the error model cost four times as much.
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
+
+def pytest_collection_finish() -> None:
+    """Let the garbage collector look at what tests make, and at that less often: it took 5 % of all work."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 1000)

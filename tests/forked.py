@@ -2,25 +2,35 @@
 
 It goes the same way as ``python -m vibsim``, from the command line over its supervisor to its exit status. What the
 test has changed in this process (`monkeypatch`) holds in it too, but nothing that only the start of an interpreter
-reads (``sitecustomize.py``): where that matters, start one.
+reads (``sitecustomize.py``): where that matters, start one. Snakemake is a fork in the same way, and its jobs are
+started as ever; `tests/contract` starts all of them.
 """
 
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import time
 import traceback
 import warnings
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import NoReturn
+from types import SimpleNamespace
+from typing import Any, NoReturn
 
 import vibsim.cli.run.command
 from vibsim import Experiment, analyse, simulate, verdicts  # noqa: F401
 from vibsim.cli import main
+from vibsim.cli.run import snakemake as starting
+from vibsim.cli.run import snakemake_process
 
+for name in ("snakemake.cli", "snakemake.report.html_reporter", "yaml", "yte"):
+    import_module(name)  # once here, and not in every process of Snakemake
 SECONDS = 300
 """A command that takes longer waits for ever."""
 
@@ -56,24 +66,72 @@ def _wait(child: int, command: list[str]) -> int:
 
 
 def _perform(command: list[str], out: int, err: int, cwd: Path | None) -> NoReturn:
-    status = 1
+    # those of an interpreter, not those of the tests
+    warnings.resetwarnings()
+    for category in (DeprecationWarning, PendingDeprecationWarning, ImportWarning):
+        warnings.simplefilter("ignore", category)
+    starting.subprocess = SimpleNamespace(**{**vars(subprocess), "Popen": Snakemake})  # type: ignore[attr-defined]
+    _become(main, command, out, err, cwd)
+
+
+def _become(
+    work: Callable[[], object], command: Sequence[str], out: int, err: int, cwd: Path | str | None
+) -> NoReturn:
+    """Do the work of a process, and end with its status."""
+    status: object = 1
     try:
         os.dup2(out, 1)
         os.dup2(err, 2)
-        sys.stdout, sys.stderr = os.fdopen(1, "w"), os.fdopen(2, "w", buffering=1)
-        # those of an interpreter, not those of the tests
-        warnings.resetwarnings()
-        for category in (DeprecationWarning, PendingDeprecationWarning, ImportWarning):
-            warnings.simplefilter("ignore", category)
+        sys.stdout = os.fdopen(1, "w", closefd=False)
+        sys.stderr = os.fdopen(2, "w", buffering=1, closefd=False)
         if cwd is not None:
             os.chdir(cwd)
-        sys.argv = command
-        status = main()
+        sys.argv = list(command)
+        status = work()
     except SystemExit as left:
-        status = left.code if isinstance(left.code, int) else 1
+        status = left.code
     except BaseException:
         traceback.print_exc()
     finally:
         sys.stdout.flush()
         sys.stderr.flush()
-        os._exit(status)
+        os._exit(status if isinstance(status, int) else int(status is not None))
+
+
+class Snakemake:
+    """What a run asks of the process of Snakemake (`subprocess.Popen`), which is a fork of the run."""
+
+    def __init__(
+        self,
+        command: Sequence[str],
+        *,
+        cwd: str,
+        env: Mapping[str, str],
+        pass_fds: Sequence[int],
+        **_: Any,
+    ) -> None:
+        reading, writing = os.pipe()
+        self.pid = os.fork()
+        if not self.pid:
+            for descriptor in pass_fds:
+                os.set_inheritable(descriptor, True)
+            # what is closed here stands open in the run
+            os.close(reading)
+            os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+            os.environ.clear()
+            os.environ.update(env)
+            # without the interpreter and the name of the module
+            _become(snakemake_process.main, command[3:], writing, writing, cwd)
+        os.close(writing)
+        self.stdout = os.fdopen(reading, "rb")
+        self.returncode: int | None = None
+
+    def wait(self) -> int:
+        if self.returncode is None:
+            self.returncode = os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
+        return self.returncode
+
+    def kill(self) -> None:
+        if self.returncode is None:
+            with suppress(ProcessLookupError):
+                os.kill(self.pid, signal.SIGKILL)

@@ -84,6 +84,7 @@ def vibsim(site: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, env=environment, text=True, capture_output=True, check=False)
 
 
+@pytest.mark.slow
 def test_the_example_runs_and_an_edit_of_its_code_makes_results_again(
     site: Path, tmp_path: Path
 ) -> None:

@@ -42,6 +42,10 @@ def test_an_experiment_has_its_files(runs: Runs, name: str) -> None:
     folder = runs.of(name)
     for file in [*EXPERIMENTS[name], "convergence.nc", "summary.json", "report.html"]:
         assert (folder / file).is_file(), file
+    levels = [file[:8] for file in EXPERIMENTS[name] if file.startswith("level")]
+    batch = f"{levels[0]}_to_{levels[-1][-2:]}"
+    assert (folder / f"logs/{batch}.log").is_file()
+    assert (folder / f"benchmarks/{batch}.tsv").is_file()
     assert list(folder.glob("tables/*.csv"))
     assert {path.stem for path in folder.glob("tables/*.csv")} == {
         path.stem for path in folder.glob("tables/*.tex")

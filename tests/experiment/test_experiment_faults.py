@@ -18,8 +18,6 @@ from vibsim.models import MODELS, quantities
 from vibsim.schemes import SCHEMES
 from vibsim.simulation import simulate_record
 
-LAPTOP = {"levels": [6, 7, 8, 9]}
-
 
 def check(**fields: Any) -> dict[str, Any]:
     return {"checks": [fields]}

@@ -64,7 +64,6 @@ def before(package: Path) -> dict[str, str]:
 
 SIMULATIONS = {"pendulum", "linear"}
 ALL = {*SIMULATIONS, "analyse", "extrapolate", "report"}
-AFTER = ALL - SIMULATIONS
 
 
 @pytest.mark.parametrize(

@@ -230,6 +230,8 @@ def test_an_extrapolated_solution_is_planned_where_it_is_asked_for(plan_of: Plan
     assert plan.best == "adhoc/tiny/best.nc"
     assert plan.best in plan.files
     assert digests(plan) == digests(plan_of())
+    # which names the file
+    assert plan.report != plan_of().report
     other = plan_of((NO_SWEEP, "output: best\n" + NO_SWEEP), ("[5, 6, 7]", "[5, 6]"))
     assert other.extrapolation != plan.extrapolation
 

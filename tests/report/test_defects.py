@@ -64,6 +64,7 @@ def test_the_factor_is_that_of_the_result_that_decides():
     assert abs(divisor(factor) - 4.0) < 0.1
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_svg_is_written_whatever_else_is_asked_for(tmp_path):
     exp = samples.plain()
     record = samples.record(exp)

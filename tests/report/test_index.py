@@ -34,6 +34,7 @@ def test_an_empty_results_folder_has_an_index(tmp_path):
     assert lines(tmp_path) == []
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_every_experiment_has_a_row_with_a_link_that_exists(tmp_path):
     folder, exp, record, summary = put(tmp_path, "pendulum_lab", "theta")
     make(folder, exp, summary, record)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.core.record import Record
@@ -70,7 +71,8 @@ def test_coarse_levels_are_called_too_coarse() -> None:
     assert "round-off" not in notes(record)
 
 
-def test_levels_that_overflow_broke_down() -> None:
+def test_levels_that_overflow_broke_down(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vibsim.simulation.level.MOST_REFERENCES", 0)
     model = {"kind": "oscillator", "spring": "u**3"}
     labelled = {"kind": "forward_euler", "label": "central"}
     _, record = made(

@@ -198,11 +198,11 @@ def test_markup_in_a_title_is_harmless(tmp_path):
     assert "<script" not in "".join(p.read_text() for p in (tmp_path / "figures").glob("*.svg"))
 
 
-@pytest.mark.parametrize("count", [1, 2, 3])
+@pytest.mark.parametrize("count", [1, 2])
 def test_few_levels_make_a_page(tmp_path, count):
     exp = samples.experiment(levels=list(range(6, 6 + count)))
     make(tmp_path, exp)
-    assert "too_few_levels" in (tmp_path / "report.html").read_text() or count == 3
+    assert "too_few_levels" in (tmp_path / "report.html").read_text()
 
 
 def test_nan_everywhere_makes_a_page_with_its_failures(tmp_path):
@@ -287,11 +287,6 @@ def test_uneven_levels_are_rescaled_so_that_they_coincide():
         ({"initial": {"theta": 0.0, "omega": 2.5}, "levels": [8, 9, 10]}, ["asymptotic", "omega = 2.5 rad s⁻¹"]),
         ({"initial": {"theta": 0.0, "omega": 0.0}}, ["θ converges"]),
         ({"schemes": [{"kind": "central", "label": "_a $x$ \\frac{"}, "central"]}, ["_a $x$ \\frac{"]),
-        ({"checks": [{"claim": "it is round", "source": "a book", "holds": False,
-                      "that": {"value": "period", "above": 100.0}},
-                     {"converges": "omega", "order": 3, "schemes": ["central"]}]},
-         ["Claim: it is round", "Source: a book. Expected to be false. Measured by: period is above 100.",
-          "ω converges with order 3 ± 0.1 (l2 norm, scheme central)", "order_low"]),
     ],
 )  # fmt: skip
 def test_all_kinds_of_experiments_make_a_page(tmp_path, changes, parts):
@@ -301,6 +296,26 @@ def test_all_kinds_of_experiments_make_a_page(tmp_path, changes, parts):
     assert not reader.faults
     assert not re.search(r"\b(nan|None)\b", text)
     for part in parts:
+        assert part in text, part
+
+
+@pytest.mark.usefixtures("unrendered")
+def test_a_claim_has_its_source_and_its_measure(tmp_path):
+    claim = {
+        "claim": "it is round",
+        "source": "a book",
+        "holds": False,
+        "that": {"value": "period", "above": 100.0},
+    }
+    order = {"converges": "omega", "order": 3, "schemes": ["central"]}
+    make(tmp_path, samples.experiment(checks=[claim, order]))
+    text = " ".join(read(tmp_path / "report.html").text)
+    for part in (
+        "Claim: it is round",
+        "Source: a book. Expected to be false. Measured by: period is above 100.",
+        "ω converges with order 3 ± 0.1 (l2 norm, scheme central)",
+        "order_low",
+    ):
         assert part in text, part
 
 
@@ -396,6 +411,7 @@ def test_a_model_without_exact_solution_and_period_makes_a_page(tmp_path, change
     assert not re.search(r"\bnan\b", text)
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_a_quantity_has_one_name_on_the_page(tmp_path):
     checks = [
         {"converges": "theta", "order": 3},

@@ -61,6 +61,7 @@ def test_the_page_of_a_scaled_run_has_units_in_its_setting_alone(tmp_path):
     assert (tmp_path / "tables/scales.csv").is_file()
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_the_page_of_a_plain_run_has_units(tmp_path):
     text = page(samples.experiment(model=MODEL), tmp_path)
     assert "[s]" in text

@@ -232,6 +232,7 @@ def test_a_page_of_all_schemes_is_small_and_folds_long_tables(everything, tmp_pa
     assert len(drawn) == gallery.MOST_SHOWN // 2
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_adaptive_schemes_have_their_place_in_work_alone(tmp_path):
     adaptive = {"kind": "dop853", "tolerance": [1e-8, 1e-4]}
     exp = spring(schemes=["central", "rk4", adaptive])

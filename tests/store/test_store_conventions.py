@@ -50,7 +50,7 @@ CONVERGENCE = {
     "energy_drift_kind",
     "force_evaluations_total",
 }
-PART = 50
+PART = 30
 """Variables that the checker is given at a time."""
 
 
@@ -72,42 +72,43 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return found
 
 
-@pytest.mark.parametrize(
-    ("storage", "name"),
-    [
-        ("series", "level_05/*.nc"),
-        ("lean", "level_05/*.nc"),
-        ("lean", "convergence.nc"),
-        pytest.param("series", "convergence.nc", marks=pytest.mark.slow),
-    ],
-)
 def test_cf_checker_finds_nothing_in_what_jobs_write(
-    results: dict[str, Path], tmp_path: Path, storage: str, name: str
-) -> None:
-    (file,) = results[storage].rglob(name)
-    variables = store.read(file).variables
-    dims = {dim for variable in variables.values() for dim in variable.dims}
-    assert dims >= ({"extremum"} if (storage, name[:5]) == ("series", "level") else set())
-    assert dims >= ({"beside"} if (storage, name) == ("series", "convergence.nc") else set())
-    if storage == "series":
-        assert set(variables) >= (CONVERGENCE if name == "convergence.nc" else LEVEL)
-    is_large = (storage, name) == ("series", "convergence.nc")
-    check(*(parts(file, tmp_path) if is_large else [file]))
-
-
-def test_cf_checker_finds_nothing_in_tables_and_theory(
     results: dict[str, Path], tmp_path: Path
 ) -> None:
-    """What `convergence.nc` has of these, without its hundreds of other variables."""
-    (file,) = results["series"].rglob("convergence.nc")
-    whole = store.read(file)
+    """Of `convergence.nc` tables and theory alone; a slow test has its hundreds of other variables."""
+    (level,) = results["series"].rglob("level_05/*.nc")
+    found = store.read(level).variables
+    assert set(found) >= LEVEL
+    assert any("extremum" in variable.dims for variable in found.values())
+    whole = store.read(convergence(results))
     kept = {
         name: variable
         for name, variable in whole.variables.items()
         if name in CONVERGENCE or {"beside", "check"} & set(variable.dims)
     }
     assert any("beside" in variable.dims for variable in kept.values())
-    check(written(tmp_path / "part.nc", whole, kept))
+    part = written(tmp_path / "part.nc", whole, kept)
+    (lean_level,) = results["lean"].rglob("level_05/*.nc")
+    check(level, lean_level, part)
+
+
+@pytest.mark.slow
+def test_cf_checker_finds_nothing_in_a_whole_convergence(
+    results: dict[str, Path], tmp_path: Path
+) -> None:
+    file = convergence(results)
+    variables = store.read(file).variables
+    assert set(variables) >= CONVERGENCE
+    assert any("beside" in variable.dims for variable in variables.values())
+    (lean,) = results["lean"].rglob("convergence.nc")
+    other = tmp_path / "lean"
+    other.mkdir()
+    check(*parts(file, tmp_path), *parts(lean, other))
+
+
+def convergence(results: dict[str, Path]) -> Path:
+    """Return the file of the analysis that keeps series."""
+    return next(results["series"].rglob("convergence.nc"))
 
 
 def parts(file: Path, folder: Path) -> list[Path]:

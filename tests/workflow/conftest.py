@@ -15,6 +15,8 @@ import pytest
 from forked import vibsim
 
 from vibsim.cli import main
+from vibsim.cli.chosen_plans import plans_of
+from vibsim.cli.run import changes
 
 ROOT = Path(__file__).parents[2]
 TEXT = """\
@@ -65,6 +67,11 @@ class Place:
         ended = self.run("--dry-run", "--json", files=files)
         assert ended.returncode == 0, ended.stderr
         return [short(entry["job"]) for entry in json.loads(ended.stdout)["jobs"]]
+
+    def changed(self) -> set[str]:
+        """Take the results for what they are, as a run does first, and return the files that it would make again."""
+        plans = plans_of([str(self.file)])
+        return {Path(e.path).name for e in changes.changed(plans, self.results, every=False)}
 
     def change(self, old: str, new: str) -> None:
         text = self.file.read_text()

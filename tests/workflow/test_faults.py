@@ -235,12 +235,10 @@ def test_a_failing_level_does_not_cost_those_that_share_its_job(place: Place, tr
     assert (folder / "level_07.nc").is_file()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new", "is_refused"),
-    [
-        ("theta: 1.0", "theta: 0.5", True),
-        pytest.param("title: A", "# a word\ntitle: A", False, marks=pytest.mark.slow),
-    ],
+    [("theta: 1.0", "theta: 0.5", True), ("title: A", "# a word\ntitle: A", False)],
 )
 def test_a_file_that_is_edited_while_it_is_run_costs_one_round(
     place: Place,

@@ -107,7 +107,8 @@ def test_members_added_at_the_end_are_what_is_new(empty: Place) -> None:
     assert empty.content() == before
 
 
-def test_one_member_alone_is_an_experiment_of_its_own(empty: Place) -> None:
+@pytest.mark.slow
+def test_one_member_alone_is_run_and_has_then_nothing_to_do(empty: Place) -> None:
     write(empty, "initial.theta: [0.5, 1.0]")
     alone = Path(f"{empty.file}@1")
     ended = empty.run(files=[alone])
@@ -115,6 +116,18 @@ def test_one_member_alone_is_an_experiment_of_its_own(empty: Place) -> None:
     assert (empty.results / "adhoc/tiny_case_1/level_06.nc").is_file()
     assert "adhoc/tiny_case_1  PASS" in ended.stdout
     assert empty.jobs(files=[alone]) == []
+
+
+def test_one_member_alone_is_an_experiment_of_its_own(empty: Place) -> None:
+    write(empty, "initial.theta: [0.5, 1.0]")
+    alone = Path(f"{empty.file}@1")
+    ended = empty.run("--dry-run", files=[alone])
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert "simulate adhoc/tiny_case_1 level_06.nc" in ended.stdout
+    assert "report adhoc/tiny_case_1" in ended.stdout
+    ended = vibsim("simulate", alone, "--level", 6, "--results", empty.results)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert (empty.results / "adhoc/tiny_case_1/level_06.nc").is_file()
     ended = empty.run(files=[Path(f"{empty.file}@2")])
     assert ended.returncode == 2
     assert "from 0 to 1" in ended.stderr
