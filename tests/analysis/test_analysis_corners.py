@@ -66,6 +66,24 @@ def test_the_place_of_the_corner_is_named(scheme: str) -> None:
     assert "before t = 3.22" in verdict.advice
 
 
+@pytest.mark.parametrize("levels", [[4, 5, 6], [5, 6, 7], [6, 7, 8], [4, 5, 6, 7], [5, 6, 7, 8]])
+def test_levels_that_show_no_order_yet_are_told_of_the_corner(levels: list[int]) -> None:
+    """Finer ones show its order, not that of the scheme: none are asked for."""
+    model = {"kind": "oscillator", "damping": "d*v*abs(v)", "parameters": {"d": 0.1}}
+    (verdict,) = judged(experiment(["rk4"], model=model, time={"end": 10.0}, levels=levels))
+    assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "non_smooth"), verdict.text
+    assert "Expect order 3" in verdict.text
+    assert "before t = 3.1" in verdict.advice
+    assert "Add level" not in verdict.advice
+
+
+def test_levels_that_are_too_coarse_for_the_order_of_the_corner_are_asked_for() -> None:
+    """The order of the scheme is the one that the corner leaves: finer levels show it."""
+    (verdict,) = judged(experiment(["rk3"], levels=[4, 5, 6]))
+    assert verdict.reason == "pre_asymptotic", verdict.text
+    assert "Add level" in verdict.advice
+
+
 def test_before_the_first_turn_the_order_is_that_of_the_scheme() -> None:
     made = experiment(["rk4"], time={"end": 3.0}, levels=[5, 6, 7, 8])
     record = analyse(made, [simulate(made, level) for level in made.levels])

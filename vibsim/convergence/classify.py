@@ -76,6 +76,8 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Floats]:
     # where no triple is left although the differences are above round-off, the corner has made them unlike each other
     unlike = nothing & (p >= e.corner)
     kinked |= unlike | (too_small & accidental)
+    # finer levels show the power of the corner, not p: those that do not yet are no reason to add some
+    limited = e.corner < p - tol
     swings = t.alternating & ~rough & ~kinked & ~doubtful
     still = at_rest(e) & (exactly | nothing)
     # what no level sees, no difference tells of: an exact solution alone would say that it does not matter
@@ -108,6 +110,7 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Floats]:
         (e.missed, "pre_asymptotic"),
         (rough, "non_smooth"),
         (t.cut, "round_off"),
+        (limited, "non_smooth"),
     ], low
 
 
