@@ -11,7 +11,7 @@ from ladders import T, Truth, evidence_of, evidence_with, random_truth, shape_in
 
 from vibsim.convergence import ladder_statistics
 from vibsim.convergence.batches import LADDERS, batches
-from vibsim.convergence.verdict import judge, judge_together
+from vibsim.convergence.verdict import Judgement, judge, judge_together
 from vibsim.core.vocabulary import NORMS, REASON_NAMES, STATUSES
 
 EXACT = np.cos(T)
@@ -320,6 +320,13 @@ def from_orders(
     orders: list[float], scatter: list[float], *, floor: float = 1e-15, **more: Any
 ) -> tuple[str, str]:
     """Decide on a ladder of neighbouring levels from its local orders and its scatter alone."""
+    found = judged_orders(orders, scatter, floor=floor, **more)
+    return STATUSES[int(found.status[0])], REASON_NAMES[int(found.reason[0])]
+
+
+def judged_orders(
+    orders: list[float], scatter: list[float], *, floor: float = 1e-15, **more: Any
+) -> Judgement:
     difference = SMALL / np.cumprod([1.0, *(2.0**p for p in orders)])
     levels = tuple(range(6, 8 + len(orders)))
     evidence = evidence_with(
@@ -333,8 +340,7 @@ def from_orders(
         relative_floor=np.array([floor]),
         **more,
     )
-    found = judge(evidence)
-    return STATUSES[int(found.status[0])], REASON_NAMES[int(found.reason[0])]
+    return judge(evidence)
 
 
 UNDECIDED = ("INCONCLUSIVE", "pre_asymptotic")
@@ -380,6 +386,17 @@ def test_the_borders_of_the_rules(
     orders: list[float], scatter: list[float], expected: tuple[str, str]
 ) -> None:
     assert from_orders(orders, scatter) == expected
+
+
+def test_orders_that_hardly_swing_have_a_narrow_interval_where_the_scatter_fades() -> None:
+    """A lower power would make the scatter grow: the interval does not reach down to one."""
+    orders = [2.00021, 1.99925, 1.99977]
+    fading, steady = (
+        judged_orders(orders, scatter)
+        for scatter in ([0.093, 0.0232, 0.0058], [0.0058, 0.0058, 0.0058])
+    )
+    assert fading.low[0] > 1.99
+    assert steady.low[0] < 0.5
 
 
 def test_a_change_that_scatter_does_not_explain_is_no_round_off() -> None:
