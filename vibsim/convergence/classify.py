@@ -126,7 +126,9 @@ def _right(e: Evidence, t: Trend, p: Floats) -> Flags:
     both |= several & t.fading & (np.abs(t.local - p) <= tol) & (np.abs(t.change) <= tol)
     both |= errors.confirm(e, t, p) & (np.abs(t.local - p) <= tol)
     near = (np.abs(t.order - p) <= tol) & ((t.width <= tol) | both | ~several)
-    together = np.abs(t.scatter) <= np.where(several, th.COINCIDENT, th.PROPORTIONAL_ALONE)
+    # one triple alone must be proportional, unless true errors have three ratios to tell with
+    alone = ~(several | errors.vouch(e, p))
+    together = np.abs(t.scatter) <= np.where(alone, th.PROPORTIONAL_ALONE, th.COINCIDENT)
     clear = _alone(e, t, p)
     right = near & together & clear & ~np.signbit(t.scatter)
     right &= ~t.gap & ~t.turning

@@ -31,7 +31,9 @@ class Evidence:
     relative_floor: Floats  # predicted round-off over the solution at the coarsest level
     size: Floats  # norm of the solution
     error: Floats  # norms of the true errors, shape (..., n); NaN where they are not known
-    error_scatter: Floats  # scatter of the errors of three levels, shape (..., n-1); NaN elsewhere
+    error_scatter: (
+        Floats  # scatter of the errors of the finest three levels, shape (..., n-1); else NaN
+    )
     blur: Floats  # how well the quantity is measured at every level, rounding apart, shape (..., n)
     promised: Floats  # the order of the scheme, infinite or NaN where it promises none
     special: Floats  # the highest order of the scheme in a special case

@@ -78,16 +78,21 @@ def vouch(e: Evidence, p: Floats) -> Flags:
 def confirm(e: Evidence, t: Trend, p: Floats) -> Flags:
     """Say of several triples where the last three true errors of the window leave no room for another power.
 
-    The scatter of the errors is at most that of the differences times what these see less of h^(p-1), or of the least
-    power below p.
+    Behind the window, where the scatter of the errors is not measured, it is at most that of the differences times what
+    these see less of h^(p-1), or of the least power below p.
     """
     found = e.error_orders
     below = np.maximum(np.where(p > 1.0, p - 1.0, p - 0.5), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         less = np.expm1(p * th.LOG2) / np.expm1(below * th.LOG2)
+        measured = [pick(e.error_scatter, t.last + 1 - back) for back in (0, 1)]
+        most = [less * scatter for scatter in (t.scatter, t.scatter_before)]
         finer, coarser = (
-            np.hypot(less * scatter, th.LOG2 * (pick(found, t.last + 1 - back) - p))
-            for back, scatter in enumerate((t.scatter, t.scatter_before))
+            np.hypot(
+                np.where(np.isnan(measured[back]), most[back], measured[back]),
+                th.LOG2 * (pick(found, t.last + 1 - back) - p),
+            )
+            for back in (0, 1)
         )
     return t.several & _no_room(e, pick(e.error, t.last + 2), finer, coarser)
 
