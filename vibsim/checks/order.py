@@ -158,7 +158,8 @@ def phase_at_start(q: Comparison) -> dict[str, Variable]:
 
 def is_of_parts(name: str) -> bool:
     """Tell whether a variable of the convergence Record is one that `phase_amplitude_text` reads."""
-    return name.endswith((f"{PHASE}_order", f"{AMPLITUDE}_order", f"{PHASE}_at_start"))
+    numbers = tuple(f"{end}_{what}" for end in (PHASE, AMPLITUDE) for what in ("order", "status"))
+    return name.endswith((*numbers, f"{PHASE}_at_start"))
 
 
 def _more_levels(q: Comparison, judged: Judgement, order: Floats, tolerance: float) -> Codes:

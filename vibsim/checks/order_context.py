@@ -74,7 +74,6 @@ class OrderContext:
         """... and the same in compensated arithmetic."""
         self.has_exact = has_exact(record, quantity, scheme, case)
         self.cost = partial(cost_in_words, experiment)
-        self.parts = parts_in_words(f, quantity)
         self.error = error_in_words(f, quantity)
         """How large the error of the finest level is; empty where it is not known."""
 
@@ -92,6 +91,7 @@ class OrderContext:
             self.centred = float(method.formal_order(whole_of(quantity), model, centred))
         self.expected = self.promised if check.order == "scheme" else float(check.order)
         """The order that was expected; infinite where the quantity was to be exact."""
+        self.parts = parts_in_words(f, quantity, self.expected)
         self.has_promise = not is_error_part(quantity) or is_promised(experiment, quantity)
         """Whether that is a promise for the quantity; of a part of an error it may be the one for its position."""
 
