@@ -329,16 +329,15 @@ def judged_orders(
 ) -> Judgement:
     difference = SMALL / np.cumprod([1.0, *(2.0**p for p in orders)])
     levels = tuple(range(6, 8 + len(orders)))
+    usual = {"order": np.array([2.0]), "size": np.ones(1)}
     evidence = evidence_with(
         levels=levels,
         difference=difference[None],
         scatter=np.array([scatter]),
         floor=np.full((1, len(levels)), floor),
-        order=np.array([2.0]),
         omega_dt=0.3 * 0.5 ** np.arange(len(levels))[None],
-        size=np.ones(1),
         relative_floor=np.array([floor]),
-        **more,
+        **(usual | more),
     )
     return judge(evidence)
 
@@ -397,6 +396,16 @@ def test_orders_that_hardly_swing_have_a_narrow_interval_where_the_scatter_fades
     )
     assert fading.low[0] > 1.99
     assert steady.low[0] < 0.5
+
+
+def test_numbers_far_below_their_round_off_have_no_order() -> None:
+    """Two units in the last place and one behind them are no first order, unless a shape over time vouches for it."""
+    floor = 1000.0 * SMALL
+    one = {"order": np.array([1.0]), "size": np.array([1e4 * SMALL]), "floor": floor}
+    reasons = [
+        from_orders([1.0], [0.0], numbers=np.array([numbers]), **one) for numbers in (True, False)
+    ]
+    assert reasons == [("INCONCLUSIVE", "round_off"), ("PASS", "asymptotic")]
 
 
 def test_a_change_that_scatter_does_not_explain_is_no_round_off() -> None:
