@@ -256,3 +256,18 @@ def test_a_wrong_limit_is_seen_beside_a_jump() -> None:
         level["u"] = level["u"] + 0.1 * level["t"]
     (found, _) = verdicts(made, analyse(made, data))
     assert (found.status, found.reason) == ("FAIL", "wrong_limit")
+
+
+@pytest.mark.parametrize("scheme", ["ab2", "forward_euler"])
+def test_a_jump_in_the_last_step_makes_no_wrong_limit(scheme: str) -> None:
+    """A scheme that looks at the beginning of its steps alone knows nothing of it on any level."""
+    made = experiment(
+        [scheme],
+        model={"kind": "oscillator", "force": "heaviside(t - 1.7)"},
+        time={"end": 1.736, "base_steps": 3},
+        levels=[1, 2, 3, 4],
+        checks=[{"converges": "v", "norm": "linf"}],
+    )
+    (found,) = judged(made)
+    assert (found.status, found.reason) == ("INCONCLUSIVE", "non_smooth"), found.text
+    assert "t = 1.7" in found.text

@@ -50,7 +50,7 @@ class Evidence:
     # the one power of an error without an expansion, where events or corners of the force are left to the mesh, or NaN
     left_to_the_mesh: Floats
     corner: Floats  # the highest power that a corner of the force within a step leaves; else NaN
-    missed: Flags  # whether the force has a pulse that no level sees
+    missed: Flags  # whether the force has a pulse, or a corner in the last step, that no level sees
     jumps: Flags  # whether it jumps there
     decay: Floats  # the largest rate at which damping takes a velocity away, times the finest step
     growth: Floats  # largest position over the largest exact one, shape (..., n); NaN if not known
