@@ -12,10 +12,10 @@ from vibsim import theory
 from vibsim.apriori.force_discontinuities import is_on_a_point, words_of
 from vibsim.apriori.formal_orders import (
     columns_of,
-    formal_orders,
     has_corners,
     is_promised,
     options_of,
+    orders_in,
     special_orders,
     stability_limits,
 )
@@ -80,7 +80,7 @@ class OrderContext:
         self.scheme, self.kind = f.scheme_name, experiment.schemes[scheme].kind
         method = experiment.schemes[scheme].method
         self.options = options_of(experiment, columns, scheme, case)
-        self.promised = f.of_member(formal_orders(experiment, quantity, columns))
+        self.promised = f.of_member(orders_in(experiment, record, quantity))
         """The order that the scheme promises, ..."""
         self.special = f.of_member(special_orders(experiment, quantity, columns))
         """... has at most, in a special case of motion, model or options, ..."""

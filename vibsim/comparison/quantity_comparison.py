@@ -196,7 +196,7 @@ def comparisons(block: MemberBlock, names: tuple[str, ...]) -> Mapping[str, Comp
             units=str(attrs.get("units", "1")),
             values=values[name],
             exact=block.exact_of(name),
-            order=formal_orders(block.experiment, name, block.columns),
+            order=formal_orders(block.experiment, name, block.columns, block.eventless),
             floor=floor,
             scale=scale,
             blur=np.zeros_like(floor),

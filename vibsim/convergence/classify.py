@@ -92,6 +92,8 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Floats]:
         (still & far_from_exact(e), "pre_asymptotic"),
         (still, "not_applicable"),
         (coarse, "pre_asymptotic"),
+        # levels that notice their events at the same points are no closer to the exact solution for that
+        (exact & far_from_exact(e) & rough, "non_smooth"),
         (exact & far_from_exact(e), "wrong_limit"),
         (exact, "exact"),
         (exactly & ~at_round_off(e), "order_low"),
