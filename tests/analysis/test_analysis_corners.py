@@ -271,3 +271,16 @@ def test_a_jump_in_the_last_step_makes_no_wrong_limit(scheme: str) -> None:
     (found,) = judged(made)
     assert (found.status, found.reason) == ("INCONCLUSIVE", "non_smooth"), found.text
     assert "t = 1.7" in found.text
+
+
+def test_a_jump_beside_a_point_of_all_levels_makes_no_wrong_limit() -> None:
+    """It lies 0.005 of a step behind a point of level 10 and of every finer one: all of them take it to be there."""
+    made = experiment(
+        ["gauss4"],
+        model={"kind": "oscillator", "damping": {"linear": 0.2}, "force": "heaviside(t - 1.7)/4"},
+        time={"end": 21.49},
+        levels=[9, 10, 11, 12, 13],
+        checks=[{"converges": "u", "norm": "l1"}],
+    )
+    (found,) = judged(made)
+    assert (found.status, found.reason) == ("INCONCLUSIVE", "non_smooth"), found.text

@@ -133,11 +133,18 @@ def irregular(e: Evidence, t: Trend) -> Flags:
 
 
 def _stays_throughout(e: Evidence) -> Flags:
-    """Say where the errors of four levels and more have not even halved: those of order 1 are eight times smaller."""
+    """Say where the errors of four levels and more have not even halved: those of order 1 are eight times smaller.
+
+    Errors that the finest step may make stay where an event or a corner lies beside a point that all levels share.
+    """
     if len(e.levels) < 4:
         return np.zeros(e.order.shape, dtype=bool)
+    steps = e.steps * 2.0 ** (e.levels[-1] - e.levels[0])
+    step = np.where(np.isfinite(e.omega_dt[..., -1]), e.omega_dt[..., -1], 1.0 / steps)
     with np.errstate(invalid="ignore"):
-        return np.asarray(e.error[..., -1] > th.STAYED * e.error[..., 0])
+        beside_a_point = e.size * step ** np.fmin(e.corner, e.left_to_the_mesh)
+        stays = e.error[..., -1] > th.STAYED * e.error[..., 0]
+        return np.asarray(stays & ~(e.error[..., -1] <= beside_a_point))
 
 
 def stay(e: Evidence, t: Trend) -> Flags:
