@@ -91,6 +91,7 @@ def evidence_with(**known: Any) -> Evidence:
         "error": np.full((*shape, n), np.nan),
         "error_scatter": np.full((*shape, n - 1), np.nan),
         "blur": np.zeros((*shape, n)),
+        "scale": np.full(shape, np.inf),
         "promised": order,
         "special": order,
         "combined": lambda rows, first, weights: np.full(np.count_nonzero(rows), np.nan),

@@ -175,6 +175,21 @@ def test_what_meets_no_event_has_the_order_of_a_smooth_motion(events: str) -> No
     assert expected == {0: 2.0, 1: 1.0}
 
 
+def test_levels_that_differ_by_more_than_the_motion_decide_nothing() -> None:
+    """Forward Euler lifts a ball that rests at once by a hundred times its height, less with every level."""
+    made = experiment(
+        model={"kind": "bouncing_ball", "restitution": 0.4364},
+        initial={"h": 4.479e-06, "v": -3.163e-06},
+        time={"end": 19.99, "base_steps": 5},
+        levels=[7, 8, 9, 10],
+        schemes=["forward_euler"],
+        checks=[{"converges": "h", "order": order} for order in ("scheme", 2)],
+        samples="common",
+    )
+    found = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
+    assert {(one.status, one.reason) for one in found} == {("INCONCLUSIVE", "pre_asymptotic")}
+
+
 def test_levels_that_notice_an_event_at_one_point_have_no_wrong_limit() -> None:
     """The impact at t = 1.7334 is noticed at the same point on every level, and so a little late on all of them."""
     scheme = {"kind": "velocity_verlet", "events": "mesh"}

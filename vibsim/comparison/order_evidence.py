@@ -175,6 +175,7 @@ def evidences(
                 floor=q.floor * weight[:, None],
                 ceiling=ceiling * weight[:, None],
                 size=size * weight,
+                scale=q.scale * weight,
                 error=measured.error,
                 error_scatter=measured.error_scatter,
                 blur=q.blur * weight[:, None],

@@ -18,6 +18,7 @@ from vibsim.convergence.ladder_statistics import (
     at_rest,
     at_round_off,
     far_from_exact,
+    pick,
     truly_exact,
     unresolved,
 )
@@ -61,6 +62,10 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Floats]:
         several | (np.abs(t.scatter) <= th.COINCIDENT),
     )
     wrong |= _settled_elsewhere(e, t, p)
+    # levels that differ by more than the solution have nothing to do with it yet
+    lost = pick(e.difference, t.last + 1) > e.scale
+    right &= ~lost
+    wrong &= ~lost
     wrong &= ~(hidden & above)
     too_large, too_small = errors.contradicts(e, t)
     accidental = errors.irregular(e, t)

@@ -30,6 +30,7 @@ class Evidence:
     ceiling: Floats  # the most that round-off can be in any arithmetic, shape (..., n)
     relative_floor: Floats  # predicted round-off over the solution at the coarsest level
     size: Floats  # norm of the solution
+    scale: Floats  # the same of the whole that a quantity is a part of, such as the energy
     error: Floats  # norms of the true errors, shape (..., n); NaN where they are not known
     error_scatter: (
         Floats  # scatter of the errors of the finest three levels, shape (..., n-1); else NaN
