@@ -75,6 +75,15 @@ class Notation:
 PLAIN = Notation()
 
 
+def order_interval(low: float, high: float) -> tuple[str, ...]:
+    """Write the ends of the interval of an order with the decimals that tell them apart, 3 to 6; once if none do."""
+    for decimals in range(3, 7):
+        ends = f"{low:.{decimals}f}", f"{high:.{decimals}f}"
+        if ends[0] != ends[1]:
+            return ends
+    return (f"{low:.3f}",)
+
+
 class Template(string.Formatter):
     """Fills templates with attributes of an object: ``{name}``, or ``{name:4}`` with so many digits of a number."""
 
