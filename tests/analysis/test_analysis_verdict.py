@@ -351,6 +351,7 @@ UNDECIDED = ("INCONCLUSIVE", "pre_asymptotic")
         ([2.02], [0.03], ("PASS", "asymptotic")),
         ([2.02], [0.06], UNDECIDED),
         ([1.05], [0.09], ("FAIL", "order_low")),
+        ([1.05], [0.12], UNDECIDED),
         ([1.3], [0.02], UNDECIDED),
         ([1.05], [0.3], UNDECIDED),
         # beside a third order, a second one of a tenth of it or more makes a scatter of 0.02

@@ -176,15 +176,20 @@ def part_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floa
 def special_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floats:
     """Return the highest order that every scheme has in a special case, shape (scheme, 1 or case).
 
-    A part of an error has one order at a special start, and another at any other one: it may have any. Where events or
-    corners decide there is no such case (NaN).
+    A part of an error has one order at a special start, and another at any other one: it may have any. Where the mesh
+    or corners decide there is no such case (NaN).
     """
     model = experiment.model.definition
-    if model.events is not None or model.lookup is not None:
+    if model.lookup is not None:
         return np.full((len(experiment.schemes), 1), np.nan)
     if is_promised(experiment, quantity):
         return np.full((len(experiment.schemes), 1), np.inf)
-    return _each(experiment, columns, lambda s, o: s.special_order(o))
+
+    def special(scheme: Scheme, options: Options) -> float:
+        has_mesh = model.events is not None and is_on_the_mesh(options)
+        return math.nan if has_mesh else scheme.special_order(options)
+
+    return _each(experiment, columns, special)
 
 
 def orders_vary(experiment: Experiment, quantity: str) -> bool:
