@@ -279,9 +279,13 @@ def test_a_package_at_fault_is_named_with_its_entry_point(
 ) -> None:
     offered(group, name, value)
     assert main(["list", group]) == 2
-    told = capsys.readouterr().err
+    listed, told = capsys.readouterr()
     place = f"package other-package 0.1: entry point '{name}' of vibsim.{group}: {value}: "
     assert told.startswith(place + rule)
+    # what can be had is listed all the same
+    kinds = {line.split()[0] for line in listed.splitlines()}
+    assert {"models": {"spring", "duffing"}, "schemes": {"rk4", "lsoda"}}[group] <= kinds
+    assert "mine" not in kinds
 
 
 def test_two_packages_with_one_name_are_both_named(

@@ -69,10 +69,15 @@ def evidence_of(
         relative_floor=floors[:, 0] / (size or 1.0),
         tolerance=tolerance,
         size=norm_of_floor(np.array([size]), norm, len(T), SPACING),
-        **({"error_scatter": np.stack(of_errors, -1)} if of_errors and len(levels) == 3 else {}),
+        **({"error_scatter": finest_three(np.stack(of_errors, -1))} if of_errors else {}),
         **({} if exact is None else {"error": measure([exact - u for u in fields])}),
         **more,
     )
+
+
+def finest_three(scatter: Floats) -> Floats:
+    """Return the scatter of errors as an analysis has it: of the finest three levels alone."""
+    return np.where(np.arange(scatter.shape[-1]) < scatter.shape[-1] - 2, np.nan, scatter)
 
 
 def evidence_with(**known: Any) -> Evidence:
@@ -86,6 +91,7 @@ def evidence_with(**known: Any) -> Evidence:
         "error": np.full((*shape, n), np.nan),
         "error_scatter": np.full((*shape, n - 1), np.nan),
         "blur": np.zeros((*shape, n)),
+        "scale": np.full(shape, np.inf),
         "promised": order,
         "special": order,
         "combined": lambda rows, first, weights: np.full(np.count_nonzero(rows), np.nan),

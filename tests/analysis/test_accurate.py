@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -101,10 +102,31 @@ def test_an_estimated_error_is_the_true_one_within_its_bound(
     assert told["error"] == pytest.approx(error, rel=0.3)
 
 
-def test_an_absolute_accuracy_has_the_unit_of_the_norm() -> None:
+def test_an_absolute_accuracy_is_told_as_a_root_mean_square_beside() -> None:
     (found,) = asked(PENDULUM, {"accurate": "theta", "absolute": 1.0})
     assert found.status == "PASS"
-    assert "rad sqrt(s) at level 9" in found.text
+    error = facts(found)["error"]
+    assert f"theta is accurate to {error:.2g} at level 9" in found.text
+    mean = error / math.sqrt(20.0)
+    told = f"These are L2 norms over time. The root-mean-square error is {mean:.2g} rad."
+    assert told in found.text
+
+
+@pytest.mark.parametrize("kind", ["relative", "absolute"])
+@pytest.mark.parametrize("factor", [0.9999, 1.0001])
+def test_numbers_beside_what_is_asked_have_the_digits_that_tell_them_apart(
+    kind: str, factor: float
+) -> None:
+    (plain,) = asked(PENDULUM, {"accurate": "theta", kind: 1.0})
+    error = facts(plain)["relative_error" if kind == "relative" else "error"]
+    limit = float(f"{factor * error:.6g}")
+    (found,) = asked(PENDULUM, {"accurate": "theta", kind: limit})
+    assert found.status == ("PASS" if factor > 1.0 else "FAIL")
+    name = "at most" if factor > 1.0 else "at least"
+    told = re.search(rf"{name} ([0-9.e-]+[0-9])", found.text)
+    assert told is not None
+    assert (float(told[1]) < limit) == (factor > 1.0)
+    assert float(told[1]) != limit
 
 
 # -- every verdict -----------------------------------------------------------------------------------------------------
@@ -273,9 +295,10 @@ def test_a_verdict_on_an_order_states_the_same_error(with_exact: bool) -> None:
         assert (facts(found)["best"], facts(found)["best_bound"]) == (None, None)
         assert found.results[0].value is None
     told = facts(accurate)
-    size = f"{told['error']:.2g} rad sqrt(s) ({told['relative_error']:.2g} of its size)"
+    mean = told["error"] / math.sqrt(20.0)
+    size = f"{mean:.2g} rad ({told['relative_error']:.2g} of its size)"
     for found in (passed, failed):
-        assert f"The error of the finest level is {size}." in found.text
+        assert f"The root-mean-square error of the finest level is {size}." in found.text
 
 
 def test_a_bound_with_other_digits_is_stated() -> None:
@@ -283,7 +306,7 @@ def test_a_bound_with_other_digits_is_stated() -> None:
     (found,) = asked(content, {"converges": "theta"}, with_exact=False)
     told = facts(found)
     assert found.status == "PASS"
-    assert f"of its size), at most {told['error_bound']:.2g}." in found.text
+    assert f"of its size), at most {told['error_bound'] / math.sqrt(20.0):.2g}." in found.text
 
 
 def test_an_error_is_stated_where_it_is_believed_alone() -> None:

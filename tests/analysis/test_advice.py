@@ -25,6 +25,7 @@ from vibsim.comparison.order_evidence import CAUSES
 from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import DRIFTS, REASON_NAMES, REASONS, STATUSES
 from vibsim.experiment.schema.checks import MEASURED
+from vibsim.report.text.words import interval
 from vibsim.simulation import simulate_record
 
 SCHEMA = Path(__file__).parents[2] / "workflow/schemas/experiment.schema.json"
@@ -492,3 +493,24 @@ def test_nothing_is_readable_of_a_motion_that_does_not_move() -> None:
     run = {**ball, "time": {"end": 5.0}, "schemes": ["rk4"], "levels": [5, 6, 7, 8]}
     verdict = judged({**run, "checks": [{"converges": "h"}]})
     assert "level 40" not in verdict.advice
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "ends"),
+    [
+        (1.98, 2.02, "between 1.980 and 2.020"),
+        (1.99974, 2.00018, "between 1.9997 and 2.0002"),
+        (1.999999, 2.000001, "between 1.999999 and 2.000001"),
+    ],
+)
+def test_the_ends_of_an_interval_are_told_apart(low: float, high: float, ends: str) -> None:
+    told = story(reason="asymptotic", order=2.0, low=low, high=high)
+    assert f"order 2.000 ({ends}) on levels 4 to 7" in tell(told)
+    assert interval((low, high)) == ends.removeprefix("between ").replace(" and ", " to ")
+
+
+def test_an_interval_without_a_width_is_not_told() -> None:
+    assert "order 2.000 on levels 4 to 7" in tell(
+        story(reason="asymptotic", order=2.0, low=2.0, high=2.0)
+    )
+    assert interval((2.0, 2.0)) == "2.000"

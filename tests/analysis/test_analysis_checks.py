@@ -256,6 +256,13 @@ def test_claims(holds: bool) -> None:
         assert bool(v.advice) == (v.status != "PASS")
 
 
+@pytest.mark.parametrize("claim", ["the error is small", "the error is small. "])
+def test_a_claim_ends_with_one_point(claim: str) -> None:
+    that = {"value": "error_linf", "quantity": "theta", "below": 1.0}
+    (found,) = run({"claim": claim, "that": that, "holds": True})
+    assert found.text.startswith("Claim: the error is small. The statement is true.")
+
+
 def test_a_claim_that_cannot_be_decided() -> None:
     for holds in (True, False):
         that = {"converges": "theta"}

@@ -66,6 +66,24 @@ def test_the_place_of_the_corner_is_named(scheme: str) -> None:
     assert "before t = 3.22" in verdict.advice
 
 
+@pytest.mark.parametrize("levels", [[4, 5, 6], [5, 6, 7], [6, 7, 8], [4, 5, 6, 7], [5, 6, 7, 8]])
+def test_levels_that_show_no_order_yet_are_told_of_the_corner(levels: list[int]) -> None:
+    """Finer ones show its order, not that of the scheme: none are asked for."""
+    model = {"kind": "oscillator", "damping": "d*v*abs(v)", "parameters": {"d": 0.1}}
+    (verdict,) = judged(experiment(["rk4"], model=model, time={"end": 10.0}, levels=levels))
+    assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "non_smooth"), verdict.text
+    assert "Expect order 3" in verdict.text
+    assert "before t = 3.1" in verdict.advice
+    assert "Add level" not in verdict.advice
+
+
+def test_levels_that_are_too_coarse_for_the_order_of_the_corner_are_asked_for() -> None:
+    """The order of the scheme is the one that the corner leaves: finer levels show it."""
+    (verdict,) = judged(experiment(["rk3"], levels=[4, 5, 6]))
+    assert verdict.reason == "pre_asymptotic", verdict.text
+    assert "Add level" in verdict.advice
+
+
 def test_before_the_first_turn_the_order_is_that_of_the_scheme() -> None:
     made = experiment(["rk4"], time={"end": 3.0}, levels=[5, 6, 7, 8])
     record = analyse(made, [simulate(made, level) for level in made.levels])
@@ -240,3 +258,31 @@ def test_a_wrong_limit_is_seen_beside_a_jump() -> None:
         level["u"] = level["u"] + 0.1 * level["t"]
     (found, _) = verdicts(made, analyse(made, data))
     assert (found.status, found.reason) == ("FAIL", "wrong_limit")
+
+
+@pytest.mark.parametrize("scheme", ["ab2", "forward_euler"])
+def test_a_jump_in_the_last_step_makes_no_wrong_limit(scheme: str) -> None:
+    """A scheme that looks at the beginning of its steps alone knows nothing of it on any level."""
+    made = experiment(
+        [scheme],
+        model={"kind": "oscillator", "force": "heaviside(t - 1.7)"},
+        time={"end": 1.736, "base_steps": 3},
+        levels=[1, 2, 3, 4],
+        checks=[{"converges": "v", "norm": "linf"}],
+    )
+    (found,) = judged(made)
+    assert (found.status, found.reason) == ("INCONCLUSIVE", "non_smooth"), found.text
+    assert "t = 1.7" in found.text
+
+
+def test_a_jump_beside_a_point_of_all_levels_makes_no_wrong_limit() -> None:
+    """It lies 0.005 of a step behind a point of level 10 and of every finer one: all of them take it to be there."""
+    made = experiment(
+        ["gauss4"],
+        model={"kind": "oscillator", "damping": {"linear": 0.2}, "force": "heaviside(t - 1.7)/4"},
+        time={"end": 21.49},
+        levels=[9, 10, 11, 12, 13],
+        checks=[{"converges": "u", "norm": "l1"}],
+    )
+    (found,) = judged(made)
+    assert (found.status, found.reason) == ("INCONCLUSIVE", "non_smooth"), found.text

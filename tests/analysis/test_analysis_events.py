@@ -153,3 +153,54 @@ def test_a_motion_without_a_frequency_is_told_without_one() -> None:
     (verdict,) = verdicts(experiment, analyse(experiment, [simulate(experiment, 6)]))
     assert verdict.status == "PASS"
     assert "nan" not in verdict.text
+
+
+@pytest.mark.parametrize("events", ["located", "mesh"])
+def test_what_meets_no_event_has_the_order_of_a_smooth_motion(events: str) -> None:
+    """The position of this scheme has order 2 until the first event, and the order of its velocity behind it."""
+    scheme = {"kind": "euler_cromer_u_first", "start": "centred", "events": events}
+    ends = [0.8, 14.0]
+    initial = {"u": -0.4, "v": 0.0}
+    swept = experiment(
+        schemes=[scheme], initial=initial, sweep={"time.end": ends}, time={"end": 1.0}
+    )
+    record = analyse(swept, [simulate(swept, level) for level in swept.levels])
+    assert record["u_formal_order"].values.tolist() == [[2.0, 1.0]]
+    found = verdicts(swept, record)
+    asked = {order: verdict.results for order, verdict in zip(ORDERS, found, strict=True)}
+    for order in ("scheme", 2):
+        (first,) = (row for row in asked[order] if row.case == 0)
+        assert (first.status, first.reason) == ("PASS", "asymptotic")
+    expected = {row.case: row.facts["expected"] for row in asked["scheme"]}
+    assert expected == {0: 2.0, 1: 1.0}
+
+
+def test_levels_that_differ_by_more_than_the_motion_decide_nothing() -> None:
+    """Forward Euler lifts a ball that rests at once by a hundred times its height, less with every level."""
+    made = experiment(
+        model={"kind": "bouncing_ball", "restitution": 0.4364},
+        initial={"h": 4.479e-06, "v": -3.163e-06},
+        time={"end": 19.99, "base_steps": 5},
+        levels=[7, 8, 9, 10],
+        schemes=["forward_euler"],
+        checks=[{"converges": "h", "order": order} for order in ("scheme", 2)],
+        samples="common",
+    )
+    found = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
+    assert {(one.status, one.reason) for one in found} == {("INCONCLUSIVE", "pre_asymptotic")}
+
+
+def test_levels_that_notice_an_event_at_one_point_have_no_wrong_limit() -> None:
+    """The impact at t = 1.7334 is noticed at the same point on every level, and so a little late on all of them."""
+    scheme = {"kind": "velocity_verlet", "events": "mesh"}
+    made = experiment(
+        model={"kind": "bouncing_ball", "restitution": 0.4681},
+        initial={"h": 0.0, "v": 0.8667},
+        time={"end": 2.209},
+        levels=[8, 9, 10, 11],
+        schemes=[scheme],
+        checks=[{"converges": "h"}],
+    )
+    (found,) = verdicts(made, analyse(made, [simulate(made, level) for level in made.levels]))
+    assert (found.status, found.reason) == ("INCONCLUSIVE", "non_smooth"), found.text
+    assert "events: located" in found.advice

@@ -11,7 +11,7 @@ from ladders import T, Truth, evidence_of, evidence_with, random_truth, shape_in
 
 from vibsim.convergence import ladder_statistics
 from vibsim.convergence.batches import LADDERS, batches
-from vibsim.convergence.verdict import judge, judge_together
+from vibsim.convergence.verdict import Judgement, judge, judge_together
 from vibsim.core.vocabulary import NORMS, REASON_NAMES, STATUSES
 
 EXACT = np.cos(T)
@@ -320,21 +320,26 @@ def from_orders(
     orders: list[float], scatter: list[float], *, floor: float = 1e-15, **more: Any
 ) -> tuple[str, str]:
     """Decide on a ladder of neighbouring levels from its local orders and its scatter alone."""
+    found = judged_orders(orders, scatter, floor=floor, **more)
+    return STATUSES[int(found.status[0])], REASON_NAMES[int(found.reason[0])]
+
+
+def judged_orders(
+    orders: list[float], scatter: list[float], *, floor: float = 1e-15, **more: Any
+) -> Judgement:
     difference = SMALL / np.cumprod([1.0, *(2.0**p for p in orders)])
     levels = tuple(range(6, 8 + len(orders)))
+    usual = {"order": np.array([2.0]), "size": np.ones(1)}
     evidence = evidence_with(
         levels=levels,
         difference=difference[None],
         scatter=np.array([scatter]),
         floor=np.full((1, len(levels)), floor),
-        order=np.array([2.0]),
         omega_dt=0.3 * 0.5 ** np.arange(len(levels))[None],
-        size=np.ones(1),
         relative_floor=np.array([floor]),
-        **more,
+        **(usual | more),
     )
-    found = judge(evidence)
-    return STATUSES[int(found.status[0])], REASON_NAMES[int(found.reason[0])]
+    return judge(evidence)
 
 
 UNDECIDED = ("INCONCLUSIVE", "pre_asymptotic")
@@ -346,6 +351,7 @@ UNDECIDED = ("INCONCLUSIVE", "pre_asymptotic")
         ([2.02], [0.03], ("PASS", "asymptotic")),
         ([2.02], [0.06], UNDECIDED),
         ([1.05], [0.09], ("FAIL", "order_low")),
+        ([1.05], [0.12], UNDECIDED),
         ([1.3], [0.02], UNDECIDED),
         ([1.05], [0.3], UNDECIDED),
         # beside a third order, a second one of a tenth of it or more makes a scatter of 0.02
@@ -380,6 +386,27 @@ def test_the_borders_of_the_rules(
     orders: list[float], scatter: list[float], expected: tuple[str, str]
 ) -> None:
     assert from_orders(orders, scatter) == expected
+
+
+def test_orders_that_hardly_swing_have_a_narrow_interval_where_the_scatter_fades() -> None:
+    """A lower power would make the scatter grow: the interval does not reach down to one."""
+    orders = [2.00021, 1.99925, 1.99977]
+    fading, steady = (
+        judged_orders(orders, scatter)
+        for scatter in ([0.093, 0.0232, 0.0058], [0.0058, 0.0058, 0.0058])
+    )
+    assert fading.low[0] > 1.99
+    assert steady.low[0] < 0.5
+
+
+def test_numbers_far_below_their_round_off_have_no_order() -> None:
+    """Two units in the last place and one behind them are no first order, unless a shape over time vouches for it."""
+    floor = 1000.0 * SMALL
+    one = {"order": np.array([1.0]), "size": np.array([1e4 * SMALL]), "floor": floor}
+    reasons = [
+        from_orders([1.0], [0.0], numbers=np.array([numbers]), **one) for numbers in (True, False)
+    ]
+    assert reasons == [("INCONCLUSIVE", "round_off"), ("PASS", "asymptotic")]
 
 
 def test_a_change_that_scatter_does_not_explain_is_no_round_off() -> None:

@@ -104,3 +104,24 @@ def test_levels_that_leave_no_room_for_the_promised_power_fail_it() -> None:
     )
     assert (low.status, low.reason) == ("FAIL", "order_high")
     assert (high.status, high.reason) == ("PASS", "asymptotic")
+
+
+def test_a_start_nearly_in_balance_hides_the_promise_between_events_too() -> None:
+    model = {"kind": "oscillator", "spring": "0.6876*u", "damping": {"coulomb": 0.01015}}
+    model |= {"force": "0.1261*t"}
+    initial = {"u": -0.001201, "v": 0.0003687}
+    for norm in ("l1", "l2"):
+        made = Experiment.from_dict(
+            {
+                "title": "t",
+                "model": model,
+                "initial": initial,
+                "time": {"end": 63.39, "base_steps": 5},
+                "levels": [3, 4, 5, 6, 7, 8],
+                "schemes": ["euler_cromer_u_first"],
+                "checks": [{"converges": "u", "order": order, "norm": norm} for order in (1, 2)],
+            }
+        )
+        record = analyse(made, [simulate(made, level) for level in made.levels])
+        for verdict in verdicts(made, record):
+            assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "pre_asymptotic")

@@ -116,6 +116,22 @@ LADDERS = {
         ("INCONCLUSIVE", "round_off"),
         ("have reached round-off",),
     ),
+    "three levels whose true errors leave no room for another power": Ladder(
+        {"model": {"kind": "spring", "w": 2.0}, "initial": {"u": 1.0}, "time": {"end": 20.0}},
+        "rk4",
+        (7, 8, 9),
+        {"converges": "u", "order": 4},
+        ("PASS", "asymptotic"),
+        ("order 3.998", "on levels 7 to 9"),
+    ),
+    "a long run of which the last true errors have the order": Ladder(
+        {"model": {"kind": "spring"}, "initial": {"u": 1.0}, "time": {"end": 1000.0}},
+        "rk4",
+        (10, 11, 12, 13, 14),
+        {"converges": "u", "order": 4},
+        ("PASS", "asymptotic"),
+        ("order 3.99",),
+    ),
     "Dt = pi/w": Ladder(
         {**SPRING, "time": {"end": 16 * math.pi}, "samples": {"every": 16}},
         "central",

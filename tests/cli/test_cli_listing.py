@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from vibsim import schemes, theory
+from vibsim import theory
 from vibsim.cli import main
 from vibsim.schemes import SCHEMES
 
@@ -56,7 +56,7 @@ def test_a_scheme_added_tomorrow_is_listed(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     new = replace(SCHEMES["rk4"], kind="new", title="A new one", force_evaluations=7)
-    monkeypatch.setattr(schemes, "SCHEMES", {**SCHEMES, "new": new})
+    monkeypatch.setattr(SCHEMES, "built_in", {**SCHEMES.built_in, "new": new})
     (line,) = (line for line in listed(capsys) if line.startswith("new "))
     assert line.split() == ["new", "4", "explicit", "no", "7", "w", "dt", "<", "2.82843"]
 

@@ -102,6 +102,30 @@ def test_kernels_of_smooth_models_hold_nothing_of_events():
                 assert ("passed" in text) == (model.events is not None)
 
 
+@pytest.mark.parametrize("lane", ["plain", "scalar"])
+def test_turns_that_are_events_have_their_time_and_height(lane):
+    """A parabola through three points around a corner is off by dt^2 in time, an event by the error of the scheme."""
+    more = {"n_extrema": 3, "lane": lane}
+    found = runs_of.run(BOX, "rk4", {"mu": 0.1}, (1.0, 0.0), 15.0, 2000, **more).extrema
+    for times, heights, turns in (
+        (found.trough_time, found.trough, ((1, -0.8), (3, -0.4))),
+        (found.peak_time, found.peak, ((2, 0.6), (4, 0.2))),
+    ):
+        np.testing.assert_allclose(times[0, :2], [k * math.pi for k, _ in turns], atol=1e-9)
+        np.testing.assert_allclose(heights[0, :2], [u for _, u in turns], atol=1e-9)
+    # a peak in flight is smooth: the parabola is the motion
+    ball = runs_of.run(BALL, "rk4", {}, (1.0, 0.0), 6.0, 500, **more)
+    speed = math.sqrt(2.0)
+    impacts = speed * np.array([1.0, 1.0 + 2 * 0.8, 1.0 + 2 * 0.8 + 2 * 0.64])
+    np.testing.assert_allclose(ball.extrema.trough_time[0], impacts, atol=1e-12)
+    assert ball.extrema.trough[0].tolist() == [0.0] * 3
+    np.testing.assert_allclose(ball.extrema.peak_time[0, 0], speed * 1.8, atol=1e-9)
+    # what is left to the mesh has no event but its points
+    left = runs_of.run(BOX, "rk4", {"mu": 0.1}, (1.0, 0.0), 15.0, 2000, events="mesh", **more)
+    assert left.extrema.trough_time[0, 0] == pytest.approx(math.pi, abs=0.01)
+    assert left.extrema.trough_time[0, 0] != left.events.first_event_time[0]
+
+
 @pytest.mark.parametrize("events", TREATMENTS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_box_that_sticks_stays_where_it_is_to_the_bit(kind, events):

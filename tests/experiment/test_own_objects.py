@@ -18,7 +18,7 @@ from vibsim import Experiment, analyse, best, simulate, verdicts
 from vibsim.core import registry
 from vibsim.core.errors import Fault, InputError, SimulationError
 from vibsim.experiment import canonical
-from vibsim.models import MODELS, Model, Parameter, State
+from vibsim.models import MODELS, Damping, Model, Parameter, State
 from vibsim.schemes import SCHEMES, Flag, Scheme, Stepper
 from vibsim.schemes.orders import same_orders
 from vibsim.schemes.runge_kutta import Tableau, from_tableau
@@ -244,3 +244,17 @@ def test_the_code_of_the_pages_runs_and_keeps_its_promise(
     statuses = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
     assert statuses
     assert set(statuses) == {"PASS"}
+
+
+def test_a_model_with_damping_is_told_how_to_declare_it() -> None:
+    damped = replace(
+        RAYLEIGH, kind="damped", acceleration="-mu*v - u", linear=True, dissipation="mu*v**2"
+    )
+    with pytest.raises(InputError) as refused:
+        build(model=damped, schemes=["central"])
+    (fault,) = refused.value.faults
+    told = "cannot treat damped, whose acceleration depends on v and which declares no linear or quadratic damping"
+    assert fault.rule == told
+    assert "write damping=Damping(kind, rate) in the model" in fault.hint
+    declared = replace(damped, damping=Damping("linear", "mu"))
+    assert build(model=declared, schemes=["central"]).schemes[0].kind == "central"

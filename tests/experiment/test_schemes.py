@@ -199,7 +199,7 @@ def test_a_scheme_for_forces_without_velocity_names_those_that_can(
     build()
     monkeypatch.setattr(kinds, "MODELS", {"pendulum": model})
     (fault,) = file_faults(tmp_path, GOOD)
-    rule = "cannot treat pendulum, whose acceleration depends on omega otherwise than by linear or quadratic damping"
+    rule = "cannot treat pendulum, whose acceleration depends on omega by more than linear or quadratic damping"
     assert fault.rule == rule
     able = [kind for kind, scheme in schemes.items() if scheme.velocity_forces]
     assert able

@@ -93,7 +93,8 @@ def kept(experiment: Experiment, parts: Iterable[Record], thin: list[Record]) ->
     """Pass parts on, and keep of each in `thin` what `verdicts` and `summarise` need of it."""
     # a claim reads what the check that decides it reads
     measured = [check.measured for check in experiment.checks]
-    orders = {f"{one.converges}_observed_order" for one in measured if one.kind == "converges"}
+    asked = [one.converges for one in measured if one.kind == "converges"]
+    orders = {f"{name}_{which}_order" for name in asked for which in ("observed", "formal")}
 
     def is_read(name: str) -> bool:
         of_check = name.startswith(("check_", "corner_")) or is_bound(name) or is_of_parts(name)

@@ -91,7 +91,7 @@ def _verdict(
     wording = Wording(experiment, record, check)
     text = wording.text(decisive, counts, found)
     if check is not None and check.kind == "claim":
-        text = f"Claim: {check.claim}. {text}"
+        text = f"Claim: {check.claim.rstrip().removesuffix('.')}. {text}"
         is_true = truth(check, status, decisive.reason)
         if is_true is not None:
             is_right = is_true == check.holds

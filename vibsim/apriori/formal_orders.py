@@ -100,27 +100,46 @@ def beginnings(experiment: Experiment, columns: Columns) -> Integers:
     return np.broadcast_to(found, size)
 
 
-def formal_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floats:
+def formal_orders(
+    experiment: Experiment, quantity: str, columns: Columns, eventless: Flags | None = None
+) -> Floats:
     """Return the order that every scheme promises for a quantity, shape (scheme, case).
 
     It is infinite for what is exact, and NaN for a scheme that chooses its own steps. Of a part of an error it is what
     theory says of it, and that of the position where it says nothing. Where no option is swept there is one case for
     all, here and below, but of parts, which depend on every number of a member, and of schemes whose orders depend on
-    how a motion begins.
+    how a motion begins. Of a model with events `eventless`, shape (scheme, case), says which members met none.
     """
     if is_promised(experiment, quantity):
         return part_orders(experiment, quantity, columns)
     model, of = experiment.model.definition, whole_of(quantity)
 
-    def promised(beginning: Beginning) -> Floats:
+    def promised(beginning: Beginning, meets_events: bool = True) -> Floats:
         return _each(
-            experiment, columns, lambda s, o: float(s.formal_order(of, model, o, beginning))
+            experiment,
+            columns,
+            lambda s, o: float(s.formal_order(of, model, o, beginning, meets_events=meets_events)),
         )
 
+    if eventless is not None and np.any(eventless):
+        return np.where(eventless, promised(BEGINNINGS[0], False), promised(BEGINNINGS[0]))
     begins = beginnings(experiment, columns)
     if not begins.any():
         return promised(BEGINNINGS[0])
     return np.choose(begins, [promised(b) for b in BEGINNINGS])
+
+
+def orders_in(experiment: Experiment, record: Record, quantity: str) -> Floats:
+    """Return the promised orders that a convergence Record holds of a quantity, shape (scheme, 1 or case).
+
+    Those of the file alone where it does not hold them: whether a motion meets an event, its levels say.
+    """
+    name = f"{quantity}_formal_order"
+    if name not in record:
+        return formal_orders(experiment, quantity, columns_of(record))
+    variable = record.variable(name)
+    orders = np.asarray(variable.values, dtype=np.float64)
+    return orders if "case" in variable.dims else orders[:, None]
 
 
 def is_promised(experiment: Experiment, quantity: str) -> bool:
@@ -157,20 +176,25 @@ def part_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floa
 def special_orders(experiment: Experiment, quantity: str, columns: Columns) -> Floats:
     """Return the highest order that every scheme has in a special case, shape (scheme, 1 or case).
 
-    A part of an error has one order at a special start, and another at any other one: it may have any. Where events or
-    corners decide there is no such case (NaN).
+    A part of an error has one order at a special start, and another at any other one: it may have any. Where the mesh
+    or corners decide there is no such case (NaN).
     """
     model = experiment.model.definition
-    if model.events is not None or model.lookup is not None:
+    if model.lookup is not None:
         return np.full((len(experiment.schemes), 1), np.nan)
     if is_promised(experiment, quantity):
         return np.full((len(experiment.schemes), 1), np.inf)
-    return _each(experiment, columns, lambda s, o: s.special_order(o))
+
+    def special(scheme: Scheme, options: Options) -> float:
+        has_mesh = model.events is not None and is_on_the_mesh(options)
+        return math.nan if has_mesh else scheme.special_order(options)
+
+    return _each(experiment, columns, special)
 
 
 def orders_vary(experiment: Experiment, quantity: str) -> bool:
     """Tell whether members have orders of their own."""
-    if is_promised(experiment, quantity):
+    if is_promised(experiment, quantity) or experiment.model.definition.events is not None:
         return experiment.sweep is not None
     return options_swept(experiment) or beginning_varies(experiment)
 

@@ -26,8 +26,16 @@ from vibsim.checks.outcome import (
     as_expected,
     is_open,
 )
-from vibsim.checks.sentences import NOT_FINITE, PLAIN, Description, Found, Notation, cost_in_words
-from vibsim.checks.value import unit_of_norm
+from vibsim.checks.sentences import (
+    NOT_FINITE,
+    PLAIN,
+    Description,
+    Found,
+    Notation,
+    beside,
+    cost_in_words,
+)
+from vibsim.checks.value import unit_of_quantity
 from vibsim.comparison.finest_error import FinestError, error_of_finest
 from vibsim.comparison.order_evidence import judgement
 from vibsim.comparison.quantity_comparison import Comparison
@@ -110,18 +118,26 @@ def known_error(q: Comparison) -> dict[str, Any]:
 
 
 def error_in_words(f: Found, quantity: str) -> str:
-    """Say how large the error of the finest level is; empty where that is not known."""
+    """Say how large the error of the finest level is, as a root mean square over time; empty where it is not known."""
     error, most, relative = (f.fact(name) for name in ERROR)
     if not math.isfinite(most):
         return ""
-    unit, number = unit_of_norm(f.record, quantity), f.notation.number
-    told = f" The error of the finest level is {number(error, 2)} {unit}".rstrip()
+    number, (mean, largest) = f.notation.number, (_mean_square(f, x) for x in (error, most))
+    unit = unit_of_quantity(f.record, quantity)
+    told = f" The root-mean-square error of the finest level is {number(mean, 2)} {unit}".rstrip()
     if math.isfinite(relative):
         told += f" ({number(relative, 2)} of its size)"
     # of a true error the bound has the same digits
-    if number(most, 2) != number(error, 2):
-        told += f", at most {number(most, 2)}"
+    if number(largest, 2) != number(mean, 2):
+        told += f", at most {number(largest, 2)}"
     return f"{told}."
+
+
+def _mean_square(f: Found, error: float) -> float:
+    """Return the root of the mean square over time of an error whose L2 norm over time is given."""
+    dt = np.asarray(f.record["dt"])[-1]
+    duration = float(dt[f.case] if dt.ndim else dt) * f.experiment.steps(int(f.record["level"][-1]))
+    return error / math.sqrt(duration)
 
 
 def _level_needed(last: int, found: FinestError, judged: Judgement, check: AccurateCheck) -> Codes:
@@ -173,14 +189,14 @@ def describe(f: Found, check: AccurateCheck) -> Description:
         case "match":
             return Description(
                 f"{s.subject} is accurate to {s.error()} at level {s.level} (at most {s.most()}), as asked "
-                f"({s.asked}).",
+                f"({s.asked}).{s.mean()}",
                 "",
                 f"{s.error()} at level {s.level}, at most {s.most()}",
             )
         case "mismatch":
             return Description(
                 f"{s.subject} is not as accurate as asked ({s.asked}). The error at level {s.level} is {s.error()}, at "
-                f"least {s.least()}.",
+                f"least {s.least()}.{s.mean()}",
                 s.finer(),
             )
         case "unstable":
@@ -235,9 +251,19 @@ class _Phrases:
         """Write an error as the check counts it."""
         if self.check.is_relative:
             size = self.f.fact("size")
-            return self.f.notation.number(error / size if size > 0.0 else math.nan, 2)
-        unit = unit_of_norm(self.f.record, self.check.accurate)
-        return f"{self.f.notation.number(error, 2)} {unit}".rstrip()
+            error = error / size if size > 0.0 else math.nan
+        return beside(self.f.notation, error, self.check.accuracy)
+
+    def mean(self) -> str:
+        """Say how large an error is in the unit of its quantity, where it is asked for as a norm over time."""
+        if self.check.is_relative:
+            return ""
+        mean = self.f.notation.number(_mean_square(self.f, self.f.fact("error")), 2)
+        unit = unit_of_quantity(self.f.record, self.check.accurate)
+        return (
+            f" These are L2 norms over time. The root-mean-square error is {mean} {unit}".rstrip()
+            + "."
+        )
 
     def error(self) -> str:
         """Say how large the error is."""
@@ -254,7 +280,7 @@ class _Phrases:
         """Say that what is asked lies between the bounds of the error."""
         return (
             f"{self.subject} may or may not be as accurate as asked ({self.asked}). The error at level {self.level} is "
-            f"{self.error()}, between {self.least()} and {self.most()}."
+            f"{self.error()}, between {self.least()} and {self.most()}.{self.mean()}"
         )
 
     def estimate(self) -> str:

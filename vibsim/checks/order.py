@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vibsim.apriori.formal_orders import columns_of, even_powers, formal_orders, relative_floors
+from vibsim.apriori.formal_orders import even_powers, orders_in, relative_floors
 from vibsim.checks.accurate import ERROR, known_error
 from vibsim.checks.fields import REASON, STATUS, Field
 from vibsim.checks.outcome import (
@@ -138,7 +138,7 @@ def judge(
 def expected_order(experiment: Experiment, record: Record, check: ConvergesCheck) -> Floats:
     """Return the order that a check expects, shape (scheme, 1 or case)."""
     if check.order == "scheme":
-        return formal_orders(experiment, check.converges, columns_of(record))
+        return orders_in(experiment, record, check.converges)
     return np.full((len(experiment.schemes), 1), float(check.order))
 
 
@@ -158,7 +158,8 @@ def phase_at_start(q: Comparison) -> dict[str, Variable]:
 
 def is_of_parts(name: str) -> bool:
     """Tell whether a variable of the convergence Record is one that `phase_amplitude_text` reads."""
-    return name.endswith((f"{PHASE}_order", f"{AMPLITUDE}_order", f"{PHASE}_at_start"))
+    numbers = tuple(f"{end}_{what}" for end in (PHASE, AMPLITUDE) for what in ("order", "status"))
+    return name.endswith((*numbers, f"{PHASE}_at_start"))
 
 
 def _more_levels(q: Comparison, judged: Judgement, order: Floats, tolerance: float) -> Codes:

@@ -12,10 +12,10 @@ from vibsim import theory
 from vibsim.apriori.force_discontinuities import is_on_a_point, words_of
 from vibsim.apriori.formal_orders import (
     columns_of,
-    formal_orders,
     has_corners,
     is_promised,
     options_of,
+    orders_in,
     special_orders,
     stability_limits,
 )
@@ -74,14 +74,13 @@ class OrderContext:
         """... and the same in compensated arithmetic."""
         self.has_exact = has_exact(record, quantity, scheme, case)
         self.cost = partial(cost_in_words, experiment)
-        self.parts = parts_in_words(f, quantity)
         self.error = error_in_words(f, quantity)
         """How large the error of the finest level is; empty where it is not known."""
 
         self.scheme, self.kind = f.scheme_name, experiment.schemes[scheme].kind
         method = experiment.schemes[scheme].method
         self.options = options_of(experiment, columns, scheme, case)
-        self.promised = f.of_member(formal_orders(experiment, quantity, columns))
+        self.promised = f.of_member(orders_in(experiment, record, quantity))
         """The order that the scheme promises, ..."""
         self.special = f.of_member(special_orders(experiment, quantity, columns))
         """... has at most, in a special case of motion, model or options, ..."""
@@ -92,6 +91,7 @@ class OrderContext:
             self.centred = float(method.formal_order(whole_of(quantity), model, centred))
         self.expected = self.promised if check.order == "scheme" else float(check.order)
         """The order that was expected; infinite where the quantity was to be exact."""
+        self.parts = parts_in_words(f, quantity, self.expected)
         self.has_promise = not is_error_part(quantity) or is_promised(experiment, quantity)
         """Whether that is a promise for the quantity; of a part of an error it may be the one for its position."""
 

@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from vibsim.checks.order_context import OrderContext
-from vibsim.checks.sentences import Description, Found, Template
+from vibsim.checks.sentences import Description, Found, Template, order_interval
 from vibsim.convergence.thresholds import HALF_SPACING
 from vibsim.schemes.base import is_on_the_mesh
 
@@ -307,7 +307,8 @@ class _Phrases(OrderContext):
         if math.isnan(self.order):
             return ""
         known = math.isfinite(self.low) and math.isfinite(self.high)
-        between = f" (between {self.low:.3f} and {self.high:.3f})" if known else ""
+        ends = order_interval(self.low, self.high) if known else ()
+        between = f" (between {ends[0]} and {ends[1]})" if len(ends) > 1 else ""
         return f"order {self.order:.3f}{between} on levels {self.first} to {self.last}"
 
     def other_order(self) -> str:

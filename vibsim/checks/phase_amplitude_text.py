@@ -1,11 +1,11 @@
-"""What the parts of a position's error say of a verdict on the position: which of phase and amplitude is wrong."""
+"""What the parts of a position's error say of a verdict on the position: which has less than the expected order."""
 
 from __future__ import annotations
 
 import math
 
 from vibsim.checks.sentences import Found
-from vibsim.core.vocabulary import TYPICAL_NORM
+from vibsim.core.vocabulary import STATUSES, TYPICAL_NORM
 from vibsim.models.shared.phase_amplitude_names import AMPLITUDE, PHASE
 
 APART = 0.5
@@ -17,10 +17,10 @@ FROM_THE_START = 0.5
 NAMES = {1.0: "first", 2.0: "second", 3.0: "third", 4.0: "fourth", 5.0: "fifth", 6.0: "sixth"}
 
 
-def parts_in_words(f: Found, quantity: str) -> str:
-    """Say of which order phase and amplitude are where they differ; empty where they do not, or it is not known.
+def parts_in_words(f: Found, quantity: str, expected: float) -> str:
+    """Say of which order phase and amplitude are where one is below the expected order and the other is another one.
 
-    Of a quantity that is no state nothing is said.
+    Empty where that is not so or not known, and for a quantity that is no state.
     """
     model, record, place = f.model, f.record, (f.scheme, f.case)
     known = dict(zip((*model.positions, *model.velocities), model.positions * 2, strict=True))
@@ -29,15 +29,18 @@ def parts_in_words(f: Found, quantity: str) -> str:
     if any(f"{position}{end}_order" not in record for end in (PHASE, AMPLITUDE)):
         return ""
     norm = record.words("norm").index(TYPICAL_NORM)
+    open_ = STATUSES.index("INCONCLUSIVE")
+    if any(record[f"{position}{end}_status"][place] == open_ for end in (PHASE, AMPLITUDE)):
+        return ""
     phase, amplitude = (
         float(record[f"{position}{end}_order"][*place, norm]) for end in (PHASE, AMPLITUDE)
     )
     share = float(record[f"{position}{PHASE}_at_start"][place])
     whose = "" if quantity == position else f" of {f.notation.quantity(position)}"
-    return sentence(phase, amplitude, share, whose)
+    return sentence(phase, amplitude, share, expected, whose)
 
 
-def sentence(phase: float, amplitude: float, share: float, whose: str = "") -> str:
+def sentence(phase: float, amplitude: float, share: float, expected: float, whose: str = "") -> str:
     """Tell two orders apart, and where the lower one comes from.
 
     Parameters
@@ -46,6 +49,8 @@ def sentence(phase: float, amplitude: float, share: float, whose: str = "") -> s
         Orders; NaN where none is stated.
     share
         Part of the phase error that is there from the start.
+    expected
+        The order that the verdict expects: a part of this order or a higher one is as it should be.
     whose
         Of which position they are, in words; empty where the verdict is on that position.
     """
@@ -57,12 +62,14 @@ def sentence(phase: float, amplitude: float, share: float, whose: str = "") -> s
         for order, half in zip((phase, amplitude), halves, strict=True)
     ):
         return ""
+    if min(halves) >= expected:
+        return ""
     of_phase, of_amplitude = (
         f"{NAMES[half]} order" if half in NAMES else f"order {half:g}" for half in halves
     )
     both = f" The phase{whose} is of {of_phase}, the amplitude of {of_amplitude}"
     if amplitude < phase:
-        return f"{both}. The amplitude is wrong."
+        return f"{both}. The error is one of the amplitude."
     if share >= FROM_THE_START:
         return f"{both}. The error is a shift in time from the first step on, so the start is of {of_phase}."
     return f"{both}. The error is a shift in time that grows, so the frequency is of {of_phase}."

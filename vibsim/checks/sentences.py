@@ -75,6 +75,24 @@ class Notation:
 PLAIN = Notation()
 
 
+def beside(notation: Notation, value: float, limit: float) -> str:
+    """Write a number with two digits, or with as many as show on which side of a limit it is."""
+    for digits in range(2, 16):
+        told = float(f"{value:.{digits}g}")
+        if (told > limit, told < limit) == (value > limit, value < limit):
+            return notation.number(value, digits)
+    return notation.number(value, 16)
+
+
+def order_interval(low: float, high: float) -> tuple[str, ...]:
+    """Write the ends of the interval of an order with the decimals that tell them apart, 3 to 6; once if none do."""
+    for decimals in range(3, 7):
+        ends = f"{low:.{decimals}f}", f"{high:.{decimals}f}"
+        if ends[0] != ends[1]:
+            return ends
+    return (f"{low:.3f}",)
+
+
 class Template(string.Formatter):
     """Fills templates with attributes of an object: ``{name}``, or ``{name:4}`` with so many digits of a number."""
 

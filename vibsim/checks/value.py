@@ -226,6 +226,11 @@ def unit_of(experiment: Experiment, record: Record, check: ValueCheck) -> str:
     return f"{_known_units(record).get(of or '', '')} {unit}".strip()
 
 
+def unit_of_quantity(record: Record, quantity: str) -> str:
+    """Return the unit of a quantity; empty where it has none."""
+    return _known_units(record).get(quantity, "")
+
+
 def unit_of_norm(record: Record, quantity: str) -> str:
     """Return the unit of the L2 norm over time of a quantity; empty where it has none."""
     return f"{_known_units(record).get(quantity, '')} {'sqrt(s)' if has_time_unit(record) else ''}".strip()

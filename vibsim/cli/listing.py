@@ -4,27 +4,37 @@ from __future__ import annotations
 
 import math
 from argparse import Namespace
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import TYPE_CHECKING
 
+from vibsim.core.errors import Fault, InputError
+
 if TYPE_CHECKING:
+    from vibsim.models import Model
     from vibsim.schemes import AnyOption, Scheme
 
 
 def list_(options: Namespace) -> int:
-    """Print the names and what they mean."""
+    """Print the names and what they mean, of installed packages all that can be had.
+
+    Raises
+    ------
+    InputError
+        Behind the list, where a package offers something that cannot be had.
+    """
     if options.what == "schema":
         return _schema()
-    rows = {
-        "models": _models,
-        "schemes": _schemes,
-        "checks": _checks,
-        "experiments": _experiments,
-    }[options.what]()
+    faults: list[Fault] = []
+    if options.what in ("models", "schemes"):
+        rows, faults = _models() if options.what == "models" else _schemes()
+    else:
+        rows = _checks() if options.what == "checks" else _experiments()
     table = [tuple(map(str, row)) for row in rows]
     width = max((len(name) for name, _ in table), default=0)
     for name, text in table:
         print(f"{name.ljust(width)}  {text}".rstrip())
+    if faults:
+        raise InputError(faults)
     return 0
 
 
@@ -38,10 +48,15 @@ def _schema() -> int:
     return 0
 
 
-def _models() -> Iterable[tuple[str, str]]:
+def _models() -> tuple[Iterable[tuple[str, str]], list[Fault]]:
     from vibsim.models import MODELS
 
-    for model in MODELS.values():
+    found, faults = MODELS.usable()
+    return _of_models(found.values()), faults
+
+
+def _of_models(models: Iterable[Model]) -> Iterable[tuple[str, str]]:
+    for model in models:
         parameters = ", ".join(f"{p.name} = {p.default:g} {p.unit}" for p in model.parameters)
         shape = "linear" if model.linear else "nonlinear"
         if model.formulas:
@@ -49,19 +64,24 @@ def _models() -> Iterable[tuple[str, str]]:
         yield model.kind, f"{model.title}: {model.equation}; {parameters}; {shape}"
 
 
-def _schemes() -> Iterable[tuple[str, str]]:
-    """Yield a line of facts for each scheme, then what it is and where it comes from, then its options."""
+def _schemes() -> tuple[Iterable[tuple[str, str]], list[Fault]]:
     from vibsim.schemes import SCHEMES
 
+    found, faults = SCHEMES.usable()
+    return _of_schemes(found.values()), faults
+
+
+def _of_schemes(schemes: Collection[Scheme]) -> Iterable[tuple[str, str]]:
+    """Yield a line of facts for each scheme, then what it is and where it comes from, then its options."""
     head = ("order", "step", "symplectic", "forces/step", "stability limit")
-    facts = {scheme.kind: _facts(scheme) for scheme in SCHEMES.values()}
+    facts = {scheme.kind: _facts(scheme) for scheme in schemes}
     widths = [max(map(len, column)) for column in zip(head, *facts.values(), strict=True)]
 
     def line(columns: Iterable[str]) -> str:
         return "  ".join(text.ljust(width) for text, width in zip(columns, widths, strict=True))
 
     yield "kind", line(head)
-    for scheme in SCHEMES.values():
+    for scheme in schemes:
         yield scheme.kind, line(facts[scheme.kind])
         yield "", f"{scheme.title}; {scheme.source}"
         for option in scheme.options:

@@ -131,7 +131,7 @@ def _promised(name: str, place: value_numbers.Place) -> tuple[Floats, Flags]:
     quantity = place.quantity or block.model.position
     if name == "relative_energy_error":
         quantity = "energy_deviation"
-    order = formal_orders(experiment, quantity, block.columns)
+    order = formal_orders(experiment, quantity, block.columns, block.eventless)
     even = even_powers(experiment, quantity, block.columns)
     if name in _INTERPOLATED:
         order, even = np.minimum(order, OF_PARABOLA), np.zeros_like(even)

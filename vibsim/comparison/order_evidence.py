@@ -134,6 +134,9 @@ def evidences(
     moved, straight = _motion(q, order, size)
     steps = np.array(grid.steps, dtype=np.float64)
     worst = SPACING_AT_ONE * steps**2 * (q.scale * block.magnified)[..., None]
+    # a corner within the last step of every level: a scheme that looks at its beginning alone knows nothing of it
+    with np.errstate(invalid="ignore"):
+        unseen = block.corners.time > block.group.end * (1.0 - 1.0 / grid.steps[-1])
     # where nothing oscillates, no order is promised of a part of an error
     promised = ~block.adaptive[:, None] & ~np.isnan(order)
     same: dict[str, Any] = {
@@ -154,8 +157,8 @@ def evidences(
         "straight": straight,
         "left_to_the_mesh": all_cases(block.left_to_the_mesh),
         "corner": block.corners.power,
-        "missed": np.broadcast_to(np.isfinite(block.missed.time), shape),
-        "jumps": np.broadcast_to(block.missed.jumps, shape),
+        "missed": np.isfinite(block.missed.time) | unseen,
+        "jumps": block.missed.jumps | unseen,
         "decay": block.decay * block.group.end / grid.steps[-1],
         "growth": block.growth,
     }
@@ -172,6 +175,7 @@ def evidences(
                 floor=q.floor * weight[:, None],
                 ceiling=ceiling * weight[:, None],
                 size=size * weight,
+                scale=q.scale * weight,
                 error=measured.error,
                 error_scatter=measured.error_scatter,
                 blur=q.blur * weight[:, None],

@@ -29,7 +29,7 @@ class InNorm:
     scatter: Floats  # of the triples (`differences.scatters`), shape (scheme, case, triple)
     error: Floats  # exact less computed, shape (scheme, case, level); NaN where not known
     extrapolation: Floats  # exact less extrapolated, shape (scheme, case)
-    error_scatter: Floats  # the same of `FEW_LEVELS` errors, shape (scheme, case, pair); else NaN
+    error_scatter: Floats  # the same of the finest errors, shape (scheme, case, pair); else NaN
 
 
 @dataclass(frozen=True)
@@ -138,14 +138,17 @@ class Comparison:
             return stacked(differences.scatters(series, kind, grid.end_included))
 
         unknown = np.full((*shape, len(grid.levels)), np.nan)
-        few = errors if len(grid.levels) == th.FEW_LEVELS else None
+        of_errors = unknown[..., 1:].copy()
+        if errors is not None and len(errors) > 1:
+            finest = scatters(errors[-th.JUDGED_ERRORS :])
+            of_errors[..., -finest.shape[-1] :] = finest
         of_limit = None if self.exact is None else self.exact - self.extrapolation[0]
         return InNorm(
             difference=stacked([size(x) for x in self.differences]),
             scatter=scatters(self.differences),
             error=unknown if errors is None else stacked([size(e) for e in errors]),
             extrapolation=unknown[..., 0] if of_limit is None else size(of_limit),
-            error_scatter=unknown[..., 1:] if few is None else scatters(few),
+            error_scatter=of_errors,
         )
 
     @cached_property
@@ -193,7 +196,7 @@ def comparisons(block: MemberBlock, names: tuple[str, ...]) -> Mapping[str, Comp
             units=str(attrs.get("units", "1")),
             values=values[name],
             exact=block.exact_of(name),
-            order=formal_orders(block.experiment, name, block.columns),
+            order=formal_orders(block.experiment, name, block.columns, block.eventless),
             floor=floor,
             scale=scale,
             blur=np.zeros_like(floor),

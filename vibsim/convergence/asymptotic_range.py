@@ -281,7 +281,7 @@ def _hides(
     hiding = ~fading & (left[0] > most_left(limit, *left, grown)) & (tail.several | ~vouched)
     suspect = th.SUSPECT * most_left(order, *left, grown)
     hiding |= ~fading & grown & (left[0] > np.maximum(th.GROWS * left[1], suspect))
-    hiding |= uneven.found & (left[0] > th.SUSPECT * th.HIDDEN)
+    hiding |= ~fading & uneven.found & (left[0] > th.SUSPECT * th.HIDDEN)
     return np.asarray(hiding & ~uneven.sure)
 
 

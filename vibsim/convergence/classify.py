@@ -18,6 +18,7 @@ from vibsim.convergence.ladder_statistics import (
     at_rest,
     at_round_off,
     far_from_exact,
+    pick,
     truly_exact,
     unresolved,
 )
@@ -58,9 +59,13 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Floats]:
     wrong &= np.where(
         above,
         together & (t.width <= th.NARROW) & ~t.drifting & ~t.hiding & _alone(e, t, likely),
-        several | (np.abs(t.scatter) <= th.COINCIDENT),
+        several | (np.abs(t.scatter) <= th.UNRELATED_FIRST),
     )
     wrong |= _settled_elsewhere(e, t, p)
+    # levels that differ by more than the solution have nothing to do with it yet
+    lost = pick(e.difference, t.last + 1) > e.scale
+    right &= ~lost
+    wrong &= ~lost
     wrong &= ~(hidden & above)
     too_large, too_small = errors.contradicts(e, t)
     accidental = errors.irregular(e, t)
@@ -76,6 +81,8 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Floats]:
     # where no triple is left although the differences are above round-off, the corner has made them unlike each other
     unlike = nothing & (p >= e.corner)
     kinked |= unlike | (too_small & accidental)
+    # finer levels show the power of the corner, not p: those that do not yet are no reason to add some
+    limited = e.corner < p - tol
     swings = t.alternating & ~rough & ~kinked & ~doubtful
     still = at_rest(e) & (exactly | nothing)
     # what no level sees, no difference tells of: an exact solution alone would say that it does not matter
@@ -90,6 +97,8 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Floats]:
         (still & far_from_exact(e), "pre_asymptotic"),
         (still, "not_applicable"),
         (coarse, "pre_asymptotic"),
+        # levels that notice their events at the same points are no closer to the exact solution for that
+        (exact & far_from_exact(e) & rough, "non_smooth"),
         (exact & far_from_exact(e), "wrong_limit"),
         (exact, "exact"),
         (exactly & ~at_round_off(e), "order_low"),
@@ -108,6 +117,7 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Floats]:
         (e.missed, "pre_asymptotic"),
         (rough, "non_smooth"),
         (t.cut, "round_off"),
+        (limited, "non_smooth"),
     ], low
 
 
@@ -123,7 +133,9 @@ def _right(e: Evidence, t: Trend, p: Floats) -> Flags:
     both |= several & t.fading & (np.abs(t.local - p) <= tol) & (np.abs(t.change) <= tol)
     both |= errors.confirm(e, t, p) & (np.abs(t.local - p) <= tol)
     near = (np.abs(t.order - p) <= tol) & ((t.width <= tol) | both | ~several)
-    together = np.abs(t.scatter) <= np.where(several, th.COINCIDENT, th.PROPORTIONAL_ALONE)
+    # one triple alone must be proportional, unless true errors have three ratios to tell with
+    alone = ~(several | errors.vouch(e, p))
+    together = np.abs(t.scatter) <= np.where(alone, th.PROPORTIONAL_ALONE, th.COINCIDENT)
     clear = _alone(e, t, p)
     right = near & together & clear & ~np.signbit(t.scatter)
     right &= ~t.gap & ~t.turning

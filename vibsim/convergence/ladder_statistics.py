@@ -30,8 +30,11 @@ class Evidence:
     ceiling: Floats  # the most that round-off can be in any arithmetic, shape (..., n)
     relative_floor: Floats  # predicted round-off over the solution at the coarsest level
     size: Floats  # norm of the solution
+    scale: Floats  # the same of the whole that a quantity is a part of, such as the energy
     error: Floats  # norms of the true errors, shape (..., n); NaN where they are not known
-    error_scatter: Floats  # scatter of the errors of three levels, shape (..., n-1); NaN elsewhere
+    error_scatter: (
+        Floats  # scatter of the errors of the finest three levels, shape (..., n-1); else NaN
+    )
     blur: Floats  # how well the quantity is measured at every level, rounding apart, shape (..., n)
     promised: Floats  # the order of the scheme, infinite or NaN where it promises none
     special: Floats  # the highest order of the scheme in a special case
@@ -48,7 +51,7 @@ class Evidence:
     # the one power of an error without an expansion, where events or corners of the force are left to the mesh, or NaN
     left_to_the_mesh: Floats
     corner: Floats  # the highest power that a corner of the force within a step leaves; else NaN
-    missed: Flags  # whether the force has a pulse that no level sees
+    missed: Flags  # whether the force has a pulse, or a corner in the last step, that no level sees
     jumps: Flags  # whether it jumps there
     decay: Floats  # the largest rate at which damping takes a velocity away, times the finest step
     growth: Floats  # largest position over the largest exact one, shape (..., n); NaN if not known

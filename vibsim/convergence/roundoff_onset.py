@@ -43,6 +43,8 @@ def before_round_off(e: Evidence, orders: Floats) -> tuple[Flags, Floats]:
     # what rises out of the floor again on a finer level was no floor
     predicted = _from_here_on(noise) >= 1.0 / th.ABOVE_ROUND_OFF
     spoiled = _breaks_the_trend(orders, scatter, incoherent) & predicted
+    # single numbers have no shape that could vouch for differences far below their round-off
+    spoiled |= e.numbers[..., None] & (_from_here_on(noise) >= th.ABOVE_ROUND_OFF)
     onset = _onset(orders, scatter, incoherent)
     share = possible / np.fmax(np.fmin(np.abs(scatter), 1.0), th.SINGLE_NUMBER)
     spoiled |= onset & (_from_here_on(share) * th.ROUND_OFF_SAFETY >= 1.0)

@@ -78,16 +78,21 @@ def vouch(e: Evidence, p: Floats) -> Flags:
 def confirm(e: Evidence, t: Trend, p: Floats) -> Flags:
     """Say of several triples where the last three true errors of the window leave no room for another power.
 
-    The scatter of the errors is at most that of the differences times what these see less of h^(p-1), or of the least
-    power below p.
+    Behind the window, where the scatter of the errors is not measured, it is at most that of the differences times what
+    these see less of h^(p-1), or of the least power below p.
     """
     found = e.error_orders
     below = np.maximum(np.where(p > 1.0, p - 1.0, p - 0.5), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         less = np.expm1(p * th.LOG2) / np.expm1(below * th.LOG2)
+        measured = [pick(e.error_scatter, t.last + 1 - back) for back in (0, 1)]
+        most = [less * scatter for scatter in (t.scatter, t.scatter_before)]
         finer, coarser = (
-            np.hypot(less * scatter, th.LOG2 * (pick(found, t.last + 1 - back) - p))
-            for back, scatter in enumerate((t.scatter, t.scatter_before))
+            np.hypot(
+                np.where(np.isnan(measured[back]), most[back], measured[back]),
+                th.LOG2 * (pick(found, t.last + 1 - back) - p),
+            )
+            for back in (0, 1)
         )
     return t.several & _no_room(e, pick(e.error, t.last + 2), finer, coarser)
 
@@ -128,11 +133,18 @@ def irregular(e: Evidence, t: Trend) -> Flags:
 
 
 def _stays_throughout(e: Evidence) -> Flags:
-    """Say where the errors of four levels and more have not even halved: those of order 1 are eight times smaller."""
+    """Say where the errors of four levels and more have not even halved: those of order 1 are eight times smaller.
+
+    Errors that the finest step may make stay where an event or a corner lies beside a point that all levels share.
+    """
     if len(e.levels) < 4:
         return np.zeros(e.order.shape, dtype=bool)
+    steps = e.steps * 2.0 ** (e.levels[-1] - e.levels[0])
+    step = np.where(np.isfinite(e.omega_dt[..., -1]), e.omega_dt[..., -1], 1.0 / steps)
     with np.errstate(invalid="ignore"):
-        return np.asarray(e.error[..., -1] > th.STAYED * e.error[..., 0])
+        beside_a_point = e.size * step ** np.fmin(e.corner, e.left_to_the_mesh)
+        stays = e.error[..., -1] > th.STAYED * e.error[..., 0]
+        return np.asarray(stays & ~(e.error[..., -1] <= beside_a_point))
 
 
 def stay(e: Evidence, t: Trend) -> Flags:

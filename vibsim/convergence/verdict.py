@@ -21,7 +21,8 @@ The rules, in the order in which they apply (the first that applies decides):
 6. where events are left to the mesh, or corners of a force from a table, an error has no expansion behind its first
    power, or the second: a ladder that does not show that power is ``non_smooth``. So is one that is lower than expected
    where the motion meets another corner of the force within a step (`vibsim.apriori.force_discontinuities`), but for
-   one that settles below the power which that corner leaves;
+   one that settles below the power which that corner leaves. So is one that stays open although finer levels would show
+   that power, not the expected one;
 7. a settled ladder whose error against the exact solution is larger than its differences allow: ``wrong_limit``.
 """
 

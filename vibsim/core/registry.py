@@ -85,6 +85,20 @@ class Registry(Mapping[str, Entry]):
             found[name] = entry
         return found
 
+    def usable(self) -> tuple[dict[str, Entry], list[Fault]]:
+        """Return all entries that can be had, and the faults of the packages that offer others."""
+        found, faults = dict(self.built_in), list[Fault]()
+        try:
+            kinds = list(self._offers())
+        except InputError as error:
+            return found, [*error.faults]
+        for kind in kinds:
+            try:
+                found[kind] = self[kind]
+            except InputError as error:
+                faults += error.faults
+        return found, faults
+
     def _offers(self) -> Mapping[str, EntryPoint]:
         found = offers(self.group)
         for name in found.keys() & self.built_in.keys():

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from vibsim.engine.extrema import HEIGHT, OF_A_KIND, PEAK_COUNT, TIME, TIME_GRID
 from vibsim.engine.gather import N_STATS, note_turning
 from vibsim.engine.kernel_stubs import P, State, called, unbound
 
@@ -25,8 +26,10 @@ start = start_of = step = turning = with_mode = unbound
 # Columns of `stats` behind those of `vibsim.engine.gather`. HALTED and HALTED_GRID: the mode before the body came to
 # rest, and the grid point behind, since it may leave the other way, which is a turn. LOST: what sliding or impacts have
 # cost so far. DONE: work of driving forces so far, whose power has a corner at every event: summed piece by piece.
+# TURN_TIME, TURN: time and height of the last event that was a peak, and behind them of the last that was a trough.
 EVENT_COUNT, FIRST_EVENT, LAST_EVENT, REST_TIME = range(N_STATS, N_STATS + 4)
-HALTED, HALTED_GRID, LOST, DONE, N_STATS_EVENTS = range(N_STATS + 4, N_STATS + 9)
+HALTED, HALTED_GRID, LOST, DONE, TURN_TIME, TURN = range(N_STATS + 4, N_STATS + 10)
+N_STATS_EVENTS = N_STATS + 12
 
 MOST_EVENTS = 256
 """Events of a step; a member with more comes to rest until the next grid point."""
@@ -222,3 +225,22 @@ def note_event(
     kind = turning(before, after)
     if kind != 0.0:
         note_turning(stats, counts, case, since, point, u, kind)
+        side = 0 if kind > 0.0 else 2
+        stats[case, TURN_TIME + side] = since
+        stats[case, TURN + side] = u
+
+
+@called
+def put_turned(stats: Any, counts: Any, kept: Any, case: int, dt: float) -> None:
+    """Give the last peak and the last trough that were kept the time and the height of the event that they are.
+
+    The parabola through three points knows nothing of the corner between them.
+    """
+    for kind in range(2):
+        place = counts[case, PEAK_COUNT + kind] - 1
+        row = OF_A_KIND * kind
+        if 0 <= place < kept.shape[2]:
+            time = stats[case, TURN_TIME + 2 * kind]
+            if abs(time - kept[row + TIME_GRID, case, place]) <= dt:
+                kept[row + TIME, case, place] = time
+                kept[row + HEIGHT, case, place] = stats[case, TURN + 2 * kind]

@@ -9,6 +9,8 @@ The parabola through the three points has its top ``(left - right)/(2 (left + ri
 force drives or damps, its time is off by O(dt^3) and its height by O(dt^4); elsewhere by O(dt^2) and O(dt^3). Of two
 equal points it finds the middle; of a longer plateau, which resolves nothing, the middle is taken as well.
 
+A turn that is a located event has the time and the height of that (`vibsim.engine.events.put_turned`).
+
 Point n - 1 is judged at step n, when both of its neighbours are known to be sound.
 """
 

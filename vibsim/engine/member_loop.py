@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from vibsim.engine.events import DONE, LOST, begun, passed
+from vibsim.engine.events import DONE, LOST, begun, passed, put_turned
 from vibsim.engine.extrema import is_turned, note_turned
 from vibsim.engine.gather import (
     DISSIPATED_ROW,
@@ -36,7 +36,7 @@ from vibsim.engine.gather import (
 from vibsim.engine.kernel_stubs import P, unbound
 
 # bound by the kernel (`vibsim.engine.kernel_stubs`)
-D2T = EVENTS = GATHER = KEEP = SERIES = STAGGERED = WORK = True
+D2T = EVENTS = GATHER = KEEP = LOCATED = SERIES = STAGGERED = WORK = True
 backward = energies = energy_with = first_further = first_of = initial_of = mode_of = unbound
 next_further = note_further = observed = parameters_of = point_of = powers = unbound
 put_components = put_moving = size_of = start = step = unbound
@@ -151,6 +151,9 @@ def run(members: Any, span: Any, settings: Any, found: Any, rows: Any) -> None:
             if KEEP:  # noqa: SIM102
                 if is_turned(u_two_before, u_before, u):
                     note_turned(kept, counts, case, n - 1, h, u_two_before, u_before, u)
+                    if EVENTS:  # noqa: SIM102
+                        if LOCATED:
+                            put_turned(stats, counts, kept, case, h)
             if n == due:
                 put_moving(samples, case, sample, q, w)
                 if SERIES:

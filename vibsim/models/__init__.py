@@ -6,6 +6,7 @@ from vibsim.core.registry import Registry
 from vibsim.models.base import (
     BUDGET,
     ENERGIES,
+    Damping,
     FormulaField,
     Model,
     Output,
@@ -52,6 +53,7 @@ __all__ = [
     "BUDGET",
     "ENERGIES",
     "MODELS",
+    "Damping",
     "FormulaField",
     "Model",
     "Output",

@@ -64,10 +64,11 @@ class MemberBlock:
     group: Members  # the numbers of the members
     stability_limit: Floats  # largest stable w dt, infinite for none, shape (s, 1 or c)
     adaptive: Flags  # whether a scheme chooses its own steps and so has no levels, shape (s,)
-    left_to_the_mesh: Floats  # power of errors where the mesh decides, else NaN, shape (s, 1 or c)
+    left_to_the_mesh: Floats  # power of errors where the mesh decides, else NaN, shape (s, c)
     corners: Corners  # where the force has its first corner within a step
     missed: Missed  # pulses of the force between the points of every level
     growth: Floats  # largest position over the largest exact one, shape (s, c, l); NaN if not known
+    eventless: Flags  # whether a model with events met none on the finest level, shape (s, c)
 
     @property
     def model(self) -> Model:
@@ -181,6 +182,8 @@ def block_of(experiment: Experiment, records: Mapping[int, Record]) -> MemberBlo
     check_belonging(experiment, records)
     rows = [records[level] for level in grid.levels]
     model, finest = experiment.model.definition, rows[-1]
+    failed = by_level([row["status"] for row in rows]) != 0
+    eventless = stored(finest, "event_count", failed.shape[:2]) == 0.0
     lean = any(record.attrs.get("storage") == "lean" for record in rows)
     columns, states = columns_of(finest), [state.name for state in model.states]
     case = np.asarray(finest["case"], dtype=np.int64)
@@ -208,13 +211,14 @@ def block_of(experiment: Experiment, records: Mapping[int, Record]) -> MemberBlo
         fastest=_fastest(model, rows, grid, group, exact),
         decay=decay_rate(model, grid, finest, group, exact),
         group=group,
-        failed=by_level([row["status"] for row in rows]) != 0,
+        failed=failed,
         stability_limit=stability_limits(experiment, columns),
         adaptive=np.array([scheme.adaptive for scheme in experiment.schemes]),
-        left_to_the_mesh=left_to_the_mesh(experiment, columns),
+        left_to_the_mesh=np.where(eventless, np.nan, left_to_the_mesh(experiment, columns)),
         corners=corners_of(model, finest, group, grid.dt[0]),
         missed=missed_pulses(model, finest, group),
         growth=_growth(model, rows, grid, exact),
+        eventless=eventless,
     )
 
 

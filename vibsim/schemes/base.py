@@ -234,15 +234,21 @@ class Scheme:
         return replace(stepper, events=treatment, own_velocity=False, staggered=False)
 
     def formal_order(
-        self, quantity: str, model: Model, options: Options, beginning: Beginning = "any"
+        self,
+        quantity: str,
+        model: Model,
+        options: Options,
+        beginning: Beginning = "any",
+        *,
+        meets_events: bool = True,
     ) -> float:
         """Return the order that is promised for a quantity of a model; infinite for what is exact.
 
         An event that is left to the mesh is noticed up to a step late: no order above 1 is left. A corner of the force
-        that a step does not see leaves 2 (`ORDER_AT_CORNERS`).
+        that a step does not see leaves 2 (`ORDER_AT_CORNERS`). A motion that meets no event is smooth.
         """
         orders = self.orders(options)
-        if model.events is None:
+        if model.events is None or not meets_events:
             order = orders.of(quantity, model, beginning)
             # the power of the force has its corners, whatever the steps do; that of damping has none
             is_kept = self._sees_corners(model) and quantity not in BUDGET[1:]

@@ -316,6 +316,7 @@ def _ends(found: Trajectories, end: Floats, steps: int) -> Iterable[Row]:
 def _extrema(model: Model, found: Extrema) -> dict[str, Variable]:
     """Return the local extrema of the position, and how many there are (vibration text, section 3.5)."""
     unit, parabola = model.states[0].unit, "on the parabola through three points"
+    parabola += " or of the event" if model.events is not None else ""
     table: dict[str, Variable] = {}
     for kind in ("peak", "trough"):
         rows = (

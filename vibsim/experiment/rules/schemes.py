@@ -12,7 +12,7 @@ from vibsim.experiment.kinds import Kinds
 from vibsim.experiment.schema.checks import SOLUTIONS
 from vibsim.experiment.schema.model_and_schemes import TOLERANCE
 from vibsim.experiment.schema.sweep import tolerance_name
-from vibsim.models import Model
+from vibsim.models import MODELS, Model
 from vibsim.schemes import FIXED_STEP
 from vibsim.schemes.base import EVENTS, VECTOR
 
@@ -82,13 +82,17 @@ def _check_forces(kind: str, i: int, model: Model, report: Report) -> None:
     if method.treats(model):
         return
     able = [other for other, row in report.kinds.all_schemes().items() if row.treats(model)]
+    hint = "choose from " + ", ".join(able) if able else "no scheme can"
     rule = f"cannot treat {model.kind}, whose acceleration depends on {model.velocity}"
     damped = [other for other, _ in method.damped if not other.startswith(VECTOR)]
     if model.events is not None and method.adaptive:
         rule = f"cannot treat {model.kind}: it takes its own steps across events, where the motion is not smooth"
+    elif damped and model.kind in MODELS.built_in:
+        rule += f" by more than {' or '.join(damped)} damping"
     elif damped:
-        rule += f" otherwise than by {' or '.join(damped)} damping"
-    hint = "choose from " + ", ".join(able) if able else "no scheme can"
+        kinds = " or ".join(damped)
+        rule += f" and which declares no {kinds} damping"
+        hint += f"; if it is {kinds} damping, write damping=Damping(kind, rate) in the model"
     report.add(("schemes", i), rule, hint, kind)
 
 

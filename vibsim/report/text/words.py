@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from vibsim.checks.sentences import Notation
+from vibsim.checks.sentences import Notation, order_interval
 from vibsim.experiment.value_names import VALUES
 from vibsim.models.shared.phase_amplitude_names import AMPLITUDE, PHASE, is_error_part, whole_of
 from vibsim.report.style import power
@@ -206,9 +206,12 @@ def factor(value: float, base: float) -> str:
 
 def interval(bounds: Sequence[float | None] | None) -> str:
     """Write the interval of an order."""
-    if not bounds or any(b is None or math.isnan(b) for b in bounds):
+    known = [b for b in bounds or () if b is not None and not math.isnan(b)]
+    if len(known) < 2:
         return "–"
-    return f"{number(bounds[0], 'order')} to {number(bounds[1], 'order')}"
+    if max(map(abs, known)) >= 1e4:
+        return f"{number(known[0], 'order')} to {number(known[1], 'order')}"
+    return " to ".join(end.replace("-", "−") for end in order_interval(*known))
 
 
 def levels(window: Sequence[int] | None) -> str:

@@ -1,0 +1,50 @@
+"""Random real ladders over every scheme and model: no verdict is against what the scheme promises."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections import Counter
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+from random_ladders import contradictions, drawn_experiment
+
+SECONDS = 75.0
+"""CPU time of the slow test; the last experiment may take ten more."""
+EXPERIMENTS = 7
+"""Of the short one: 16 ladders each, or 8 where one scheme alone can treat the model."""
+DECIDED = 0.3
+"""Least part of verdicts that pass: ladders of which nothing is known test nothing."""
+
+
+def judged(seed: int, numbers: range, seconds: float) -> Counter[str]:
+    """Judge random experiments until the time is over; return how often each status was given."""
+    counts: Counter[str] = Counter()
+    start = time.process_time()
+    for number in numbers:
+        found, outcomes = contradictions(drawn_experiment(np.random.default_rng([seed, number])))
+        told = [
+            f"seed {seed}, number {number}: {one.status} {one.reason} {one.order}, promised {one.promised}: "
+            f"{json.dumps(one.content)}"
+            for one in found
+        ]
+        assert not told, "\n".join(told)
+        for (status, _), count in outcomes.items():
+            counts[status] += count
+        if time.process_time() - start > seconds:
+            break
+    return counts
+
+
+def test_some_random_ladders() -> None:
+    counts = judged(7, range(EXPERIMENTS), 60.0)
+    assert counts["PASS"] >= DECIDED * counts.total()
+
+
+@pytest.mark.slow
+def test_random_ladders_of_the_day() -> None:
+    seed = datetime.now(UTC).date().toordinal()
+    counts = judged(seed, range(1000), SECONDS)
+    assert counts["PASS"] >= DECIDED * counts.total(), seed
