@@ -119,7 +119,7 @@ def build(
     """
     report = Report(source, kinds)
     for what, text in (("experiment", name), ("collection", collection)):
-        _check_name(f"the name of the {what}, '{shorten(text)}',", text, report)
+        check_name(f"the name of the {what}, '{shorten(text)}',", text, report)
     document = read_document(source, report)
     swept = sorted(set(_keys(source.data.get("sweep"))))
     # a model section with a fault elsewhere still names its model
@@ -197,7 +197,8 @@ def build(
     return members.update_tables(experiment)
 
 
-def _check_name(what: str, text: str, report: Report) -> None:
+def check_name(what: str, text: str, report: Report) -> None:
+    """Note what is wrong with the name of an experiment or a collection, which `what` says."""
     if not re.fullmatch(IDENTIFIER, text):
         report.add((), f"{what} must consist of a to z, 0 to 9 and _")
     elif len(text) > MAX_NAME:
