@@ -73,9 +73,14 @@ def read_solver(source: Source, collection: str, name: str, file: Path) -> Solve
     document = read_document(source, report, SolverDocument)
     numbers, sizes = _sizes(document.refine, report)
     sweep, whole = _sweep(document.sweep, source, report)
-    names = {"sizes": list(sizes), "sweep": list(sweep.keys) if sweep else []}
+    # as written, faulty or not: nothing more is said about placeholders of what is faulty
+    names = {
+        "sizes": [name for name in _keys(source.data.get("refine")) if name != "levels"],
+        "sweep": [name for name, _ in _written(source.data.get("sweep"))],
+    }
     _check_names(names, document.quantities, report)
-    solver = _solver(document.solver, names, has_level=bool(numbers), report=report)
+    has_level = "levels" in _keys(source.data.get("refine"))
+    solver = _solver(document.solver, names, has_level=has_level, report=report)
     checks = _checks(document, report)
     report.raise_any()
     assert solver is not None
@@ -176,14 +181,18 @@ def _sweep(section: Any, source: Source, report: Report) -> tuple[Sweep | None, 
     raw = dict(_written(order))
     types = {name: Text if _is_text(values) else Number for name, values in raw.items()}
     axes = [axis for axis in SweepReader(types, report).axes(section, order) if axis is not None]
-    if not axes:
+    if not raw:
         report.add(("sweep",), "must not be empty")
     return Sweep.model_construct(axes=tuple(axes)), tuple(filter(lambda n: _is_whole(raw[n]), raw))
 
 
-def _written(section: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+def _keys(section: Any) -> list[str]:
+    return list(section) if isinstance(section, Mapping) else []
+
+
+def _written(section: Any) -> Iterator[tuple[str, Any]]:
     """Yield the names of a sweep with what is written of each."""
-    for key, value in section.items():
+    for key, value in section.items() if isinstance(section, Mapping) else ():
         inner = value.get("over") if key == "sample" and isinstance(value, Mapping) else value
         if key in ("zip", "sample"):
             yield from inner.items() if isinstance(inner, Mapping) else ()
@@ -266,30 +275,32 @@ def _check_template(
     path = (MARK, kind)
     try:
         used = list(placeholders(text))
-        if kind == "command" and not shlex.split(text):
-            report.add(path, "must name a program", value=text)
-    except ValueError as error:
-        hint = (
-            "a brace that is none is written twice, {{ or }}" if "{" in text or "}" in text else ""
-        )
-        report.add(path, f"cannot be split into arguments ({error})", hint, text)
+    except ValueError:
+        hint = "a brace of the program's own is written twice, {{ or }}"
+        report.add(path, "must have a name alone between braces, such as {h}", hint, text)
         return
+    try:
+        is_empty = kind == "command" and not shlex.split(text)
+    except ValueError as error:
+        report.add(path, f"cannot be split into arguments ({error})", value=text)
+        return
+    if is_empty:
+        report.add(path, "must name a program", value=text)
     levels = [*names["sizes"], *(["level"] if has_level else [])]
     known = [*levels, *names["sweep"]]
     known += [*OUTPUTS, "threads"] if kind == "command" else []
-    for name in dict.fromkeys(used):
-        if name not in known:
-            hint = nearest(name, known)
-            report.add(path, f"unknown placeholder {{{name}}}", hint, text)
-    if not set(used) & set(levels) and levels:
+    unknown = [name for name in dict.fromkeys(used) if name not in known]
+    for name in unknown:
+        report.add(path, f"unknown placeholder {{{name}}}", nearest(name, known), text)
+    if not set(used) & set(levels) and levels and not unknown:
         hint = "e.g. {" + levels[0] + "}"
         report.add(path, "has no placeholder that differs between levels", hint, text)
-    if kind == "command" and not set(used) & set(OUTPUTS):
+    if kind == "command" and not set(used) & set(OUTPUTS) and not unknown:
         report.add(path, "has no placeholder for the file that it writes", "{output}", text)
     for name in names["sweep"]:
         if name not in used:
-            rule = f"is no placeholder of `{kind}:`, so every member would be the same"
-            report.add((MARK, kind), rule, f"write {{{name}}} where it belongs", name)
+            rule = f"is no placeholder of `{kind}:`, so it would change nothing"
+            report.add(("sweep", name), rule, f"write {{{name}}} where it belongs", at_key=True)
 
 
 # ---- checks and files
@@ -327,7 +338,7 @@ def _check_files(experiment: SolverExperiment, report: Report) -> None:
         report.add(("sweep",), rule, at_key=True)
         return
     for i, name in enumerate(experiment.solver.inputs):
-        _check_file(experiment.folder / name, (MARK, "inputs", i), name, report)
+        _check_file(experiment.folder / name, (MARK, "inputs", i), "", report)
     if experiment.solver.kind != "files":
         return
     seen: dict[str, str] = {}
@@ -340,14 +351,14 @@ def _check_files(experiment: SolverExperiment, report: Report) -> None:
                 rule = f"is the file of {seen[path]}, too"
                 report.add((MARK, "files"), f"{path} {rule}", f"of {where}")
                 continue
-            _check_file(experiment.folder / path, (MARK, "files"), path, report)
+            _check_file(experiment.folder / path, (MARK, "files"), f"{path}: ", report)
 
 
-def _check_file(path: Path, place: Path_, name: str, report: Report) -> None:
+def _check_file(path: Path, place: Path_, told: str, report: Report) -> None:
     try:
         is_file, is_there = path.is_file(), path.exists()
     except (OSError, ValueError):
         is_file = is_there = False
     if not is_file:
         rule = "must be a file" if is_there else "there is no such file"
-        report.add(place, f"{name}: {rule}")
+        report.add(place, f"{told}{rule}")

@@ -10,13 +10,15 @@ from typing import Any
 import numpy as np
 
 from vibsim.analysis.summary import WORST
-from vibsim.checks.fields import GROUP, name_of
+from vibsim.checks.fields import GROUP, flags, name_of
+from vibsim.checks.solver_facts import SOLVER_FACTS
 from vibsim.convergence import LadderVerdict
 from vibsim.convergence.study.labelled import COLUMNS, dataset
 from vibsim.convergence.study.verdict_data import Level
+from vibsim.core.array_types import Floats
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record, Variable, attributes
-from vibsim.core.vocabulary import FORMAT, SEVERITY, STATUSES, jsonable, worst
+from vibsim.core.vocabulary import FORMAT, REASON_NAMES, SEVERITY, STATUSES, jsonable, worst
 from vibsim.experiment.schema.solver import SolverCheck
 from vibsim.experiment.solver import SolverExperiment
 from vibsim.solver import level_output
@@ -183,37 +185,43 @@ def record(experiment: SolverExperiment, checks: Iterable[CheckResults]) -> Reco
         coords[name] = Variable(("case",), column, attributes(f"parameter {name}", "1"))
     variables: dict[str, Variable] = {}
     for found in checks:
-        variables |= _of_check(found, members, len(levels))
+        variables |= _of_check(found)
     return Record(coords, variables)
 
 
-def _of_check(found: CheckResults, members: int, levels: int) -> dict[str, Variable]:
+def _of_check(found: CheckResults) -> dict[str, Variable]:
     """Return the variables of a check."""
-    id_ = found.check.id
-    table = {}
+    id_, decides = found.check.id, found.results[0]
+    table: dict[str, Variable] = {}
+
+    def add(name: str, dims: tuple[str, ...], values: Any, meaning: str, **more: Any) -> None:
+        text = attributes(f"check {id_}: {meaning}", "1", **more)
+        table[name_of(id_, name)] = Variable(dims, np.asarray(values), text, GROUP)
+
+    by_member = sorted(found.results, key=lambda result: result.member)
+    for name, words in (("status", STATUSES), ("reason", REASON_NAMES)):
+        codes = [words.index(getattr(result.verdict, name)) for result in by_member]
+        add(name, ("case",), np.array(codes, dtype=np.int8), f"measured {name}", **flags(words))
+    for name, meaning in SOLVER_FACTS[found.check.kind].items():
+        add(name, ("case",), _floats(result.facts[name] for result in by_member), meaning)
     for name, meaning in COLUMNS.items():
-        values = np.full((members, levels), np.nan)
-        for result in found.results:
-            entries = [getattr(row, name) for row in result.verdict.levels]
-            values[result.member] = [np.nan if x is None else x for x in entries]
-        text = attributes(f"check {id_}: {meaning}", "1")
-        table[name_of(id_, f"level_{name}")] = Variable(("case", "level"), values, text, GROUP)
-    decides = found.results[0]
-    member = np.int64(decides.member)
-    text = attributes(f"check {id_}: member that decides", "1")
-    table[name_of(id_, "member")] = Variable((), np.asarray(member), text, GROUP)
+        rows = [
+            _floats(getattr(row, name) for row in result.verdict.levels) for result in by_member
+        ]
+        add(f"level_{name}", ("case", "level"), rows, meaning)
+    add("member", (), np.int64(decides.member), "member that decides")
     shown = dataset(decides.verdict)
     for name in SHOWN:
         if name in shown:
-            array = shown[name]
-            dims = tuple("level" if dim == "h" else _dim(id_, str(dim)) for dim in array.dims)
-            text = attributes(f"check {id_}: {array.attrs['long_name']}", "1")
-            table[name_of(id_, f"of_{name}")] = Variable(dims, array.values, text, GROUP)
+            dims = ("level" if dim == "h" else _dim(id_, str(dim)) for dim in shown[name].dims)
+            add(f"of_{name}", tuple(dims), shown[name].values, shown[name].attrs["long_name"])
     for dim, points in decides.verdict.coords.items():
-        own = _dim(id_, dim)
-        text = attributes(f"check {id_}: common points along {dim}", "1")
-        table[own] = Variable((own,), np.asarray(points), text, GROUP)
+        add(f"at_{dim}", (_dim(id_, dim),), points, f"common points along {dim}")
     return table
+
+
+def _floats(entries: Iterable[float | None]) -> Floats:
+    return np.array([np.nan if x is None else x for x in entries], dtype=np.float64)
 
 
 def _dim(id_: str, dim: str) -> str:

@@ -59,7 +59,7 @@ def judge(
     except InputError as error:
         fault = error.faults[0]
         parts = (str(check.about), fault.key, fault.value, fault.rule, fault.hint)
-        raise VibsimError(": ".join(filter(None, parts))) from None
+        raise VibsimError(": ".join(dict.fromkeys(filter(None, parts)))) from None
     if isinstance(check, SolverAccurateCheck):
         found, facts, away = _accuracy(check, found)
     else:

@@ -62,6 +62,7 @@ def make(plan: Plan, level: int, job: ShardJob, path: Path, threads: int) -> Non
             path, titled(record, title), digest=job.digest, provenance=provenance(plan, uses)
         )
     except (VibsimError, MemoryError, OSError) as error:
-        raise VibsimError(f"{name}: {sentence(error)}") from error
+        # the folder is gone when somebody reads this
+        raise VibsimError(f"{name}: {sentence(error).replace(f'{work}/', '')}") from error
     finally:
         shutil.rmtree(work, ignore_errors=True)

@@ -37,13 +37,15 @@ RESERVED = (PLACE, "level", "levels", "threads", "case")
 MOST_LEVELS = 100
 
 
-def _name(value: Any) -> Any:
-    if not (isinstance(value, str) and value.isidentifier() and value.isascii()):
-        raise refused("must be a name of letters, digits and _")
+def _function(value: Any) -> Any:
+    module, colon, name = value.partition(":") if isinstance(value, str) else ("", "", "")
+    parts = [*module.split("."), name]
+    if not colon or not all(part.isidentifier() and part.isascii() for part in parts):
+        raise refused("must be module:function", "e.g. heat:solve")
     return value
 
 
-Name = Annotated[str, BeforeValidator(_name)]
+Function = Annotated[str, BeforeValidator(_function)]
 
 
 class SolverSection(Section):
@@ -52,12 +54,13 @@ class SolverSection(Section):
     model_config = ConfigDict(
         json_schema_extra={"oneOf": [{"required": [kind]} for kind in KINDS]},
     )
+    stand_ins = MappingProxyType({})
 
     command: Line | None = None
     """A program with its arguments, run without a shell in the folder of this file. `{h}` stands for a size or a swept
     parameter, `{output}` for the netCDF or CSV file to write (`{output.csv}` if the program goes by the ending), and
     `{threads}` for the number of threads."""
-    python: Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$")] | None = None
+    python: Function | None = None
     """`module:function`, called with sizes and swept parameters by their names; it returns an `xarray.Dataset`."""
     files: Line | None = None
     """The path of a netCDF or CSV file for each level, from the folder of this file, with placeholders."""
@@ -99,6 +102,7 @@ class RefineSection(Section):
 class QuantitySection(Section):
     """A variable or a column of the output."""
 
+    stand_ins = MappingProxyType({})
     coordinates: Annotated[tuple[Line, ...], Field(min_length=1)] | None = None
     """Names of the coordinates that it must have; when left out, a number, or the coordinates that the file has."""
     restrict: Restriction = "subset"
