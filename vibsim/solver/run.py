@@ -61,9 +61,16 @@ def _run(command: list[str], folder: Path) -> None:
     """Run a program without a shell, which ends with this process; what it prints goes where this process prints."""
     sys.stdout.flush()
     prepare = partial(end_with, os.getpid())
+    # the programs beside this Python come first, as in jobs of the workflow
+    places = (str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath))
     try:
         ended = subprocess.run(
-            command, cwd=folder, stdin=subprocess.DEVNULL, preexec_fn=prepare, check=False
+            command,
+            cwd=folder,
+            env=os.environ | {"PATH": os.pathsep.join(places)},
+            stdin=subprocess.DEVNULL,
+            preexec_fn=prepare,
+            check=False,
         )
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
