@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from shlex import quote
@@ -26,6 +27,8 @@ from vibsim.solver.verdicts import SolverResult, expected, judge, reason_of
 
 SCHEME = "solver"
 """In place of the name of a scheme, in results."""
+ORDER = "order"
+"""What a page compares errors with, also where the check does not ask for it."""
 SHOWN = ("values", "best_values")
 """Arrays of the decisive member, beside the table of levels of every one."""
 
@@ -202,6 +205,8 @@ def _of_check(found: CheckResults) -> dict[str, Variable]:
     for name, words in (("status", STATUSES), ("reason", REASON_NAMES)):
         codes = [words.index(getattr(result.verdict, name)) for result in by_member]
         add(name, ("case",), np.array(codes, dtype=np.int8), f"measured {name}", **flags(words))
+    orders = (result.verdict.order for result in by_member)
+    add(ORDER, ("case",), _floats(orders), SOLVER_FACTS["converges"][ORDER])
     for name, meaning in SOLVER_FACTS[found.check.kind].items():
         add(name, ("case",), _floats(result.facts[name] for result in by_member), meaning)
     for name, meaning in COLUMNS.items():
@@ -224,6 +229,10 @@ def _floats(entries: Iterable[float | None]) -> Floats:
     return np.array([np.nan if x is None else x for x in entries], dtype=np.float64)
 
 
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
 def _dim(id_: str, dim: str) -> str:
     return name_of(id_, f"at_{dim}")
 
@@ -238,7 +247,7 @@ def restored(
     member = int(found[name_of(id_, "member")])
     columns = {name: found[name_of(id_, f"level_{name}")][member].tolist() for name in COLUMNS}
     rows = zip(experiment.sizes[experiment.step], *columns.values(), strict=True)
-    known = [(h, *(None if x != x else x for x in entries)) for h, *entries in rows]
+    known = [(h, *map(_known, entries)) for h, *entries in rows]
     values, best = (name_of(id_, f"of_{name}") for name in SHOWN)
     dims = found.variable(values).dims[1:] if values in found else ()
     head = _dim(id_, "")
@@ -247,7 +256,7 @@ def restored(
         quantity=str(check.about),
         status=result["status"],
         reason=result["reason"],
-        order=facts.get("order"),
+        order=_known(float(found[name_of(id_, ORDER)][member])),
         order_low=facts.get("order_low"),
         order_high=facts.get("order_high"),
         h_used=tuple(facts.get("h_used") or ()),

@@ -7,12 +7,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from vibsim import store
 from vibsim.convergence import LadderVerdict
 from vibsim.core.record import Record
 from vibsim.experiment.solver import SolverExperiment, restore
 from vibsim.report import style
 from vibsim.report.figures import drawing
+from vibsim.report.figures.panels import Curve, stamp
 from vibsim.report.page import study
 from vibsim.report.page.cards import provenance_rows
 from vibsim.report.page.page import environment, replace_files
@@ -40,7 +43,8 @@ def write(
         card = _card(experiment, verdict, entry)
         cards.append(card)
         tables += [table for table in (card["table"], card["members"]) if table]
-        figures |= _files(card["picture"], verdict, formats, is_first=not figures)
+        figures |= dict(_thumbnail(verdict)) if not figures else {}
+        figures |= dict(_files(card["picture"], formats))
     replace_files(directory / "figures", figures)
     files: dict[str, bytes] = {}
     for table in tables:
@@ -71,10 +75,15 @@ def _card(
     card = study.card(
         entry["id"], verdict, entry["expected"], files if not experiment.sweep else ()
     )
-    card["table"] = replace(card["table"], name=f"levels_{entry['id']}")
-    members = _members(entry) if experiment.sweep else None
-    shown = replace(verdict, status=entry["status"], reason=entry["reason"])
-    return card | {"verdict": shown, "members": members}
+    caption = card["table"].caption
+    if experiment.sweep:
+        caption = f"Levels of member {entry['results'][0]['case']}{caption.removeprefix('Levels')}"
+    return card | {
+        "heading": f"{verdict.quantity}: {entry['expected']}",
+        "verdict": replace(verdict, status=entry["status"], reason=entry["reason"]),
+        "table": replace(card["table"], name=f"levels_{entry['id']}", caption=caption),
+        "members": _members(entry) if experiment.sweep else None,
+    }
 
 
 def _members(entry: Mapping[str, Any]) -> Table:
@@ -104,18 +113,25 @@ def _members(entry: Mapping[str, Any]) -> Table:
     return Table(f"members_{entry['id']}", caption, columns, rows)
 
 
-def _files(
-    picture: style.Picture, verdict: LadderVerdict, formats: Sequence[str], *, is_first: bool
-) -> Iterator[tuple[str, bytes]] | Any:
-    """Return the figure of a check as files; the first one is that of the index, too."""
-    found = {}
+def _files(picture: style.Picture, formats: Sequence[str]) -> Iterator[tuple[str, bytes]]:
+    """Yield the figure of a check as files."""
+    assert picture.figure is not None
     with style.applied():
-        text = drawing.svg(picture.figure, picture.name).encode() if picture.figure else b""
-        found[f"{picture.name}.svg"] = text
+        yield f"{picture.name}.svg", drawing.svg(picture.figure, picture.name).encode()
         for form in formats:
-            if form != "svg" and picture.figure:
-                found[f"{picture.name}.{form}"] = drawing.binary(picture.figure, form)
-    return found | ({"thumbnail.svg": text} if is_first else {})
+            if form != "svg":
+                yield f"{picture.name}.{form}", drawing.binary(picture.figure, form)
+
+
+def _thumbnail(verdict: LadderVerdict) -> Iterator[tuple[str, bytes]]:
+    """Yield the small figure of the index, errors or differences over the levels; nothing without two of them."""
+    found = [abs(level.error or level.difference or 0.0) for level in verdict.levels]
+    places = np.flatnonzero(found)
+    if len(places) > 1:
+        sizes = np.log10(np.array(found)[places])
+        with style.applied():
+            figure = stamp(places.astype(np.float64), [Curve("", sizes)])
+            yield "thumbnail.svg", drawing.svg(figure, "thumbnail").encode()
 
 
 def _setup(experiment: SolverExperiment) -> Iterator[tuple[str, str]]:

@@ -99,6 +99,7 @@ def card(name: str, verdict: LadderVerdict, asked: str, files: Sequence[str]) ->
         *([("Files" if len(files) > 1 else "File", ", ".join(files))] if files else []),
     ]
     return {
+        "heading": verdict.quantity,
         "verdict": verdict,
         "facts": rows,
         "table": _table(verdict),
