@@ -11,6 +11,8 @@ import yaml
 from jsonschema import Draft202012Validator
 
 from vibsim.cli import main
+from vibsim.core.errors import InputError
+from vibsim.experiment import Experiment
 from vibsim.experiment.schema.solver import schema
 from vibsim.experiment.solver import SolverExperiment, restore
 from vibsim.experiment.solver_reading import from_file
@@ -225,3 +227,8 @@ def test_the_schema_for_editors_accepts_and_refuses_the_same(heat: Path) -> None
         ("sweep:", "resources: {mem_mb: lots}\nsweep:"),
     ):
         assert not VALIDATOR.is_valid(yaml.safe_load(TEXT.replace(old, new))), new
+
+
+def test_an_experiment_of_vibsim_is_not_made_of_it(heat: Path) -> None:
+    with pytest.raises(InputError, match=r"heat\.yaml:2: solver: belongs to an experiment with a"):
+        Experiment.from_yaml(heat)

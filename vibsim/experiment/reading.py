@@ -31,6 +31,8 @@ from vibsim.experiment.yaml.parse import MAX_DEPTH, Source, read
 from vibsim.models import MODELS, Model
 from vibsim.schemes import SCHEMES, Scheme
 
+SOLVER = "solver"
+"""The key that only a file of `vibsim.experiment.solver_reading` has."""
 MAX_NAME = 100
 MAX_REPEATS = 20
 """Snakemake takes a name that ends in so many repetitions for a rule that feeds itself."""
@@ -45,6 +47,10 @@ def from_file(
 ) -> AnyExperiment:
     """Read the experiment file at `path`; see `vibsim.experiment.Experiment.from_yaml`."""
     source = read(path, list(Document.model_fields))
+    if (place := source.place((SOLVER,))) is not None:
+        rule = "belongs to an experiment with a solver of the user, which vibsim run makes"
+        hint = "in Python, vibsim.judge compares levels"
+        raise InputError([Fault(str(path), place.key_line, SOLVER, "", rule, hint)])
     return build(kind, source, collection or collection_of(path, configs), path.stem, path)
 
 

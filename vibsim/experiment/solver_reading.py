@@ -13,7 +13,7 @@ from vibsim.experiment.collection import collection_of
 from vibsim.experiment.data import Sweep
 from vibsim.experiment.experiment import Experiment
 from vibsim.experiment.faults import Report
-from vibsim.experiment.reading import build, check_name
+from vibsim.experiment.reading import SOLVER, build, check_name
 from vibsim.experiment.rules.checks import check_expect, check_ids, given_one
 from vibsim.experiment.rules.levels import rising_levels
 from vibsim.experiment.rules.size_limits import MAX_FILES
@@ -39,8 +39,6 @@ from vibsim.experiment.validation import read_document
 from vibsim.experiment.yaml.parse import Path_, Source, read
 from vibsim.formula import ExpressionError, constant, evaluate, parse
 
-MARK = "solver"
-"""The key that only such a file has."""
 _NAME = "must be a name of letters, digits and _"
 
 
@@ -48,7 +46,7 @@ def read_any(path: Path, collection: str) -> Experiment | SolverExperiment:
     """Read an experiment file of either kind; InputError with every fault of it."""
     keys = dict.fromkeys((*Document.model_fields, *SolverDocument.model_fields))
     source = read(path, list(keys))
-    if MARK in source.data:
+    if SOLVER in source.data:
         return read_solver(source, collection, path.stem, path)
     return build(Experiment, source, collection, path.stem, path)
 
@@ -255,13 +253,13 @@ def _solver(
     section: Any, names: Mapping[str, list[str]], *, has_level: bool, report: Report
 ) -> SolverSpec | None:
     """Return how levels are made; None where that is faulty."""
-    kind = None if section is None else given_one(section, KINDS, (MARK,), report)
+    kind = None if section is None else given_one(section, KINDS, (SOLVER,), report)
     if not kind:
         return None
     text = getattr(section, kind)
     if kind == "files" and section.inputs:
         rule = "belong to a command or a function: a file that is there is an input itself"
-        report.add((MARK, "inputs"), rule, at_key=True)
+        report.add((SOLVER, "inputs"), rule, at_key=True)
     if kind != "python":
         _check_template(kind, text, names, has_level, report)
     known: Kind = next(name for name in KINDS if name == kind)
@@ -272,7 +270,7 @@ def _check_template(
     kind: str, text: str, names: Mapping[str, list[str]], has_level: bool, report: Report
 ) -> None:
     """Check the placeholders of a command or of the path of a file."""
-    path = (MARK, kind)
+    path = (SOLVER, kind)
     try:
         used = list(placeholders(text))
     except ValueError:
@@ -338,7 +336,7 @@ def _check_files(experiment: SolverExperiment, report: Report) -> None:
         report.add(("sweep",), rule, at_key=True)
         return
     for i, name in enumerate(experiment.solver.inputs):
-        _check_file(experiment.folder / name, (MARK, "inputs", i), "", report)
+        _check_file(experiment.folder / name, (SOLVER, "inputs", i), "", report)
     if experiment.solver.kind != "files":
         return
     seen: dict[str, str] = {}
@@ -349,9 +347,9 @@ def _check_files(experiment: SolverExperiment, report: Report) -> None:
             where = ", ".join(f"{name} = {word}" for name, word in words.items())
             if seen.setdefault(path, where) != where:
                 rule = f"is the file of {seen[path]}, too"
-                report.add((MARK, "files"), f"{path} {rule}", f"of {where}")
+                report.add((SOLVER, "files"), f"{path} {rule}", f"of {where}")
                 continue
-            _check_file(experiment.folder / path, (MARK, "files"), f"{path}: ", report)
+            _check_file(experiment.folder / path, (SOLVER, "files"), f"{path}: ", report)
 
 
 def _check_file(path: Path, place: Path_, told: str, report: Report) -> None:

@@ -18,6 +18,7 @@ from vibsim.convergence.study.judgement import verdicts
 from vibsim.convergence.study.sentences import at_most, number
 from vibsim.core.errors import InputError, VibsimError
 from vibsim.core.vocabulary import REASON_NAMES, REASONS, STATUSES
+from vibsim.experiment.schema.checks import Expect
 from vibsim.experiment.schema.solver import SolverAccurateCheck, SolverCheck, SolverConvergesCheck
 from vibsim.experiment.solver import SolverExperiment
 
@@ -46,14 +47,14 @@ def judge(
     VibsimError
         Where the levels have no common points.
     """
-    converges = check if isinstance(check, SolverConvergesCheck) else None
+    promise = _promise(experiment, check)
     try:
         (found,) = verdicts(
             _steps(experiment),
             values,
             quantity=check.about,
-            order=converges.order if converges else None,
-            at_least=converges.at_least if converges else None,
+            order=promise.order if promise else None,
+            at_least=promise.at_least if promise else None,
             restrict=experiment.quantities[str(check.about)].restrict,
         )
     except InputError as error:
@@ -67,6 +68,17 @@ def judge(
     code = np.array([REASON_NAMES.index(found.reason)], dtype=np.int8)
     compared = STATUSES[int(as_expected(check.expect, code)[0])]
     return SolverResult(member, found, compared, facts, away)
+
+
+def _promise(experiment: SolverExperiment, check: SolverCheck) -> SolverConvergesCheck | None:
+    """Return the check that says which order is expected: of an accuracy another one of the same quantity, if any."""
+    if isinstance(check, SolverConvergesCheck):
+        return check
+    for other in experiment.checks:
+        is_ours = other.about == check.about and other.expect == Expect()
+        if is_ours and isinstance(other, SolverConvergesCheck):
+            return other
+    return None
 
 
 def _steps(experiment: SolverExperiment) -> dict[str, tuple[float, ...]]:
