@@ -74,10 +74,9 @@ def _solver_lines(item: Plan) -> Iterator[str]:
     yield _row(("level", *sizes))
     for level in item.levels:
         yield _row((str(level.level), *(f"{values[level.level]:g}" for values in sizes.values())))
-    memory = f", {size(first.memory)} of memory" if first.memory else ""
     minutes = f", {first.runtime} min" if first.runtime else ""
     threads = "1 thread" if first.threads == 1 else f"{first.threads} threads"
-    yield f"    each: {threads}{memory}{minutes}"
+    yield f"    each: {threads}, {size(first.memory)} of memory{minutes}"
 
 
 def _lines(item: Plan) -> Iterator[str]:

@@ -15,9 +15,8 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, PrivateAttr
 
-from vibsim.core.errors import Fault, InputError
 from vibsim.experiment.collection import ADHOC
-from vibsim.experiment.data import Sweep
+from vibsim.experiment.data import Sweep, check_member
 from vibsim.experiment.schema.fields import FrozenDict, Identifier, Section, Text
 from vibsim.experiment.schema.solver import (
     PLACE,
@@ -142,12 +141,7 @@ class SolverExperiment(Section):
         InputError
             Where there is no such member.
         """
-        if not 0 <= member < self.members:
-            there = (
-                "there is 1 member" if self.members == 1 else f"there are {self.members} members"
-            )
-            rule = f"a case must be from 0 to {self.members - 1}"
-            raise InputError([Fault(str(self.file or self.name), 0, "", str(member), rule, there)])
+        check_member(member, self.members, str(self.file or self.name))
         update = {
             "name": f"{self.name}_case_{member}",
             "sweep": None,

@@ -90,7 +90,7 @@ def _level(level: int, shards: tuple[ShardJob, ...], experiment: SolverExperimen
         bytes=0,
         seconds=0.0,
         shared=0.0,
-        memory=(experiment.resources.mem_mb or 0) * MEGABYTE,
+        memory=experiment.resources.mem_mb * MEGABYTE,
         shards=shards,
     )
 

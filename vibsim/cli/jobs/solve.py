@@ -46,7 +46,8 @@ def make(plan: Plan, level: int, job: ShardJob, path: Path, threads: int) -> Non
     from vibsim.solver import level_output, run
 
     experiment = restore(plan.content, plan.source_file)
-    words = ", ".join(f"{k} = {v}" for k, v in experiment.words(level, job.start).items())
+    values = {**experiment.sizes_of(level), **experiment.parameters_of(job.start)}
+    words = ", ".join(f"{name} = {value}" for name, value in values.items())
     member = "" if experiment.sweep is None else f", member {job.start}"
     name = f"{plan.key}, level {level}{member} ({words})"
     print(name, flush=True)
@@ -54,8 +55,8 @@ def make(plan: Plan, level: int, job: ShardJob, path: Path, threads: int) -> Non
     shutil.rmtree(work, ignore_errors=True)
     try:
         work.mkdir(parents=True)
-        values = run.make(experiment, level, job.start, work, threads)
-        record = level_output.record(experiment, level, job.start, values)
+        found = run.make(experiment, level, job.start, work, threads)
+        record = level_output.record(experiment, level, job.start, found)
         uses = {**solved(experiment, level, job.start), "level": level, "case": job.start}
         title = f"{plan.key}: level {level}"
         store.write(

@@ -146,7 +146,7 @@ else:
 class ResourcesSection(Section):
     """What the making of one level takes, for Snakemake."""
 
-    mem_mb: Count | None = None
+    mem_mb: Count = 1000
     """Megabytes of memory: so many jobs run at once as fit."""
     runtime: Count | None = None
     """Minutes, for clusters that want to know; here nothing ends a solver."""
