@@ -131,3 +131,12 @@ def test_levels_without_common_points_are_named(tmp_path: Path) -> None:
 
     with pytest.raises(VibsimError, match=r"member 0: u: level 3 \(from the coarsest\): has the"):
         analysis.judge_members(found, read)
+
+    def shifted(member: int) -> list[Any]:
+        points = [np.linspace(0.0, 1.0, n) for n in (5, 9, 17, 33)]
+        points[2] += 0.01
+        levels = [GridValues(x, ("x",), {"x": x}, "u") for x in points]
+        return [level_output.record(found, i, 0, {"u": v}) for i, v in enumerate(levels)]
+
+    with pytest.raises(VibsimError, match="u: level 2 beside level 0: x: coordinates: the levels"):
+        analysis.judge_members(found, shifted)

@@ -33,6 +33,8 @@ from vibsim.schemes import SCHEMES, Scheme
 
 SOLVER = "solver"
 """The key that only a file of `vibsim.experiment.solver_reading` has."""
+KEYS = (*Document.model_fields, SOLVER, "refine", "quantities")
+"""Keys of experiment files of both kinds."""
 MAX_NAME = 100
 MAX_REPEATS = 20
 """Snakemake takes a name that ends in so many repetitions for a rule that feeds itself."""

@@ -11,14 +11,12 @@ from typing import Any
 from vibsim.core.errors import nearest
 from vibsim.experiment.collection import collection_of
 from vibsim.experiment.data import Sweep
-from vibsim.experiment.experiment import Experiment
 from vibsim.experiment.faults import Report
-from vibsim.experiment.reading import SOLVER, build, check_name
+from vibsim.experiment.reading import KEYS, SOLVER, check_name
 from vibsim.experiment.rules.checks import check_expect, check_ids, given_one
 from vibsim.experiment.rules.levels import rising_levels
 from vibsim.experiment.rules.size_limits import MAX_FILES
 from vibsim.experiment.rules.sweep import SweepReader
-from vibsim.experiment.schema.document import Document
 from vibsim.experiment.schema.fields import Number, Text
 from vibsim.experiment.schema.solver import (
     KINDS,
@@ -42,22 +40,12 @@ from vibsim.formula import ExpressionError, constant, evaluate, parse
 _NAME = "must be a name of letters, digits and _"
 
 
-def read_any(path: Path, collection: str) -> Experiment | SolverExperiment:
-    """Read an experiment file of either kind; InputError with every fault of it."""
-    keys = dict.fromkeys((*Document.model_fields, *SolverDocument.model_fields))
-    source = read(path, list(keys))
-    if SOLVER in source.data:
-        return read_solver(source, collection, path.stem, path)
-    return build(Experiment, source, collection, path.stem, path)
-
-
 def from_file(path: Path) -> SolverExperiment:
     """Read the file of an experiment with a solver; InputError with every fault of it."""
-    source = read(path, list(SolverDocument.model_fields))
-    return read_solver(source, collection_of(path), path.stem, path)
+    return read_solver(read(path, KEYS), collection_of(path), path)
 
 
-def read_solver(source: Source, collection: str, name: str, file: Path) -> SolverExperiment:
+def read_solver(source: Source, collection: str, file: Path) -> SolverExperiment:
     """Validate what `source` holds and fill in every default.
 
     Raises
@@ -65,7 +53,7 @@ def read_solver(source: Source, collection: str, name: str, file: Path) -> Solve
     InputError
         With every fault of the file.
     """
-    report = Report(source)
+    report, name = Report(source), file.stem
     for what, text in (("experiment", name), ("collection", collection)):
         check_name(f"the name of the {what}, '{text}',", text, report)
     document = read_document(source, report, SolverDocument)

@@ -67,14 +67,20 @@ def load(choice: Choice, resolve: Resolver | None = None, *, cached: bool = Fals
 
 
 def _built(choice: Choice, resolve: Resolver | None) -> Plan:
-    from vibsim.experiment.solver import SolverExperiment
-    from vibsim.experiment.solver_reading import read_any
-    from vibsim.plan import build, solver_plan
+    from vibsim.experiment import Experiment, reading
+    from vibsim.experiment.yaml.parse import read
 
-    experiment = read_any(choice.file, choice.collection)
-    if isinstance(experiment, SolverExperiment):
-        wanted = experiment if choice.case is None else experiment.alone(choice.case)
-        return solver_plan.build(wanted)
+    source = read(choice.file, reading.KEYS)
+    if reading.SOLVER in source.data:
+        from vibsim.experiment.solver_reading import read_solver
+        from vibsim.plan import solver_plan
+
+        found = read_solver(source, choice.collection, choice.file)
+        return solver_plan.build(found if choice.case is None else found.alone(choice.case))
+    from vibsim.plan import build
+
+    stem = choice.file.stem
+    experiment = reading.build(Experiment, source, choice.collection, stem, choice.file)
     return build.build(_resolved(experiment, choice, resolve))
 
 

@@ -13,6 +13,7 @@ from vibsim.checks.accurate import is_known_order
 from vibsim.checks.outcome import as_expected, compared_reason
 from vibsim.checks.solver_facts import SOLVER_FACTS
 from vibsim.convergence import LadderVerdict
+from vibsim.convergence.study.common_points import common_values
 from vibsim.convergence.study.grid_values import GridValues
 from vibsim.convergence.study.judgement import verdicts
 from vibsim.convergence.study.sentences import at_most, number
@@ -48,6 +49,7 @@ def judge(
         Where the levels have no common points.
     """
     promise = _promise(experiment, check)
+    restrict = experiment.quantities[str(check.about)].restrict
     try:
         (found,) = verdicts(
             _steps(experiment),
@@ -55,11 +57,12 @@ def judge(
             quantity=check.about,
             order=promise.order if promise else None,
             at_least=promise.at_least if promise else None,
-            restrict=experiment.quantities[str(check.about)].restrict,
+            restrict=restrict,
         )
     except InputError as error:
         fault = error.faults[0]
-        parts = (str(check.about), fault.key, fault.value, fault.rule, fault.hint)
+        key = fault.key if fault.key.startswith("level") else _place(values, restrict) + fault.key
+        parts = (str(check.about), key, fault.value, fault.rule, fault.hint)
         raise VibsimError(": ".join(dict.fromkeys(filter(None, parts)))) from None
     if isinstance(check, SolverAccurateCheck):
         found, facts, away = _accuracy(check, found)
@@ -68,6 +71,16 @@ def judge(
     code = np.array([REASON_NAMES.index(found.reason)], dtype=np.int8)
     compared = STATUSES[int(as_expected(check.expect, code)[0])]
     return SolverResult(member, found, compared, facts, away)
+
+
+def _place(values: Sequence[GridValues], restrict: str) -> str:
+    """Name the first level that cannot be compared with the coarsest one; empty where each can."""
+    for level in range(1, len(values)):
+        try:
+            common_values([values[0], values[level]], restrict, None)
+        except InputError:
+            return f"level {level} beside level 0: "
+    return ""
 
 
 def _promise(experiment: SolverExperiment, check: SolverCheck) -> SolverConvergesCheck | None:
