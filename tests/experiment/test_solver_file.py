@@ -95,6 +95,7 @@ REFUSED = [
         ["5: refine.h: 1/2**lvel: must be a formula in level (unknown name 'lvel'): did you"],
     ),
     ("h: [0.05", "levels: {from: 4, to: 3}, h: [0.05", ["5: refine.levels.to: 3: must be at"]),
+    ("h: [0.05, 0.1, 0.02]", "h: 1, levels: [a]", ["5: refine.h: 1: must be a list"]),
     ("T: {coordinates: [x, t]}", "T: {coordinates: [x, x]}", ["6: quantities.T.coordinates[1]"]),
     ("T: {coordinates: [x, t]}", "T: {coordinates: [x, h]}", ["is the name of a size, too"]),
     ("T: {coordinates", "kappa: {coordinates", ["is the name of a swept parameter, too"]),
@@ -128,6 +129,13 @@ def test_faults_of_all_sections_are_told_at_once(
     file = changed(heat, ("{h}", "{g}"), ("0.02", "-1"), ("flux: {}", "u: {x: 1}"), ("order", "o"))
     keys = {line.split(": ")[1] for line in faults(file, capsys)}
     assert {"solver.command", "refine.h[2]", "quantities.u.x", "checks[0].o"} <= keys
+
+
+def test_nothing_more_is_said_of_a_formula_whose_levels_are_faulty(
+    heat: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = faults(changed(heat, ("[0.05, 0.1, 0.02]", "1/2**level, levels: [a]")), capsys)
+    assert found == ["5: refine.levels[0]: a: must be a whole number"]
 
 
 def test_files_that_are_to_be_there_must_be(heat: Path, capsys: pytest.CaptureFixture[str]) -> None:

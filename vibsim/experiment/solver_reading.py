@@ -103,13 +103,12 @@ def _sizes(section: Any, report: Report) -> tuple[tuple[int, ...], dict[str, tup
     if not section.sizes:
         report.add(("refine",), "must name a step size", "e.g. h: [0.1, 0.05, 0.025]")
     found: dict[str, tuple[Any, ...]] = {}
+    raw = report.source.data["refine"]
     for name, written in section.sizes.items():
-        path: Path_ = ("refine", name)
         if isinstance(written, str):
-            values = _by_formula(path, written, numbers, section.levels is not None, report)
+            values = _by_formula(("refine", name), written, numbers, "levels" in raw, report)
         else:
-            raw = report.source.data["refine"][name]
-            values = _as_written(raw, written)
+            values = tuple(map(int, written)) if _is_whole(raw[name]) else written
         if values:
             found[name] = values
     count = len(numbers) or len(next(iter(found.values()), ()))
@@ -127,12 +126,6 @@ def _sizes(section: Any, report: Report) -> tuple[tuple[int, ...], dict[str, tup
         elif size in next(iter(found.values()))[:i]:
             report.add(path, "a step size must not be repeated", value=size)
     return numbers, found
-
-
-def _as_written(raw: Sequence[Any], values: Sequence[Any]) -> tuple[Any, ...]:
-    """Return numbers as whole ones where all are written so."""
-    is_whole = all(isinstance(entry, int) and not isinstance(entry, bool) for entry in raw)
-    return tuple(map(int, values)) if is_whole else tuple(values)
 
 
 def _by_formula(
@@ -198,6 +191,7 @@ def _is_text(written: Any) -> bool:
 
 
 def _is_whole(written: Any) -> bool:
+    """Say whether all numbers of a list, or of a range, are written as whole ones."""
     if isinstance(written, Mapping):
         written = written.get("range")
     is_list = isinstance(written, list)
@@ -205,6 +199,10 @@ def _is_whole(written: Any) -> bool:
 
 
 # ---- names and placeholders
+
+
+def _is_name(text: str) -> bool:
+    return text.isidentifier() and text.isascii()
 
 
 def _check_names(
@@ -218,7 +216,7 @@ def _check_names(
         *((("quantities", name), name, "a quantity") for name in quantities),
     ]
     for path, name, what in places:
-        if not (name.isidentifier() and name.isascii()):
+        if not _is_name(name):
             report.add(path, _NAME, value=name, at_key=True)
         elif name in RESERVED:
             rule = "means something else here: " + ", ".join(RESERVED)
@@ -230,7 +228,7 @@ def _check_names(
             path = ("quantities", name, "coordinates", i)
             if coordinate in quantity.coordinates[:i]:
                 report.add(path, "a coordinate must not be repeated", value=coordinate)
-            elif not (coordinate.isidentifier() and coordinate.isascii()):
+            elif not _is_name(coordinate):
                 report.add(path, _NAME, value=coordinate)
             elif coordinate in taken or coordinate in RESERVED:
                 what = taken.get(coordinate, "something else")
