@@ -205,7 +205,7 @@ def test_a_summary_states_facts_of_every_result(made: Study) -> None:
     assert check["text"].startswith("All 2 members passed. The hardest is member 1 (rate = 1.0).")
     worst = check["results"][0]
     assert (worst["case"], worst["values"]) == (1, {"rate": 1.0})
-    assert worst["command"] == "vibsim run command.yaml@1"
+    assert worst["command"] == "vibsim run command.yaml@1 --allow-commands"
 
 
 def test_levels_are_stored_with_sizes_parameters_and_provenance(made: Study) -> None:

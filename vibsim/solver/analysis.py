@@ -162,9 +162,10 @@ def _result(experiment: SolverExperiment, result: SolverResult) -> dict[str, Any
     }
     if experiment.sweep is None:
         return found
+    flag = "" if experiment.solver.kind == "files" else " --allow-commands"
     return found | {
         "values": experiment.parameters_of(result.member),
-        "command": f"vibsim run {quote(f'{experiment.word}@{result.member}')}",
+        "command": f"vibsim run {quote(f'{experiment.word}@{result.member}')}{flag}",
     }
 
 
