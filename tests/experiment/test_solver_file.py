@@ -147,6 +147,8 @@ def test_files_that_are_to_be_there_must_be(heat: Path, capsys: pytest.CaptureFi
     assert "run_0.02_1.nc: there is no such file" in "\n".join(found)
     heat.write_text(text)
     assert any("belong to a command" in line for line in faults(heat, capsys))
+    heat.write_text(text.replace("_{kappa}.nc", "_{kappa}").replace("  inputs: [heat]\n", ""))
+    assert any("must end with .csv or .nc" in line for line in faults(heat, capsys))
     # the same file twice would be two levels that are equal
     text = TEXT.replace(f"command: {COMMAND}", "files: run{level}_{kappa}.csv")
     text = text.replace("  inputs: [heat]\n", "").replace("h: [", "levels: [1, 2, 3], h: [")

@@ -119,6 +119,19 @@ def test_a_row_alone_is_a_number_and_several_are_a_series(tmp_path: Path) -> Non
     assert np.isnan(table(tmp_path, "flux\nnan\n", wanted)["flux"].values)
 
 
+def test_what_may_be_no_table_is_not_shown(tmp_path: Path) -> None:
+    """An experiment file of somebody else may name a link to anything."""
+    wanted = {"flux": WANTED["flux"]}
+    for text in ("BEGIN PRIVATE KEY\nsecret,hidden\n", "flux,x\nsecret,1\n"):
+        (tmp_path / "link.csv").write_text(text)
+        with pytest.raises(VibsimError) as refused:
+            level_output.read(tmp_path / "link.csv", wanted, is_shown=False)
+        assert "flux" in str(refused.value)
+        assert not {"PRIVATE", "secret", "hidden"} & set(
+            str(refused.value).replace(":", "").split()
+        )
+
+
 @pytest.mark.parametrize(
     ("text", "rule"),
     [

@@ -33,6 +33,7 @@ from vibsim.experiment.solver import (
     SolverSpec,
     placeholders,
 )
+from vibsim.experiment.tables.file import ENDINGS
 from vibsim.experiment.validation import read_document
 from vibsim.experiment.yaml.parse import Path_, Source, read
 from vibsim.formula import ExpressionError, constant, evaluate, parse
@@ -270,6 +271,8 @@ def _check_template(
         return
     if is_empty:
         report.add(path, "must name a program", value=text)
+    if kind == "files" and not text.lower().endswith(ENDINGS):
+        report.add(path, f"must end with {' or '.join(ENDINGS)}", value=text)
     levels = [*names["sizes"], *(["level"] if has_level else [])]
     known = [*levels, *names["sweep"]]
     known += [*OUTPUTS, "threads"] if kind == "command" else []

@@ -26,8 +26,11 @@ EPSILON = "epsilon"
 """Attribute with the distance of neighbouring numbers near 1 in the precision that values were computed in."""
 
 
-def read(path: Path, quantities: Quantities) -> dict[str, GridValues]:
-    """Return the quantities in a netCDF or CSV file; VibsimError where it does not have them as they are wanted."""
+def read(path: Path, quantities: Quantities, *, is_shown: bool = True) -> dict[str, GridValues]:
+    """Return the quantities in a netCDF or CSV file; VibsimError where it does not have them as they are wanted.
+
+    `is_shown`: whether messages may show what is in a table; see `vibsim.solver.level_tables.columns`.
+    """
     if level_files.is_netcdf(path):
         with level_files.opened(path) as dataset:
             return {
@@ -36,7 +39,7 @@ def read(path: Path, quantities: Quantities) -> dict[str, GridValues]:
                 )
                 for name, row in quantities.items()
             }
-    return _from_table(path, quantities)
+    return _from_table(path, quantities, is_shown)
 
 
 def from_dataset(dataset: Any, quantities: Quantities) -> dict[str, GridValues]:
@@ -60,11 +63,11 @@ def from_dataset(dataset: Any, quantities: Quantities) -> dict[str, GridValues]:
     return found
 
 
-def _from_table(path: Path, quantities: Quantities) -> dict[str, GridValues]:
+def _from_table(path: Path, quantities: Quantities, is_shown: bool) -> dict[str, GridValues]:
     """Return the quantities in the columns of a table: a row for each point, or a single one."""
     columns = [name for row in quantities.values() for name in row.coordinates or ()]
     names = list(dict.fromkeys([*columns, *quantities]))
-    table, _ = level_tables.columns(path, names, MOST_LINES)
+    table, _ = level_tables.columns(path, names, MOST_LINES, is_shown=is_shown)
     if not len(table[names[0]]):
         raise VibsimError(f"{path}: has no row below the names of its columns")
     return {

@@ -48,7 +48,7 @@ def read(path: Path, size: str, quantities: Sequence[str]) -> list[Study]:
     file = str(path)
     names: list[str] = []
 
-    def choose(known: list[str]) -> list[str]:
+    def choose(known: list[str], _: bool) -> list[str]:
         names.extend(_chosen(file, known, size, quantities))
         return [size, *names]
 
@@ -60,33 +60,42 @@ def read(path: Path, size: str, quantities: Sequence[str]) -> list[Study]:
     return [Study(name, {size: h.tolist()}, column.tolist(), [file]) for name, column in table]
 
 
-def columns(path: Path, names: Sequence[str], most: int) -> tuple[dict[str, Floats], Integers]:
-    """Return the columns `names` of a table of `most` rows at most, and the line of every row; InputError as `read`."""
+def columns(
+    path: Path, names: Sequence[str], most: int, *, is_shown: bool
+) -> tuple[dict[str, Floats], Integers]:
+    """Return the columns `names` of a table of `most` rows at most, and the line of every row; InputError as `read`.
 
-    def choose(known: list[str]) -> Sequence[str]:
+    Where the file may be anything (`is_shown` is false), no message shows what is in it but numbers.
+    """
+
+    def choose(known: list[str], is_table: bool) -> Sequence[str]:
         for name in names:
             if known.count(name) != 1:
                 what = "more than one such column" if name in known else "no such column"
-                hint = "" if name in known else _hint(name, known)
+                hint = _hint(name, known) if name not in known and (is_shown or is_table) else ""
                 raise InputError([Fault(str(path), 0, "", name, f"the table has {what}", hint)])
         return names
 
-    found, lines = _read(path, choose, most)
+    found, lines = _read(path, choose, most, is_shown=is_shown)
     return dict(zip(names, found, strict=True)), lines
 
 
 def _read(
-    path: Path, choose: Callable[[list[str]], Sequence[str]], most: int
+    path: Path,
+    choose: Callable[[list[str], bool], Sequence[str]],
+    most: int,
+    *,
+    is_shown: bool = True,
 ) -> tuple[list[Floats], Integers]:
     """Return the columns that `choose` names of those that there are, and the line of every row."""
 
-    def numbers(known: list[str], _: bool) -> list[int]:
-        return [known.index(name) for name in choose(known)]
+    def numbers(known: list[str], is_table: bool) -> list[int]:
+        return [known.index(name) for name in choose(known, is_table)]
 
     try:
         return csv_text.read(_content(path), numbers, most)
     except csv_text.CsvError as error:
-        cell = _printable(error.cell)
+        cell = _printable(error.cell) if is_shown or csv_text.is_shown(error.cell) else ""
         fault = Fault(str(path), error.line, error.column, cell, error.rule, error.hint)
         raise InputError([fault]) from None
 

@@ -43,7 +43,9 @@ def make(
     """
     kind, quantities = experiment.solver.kind, experiment.quantities
     if kind == "files":
-        return level_output.read(experiment.folder / experiment.path(level, member), quantities)
+        path = experiment.folder / experiment.path(level, member)
+        # nobody has looked at the file, which may be a link to anything
+        return level_output.read(path, quantities, is_shown=False)
     if kind == "python":
         return level_output.from_dataset(_called(experiment, level, member), quantities)
     files = {name: str(place / (name if "." in name else f"{name}.nc")) for name in OUTPUTS}
