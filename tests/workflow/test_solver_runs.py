@@ -416,15 +416,16 @@ def test_a_solver_ends_with_the_run_that_started_it(study: Study) -> None:
                 found.append(int(path.parent.name))
         return found
 
-    deadline = time.monotonic() + 60
-    while not solvers() and time.monotonic() < deadline:
-        time.sleep(0.1)
-    assert solvers()
+    def wait_until(wanted: bool) -> None:
+        deadline = time.monotonic() + 60
+        while bool(solvers()) != wanted and time.monotonic() < deadline:
+            time.sleep(0.1)
+        assert bool(solvers()) == wanted
+
+    wait_until(True)
     os.killpg(child, signal.SIGKILL)
     os.waitpid(child, 0)
-    while solvers() and time.monotonic() < deadline:
-        time.sleep(0.1)
-    assert not solvers()
+    wait_until(False)
 
 
 def test_a_plan_shows_sizes_and_resources(made: Study, capsys: pytest.CaptureFixture[str]) -> None:
