@@ -4,15 +4,15 @@ from pathlib import Path
 from shlex import quote
 
 from vibsim.cli.run.lock import hold
-from vibsim.cli.results_folder import check
-from vibsim.cli.chosen_plans import resolve
+from vibsim.cli.workflow import names_of
 from vibsim.cli.run.supervise import children_end_with_this
-from vibsim.plan import Names
 
 root = Path(workflow.basedir)
 results = config.get("results", root / "results")
-names = Names.of(config.get("experiments", []), results, root, resolve)
-check(names.results, names.plans)
+# What allows programs of users to run is read from the command line alone, never from a file.
+names = names_of(
+    config.get("experiments", []), results, root, workflow.config_settings.config
+)
 
 
 # Jobs run the vibsim that stands beside this Python, whatever else is installed.

@@ -14,10 +14,11 @@ from typing import Any
 
 from vibsim.analysis import summary_schema
 from vibsim.convergence.study import verdict_schema
-from vibsim.experiment.schema import document
+from vibsim.experiment.schema import document, solver
 
 SCHEMAS: Mapping[str, Callable[[], dict[str, Any]]] = {
     "experiment": document.schema,
+    "solver": solver.schema,
     "summary": summary_schema.schema,
     "verdict": verdict_schema.schema,
 }

@@ -129,6 +129,12 @@ ALL = {*SIMULATIONS, "analyse", "extrapolate", "report"}
         ("cli/jobs/extrapolate.py", {"extrapolate"}),
         ("cli/jobs/report.py", {"report"}),
         ("cli/jobs/common.py", ALL),
+        # of experiments with a solver of the user alone
+        *(
+            (f"{name}.py", set())
+            for name in ("solver/run", "solver/analysis", "experiment/solver", "cli/jobs/solve")
+        ),
+        ("report/page/solver.py", set()),
         ("cli/run/command.py", set()),
         ("cli/arguments.py", set()),
     ],
@@ -142,6 +148,25 @@ def test_a_changed_module_changes_what_can_run_it(
     after = digests()
     file.write_bytes(content)
     assert {name for name in before if before[name] != after[name]} == {*touched, "everything"}
+
+
+def test_the_analysis_of_a_solver_runs_what_its_digest_covers(tmp_path: Path) -> None:
+    file = tmp_path / "files.yaml"
+    file.write_text(
+        "title: files\nsolver: {files: 'u_{h}.csv'}\nrefine: {h: [0.5, 0.25, 0.125]}\n"
+        "quantities: {u: {}}\n"
+    )
+    for h in (0.5, 0.25, 0.125):
+        (tmp_path / f"u_{h}.csv").write_text(f"u\n{1 + h * h}\n")
+    common = ("--results", tmp_path / "results")
+    ran_by("simulate", file, "--level", 0, 1, 2, *common)
+    # the code of vibsim is no part of the digest of a level
+    assert "vibsim.solver.run" not in covered("analyse")
+    found = ran_by("analyse", file, *common)
+    assert found <= code_digest.reached("vibsim.cli.jobs.judge_levels")
+    assert {"vibsim.solver.analysis", "vibsim.convergence.assessment"} <= found
+    page = code_digest.reached("vibsim.report.page.solver") | covered("report")
+    assert ran_by("report", file, *common) <= page
 
 
 def test_another_entry_under_the_same_name_changes_the_simulation(

@@ -13,6 +13,7 @@ import numpy as np
 from vibsim.checks.fields import MEMBERS, Field, stated
 from vibsim.checks.kinds import KINDS
 from vibsim.checks.order import BESIDE
+from vibsim.checks.solver_facts import LEVELS, SOLVER_FACTS
 from vibsim.checks.tolerance import BOUND
 from vibsim.core.vocabulary import BY_TOLERANCE, FORMAT, REASON_NAMES, STATUSES
 
@@ -56,6 +57,12 @@ def schema() -> dict[str, Any]:
         facts.append(_object(of_kind, title=f"facts of a check `{kind}`"))
     reached = {"error_bound": _fact(BOUND), "state": TEXT}
     facts.append(_object(reached, title=f"facts of the check `{BY_TOLERANCE}`"))
+    for kind, meanings in SOLVER_FACTS.items():
+        of_kind = {name: NUMBER | {"description": text} for name, text in meanings.items()}
+        if kind == "converges":
+            several = {"type": ["array", "null"], "items": {"type": "number"}}
+            of_kind |= {name: several | {"description": text} for name, text in LEVELS.items()}
+        facts.append(_object(of_kind, title=f"facts of a check `{kind}` on a solver of the user"))
     member = {"values": {"type": "object"}, "command": TEXT}
     result = {
         "scheme": TEXT,

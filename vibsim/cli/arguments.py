@@ -55,12 +55,17 @@ def _commands() -> Iterator[tuple[str, str, str, Sequence[_Row]]]:
     verify = (
         "compare every result with its digest, also where size, time and inode are as they were"
     )
+    text = (
+        "run commands and functions that experiment files name (`solver:`); trust the files first"
+    )
+    allow = _flag("--allow-commands", text)
     options: tuple[_Row, ...] = (
         results,
         _row("experiments", _word, "EXPERIMENT", _NAMES, nargs="*"),
         _row("--cores", _positive, "N", "jobs at once (default: all cores)"),
         _flag("--dry-run", "show what would run and why"),
         _flag("--verify", verify),
+        allow,
         _flag("--json", "print the outcome as JSON"),
     )
     yield "run", "run.command", "Run experiments and show every verdict.", options
@@ -97,6 +102,7 @@ def _commands() -> Iterator[tuple[str, str, str, Sequence[_Row]]]:
         _row("--level", int, "L", several, nargs="+", required=True),
         _row("--shard", int, "K", "range of members (from 0)", default=0),
         _row("--out", _path, "FILE", place),
+        allow,
     )
     yield "simulate", "jobs.simulate", "Simulate levels of an experiment.", options
     text = "Compare the levels of an experiment: convergence.nc and summary.json."

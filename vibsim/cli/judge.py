@@ -11,10 +11,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vibsim.cli import level_tables
-from vibsim.cli.level_tables import Study
 from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.core.vocabulary import FORMAT, worst
+from vibsim.solver import level_tables
+from vibsim.solver.level_tables import Study
 
 if TYPE_CHECKING:
     from vibsim.convergence import LadderVerdict
@@ -52,7 +52,7 @@ def _refuse(key: str, value: str, rule: str, hint: str = "") -> None:
 
 def _studies(options: Namespace) -> list[Study]:
     """Read what is to be judged: one table, or netCDF files."""
-    from vibsim.cli import level_files
+    from vibsim.solver import level_files
 
     paths: list[Path] = options.files
     quantities = options.quantity or []

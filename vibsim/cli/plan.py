@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import sys
 from argparse import Namespace
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -66,7 +66,23 @@ def _members(item: Plan) -> str:
     return "1 member" if item.cases == 1 else f"{item.cases} members"
 
 
+def _solver_lines(item: Plan) -> Iterator[str]:
+    """Yield what is known of a solver of the user: its levels, and what each of them is to be given."""
+    jobs, first = len(item.batches), item.batches[0]
+    sizes: Mapping[str, Sequence[float]] = item.content["sizes"]
+    yield f"{item.key}: {_members(item)}, {jobs} jobs of {item.content['solver']['text']}"
+    yield _row(("level", *sizes))
+    for level in item.levels:
+        yield _row((str(level.level), *(f"{values[level.level]:g}" for values in sizes.values())))
+    minutes = f", {first.runtime} min" if first.runtime else ""
+    threads = "1 thread" if first.threads == 1 else f"{first.threads} threads"
+    yield f"    each: {threads}, {size(first.memory)} of memory{minutes}"
+
+
 def _lines(item: Plan) -> Iterator[str]:
+    if item.has_solver:
+        yield from _solver_lines(item)
+        return
     schemes = "scheme" if len(item.schemes) == 1 else "schemes"
     yield f"{item.key}: {_members(item)}, {schemes} {', '.join(item.schemes)}"
     yield _row(_HEAD)
@@ -83,7 +99,8 @@ def _lines(item: Plan) -> Iterator[str]:
 
 
 def _row(cells: Sequence[str]) -> str:
-    return "".join(cell.rjust(width) for cell, width in zip(cells, _WIDTHS, strict=True))
+    widths = [*_WIDTHS, *_WIDTHS[-1:] * len(cells)]
+    return "".join(cell.rjust(width) for cell, width in zip(cells, widths, strict=False))
 
 
 def _sum(plans: Sequence[Plan], results: Path) -> str:

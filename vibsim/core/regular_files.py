@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
 import stat
+from io import BufferedReader
 from pathlib import Path
-from typing import BinaryIO
 
 
 def descriptor(path: Path | str, flags: int, *, folder: int | None = None) -> int:
@@ -41,6 +42,12 @@ def append(path: Path, line: bytes) -> None:
         os.close(found)
 
 
-def reading(path: Path) -> BinaryIO:
+def digest(path: Path) -> str:
+    """Return the SHA-256 of the content of a file of any size; OSError where it cannot be read."""
+    with reading(path) as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def reading(path: Path) -> BufferedReader:
     """Open a file to be read; see `descriptor`."""
     return os.fdopen(descriptor(path, os.O_RDONLY), "rb")

@@ -42,7 +42,8 @@ SERIES = (*MEMBER, "t")
 """Dimensions of a series over the stored times."""
 OF_LEVEL = (*MEMBER, "level")
 """Dimensions of a number of each level."""
-RESTRICTIONS = ("subset", "mean", "linear", "cubic")
+Restriction = Literal["subset", "mean", "linear", "cubic"]
+RESTRICTIONS: tuple[Restriction, ...] = get_args(Restriction)
 """Ways to bring the levels of a study to common points."""
 ORDER_TOLERANCE = 0.1
 """How far from the promised order a measured one may be where a check does not say."""

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import AfterValidator, Field, PrivateAttr, StrictBool
 
-from vibsim.core.errors import VibsimError
+from vibsim.core.errors import Fault, InputError, VibsimError
 from vibsim.experiment.collection import ADHOC
 from vibsim.experiment.schema.checks import Check, ConservesCheck, EqualCheck, ValueCheck
 from vibsim.experiment.schema.fields import (
@@ -304,6 +304,14 @@ class ExperimentSpec(Section):
 
 AnyExperiment = TypeVar("AnyExperiment", bound=ExperimentSpec)
 """The class of an experiment, which stays the same where one is made of another."""
+
+
+def check_member(case: int, members: int, name: str) -> None:
+    """Refuse a member that an experiment has not, which is read from a file called `name`."""
+    if not 0 <= case < members:
+        there = "there is 1 member" if members == 1 else f"there are {members} members"
+        rule = f"a case must be from 0 to {members - 1}"
+        raise InputError([Fault(name, 0, "", str(case), rule, there)])
 
 
 def schemes_of(experiment: ExperimentSpec, check: Check) -> tuple[int, ...]:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
-from vibsim.core.errors import Fault, InputError
-from vibsim.experiment.data import AnyExperiment, SchemeSpec, Sweep
+from vibsim.experiment.data import AnyExperiment, SchemeSpec, Sweep, check_member
 from vibsim.experiment.faults import Report
 from vibsim.experiment.rules import size_limits
 from vibsim.experiment.rules.checks import check_published, finish_checks
@@ -42,12 +41,7 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
     InputError
         Where there is no such member.
     """
-    members = experiment.members
-    if not 0 <= case < members:
-        there = "there is 1 member" if members == 1 else f"there are {members} members"
-        name = str(experiment.file or experiment.name)
-        rule = f"a case must be from 0 to {members - 1}"
-        raise InputError([Fault(name, 0, "", str(case), rule, there)])
+    check_member(case, experiment.members, str(experiment.file or experiment.name))
     swept = {key: column[0].item() for key, column in columns(experiment, case, case + 1).items()}
     parameters = _filled(swept, "model", experiment.model.parameters)
     # a term that is 0 for this member alone stays, and with it every bit

@@ -31,6 +31,10 @@ from vibsim.experiment.yaml.parse import MAX_DEPTH, Source, read
 from vibsim.models import MODELS, Model
 from vibsim.schemes import SCHEMES, Scheme
 
+SOLVER = "solver"
+"""The key that only a file of `vibsim.experiment.solver_reading` has."""
+KEYS = (*Document.model_fields, SOLVER, "refine", "quantities")
+"""Keys of experiment files of both kinds."""
 MAX_NAME = 100
 MAX_REPEATS = 20
 """Snakemake takes a name that ends in so many repetitions for a rule that feeds itself."""
@@ -45,6 +49,10 @@ def from_file(
 ) -> AnyExperiment:
     """Read the experiment file at `path`; see `vibsim.experiment.Experiment.from_yaml`."""
     source = read(path, list(Document.model_fields))
+    if (place := source.place((SOLVER,))) is not None:
+        rule = "belongs to an experiment with a solver of the user, which vibsim run makes"
+        hint = "in Python, vibsim.judge compares levels"
+        raise InputError([Fault(str(path), place.key_line, SOLVER, "", rule, hint)])
     return build(kind, source, collection or collection_of(path, configs), path.stem, path)
 
 
@@ -119,7 +127,7 @@ def build(
     """
     report = Report(source, kinds)
     for what, text in (("experiment", name), ("collection", collection)):
-        _check_name(f"the name of the {what}, '{shorten(text)}',", text, report)
+        check_name(f"the name of the {what}, '{shorten(text)}',", text, report)
     document = read_document(source, report)
     swept = sorted(set(_keys(source.data.get("sweep"))))
     # a model section with a fault elsewhere still names its model
@@ -197,7 +205,8 @@ def build(
     return members.update_tables(experiment)
 
 
-def _check_name(what: str, text: str, report: Report) -> None:
+def check_name(what: str, text: str, report: Report) -> None:
+    """Note what is wrong with the name of an experiment or a collection, which `what` says."""
     if not re.fullmatch(IDENTIFIER, text):
         report.add((), f"{what} must consist of a to z, 0 to 9 and _")
     elif len(text) > MAX_NAME:

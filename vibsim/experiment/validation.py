@@ -23,19 +23,22 @@ _FAULTY: Any = object()
 """In place of a value that is left out."""
 
 
-def read_document(source: Source, report: Report) -> Any:
+def read_document(source: Source, report: Report, kind: type[Section] = Document) -> Any:
     """Return the content of a file, and note the faults of its values.
 
     Returns
     -------
     Document
-        Without what is faulty. A section that cannot be left out is then None, and so is an entry of `schemes`,
-        `checks` and `published`; of a check and of a sweep, what has no fault is kept (`Section.stand_ins`).
+        Or another `kind`, in which no number has a unit. It is without what is faulty. A section that cannot be left
+        out is then None, and so is an entry of `schemes`, `checks` and `published`; of a check and of a sweep, what
+        has no fault is kept (`Section.stand_ins`).
     """
-    fields = Document.model_fields
+    fields = kind.model_fields
     # a section without content is one that is left out, where it may be
     optional = {key for key, field in fields.items() if not field.is_required()}
     data = {k: v for k, v in source.data.items() if v is not None or k not in optional}
+    if kind is not Document:
+        return _Reader(source, report, None).section((), data, kind)
     units = Units(data, report)
     if isinstance(data.get("units"), dict):
         data["units"] = units.defined
@@ -50,7 +53,7 @@ def read_value(path: Path_, written: Any, annotation: Any, report: Report) -> An
 
 
 class _Reader:
-    def __init__(self, source: Source, report: Report, units: Units) -> None:
+    def __init__(self, source: Source, report: Report, units: Units | None) -> None:
         self.source, self.report, self.units = source, report, units
 
     def section(self, path: Path_, written: Mapping[str, Any], kind: type[Section]) -> Any:
@@ -103,7 +106,9 @@ class _Reader:
 
     def single(self, path: Path_, written: Any, form: _Form, keeps_rest: bool) -> Any:
         """Return a value that is no section and holds none."""
-        written, refused = self.units.plain(path, self._as_printed(path, written))
+        written, refused = self._as_printed(path, written), set[str | int]()
+        if self.units is not None:
+            written, refused = self.units.plain(path, written)
         if path in self.report.faulty:
             return _FAULTY
         try:

@@ -50,10 +50,10 @@ def build(experiment: Experiment) -> Plan:
     groups, trajectories = _groups(levels), experiment.trajectories
     loads = [load_of(experiment, level) for level in experiment.levels]
     made = {"levels": [[shard.digest for shard in level.shards] for level in levels]}
-    analysis = _job("analyse", in_numbers(analysed(content)), made)
+    analysis = job_digest("analyse", in_numbers(analysed(content)), made)
     extrapolation = ""
     if experiment.output == "best":
-        extrapolation = _job("extrapolate", in_numbers(extrapolated(content)), made)
+        extrapolation = job_digest("extrapolate", in_numbers(extrapolated(content)), made)
     return Plan(
         collection=experiment.collection,
         name=experiment.name,
@@ -71,7 +71,7 @@ def build(experiment: Experiment) -> Plan:
         analysis_memory=analysis_memory(loads, experiment.members),
         analysis_bytes=analysis_disk(loads, experiment.members, is_bounded(experiment)),
         extrapolation=extrapolation,
-        report=_job("report", content, {"analysis": analysis}, DRAWING),
+        report=job_digest("report", content, {"analysis": analysis}, DRAWING),
         content=content,
         versions={**versions(NUMERICAL), **_versions_of(packages)},
         inputs=tuple((t.file, t.content) for t in experiment.model.tables.values()),
@@ -79,20 +79,24 @@ def build(experiment: Experiment) -> Plan:
     )
 
 
-def _job(
+def job_digest(
     name: str,
     content: Mapping[str, Any],
     before: Mapping[str, Any],
     libraries: tuple[str, ...] = NUMERICAL,
+    home: str = "vibsim.cli.jobs",
 ) -> str:
-    """Return the digest of a job that runs after the simulation: what it uses, and the digests of the jobs before."""
-    own = {"job": name, "experiment": content, "code": _code(name)}
+    """Return the digest of a job that runs after the simulation: what it uses, and the digests of the jobs before.
+
+    Its code is that of the module `name` in the package `home`.
+    """
+    own = {"job": name, "experiment": content, "code": _code(name, home)}
     return digest_of({**own, **before, "versions": versions(libraries)})
 
 
 @cache
-def _code(command: str) -> str:
-    return code_digest.used_by(f"vibsim.cli.jobs.{command}")
+def _code(command: str, home: str = "vibsim.cli.jobs") -> str:
+    return code_digest.used_by(f"{home}.{command}")
 
 
 @cache

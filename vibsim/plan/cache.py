@@ -13,9 +13,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from vibsim.core import private_cache
+from vibsim.core import private_cache, regular_files
 from vibsim.core.errors import Fault, InputError, VibsimError
-from vibsim.experiment.yaml.file_content import MOST_BYTES, content_of, read_bytes
+from vibsim.experiment.yaml.file_content import read_bytes
 from vibsim.plan import code_digest
 from vibsim.plan.choose import Choice
 from vibsim.plan.jobs import Plan, from_json, to_json
@@ -48,9 +48,7 @@ def load(choice: Choice, resolve: Resolver | None = None, *, cached: bool = Fals
     word = str(choice.file) if choice.case is None else f"{choice.file}@{choice.case}"
 
     def build() -> Plan:
-        from vibsim.plan.build import build
-
-        return replace(build(_experiment(choice, resolve)), file=word)
+        return replace(_built(choice, resolve), file=word)
 
     def dump(plan: Plan) -> bytes | None:
         # a file that changed while it was read is not kept under the digest of the old bytes
@@ -68,10 +66,26 @@ def load(choice: Choice, resolve: Resolver | None = None, *, cached: bool = Fals
     return private_cache.kept("plans", key, build, dump, kept) if key else build()
 
 
-def _experiment(choice: Choice, resolve: Resolver | None) -> Experiment:
-    from vibsim.experiment import Experiment
+def _built(choice: Choice, resolve: Resolver | None) -> Plan:
+    from vibsim.experiment import Experiment, reading
+    from vibsim.experiment.yaml.parse import read
 
-    experiment = Experiment.from_yaml(choice.file, collection=choice.collection)
+    source = read(choice.file, reading.KEYS)
+    if reading.SOLVER in source.data:
+        from vibsim.experiment.solver_reading import read_solver
+        from vibsim.plan import solver_plan
+
+        found = read_solver(source, choice.collection, choice.file)
+        return solver_plan.build(found if choice.case is None else found.alone(choice.case))
+    from vibsim.plan import build
+
+    stem = choice.file.stem
+    experiment = reading.build(Experiment, source, choice.collection, stem, choice.file)
+    return build.build(_resolved(experiment, choice, resolve))
+
+
+def _resolved(experiment: Experiment, choice: Choice, resolve: Resolver | None) -> Experiment:
+    """Return the experiment, or its member, with levels."""
     wanted = experiment if choice.case is None else experiment.alone(choice.case)
     if experiment.levels:
         return wanted
@@ -112,14 +126,21 @@ def _key(choice: Choice) -> str:
 
 def _has_inputs(plan: Plan, choice: Choice) -> bool:
     """Tell whether tables and packages of models and schemes are those that the plan was made from."""
-    if any(code_digest.of_offer(group, kind) != digest for group, kind, digest in plan.packages):
-        return False
+    folder = choice.file.parent
+    for group, name, digest in plan.packages:
+        is_function = group == code_digest.MODULE
+        of = (
+            code_digest.of_module(name, folder)
+            if is_function
+            else code_digest.of_offer(group, name)
+        )
+        if of != digest:
+            return False
     for path, digest in plan.inputs:
         try:
-            content = content_of(choice.file.parent / path, MOST_BYTES)
+            if regular_files.digest(folder / path) != digest:
+                return False
         except (OSError, ValueError):
-            return False
-        if _sha256(content) != digest:
             return False
     return True
 

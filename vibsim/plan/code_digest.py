@@ -21,6 +21,7 @@ import hashlib
 import importlib
 import importlib.util
 import json
+import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from functools import cache
@@ -32,6 +33,8 @@ from vibsim.core.errors import VibsimError
 
 PACKAGE = Path(vibsim.__file__).parent
 _LISTS = ("vibsim.models", "vibsim.schemes")
+MODULE = "module"
+"""In place of a group of entry points: the module of a function of the user."""
 _LOOKUP = "vibsim.core.registry"
 """By which every job finds its entries of the lists."""
 _PLANNING = (
@@ -44,6 +47,8 @@ _PLANNING = (
     "vibsim.plan.workflow_names",
     "vibsim.experiment.derived",
     "vibsim.experiment.reading",
+    "vibsim.experiment.solver_reading",
+    "vibsim.plan.solver_plan",
 )
 """From what a user writes to a plan; no job runs any of it once it has its plan (a test traces that)."""
 
@@ -52,6 +57,14 @@ _PLANNING = (
 def everything() -> str:
     """Return the digest of the whole package: of every file in it that is not made by Python."""
     return of_folder("vibsim")
+
+
+_OF_SOLVERS = (
+    "vibsim.cli.jobs.solve",
+    "vibsim.cli.jobs.judge_levels",
+    "vibsim.report.page.solver",
+)
+"""What jobs run in experiments with a solver of the user alone, whose digests begin there."""
 
 
 def used_by(*names: str) -> str:
@@ -69,7 +82,8 @@ def reached(*names: str) -> set[str]:
         module = todo.pop()
         done.add(module)
         imports = _of_all_modules().get(module) or _imports(module)
-        todo |= {found for found in imports - done if found not in (*_LISTS, *_PLANNING)}
+        others = (*_LISTS, *_PLANNING, *_OF_SOLVERS)
+        todo |= {found for found in imports - done if found not in others}
     return done
 
 
@@ -97,6 +111,34 @@ def of_offer(group: str, kind: str) -> str:
             digest.update(_digest(files, file.parent).encode())
             return digest.hexdigest()
     raise VibsimError(f"the code of {registry.package_of(point)} cannot be found: {point.module}")
+
+
+def of_module(name: str, folder: Path) -> str:
+    """Return the digest of the outermost package of a module of the user, or of the module; empty where there is none.
+
+    It is looked for as an import would, at last in `folder`, and not imported.
+    """
+    top = name.partition(".")[0]
+    before = sys.path.copy()
+    try:
+        sys.path.append(str(folder))
+        importlib.invalidate_caches()
+        spec = importlib.util.find_spec(top)
+    except (ImportError, ValueError):
+        spec = None
+    finally:
+        sys.path[:] = before
+    if spec is None:
+        return ""
+    digest = hashlib.sha256(f"{name}\n".encode())
+    places = [Path(place) for place in spec.submodule_search_locations or ()]
+    for place in places:
+        # a folder without __init__ may hold anything
+        files = _files_in(place) if spec.has_location else sorted(place.rglob("*.py"))
+        digest.update(_digest(files, place).encode())
+    if not places and spec.has_location and spec.origin is not None:
+        digest.update(Path(spec.origin).read_bytes())
+    return digest.hexdigest()
 
 
 def home(item: object, package: str) -> tuple[str, str]:

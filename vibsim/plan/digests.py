@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
+    from vibsim.experiment.solver import SolverExperiment
 
 
 def simulated(content: Mapping[str, Any]) -> dict[str, Any]:
@@ -25,6 +26,31 @@ def extrapolated(content: Mapping[str, Any]) -> dict[str, Any]:
 def analysed(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return the part of an experiment in normal form that an analysis depends on and tells of."""
     return _without(content, "title source output units")
+
+
+def solved(experiment: SolverExperiment, level: int, member: int) -> dict[str, Any]:
+    """Return what a level of a solver of the user depends on and tells of, besides files and code."""
+    solver = experiment.solver
+    marks = {name: f"{{{name}}}" for name in ("output", "output.nc", "output.csv", "threads")}
+    what: Any = solver.text
+    if solver.kind == "command":
+        what = experiment.arguments(level, member, marks)
+    elif solver.kind == "files":
+        what = experiment.path(level, member)
+    return {
+        solver.kind: what,
+        "sizes": experiment.sizes_of(level),
+        "parameters": experiment.parameters_of(member),
+        "quantities": {
+            name: None if row.coordinates is None else list(row.coordinates)
+            for name, row in experiment.quantities.items()
+        },
+    }
+
+
+def solved_and_judged(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the part of an experiment with such a solver that its analysis depends on and tells of."""
+    return _without(content, "title source solver resources")
 
 
 def _without(content: Mapping[str, Any], keys: str) -> dict[str, Any]:

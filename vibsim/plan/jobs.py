@@ -68,6 +68,10 @@ class Batch:
     """Bytes that the job holds at its peak, estimated."""
     is_divisible: bool
     """Whether more threads than one are worth having."""
+    threads: int | None = None
+    """Threads that the user asks for; None where vibsim knows how many are of use."""
+    runtime: int | None = None
+    """Minutes that the user expects; None where nobody says."""
 
 
 @dataclass(frozen=True)
@@ -109,9 +113,24 @@ class Plan:
         """The experiment that the digests were made of, also when its file has changed since."""
         from vibsim.experiment import restore
 
-        # one member alone is named by the file and its number
+        return restore(self.content, self.source_file)
+
+    @property
+    def source_file(self) -> Path | None:
+        """The experiment file; one member alone is named by the file and its number."""
         named = self.file if self.file.endswith(ENDINGS) else self.file.rpartition("@")[0]
-        return restore(self.content, Path(named) if named else None)
+        return Path(named) if named else None
+
+    @property
+    def has_solver(self) -> bool:
+        """Whether a solver of the user makes the levels (`vibsim.experiment.solver`)."""
+        return "solver" in self.content
+
+    @property
+    def command(self) -> str:
+        """The command or the function of the user that jobs run; empty where they run none."""
+        solver = self.content.get("solver", {})
+        return "" if solver.get("kind", "files") == "files" else str(solver["text"])
 
     @property
     def key(self) -> str:

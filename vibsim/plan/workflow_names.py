@@ -35,6 +35,8 @@ class Simulation:
     threads: int
     memory: int
     """Megabytes of a job."""
+    runtime: int | None
+    """Minutes of a job; None where nobody says."""
     digests: list[str]
     """Of every job."""
     source: str
@@ -66,8 +68,9 @@ def _simulation(plan: Plan, batches: Sequence[Batch], rule: str) -> Simulation:
         paths=paths,
         log=f"{plan.key}/logs/{stem}.log",
         benchmark=f"{plan.key}/benchmarks/{stem}.tsv",
-        threads=_cores() if first.is_divisible else 1,
+        threads=first.threads or (_cores() if first.is_divisible else 1),
         memory=-(-max(batch.memory for batch in batches) // 10**6),
+        runtime=first.runtime,
         digests=[batch.digest for batch in batches],
         source=plan.file,
     )
@@ -88,14 +91,26 @@ class Names:
 
     plans: Mapping[str, Plan]
     results: Path
+    allows_commands: bool = False
+    """Whether programs of the user may run."""
 
     @staticmethod
     def of(
-        experiments: Sequence[str], results: str, root: Path, resolve: Resolver | None = None
+        experiments: Sequence[str],
+        results: str,
+        root: Path,
+        resolve: Resolver | None = None,
+        allows_commands: bool = False,
     ) -> Names:
         """Load the plans of `experiments` (files, names, collections; none means the default)."""
         folder = Path(results).absolute()
-        return Names(load_all(choose(experiments, root), resolve, cached=True), folder)
+        return Names(
+            load_all(choose(experiments, root), resolve, cached=True), folder, allows_commands
+        )
+
+    def level_flags(self, wildcards: Any, input: Any) -> str:  # noqa: A002
+        """Return further options of jobs that make levels, which Snakemake does not compare; see `file`."""
+        return "--allow-commands" if self.allows_commands else ""
 
     @property
     def experiment_pattern(self) -> str:

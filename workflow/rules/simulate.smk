@@ -13,10 +13,12 @@ for simulation in names.simulations:
         threads: simulation.threads
         resources:
             mem_mb=simulation.memory,
+            runtime=simulation.runtime,
         params:
             digest=simulation.digest,
             levels=simulation.levels,
             shard=simulation.shard,
             file=simulation.file,
+            flags=names.level_flags,
         shell:
-            'exec > {log:q} 2>&1; cd / && exec vibsim simulate {params.file:q} --level {params.levels:q} --shard {params.shard:q} --results "$OLDPWD" --threads {threads:q} --digest {params.digest:q}'
+            'exec > {log:q} 2>&1; cd / && exec vibsim simulate {params.file:q} --level {params.levels:q} --shard {params.shard:q} --results "$OLDPWD" --threads {threads:q} --digest {params.digest:q} {params.flags}'

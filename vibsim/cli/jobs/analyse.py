@@ -17,6 +17,10 @@ def analyse(options: Namespace) -> int:
     """Compare all levels; write ``convergence.nc`` and ``summary.json``."""
     plan, results = one_plan(options)
     check_digest(plan, options.digest, plan.analysis)
+    if plan.has_solver:
+        from vibsim.cli.jobs.judge_levels import judge_levels
+
+        return judge_levels(plan, options, results)
     from vibsim import store
     from vibsim.analysis import analyse_parts, joined, kept, summarise, verdicts
 

@@ -96,6 +96,14 @@ def provenance(plan: Plan, uses: dict[str, Any]) -> dict[str, Any]:
     return {"experiment": uses, "versions": versions}
 
 
+def check_levels(plan: Plan, options: Namespace, results: Path) -> None:
+    """Check all level files; VibsimError where files are damaged or another job's."""
+    from vibsim import store
+
+    checks = {shard.path: partial(store.check, digest=shard.digest) for shard in plan.shards}
+    read_all(options, results, checks)
+
+
 @contextmanager
 def open_levels(
     plan: Plan, options: Namespace, results: Path
@@ -109,8 +117,7 @@ def open_levels(
     """
     from vibsim import store
 
-    checks = {shard.path: partial(store.check, digest=shard.digest) for shard in plan.shards}
-    read_all(options, results, checks)
+    check_levels(plan, options, results)
     with ExitStack() as stack:
         yield {
             level.level: stack.enter_context(

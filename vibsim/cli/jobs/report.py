@@ -33,6 +33,8 @@ def report(options: Namespace) -> int:
     from vibsim import store
     from vibsim.report import write
 
+    if plan.has_solver:
+        from vibsim.report.page.solver import write
     readers: dict[str, Callable[[Path], Any]] = {
         plan.convergence: partial(store.read, digest=plan.analysis),
         plan.summary: partial(store.read_json, digest=plan.analysis, name=plan.key),

@@ -24,10 +24,16 @@ def simulate(options: Namespace) -> int:
     plan, results = one_plan(options)
     jobs = _jobs(plan, options.level, options.shard)
     check_digest(plan, options.digest, batch_digest([job.digest for job in jobs]))
+    make = _make
+    if plan.has_solver:
+        from vibsim.cli.jobs import solve
+
+        solve.check_allowed([plan], options.allow_commands)
+        make = solve.make
     if options.out is not None:
         if len(jobs) > 1:
             raise refusal("--out", options.out, "is one file, and several levels are several")
-        _make(plan, options.level[0], jobs[0], options.out, options.threads)
+        make(plan, options.level[0], jobs[0], options.out, options.threads)
         return 0
     failed = []
     for level, job in zip(options.level, jobs, strict=True):
@@ -36,7 +42,7 @@ def simulate(options: Namespace) -> int:
             print(f"{job.path}: is up to date", flush=True)
             continue
         try:
-            _make(plan, level, job, path, options.threads)
+            make(plan, level, job, path, options.threads)
             made_files.add(results, plan.key, [job.path.removeprefix(f"{plan.key}/")])
         except VibsimError as error:
             failed.append(str(error))

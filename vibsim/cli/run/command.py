@@ -18,6 +18,7 @@ from vibsim.cli import failure, resources, results_folder
 from vibsim.cli.chosen_plans import plans_of
 from vibsim.cli.jobs.common import chosen_results
 from vibsim.cli.jobs.simulate import is_made
+from vibsim.cli.jobs.solve import check_allowed
 from vibsim.cli.run import changes, lock, outcome, snakemake, supervise
 from vibsim.cli.run.snakemake import Job, Progress
 from vibsim.core import private_cache
@@ -41,10 +42,14 @@ def _run(options: Namespace) -> int:
     results = chosen_results(options)
     # Everything is validated before anything is written but the cache of plans.
     plans = plans_of(options.experiments, cached=True)
+    check_allowed(plans, options.allow_commands)
     results_folder.check(results, [plan.key for plan in plans])
     resources.check(plans, results)
     arguments = ["--cores", str(options.cores or len(os.sched_getaffinity(0)))]
     arguments += ["--resources", f"mem_mb={resources.megabytes(plans)}"]
+    if options.allow_commands:
+        # on the command line alone: what a file says is not heard
+        arguments += ["--config", "allow_commands=true"]
     if options.dry_run:
         return _dry_run(plans, results, arguments, options)
     held = lock.hold(results)

@@ -17,6 +17,7 @@ from snakemake_interface_logger_plugins.registry import LoggerPluginRegistry
 from snakemake_interface_logger_plugins.settings import LogHandlerSettingsBase
 
 from vibsim.cli.run import supervise
+from vibsim.core.processes import end_with
 
 FIELDS = {
     LogEvent.RUN_INFO: ("stats",),
@@ -56,7 +57,7 @@ class LogHandler(LogHandlerBase):
 def main() -> None:
     """Run Snakemake for the process that the first argument names, with the others."""
     supervise.end_at_once()
-    supervise.end_with(int(sys.argv.pop(1)))
+    end_with(int(sys.argv.pop(1)))
     from snakemake.cli import main as snakemake
 
     LoggerPluginRegistry().register_plugin("snakemake_logger_plugin_vibsim", sys.modules[__name__])

@@ -8,7 +8,6 @@ folder is free.
 
 from __future__ import annotations
 
-import ctypes
 import os
 import signal
 import sys
@@ -18,14 +17,13 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import NoReturn
 
-from vibsim.core.errors import VibsimError
+from vibsim.core.processes import adopt_orphans, end_with
 
 ENDS = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)
 """Signals that ask a command to end."""
 _GRACE = 3.0
 """Seconds that a worker has to end by itself, and then its children."""
 _PARENT = "VIBSIM_PARENT"
-_SET_PARENT_DEATH_SIGNAL, _SET_CHILD_SUBREAPER = 1, 36
 
 Work = Callable[[], int]
 
@@ -48,7 +46,7 @@ def supervised(work: Work) -> int:
     ends = _heeded()
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ends | {signal.SIGCHLD})
-    _control(_SET_CHILD_SUBREAPER, 1)
+    adopt_orphans()
     supervisor = os.getpid()
     reading, writing = os.pipe()
     worker = os.fork()
@@ -68,19 +66,6 @@ def children_end_with_this() -> None:
 def environment() -> dict[str, str]:
     """Return what tells a command to end with this process, which starts it."""
     return {_PARENT: str(os.getpid())}
-
-
-def end_with(parent: int) -> None:
-    """Have the kernel kill this process when `parent`, which started it, has ended.
-
-    Raises
-    ------
-    VibsimError
-        When it has ended already.
-    """
-    _control(_SET_PARENT_DEATH_SIGNAL, signal.SIGKILL)
-    if os.getppid() != parent:
-        raise VibsimError("the run that started this job has ended")
 
 
 def end_at_once() -> None:
@@ -110,13 +95,6 @@ def known_pid() -> int:
 
 
 _supervisor = 0
-
-
-def _control(option: int, value: int) -> None:
-    library = ctypes.CDLL(None, use_errno=True)
-    if library.prctl(option, value, 0, 0, 0):
-        number = ctypes.get_errno()
-        raise OSError(number, f"prctl: {os.strerror(number)}")
 
 
 def _heeded() -> set[signal.Signals]:

@@ -26,6 +26,8 @@ class GridValues:
     name: str = ""
     epsilon: float = DOUBLE
     """Distance of neighbouring numbers near 1 in the precision that the values were computed in."""
+    units: str = ""
+    """As the user gave them; nothing depends on them."""
 
 
 def grid_values(value: Any, key: str) -> GridValues:
@@ -49,7 +51,8 @@ def grid_values(value: Any, key: str) -> GridValues:
         own = {str(n): c for n, c in value.coords.items() if tuple(map(str, c.dims)) == (str(n),)}
         coords = {name: plain_coordinate(np.asarray(own[name])) for name in dims if name in own}
         numbers, epsilon = real(np.asarray(value), key)
-        return GridValues(numbers, dims, coords, str(value.name or ""), epsilon)
+        units = str(getattr(value, "attrs", {}).get("units", ""))
+        return GridValues(numbers, dims, coords, str(value.name or ""), epsilon, units)
     try:
         array = value if isinstance(value, np.ma.MaskedArray) else np.asarray(value)
     except ValueError:

@@ -33,6 +33,7 @@ from vibsim.experiment.schema.checks import (
 )
 from vibsim.experiment.schema.published import row_at, row_id
 from vibsim.experiment.value_names import VALUES, Value
+from vibsim.experiment.yaml.parse import Path_
 from vibsim.models import BUDGET, centred, has_budget, has_solution
 from vibsim.models.shared.free import why_not_free
 from vibsim.models.shared.phase_amplitude_names import (
@@ -91,7 +92,7 @@ def _published_table(table: Any, scope: Scope) -> None:
 
 def finish_checks(checks: Sequence[Any], setting: Setting, report: Report) -> tuple[Any, ...]:
     """Note every fault of the checks (None stands for a malformed one); give an id to those without."""
-    ids = _ids(checks, setting.by_tolerance, report)
+    ids = check_ids(checks, setting.by_tolerance, report)
     finished = []
     for i, check in enumerate(checks):
         if check is None:
@@ -104,7 +105,7 @@ def finish_checks(checks: Sequence[Any], setting: Setting, report: Report) -> tu
     return tuple(finished)
 
 
-def _ids(checks: Sequence[Any], by_tolerance: bool, report: Report) -> list[str]:
+def check_ids(checks: Sequence[Any], by_tolerance: bool, report: Report) -> list[str]:
     """Return the id of every check; a generated one is its place in the file."""
     ids = [check.id if check is not None else "" for check in checks]
     given: dict[str, int] = {}
@@ -154,7 +155,7 @@ def _quantity_of_schemes(name: str, key: str, schemes: Sequence[str] | None, sco
 
 
 def _converges(check: ConvergesCheck, scope: Scope) -> None:
-    _expect(check.expect, scope.at("expect"))
+    check_expect(check.expect, (*scope.path, "expect"), scope.report)
     name, model = check.converges, scope.setting.model
     _convergent(name, "converges", check.schemes, scope)
     if not is_error_part(name) or model is None or name not in error_parts(model):
@@ -169,16 +170,10 @@ def _converges(check: ConvergesCheck, scope: Scope) -> None:
 
 
 def _accurate(check: AccurateCheck, scope: Scope) -> None:
-    _expect(check.expect, scope.at("expect"))
+    check_expect(check.expect, (*scope.path, "expect"), scope.report)
     _convergent(check.accurate, "accurate", check.schemes, scope)
-    keys = ("relative", "absolute")
-    if any(scope.at(key).is_faulty for key in keys):
-        return
-    given = [key for key in keys if getattr(check, key) is not None]
-    if len(given) != 1:
-        found = " and ".join(given) or "none of them"
-        scope.refuse(f"must have exactly one of relative, absolute; has {found}")
-    elif check.is_relative and is_error_part(check.accurate):
+    given = given_one(check, ("relative", "absolute"), scope.path, scope.report)
+    if given == "relative" and is_error_part(check.accurate):
         rule = f"is a part of the solution, and {check.accurate} is an error itself"
         scope.at("relative").refuse(rule, "give `absolute:`", at_key=True)
 
@@ -197,27 +192,39 @@ def _convergent(name: str, key: str, schemes: Sequence[str] | None, scope: Scope
         scope.at(key).refuse(rule, hint, name)
 
 
-def _expect(expect: Expect, scope: Scope) -> None:
+def check_expect(expect: Expect, path: Path_, report: Report) -> None:
+    """Check that the reason of an expected verdict, which stands at `path`, exists and has its status."""
     reason = expect.reason
     if reason is None:
         return
     if reason not in REASONS:
-        scope.at("reason").refuse("unknown reason", nearest(reason, list(REASONS)), reason)
-    elif REASONS[reason] != expect.status and not scope.at("status").is_faulty:
+        hint = nearest(reason, list(REASONS))
+        report.add((*path, "reason"), "unknown reason", hint, reason)
+    elif REASONS[reason] != expect.status and (*path, "status") not in report.faulty:
         rule = f"reason of status {REASONS[reason]}, but the status is {expect.status}"
         choices = [name for name, status in REASONS.items() if status == expect.status]
-        scope.at("reason").refuse(rule, "choose from " + ", ".join(choices), reason)
+        report.add((*path, "reason"), rule, "choose from " + ", ".join(choices), reason)
+
+
+def given_one(section: Any, keys: Sequence[str], path: Path_, report: Report) -> str | None:
+    """Return which of some keys a section at `path` has, of which it must have exactly one; None where one is faulty.
+
+    Of several the first is returned.
+    """
+    if any((*path, key) in report.faulty for key in keys):
+        return None
+    given = [key for key in keys if getattr(section, key) is not None]
+    if len(given) != 1:
+        found = " and ".join(given) or "none of them"
+        report.add(path, f"must have exactly one of {', '.join(keys)}; has {found}")
+    return given[0] if given else ""
 
 
 def _value(check: ValueCheck, scope: Scope) -> None:
-    borders = ("equals", "below", "above")
-    if not any(scope.at(name).is_faulty for name in borders):
-        given = [name for name in borders if getattr(check, name) is not None]
-        if len(given) != 1:
-            found = " and ".join(given) or "none of them"
-            scope.refuse(f"must have exactly one of equals, below, above; has {found}")
+    given = given_one(check, ("equals", "below", "above"), scope.path, scope.report)
+    if given is not None:
         for name in ("rtol", "atol"):
-            if getattr(check, name) is not None and "equals" not in given:
+            if getattr(check, name) is not None and given != "equals":
                 scope.at(name).refuse("is used with equals only", at_key=True)
     place = scope.at("at")
     row = _known_value(check.value, scope.at("value"))

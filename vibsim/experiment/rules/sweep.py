@@ -62,15 +62,8 @@ def read_sweep(
     if section is None:
         return Sweep(axes=()), _is_wellformed(report)
     types = sweep_types(model, ((scheme.name, scheme.method) for scheme in schemes))
-    reader = _SweepReader(document.time, model, types, lacks_scheme, report)
-    found: list[Axis | None] = []
-    for key in order:
-        if key == "zip" and section.zip is not None:
-            found.append(reader.zipped(section.zip))
-        elif key == "sample" and section.sample is not None:
-            found.append(reader.scattered(section.sample))
-        elif key in section.single:
-            found.append(reader.alone(key, section.single[key]))
+    reader = SweepReader(types, report, document.time, model, lacks_scheme)
+    found = reader.axes(section, order)
     sound = tuple(axis for axis in found if axis is not None)
     is_whole = _is_wellformed(report) and len(sound) == len(found)
     if is_whole and not sound:
@@ -92,16 +85,28 @@ def _axis(keys: tuple[str, ...], values: tuple[Values, ...] | Draw) -> Axis:
 
 
 @dataclass
-class _SweepReader:
+class SweepReader:
     """Turns what is written of each key into values of its type; None stands for those with a fault."""
 
-    time: Any
-    model: Model | None
     types: Mapping[str, Any]
-    lacks_scheme: bool
     report: Report
+    time: Any = None
+    model: Model | None = None
+    lacks_scheme: bool = False
     first: dict[str, Path_] = field(default_factory=dict)
     """Where each key is swept first."""
+
+    def axes(self, section: Any, order: Any) -> list[Axis | None]:
+        """Return the axes of a section whose keys stand in some `order`."""
+        found: list[Axis | None] = []
+        for key in order:
+            if key == "zip" and section.zip is not None:
+                found.append(self.zipped(section.zip))
+            elif key == "sample" and section.sample is not None:
+                found.append(self.scattered(section.sample))
+            elif key in section.single:
+                found.append(self.alone(key, section.single[key]))
+        return found
 
     def alone(self, key: str, written: Written) -> Axis | None:
         """Return a key that moves alone."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
@@ -56,6 +56,7 @@ class Expect(Section):
 class MeasuringCheck(Section):
     """What every check that measures something has."""
 
+    kind: ClassVar[str]
     id: GivenId = ""
     """Name of the check, unique in the file; `check_1` and so on when left out."""
 
@@ -227,18 +228,17 @@ class ConvergesCheck(MeasuringCheck):
         return self.converges
 
 
-class AccurateCheck(MeasuringCheck):
-    """The error of the finest level, in the L2 norm over time, is small enough."""
+class Accuracy(MeasuringCheck):
+    """The error of the finest level is small enough."""
 
     kind: ClassVar[Literal["accurate"]] = "accurate"
     stand_ins = MappingProxyType({"accurate": STAND_IN})
     accurate: Text
     """The quantity: one that `converges` may be about."""
     relative: Positive | None = None
-    """The error must be below this part of the solution, both in the L2 norm over time."""
+    """The error must be below this part of the solution, both in the L2 norm."""
     absolute: Positive | None = None
-    """The error must be below this, in the unit of the quantity times the square root of s."""
-    schemes: _Schemes = None
+    """The error must be below this, in the unit of its norm."""
     expect: Expect = Expect()
     """The verdict that passes; PASS when left out."""
 
@@ -262,6 +262,12 @@ class AccurateCheck(MeasuringCheck):
         """The error that is allowed; NaN where the file does not say."""
         given = self.absolute if self.relative is None else self.relative
         return math.nan if given is None else given
+
+
+class AccurateCheck(Accuracy):
+    """The error of the finest level, in the L2 norm over time, is small enough."""
+
+    schemes: _Schemes = None
 
 
 DEFAULT_RTOL, DEFAULT_ATOL = 1e-9, 1e-12
@@ -310,18 +316,26 @@ class ValueCheck(MeasuringCheck):
         return self.at.case
 
 
-def _which(value: Any) -> str | None:
-    if isinstance(value, ClaimCheck | Measurement):
-        return tag(value.kind)
-    keys = value if isinstance(value, dict) else ()
-    return next((tag(key) for key in CLASSES if key in keys), None)
+def by_key(kinds: Iterable[str]) -> Callable[[Any], str | None]:
+    """Return what tells of which of some kinds a check is: by its leading key."""
+
+    def which(value: Any) -> str | None:
+        if isinstance(value, ClaimCheck | MeasuringCheck):
+            kind: str = value.kind
+            return tag(kind)
+        keys = value if isinstance(value, dict) else ()
+        return next((tag(key) for key in kinds if key in keys), None)
+
+    return which
 
 
-def _one_of(members: Mapping[str, type[Section]]) -> Any:
+def one_of(members: Mapping[str, type[Section]], which: Callable[[Any], str | None]) -> Any:
+    """Return the union of checks, of which `which` tells by `by_key`."""
     *others, last = members
     rule = f"must be a mapping with the key {', '.join(others)} or {last}"
-    which = Discriminator(_which, custom_error_type="check", custom_error_message=rule)
-    return tagged(members, which)
+    return tagged(
+        members, Discriminator(which, custom_error_type="check", custom_error_message=rule)
+    )
 
 
 MEASURED: Mapping[str, type[Section]] = MappingProxyType(
@@ -334,6 +348,8 @@ MEASURED: Mapping[str, type[Section]] = MappingProxyType(
     }
 )
 """The checks that measure something, by their leading key."""
+KINDS = ("claim", *MEASURED)
+"""Leading keys, in the order in which they are looked for."""
 
 Measurement = (
     ConvergesCheck | AccurateCheck | ValueCheck | StableCheck | ConservesCheck | EqualCheck
@@ -341,7 +357,7 @@ Measurement = (
 if TYPE_CHECKING:
     Measured = Measurement
 else:
-    Measured = _one_of(MEASURED)
+    Measured = one_of(MEASURED, by_key(KINDS))
 
 
 class ClaimCheck(Section):
@@ -368,9 +384,7 @@ class ClaimCheck(Section):
         return self.that
 
 
-CLASSES: Mapping[str, type[Section]] = MappingProxyType({"claim": ClaimCheck, **MEASURED})
-"""Every kind of check by its leading key."""
 if TYPE_CHECKING:
     Check = Measurement | ClaimCheck
 else:
-    Check = _one_of({**MEASURED, "claim": ClaimCheck})
+    Check = one_of({**MEASURED, "claim": ClaimCheck}, by_key(KINDS))

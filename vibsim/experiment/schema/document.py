@@ -195,10 +195,15 @@ class _Generator(GenerateJsonSchema):
         return False
 
 
-def schema() -> dict[str, Any]:
-    """Return the JSON Schema (draft 2020-12) of an experiment file with the models and schemes of vibsim."""
+def json_schema(kind: type[Section]) -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of files that a class describes."""
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
-    return head | Document.model_json_schema(schema_generator=_Generator)
+    return head | kind.model_json_schema(schema_generator=_Generator)
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema of an experiment file with the models and schemes of vibsim."""
+    return json_schema(Document)
 
 
 def installed_schema() -> dict[str, Any]:
@@ -221,7 +226,6 @@ def installed_schema() -> dict[str, Any]:
     doc = Document.__doc__
     whole = create_model("Document", __base__=Document, __doc__=doc, **fields)
     whole.model_config["use_attribute_docstrings"] = False
-    head = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
-    found = head | whole.model_json_schema(schema_generator=_Generator)
+    found = json_schema(whole)
     found["$defs"]["SweepSection"]["patternProperties"] = swept_options(SCHEMES.values())
     return found

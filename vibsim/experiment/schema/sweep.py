@@ -187,9 +187,9 @@ _List = Annotated[tuple[_Entry, ...], Field(min_length=1), BeforeValidator(plain
 Written = tuple[bool | float | str, ...] | Linspace | Logspace | Range
 """Values of one key as written: text is an option word or a formula, a truth value a flag, which its key tells."""
 if TYPE_CHECKING:
-    _Values = Written
+    Spread = Written
 else:
-    _Values = tagged(
+    Spread = tagged(
         {**RULES, "list": _List},
         Discriminator(_which, custom_error_type="values", custom_error_message=LIST_RULE),
     )
@@ -232,11 +232,11 @@ class SweepSection(Section):
             "patternProperties": swept_options(SCHEMES.built_in.values()),
         },
     )
-    __pydantic_extra__: dict[str, _Values]
+    __pydantic_extra__: dict[str, Spread]
     stand_ins = MappingProxyType({})
-    other_values = _Values
+    other_values = Spread
 
-    zip: Annotated[dict[str, _Values], Field(min_length=1)] | None = None
+    zip: Annotated[dict[str, Spread], Field(min_length=1)] | None = None
     """Parameters that move together, each with as many values: one axis of the grid."""
     sample: Sample | None = None
     """Points scattered over several parameters: one axis of the grid."""

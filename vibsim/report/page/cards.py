@@ -71,7 +71,7 @@ def context(
         if broken > listed
         else "",
         "setup": list(setting.setup(experiment, record)),
-        "provenance": list(_provenance(provenance)),
+        "provenance": list(provenance_rows(provenance)),
         "used": json.dumps(used, indent=1, ensure_ascii=False, default=str) if used else "",
         "target": quote(experiment.word),
         "python": _python(experiment),
@@ -174,7 +174,7 @@ def _alone(check: Mapping[str, Any]) -> str:
     return "\n".join(f"{command:{width}}  # {found}" for command, found in lines.items())
 
 
-def _provenance(provenance: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+def provenance_rows(provenance: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """Yield the versions of all software in one line, then what else is known of where the results came from."""
     found = {**provenance.get("versions", {}), **versions(DRAWING)}
     named = {"python": "Python"}

@@ -78,7 +78,7 @@ def write(
             for form in (form for form in formats if form != "svg"):
                 files[f"{picture.name}.{form}"] = drawing.binary(picture.figure, form)
     small = drawing.svg(_stamp(position, convergence, shown[0]), "thumbnail")
-    _replace(directory / "figures", {**files, "thumbnail.svg": small.encode()})
+    replace_files(directory / "figures", {**files, "thumbnail.svg": small.encode()})
     listed, folded = _tables(experiment, convergence)
     scales = scales_table(experiment, convergence)
     printed = published.tables(experiment, convergence, summary)
@@ -94,7 +94,7 @@ def write(
     if kept:
         members.write_csv(directory / "tables/members.csv", convergence, position)
         files.pop("members.csv", None)
-    _replace(directory / "tables", files, kept)
+    replace_files(directory / "tables", files, kept)
     context = cards.context(experiment, convergence, summary, provenance) | {
         "tables": listed,
         "scales": scales,
@@ -149,7 +149,7 @@ def _drawn(picture: Picture) -> str:
         return markup(drawing.element(picture))
 
 
-def _replace(directory: Path, files: Mapping[str, bytes], others: Sequence[str] = ()) -> None:
+def replace_files(directory: Path, files: Mapping[str, bytes], others: Sequence[str] = ()) -> None:
     """Write files, and remove those of an earlier report that are neither among them nor among the `others`."""
     for name, content in files.items():
         store.write_bytes(directory / name, content)

@@ -51,11 +51,17 @@ def write(
         The verdicts as the command prints them.
     """
     cards = [
-        _card(i, verdict, files)
+        card(str(i), verdict, _asked(verdict), files)
         for i, (verdict, files) in enumerate(zip(verdicts, sources, strict=True))
     ]
-    status = worst(verdict.status for verdict in verdicts)
-    context = {"status": status, "sentence": _overall(verdicts), "cards": cards}
+    context = {
+        "status": worst(verdict.status for verdict in verdicts),
+        "sentence": _overall(verdicts) if len(verdicts) > 1 else "",
+        "path": "vibsim judge",
+        "title": "Convergence study",
+        "cards": cards,
+        "facts": "verdict.json",
+    }
     page = environment().get_template("study.html").render(context)
     store.write_text(directory / "report.html", page)
     text = json.dumps(content, indent=1, ensure_ascii=False)
@@ -68,13 +74,17 @@ def _overall(verdicts: Sequence[LadderVerdict]) -> str:
     return f"{passed} of {len(verdicts)} quantities passed."
 
 
-def _card(i: int, verdict: LadderVerdict, files: Sequence[str]) -> dict[str, Any]:
-    """Return what the page shows of a quantity."""
-    asked = "no order, so any that may be believed passes"
+def _asked(verdict: LadderVerdict) -> str:
+    """Say what order was asked for."""
     if verdict.expected is not None:
-        asked = f"order {verdict.expected:g}"
-    elif verdict.at_least is not None:
-        asked = f"order {verdict.at_least:g} at least"
+        return f"order {verdict.expected:g}"
+    if verdict.at_least is not None:
+        return f"order {verdict.at_least:g} at least"
+    return "no order, so any that may be believed passes"
+
+
+def card(name: str, verdict: LadderVerdict, asked: str, files: Sequence[str]) -> dict[str, Any]:
+    """Return what the page shows of a quantity: `asked` is what was expected, and `name` unique on the page."""
     rows = [
         ("Expected", asked),
         ("Order", _order(verdict)),
@@ -86,13 +96,14 @@ def _card(i: int, verdict: LadderVerdict, files: Sequence[str]) -> dict[str, Any
         ("Its bound", words.number(verdict.best_bound, "small")),
         ("Grid convergence index", words.number(verdict.gci, "small")),
         ("Reason", verdict.reason),
-        ("Files" if len(files) > 1 else "File", ", ".join(files)),
+        *([("Files" if len(files) > 1 else "File", ", ".join(files))] if files else []),
     ]
     return {
+        "heading": verdict.quantity,
         "verdict": verdict,
         "facts": rows,
         "table": _table(verdict),
-        "picture": _picture(i, verdict),
+        "picture": _picture(name, verdict),
         "doubt": UNSEEN if verdict.status == "PASS" and not verdict.is_exact_known else "",
     }
 
@@ -127,7 +138,7 @@ def _table(verdict: LadderVerdict) -> Table:
     return Table("levels", caption, columns, rows)
 
 
-def _picture(i: int, verdict: LadderVerdict) -> Picture:
+def _picture(name: str, verdict: LadderVerdict) -> Picture:
     """Return the figure of a verdict with its caption."""
     asked = verdict.expected or verdict.at_least
     order = asked or verdict.order
@@ -140,4 +151,4 @@ def _picture(i: int, verdict: LadderVerdict) -> Picture:
     alt = f"Error and difference of {verdict.quantity} against {verdict.size_name}. {verdict.sentence}"
     with style.applied():
         figure = convergence_figure(verdict)
-    return Picture(f"study-{i}", "", caption, alt, figure)
+    return Picture(f"study-{name}", "", caption, alt, figure)

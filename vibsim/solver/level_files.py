@@ -10,10 +10,10 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from vibsim.cli.level_tables import Study
 from vibsim.convergence.study.grid_values import GridValues, plain_coordinate, real
 from vibsim.core import netcdf, regular_files
 from vibsim.core.errors import Fault, InputError, nearest
+from vibsim.solver.level_tables import Study
 
 MAGIC = (b"CDF", b"\x89HDF")
 """With what the files of netCDF 3 and 4 begin."""
@@ -56,10 +56,10 @@ def read(paths: Sequence[Path], size: str, quantities: Sequence[str]) -> list[St
     h: list[float] = []
     values: dict[str, list[GridValues]] = {name: [] for name in names}
     for i, path in enumerate(paths):
-        with _opened(path) as dataset:
+        with opened(path) as dataset:
             h.append(listed[i] if listed is not None else _step_size(str(path), dataset, size))
             for name in names:
-                values[name].append(_grid_values(str(path), dataset, name))
+                values[name].append(grid_values(str(path), dataset, name, key="--quantity"))
     _check_sizes(paths, size if listed is None else "h", h)
     files = [str(path) for path in paths]
     key = "h" if listed is not None else size.rpartition("/")[2]
@@ -80,7 +80,8 @@ def _listed(size: str) -> list[float] | None:
         return None
 
 
-def _opened(path: Path) -> Any:
+def opened(path: Path) -> Any:
+    """Return the dataset of a netCDF file; InputError where the library cannot read it."""
     try:
         return netcdf.opened(path)
     except (OSError, RuntimeError) as error:
@@ -130,21 +131,37 @@ def _step_size(file: str, dataset: Any, name: str) -> float:
         _refuse(file, name, str(value), "must be a number")
 
 
-def _grid_values(file: str, dataset: Any, name: str) -> GridValues:
+def grid_values(
+    file: str, dataset: Any, name: str, dims: Sequence[str] | None = None, key: str = ""
+) -> GridValues:
+    """Return a variable of the root of a dataset, or of a group by its path; `key` is the option that names it.
+
+    A dimension along which lies one of the coordinates `dims` that are wanted gets the name of that.
+
+    Raises
+    ------
+    InputError
+        Where there is no such variable, or it holds no real numbers.
+    """
     variable = _variable(dataset, name)
     if variable is None:
         known = [f"{group}/{n}" if group else n for n, _, group in netcdf.variables(dataset)]
-        _refuse(file, "--quantity", name, "the file has no such variable", nearest(name, known))
+        _refuse(file, key, name, "the file has no such variable", nearest(name, known))
     array = _array(file, name, variable)
     try:
         values, epsilon = real(array, name)
     except InputError as error:
         fault = error.faults[0]
         _refuse(file, name, fault.value, fault.rule, fault.hint)
-    dims = tuple(variable.dimensions)
     find = _coordinate_of(variable, dataset)
-    coords = {dim: found for dim in dims if (found := find(dim)) is not None}
-    return GridValues(values, dims, coords, name, epsilon)
+    places = {dim: dim for dim in variable.dimensions}
+    for wanted in dims or ():
+        along: Sequence[str] = getattr(_variable(dataset, wanted), "dimensions", ())
+        if wanted not in places and len(along) == 1 and along[0] in places:
+            places[along[0]] = wanted
+    coords = {name: found for dim, name in places.items() if (found := find(dim, name)) is not None}
+    units = str(getattr(variable, "units", ""))
+    return GridValues(values, tuple(places.values()), coords, name, epsilon, units)
 
 
 def _array(file: str, name: str, variable: Any) -> NDArray[Any]:
@@ -154,19 +171,20 @@ def _array(file: str, name: str, variable: Any) -> NDArray[Any]:
         _refuse(file, name, "", f"the netCDF library cannot read it ({error})")
 
 
-def _coordinate_of(variable: Any, dataset: Any) -> Callable[[str], NDArray[Any] | None]:
+def _coordinate_of(variable: Any, dataset: Any) -> Callable[[str, str], NDArray[Any] | None]:
     """Return what finds the coordinate of a dimension.
 
-    It is the variable of that name, in the group of the values or in the root; else the one along that dimension alone
-    that the attribute ``coordinates`` of the values names (CF conventions).
+    It is the variable of a name that is wanted, by default that of the dimension, in the group of the values or in the
+    root; else the one along that dimension alone that the attribute ``coordinates`` of the values names (CF
+    conventions).
     """
     scopes: list[Mapping[str, Any]] = [variable.group().variables, dataset.variables]
     listed = getattr(variable, "coordinates", "")
     named = str(listed).split()
 
-    def find(dim: str) -> NDArray[Any] | None:
+    def find(dim: str, wanted: str) -> NDArray[Any] | None:
         for scope in scopes:
-            for name in (dim, *named):
+            for name in (wanted, dim, *named):
                 found = scope.get(name)
                 if found is not None and found.dimensions == (dim,):
                     return _coordinate(found)

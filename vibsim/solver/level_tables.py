@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from vibsim.core.array_types import Floats, Integers
 from vibsim.core.errors import Fault, InputError, nearest
 from vibsim.experiment.tables import csv_text
 from vibsim.experiment.yaml.file_content import MOST_BYTES, content_of
@@ -47,21 +48,56 @@ def read(path: Path, size: str, quantities: Sequence[str]) -> list[Study]:
     file = str(path)
     names: list[str] = []
 
-    def choose(known: list[str], _: bool) -> list[int]:
+    def choose(known: list[str], _: bool) -> list[str]:
         names.extend(_chosen(file, known, size, quantities))
-        return [known.index(name) for name in (size, *names)]
+        return [size, *names]
 
-    try:
-        (h, *columns), lines = csv_text.read(_content(path), choose, MOST_LEVELS)
-    except csv_text.CsvError as error:
-        cell = _printable(error.cell)
-        fault = Fault(file, error.line, error.column, cell, error.rule, error.hint)
-        raise InputError([fault]) from None
+    (h, *columns), lines = _read(path, choose, MOST_LEVELS)
     if not len(lines):
         raise InputError([Fault(file, 0, "", "", "has no row below the names of its columns")])
     _check_sizes(file, size, h.tolist(), lines.tolist())
     table = zip(names, columns, strict=True)
     return [Study(name, {size: h.tolist()}, column.tolist(), [file]) for name, column in table]
+
+
+def columns(
+    path: Path, names: Sequence[str], most: int, *, is_shown: bool
+) -> tuple[dict[str, Floats], Integers]:
+    """Return the columns `names` of a table of `most` rows at most, and the line of every row; InputError as `read`.
+
+    Where the file may be anything (`is_shown` is false), no message shows what is in it but numbers.
+    """
+
+    def choose(known: list[str], is_table: bool) -> Sequence[str]:
+        for name in names:
+            if known.count(name) != 1:
+                what = "more than one such column" if name in known else "no such column"
+                hint = _hint(name, known) if name not in known and (is_shown or is_table) else ""
+                raise InputError([Fault(str(path), 0, "", name, f"the table has {what}", hint)])
+        return names
+
+    found, lines = _read(path, choose, most, is_shown=is_shown)
+    return dict(zip(names, found, strict=True)), lines
+
+
+def _read(
+    path: Path,
+    choose: Callable[[list[str], bool], Sequence[str]],
+    most: int,
+    *,
+    is_shown: bool = True,
+) -> tuple[list[Floats], Integers]:
+    """Return the columns that `choose` names of those that there are, and the line of every row."""
+
+    def numbers(known: list[str], is_table: bool) -> list[int]:
+        return [known.index(name) for name in choose(known, is_table)]
+
+    try:
+        return csv_text.read(_content(path), numbers, most)
+    except csv_text.CsvError as error:
+        cell = _printable(error.cell) if is_shown or csv_text.is_shown(error.cell) else ""
+        fault = Fault(str(path), error.line, error.column, cell, error.rule, error.hint)
+        raise InputError([fault]) from None
 
 
 def _content(path: Path) -> bytes:

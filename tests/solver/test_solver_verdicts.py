@@ -1,0 +1,142 @@
+"""Verdicts on the levels of a solver: orders, accuracies, what is expected, and which member decides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vibsim.convergence.study.grid_values import GridValues
+from vibsim.core.errors import VibsimError
+from vibsim.experiment.solver import SolverExperiment
+from vibsim.experiment.solver_reading import from_file
+from vibsim.solver import analysis, level_output
+from vibsim.solver.analysis import CheckResults
+
+H = [1 / 4, 1 / 8, 1 / 16, 1 / 32]
+Levels = Callable[[int, float], float]
+
+
+def experiment(
+    folder: Path, checks: str, more: str = "", h: Sequence[float] = H
+) -> SolverExperiment:
+    file = folder / "study.yaml"
+    file.write_text(
+        f"title: a study\nsolver: {{command: 'solve {{h}} {{output}} {{a}}'}}\nrefine: {{h: {list(h)}{more}}}\n"
+        f"quantities: {{u: {{}}}}\nsweep: {{a: [1.0, 2.0]}}\nchecks: {checks}\n"
+    )
+    return from_file(file)
+
+
+def judged(found: SolverExperiment, u: Levels) -> list[CheckResults]:
+    def read(member: int) -> list[Any]:
+        sizes = found.sizes[found.step]
+        values = [GridValues(np.float64(u(member, h)), (), {}, "u") for h in sizes]
+        return [
+            level_output.record(found, i, member, {"u": value}) for i, value in enumerate(values)
+        ]
+
+    return analysis.judge_members(found, read)
+
+
+def second(member: int, h: float) -> float:
+    """Return a number of second order: 1 + a h^2, whose error at the finest level is nearly a 1e-3."""
+    return 1.0 + (member + 1.0) * h**2 + 0.1 * h**4
+
+
+@pytest.mark.parametrize(
+    ("check", "status", "reason"),
+    [
+        ("{converges: u}", "PASS", "asymptotic"),
+        ("{converges: u, at_least: 2}", "PASS", "asymptotic"),
+        ("{converges: u, order: 1}", "FAIL", "order_high"),
+        ("{converges: u, order: 4}", "FAIL", "order_low"),
+        ("{converges: u, order: 4, expect: {status: FAIL}}", "PASS", "match"),
+        ("{converges: u, order: 2, expect: {status: FAIL}}", "FAIL", "mismatch"),
+        ("{accurate: u, relative: 2.5e-3}", "PASS", "match"),
+        ("{accurate: u, absolute: 2.5e-3}", "PASS", "match"),
+        ("{accurate: u, relative: 1.5e-3}", "FAIL", "mismatch"),
+        ("{accurate: u, relative: 1.954e-3}", "INCONCLUSIVE", "pre_asymptotic"),
+    ],
+)
+def test_checks_are_decided_by_the_worst_member(
+    tmp_path: Path, check: str, status: str, reason: str
+) -> None:
+    found = experiment(tmp_path, f"[{check}]")
+    results = judged(found, second)
+    (entry,) = analysis.summarise(found, results)["checks"]
+    assert (entry["status"], entry["reason"]) == (status, reason)
+    if "accurate" in check:
+        worst = entry["results"][0]
+        assert worst["case"] == 1
+        assert worst["facts"]["error"] == pytest.approx(2 / 1024, rel=0.01)
+    assert sum(entry["counts"].values()) == 2
+    assert bool(entry["advice"]) == (status != "PASS")
+
+
+def test_an_accuracy_is_open_where_the_order_is(tmp_path: Path) -> None:
+    def three(member: int, h: float) -> float:
+        return 1.0 + h**2 + 0.02 * h**3
+
+    few = H[:3]
+    (alone,) = judged(experiment(tmp_path, "[{accurate: u, relative: 0.1}]", h=few), three)
+    assert alone.results[0].verdict.reason == "pre_asymptotic"
+    promised = "[{accurate: u, relative: 0.1}, {converges: u, order: 2}]"
+    helped, _ = judged(experiment(tmp_path, promised, h=few), three)
+    assert helped.results[0].verdict.reason == "match"
+    # an expectation that is meant to fail promises nothing
+    trap = "[{accurate: u, relative: 0.1}, {converges: u, order: 2, expect: {status: FAIL}}]"
+    left, _ = judged(experiment(tmp_path, trap, h=few), three)
+    assert left.results[0].verdict.reason == "pre_asymptotic"
+
+
+def test_zero_has_no_relative_error(tmp_path: Path) -> None:
+    (found,) = judged(experiment(tmp_path, "[{accurate: u, relative: 0.1}]"), lambda _, h: 0.0)
+    assert found.results[0].verdict.reason == "not_applicable"
+
+
+def test_sizes_that_grow_are_no_step_sizes(tmp_path: Path) -> None:
+    """Numbers of cells are placeholders; another step is named where it is refined in another way."""
+    cells = experiment(
+        tmp_path, "[{converges: u, order: 2}]", ", n: [4, 8, 16, 32], dt: [8, 4, 2, 1]"
+    )
+    (found,) = judged(cells, second)
+    assert found.status == "PASS"
+    uneven = experiment(tmp_path, "[{converges: u, order: 2}]", ", dt: [64, 16, 4, 1]")
+    (found,) = judged(uneven, second)
+    assert "dt is refined with it, not in proportion" in found.results[0].verdict.sentence
+
+
+def test_a_stored_verdict_comes_back_for_its_page(tmp_path: Path) -> None:
+    found = experiment(tmp_path, "[{converges: u, order: 2}, {accurate: u, relative: 1e-3}]")
+    results = judged(found, second)
+    record, summary = analysis.record(found, results), analysis.summarise(found, results)
+    for check, entry, known in zip(found.checks, summary["checks"], results, strict=True):
+        back, verdict = analysis.restored(found, record, check, entry), known.results[0].verdict
+        for name in ("quantity", "status", "order", "error", "error_bound", "levels", "best"):
+            assert getattr(back, name) == getattr(verdict, name), name
+        assert back.is_number
+
+
+def test_levels_without_common_points_are_named(tmp_path: Path) -> None:
+    found = experiment(tmp_path, "[{converges: u}]")
+
+    def read(member: int) -> list[Any]:
+        shapes = [(3,), (5,), (9,), (3, 3)]
+        values = [GridValues(np.zeros(s), tuple("xy"[: len(s)]), {}, "u") for s in shapes]
+        return [level_output.record(found, i, 0, {"u": v}) for i, v in enumerate(values)]
+
+    with pytest.raises(VibsimError, match=r"member 0: u: level 3 \(from the coarsest\): has the"):
+        analysis.judge_members(found, read)
+
+    def shifted(member: int) -> list[Any]:
+        points = [np.linspace(0.0, 1.0, n) for n in (5, 9, 17, 33)]
+        points[2] += 0.01
+        levels = [GridValues(x, ("x",), {"x": x}, "u") for x in points]
+        return [level_output.record(found, i, 0, {"u": v}) for i, v in enumerate(levels)]
+
+    with pytest.raises(VibsimError, match="u: level 2 beside level 0: x: coordinates: the levels"):
+        analysis.judge_members(found, shifted)

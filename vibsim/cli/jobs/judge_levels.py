@@ -1,0 +1,41 @@
+"""The judging of the levels of a solver of the user, for the job ``analyse``."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from pathlib import Path
+
+from vibsim import store
+from vibsim.cli import made_files
+from vibsim.cli.jobs.common import check_levels, provenance, titled
+from vibsim.core.record import Record
+from vibsim.experiment.solver import restore
+from vibsim.plan import Plan
+from vibsim.plan.digests import solved_and_judged
+from vibsim.solver import analysis
+
+
+def judge_levels(plan: Plan, options: Namespace, results: Path) -> int:
+    """Compare all levels; write ``convergence.nc`` and ``summary.json``."""
+    experiment = restore(plan.content, plan.source_file)
+    check_levels(plan, options, results)
+
+    def read(member: int) -> list[Record]:
+        shards = (level.shards[member] for level in plan.levels)
+        return [store.read(results / shard.path, digest=shard.digest) for shard in shards]
+
+    checks = analysis.judge_members(experiment, read)
+    folder = options.out or results / plan.key
+    record = titled(analysis.record(experiment, checks), f"{plan.key}: comparison of levels")
+    uses = solved_and_judged(plan.content)
+    store.write(
+        folder / "convergence.nc",
+        record,
+        digest=plan.analysis,
+        provenance=provenance(plan, uses),
+    )
+    summary = analysis.summarise(experiment, checks)
+    store.write_json(folder / "summary.json", summary, digest=plan.analysis)
+    if options.out is None:
+        made_files.add(results, plan.key, ["convergence.nc", "summary.json"])
+    return 0

@@ -1,0 +1,201 @@
+"""The file of an experiment whose levels a solver of the user makes, one class per section, and its JSON Schema."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
+
+from pydantic import BeforeValidator, ConfigDict, Discriminator, Field
+
+from vibsim.core.vocabulary import Restriction
+from vibsim.experiment.schema.checks import Accuracy, Expect, MeasuringCheck, by_key, one_of
+from vibsim.experiment.schema.document import Levels, json_schema
+from vibsim.experiment.schema.fields import (
+    MAX_ENTRIES,
+    STAND_IN,
+    Count,
+    Line,
+    Number,
+    Positive,
+    Section,
+    Text,
+    refused,
+    short,
+    tag,
+    tagged,
+)
+from vibsim.experiment.schema.sweep import Sample, Spread
+
+Kind = Literal["command", "python", "files"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+"""Ways to have levels made, each the key of a section ``solver``."""
+PLACE = "output"
+"""The placeholder of the file that a command writes."""
+RESERVED = (PLACE, "level", "levels", "threads", "case")
+"""Names that mean something already where a size, a parameter or a quantity has its name."""
+MOST_LEVELS = 100
+
+
+def _function(value: Any) -> Any:
+    module, colon, name = value.partition(":") if isinstance(value, str) else ("", "", "")
+    parts = [*module.split("."), name]
+    if not colon or not all(part.isidentifier() and part.isascii() for part in parts):
+        raise refused("must be module:function", "e.g. heat:solve")
+    return value
+
+
+Function = Annotated[str, BeforeValidator(_function)]
+
+
+class SolverSection(Section):
+    """How a level is made: by a command, by a function in Python, or by nobody, because its file is there."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"oneOf": [{"required": [kind]} for kind in KINDS]},
+    )
+    stand_ins = MappingProxyType({})
+
+    command: Line | None = None
+    """A program with its arguments, run without a shell in the folder of this file. `{h}` stands for a size or a swept
+    parameter, `{output}` for the netCDF or CSV file to write (`{output.csv}` if the program goes by the ending), and
+    `{threads}` for the number of threads."""
+    python: Function | None = None
+    """`module:function`, called with sizes and swept parameters by their names; it returns an `xarray.Dataset`."""
+    files: Line | None = None
+    """The path of a netCDF or CSV file for each level, from the folder of this file, with placeholders."""
+    inputs: Annotated[tuple[Line, ...], short(MAX_ENTRIES)] = ()
+    """Files that the solver reads or consists of; when one changes, all levels are made again."""
+
+
+def _is_formula(value: Any) -> str:
+    return tag("formula" if isinstance(value, str) else "list")
+
+
+_List = Annotated[tuple[Number, ...], Field(min_length=1), short(MOST_LEVELS)]
+if TYPE_CHECKING:
+    Sizes = tuple[float, ...] | str
+else:
+    Sizes = tagged({"formula": Line, "list": _List}, Discriminator(_is_formula))
+
+
+class RefineSection(Section):
+    """What differs between levels: a list of values for each name, or formulas in `level`. The first is the step size.
+
+    Several names are refined together.
+    """
+
+    model_config = ConfigDict(extra="allow", json_schema_extra={"minProperties": 1})
+    __pydantic_extra__: dict[str, Sizes]
+    stand_ins = MappingProxyType({})
+    other_values = Sizes
+
+    levels: Levels | None = None
+    """Numbers of levels, for formulas in `level` such as `h: 1/2**level`."""
+
+    @property
+    def sizes(self) -> Mapping[str, tuple[float, ...] | str]:
+        """What is written of each name."""
+        return self.__pydantic_extra__ or {}
+
+
+class QuantitySection(Section):
+    """A variable or a column of the output."""
+
+    stand_ins = MappingProxyType({})
+    coordinates: Annotated[tuple[Line, ...], Field(min_length=1)] | None = None
+    """Names of the coordinates that it must have; when left out, a number, or the coordinates that the file has."""
+    restrict: Restriction = "subset"
+    """How levels are brought to common points."""
+
+
+class SolverConvergesCheck(MeasuringCheck):
+    """A quantity converges."""
+
+    kind: ClassVar[Literal["converges"]] = "converges"
+    stand_ins = MappingProxyType({"converges": STAND_IN})
+    converges: Text
+    """The quantity."""
+    order: Positive | None = None
+    """The order that is expected."""
+    at_least: Positive | None = None
+    """The lowest order that is expected; without this and `order`, any order will do that can be believed."""
+    expect: Expect = Expect()
+    """The verdict that passes; PASS when left out."""
+
+    @property
+    def about(self) -> str:
+        """The quantity."""
+        return self.converges
+
+
+class SolverAccurateCheck(Accuracy):
+    """The error of the finest level is small enough."""
+
+
+CHECKS: Mapping[str, type[Section]] = MappingProxyType(
+    {"converges": SolverConvergesCheck, "accurate": SolverAccurateCheck}
+)
+"""Every kind of check on the levels of a solver, by its leading key."""
+if TYPE_CHECKING:
+    SolverCheck = SolverConvergesCheck | SolverAccurateCheck
+else:
+    SolverCheck = one_of(CHECKS, by_key(CHECKS))
+
+
+class ResourcesSection(Section):
+    """What the making of one level takes, for Snakemake."""
+
+    mem_mb: Count = 1000
+    """Megabytes of memory: so many jobs run at once as fit."""
+    runtime: Count | None = None
+    """Minutes, for clusters that want to know; here nothing ends a solver."""
+    threads: Count = 1
+    """Cores."""
+
+
+class ParameterSweep(Section):
+    """Further placeholders of the command, or parameters of the function, that vary; several make a grid."""
+
+    model_config = ConfigDict(extra="allow", json_schema_extra={"minProperties": 1})
+    __pydantic_extra__: dict[str, Spread]
+    stand_ins = MappingProxyType({})
+    other_values = Spread
+
+    zip: Annotated[dict[str, Spread], Field(min_length=1)] | None = None
+    """Parameters that move together, each with as many values: one axis of the grid."""
+    sample: Sample | None = None
+    """Points scattered over several parameters: one axis of the grid."""
+
+    @property
+    def single(self) -> Mapping[str, Any]:
+        """Values of the parameters that are an axis of their own."""
+        return self.__pydantic_extra__ or {}
+
+
+class SolverDocument(Section):
+    """An experiment with a solver of the user."""
+
+    stand_ins = MappingProxyType({"title": None, "solver": None, "refine": None, "quantities": {}})
+
+    title: Text
+    """What the experiment shows, in a line."""
+    source: Text | None = None
+    """What the experiment comes from."""
+    solver: SolverSection
+    """How a level is made."""
+    refine: RefineSection
+    """What differs between levels."""
+    quantities: Annotated[dict[str, QuantitySection], Field(min_length=1)]
+    """What is judged: variables or columns of the output, by their names."""
+    checks: Annotated[tuple[SolverCheck, ...], short(MAX_ENTRIES)] = ()
+    """What must come out; when left out, that every quantity converges."""
+    resources: ResourcesSection = ResourcesSection()
+    """What the making of one level takes."""
+    sweep: ParameterSweep | None = None
+    """Parameters that vary; every member has all levels."""
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of such a file."""
+    return json_schema(SolverDocument)

@@ -1,0 +1,351 @@
+"""From a file to an experiment with a solver of the user: all sections are read before anything is refused."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from vibsim.core.errors import nearest
+from vibsim.experiment.collection import collection_of
+from vibsim.experiment.data import Sweep
+from vibsim.experiment.faults import Report
+from vibsim.experiment.reading import KEYS, SOLVER, check_name
+from vibsim.experiment.rules.checks import check_expect, check_ids, given_one
+from vibsim.experiment.rules.levels import rising_levels
+from vibsim.experiment.rules.size_limits import MAX_FILES
+from vibsim.experiment.rules.sweep import SweepReader
+from vibsim.experiment.schema.fields import Number, Text
+from vibsim.experiment.schema.solver import (
+    KINDS,
+    MOST_LEVELS,
+    RESERVED,
+    Kind,
+    SolverCheck,
+    SolverConvergesCheck,
+    SolverDocument,
+)
+from vibsim.experiment.solver import (
+    OUTPUTS,
+    SolverExperiment,
+    SolverSpec,
+    placeholders,
+)
+from vibsim.experiment.tables.file import ENDINGS
+from vibsim.experiment.validation import read_document
+from vibsim.experiment.yaml.parse import Path_, Source, read
+from vibsim.formula import ExpressionError, constant, evaluate, parse
+
+_NAME = "must be a name of letters, digits and _"
+
+
+def from_file(path: Path) -> SolverExperiment:
+    """Read the file of an experiment with a solver; InputError with every fault of it."""
+    return read_solver(read(path, KEYS), collection_of(path), path)
+
+
+def read_solver(source: Source, collection: str, file: Path) -> SolverExperiment:
+    """Validate what `source` holds and fill in every default.
+
+    Raises
+    ------
+    InputError
+        With every fault of the file.
+    """
+    report, name = Report(source), file.stem
+    for what, text in (("experiment", name), ("collection", collection)):
+        check_name(f"the name of the {what}, '{text}',", text, report)
+    document = read_document(source, report, SolverDocument)
+    numbers, sizes = _sizes(document.refine, report)
+    sweep, whole = _sweep(document.sweep, source, report)
+    # as written, faulty or not: nothing more is said about placeholders of what is faulty
+    names = {
+        "sizes": [name for name in _keys(source.data.get("refine")) if name != "levels"],
+        "sweep": [name for name, _ in _written(source.data.get("sweep"))],
+    }
+    _check_names(names, document.quantities, report)
+    has_level = "levels" in _keys(source.data.get("refine"))
+    solver = _solver(document.solver, names, has_level=has_level, report=report)
+    checks = _checks(document, report)
+    report.raise_any()
+    assert solver is not None
+    step = next(iter(sizes))
+    order = sorted(range(len(sizes[step])), key=lambda i: -sizes[step][i])
+    found = SolverExperiment(
+        collection=collection,
+        name=name,
+        title=document.title,
+        source=document.source,
+        solver=solver,
+        sizes={name: tuple(values[i] for i in order) for name, values in sizes.items()},
+        numbers=tuple(numbers[i] for i in order) if numbers else (),
+        quantities=document.quantities,
+        sweep=sweep,
+        whole=whole,
+        resources=document.resources,
+        checks=checks,
+    )
+    found._file = file
+    _check_files(found, report)
+    report.raise_any()
+    return found
+
+
+# ---- sizes
+
+
+def _sizes(section: Any, report: Report) -> tuple[tuple[int, ...], dict[str, tuple[Any, ...]]]:
+    """Return the numbers of levels, where there are any, and the sizes of every level by name."""
+    if section is None:
+        return (), {}
+    numbers = rising_levels(section.levels, report, ("refine", "levels"))
+    if not section.sizes:
+        report.add(("refine",), "must name a step size", "e.g. h: [0.1, 0.05, 0.025]")
+    found: dict[str, tuple[Any, ...]] = {}
+    raw = report.source.data["refine"]
+    for name, written in section.sizes.items():
+        if isinstance(written, str):
+            values = _by_formula(("refine", name), written, numbers, "levels" in raw, report)
+        else:
+            values = tuple(map(int, written)) if _is_whole(raw[name]) else written
+        if values:
+            found[name] = values
+    count = len(numbers) or len(next(iter(found.values()), ()))
+    for name, values in found.items():
+        if len(values) != count:
+            of = "there are levels" if numbers else f"{next(iter(found))} has"
+            rule = f"must have as many values as {of}, {count}, has {len(values)}"
+            report.add(("refine", name), rule, at_key=True)
+    if count > MOST_LEVELS:
+        report.add(("refine",), f"must not have more than {MOST_LEVELS} levels, has {count}")
+    for i, size in enumerate(next(iter(found.values()), ())):
+        path = ("refine", next(iter(found)), i)
+        if not size > 0.0:
+            report.add(path, "a step size must be greater than 0", value=size)
+        elif size in next(iter(found.values()))[:i]:
+            report.add(path, "a step size must not be repeated", value=size)
+    return numbers, found
+
+
+def _by_formula(
+    path: Path_, text: str, numbers: Sequence[int], has_levels: bool, report: Report
+) -> tuple[Any, ...]:
+    """Return the values of a formula in `level`: whole numbers where none has a fraction and nothing is divided."""
+    if not has_levels:
+        hint = "give a list, or `levels: {from: 4, to: 8}`"
+        report.add(path, "a formula needs `levels` beside it", hint, text)
+        return ()
+    try:
+        tree = parse(text, ("level",))
+        values = [evaluate(tree, {"level": float(number)}, text) for number in numbers]
+    except ExpressionError as error:
+        report.add(path, f"must be a formula in level ({error.rule})", error.hint, text)
+        return ()
+    if not all(map(math.isfinite, values)):
+        report.add(path, "must have a finite value on every level", value=text)
+        return ()
+    is_whole = "/" not in text and "." not in text and all(value.is_integer() for value in values)
+    return tuple(map(int, values)) if is_whole else tuple(values)
+
+
+# ---- the sweep
+
+
+def _sweep(section: Any, source: Source, report: Report) -> tuple[Sweep | None, tuple[str, ...]]:
+    """Return the sweep, None without one, and the names whose values are all written as whole numbers."""
+    if section is None:
+        return None, ()
+    order = source.data["sweep"]
+    raw = dict(_written(order))
+    types = {name: Text if _is_text(values) else Number for name, values in raw.items()}
+    axes = [axis for axis in SweepReader(types, report).axes(section, order) if axis is not None]
+    if not raw:
+        report.add(("sweep",), "must not be empty")
+    return Sweep.model_construct(axes=tuple(axes)), tuple(filter(lambda n: _is_whole(raw[n]), raw))
+
+
+def _keys(section: Any) -> list[str]:
+    return list(section) if isinstance(section, Mapping) else []
+
+
+def _written(section: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the names of a sweep with what is written of each."""
+    for key, value in section.items() if isinstance(section, Mapping) else ():
+        inner = value.get("over") if key == "sample" and isinstance(value, Mapping) else value
+        if key in ("zip", "sample"):
+            yield from inner.items() if isinstance(inner, Mapping) else ()
+        else:
+            yield key, value
+
+
+def _is_text(written: Any) -> bool:
+    """Say whether a list holds text that is no constant formula."""
+    for entry in written if isinstance(written, list) else ():
+        if isinstance(entry, str):
+            try:
+                constant(entry)
+            except ExpressionError:
+                return True
+    return False
+
+
+def _is_whole(written: Any) -> bool:
+    """Say whether all numbers of a list, or of a range, are written as whole ones."""
+    if isinstance(written, Mapping):
+        written = written.get("range")
+    is_list = isinstance(written, list)
+    return is_list and all(isinstance(x, int) and not isinstance(x, bool) for x in written)
+
+
+# ---- names and placeholders
+
+
+def _is_name(text: str) -> bool:
+    return text.isidentifier() and text.isascii()
+
+
+def _check_names(
+    names: Mapping[str, list[str]], quantities: Mapping[str, Any], report: Report
+) -> None:
+    """Check that names of sizes, parameters, quantities and coordinates can stand side by side."""
+    taken: dict[str, str] = {}
+    places: list[tuple[Path_, str, str]] = [
+        *((("refine", name), name, "a size") for name in names["sizes"]),
+        *((("sweep", name), name, "a swept parameter") for name in names["sweep"]),
+        *((("quantities", name), name, "a quantity") for name in quantities),
+    ]
+    for path, name, what in places:
+        if not _is_name(name):
+            report.add(path, _NAME, value=name, at_key=True)
+        elif name in RESERVED:
+            rule = "means something else here: " + ", ".join(RESERVED)
+            report.add(path, f"'{name}' {rule}", "choose another name", at_key=True)
+        elif taken.setdefault(name, what) != what:
+            report.add(path, f"is the name of {taken[name]}, too", "choose another", at_key=True)
+    for name, quantity in quantities.items():
+        for i, coordinate in enumerate(quantity.coordinates or ()):
+            path = ("quantities", name, "coordinates", i)
+            if coordinate in quantity.coordinates[:i]:
+                report.add(path, "a coordinate must not be repeated", value=coordinate)
+            elif not _is_name(coordinate):
+                report.add(path, _NAME, value=coordinate)
+            elif coordinate in taken or coordinate in RESERVED:
+                what = taken.get(coordinate, "something else")
+                report.add(path, f"is the name of {what}, too", "choose another", coordinate)
+
+
+def _solver(
+    section: Any, names: Mapping[str, list[str]], *, has_level: bool, report: Report
+) -> SolverSpec | None:
+    """Return how levels are made; None where that is faulty."""
+    kind = None if section is None else given_one(section, KINDS, (SOLVER,), report)
+    if not kind:
+        return None
+    text = getattr(section, kind)
+    if kind == "files" and section.inputs:
+        rule = "belong to a command or a function: a file that is there is an input itself"
+        report.add((SOLVER, "inputs"), rule, at_key=True)
+    if kind != "python":
+        _check_template(kind, text, names, has_level, report)
+    known: Kind = next(name for name in KINDS if name == kind)
+    return SolverSpec.model_construct(kind=known, text=text, inputs=section.inputs)
+
+
+def _check_template(
+    kind: str, text: str, names: Mapping[str, list[str]], has_level: bool, report: Report
+) -> None:
+    """Check the placeholders of a command or of the path of a file."""
+    path = (SOLVER, kind)
+    try:
+        used = list(placeholders(text))
+    except ValueError:
+        hint = "a brace of the program's own is written twice, {{ or }}"
+        report.add(path, "must have a name alone between braces, such as {h}", hint, text)
+        return
+    try:
+        is_empty = kind == "command" and not shlex.split(text)
+    except ValueError as error:
+        report.add(path, f"cannot be split into arguments ({error})", value=text)
+        return
+    if is_empty:
+        report.add(path, "must name a program", value=text)
+    if kind == "files" and not text.lower().endswith(ENDINGS):
+        report.add(path, f"must end with {' or '.join(ENDINGS)}", value=text)
+    levels = [*names["sizes"], *(["level"] if has_level else [])]
+    known = [*levels, *names["sweep"]]
+    known += [*OUTPUTS, "threads"] if kind == "command" else []
+    unknown = [name for name in dict.fromkeys(used) if name not in known]
+    for name in unknown:
+        report.add(path, f"unknown placeholder {{{name}}}", nearest(name, known), text)
+    if not set(used) & set(levels) and levels and not unknown:
+        hint = "e.g. {" + levels[0] + "}"
+        report.add(path, "has no placeholder that differs between levels", hint, text)
+    if kind == "command" and not set(used) & set(OUTPUTS) and not unknown:
+        report.add(path, "has no placeholder for the file that it writes", "{output}", text)
+    for name in names["sweep"]:
+        if name not in used:
+            rule = f"is no placeholder of `{kind}:`, so it would change nothing"
+            report.add(("sweep", name), rule, f"write {{{name}}} where it belongs", at_key=True)
+
+
+# ---- checks and files
+
+
+def _checks(document: Any, report: Report) -> tuple[SolverCheck, ...]:
+    """Return the checks of a file, or that every quantity converges."""
+    known = list(document.quantities)
+    given = document.checks or [SolverConvergesCheck(converges=name) for name in known]
+    ids = check_ids(given, False, report)
+    found = []
+    for i, check in enumerate(given):
+        if check is None:
+            continue
+        path: Path_ = ("checks", i)
+        check_expect(check.expect, (*path, "expect"), report)
+        if known and check.about not in known and (*path, check.kind) not in report.faulty:
+            hint = nearest(check.about, known)
+            report.add((*path, check.kind), "is none of the quantities", hint, check.about)
+        if isinstance(check, SolverConvergesCheck):
+            if check.order is not None and check.at_least is not None:
+                rule = "must not be given together with order"
+                report.add((*path, "at_least"), rule, at_key=True)
+        else:
+            given_one(check, ("relative", "absolute"), path, report)
+        found.append(check.model_copy(update={"id": ids[i]}))
+    return tuple(found)
+
+
+def _check_files(experiment: SolverExperiment, report: Report) -> None:
+    """Check that files that are to be there are, and that there are not too many of those to be made."""
+    count = len(experiment.levels) * experiment.members
+    if count > MAX_FILES:
+        rule = f"the levels must not have more than {MAX_FILES} files, they have {count}"
+        report.add(("sweep",), rule, at_key=True)
+        return
+    for i, name in enumerate(experiment.solver.inputs):
+        _check_file(experiment.folder / name, (SOLVER, "inputs", i), "", report)
+    if experiment.solver.kind != "files":
+        return
+    seen: dict[str, str] = {}
+    for member in range(experiment.members):
+        for level in experiment.levels:
+            path = experiment.path(level, member)
+            words = experiment.words(level, member)
+            where = ", ".join(f"{name} = {word}" for name, word in words.items())
+            if seen.setdefault(path, where) != where:
+                rule = f"is the file of {seen[path]}, too"
+                report.add((SOLVER, "files"), f"{path} {rule}", f"of {where}")
+                continue
+            _check_file(experiment.folder / path, (SOLVER, "files"), f"{path}: ", report)
+
+
+def _check_file(path: Path, place: Path_, told: str, report: Report) -> None:
+    try:
+        is_file, is_there = path.is_file(), path.exists()
+    except (OSError, ValueError):
+        is_file = is_there = False
+    if not is_file:
+        rule = "must be a file" if is_there else "there is no such file"
+        report.add(place, f"{told}{rule}")

@@ -1,0 +1,135 @@
+"""Build the plan of an experiment with a solver of the user.
+
+The digest of a level covers what decides its numbers: the command with its arguments, or the function with sizes and
+parameters, and the content of all files that these depend on. The code of vibsim is no part of it: a solver may run for
+hours, and vibsim only stores what it wrote.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from vibsim.core import regular_files
+from vibsim.core.errors import Fault, InputError
+from vibsim.core.vocabulary import FORMAT
+from vibsim.experiment.solver import SolverExperiment
+from vibsim.plan import code_digest
+from vibsim.plan.build import job_digest
+from vibsim.plan.digests import digest_of, solved, solved_and_judged
+from vibsim.plan.jobs import Batch, LevelJob, Plan, ShardJob, shard_path
+from vibsim.plan.versions import DRAWING, NUMERICAL, versions
+
+MEGABYTE = 10**6
+ANALYSIS_MEMORY = 500 * MEGABYTE
+"""Bytes that an analysis may hold; the sizes of fields are not known before they are made."""
+
+
+def build(experiment: SolverExperiment) -> Plan:
+    """Return the plan of `experiment`.
+
+    Raises
+    ------
+    InputError
+        Where a file or a module that levels depend on cannot be found.
+    """
+    content: dict[str, Any] = json.loads(json.dumps(experiment.content, allow_nan=False))
+    solver = experiment.solver
+    inputs = {name: _digest(experiment, name) for name in solver.inputs}
+    package = _code(experiment) if solver.kind == "python" else ""
+    key = f"{experiment.collection}/{experiment.name}"
+    files: dict[str, str] = {}
+    levels = []
+    for level in experiment.levels:
+        shards = []
+        for member in range(experiment.members):
+            if solver.kind == "files":
+                path = experiment.path(level, member)
+                files[path] = _digest(experiment, path)
+                inputs = {"file": files[path]}
+            own = {"uses": solved(experiment, level, member), "inputs": inputs, "code": package}
+            digest = digest_of({"job": "solve", "format": FORMAT, **own})
+            number = None if experiment.sweep is None else member
+            shards.append(
+                ShardJob(member, member, member + 1, shard_path(key, level, number), digest)
+            )
+        levels.append(_level(level, tuple(shards), experiment))
+    made = {"levels": [[shard.digest for shard in level.shards] for level in levels]}
+    analysis = job_digest("judge_levels", solved_and_judged(content), made)
+    return Plan(
+        collection=experiment.collection,
+        name=experiment.name,
+        title=experiment.title,
+        source=experiment.source,
+        cases=experiment.members,
+        schemes=(),
+        levels=tuple(levels),
+        batches=tuple(
+            _batch(level, shard, experiment) for level in levels for shard in level.shards
+        ),
+        analysis=analysis,
+        analysis_memory=ANALYSIS_MEMORY,
+        analysis_bytes=0,
+        extrapolation="",
+        report=job_digest(
+            "solver", content, {"analysis": analysis}, DRAWING, home="vibsim.report.page"
+        ),
+        content=content,
+        versions=versions(NUMERICAL),
+        inputs=tuple((files or inputs).items()),
+        packages=((code_digest.MODULE, _module(experiment), package),) if package else (),
+    )
+
+
+def _level(level: int, shards: tuple[ShardJob, ...], experiment: SolverExperiment) -> LevelJob:
+    return LevelJob(
+        level=level,
+        steps=0,
+        every=1,
+        member_steps=0,
+        bytes=0,
+        seconds=0.0,
+        shared=0.0,
+        memory=experiment.resources.mem_mb * MEGABYTE,
+        shards=shards,
+    )
+
+
+def _batch(level: LevelJob, shard: ShardJob, experiment: SolverExperiment) -> Batch:
+    return Batch(
+        levels=(level.level,),
+        shard=shard.index,
+        digest=shard.digest,
+        seconds=0.0,
+        memory=level.memory,
+        is_divisible=False,
+        threads=experiment.resources.threads,
+        runtime=experiment.resources.runtime,
+    )
+
+
+def _digest(experiment: SolverExperiment, name: str) -> str:
+    """Return the digest of a file in the folder of the experiment file."""
+    try:
+        return regular_files.digest(experiment.folder / name)
+    except (OSError, ValueError) as error:
+        rule = f"cannot be read ({getattr(error, 'strerror', None) or error})"
+        raise _refusal(experiment, name, rule) from None
+
+
+def _module(experiment: SolverExperiment) -> str:
+    return experiment.solver.text.partition(":")[0]
+
+
+def _code(experiment: SolverExperiment) -> str:
+    """Return the digest of the package that a function stands in, which is not imported for that."""
+    found = code_digest.of_module(_module(experiment), experiment.folder)
+    if not found:
+        rule = "cannot be found: no installed package and no module beside the file has this name"
+        raise _refusal(experiment, _module(experiment).partition(".")[0], rule)
+    return found
+
+
+def _refusal(experiment: SolverExperiment, value: str, rule: str) -> InputError:
+    key = f"solver.{experiment.solver.kind}"
+    return InputError([Fault(str(experiment.file), 0, key, value, rule)])

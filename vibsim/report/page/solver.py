@@ -1,0 +1,153 @@
+"""The page of an experiment with a solver of the user: a card for each check, the members of a sweep, the set-up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vibsim import store
+from vibsim.convergence import LadderVerdict
+from vibsim.core.record import Record
+from vibsim.experiment.solver import SolverExperiment, restore
+from vibsim.report import style
+from vibsim.report.figures import drawing
+from vibsim.report.figures.panels import Curve, stamp
+from vibsim.report.page import study
+from vibsim.report.page.cards import provenance_rows
+from vibsim.report.page.page import environment, replace_files
+from vibsim.report.tables import checks as check_tables
+from vibsim.report.tables.table import Cell, Column, Table, to_csv, to_latex
+from vibsim.report.text import words
+from vibsim.report.types import Plan
+from vibsim.solver import analysis
+
+
+def write(
+    plan: Plan,
+    convergence: Record,
+    summary: Mapping[str, Any],
+    directory: Path,
+    formats: Sequence[str] = ("svg",),
+    provenance: Mapping[str, Any] | None = None,
+) -> None:
+    """Write ``report.html``, ``figures/`` and ``tables/``; arguments as for `vibsim.report.write`."""
+    experiment = restore(plan.content, plan.source_file)
+    cards, tables = [], [check_tables.checks(summary)]
+    figures: dict[str, bytes] = {}
+    for check, entry in zip(experiment.checks, summary["checks"], strict=True):
+        verdict = analysis.restored(experiment, convergence, check, entry)
+        card = _card(experiment, verdict, entry)
+        cards.append(card)
+        tables += [table for table in (card["table"], card["members"]) if table]
+        figures |= dict(_thumbnail(verdict)) if not figures else {}
+        figures |= dict(_files(card["picture"], formats))
+    replace_files(directory / "figures", figures)
+    files: dict[str, bytes] = {}
+    for table in tables:
+        files[f"{table.name}.csv"] = to_csv(table).encode()
+        files[f"{table.name}.tex"] = to_latex(table).encode()
+    replace_files(directory / "tables", files)
+    context = {
+        "status": summary["status"],
+        "sentence": words.overall(summary),
+        "path": f"{plan.collection} / {plan.name}",
+        "title": plan.title,
+        "source": plan.source or "",
+        "home": "../../index.html",
+        "cards": cards,
+        "setup": list(_setup(experiment)),
+        "provenance": list(provenance_rows(provenance or {})),
+        "facts": "summary.json",
+    }
+    page = environment().get_template("study.html").render(context)
+    store.write_text(directory / "report.html", page)
+
+
+def _card(
+    experiment: SolverExperiment, verdict: LadderVerdict, entry: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return what the page shows of a check."""
+    files = [f"level_{level:02d}.nc" for level in experiment.levels]
+    card = study.card(
+        entry["id"], verdict, entry["expected"], files if not experiment.sweep else ()
+    )
+    caption = card["table"].caption
+    if experiment.sweep:
+        caption = f"Levels of member {entry['results'][0]['case']}{caption.removeprefix('Levels')}"
+    return card | {
+        "heading": f"{verdict.quantity}: {entry['expected']}",
+        "verdict": replace(verdict, status=entry["status"], reason=entry["reason"]),
+        "table": replace(card["table"], name=f"levels_{entry['id']}", caption=caption),
+        "members": _members(entry) if experiment.sweep else None,
+    }
+
+
+def _members(entry: Mapping[str, Any]) -> Table:
+    """Return the table of the members that the summary lists, the worst first."""
+    results = entry["results"]
+    names = list(results[0]["values"])
+    facts = [
+        name for name in ("order", "error", "error_bound", "best") if name in results[0]["facts"]
+    ]
+    forms = {"order": "order", "best": "full"}
+    columns = (
+        Column("member", form="integer"),
+        *(Column(name, form="text") for name in names),
+        Column("measured"),
+        Column("reason"),
+        *(Column(name.replace("_", " "), form=forms.get(name, "small")) for name in facts),
+    )
+
+    def cells(result: Mapping[str, Any]) -> Iterator[Cell]:
+        yield result["case"]
+        yield from (str(result["values"][name]) for name in names)
+        yield from (result["status"], result["reason"])
+        yield from (words.fact(result, name) for name in facts)
+
+    rows = tuple(tuple(cells(result)) for result in results)
+    caption = f"Members, the worst first: {len(rows)} of {sum(entry['counts'].values())}"
+    return Table(f"members_{entry['id']}", caption, columns, rows)
+
+
+def _files(picture: style.Picture, formats: Sequence[str]) -> Iterator[tuple[str, bytes]]:
+    """Yield the figure of a check as files."""
+    assert picture.figure is not None
+    with style.applied():
+        yield f"{picture.name}.svg", drawing.svg(picture.figure, picture.name).encode()
+        for form in formats:
+            if form != "svg":
+                yield f"{picture.name}.{form}", drawing.binary(picture.figure, form)
+
+
+def _thumbnail(verdict: LadderVerdict) -> Iterator[tuple[str, bytes]]:
+    """Yield the small figure of the index, errors or differences over the levels; nothing without two of them."""
+    found = [abs(level.error or level.difference or 0.0) for level in verdict.levels]
+    places = np.flatnonzero(found)
+    if len(places) > 1:
+        sizes = np.log10(np.array(found)[places])
+        with style.applied():
+            figure = stamp(places.astype(np.float64), [Curve("", sizes)])
+            yield "thumbnail.svg", drawing.svg(figure, "thumbnail").encode()
+
+
+def _setup(experiment: SolverExperiment) -> Iterator[tuple[str, str]]:
+    """Yield what makes the levels."""
+    yield (
+        {"command": "Command", "python": "Function", "files": "Files"}[experiment.solver.kind],
+        experiment.solver.text,
+    )
+    if experiment.solver.inputs:
+        yield "Inputs", ", ".join(experiment.solver.inputs)
+    for name, sizes in experiment.sizes.items():
+        yield f"Size {name}", ", ".join(words.number(size, "step") for size in sizes)
+    for name, value in experiment.values.items():
+        yield f"Parameter {name}", str(value)
+    if experiment.sweep:
+        yield "Sweep", f"{experiment.members} members over {', '.join(experiment.sweep.keys)}"
+    for name, row in experiment.quantities.items():
+        over = f" over {', '.join(row.coordinates)}" if row.coordinates else ""
+        yield f"Quantity {name}", f"compared by {row.restrict}{over}"

@@ -1,0 +1,282 @@
+"""The levels of a solver compared, member by member: the content of ``convergence.nc`` and of ``summary.json``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from shlex import quote
+from typing import Any
+
+import numpy as np
+
+from vibsim.analysis.summary import WORST
+from vibsim.checks.fields import GROUP, flags, name_of
+from vibsim.checks.solver_facts import SOLVER_FACTS
+from vibsim.convergence import LadderVerdict
+from vibsim.convergence.study.labelled import COLUMNS, dataset
+from vibsim.convergence.study.verdict_data import Level
+from vibsim.core.array_types import Floats
+from vibsim.core.errors import VibsimError
+from vibsim.core.record import Record, Variable, attributes
+from vibsim.core.vocabulary import FORMAT, REASON_NAMES, SEVERITY, STATUSES, jsonable, worst
+from vibsim.experiment.schema.solver import SolverCheck
+from vibsim.experiment.solver import SolverExperiment
+from vibsim.solver import level_output
+from vibsim.solver.verdicts import SolverResult, expected, judge, reason_of
+
+SCHEME = "solver"
+"""In place of the name of a scheme, in results."""
+ORDER = "order"
+"""What a page compares errors with, also where the check does not ask for it."""
+SHOWN = ("values", "best_values")
+"""Arrays of the decisive member, beside the table of levels of every one."""
+
+
+@dataclass(frozen=True)
+class CheckResults:
+    """What was decided of one check: every member, the worst first."""
+
+    check: SolverCheck
+    results: Sequence[SolverResult]
+    """Without the compared values, but of the first."""
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of results by status, compared with what was expected."""
+        found = [result.compared for result in self.results]
+        return {status: found.count(status) for status in STATUSES}
+
+    @property
+    def status(self) -> str:
+        """The worst of them."""
+        return worst(result.compared for result in self.results)
+
+
+def judge_members(
+    experiment: SolverExperiment, read: Callable[[int], Sequence[Record]]
+) -> list[CheckResults]:
+    """Judge every check of every member.
+
+    Parameters
+    ----------
+    read
+        Returns the levels of a member, the coarsest first.
+
+    Raises
+    ------
+    VibsimError
+        With the member, the quantity and the levels that cannot be compared.
+    """
+    rows: list[list[SolverResult]] = [[] for _ in experiment.checks]
+    for member in range(experiment.members):
+        records = read(member)
+        for check, row in zip(experiment.checks, rows, strict=True):
+            values = [level_output.stored(record, str(check.about)) for record in records]
+            try:
+                found = judge(experiment, check, member, values)
+            except VibsimError as error:
+                where = f"member {member}: " if experiment.sweep else ""
+                raise VibsimError(f"{where}{error}") from None
+            if row and _severity(found) < _severity(row[0]):
+                row[0], found = found, row[0]
+            # the worst one is shown with its values
+            row.append(replace(found, verdict=_bare(found.verdict)) if row else found)
+    return [
+        CheckResults(check, sorted(row, key=_severity))
+        for check, row in zip(experiment.checks, rows, strict=True)
+    ]
+
+
+def _severity(result: SolverResult) -> tuple[int, float, int]:
+    return -SEVERITY[result.compared], -result.away, result.member
+
+
+def _bare(verdict: LadderVerdict) -> LadderVerdict:
+    return replace(verdict, values=np.empty(0), best_values=None, coords={})
+
+
+# ---- summary.json
+
+
+def summarise(experiment: SolverExperiment, checks: Sequence[CheckResults]) -> dict[str, Any]:
+    """Return the summary of an experiment, as `vibsim.analysis.summary.summarise` does."""
+    plain: dict[str, Any] = jsonable(
+        {
+            "vibsim_format": FORMAT,
+            "collection": experiment.collection,
+            "experiment": experiment.name,
+            "title": experiment.title,
+            "status": worst(check.status for check in checks),
+            "checks": [_check(experiment, check) for check in checks],
+            "failures": [],
+            "failure_count": 0,
+        }
+    )
+    return plain
+
+
+def _check(experiment: SolverExperiment, found: CheckResults) -> dict[str, Any]:
+    check, decides = found.check, found.results[0]
+    status, most = found.status, None if experiment.sweep is None else WORST
+    advice = decides.verdict.advice or "Compare the expectation with the levels."
+    return {
+        "id": check.id,
+        "kind": check.kind,
+        "text": _text(experiment, found),
+        "quantity": check.about,
+        "expected": expected(check),
+        "status": status,
+        "reason": reason_of(check, status, decides.verdict),
+        "advice": "" if status == "PASS" else advice,
+        "results": [_result(experiment, result) for result in found.results[:most]],
+        "counts": found.counts,
+        "where": {},
+        "note": None,
+    }
+
+
+def _text(experiment: SolverExperiment, found: CheckResults) -> str:
+    """Say what was found where it decides, and of how many members."""
+    decides, status = found.results[0], found.status
+    told = decides.verdict.sentence
+    total = len(found.results)
+    if total == 1:
+        return told
+    head = f"{status} in {found.counts[status]} of {total} members"
+    if status == "PASS":
+        head = f"All {total} members passed"
+    place = ", ".join(f"{k} = {v}" for k, v in experiment.parameters_of(decides.member).items())
+    return f"{head}. The hardest is member {decides.member} ({place}). {told}"
+
+
+def _result(experiment: SolverExperiment, result: SolverResult) -> dict[str, Any]:
+    verdict = result.verdict
+    found = {
+        "scheme": SCHEME,
+        "case": result.member,
+        "status": verdict.status,
+        "reason": verdict.reason,
+        "facts": result.facts,
+        "sentence": verdict.sentence,
+    }
+    if experiment.sweep is None:
+        return found
+    flag = "" if experiment.solver.kind == "files" else " --allow-commands"
+    return found | {
+        "values": experiment.parameters_of(result.member),
+        "command": f"vibsim run {quote(f'{experiment.word}@{result.member}')}{flag}",
+    }
+
+
+# ---- convergence.nc
+
+
+def record(experiment: SolverExperiment, checks: Iterable[CheckResults]) -> Record:
+    """Return what is stored of all checks: the table of levels of every member, and the values of the decisive one."""
+    members, levels = experiment.members, list(experiment.levels)
+    coords = {
+        "level": Variable(
+            ("level",), np.array(levels), attributes("position of the level, the coarsest 0", "1")
+        ),
+        "case": Variable(("case",), np.arange(members), attributes("member of the sweep", "1")),
+    }
+    for name, sizes in experiment.sizes.items():
+        values = np.array(sizes, dtype=np.float64)
+        coords[name] = Variable(("level",), values, attributes(f"size {name} of the level", "1"))
+    for name in experiment.parameters_of(0):
+        column = np.array([experiment.parameters_of(i)[name] for i in range(members)])
+        coords[name] = Variable(("case",), column, attributes(f"parameter {name}", "1"))
+    variables: dict[str, Variable] = {}
+    for found in checks:
+        variables |= _of_check(found)
+    return Record(coords, variables)
+
+
+def _of_check(found: CheckResults) -> dict[str, Variable]:
+    """Return the variables of a check."""
+    id_, decides = found.check.id, found.results[0]
+    table: dict[str, Variable] = {}
+
+    def add(name: str, dims: tuple[str, ...], values: Any, meaning: str, **more: Any) -> None:
+        text = attributes(f"check {id_}: {meaning}", "1", **more)
+        table[name_of(id_, name)] = Variable(dims, np.asarray(values), text, GROUP)
+
+    by_member = sorted(found.results, key=lambda result: result.member)
+    for name, words in (("status", STATUSES), ("reason", REASON_NAMES)):
+        codes = [words.index(getattr(result.verdict, name)) for result in by_member]
+        add(name, ("case",), np.array(codes, dtype=np.int8), f"measured {name}", **flags(words))
+    orders = (result.verdict.order for result in by_member)
+    add(ORDER, ("case",), _floats(orders), SOLVER_FACTS["converges"][ORDER])
+    for name, meaning in SOLVER_FACTS[found.check.kind].items():
+        add(name, ("case",), _floats(result.facts[name] for result in by_member), meaning)
+    for name, meaning in COLUMNS.items():
+        rows = [
+            _floats(getattr(row, name) for row in result.verdict.levels) for result in by_member
+        ]
+        add(f"level_{name}", ("case", "level"), rows, meaning)
+    add("member", (), np.int64(decides.member), "member that decides")
+    shown = dataset(decides.verdict)
+    for name in SHOWN:
+        if name in shown:
+            dims = ("level" if dim == "h" else _dim(id_, str(dim)) for dim in shown[name].dims)
+            add(f"of_{name}", tuple(dims), shown[name].values, shown[name].attrs["long_name"])
+    for dim, points in decides.verdict.coords.items():
+        add(f"at_{dim}", (_dim(id_, dim),), points, f"common points along {dim}")
+    return table
+
+
+def _floats(entries: Iterable[float | None]) -> Floats:
+    return np.array([np.nan if x is None else x for x in entries], dtype=np.float64)
+
+
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+def _dim(id_: str, dim: str) -> str:
+    return name_of(id_, f"at_{dim}")
+
+
+def restored(
+    experiment: SolverExperiment, found: Record, check: SolverCheck, entry: Mapping[str, Any]
+) -> LadderVerdict:
+    """Return the verdict on the decisive member, from ``convergence.nc`` and the entry of a check in the summary."""
+    id_ = check.id
+    result = entry["results"][0]
+    facts = result["facts"]
+    member = int(found[name_of(id_, "member")])
+    columns = {name: found[name_of(id_, f"level_{name}")][member].tolist() for name in COLUMNS}
+    rows = zip(experiment.sizes[experiment.step], *columns.values(), strict=True)
+    known = [(h, *map(_known, entries)) for h, *entries in rows]
+    values, best = (name_of(id_, f"of_{name}") for name in SHOWN)
+    dims = found.variable(values).dims[1:] if values in found else ()
+    head = _dim(id_, "")
+    is_order = check.kind == "converges"
+    return LadderVerdict(
+        quantity=str(check.about),
+        status=result["status"],
+        reason=result["reason"],
+        order=_known(float(found[name_of(id_, ORDER)][member])),
+        order_low=facts.get("order_low"),
+        order_high=facts.get("order_high"),
+        h_used=tuple(facts.get("h_used") or ()),
+        error=facts["error"],
+        error_bound=facts["error_bound"],
+        relative_error=facts["relative_error"],
+        best=facts["best"],
+        best_bound=facts["best_bound"],
+        gci=facts["gci"],
+        sentence=entry["text"],
+        advice=entry["advice"],
+        levels=tuple(Level(*row) for row in known),
+        expected=getattr(check, "order", None) if is_order else None,
+        at_least=getattr(check, "at_least", None) if is_order else None,
+        size_name=experiment.step,
+        dims=tuple(dim.removeprefix(head) for dim in dims),
+        coords={dim.removeprefix(head): found[dim] for dim in dims if dim in found},
+        values=found[values]
+        if values in found
+        else np.array([row[1] for row in known], dtype=float),
+        best_values=np.asarray(found[best]) if best in found else None,
+    )

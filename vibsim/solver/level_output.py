@@ -1,0 +1,169 @@
+"""What a solver wrote for one level: from its file or its dataset to values, and to the record that is stored."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.convergence.study.grid_values import GridValues, grid_values
+from vibsim.core.array_types import Floats
+from vibsim.core.errors import InputError, VibsimError, nearest
+from vibsim.core.record import Record, Variable, attributes
+from vibsim.experiment.schema.solver import QuantitySection
+from vibsim.experiment.solver import SolverExperiment
+from vibsim.experiment.tables.csv_text import MOST_LINES
+from vibsim.solver import level_files, level_tables
+
+Quantities = Mapping[str, QuantitySection]
+LEVEL = "level"
+"""Name of the coordinate with the position of a level, the coarsest 0."""
+EPSILON = "epsilon"
+"""Attribute with the distance of neighbouring numbers near 1 in the precision that values were computed in."""
+
+
+def read(path: Path, quantities: Quantities, *, is_shown: bool = True) -> dict[str, GridValues]:
+    """Return the quantities in a netCDF or CSV file; VibsimError where it does not have them as they are wanted.
+
+    `is_shown`: whether messages may show what is in a table; see `vibsim.solver.level_tables.columns`.
+    """
+    if level_files.is_netcdf(path):
+        with level_files.opened(path) as dataset:
+            return {
+                name: _checked(
+                    name, level_files.grid_values(str(path), dataset, name, row.coordinates), row
+                )
+                for name, row in quantities.items()
+            }
+    return _from_table(path, quantities, is_shown)
+
+
+def from_dataset(dataset: Any, quantities: Quantities) -> dict[str, GridValues]:
+    """Return the quantities in what a function returned; VibsimError where it does not have them as they are wanted."""
+    if not hasattr(dataset, "data_vars"):
+        kind = type(dataset).__name__
+        raise VibsimError(f"returned a value of type {kind}, and must return an xarray.Dataset")
+    found = {}
+    for name, row in quantities.items():
+        if name not in dataset.variables:
+            hint = nearest(name, list(map(str, dataset.data_vars)))
+            raise VibsimError(f"{name}: the dataset has no such variable: {hint}")
+        array = dataset[name]
+        for wanted in row.coordinates or ():
+            if wanted not in array.dims and wanted in array.coords:
+                array = array.swap_dims(dict.fromkeys(array.coords[wanted].dims, wanted))
+        try:
+            found[name] = _checked(name, grid_values(array, name), row)
+        except InputError as error:
+            raise VibsimError(f"{name}: {error.faults[0].value} {error.faults[0].rule}") from None
+    return found
+
+
+def _from_table(path: Path, quantities: Quantities, is_shown: bool) -> dict[str, GridValues]:
+    """Return the quantities in the columns of a table: a row for each point, or a single one."""
+    columns = [name for row in quantities.values() for name in row.coordinates or ()]
+    names = list(dict.fromkeys([*columns, *quantities]))
+    table, _ = level_tables.columns(path, names, MOST_LINES, is_shown=is_shown)
+    if not len(table[names[0]]):
+        raise VibsimError(f"{path}: has no row below the names of its columns")
+    return {
+        name: _checked(name, _on_grid(name, table, row.coordinates or ()), row)
+        for name, row in quantities.items()
+    }
+
+
+def _on_grid(name: str, table: Mapping[str, Floats], dims: Sequence[str]) -> GridValues:
+    """Return a column as values on the grid of its coordinates; without them a number, or a series over the rows."""
+    column = table[name]
+    if not dims:
+        return (
+            GridValues(column[0], (), {}, name)
+            if len(column) == 1
+            else GridValues(column, ("row",), {}, name)
+        )
+    points = [np.unique(table[dim], return_inverse=True) for dim in dims]
+    shape = tuple(len(axis) for axis, _ in points)
+    flat = np.ravel_multi_index(tuple(place for _, place in points), shape)
+    if len(np.unique(flat)) < len(flat) or len(flat) < np.prod(shape):
+        size = " x ".join(map(str, shape))
+        rule = f"has {len(flat)} rows for the {size} points of {', '.join(dims)}"
+        raise VibsimError(f"{name}: {rule}; every point must have one row")
+    values = np.empty(len(flat))
+    values[flat] = column
+    coords = {dim: axis for dim, (axis, _) in zip(dims, points, strict=True)}
+    return GridValues(values.reshape(shape), tuple(dims), coords, name)
+
+
+def _checked(name: str, values: GridValues, wanted: QuantitySection) -> GridValues:
+    """Return values with the coordinates that are wanted; VibsimError where they have others."""
+    for dim, points in values.coords.items():
+        if points.dtype.kind == "f" and not np.isfinite(points).all():
+            raise VibsimError(f"{name}: coordinate {dim} must be finite")
+        if len(np.unique(points)) < len(points):
+            raise VibsimError(f"{name}: the points of coordinate {dim} must differ from each other")
+    if wanted.coordinates is None:
+        return values
+    if set(values.dims) != set(wanted.coordinates):
+        found = ", ".join(values.dims) or "none (a number)"
+        rule = f"has the dimensions {found}, and must have {', '.join(wanted.coordinates)}"
+        raise VibsimError(f"{name}: {rule}")
+    missing = [dim for dim in wanted.coordinates if dim not in values.coords]
+    if missing:
+        raise VibsimError(f"{name}: dimension {missing[0]} has no coordinate")
+    return values
+
+
+def record(
+    experiment: SolverExperiment, level: int, member: int, values: Mapping[str, GridValues]
+) -> Record:
+    """Return what is stored of a level: its quantities and their coordinates, its sizes and parameters.
+
+    Raises
+    ------
+    VibsimError
+        Where two quantities have different points under one name.
+    """
+    coords: dict[str, Variable] = {
+        LEVEL: _variable((), np.int64(level), "position of the level, the coarsest 0")
+    }
+    for name, size in experiment.sizes_of(level).items():
+        coords[name] = _variable((), np.float64(size), f"size {name} of the level")
+    for name, parameter in experiment.parameters_of(member).items():
+        coords[name] = _variable((), np.asarray(parameter), f"parameter {name}")
+    lengths: dict[str, int] = {}
+    for name, one in values.items():
+        for dim, length in zip(one.dims, one.values.shape, strict=True):
+            points = one.coords.get(dim)
+            known = coords.get(dim)
+            is_other = known is not None and not np.array_equal(known.values, points)  # type: ignore[arg-type]
+            if lengths.setdefault(dim, length) != length or is_other:
+                raise VibsimError(f"{name}: has other points along {dim} than another quantity")
+            if points is not None and known is None:
+                coords[dim] = _variable((dim,), points, f"coordinate {dim}")
+    variables = {
+        name: Variable(
+            one.dims,
+            one.values,
+            attributes(name, one.units or "1", **{EPSILON: one.epsilon}),
+        )
+        for name, one in values.items()
+    }
+    return Record(coords, variables)
+
+
+def _variable(dims: tuple[str, ...], values: NDArray[Any] | np.generic, text: str) -> Variable:
+    return Variable(dims, np.asarray(values), attributes(text, "1"))
+
+
+def stored(found: Record, name: str) -> GridValues:
+    """Return a quantity of a level as it was stored."""
+    variable = found.variable(name)
+    epsilon = variable.attrs[EPSILON]
+    assert isinstance(epsilon, float)
+    coords = {dim: found[dim] for dim in variable.dims if dim in found.coords}
+    values = GridValues(np.asarray(variable.values), variable.dims, coords, name, epsilon)
+    return replace(values, units=str(variable.attrs["units"]))

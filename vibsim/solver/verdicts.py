@@ -1,0 +1,199 @@
+"""What is decided of the levels of a solver: a check of a quantity, of one member, with its facts and its words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from vibsim.checks.accurate import is_known_order
+from vibsim.checks.outcome import as_expected, compared_reason
+from vibsim.checks.solver_facts import SOLVER_FACTS
+from vibsim.convergence import LadderVerdict
+from vibsim.convergence.study.common_points import common_values
+from vibsim.convergence.study.grid_values import GridValues
+from vibsim.convergence.study.judgement import verdicts
+from vibsim.convergence.study.sentences import at_most, number
+from vibsim.core.errors import InputError, VibsimError
+from vibsim.core.vocabulary import REASON_NAMES, REASONS, STATUSES
+from vibsim.experiment.schema.checks import Expect
+from vibsim.experiment.schema.solver import SolverAccurateCheck, SolverCheck, SolverConvergesCheck
+from vibsim.experiment.solver import SolverExperiment
+
+
+@dataclass(frozen=True)
+class SolverResult:
+    """What was decided of one check and one member."""
+
+    member: int
+    verdict: LadderVerdict
+    """With status, reason, sentence and advice of the check."""
+    compared: str
+    """The status after comparison with what was expected."""
+    facts: dict[str, Any]
+    away: float
+    """How far the outcome is from what was asked; larger is worse."""
+
+
+def judge(
+    experiment: SolverExperiment, check: SolverCheck, member: int, values: Sequence[GridValues]
+) -> SolverResult:
+    """Judge the levels of a quantity, the coarsest first.
+
+    Raises
+    ------
+    VibsimError
+        Where the levels have no common points.
+    """
+    promise = _promise(experiment, check)
+    restrict = experiment.quantities[str(check.about)].restrict
+    try:
+        (found,) = verdicts(
+            _steps(experiment),
+            values,
+            quantity=check.about,
+            order=promise.order if promise else None,
+            at_least=promise.at_least if promise else None,
+            restrict=restrict,
+        )
+    except InputError as error:
+        fault = error.faults[0]
+        key = fault.key if fault.key.startswith("level") else _place(values, restrict) + fault.key
+        parts = (str(check.about), key, fault.value, fault.rule, fault.hint)
+        raise VibsimError(": ".join(dict.fromkeys(filter(None, parts)))) from None
+    if isinstance(check, SolverAccurateCheck):
+        found, facts, away = _accuracy(check, found)
+    else:
+        facts, away = _order(experiment, check, found)
+    code = np.array([REASON_NAMES.index(found.reason)], dtype=np.int8)
+    compared = STATUSES[int(as_expected(check.expect, code)[0])]
+    return SolverResult(member, found, compared, facts, away)
+
+
+def _place(values: Sequence[GridValues], restrict: str) -> str:
+    """Name the first level that cannot be compared with the coarsest one; empty where each can."""
+    for level in range(1, len(values)):
+        try:
+            common_values([values[0], values[level]], restrict, None)
+        except InputError:
+            return f"level {level} beside level 0: "
+    return ""
+
+
+def _promise(experiment: SolverExperiment, check: SolverCheck) -> SolverConvergesCheck | None:
+    """Return the check that says which order is expected: of an accuracy another one of the same quantity, if any."""
+    if isinstance(check, SolverConvergesCheck):
+        return check
+    for other in experiment.checks:
+        is_ours = other.about == check.about and other.expect == Expect()
+        if is_ours and isinstance(other, SolverConvergesCheck):
+            return other
+    return None
+
+
+def _steps(experiment: SolverExperiment) -> dict[str, tuple[float, ...]]:
+    """Return the sizes that fall with the step size; others, such as numbers of cells, are no sizes of steps."""
+    falling = {
+        name: values
+        for name, values in experiment.sizes.items()
+        if min(values) > 0.0 and all(np.diff(values) < 0.0)
+    }
+    return {experiment.step: experiment.sizes[experiment.step], **falling}
+
+
+def _order(
+    experiment: SolverExperiment, check: SolverConvergesCheck, found: LadderVerdict
+) -> tuple[dict[str, Any], float]:
+    """Return the facts on an order, and how far it is from the expected one."""
+    places = [experiment.sizes[experiment.step].index(h) for h in found.h_used]
+    wanted = check.order or check.at_least
+    facts = {name: getattr(found, name, None) for name in SOLVER_FACTS["converges"]}
+    facts |= {
+        "promised": wanted,
+        "levels": [places[0], places[-1]] if places else None,
+        "h_used": list(found.h_used),
+    }
+    away = math.inf if found.order is None else abs(found.order - (wanted or found.order))
+    return facts, away
+
+
+def _accuracy(
+    check: SolverAccurateCheck, found: LadderVerdict
+) -> tuple[LadderVerdict, dict[str, Any], float]:
+    """Return the verdict on an error, its facts, and the bound of the error over what is allowed."""
+    size = abs(found.levels[-1].value or 0.0)
+    asked = check.accuracy * (size if check.is_relative else 1.0)
+    error = None if found.error is None else abs(found.error)
+    bound = found.error_bound
+    decides = is_known_order(found.reason) and error is not None and bound is not None
+    if found.reason == "non_finite":
+        reason = "non_finite"
+    elif not asked > 0.0:
+        reason = "not_applicable"
+    elif decides and error is not None and bound is not None:
+        # as far below the error as the bound is above it
+        least = max(2.0 * error - bound, 0.0)
+        reason = "match" if bound < asked else "mismatch" if least > asked else "pre_asymptotic"
+    else:
+        reason = found.reason
+    facts = {name: getattr(found, name, None) for name in SOLVER_FACTS["accurate"]}
+    facts |= {"size": size, "accuracy": check.accuracy}
+    sentence, advice = _words(check, found, reason, size, decides)
+    told = replace(found, status=REASONS[reason], reason=reason, sentence=sentence, advice=advice)
+    away = math.inf if bound is None or not asked > 0.0 else bound / asked
+    return told, facts, away
+
+
+def _words(
+    check: SolverAccurateCheck, found: LadderVerdict, reason: str, size: float, decides: bool
+) -> tuple[str, str]:
+    """Return sentence and advice of a verdict on an error."""
+    unit, of_size = (size, " of its size") if check.is_relative else (1.0, "")
+    asked = f"as asked ({number(check.accuracy, 3)}{of_size})"
+    name, h = found.quantity, f"{found.size_name} = {number(found.levels[-1].h, 6)}"
+    if reason == "non_finite":
+        return found.sentence, found.advice
+    if reason == "not_applicable":
+        return (
+            f"{name} is 0, so it has no relative error.",
+            "Give `absolute:` in place of `relative:`.",
+        )
+    if not decides:
+        told = f"{name} may or may not be as accurate {asked}. {found.sentence}"
+        return told, found.advice or "Add a finer level."
+    error, bound = abs(found.error or 0.0) / unit, (found.error_bound or 0.0) / unit
+    least = max(2.0 * error - bound, 0.0)
+    told = f"The error at {h} is {number(error, 2)}{of_size}"
+    finer = f"Add a finer level, or change `{check.key}:`."
+    if reason == "match":
+        return f"{name} is accurate {asked}. {told}, at most {at_most(bound)}.", ""
+    if reason == "mismatch":
+        return f"{name} is not accurate {asked}. {told}, at least {number(least, 2)}.", finer
+    between = f"between {number(least, 2)} and {at_most(bound)}"
+    return f"{name} may or may not be as accurate {asked}. {told}, {between}.", finer
+
+
+def reason_of(check: SolverCheck, status: str, found: LadderVerdict) -> str:
+    """Return the reason of a check whose compared status is `status`; see `vibsim.checks.outcome.compared_reason`."""
+    return compared_reason(check, status, found.status, found.reason)  # type: ignore[arg-type]
+
+
+def expected(check: SolverCheck) -> str:
+    """Say what a check expects."""
+    if isinstance(check, SolverAccurateCheck):
+        of_size = " of its size" if check.is_relative else ""
+        asked = f"accurate to {number(check.accuracy, 3)}{of_size}"
+    elif check.order is not None:
+        asked = f"order {check.order:g}"
+    elif check.at_least is not None:
+        asked = f"order {check.at_least:g} at least"
+    else:
+        asked = "an order that can be believed"
+    expect = check.expect
+    if (expect.status, expect.reason) == ("PASS", None):
+        return asked
+    reason = f" ({expect.reason})" if expect.reason else ""
+    return f"{asked}: {expect.status}{reason}"
