@@ -29,15 +29,17 @@ def parts_in_words(f: Found, quantity: str, expected: float) -> str:
     if any(f"{position}{end}_order" not in record for end in (PHASE, AMPLITUDE)):
         return ""
     norm = record.words("norm").index(TYPICAL_NORM)
-    open_ = STATUSES.index("INCONCLUSIVE")
-    if any(record[f"{position}{end}_status"][place] == open_ for end in (PHASE, AMPLITUDE)):
-        return ""
     phase, amplitude = (
         float(record[f"{position}{end}_order"][*place, norm]) for end in (PHASE, AMPLITUDE)
     )
+    lower = AMPLITUDE if amplitude < phase else PHASE
+    if record[f"{position}{lower}_status"][place] == STATUSES.index("INCONCLUSIVE"):
+        return ""
     share = float(record[f"{position}{PHASE}_at_start"][place])
     whose = "" if quantity == position else f" of {f.notation.quantity(position)}"
-    return sentence(phase, amplitude, share, expected, whose)
+    # an order that is too high may be that of one part alone, whatever was expected
+    least = math.inf if f.reason == "order_high" else expected
+    return sentence(phase, amplitude, share, least, whose)
 
 
 def sentence(phase: float, amplitude: float, share: float, expected: float, whose: str = "") -> str:
