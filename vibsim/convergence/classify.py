@@ -59,7 +59,7 @@ def rules(e: Evidence, t: Trend) -> tuple[list[tuple[Flags, str]], Floats]:
     wrong &= np.where(
         above,
         together & (t.width <= th.NARROW) & ~t.drifting & ~t.hiding & _alone(e, t, likely),
-        several | (np.abs(t.scatter) <= th.UNRELATED_FIRST),
+        several | (np.abs(t.scatter) <= th.FAILS_ALONE),
     )
     wrong |= _settled_elsewhere(e, t, p)
     # levels that differ by more than the solution have nothing to do with it yet
