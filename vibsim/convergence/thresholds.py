@@ -60,7 +60,7 @@ SINGLE_NUMBER = 1e-9
 
 COINCIDENT = 0.2  # largest scatter of curves that count as proportional [calibrated]
 PROPORTIONAL_ALONE = 0.05  # the same where one triple is the only evidence [calibrated]
-FAILS_ALONE = 0.11  # the same where one triple is to show another order [calibrated on random real ladders]
+FAILS_ALONE = 0.11  # the same where it is to show another order [calibrated on real ladders]
 UNRELATED = 0.7  # with so much scatter, a change from there says nothing [calibrated]
 # Change of the order from one triple to the next that a scatter of `HIDDEN` at most cannot come from. [calibrated]
 JUMP = 0.3
