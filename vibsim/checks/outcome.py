@@ -19,7 +19,7 @@ from vibsim.experiment.data import schemes_of
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
-    from vibsim.experiment.schema.checks import ClaimCheck, Expect, Measurement
+    from vibsim.experiment.schema.checks import ClaimCheck, Expect, Measurement, MeasuringCheck
 
 PASS, FAIL, INCONCLUSIVE = map(STATUSES.index, ("PASS", "FAIL", "INCONCLUSIVE"))
 """Index into `STATUSES`."""
@@ -241,7 +241,7 @@ def as_expected(expect: Expect, reason: Codes) -> Codes:
     return np.where(right, PASS, np.where(is_open(reason), INCONCLUSIVE, FAIL))
 
 
-def compared_reason(check: Measurement | None, status: str, measured: str, reason: str) -> str:
+def compared_reason(check: MeasuringCheck | None, status: str, measured: str, reason: str) -> str:
     """Return the measured reason where a PASS was expected, else whether the outcome is the expected one.
 
     Parameters
@@ -251,11 +251,7 @@ def compared_reason(check: Measurement | None, status: str, measured: str, reaso
     status, measured
         Status compared with what was expected, and the measured one.
     """
-    expects_pass = True
-    if check is not None and check.expected_verdict is not None:
-        expects_pass = check.expected_verdict.status == "PASS"
-    elif check is not None and check.kind == "stable":
-        expects_pass = check.stable
+    expects_pass = check is None or check.expects_pass
     if status == "PASS" and not expects_pass:
         return "match"
     if status == "FAIL" and (not expects_pass or measured == "PASS"):

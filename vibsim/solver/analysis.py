@@ -12,6 +12,7 @@ import numpy as np
 
 from vibsim.analysis.summary import WORST
 from vibsim.checks.fields import GROUP, flags, name_of
+from vibsim.checks.outcome import compared_reason
 from vibsim.checks.solver_facts import SOLVER_FACTS
 from vibsim.convergence import LadderVerdict
 from vibsim.convergence.study.labelled import COLUMNS, dataset
@@ -23,7 +24,7 @@ from vibsim.core.vocabulary import FORMAT, REASON_NAMES, SEVERITY, STATUSES, jso
 from vibsim.experiment.schema.solver import SolverCheck
 from vibsim.experiment.solver import SolverExperiment
 from vibsim.solver import level_output
-from vibsim.solver.verdicts import SolverResult, expected, judge, reason_of
+from vibsim.solver.verdicts import SolverResult, expected, judge
 
 SCHEME = "solver"
 """In place of the name of a scheme, in results."""
@@ -127,7 +128,7 @@ def _check(experiment: SolverExperiment, found: CheckResults) -> dict[str, Any]:
         "quantity": check.about,
         "expected": expected(check),
         "status": status,
-        "reason": reason_of(check, status, decides.verdict),
+        "reason": compared_reason(check, status, decides.verdict.status, decides.verdict.reason),
         "advice": "" if status == "PASS" else advice,
         "results": [_result(experiment, result) for result in found.results[:most]],
         "counts": found.counts,

@@ -139,7 +139,9 @@ def record(
         for dim, length in zip(one.dims, one.values.shape, strict=True):
             points = one.coords.get(dim)
             known = coords.get(dim)
-            is_other = known is not None and not np.array_equal(known.values, points)  # type: ignore[arg-type]
+            is_other = known is not None and (
+                points is None or not np.array_equal(known.values, points)
+            )
             if lengths.setdefault(dim, length) != length or is_other:
                 raise VibsimError(f"{name}: has other points along {dim} than another quantity")
             if points is not None and known is None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vibsim.checks.accurate import is_known_order
-from vibsim.checks.outcome import as_expected, compared_reason
+from vibsim.checks.outcome import as_expected
 from vibsim.checks.solver_facts import SOLVER_FACTS
 from vibsim.convergence import LadderVerdict
 from vibsim.convergence.study.common_points import common_values
@@ -174,11 +174,6 @@ def _words(
         return f"{name} is not accurate {asked}. {told}, at least {number(least, 2)}.", finer
     between = f"between {number(least, 2)} and {at_most(bound)}"
     return f"{name} may or may not be as accurate {asked}. {told}, {between}.", finer
-
-
-def reason_of(check: SolverCheck, status: str, found: LadderVerdict) -> str:
-    """Return the reason of a check whose compared status is `status`; see `vibsim.checks.outcome.compared_reason`."""
-    return compared_reason(check, status, found.status, found.reason)  # type: ignore[arg-type]
 
 
 def expected(check: SolverCheck) -> str:

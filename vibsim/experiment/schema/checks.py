@@ -83,6 +83,11 @@ class MeasuringCheck(Section):
         found: Expect | None = getattr(self, "expect", None)
         return found
 
+    @property
+    def expects_pass(self) -> bool:
+        """Whether the verdict that passes is a PASS."""
+        return self.expected_verdict is None or self.expected_verdict.status == "PASS"
+
 
 class StableCheck(MeasuringCheck):
     """The amplitude does not grow without bound, or it does."""
@@ -94,6 +99,11 @@ class StableCheck(MeasuringCheck):
     schemes: _Schemes = None
     level: _Level = None
     case: _Case = None
+
+    @property
+    def expects_pass(self) -> bool:
+        """Whether they must be."""
+        return self.stable
 
 
 class ConservesCheck(MeasuringCheck):

@@ -25,7 +25,7 @@ from vibsim.experiment.schema.fields import (
     tag,
     tagged,
 )
-from vibsim.experiment.schema.sweep import Sample, Spread
+from vibsim.experiment.schema.sweep import ParameterSweep
 
 Kind = Literal["command", "python", "files"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -152,25 +152,6 @@ class ResourcesSection(Section):
     """Minutes, for clusters that want to know; here nothing ends a solver."""
     threads: Count = 1
     """Cores."""
-
-
-class ParameterSweep(Section):
-    """Further placeholders of the command, or parameters of the function, that vary; several make a grid."""
-
-    model_config = ConfigDict(extra="allow", json_schema_extra={"minProperties": 1})
-    __pydantic_extra__: dict[str, Spread]
-    stand_ins = MappingProxyType({})
-    other_values = Spread
-
-    zip: Annotated[dict[str, Spread], Field(min_length=1)] | None = None
-    """Parameters that move together, each with as many values: one axis of the grid."""
-    sample: Sample | None = None
-    """Points scattered over several parameters: one axis of the grid."""
-
-    @property
-    def single(self) -> Mapping[str, Any]:
-        """Values of the parameters that are an axis of their own."""
-        return self.__pydantic_extra__ or {}
 
 
 class SolverDocument(Section):

@@ -222,16 +222,10 @@ def swept_options(schemes: Iterable[Scheme]) -> dict[str, Any]:
     }
 
 
-class SweepSection(Section):
-    """Parameters that vary, by dotted path; several make a grid in the order written, the last one fastest."""
+class ParameterSweep(Section):
+    """Further placeholders of the command, or parameters of the function, that vary; several make a grid."""
 
-    model_config = ConfigDict(
-        extra="allow",
-        json_schema_extra={
-            "minProperties": 1,
-            "patternProperties": swept_options(SCHEMES.built_in.values()),
-        },
-    )
+    model_config = ConfigDict(extra="allow", json_schema_extra={"minProperties": 1})
     __pydantic_extra__: dict[str, Spread]
     stand_ins = MappingProxyType({})
     other_values = Spread
@@ -245,3 +239,15 @@ class SweepSection(Section):
     def single(self) -> Mapping[str, Written]:
         """Values of the parameters that are an axis of their own."""
         return self.__pydantic_extra__ or {}
+
+
+class SweepSection(ParameterSweep):
+    """Parameters that vary, by dotted path; several make a grid in the order written, the last one fastest."""
+
+    model_config = ConfigDict(
+        extra="allow",
+        json_schema_extra={
+            "minProperties": 1,
+            "patternProperties": swept_options(SCHEMES.built_in.values()),
+        },
+    )
