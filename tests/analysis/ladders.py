@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vibsim.apriori.roundoff_floor import norm_of_floor
 from vibsim.convergence import differences
-from vibsim.convergence.ladder_statistics import Evidence
+from vibsim.convergence.circumstances import Evidence
 from vibsim.core.vocabulary import ORDER_TOLERANCE
 
 Floats = NDArray[np.float64]
@@ -57,27 +57,23 @@ def evidence_of(
     def measure(values: list[Floats]) -> Floats:
         return np.stack([differences.norm(v.reshape(1, -1), norm, SPACING) for v in values], -1)
 
-    errors = [] if exact is None else [(exact - u)[None] for u in fields]
-    of_errors, scatter = (differences.scatters(x, norm) for x in (errors, d))
+    rows = d if exact is None else [*d, (fields[-1] - exact)[None]]
+    cosines = np.zeros((1, len(levels), len(levels)))
+    if rows:
+        cosines[:, : len(rows), : len(rows)] = differences.cosines(rows, norm)
     return evidence_with(
         levels=levels,
         difference=measure(d) if d else np.empty((1, 0)),
-        scatter=np.stack(scatter, -1) if scatter else np.empty((1, 0)),
+        cosines=cosines,
         floor=norm_of_floor(floors, norm, len(T), SPACING),
         order=np.array([order]),
         omega_dt=T[-1] * 2.0 ** -np.array([levels], dtype=float),
         relative_floor=floors[:, 0] / (size or 1.0),
         tolerance=tolerance,
         size=norm_of_floor(np.array([size]), norm, len(T), SPACING),
-        **({"error_scatter": finest_three(np.stack(of_errors, -1))} if of_errors else {}),
-        **({} if exact is None else {"error": measure([exact - u for u in fields])}),
+        **({} if exact is None else {"error": measure([exact - fields[-1]])[:, 0]}),
         **more,
     )
-
-
-def finest_three(scatter: Floats) -> Floats:
-    """Return the scatter of errors as an analysis has it: of the finest three levels alone."""
-    return np.where(np.arange(scatter.shape[-1]) < scatter.shape[-1] - 2, np.nan, scatter)
 
 
 def evidence_with(**known: Any) -> Evidence:
@@ -87,9 +83,8 @@ def evidence_with(**known: Any) -> Evidence:
     unknown, no = np.full(shape, np.nan), np.zeros(shape, dtype=bool)
     neutral = {
         "tolerance": ORDER_TOLERANCE,
-        "ceiling": known["floor"],
-        "error": np.full((*shape, n), np.nan),
-        "error_scatter": np.full((*shape, n - 1), np.nan),
+        "ceiling": known["floor"][..., -1],
+        "error": unknown,
         "blur": np.zeros((*shape, n)),
         "scale": np.full(shape, np.inf),
         "promised": order,

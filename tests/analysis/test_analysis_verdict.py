@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from ladders import T, Truth, evidence_of, evidence_with, random_truth, shape_in_time
 
-from vibsim.convergence import ladder_statistics
+from vibsim.convergence import circumstances
 from vibsim.convergence.batches import LADDERS, batches
 from vibsim.convergence.verdict import Judgement, judge, judge_together
 from vibsim.core.vocabulary import NORMS, REASON_NAMES, STATUSES
@@ -226,12 +226,10 @@ def test_no_nan_among_the_evidence_passes(place: str) -> None:
     values = np.array(getattr(evidence, place), dtype=float)
     values[..., -1] = np.nan
     fields = {**vars(evidence), place: values}
-    assert STATUSES[int(judge(ladder_statistics.Evidence(**fields)).status[0])] != "PASS"
+    assert STATUSES[int(judge(circumstances.Evidence(**fields)).status[0])] != "PASS"
 
 
-def stacked(
-    rows: list[ladder_statistics.Evidence], shape: tuple[int, ...]
-) -> ladder_statistics.Evidence:
+def stacked(rows: list[circumstances.Evidence], shape: tuple[int, ...]) -> circumstances.Evidence:
     """Return the evidence of many ladders of the same levels."""
     arrays = {
         name: np.concatenate([getattr(row, name) for row in rows]).reshape(*shape, *one.shape[1:])
@@ -259,7 +257,7 @@ def test_many_ladders_at_once_are_judged_as_one_by_one() -> None:
 def test_random_ladders_have_no_false_pass(norm: str) -> None:
     rng = np.random.default_rng(2026)
     false_pass, false_fail, right, passed, widths = [], [], 0, 0, []
-    of_levels: dict[tuple[int, ...], list[tuple[Truth, float, ladder_statistics.Evidence]]] = {}
+    of_levels: dict[tuple[int, ...], list[tuple[Truth, float, circumstances.Evidence]]] = {}
     for _ in range(700):
         truth = random_truth(rng)
         p, q = truth.orders

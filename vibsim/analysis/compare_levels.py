@@ -16,7 +16,7 @@ from vibsim.checks.order import phase_at_start
 from vibsim.checks.tolerance import bounds
 from vibsim.comparison import best_values
 from vibsim.comparison.comparison_variables import Table, in_precision, numbers, over_time
-from vibsim.comparison.order_evidence import judge_orders, judgement
+from vibsim.comparison.order_evidence import judge_orders, judgement, order_in
 from vibsim.comparison.quantity_comparison import Comparison, comparisons
 from vibsim.comparison.work_precision import work_precision
 from vibsim.convergence import differences
@@ -222,7 +222,7 @@ _LEAN = {
 
 
 def _verdict(q: Comparison) -> Table:
-    """Judge a quantity by the formal order; the order in every norm, status and window in the typical norm."""
+    """Return the verdict on a quantity by the formal order: in the typical norm, but for the order in every norm."""
     typical = judgement(q, TYPICAL_NORM)
     table: Table = {}
 
@@ -231,11 +231,15 @@ def _verdict(q: Comparison) -> Table:
         attrs = attributes(f"{q.name}: {words}", "1", **more)
         table[f"{q.name}_{key}"] = Variable(dims, values, attrs)
 
-    words = {"order": "stated order", "low": "its lower end", "high": "its upper end"}
-    for field, text in words.items():
-        values = np.stack([getattr(judgement(q, norm), field) for norm in q.block.norms], axis=-1)
-        key = "order" if field == "order" else f"order_{field}"
-        add(key, in_precision(q, values), text)
+    orders = np.stack([order_in(q, norm) for norm in q.block.norms], axis=-1)
+    add("order", in_precision(q, orders), "stated order")
+    for end, text in {"low": "lower", "high": "upper"}.items():
+        judged = (q.judged.get((norm, "scheme")) for norm in q.block.norms)
+        values = [
+            np.full(orders.shape[:-1], np.nan) if j is None else getattr(j, end) for j in judged
+        ]
+        found = np.stack(values, axis=-1)
+        add(f"order_{end}", in_precision(q, found), f"its {text} end, in the norms that are judged")
     for key, levels in (("first", typical.first), ("last", typical.last)):
         text = f"{key} level that the order rests on, -1 for none"
         add(f"window_{key}", levels.astype(np.int16), text)

@@ -11,11 +11,9 @@ times that all lie at turning points (Dt = pi/w after a release from rest) there
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from functools import partial
-from itertools import groupby
-from operator import itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,12 +21,12 @@ from vibsim.apriori.roundoff_floor import SPACING_AT_ONE, norm_of_floor
 from vibsim.comparison.quantity_comparison import Comparison
 from vibsim.comparison.thresholds import STRAIGHT, THEORY_ROUNDING, VANISHING_RATE
 from vibsim.convergence.batches import batches
+from vibsim.convergence.circumstances import Evidence, at_rest, floor_of_pairs, unresolved
 from vibsim.convergence.differences import largest, safe_ratio
-from vibsim.convergence.ladder_statistics import Evidence, at_rest, floor_of_pairs, unresolved
 from vibsim.convergence.thresholds import ABOVE_ROUND_OFF, HALF_SPACING
 from vibsim.convergence.verdict import Judgement, judge, judge_together
 from vibsim.core.array_types import Codes, Flags, Floats
-from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE, REASON_NAMES
+from vibsim.core.vocabulary import NORMS, ORDER_TOLERANCE, REASON_NAMES, TYPICAL_NORM
 from vibsim.models import ENERGIES
 from vibsim.models.shared.phase_amplitude_names import is_error_part
 from vibsim.observe import predicted_oscillation
@@ -52,25 +50,25 @@ ROUGH = ("pre_asymptotic", "non_smooth")
 
 
 def judge_orders(quantities: Mapping[str, Comparison], checks: Iterable[ConvergesCheck]) -> None:
-    """Judge quantities in every norm by the orders that their schemes promise, and by those that checks expect.
+    """Judge quantities by the orders that their schemes promise, and by those that checks expect, in their norms.
 
     `judgement` and `judge_check` return what was found.
     """
     due: list[tuple[str, float | str, str]] = [
-        (q.name, "scheme", norm) for q in quantities.values() for norm in q.block.norms
+        (name, "scheme", TYPICAL_NORM) for name in quantities
     ]
     due += [
-        (check.converges, check.order, check.norm)
+        (check.converges, _expected(quantities[check.converges], check), check.norm)
         for check in checks
-        if not _is_promised(quantities[check.converges], check) and _is_usual(check)
+        if _is_usual(check)
     ]
     due = list(dict.fromkeys(due))
     ladders = math.prod(quantities[due[0][0]].block.shape) if due else 0
     for part in batches(due, ladders):
-        rows: list[Evidence] = []
-        for (name, order), same in groupby(part, key=itemgetter(0, 1)):
-            q, norms = quantities[name], [norm for *_, norm in same]
-            rows += evidences(q, norms, _order(q, order), ORDER_TOLERANCE)
+        rows = [
+            evidence(quantities[name], norm, _order(quantities[name], order), ORDER_TOLERANCE)
+            for name, order, norm in part
+        ]
         for (name, order, norm), judged in zip(part, judge_together(rows), strict=True):
             quantities[name].judged[norm, order] = judged
 
@@ -87,16 +85,33 @@ def judge_check(q: Comparison, check: ConvergesCheck) -> Judgement:
     """Judge a quantity as a check asks for it."""
     if not _is_usual(check):
         return judge(evidence(q, check.norm, order_of(q, check), check.tolerance))
-    return judgement(q, check.norm, "scheme" if _is_promised(q, check) else check.order)
+    return judgement(q, check.norm, _expected(q, check))
+
+
+def order_in(q: Comparison, norm: str) -> Floats:
+    """Return the order of a quantity in a norm, shape (scheme, case).
+
+    In a norm that is not judged, it is the local order where the verdict in the typical norm has its own.
+    """
+    if (norm, "scheme") in q.judged:
+        return q.judged[norm, "scheme"].order
+    typical, orders = judgement(q, TYPICAL_NORM), q.observed_orders(norm)
+    if not orders.shape[-1]:
+        return typical.order
+    # of the finest three levels up to the last one of the window
+    at = np.searchsorted(q.block.grid.levels, typical.last) - 2
+    found = np.take_along_axis(orders, np.maximum(at, 0)[..., None], axis=-1)[..., 0]
+    return np.where(np.isnan(typical.order), np.nan, found)
 
 
 def _is_usual(check: ConvergesCheck) -> bool:
     return check.tolerance == ORDER_TOLERANCE
 
 
-def _is_promised(q: Comparison, check: ConvergesCheck) -> bool:
-    """Tell whether a check expects of every scheme and member the order that is promised."""
-    return check.order == "scheme" or bool(np.all(order_of(q, check) == q.order))
+def _expected(q: Comparison, check: ConvergesCheck) -> float | str:
+    """Return the order that a check expects: "scheme" where it is the promised one of every scheme and member."""
+    promised = check.order == "scheme" or bool(np.all(order_of(q, check) == q.order))
+    return "scheme" if promised else check.order
 
 
 def order_of(q: Comparison, check: ConvergesCheck) -> Floats:
@@ -110,13 +125,6 @@ def _order(q: Comparison, order: float | str) -> Floats:
 
 def evidence(q: Comparison, norm: str, order: Floats, tolerance: float) -> Evidence:
     """Collect the evidence on a quantity in a norm, for the order that is expected, shape (scheme, 1 or case)."""
-    return evidences(q, (norm,), order, tolerance)[0]
-
-
-def evidences(
-    q: Comparison, norms: Sequence[str], order: Floats, tolerance: float
-) -> list[Evidence]:
-    """Collect the evidence on a quantity in several norms; see `evidence`."""
     block = q.block
     grid, shape = block.grid, block.shape
     size, exists = largest(q.values[-1]), np.ones(shape, dtype=bool)
@@ -131,59 +139,50 @@ def evidences(
     def all_cases(values: Floats) -> Floats:
         return np.broadcast_to(values, shape)
 
+    worst = SPACING_AT_ONE * grid.steps[-1] ** 2 * q.scale * block.magnified
     moved, straight = _motion(q, order, size)
-    steps = np.array(grid.steps, dtype=np.float64)
-    worst = SPACING_AT_ONE * steps**2 * (q.scale * block.magnified)[..., None]
     # a corner within the last step of every level: a scheme that looks at its beginning alone knows nothing of it
     with np.errstate(invalid="ignore"):
         unseen = block.corners.time > block.group.end * (1.0 - 1.0 / grid.steps[-1])
     # where nothing oscillates, no order is promised of a part of an error
     promised = ~block.adaptive[:, None] & ~np.isnan(order)
-    same: dict[str, Any] = {
-        "levels": grid.levels,
-        "order": all_cases(order),
-        "tolerance": tolerance,
-        "relative_floor": all_cases(block.relative_floor[..., 0]),
-        "promised": all_cases(q.order),
-        "special": all_cases(q.special),
-        "numbers": q.are_numbers,
-        "failed": block.failed,
-        "applicable": (exists | np.any(block.failed, axis=-1)) & promised,
-        "omega_dt": np.broadcast_to(block.fastest, (*shape, len(grid.levels))),
-        "stability_limit": all_cases(block.stability_limit),
-        "span": all_cases(block.omega_dt[:, 0] * float(grid.steps[0])),
-        "steps": float(grid.steps[0]),
-        "moved": moved,
-        "straight": straight,
-        "left_to_the_mesh": all_cases(block.left_to_the_mesh),
-        "corner": block.corners.power,
-        "missed": np.isfinite(block.missed.time) | unseen,
-        "jumps": block.missed.jumps | unseen,
-        "decay": block.decay * block.group.end / grid.steps[-1],
-        "growth": block.growth,
-    }
-    ceiling = np.maximum(worst, q.floor)
-    found = []
-    for norm in norms:
-        measured = q.in_norm(norm)
-        # noise of size 1 at every point
-        weight = norm_of_floor(np.ones(1), norm, len(grid.t), grid.spacing)
-        found.append(
-            Evidence(
-                difference=measured.difference,
-                scatter=measured.scatter,
-                floor=q.floor * weight[:, None],
-                ceiling=ceiling * weight[:, None],
-                size=size * weight,
-                scale=q.scale * weight,
-                error=measured.error,
-                error_scatter=measured.error_scatter,
-                blur=q.blur * weight[:, None],
-                combined=partial(q.combined, norm),
-                **same,
-            )
-        )
-    return found
+    measured, cosines = q.in_norm(norm), q.cosines(norm)
+    # of an error that is not known there is no row
+    missing = len(grid.levels) - cosines.shape[-1]
+    # noise of size 1 at every point
+    weight = norm_of_floor(np.ones(1), norm, len(grid.t), grid.spacing)
+    return Evidence(
+        levels=grid.levels,
+        order=all_cases(order),
+        tolerance=tolerance,
+        difference=measured.difference,
+        cosines=np.pad(cosines, [(0, 0), (0, 0), (0, missing), (0, missing)]),
+        error=measured.error[..., -1],
+        floor=q.floor * weight[:, None],
+        ceiling=np.maximum(worst, q.floor[..., -1]) * weight,
+        relative_floor=all_cases(block.relative_floor[..., 0]),
+        size=size * weight,
+        scale=q.scale * weight,
+        blur=q.blur * weight[:, None],
+        promised=all_cases(q.order),
+        special=all_cases(q.special),
+        combined=partial(q.combined, norm),
+        numbers=q.are_numbers,
+        failed=block.failed,
+        applicable=(exists | np.any(block.failed, axis=-1)) & promised,
+        omega_dt=np.broadcast_to(block.fastest, (*shape, len(grid.levels))),
+        stability_limit=all_cases(block.stability_limit),
+        span=all_cases(block.omega_dt[:, 0] * float(grid.steps[0])),
+        steps=float(grid.steps[0]),
+        moved=moved,
+        straight=straight,
+        left_to_the_mesh=all_cases(block.left_to_the_mesh),
+        corner=block.corners.power,
+        missed=np.isfinite(block.missed.time) | unseen,
+        jumps=block.missed.jumps | unseen,
+        decay=block.decay * block.group.end / grid.steps[-1],
+        growth=block.growth,
+    )
 
 
 def _motion(q: Comparison, order: Floats, size: Floats) -> tuple[Floats, Flags]:
@@ -249,7 +248,7 @@ def causes(
 
     def near(of: Comparison, kind: str, order: Floats) -> Flags:
         with np.errstate(invalid="ignore"):
-            return np.asarray(np.abs(judgement(of, kind).order - order) <= tolerance)
+            return np.asarray(np.abs(order_in(of, kind) - order) <= tolerance)
 
     def is_usual(names: Iterable[str]) -> Flags:
         """Say where one of other states has the expected order."""

@@ -26,10 +26,8 @@ class InNorm:
     """A quantity in a norm over time."""
 
     difference: Floats  # of successive levels, shape (scheme, case, pair)
-    scatter: Floats  # of the triples (`differences.scatters`), shape (scheme, case, triple)
     error: Floats  # exact less computed, shape (scheme, case, level); NaN where not known
     extrapolation: Floats  # exact less extrapolated, shape (scheme, case)
-    error_scatter: Floats  # the same of the finest errors, shape (scheme, case, pair); else NaN
 
 
 @dataclass(frozen=True)
@@ -114,6 +112,11 @@ class Comparison:
             self._norms[kind] = self._measured(kind)
         return self._norms[kind]
 
+    def cosines(self, kind: str) -> Floats:
+        """Return cosines between the differences, and the last error where known, shape (scheme, case, row, row)."""
+        rows = self.differences + ([] if self.errors is None else [-self.errors[-1]])
+        return differences.cosines(rows, kind, self.block.grid.end_included)
+
     def combined(self, kind: str, rows: Flags, first: int, weights: Floats) -> Floats:
         """Return the norm of a weighted sum of successive differences from a first one on, shape (count of rows,).
 
@@ -134,21 +137,12 @@ class Comparison:
         def size(of: Floats) -> Floats:
             return differences.norm(of, kind, grid.spacing, grid.end_included)
 
-        def scatters(series: list[Floats]) -> Floats:
-            return stacked(differences.scatters(series, kind, grid.end_included))
-
         unknown = np.full((*shape, len(grid.levels)), np.nan)
-        of_errors = unknown[..., 1:].copy()
-        if errors is not None and len(errors) > 1:
-            finest = scatters(errors[-th.JUDGED_ERRORS :])
-            of_errors[..., -finest.shape[-1] :] = finest
         of_limit = None if self.exact is None else self.exact - self.extrapolation[0]
         return InNorm(
             difference=stacked([size(x) for x in self.differences]),
-            scatter=scatters(self.differences),
             error=unknown if errors is None else stacked([size(e) for e in errors]),
             extrapolation=unknown[..., 0] if of_limit is None else size(of_limit),
-            error_scatter=of_errors,
         )
 
     @cached_property

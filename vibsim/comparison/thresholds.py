@@ -12,9 +12,6 @@ from __future__ import annotations
 # Factor on an error bound behind events: where they lie in a step makes the second power another at each level.
 # [checked]
 IRREGULAR = 2.0
-JUDGED_ERRORS = (
-    3  # so many of the finest true errors are evidence by their directions, too [derived]
-)
 VANISHING_POINT = 1e-3  # a smaller part of the largest difference does not count [convention]
 SHAPELESS_POINTS = 2  # series that differ at no more points have no shape [derived]
 # Order with which a quantity that is promised to be exact is extrapolated: the finest level then stands as it is.

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibsim.convergence.error_model.hypotheses import times
+from vibsim.convergence.error_model.hypotheses import Promise, times
 from vibsim.convergence.error_model.posterior import Ladder, Posterior, posterior
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
 from vibsim.core.vocabulary import ORDER_TOLERANCE, REASON_NAMES, REASONS, STATUSES
@@ -75,6 +75,7 @@ def assess(
     at_least: float | None = None,
     tolerance: float = ORDER_TOLERANCE,
     noise_factor: float = NOISE_FACTOR,
+    by_theory: bool = False,
 ) -> Assessment:
     """Decide whether ladders converge as expected.
 
@@ -90,7 +91,10 @@ def assess(
         How far from `expected`, or below `at_least`, an order may be.
     noise_factor
         Noise may be so many times `Ladder.floor` where levels are said to differ by nothing else.
+    by_theory
+        Whether theory promises the order that is expected.
     """
+    promise = None if expected is None else Promise(expected, by_theory)
     n, count = len(ladder.h), len(ladder.gram)
     finite = np.all(np.isfinite(ladder.gram), axis=(-2, -1)) & np.all(
         np.isfinite(ladder.floor), axis=-1
@@ -104,16 +108,15 @@ def assess(
         for start in range(0, len(every), BLOCK):
             rows = every[start : start + BLOCK]
             part, size, factors = _scaled(ladder, rows)
-            believed = posterior(part, expected)
+            believed = posterior(part, promise)
             sides = _sides(believed, expected, at_least, tolerance)
             exact = _is_only_noise(part, noise_factor)
             # what the levels say of the limit without the exact solution
             of_limit, missed = believed, np.zeros(len(rows), dtype=bool)
             if part.exact_known:
-                of_limit = posterior(_without_exact(part), expected)
-                _, settled, _ = _sides(of_limit, None, None, tolerance)
+                of_limit = posterior(_without_exact(part), promise)
                 missed = exact & _is_away(part, noise_factor)
-                missed |= (settled > 1.0 - RISK) & _is_missed(part, of_limit)
+                missed |= (of_limit.expansion > 1.0 - RISK) & _is_missed(part, of_limit)
             reason[rows] = _reasons(believed, sides, exact, missed)
             numbers = _numbers(part, believed, of_limit, exact, missed, factors)
             for name, value in numbers.items():

@@ -10,11 +10,10 @@ Source: pendulum lecture, section 2.5. Series have the shape (..., t); time is t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
-from vibsim.convergence.thresholds import ROUND_OFF_SAFETY, STEEPEST, ZERO_CROSSING
+from vibsim.convergence.thresholds import PEAKS, ROUND_OFF_SAFETY, STEEPEST, ZERO_CROSSING
 from vibsim.core.array_types import Floats
 
 SAFE_SQUARES = 1e140
@@ -217,21 +216,22 @@ def coincidence(first: Floats, second: Floats, ratio: Floats) -> Floats:
     return np.where((whole == 0) & (rest == 0), 0.0, safe_ratio(rest, whole))
 
 
-def scatters(differences: Sequence[Floats], kind: str, end_included: bool = True) -> list[Floats]:
-    """Return how far successive differences are from being proportional, in a norm, for every two of them.
+def cosines(rows: Sequence[Floats], kind: str, end_included: bool = True) -> Floats:
+    """Return the cosines of the angles between series, shape (..., row, row); 0 where one of them vanishes.
 
-    ``||d/||d|| - s d'/||d'||||`` with s the sign of their inner product: 0 for proportional series, 1 and more for
-    unrelated ones, of shape (...), with the sign bit of s also where it is 0; NaN where a difference vanishes. Each
-    norm sees its own part of the series: one bad point matters to linf as much as it weighs there.
+    Each norm sees its own part of the series: for a largest value the points count where one of the series is large
+    (`PEAKS`), and ``linf_interior`` leaves the end point out.
     """
-    one = np.ones(1)
     if kind == "linf_interior" and end_included:
-        differences = [series[..., :-1] for series in differences]
-    units = [unit(series, norm(series, kind, one, False)) for series in differences]
-    found = []
-    for first, second in pairwise(units):
-        sign = np.where(total(first * second) < 0, -1.0, 1.0)
-        left = norm(first - sign[..., None] * second, kind, one, False)
-        # a norm of 0 may carry either sign
-        found.append(np.copysign(left, sign))
+        rows = [series[..., :-1] for series in rows]
+    one = np.ones(1)
+    if kind in {"linf", "linf_interior"}:
+        sizes = [np.abs(np.nan_to_num(unit(series, largest(series)))) for series in rows]
+        weight = np.maximum.reduce(sizes) ** PEAKS
+        rows = [np.nan_to_num(unit(series, largest(series))) * weight for series in rows]
+    units = [np.nan_to_num(unit(series, norm(series, "l2", one, False))) for series in rows]
+    found = np.empty((*units[0].shape[:-1], len(units), len(units)))
+    for i, first in enumerate(units):
+        for j, second in enumerate(units[: i + 1]):
+            found[..., i, j] = found[..., j, i] = total(first * second)
     return found

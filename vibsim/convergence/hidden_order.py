@@ -14,21 +14,29 @@ from __future__ import annotations
 
 import numpy as np
 
-from vibsim.convergence.asymptotic_range import Trend
-from vibsim.convergence.ladder_statistics import Evidence, floor_of_pairs, pick
+from vibsim.convergence.circumstances import Evidence, floor_of_pairs, pick
 from vibsim.convergence.thresholds import EXCLUDED, HALF_SPACING, HIGHER_POWERS
-from vibsim.core.array_types import Flags, Floats
+from vibsim.core.array_types import Flags, Floats, Integers
 
 
-def is_promise_hidden(e: Evidence, t: Trend) -> Flags:
-    """Say where levels show a higher order than the promised one, which may be there with a small coefficient."""
+def is_promise_hidden(e: Evidence, order: Floats, last: Integers) -> Flags:
+    """Say where levels show a higher order than the promised one, which may be there with a small coefficient.
+
+    Parameters
+    ----------
+    e
+        The evidence on ladders.
+    order
+        The order that each shows, NaN for none, shape (...).
+    last
+        Position of the finest level that it rests on.
+    """
     with np.errstate(invalid="ignore"):
-        shown = np.round(2.0 * t.order) / 2
-        maybe = (t.count > 0) & np.isfinite(shown) & (shown > e.promised + HALF_SPACING)
+        shown = np.round(2.0 * order) / 2
+        maybe = np.isfinite(shown) & (shown > e.promised + HALF_SPACING)
         maybe &= e.special > e.promised + HALF_SPACING
     hidden = maybe.copy()
-    last = t.last + 1
-    groups = np.stack([last, shown, e.promised], axis=-1)
+    groups = np.stack([last - 1, shown, e.promised], axis=-1)
     for pair, p, r in np.unique(groups[maybe], axis=0):
         rows = maybe & np.all(groups == (pair, p, r), axis=-1)
         hidden[rows] = ~(_most(e, rows, int(pair), float(p), float(r)) <= EXCLUDED)

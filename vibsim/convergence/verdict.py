@@ -1,49 +1,65 @@
 r"""The verdict: may the observed order of a ladder of levels be believed?
 
 A pure function of the numbers of a ladder, for any number of ladders at once. Leading dimensions ``...`` are ladders
-(scheme, case); n is the number of levels, a *pair* is two successive levels, a *triple* three.
+(scheme, case); n is the number of levels.
 
-The rules, in the order in which they apply (the first that applies decides):
+The error model decides on the order (`vibsim.convergence.assessment`). Facts that no ladder shows come first, or set
+limits to it. The first line that applies decides:
 
-1. a quantity that does not exist: ``not_applicable``; a level that broke down, or w dt beyond the stability limit, or
-   growth that refinement does not remove: ``unstable``, else ``non_finite``; fewer than three levels:
-   ``too_few_levels``;
-2. round-off: `vibsim.convergence.roundoff_onset` says where it begins; finer triples are cut off. Nothing left:
-   ``exact`` where the differences of an inexact scheme would have been seen, else ``round_off``. Where the promise is
-   that a quantity is exact, this alone decides: a difference above ``ABOVE_ROUND_OFF * floor`` is ``order_low``;
-3. one triple left: the two difference series over time are the evidence, and must be proportional; beside them the true
-   errors, where they are known;
-4. several left: the last two local orders or their limit, and what is left besides h^p, which must fade, or be too
-   small for a tenth of a lower power (`vibsim.convergence.asymptotic_range`);
-5. the order is stated with an interval where something is decided. PASS where it is within the tolerance, the series
-   coincide, and it stands alone; ``order_low``, ``order_high`` where the interval excludes what is expected and holds
-   an order that an expansion can have; else ``pre_asymptotic``, ``oscillating`` or ``round_off``;
-6. where events are left to the mesh, or corners of a force from a table, an error has no expansion behind its first
-   power, or the second: a ladder that does not show that power is ``non_smooth``. So is one that is lower than expected
-   where the motion meets another corner of the force within a step (`vibsim.apriori.force_discontinuities`), but for
-   one that settles below the power which that corner leaves. So is one that stays open although finer levels would show
-   that power, not the expected one;
-7. a settled ladder whose error against the exact solution is larger than its differences allow: ``wrong_limit``.
+| what is known | status and reason |
+|---|---|
+| the quantity does not exist, or the scheme has no levels | ``not_applicable`` |
+| w dt beyond the stability limit, or growth that refinement does not remove | ``unstable`` |
+| a level that broke down | ``non_finite`` |
+| fewer than three levels | ``too_few_levels`` |
+| a pulse of the force that no level sees, and no exact solution that says it does not matter | ``non_smooth`` for a \
+jump, else ``pre_asymptotic`` |
+| nothing moves wherever levels are compared | ``not_applicable``; ``pre_asymptotic`` where the exact solution moves |
+| a velocity that is gone within a step of every level, and no order that is expected | ``pre_asymptotic`` |
+| all differences are round-off, and an ordinary error would show | ``exact``; ``wrong_limit`` away from the exact \
+solution |
+| exactness is promised, and a difference is none of round-off | ``order_low`` |
+| the finest differences may be round-off, and the error model believes no order | ``round_off`` |
+| the error model finds alternating errors | ``oscillating`` |
+| ... another limit than the exact solution | ``wrong_limit`` |
+| ... the expected order, and no promised power may hide behind it | ``asymptotic`` |
+| ... a lower order, which no corner of the force within a step explains | ``order_low`` |
+| such a corner explains an order below the expected one | ``non_smooth`` |
+| the error model finds a higher order, and no promised power may hide behind it | ``order_high`` |
+| events are left to the mesh, or a corner leaves less than the expected order | ``non_smooth`` |
+| anything else | ``pre_asymptotic`` |
+
+Where levels differ by more than the solution, the error model decides nothing. Where events are left to the mesh, or
+corners to a table, only the power that they leave is regular.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
-from vibsim.convergence import true_errors as errors
-from vibsim.convergence.asymptotic_range import trend
-from vibsim.convergence.classify import rules
-from vibsim.convergence.differences import order_of_ratio, safe_ratio
-from vibsim.convergence.ladder_statistics import (
+from vibsim.convergence import thresholds as th
+from vibsim.convergence.assessment import assess
+from vibsim.convergence.circumstances import (
     Evidence,
+    at_rest,
     at_round_off,
     beside_each_other,
     breakdown,
+    errors_stay,
+    far_from_exact,
+    is_noise,
+    pick,
+    truly_exact,
+    unresolved,
 )
-from vibsim.core.array_types import Codes, Floats, Integers
+from vibsim.convergence.differences import order_of_ratio, safe_ratio
+from vibsim.convergence.error_model.posterior import Ladder
+from vibsim.convergence.hidden_order import is_promise_hidden
+from vibsim.core.array_types import Codes, Flags, Floats, Integers
 from vibsim.core.vocabulary import REASON_NAMES, REASONS, STATUSES
 
 
@@ -62,8 +78,19 @@ class Judgement:
     orders: Floats = field(repr=False)  # local order of every triple, shape (..., n-2)
 
 
+class Believed(NamedTuple):
+    """What the error model believes of every ladder; see `vibsim.convergence.assessment.Assessment`."""
+
+    reason: Codes
+    order: Floats
+    low: Floats
+    high: Floats
+    first: Integers
+    last: Integers
+
+
 def judge(e: Evidence) -> Judgement:
-    """Decide on every ladder; see the head of this module for the rules."""
+    """Decide on every ladder; see the head of this module."""
     shape, levels = e.difference.shape[:-1], np.array(e.levels, dtype=np.int64)
     orders = local_orders(e.difference, e.levels)
     broken, beyond, growing = breakdown(e)
@@ -81,19 +108,17 @@ def judge(e: Evidence) -> Judgement:
     if len(e.levels) < 3:
         cases.append((np.ones(shape, dtype=bool), "too_few_levels"))
     else:
-        of_errors, vouched = np.full(shape, np.nan), np.zeros(shape, dtype=bool)
-        if len(e.levels) == 3:
-            of_errors = e.error_orders[..., -1]
-            vouched = errors.vouch(e, np.round(2.0 * orders[..., 0]) / 2)
-        found = trend(e, orders, of_errors, vouched)
-        read, lower = rules(e, found)
+        asked = e.applicable & ~undefined & ~fails & ~growing
+        believed = _believed(e, asked)
+        read, lower, noise = _cases(e, believed, orders)
         cases += read
         # the order of noise is none
-        stated = e.applicable & ~undefined & ~fails & ~growing
-        stated &= (found.count > 0) & ~(np.isinf(e.order) & at_round_off(e))
-        order, low, high = (np.where(stated, x, np.nan) for x in (found.order, lower, found.high))
-        first, last = (np.where(stated, levels[x], -1) for x in (found.first, found.last + 2))
-    # without a rule that applies it is not yet asymptotic
+        stated = asked & ~noise & ~(np.isinf(e.order) & at_round_off(e))
+        order, low, high = (
+            np.where(stated, x, np.nan) for x in (believed.order, lower, believed.high)
+        )
+        first, last = (np.where(stated, levels[x], -1) for x in (believed.first, believed.last))
+    # without a case that applies it is not yet asymptotic
     codes = [REASON_NAMES.index(reason) for _, reason in cases]
     reason = np.select([mask for mask, _ in cases], codes, REASON_NAMES.index("pre_asymptotic"))
     of_reason = np.array([STATUSES.index(status) for status in REASONS.values()], dtype=np.int8)
@@ -109,6 +134,130 @@ def judge(e: Evidence) -> Judgement:
         last=last,
         culprit=np.where(fails, levels[np.argmax(culprits, axis=-1)], -1),
         orders=orders,
+    )
+
+
+def _believed(e: Evidence, asked: Flags) -> Believed:
+    """Return what the error model says of the ladders that it is asked about, and of all others that they are noise."""
+    shape, n = asked.shape, len(e.levels)
+    found = Believed(
+        reason=np.full(shape, REASON_NAMES.index("round_off"), dtype=np.int8),
+        order=np.full(shape, np.nan),
+        low=np.full(shape, np.nan),
+        high=np.full(shape, np.nan),
+        first=np.zeros(shape, dtype=np.int64),
+        last=np.full(shape, n - 1),
+    )
+    rows = np.concatenate([e.difference, e.error[..., None]], axis=-1)
+    keys = np.stack([np.isfinite(e.error), _expected(e), _is_theory(e)], axis=-1)
+    # differences that all vanish have no size
+    asked = asked & np.any(e.difference > 0.0, axis=-1)
+    for key in np.unique(keys[asked].astype(np.float64), axis=0):
+        chosen = asked & np.all(keys == key, axis=-1)
+        exact_known, expected, by_theory = key.tolist()
+        count = n if exact_known else n - 1
+        sizes = rows[chosen][:, :count]
+        unit = np.max(sizes, axis=-1, keepdims=True)
+        sizes = sizes / unit
+        ladder = Ladder(
+            h=np.exp2(-np.array(e.levels, dtype=np.float64)),
+            gram=e.cosines[chosen][:, :count, :count] * sizes[:, :, None] * sizes[:, None, :],
+            floor=e.floor[chosen] / unit,
+            numbers=e.numbers[chosen],
+            exact_known=bool(exact_known),
+        )
+        # what is exact is told from the predicted round-off of the scheme
+        a = assess(
+            ladder,
+            expected=expected,
+            tolerance=e.tolerance,
+            noise_factor=0.0,
+            by_theory=bool(by_theory),
+        )
+        for name, values in found._asdict().items():
+            values[chosen] = getattr(a, name)
+    return found
+
+
+def _expected(e: Evidence) -> Floats:
+    """Return the order that is expected; where it is exactness, the order that an ordinary error has."""
+    return np.where(np.isinf(e.order), th.ORDINARY_ORDER, e.order)
+
+
+def _is_theory(e: Evidence) -> Flags:
+    """Say where theory promises the expected order, and no event or corner within a step leaves a lower one."""
+    rough = np.fmin(e.left_to_the_mesh, e.corner) < e.order - e.tolerance
+    return np.asarray((e.order == e.promised) & ~rough)
+
+
+def _cases(
+    e: Evidence, b: Believed, orders: Floats
+) -> tuple[list[tuple[Flags, str]], Floats, Flags]:
+    """Return the cases of ladders of three levels and more, first to last.
+
+    With them the lower end of the interval, which reaches to a promised power that may hide, and where all is noise.
+    """
+
+    def says(*reasons: str) -> Flags:
+        return np.isin(b.reason, [REASON_NAMES.index(reason) for reason in reasons])
+
+    exactly, tol, p = np.isinf(e.order), e.tolerance, _expected(e)
+    noise = says("exact") | (says("round_off", "pre_asymptotic") & is_noise(e))
+    exact = (exactly | noise) & truly_exact(e)
+    # levels that differ by more than the solution have nothing to do with it yet
+    near = pick(e.difference, b.last - 1) <= e.scale
+    right, low, high, missed = (
+        says(reason) & near for reason in ("asymptotic", "order_low", "order_high", "wrong_limit")
+    )
+    alternating = says("oscillating")
+    # neither the higher order nor a failure of the promised one, until the levels exclude this or show it
+    hidden = is_promise_hidden(e, np.where(noise, np.nan, b.order), b.last)
+    lower = np.where(hidden, np.minimum(b.low, e.promised), b.low)
+    hidden &= p >= e.promised - tol
+    # any other power is the accident of where events or corners lie between grid points
+    left, rough = e.left_to_the_mesh, ~np.isnan(e.left_to_the_mesh)
+    regular = ~rough | (np.abs(b.order - left) <= tol)
+    # two levels may then be near each other, and both be away from the exact solution
+    missed &= ~(rough | ~np.isnan(e.corner)) | errors_stay(e)
+    # a corner leaves all powers up to its own: a ladder that settles lower has another cause
+    below = (b.order < p - tol) | np.any(orders[..., -2:] < (p - tol)[..., None], axis=-1)
+    kinked = ~np.isnan(e.corner) & (p >= e.corner) & (below | alternating | noise)
+    deeper = b.order < e.corner - np.maximum(tol, th.HALF_SPACING)
+    # finer levels show the power of the corner, not p: those that do not yet are no reason to add some
+    limited = e.corner < p - tol
+    far = far_from_exact(e)
+    still = at_rest(e) & (exactly | noise)
+    # what no level sees, no difference tells of: an exact solution alone would say that it does not matter
+    blind = e.missed & (missed | ((exact | noise | exactly) & far) | np.isnan(e.error))
+    # an implicit scheme with long steps goes on with a velocity that has gone, and that is no fault of it
+    coarse = unresolved(e) & (exact | missed | low | high)
+    return (
+        [
+            (blind & e.jumps, "non_smooth"),
+            (blind, "pre_asymptotic"),
+            # at rest on every level, and away from a motion: steps as long as that see nothing of it
+            (still & far, "pre_asymptotic"),
+            (still, "not_applicable"),
+            (coarse, "pre_asymptotic"),
+            # levels that notice their events at the same points are no closer to the exact solution for that
+            (exact & far & rough, "non_smooth"),
+            (exact & far, "wrong_limit"),
+            (exact, "exact"),
+            (exactly & ~at_round_off(e), "order_low"),
+            (noise & (e.moved == 0.0) & far, "pre_asymptotic"),
+            (exactly | (noise & (at_round_off(e) | ~(rough | kinked))), "round_off"),
+            (alternating & ~rough & ~kinked, "oscillating"),
+            (missed, "wrong_limit"),
+            (right & regular & ~hidden, "asymptotic"),
+            (low & regular & (~kinked | deeper), "order_low"),
+            (kinked, "non_smooth"),
+            (high & ~rough & ~hidden, "order_high"),
+            (e.missed & e.jumps, "non_smooth"),
+            (e.missed, "pre_asymptotic"),
+            (rough | limited, "non_smooth"),
+        ],
+        lower,
+        noise,
     )
 
 

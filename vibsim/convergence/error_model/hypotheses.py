@@ -49,21 +49,40 @@ class Table:
     beside: Floats | None = None
 
 
+class Promise(NamedTuple):
+    """An order that is expected."""
+
+    order: float
+    by_theory: bool = (
+        False  # whether theory promises it, and so knows the other powers too, or a user expects it
+    )
+
+
 @lru_cache
-def two_powers(signs: tuple[float, ...], promised: float | None) -> Terms:
+def two_powers(signs: tuple[float, ...], promise: Promise | None) -> Terms:
     """Return the hypotheses on the powers: one of `POWERS` with or without a second one."""
-    rows = []
-    usual = sorted({*priors.POWERS, *(p for p in [promised] if p and 0.0 < p < math.inf)})
-    of_promise = priors.PROMISE if promised in usual else 0.0
-    seconds = list(product(priors.DISTANCES, priors.SHARES, signs))
+    order, by_theory = promise or (math.nan, False)
+    usual = sorted({*priors.POWERS, *(p for p in [order] if 0.0 < p < math.inf)})
+    of_promise = priors.THEORY if by_theory else priors.EXPECTED
+    of_promise *= order in usual
+
+    def chance(p: float) -> float:
+        return priors.BETWEEN if by_theory and (p - order) % 1.0 else 1.0
+
+    whole, rows = sum(map(chance, usual)), []
+    distances = {distance: chance(order + distance) for distance in priors.DISTANCES}
     for p in usual:
-        prior = (1.0 - of_promise) / len(usual) + of_promise * (p == promised)
+        prior = (1.0 - of_promise) * chance(p) / whole + of_promise * (p == order)
         prior *= 1.0 - priors.OTHER_PRIOR
         rows.append((p, p, 0.0, prior * priors.PURE_PRIOR))
-        each = prior * (1.0 - priors.PURE_PRIOR) / len(seconds)
-        rows += [(p, p + distance, sign * share, each) for distance, share, sign in seconds]
-    lower, higher, share, prior = np.array(rows).T
-    return Terms(lower, higher, share, np.log(prior))
+        each = prior * (1.0 - priors.PURE_PRIOR) / sum(distances.values())
+        each /= len(priors.SHARES) * len(signs)
+        rows += [
+            (p, p + distance, sign * share, each * distances[distance])
+            for distance, share, sign in product(distances, priors.SHARES, signs)
+        ]
+    lower, higher, share, log_prior = np.array(rows).T
+    return Terms(lower, higher, share, np.log(log_prior))
 
 
 def pure(powers: tuple[float, ...]) -> Terms:
@@ -257,11 +276,11 @@ class Hypotheses(NamedTuple):
 
 
 @lru_cache(maxsize=48)
-def hypotheses_of(sizes: tuple[float, ...], promised: float | None) -> Hypotheses:
+def hypotheses_of(sizes: tuple[float, ...], promise: Promise | None) -> Hypotheses:
     """Return the hypotheses for levels of these sizes; windows of ladders of one ratio share them."""
     relative = np.array(sizes)
     return Hypotheses(
-        _two_shapes(relative, two_powers((1.0,), promised)),
-        _one_shape(relative, two_powers((1.0, -1.0), promised)),
+        _two_shapes(relative, two_powers((1.0,), promise)),
+        _one_shape(relative, two_powers((1.0, -1.0), promise)),
         _two_shapes(relative, pure(priors.POWERS), alternating=True),
     )

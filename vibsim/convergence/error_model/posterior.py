@@ -10,6 +10,7 @@ import numpy as np
 from vibsim.convergence.differences import order_of_differences, safe_ratio
 from vibsim.convergence.error_model import priors
 from vibsim.convergence.error_model.hypotheses import (
+    Promise,
     between,
     form,
     hypotheses_of,
@@ -125,9 +126,9 @@ def _by_ladder(factor: Floats, values: Floats) -> Floats:
 class _Fit:
     """The posterior in the making: hypotheses are added window by window."""
 
-    def __init__(self, ladder: Ladder, promised: float | None) -> None:
-        self.ladder, self.points, self.promised = ladder, ladder.points, promised
-        terms = two_powers((1.0,), promised)
+    def __init__(self, ladder: Ladder, promise: Promise | None) -> None:
+        self.ladder, self.points, self.promise = ladder, ladder.points, promise
+        terms = two_powers((1.0,), promise)
         usual = np.concatenate([terms.lower, terms.higher])
         self.powers = np.unique(
             np.concatenate([usual, np.arange(priors.BIN, priors.HIGHEST, priors.BIN)])
@@ -169,7 +170,7 @@ class _Fit:
         else:
             behind = self.behind(start, end)
         # with a few digits less windows of one ratio are the same
-        of_window = hypotheses_of(tuple(np.round(sizes, 12)), self.promised)
+        of_window = hypotheses_of(tuple(np.round(sizes, 12)), self.promise)
         self.add_any_power(index, sizes, inside, rest + noisy[0])
         tables = [(table, noisy[i]) for i, table in enumerate(of_window.two_shapes)]
         tables += [
@@ -294,7 +295,7 @@ class _Fit:
             values.pop(name) / total[:, None]
             for name in ("pairs", "first_alone", "second_alone", "any_power")
         )
-        terms = two_powers((1.0,), self.promised)
+        terms = two_powers((1.0,), self.promise)
         of_pairs = np.stack(
             [terms.lower[terms.first_of_pairs], terms.higher[terms.first_of_pairs]], axis=-1
         )
@@ -330,9 +331,9 @@ def _of_powers(of_pairs: Floats, chosen: Flags) -> Floats:
     return found
 
 
-def posterior(ladder: Ladder, promised: float | None = None) -> Posterior:
+def posterior(ladder: Ladder, promise: Promise | None = None) -> Posterior:
     """Return what is believed of ladders of three levels and more, all of whose numbers are finite."""
-    fit = _Fit(ladder, promised)
+    fit = _Fit(ladder, promise)
     for index in range(len(fit.windows)):
         fit.add_window(index)
     fit.add_no_expansion()

@@ -19,7 +19,11 @@ OTHER_PRIOR = 0.1  # of a single power of any other value up to `HIGHEST` [chose
 AROUND = np.array(
     [s * 3e-4 * 2.0**k for s, ks in ((-1, range(8, -1, -1)), (0, (0,)), (1, range(9))) for k in ks]
 )
-PROMISE = 0.5  # prior of the order that is promised, beside that of every power [chosen]
+EXPECTED = 0.5  # prior of the order that a user expects, beside that of every power [chosen]
+THEORY = 0.9  # the same of the order that the theory of a scheme promises [chosen]
+BETWEEN = (
+    0.01  # beside 1: prior of a power that is not a whole number away from that of theory [chosen]
+)
 DISTANCES = (0.5, 1.0, 2.0)  # from the first power to the second [expansion]
 PURE_PRIOR = 0.3  # that there is no second power in sight [chosen]
 # Size of the second power over the first, at the finest level of a window. [chosen]

@@ -7,13 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from vibsim.convergence import thresholds as th
-from vibsim.convergence.differences import safe_ratio
 from vibsim.core.array_types import Flags, Floats, Integers
 
 
@@ -25,16 +23,14 @@ class Evidence:
     order: Floats  # the order p that is expected, infinite for what is to be exact
     tolerance: float  # how far from p an order may be
     difference: Floats  # norms of the differences, shape (..., n-1)
-    scatter: Floats  # signed scatter of the triples (`differences.scatters`), shape (..., n-2)
+    # cosines of the angles between the differences, and the finest level less the exact solution; shape (..., n, n)
+    cosines: Floats
     floor: Floats  # predicted round-off at every level, shape (..., n)
-    ceiling: Floats  # the most that round-off can be in any arithmetic, shape (..., n)
+    ceiling: Floats  # the most that round-off can be at the finest level in any arithmetic
     relative_floor: Floats  # predicted round-off over the solution at the coarsest level
     size: Floats  # norm of the solution
     scale: Floats  # the same of the whole that a quantity is a part of, such as the energy
-    error: Floats  # norms of the true errors, shape (..., n); NaN where they are not known
-    error_scatter: (
-        Floats  # scatter of the errors of the finest three levels, shape (..., n-1); else NaN
-    )
+    error: Floats  # norm of the true error of the finest level; NaN where it is not known
     blur: Floats  # how well the quantity is measured at every level, rounding apart, shape (..., n)
     promised: Floats  # the order of the scheme, infinite or NaN where it promises none
     special: Floats  # the highest order of the scheme in a special case
@@ -55,13 +51,6 @@ class Evidence:
     jumps: Flags  # whether it jumps there
     decay: Floats  # the largest rate at which damping takes a velocity away, times the finest step
     growth: Floats  # largest position over the largest exact one, shape (..., n); NaN if not known
-
-    @cached_property
-    def error_orders(self) -> Floats:
-        """Order of the true errors of every pair, shape (..., n-1); NaN where they are not known."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            fall = np.log2(safe_ratio(self.error[..., :-1], self.error[..., 1:]))
-        return np.asarray(fall / np.diff(np.array(self.levels)))
 
 
 def beside_each_other(rows: Sequence[Evidence]) -> Evidence:
@@ -105,6 +94,29 @@ def floor_of_pairs(e: Evidence) -> Floats:
 def at_round_off(e: Evidence) -> Flags:
     """Say where all differences may be round-off."""
     return np.asarray(np.all(e.difference <= th.ABOVE_ROUND_OFF * floor_of_pairs(e), axis=-1))
+
+
+def is_noise(e: Evidence) -> Flags:
+    """Say where the finest differences may be noise: round-off of the predicted size, or what does not fall."""
+    last, before = e.difference[..., -1], e.difference[..., -2:][..., 0]
+    small = last <= th.ABOVE_ROUND_OFF * floor_of_pairs(e)[..., -1]
+    return np.asarray(small | ((last > th.STAYS * before) & (last <= e.ceiling)))
+
+
+def errors_stay(e: Evidence) -> Flags:
+    """Say where the error of the finest level is hardly smaller than that of the coarsest one.
+
+    Errors that one step may make stay where an event or a corner lies beside a point that all levels share.
+    """
+    sizes = np.concatenate([e.difference, e.error[..., None]], axis=-1)
+    # the error of the coarsest level is the sum of all rows
+    with np.errstate(over="ignore", invalid="ignore"):
+        square = np.sum(e.cosines * sizes[..., :, None] * sizes[..., None, :], axis=(-2, -1))
+        steps = e.steps * 2.0 ** (e.levels[-1] - e.levels[0])
+        step = np.where(np.isfinite(e.omega_dt[..., -1]), e.omega_dt[..., -1], 1.0 / steps)
+        beside_a_point = e.size * step ** np.fmin(e.corner, e.left_to_the_mesh)
+        stays = e.error > th.STAYED * np.sqrt(square)
+        return np.asarray(stays & ~(e.error <= beside_a_point))
 
 
 def truly_exact(e: Evidence) -> Flags:
@@ -158,7 +170,7 @@ def accuracy(e: Evidence) -> Floats:
 
 def far_from_exact(e: Evidence) -> Flags:
     """Say where the finest level is further from the exact solution than that is known."""
-    return np.asarray(np.nan_to_num(e.error[..., -1], nan=0.0) > accuracy(e))
+    return np.asarray(np.nan_to_num(e.error, nan=0.0) > accuracy(e))
 
 
 def pick(values: Floats, index: Integers) -> Floats:
