@@ -193,7 +193,8 @@ def test_rounding_of_steep_differences_is_no_evidence(kind: str) -> None:
     none = np.empty((1, 0))
     for table in getattr(hypotheses_of((8.0, 4.0, 2.0, 1.0), 6.0), kind):
         one, other = (
-            likelihood.weights(table, g, np.array([2.0]), none)[0] for g in (gram, rounded)
+            likelihood.weights(table, g, np.array([2.0]), none, np.array([-np.inf]))[0]
+            for g in (gram, rounded)
         )
         assert other == pytest.approx(one, abs=1e-6)
 

@@ -39,12 +39,20 @@ class Table:
     """
 
     # forms of the precision K^-1, of the square of the first power, of the second, and of the limit without the
-    # differences behind the window; shape (4, packed, hypothesis)
+    # differences behind the window; shape (hypothesis, 4, packed)
     forms: Floats
     # root for one point and for two; variances over the scale that the rows leave to the first power, the second, and
-    # the limit; the limit less the finest level, as weights of the rows; shape (5 + w, hypothesis)
+    # the limit; the limit less the finest level, as weights of the rows; shape (hypothesis, 5 + w)
     columns: Floats
     pair: Integers  # position of its pair of powers, shape (hypothesis,)
+    groups: (
+        Integers  # first hypothesis of every group, and the end of the last one, shape (group + 1,)
+    )
+    # The evidence of a group is at most ``(root/tr(M G))^(N w/2)``: its root for one point and for two, and the form of
+    # M; shape (2 + packed, group).
+    bounds: Floats
+    # log of the evidence of all hypotheses at most, for one point and for two, where the last row has the square 1
+    limit: Floats
     # of one shape: form of the precision of what the other rows are beside multiples of the last one, over `TAIL`
     beside: Floats | None = None
 
@@ -191,21 +199,66 @@ def _table(
     path = -times(precision, to_limit)
     whole = prior[0] + 2.0 * prior[1] + prior[2] + own_noise
     left_whole = np.maximum(whole + np.sum(path * to_limit, axis=-1), 0.0)
-    forms = np.stack([form(x) for x in (precision, *(outer(g, g) for g in (*gains, path)))])
-    if beside is None:
-        roots = [np.exp((2.0 / n * terms.log_prior - log_det) / w) for n in (1, 2)]
-        of_beside = None
-    else:
-        # one dimension along the last row, all others across it
-        log_det_beside, precision_beside = beside
-        roots = [
-            np.exp((2.0 * terms.log_prior - log_det - (n - 1) * log_det_beside) / w) for n in (1, 2)
+    forms = np.stack([form(x) for x in (precision, *(outer(g, g) for g in (*gains, path)))], axis=1)
+    log_det_beside, precision_beside = (0.0, precision) if beside is None else beside
+    # of one shape there is one dimension along the last row, all others are across it
+    dimensions = [(n, 1 if beside else n) for n in (1, 2)]
+    roots = np.stack(
+        [
+            np.exp((2.0 / d * terms.log_prior - log_det - (n - d) * log_det_beside) / w)
+            for n, d in dimensions
         ]
-        of_beside = np.ascontiguousarray(form(precision_beside).T)
-    columns = np.stack([*roots, *left, left_whole, *path.T])
+    )
+    columns = np.stack([*roots, *left, left_whole, *path.T], axis=1)
     pair = np.searchsorted(terms.first_of_pairs, np.arange(len(terms.lower)), side="right") - 1
-    layout = np.ascontiguousarray(np.swapaxes(forms, 1, 2))
-    return Table(layout, np.ascontiguousarray(columns), pair, of_beside)
+    groups = _groups(pair, terms.share)
+    exponents = np.array([[0.5 * d * w] for _, d in dimensions])
+    bounds = _bounds(groups, terms.share, variance, c, roots, exponents, 2.0 if beside else 1.0)
+    of_beside = None if beside is None else np.ascontiguousarray(form(precision_beside))
+    # tr(K^-1 G) is at least the square of the last row over its variance
+    last = signal[:, -1, -1] + np.sum(variance[:, -2:], axis=-1)
+    limit = np.log(np.sum((roots * last) ** exponents, axis=1))
+    return Table(np.ascontiguousarray(forms), columns, pair, groups, bounds, limit, of_beside)
+
+
+def _groups(pair: Integers, share: Floats) -> Integers:
+    """Return where groups begin: hypotheses on one pair of powers, with up to `TOGETHER` successive shares."""
+    size = np.abs(share)
+    differs = np.concatenate([[True], (np.diff(size) != 0.0) | (np.diff(pair) != 0)])
+    of_share = np.cumsum(differs) - 1
+    first = np.concatenate([[True], np.diff(pair) != 0])
+    within = of_share - np.maximum.accumulate(np.where(first, of_share, 0))
+    return np.append(np.flatnonzero(differs & (within % TOGETHER == 0)), len(pair))
+
+
+def _bounds(
+    groups: Integers,
+    share: Floats,
+    variance: Floats,
+    c: tuple[Floats, Floats],
+    roots: Floats,
+    exponents: Floats,
+    factor: float,
+) -> Floats:
+    """Return `Table.bounds`.
+
+    Where a matrix C exceeds ``K/t`` for all hypotheses of a group, ``tr(K^-1 G) >= tr(C^-1 G)/t``. C has the largest
+    variances over t of the group, with ``t = 1 + share^2``; what is correlated is at most `factor` of what is not.
+    """
+    start, t = groups[:-1], 1.0 + share**2
+    parts = [np.maximum.reduceat(part / t, start) for part in (np.ones_like(t), share**2)]
+    signal = sum(
+        factor * part[:, None, None] * outer(row[start], row[start])
+        for part, row in zip(parts, c, strict=True)
+    )
+    noise = noise_of_rows(np.maximum.reduceat(variance / t[:, None], start, axis=0))
+    precision, _ = inverse(signal + noise)
+    root = np.add.reduceat((roots * t) ** exponents, start, axis=1) ** (1.0 / exponents)
+    return np.ascontiguousarray(np.concatenate([root, form(precision).T]))
+
+
+TOGETHER = 5
+"""So many shares of the second power have a bound together."""
 
 
 def _two_shapes(sizes: Floats, terms: Terms, *, alternating: bool = False) -> list[Table]:
@@ -254,6 +307,7 @@ class Hypotheses(NamedTuple):
     two_shapes: list[Table]
     one_shape: list[Table]
     alternating: list[Table]
+    any_power: Floats  # of a single power of any value, the same as `Table.limit`
 
 
 @lru_cache(maxsize=48)
@@ -264,4 +318,16 @@ def hypotheses_of(sizes: tuple[float, ...], promised: float | None) -> Hypothese
         _two_shapes(relative, two_powers((1.0,), promised)),
         _one_shape(relative, two_powers((1.0, -1.0), promised)),
         _two_shapes(relative, pure(priors.POWERS), alternating=True),
+        _limit_of_any_power(relative),
     )
+
+
+def _limit_of_any_power(sizes: Floats) -> Floats:
+    """Return `Hypotheses.any_power`, read off closely spaced powers."""
+    errors = sizes ** np.arange(priors.BIN, priors.HIGHEST + priors.AROUND[-1], priors.BIN)[:, None]
+    c = between(errors)
+    covariance = outer(c, c) + noise_of_rows((priors.MISFIT * errors) ** 2)
+    _, log_det = inverse(covariance)
+    largest = np.max(c.shape[-1] * np.log(covariance[:, -1, -1]) - log_det)
+    prior = priors.OTHER_PRIOR / priors.HIGHEST * np.sum(np.gradient(priors.AROUND))
+    return np.array([math.log(2.0 * prior) + 0.5 * n * largest for n in (1, 2)])
