@@ -360,9 +360,16 @@ def _most_near_a_power(p: Posterior) -> Floats:
 
 def _sums_near(values: Floats, powers: Floats, margin: float) -> Floats:
     """Return sums of the values of all powers so near each power, shape (ladder, power)."""
-    sums = np.concatenate([np.zeros((len(values), 1)), np.cumsum(values, axis=-1)], axis=-1)
+    sums = _sums_up(values)
     ends = np.searchsorted(powers, powers + margin, side="right")
     return np.asarray(sums[:, ends] - sums[:, np.searchsorted(powers, powers - margin)])
+
+
+def _sums_up(values: Floats) -> Floats:
+    """Return the sums of the first 0, 1, ... values along the last axis; further zeros change no bit of them."""
+    sums = np.zeros((len(values), values.shape[1] + 1))
+    np.cumsum(values, axis=-1, out=sums[:, 1:])
+    return sums
 
 
 def _numbers(
@@ -406,8 +413,9 @@ def _sides(
         # the neighbourhood that holds most
         right = np.max(_sums_near(alone, powers, margin), axis=-1)
         return np.zeros(len(alone)), right, np.zeros(len(alone))
-    low, high = powers < least, powers > most
-    lower, right, higher = (np.sum(alone[:, part], axis=-1) for part in (low, ~low & ~high, high))
+    sums = _sums_up(alone)
+    low, high = np.searchsorted(powers, least), np.searchsorted(powers, most, side="right")
+    lower, right, higher = sums[:, low], sums[:, high] - sums[:, low], sums[:, -1] - sums[:, high]
     # two powers of one size are no order, but tell of one that both are below, or above
     first, second = believed.pairs.T
     lower = lower + np.sum(mixed[:, second < least], axis=-1)

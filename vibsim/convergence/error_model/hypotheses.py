@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
 from typing import NamedTuple
@@ -55,6 +55,8 @@ class Table:
     limit: Floats
     # of one shape: form of the precision of what the other rows are beside multiples of the last one, over `TAIL`
     beside: Floats | None = None
+    # the same for whole groups: what is less than the forms of all, of the squares of the rows, shape (group, w - 1)
+    beside_bounds: Floats | None = None
 
 
 @lru_cache
@@ -167,7 +169,7 @@ def _table(
     variance: Floats,
     c: tuple[Floats, Floats],
     prior: tuple[Floats, Floats, Floats],
-    beside: tuple[Floats, Floats] | None = None,
+    beside: Floats | None = None,
 ) -> Table:
     """Lay hypotheses out.
 
@@ -181,6 +183,9 @@ def _table(
         Both powers in the rows, at size 1, each of shape (hypothesis, row).
     prior
         Variance of the first power, covariance, and variance of the second, each of shape (hypothesis,).
+    beside
+        Of one shape: covariance of what the other rows are beside multiples of the last one, shape (hypothesis, w - 1,
+        w - 1).
     """
     precision, log_det = inverse(signal + noise_of_rows(variance))
     finest = np.flatnonzero(variance[0])[-1]
@@ -200,9 +205,9 @@ def _table(
     whole = prior[0] + 2.0 * prior[1] + prior[2] + own_noise
     left_whole = np.maximum(whole + np.sum(path * to_limit, axis=-1), 0.0)
     forms = np.stack([form(x) for x in (precision, *(outer(g, g) for g in (*gains, path)))], axis=1)
-    log_det_beside, precision_beside = (0.0, precision) if beside is None else beside
+    precision_beside, log_det_beside = (None, 0.0) if beside is None else inverse(beside)
     # of one shape there is one dimension along the last row, all others are across it
-    dimensions = [(n, 1 if beside else n) for n in (1, 2)]
+    dimensions = [(n, n if beside is None else 1) for n in (1, 2)]
     roots = np.stack(
         [
             np.exp((2.0 / d * terms.log_prior - log_det - (n - d) * log_det_beside) / w)
@@ -213,12 +218,22 @@ def _table(
     pair = np.searchsorted(terms.first_of_pairs, np.arange(len(terms.lower)), side="right") - 1
     groups = _groups(pair, terms.share)
     exponents = np.array([[0.5 * d * w] for _, d in dimensions])
-    bounds = _bounds(groups, terms.share, variance, c, roots, exponents, 2.0 if beside else 1.0)
-    of_beside = None if beside is None else np.ascontiguousarray(form(precision_beside))
+    bounds = _bounds(
+        groups, terms.share, variance, c, roots, exponents, 1.0 if beside is None else 2.0
+    )
     # tr(K^-1 G) is at least the square of the last row over its variance
     last = signal[:, -1, -1] + np.sum(variance[:, -2:], axis=-1)
     limit = np.log(np.sum((roots * last) ** exponents, axis=1))
-    return Table(np.ascontiguousarray(forms), columns, pair, groups, bounds, limit, of_beside)
+    table = Table(np.ascontiguousarray(forms), columns, pair, groups, bounds, limit)
+    if beside is None or precision_beside is None:
+        return table
+    # a covariance is exceeded by its diagonal times its size
+    diagonal = np.diagonal(beside, axis1=1, axis2=2) * (w - 1)
+    return replace(
+        table,
+        beside=np.ascontiguousarray(form(precision_beside)),
+        beside_bounds=1.0 / np.maximum.reduceat(diagonal, groups[:-1], axis=0),
+    )
 
 
 def _groups(pair: Integers, share: Floats) -> Integers:
@@ -291,8 +306,7 @@ def _one_shape(sizes: Floats, terms: Terms) -> list[Table]:
     mixed = outer(part, noise[:, -1, :-1])
     across = across - mixed - np.swapaxes(mixed, 1, 2)
     variance = priors.TAIL * (priors.MISFIT / c[:, -1, None, None]) ** 2
-    precision, log_det = inverse(variance * across)
-    beside = log_det, precision
+    beside = variance * across
     ones = np.ones_like(terms.share)
     prior = ones, terms.share, terms.share**2
     return [

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 NEGLIGIBLE = 1e-9
 """Weights that are a smaller part of the largest one are left out."""
-KINDS = "f2 f2 i1 i2 f1 f2 f2 f3 f2 f2 i1 i1 f2 i i1 f1 f1 f1 f2"
+KINDS = "f2 f2 i1 i2 f1 f2 f2 f3 f2 f2 f2 i1 i1 f2 i i1 f1 f1 f1 f2"
 
 
 @cache
@@ -72,6 +72,7 @@ def kernel(
     behind: Floats,
     forms: Floats,
     beside: Floats,
+    beside_bounds: Floats,
     columns: Floats,
     pair: Integers,
     groups: Integers,
@@ -104,7 +105,7 @@ def kernel(
     behind
         Of the limit: the product of each row with the sum of all finer differences, and the square of that sum, shape
         (ladder, w + 1), or none: (ladder, 0).
-    forms, beside, columns, pair, groups, bounds
+    forms, beside, beside_bounds, columns, pair, groups, bounds
         See `vibsim.convergence.error_model.hypotheses.Table`.
     pairs
         The number of pairs of powers.
@@ -126,8 +127,17 @@ def kernel(
                 base[g] += read[ladder, k] * bounds[2 + k, g]
         count = 0
         for g in range(bounds.shape[1]):
+            bound = bounds[n - 1, g]
+            if powers[ladder, 1] > 0 and bound > least[ladder] * base[g]:
+                sum_of_all = 1.0
+                place = 0
+                for i in range(beside_bounds.shape[1]):
+                    sum_of_all += max(across[ladder, place], 0.0) * beside_bounds[g, i]
+                    place += beside_bounds.shape[1] - i
+                for _ in range(powers[ladder, 1] // powers[ladder, 0]):
+                    bound = bound / sum_of_all
             # rounding may leave less than nothing, here and below
-            if bounds[n - 1, g] > least[ladder] * base[g]:
+            if bound > least[ladder] * base[g]:
                 for h in range(groups[g], groups[g + 1]):
                     trace = read[ladder, 0] * forms[h, 0, 0]
                     for k in range(1, packed):

@@ -71,7 +71,7 @@ def highest(table: Table, gram: Floats, points: Floats) -> Floats:
 
 def weights(
     table: Table, gram: Floats, points: Floats, behind: Floats, least: Floats
-) -> tuple[Floats, dict[str, Floats]]:
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Weigh the hypotheses of a table on the rows of a window.
 
     Parameters
@@ -88,17 +88,19 @@ def weights(
     Returns
     -------
     tuple
-        The log of their evidence, with priors, summed up, shape (ladder,), and the means of what `kernel` finds.
+        The log of their evidence, with priors, summed up, shape (ladder,), and the means of what `kernel` finds: of
+        pairs of powers, shape (ladder, 3, pair), of the limit in the rows, shape (ladder, w), and of its square.
     """
     count, w = len(gram), gram.shape[-1]
     last = _last(gram)
     relative, whole = gram / last[:, None, None], _whole(table, last, points, w)
     read, dimensions = relative, points
-    beside, across = np.empty((len(table.pair), 0)), np.empty((count, 0))
+    beside, bounds, across = np.empty((1, 0)), np.empty((1, 0)), np.empty((count, 0))
     powers = np.stack([points * w, np.zeros(count)], axis=-1)
-    if table.beside is not None:
+    if table.beside is not None and table.beside_bounds is not None:
         along = outer(relative[:, -1], relative[:, -1])
-        beside, across = table.beside, packed((relative - along)[:, :-1, :-1])
+        beside, bounds = table.beside, table.beside_bounds
+        across = packed((relative - along)[:, :-1, :-1])
         # numbers have nothing across
         read, dimensions = np.where(points[:, None, None] > 1.0, along, relative), np.ones(count)
         free = (points - 1.0) * (w - 1)
@@ -109,17 +111,15 @@ def weights(
     smallest = np.exp(np.clip((least - whole) / (0.5 * powers[:, 0]), -600.0, 600.0))
     weigh()(
         packed(relative), packed(read), points.astype(np.int64), powers.astype(np.int64), smallest, across, behind,
-        table.forms, beside, table.columns, table.pair, table.groups, table.bounds, pairs,
+        table.forms, beside, bounds, table.columns, table.pair, table.groups, table.bounds, pairs,
         np.empty(size, dtype=np.int64), *np.empty((3, size)), found,
     )  # fmt: skip
     # rows that are nowhere near any hypothesis have no weight at all
-    top, total = np.maximum(found[:, 0], TINY), np.maximum(found[:, 1], TINY)
-    log = whole + 0.5 * dimensions * w * np.log(top) + np.log(total)
+    none = found[:, 1] <= 0.0
+    top, total = np.where(none, 1.0, found[:, 0]), np.where(none, 1.0, found[:, 1])
+    log = np.where(none, -np.inf, whole + 0.5 * dimensions * w * np.log(top) + np.log(total))
     found[:, 2:] /= total[:, None]
-    path, pair = found[:, 3 : 3 + w], found[:, 3 + w :].reshape(count, 3, pairs)
-    names = ("pairs", "first_alone", "second_alone")
-    means = {"path": path, "path_squared": found[:, 2] * last}
-    return log, means | {name: pair[:, i] for i, name in enumerate(names)}
+    return log, found[:, 3 + w :].reshape(count, 3, pairs), found[:, 3 : 3 + w], found[:, 2] * last
 
 
 def single_power(

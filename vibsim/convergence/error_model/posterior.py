@@ -31,8 +31,8 @@ from vibsim.core.array_types import Flags, Floats, Integers
 
 LEFT_OUT = 1e-11
 """Part of all evidence that may be left out: bounds of errors change by less than a digit, probabilities not at all."""
-MOST_HYPOTHESES = 6000
-"""There are no more on a window."""
+TABLES, MOST_HYPOTHESES = 8, 6000
+"""There are no more of them on a window."""
 LARGEST_LOG = 600.0
 """Of evidence over that of no expansion at all: more says no more."""
 LIKELY = 1e-3
@@ -100,6 +100,10 @@ def local_orders(ladder: Ladder) -> Floats:
     return np.stack(found, axis=-1)
 
 
+Rows = slice | Integers
+"""Some ladders, or all."""
+
+
 class _Fit:
     """The posterior in the making: hypotheses are added window by window."""
 
@@ -107,18 +111,23 @@ class _Fit:
         self.ladder, self.points, self.promised = ladder, ladder.points, promised
         terms = two_powers((1.0,), promised)
         usual = np.concatenate([terms.lower, terms.higher])
-        self.powers = np.unique(
+        every = np.unique(
             np.concatenate([usual, np.arange(priors.BIN, priors.HIGHEST, priors.BIN)])
         )
         self.orders = local_orders(ladder)
+        # of the powers between the usual ones, those that are nearest to some order
+        nearest = np.searchsorted(0.5 * (every[1:] + every[:-1]), self.orders)
+        used = np.unique(np.concatenate([np.searchsorted(every, usual), nearest.ravel()]))
+        self.powers, self.nearest = every[used], np.searchsorted(used, nearest)
         count, n = len(ladder.gram), len(ladder.h)
         self.windows = [
             (last - rows, last)
             for last in range(n - 1, 1, -1)
             for rows in range(min(priors.LONGEST_WINDOW, last), 1, -1)
         ]
-        # of one hypothesis
-        self.negligible = math.log(left_out / (len(self.windows) * MOST_HYPOTHESES))
+        # half of what may be left out is that of whole tables, half that of single hypotheses
+        part = 0.5 * left_out / len(self.windows)
+        self.of_table, self.of_one = math.log(part / TABLES), math.log(part / MOST_HYPOTHESES)
         # rounding is part of every row; that of a level is relative to what differs from there on
         squares = np.diagonal(ladder.gram, axis1=1, axis2=2)[:, : n - 1]
         largest = np.maximum.accumulate(squares[:, ::-1], axis=-1)[:, ::-1]
@@ -135,7 +144,7 @@ class _Fit:
         pairs, windows = len(terms.first_of_pairs), len(self.windows)
         shapes: dict[str, tuple[int, ...]] = {
             **dict.fromkeys(("alternating", "noise"), ()),
-            **dict.fromkeys(("pairs", "first_alone", "second_alone"), (pairs,)),
+            "pairs": (3, pairs),
             **dict.fromkeys(("window", "path_squared"), (windows,)),
             "any_power": (len(self.powers),),
             "path": (windows, n - 1),
@@ -174,10 +183,11 @@ class _Fit:
             prior = noisy[i] + math.log(priors.ALTERNATING)
             self.add_table(index, table, prior, inside, behind[:, :0], name="alternating")
 
-    def matters(self, most: Floats) -> tuple[Integers, Floats]:
-        """Return the ladders of which evidence up to this may matter, and what would not."""
-        least = self.unit + np.log(self.total) + self.negligible
-        return np.flatnonzero(most > least), least
+    def matters(self, most: Floats) -> tuple[Rows, Floats]:
+        """Return the ladders of which a table with evidence up to this may matter, and what hypothesis would not."""
+        whole = self.unit + np.log(self.total)
+        keep = most > whole + self.of_table
+        return slice(None) if np.all(keep) else np.flatnonzero(keep), whole + self.of_one
 
     def add_table(
         self,
@@ -191,17 +201,21 @@ class _Fit:
     ) -> None:
         """Add the hypotheses of a table on the rows of a window."""
         rows, least = self.matters(prior + highest(table, inside, self.points))
-        if not len(rows):
+        part = inside[rows]
+        if not len(part):
             return
-        log, means = weights(
-            table, inside[rows], self.points[rows], behind[rows], (least - prior)[rows]
+        log, pairs, path, squared = weights(
+            table, part, self.points[rows], behind[rows], (least - prior)[rows]
         )
+        if not np.any(np.isfinite(log)):
+            return
         if name == "window":
-            self.add(index, rows, log + prior[rows], **means)
+            weight = self.add(index, rows, log + prior[rows], path=path, path_squared=squared)
+            self.values["pairs"][rows] += weight[:, None, None] * pairs
         else:
             self.weight(rows, log + prior[rows], name)
 
-    def weight(self, rows: Integers, log: Floats, name: str) -> Floats:
+    def weight(self, rows: Rows, log: Floats, name: str) -> Floats:
         """Add hypotheses of some ladders to a sum, and return their weights."""
         found = np.exp(np.minimum(log - self.unit[rows], LARGEST_LOG))
         self.total[rows] += found
@@ -242,21 +256,18 @@ class _Fit:
     def add(
         self,
         index: int,
-        rows: Integers,
+        rows: Rows,
         log: Floats,
         *,
         path: Floats,
         path_squared: Floats,
-        **means: Floats,
-    ) -> None:
-        """Add hypotheses on the rows of a window of some ladders to all sums."""
+    ) -> Floats:
+        """Add hypotheses on the rows of a window of some ladders, and return their weights."""
         weight = self.weight(rows, log, "window")
         self.values["window"][rows, index] += weight
-        for name, mean in means.items():
-            self.values[name][rows] += weight[:, None] * mean
         if not self.ladder.exact_known:
             (start, end), n = self.windows[index], len(self.ladder.h)
-            whole = np.zeros((len(rows), n - 1))
+            whole = np.zeros((len(path), n - 1))
             whole[:, start:end] = path
             whole[:, end:] = 1.0
             # the limit is known no better than the noise behind the window
@@ -264,6 +275,7 @@ class _Fit:
                 path_squared = path_squared + self.differences[rows, end, end]
             self.values["path"][rows, index] += weight[:, None] * whole
             self.values["path_squared"][rows, index] += weight * path_squared
+        return weight
 
     def add_any_power(
         self,
@@ -282,26 +294,24 @@ class _Fit:
         most = prior + scale_free(last, 0.0, self.points, w)
         most += np.where(self.points > 1.0, *limit[::-1])
         rows, _ = self.matters(np.where(usable, most, -np.inf))
-        if not len(rows):
-            return
         order, points, inside = order[rows], self.points[rows, None], inside[rows]
+        if not len(inside):
+            return
         log, gains, squares = single_power(
             sizes, np.maximum(order[:, None] + priors.AROUND, TINY), inside, points
         )
         log += np.log(priors.OTHER_PRIOR / priors.HIGHEST * np.gradient(priors.AROUND))
         total = log_sum(log)
-        path, squared = np.zeros((len(rows), w)), np.zeros(len(rows))
+        path, squared = np.zeros((len(order), w)), np.zeros(len(order))
         if not self.ladder.exact_known:
             weight = np.exp(log - total[:, None])
             rest = behind[rows] * inside[:, -1:, -1]
             path = -np.sum(weight[..., None] * gains, axis=1)
             squares += rest[:, -1:] - 2.0 * np.sum(gains * rest[:, None, :-1], axis=-1)
             squared = np.sum(weight * squares, axis=-1)
-        nearest = np.argmin(np.abs(order[:, None] - self.powers), axis=-1)
-        of_power = (np.arange(len(self.powers)) == nearest[:, None]).astype(np.float64)
-        self.add(
-            index, rows, total + prior[rows], path=path, path_squared=squared, any_power=of_power
-        )
+        weight = self.add(index, rows, total + prior[rows], path=path, path_squared=squared)
+        nearest = self.nearest[rows, self.windows[index][1] - 2]
+        self.values["any_power"][self.every[rows], nearest] += weight
 
     def add_no_expansion(self) -> None:
         """Add the hypotheses that all rows behind one are noise, and those before it have a size of their own."""
@@ -314,15 +324,13 @@ class _Fit:
                 self.points,
                 ladder.floor[:, k:],
             )
-            self.weight(self.every, log, "noise")
+            self.weight(slice(None), log, "noise")
 
     def posterior(self) -> Posterior:
         """Return what is believed, after all hypotheses were added."""
         values, total = self.values, self.total
-        pairs, first, second, any_power = (
-            values.pop(name) / total[:, None]
-            for name in ("pairs", "first_alone", "second_alone", "any_power")
-        )
+        any_power = values.pop("any_power") / total[:, None]
+        pairs, first, second = np.moveaxis(values.pop("pairs") / total[:, None, None], 1, 0)
         terms = two_powers((1.0,), self.promised)
         of_pairs = np.stack(
             [terms.lower[terms.first_of_pairs], terms.higher[terms.first_of_pairs]], axis=-1
