@@ -40,7 +40,7 @@ OUTSIDE = 0.5 * (1.0 - INTERVAL)
 """The same of what is below it, and above."""
 BOUND = 3.0
 """Standard deviations in the bound of an error: of the tails that the posterior has, these are 95 % (seeds 1 and 3)."""
-BLOCK = 1024
+BLOCK = 512
 """So many ladders are judged together at most."""
 ROUGHLY = 1e-3
 """Part of all evidence that may be left out where only the verdict is asked, if that part cannot change it."""

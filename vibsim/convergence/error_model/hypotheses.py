@@ -104,13 +104,19 @@ def outer(one: Floats, other: Floats) -> Floats:
 
 def packed(matrices: Floats) -> Floats:
     """Return the entries (i, j), i <= j, of symmetric matrices, shape (..., packed)."""
-    i, j = np.triu_indices(matrices.shape[-1])
+    i, j = _upper(matrices.shape[-1])
     return np.ascontiguousarray(matrices[..., i, j])
+
+
+@lru_cache
+def _upper(size: int) -> tuple[Integers, Integers]:
+    i, j = np.triu_indices(size)
+    return i, j
 
 
 def form(matrices: Floats) -> Floats:
     """Return what to multiply packed Gram matrices with, and sum up, for ``tr(M G)``."""
-    i, j = np.triu_indices(matrices.shape[-1])
+    i, j = _upper(matrices.shape[-1])
     return np.where(i == j, 1.0, 2.0) * packed(matrices)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from itertools import combinations
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from vibsim.convergence.error_model.hypotheses import (
     Table,
     outer,
     packed,
-    times,
 )
 from vibsim.convergence.error_model.kernel import weigh
 from vibsim.core.array_types import Floats
@@ -146,35 +146,39 @@ def single_power(
         power, w), and its mean square, both without the differences behind the window, and only where the error of
         the finest level is not known.
     """
-    w, known = gram.shape[-1], sizes[-1] == 0.0
-    levels = w if known else w + 1
+    w, known, m = gram.shape[-1], sizes[-1] == 0.0, priors.MISFIT**2
+    every = range(w if known else w + 1)
+    levels = len(every)
     squares = np.zeros((len(gram), levels, levels))
     squares[:, :w, :w] = gram[:, ::-1, ::-1].cumsum(axis=1).cumsum(axis=2)[:, ::-1, ::-1]
-    a = sizes[:levels] ** powers[..., None]
-    b, m = 1.0 / a, priors.MISFIT**2
+    # a and 1/a, a level each
+    a = [sizes[k] ** powers for k in every]
+    b = [1.0 / x for x in a]
 
-    def square(x: Floats) -> Floats:
-        return np.asarray(np.sum(x * times(squares[:, None], x), axis=-1))
+    def square(x: list[Floats]) -> Floats:
+        found = sum(squares[:, k, k, None] * x[k] ** 2 for k in every)
+        for j, k in combinations(every, 2):
+            found = found + 2.0 * squares[:, j, k, None] * (x[j] * x[k])
+        return np.asarray(found)
 
-    own = np.diagonal(squares, axis1=1, axis2=2)[:, None]
-    trace = (np.sum(b**2 * own, axis=-1) - square(b) / (m + levels)) / m
-    log_det = levels * math.log(m) + math.log(1.0 + levels / m) + 2.0 * np.sum(np.log(a), axis=-1)
+    trace = (sum(squares[:, k, k, None] * b[k] ** 2 for k in every) - square(b) / (m + levels)) / m
+    product = np.prod(sizes[:levels])
+    log_det = levels * math.log(m) + math.log(1.0 + levels / m) + 2.0 * powers * math.log(product)
     gains, spread = np.zeros((*powers.shape, w)), np.zeros_like(powers)
     if not known:
         # any limit will do: K^-1 1, and its sum
-        of_limit = (b**2 - b * np.sum(b, axis=-1, keepdims=True) / (m + levels)) / m
-        whole = np.sum(of_limit, axis=-1)
-        trace -= square(of_limit) / whole
-        log_det += np.log(whole)
-        mean = np.sum(b, axis=-1) / (m + levels) / whole
-        of_levels = b / (m + levels) - of_limit * mean[..., None]
-        gains = np.cumsum(of_levels, axis=-1)[..., :w]
-        left = 1.0 - np.sum(a * of_levels, axis=-1)
+        mean = sum(b) / (m + levels)
+        of_limit = [(x**2 - x * mean) / m for x in b]
+        whole = sum(of_limit)
+        trace = trace - square(of_limit) / whole
+        log_det = log_det + np.log(whole)
+        of_levels = [x / (m + levels) - y * mean / whole for x, y in zip(b, of_limit, strict=True)]
+        gains = np.cumsum(np.stack(of_levels[:w], axis=-1), axis=-1)
+        left = m / (m + levels) + mean**2 / whole
         spread = square(of_levels) + trace / w * left
     # rounding leaves no less than the last row alone
-    c = a[..., -1] if known else a[..., -2] - a[..., -1]
-    variance = c**2 + m * np.sum(a[..., -1 if known else -2 :] ** 2, axis=-1)
-    trace = np.maximum(trace, _last(gram)[:, None] / variance)
+    c, noise_of_last = (a[-1], a[-1] ** 2) if known else (a[-2] - a[-1], a[-2] ** 2 + a[-1] ** 2)
+    trace = np.maximum(trace, _last(gram)[:, None] / (c**2 + m * noise_of_last))
     return scale_free(trace, log_det, points, w), gains, spread
 
 
