@@ -105,7 +105,8 @@ def assess(
         Noise may be so many times `Ladder.floor` where levels are said to differ by nothing else.
     """
     question = _Question(expected, at_least, tolerance, noise_factor)
-    return Assessment(**_in_blocks(ladder, question, _assessed))
+    found = _in_blocks(ladder, question, _assessed)
+    return Assessment(**{field.name: found[field.name] for field in fields(Assessment)})
 
 
 def decide(
@@ -121,9 +122,13 @@ def decide(
     Most ladders are so clear that a rough posterior has the same verdict (see `_is_sure`).
     """
     question = _Question(expected, at_least, tolerance, noise_factor)
-    names = (field.name for field in fields(Decision))
     found = _in_blocks(ladder, question, _decided)
-    return Decision(**{name: found[name] for name in names})
+    rest = np.flatnonzero(~found["sure"])
+    if len(rest):
+        assessed = _in_blocks(_some(ladder, rest), question, _assessed)
+        for field in fields(Decision):
+            found[field.name][rest] = assessed[field.name]
+    return Decision(**{field.name: found[field.name] for field in fields(Decision)})
 
 
 @dataclass(frozen=True)
@@ -186,15 +191,11 @@ def _assessed(ladder: Ladder, factors: Floats, question: _Question) -> dict[str,
 
 
 def _decided(ladder: Ladder, factors: Floats, question: _Question) -> dict[str, np.ndarray]:
-    """Return what a `Decision` holds, of ladders of three levels and more."""
+    """Return what a `Decision` holds, of ladders of three levels and more, and whether it is sure."""
+    del factors
     found = _found(ladder, question, ROUGHLY)
     numbers = _numbers(ladder, found, found.posterior, found.away)
-    rest = np.flatnonzero(~_is_sure(ladder, found, question))
-    if len(rest):
-        assessed = _assessed(_some(ladder, rest), factors[rest], question)
-        for name, values in numbers.items():
-            values[rest] = assessed[name]
-    return numbers
+    return numbers | {"sure": _is_sure(ladder, found, question)}
 
 
 def _some(ladder: Ladder, rows: Integers) -> Ladder:
@@ -263,7 +264,8 @@ def _nothing(count: int, levels: int) -> dict[str, np.ndarray]:
     names = ("order", "low", "high", "error", "error_bound", "best_bound")
     unknown = {name: np.full(count, np.nan) for name in names}
     window = {"first": np.zeros(count, dtype=np.int64), "last": np.full(count, levels - 1)}
-    return {**unknown, **window, "weights": np.full((count, levels), np.nan)}
+    flags = {"sure": np.ones(count, dtype=bool)}
+    return {**unknown, **window, **flags, "weights": np.full((count, levels), np.nan)}
 
 
 def _scaled(ladder: Ladder, rows: Integers) -> tuple[Ladder, Floats, Floats]:
