@@ -261,6 +261,21 @@ def test_a_ladder_is_judged_the_same_alone_and_among_others(known: bool) -> None
                 np.testing.assert_array_equal(values[0], among[name][i], err_msg=name)
 
 
+def test_orders_of_other_ladders_do_not_count() -> None:
+    """How much is near a power is looked up at the same powers, whatever orders the other ladders have."""
+    h = 0.1 * 0.5 ** np.arange(5)
+    rows = np.array(
+        [np.cumprod([1.0, *(0.5**p for p in ps)]) for ps in ((1.88, 1.83, 2.14), (1.95, 2.0, 2.05))]
+    )
+    gram = rows[:, :, None] * rows[:, None]
+    found = []
+    for count in (1, 2):
+        floor, is_number = np.full((count, 5), 1e-15), np.full(count, fill_value=False)
+        given = Ladder(h, gram[:count], floor, is_number, exact_known=False)
+        found.append(assessment._most_near_a_power(posterior(given, 4.0))[0])
+    assert found[0] == found[1]
+
+
 def test_the_compiled_loop_has_the_bits_of_its_text(monkeypatch: pytest.MonkeyPatch) -> None:
     for given in (
         ladder(HALVED, numbers(HALVED, (1.0, 2.0), (0.1, 3.0))),

@@ -356,15 +356,17 @@ def _most_near_a_power(p: Posterior) -> Floats:
     """Return the most probability that a power, within the usual tolerance, dominates or is one of two of a size."""
     # two powers of one size are further from each other than the tolerance
     present = p.lowest + p.highest - p.alone
-    near = _sums_near(present, p.powers, ORDER_TOLERANCE + 1e-9)
+    near = _sums_near(present, p, ORDER_TOLERANCE + 1e-9)
     return np.asarray(np.max(near, axis=-1))
 
 
-def _sums_near(values: Floats, powers: Floats, margin: float) -> Floats:
-    """Return sums of the values of all powers so near each power, shape (ladder, power)."""
+def _sums_near(values: Floats, p: Posterior, margin: float) -> Floats:
+    """Return sums of the values of all powers so near each power of the grid, shape (ladder, power)."""
     sums = _sums_up(values)
-    ends = np.searchsorted(powers, powers + margin, side="right")
-    return np.asarray(sums[:, ends] - sums[:, np.searchsorted(powers, powers - margin)])
+    start = np.searchsorted(p.powers, p.grid - margin)
+    return np.asarray(
+        sums[:, np.searchsorted(p.powers, p.grid + margin, side="right")] - sums[:, start]
+    )
 
 
 def _sums_up(values: Floats) -> Floats:
@@ -413,7 +415,7 @@ def _sides(
         least, most = at_least - margin, np.inf
     else:
         # the neighbourhood that holds most
-        right = np.max(_sums_near(alone, powers, margin), axis=-1)
+        right = np.max(_sums_near(alone, believed, margin), axis=-1)
         return np.zeros(len(alone)), right, np.zeros(len(alone))
     sums = _sums_up(alone)
     low, high = np.searchsorted(powers, least), np.searchsorted(powers, most, side="right")

@@ -62,6 +62,7 @@ class Posterior:
     """What is believed of ladders: probabilities, of shape (ladder,) where no other is given."""
 
     powers: Floats  # the powers that are looked at, increasing, shape (power,)
+    grid: Floats  # the same, and those that only other ladders have
     orders: Floats  # of every three successive levels, shape (ladder, n-2); see `local_orders`
     windows: list[tuple[int, int]]  # coarsest and finest level
     alone: Floats  # that this power dominates, shape (ladder, power)
@@ -118,7 +119,7 @@ class _Fit:
         # of the powers between the usual ones, those that are nearest to some order
         nearest = np.searchsorted(0.5 * (every[1:] + every[:-1]), self.orders)
         used = np.unique(np.concatenate([np.searchsorted(every, usual), nearest.ravel()]))
-        self.powers, self.nearest = every[used], np.searchsorted(used, nearest)
+        self.grid, self.powers, self.nearest = every, every[used], np.searchsorted(used, nearest)
         count, n = len(ladder.gram), len(ladder.h)
         self.windows = [
             (last - rows, last)
@@ -353,6 +354,7 @@ class _Fit:
         alone = any_power + lower(first) + higher(second)
         return Posterior(
             powers=self.powers,
+            grid=self.grid,
             orders=self.orders,
             windows=self.windows,
             alone=alone,
