@@ -118,7 +118,9 @@ class _Fit:
         self.orders = local_orders(ladder)
         # of the powers between the usual ones, those that are nearest to some order
         nearest = np.searchsorted(0.5 * (every[1:] + every[:-1]), self.orders)
-        used = np.unique(np.concatenate([np.searchsorted(every, usual), nearest.ravel()]))
+        # and the ends, which are the interval of an order that nothing is known of
+        ends = np.array([0, len(every) - 1])
+        used = np.unique(np.concatenate([np.searchsorted(every, usual), nearest.ravel(), ends]))
         self.grid, self.powers, self.nearest = every, every[used], np.searchsorted(used, nearest)
         count, n = len(ladder.gram), len(ladder.h)
         self.windows = [
