@@ -15,7 +15,9 @@ A power *dominates* where no other one has more than a tenth of it. The table of
 | errors that change their sign from level to level are | INCONCLUSIVE ``oscillating`` |
 | anything else | INCONCLUSIVE ``pre_asymptotic`` |
 
-*Surely* is a probability above ``1 - RISK``.
+*Surely* is a probability above ``1 - RISK``. For a FAIL it is one above ``1 - RISK_OF_THREE`` where it rests on three
+levels and coarser ones do not fit them: three levels may fall like a power by accident. Where predicted noise ends the
+window, and finer differences are far below it, the prediction is wrong, and nothing is decided.
 """
 
 from __future__ import annotations
@@ -32,6 +34,8 @@ from vibsim.core.vocabulary import ORDER_TOLERANCE, REASON_NAMES, REASONS, STATU
 
 RISK = 0.01
 """Accepted probability that a verdict is wrong."""
+RISK_OF_THREE = 0.1 * RISK
+"""The same of a FAIL by three levels behind others that do not fit (seeds 1, 3, 11, 101-103)."""
 DEFINITE = 0.9
 """An order fails only where one power has so much of the probability, alone or as one of two of a size."""
 INTERVAL = 0.95
@@ -159,6 +163,8 @@ class _Found:
     sides: tuple[Floats, Floats, Floats]
     exact: Flags
     away: Flags  # only noise, and not the exact solution
+    by_three: Flags  # whether three levels decide behind others that do not fit
+    cut_short: Flags  # whether noise that is far less than predicted ends the window
 
 
 def _in_blocks(
@@ -220,7 +226,9 @@ def _found(ladder: Ladder, question: _Question, left_out: float) -> _Found:
     away = np.zeros_like(exact)
     if ladder.exact_known:
         away = exact & _is_away(ladder, question.noise_factor)
-    return _Found(believed, sides, exact, away)
+    three = [start > 0 and end - start == 2 for start, end in believed.windows]
+    by_three = np.sum(believed.window[:, three], axis=-1) > 0.5
+    return _Found(believed, sides, exact, away, by_three, _is_cut_short(ladder, believed))
 
 
 def _is_sure(ladder: Ladder, found: _Found, question: _Question) -> Flags:
@@ -246,7 +254,7 @@ def _is_sure(ladder: Ladder, found: _Found, question: _Question) -> Flags:
     window = np.sort(p.window, axis=-1)
     if window.shape[1] > 1:
         margins.append(window[:, -1] - window[:, -2])
-    sure = np.asarray(np.all(np.abs(margins) > ROUGHLY, axis=0))
+    sure = np.asarray(np.all(np.abs(margins) > ROUGHLY, axis=0)) & ~(fails & found.by_three)
     if ladder.exact_known:
         open_still = np.flatnonzero(sure & ~_meets(ladder, p))
         if len(open_still):
@@ -309,6 +317,19 @@ def _is_only_noise(ladder: Ladder, factor: float) -> Flags:
     return np.asarray(np.all(d <= allowed, axis=-1))
 
 
+def _is_cut_short(ladder: Ladder, believed: Posterior) -> Flags:
+    """Say where noise that is far less than predicted ends the most probable window.
+
+    The finest differences show how large noise is at most. At the coarsest level it is as predicted, since storing
+    numbers makes noise even where differences are 0.
+    """
+    last = _window(believed)[1]
+    predicted = ladder.floor[np.arange(len(last)), last]
+    finest = np.sqrt(np.max(np.diagonal(ladder.gram, axis1=1, axis2=2)[:, -2:], axis=-1))
+    shown = np.maximum(ladder.floor[:, 0], NOISE_FACTOR * finest)
+    return np.asarray((last < len(ladder.h) - 1) & (predicted > NOISE_FACTOR * shown))
+
+
 def _is_away(ladder: Ladder, factor: float) -> Flags:
     """Say where the finest level is further from the exact solution than noise explains."""
     return np.asarray(np.sqrt(ladder.gram[:, -1, -1]) > factor * ladder.floor[:, -1])
@@ -344,13 +365,14 @@ def _variance(ladder: Ladder, of_limit: Posterior) -> Floats:
 def _reasons(found: _Found, missed: Flags) -> Integers:
     """Return the reasons of the verdicts, as positions in `REASON_NAMES`; see the head of this module."""
     p, (lower, right, higher) = found.posterior, found.sides
-    another = (lower + higher > 1.0 - RISK) & (right < RISK)
+    risk = np.where(found.by_three, RISK_OF_THREE, RISK)
+    another = (lower + higher > 1.0 - risk) & (right < risk) & ~found.cut_short
     if np.any(another):
         another &= _most_near_a_power(p) > DEFINITE
     cases = [
         (missed, "wrong_limit"),
         (found.exact, "exact"),
-        (right > 1.0 - RISK, "asymptotic"),
+        ((right > 1.0 - RISK) & ~found.cut_short, "asymptotic"),
         (another & (lower > higher), "order_low"),
         (another, "order_high"),
         (p.noise > np.maximum(1.0 - p.noise - p.alternating, p.alternating), "round_off"),
@@ -389,7 +411,7 @@ def _numbers(
 ) -> dict[str, np.ndarray]:
     """Return what a `Decision` holds beside the status, for ladders of three levels and more."""
     n, believed, exact = len(ladder.h), found.posterior, found.exact
-    first, last = np.array(believed.windows)[np.argmax(believed.window, axis=-1)].T
+    first, last = _window(believed)
     order = np.where(exact, np.nan, _finest_order(believed.orders, last))
     low, high = _interval(believed, order)
     if np.any(missed):
@@ -435,6 +457,12 @@ def _sides(
     if expected is None:
         right = right + np.sum(mixed[:, first >= least], axis=-1)
     return lower, right, higher
+
+
+def _window(believed: Posterior) -> tuple[Integers, Integers]:
+    """Return the coarsest and the finest level of the most probable window of each ladder."""
+    first, last = np.array(believed.windows)[np.argmax(believed.window, axis=-1)].T
+    return first, last
 
 
 def _finest_order(orders: Floats, last: Integers) -> Floats:
