@@ -272,7 +272,7 @@ def test_orders_of_other_ladders_do_not_count() -> None:
     for count in (1, 2):
         floor, is_number = np.full((count, 5), 1e-15), np.full(count, fill_value=False)
         given = Ladder(h, gram[:count], floor, is_number, exact_known=False)
-        found.append(assessment._most_near_a_power(posterior(given, 4.0))[0])
+        found.append(assessment._most_near_a_power(posterior(given, Promise(4.0)))[0])
     assert found[0] == found[1]
 
 
@@ -300,7 +300,7 @@ def test_no_more_is_left_out_than_may_be(known: bool, left_out: float) -> None:
         if not 3 <= len(group.levels) <= 6 or group.known != known:
             continue
         given, _ = of_group(group)
-        whole, part = (posterior(given, 2.0, left_out=x) for x in (1e-250, left_out))
+        whole, part = (posterior(given, Promise(2.0), left_out=x) for x in (1e-250, left_out))
         for name in ("alone", "lowest", "highest", "window", "noise", "scattered", "alternating"):
             off = np.abs(getattr(part, name) - getattr(whole, name))
             assert np.max(off) <= left_out, name

@@ -16,8 +16,11 @@ A power *dominates* where no other one has more than a tenth of it. The table of
 | anything else | INCONCLUSIVE ``pre_asymptotic`` |
 
 *Surely* is a probability above ``1 - RISK``. For a FAIL it is one above ``1 - RISK_OF_THREE`` where it rests on three
-levels and coarser ones do not fit them: three levels may fall like a power by accident. Where predicted noise ends the
-window, and finer differences are far below it, the prediction is wrong, and nothing is decided.
+levels and coarser ones do not fit them: three levels may fall like a power by accident.
+
+Noise that is predicted to grow may not do so. Where it ends the window, and the finest differences show that it may be
+far less, the ladder is judged with less noise as well (`_with_less_noise`). Then a verdict is sure that is sure with
+one of the two, while it has at least the probability `RISK` with the other.
 """
 
 from __future__ import annotations
@@ -46,6 +49,8 @@ BOUND = 3.0
 """Standard deviations in the bound of an error: of the tails that the posterior has, these are 95 % (seeds 1 and 3)."""
 BLOCK = 512
 """So many ladders are judged together at most."""
+DECIDED = tuple(REASON_NAMES.index(name) for name in ("asymptotic", "order_low", "order_high"))
+"""Reasons of verdicts on an order."""
 ROUGHLY = 1e-3
 """Part of all evidence that may be left out where only the verdict is asked, if that part cannot change it."""
 NEAR = 0.1
@@ -164,7 +169,26 @@ class _Found:
     exact: Flags
     away: Flags  # only noise, and not the exact solution
     by_three: Flags  # whether three levels decide behind others that do not fit
-    cut_short: Flags  # whether noise that is far less than predicted ends the window
+    cut_short: Flags  # whether noise that may be far less than predicted ends the window: nothing is decided
+
+    def some(self, rows: Integers, *, cut_short: bool) -> _Found:
+        """Return what was found of some of the ladders."""
+        lower, right, higher = (side[rows] for side in self.sides)
+        return _Found(
+            self.posterior.some(rows),
+            (lower, right, higher),
+            self.exact[rows],
+            self.away[rows],
+            self.by_three[rows],
+            np.full(len(rows), cut_short),
+        )
+
+    def replace(self, ladders: Integers, other: _Found, rows: Flags) -> None:
+        """Take what was found of some ladders from some rows of another one."""
+        self.posterior.replace(ladders, other.posterior, rows)
+        for one, of_other in zip(self.sides, other.sides, strict=True):
+            one[ladders] = of_other[rows]
+        self.by_three[ladders] = other.by_three[rows]
 
 
 def _in_blocks(
@@ -195,12 +219,13 @@ def _in_blocks(
 
 def _assessed(ladder: Ladder, factors: Floats, question: _Question) -> dict[str, np.ndarray]:
     """Return what an `Assessment` holds, of ladders of three levels and more."""
-    found = _found(ladder, question, LEFT_OUT)
+    found = _with_less_noise(ladder, _found(ladder, question, LEFT_OUT), question)
     of_limit, missed = found.posterior, found.away
     if ladder.exact_known:
         # what the levels say of the limit without the exact solution
         of_limit = posterior(_without_exact(ladder), question.promise)
-        missed = missed | ((of_limit.expansion > 1.0 - RISK) & _is_missed(ladder, of_limit))
+        risk = np.where(_rests_on_three(of_limit), RISK_OF_THREE, RISK)
+        missed = missed | ((of_limit.expansion > 1.0 - risk) & _is_missed(ladder, of_limit))
     numbers = _numbers(ladder, found, of_limit, missed)
     return numbers | _best(ladder, of_limit, found.exact, factors)
 
@@ -226,9 +251,8 @@ def _found(ladder: Ladder, question: _Question, left_out: float) -> _Found:
     away = np.zeros_like(exact)
     if ladder.exact_known:
         away = exact & _is_away(ladder, question.noise_factor)
-    three = [start > 0 and end - start == 2 for start, end in believed.windows]
-    by_three = np.sum(believed.window[:, three], axis=-1) > 0.5
-    return _Found(believed, sides, exact, away, by_three, _is_cut_short(ladder, believed))
+    by_three, cut_short = _rests_on_three(believed), _is_cut_short(ladder, believed)
+    return _Found(believed, sides, exact, away, by_three, cut_short)
 
 
 def _is_sure(ladder: Ladder, found: _Found, question: _Question) -> Flags:
@@ -254,7 +278,11 @@ def _is_sure(ladder: Ladder, found: _Found, question: _Question) -> Flags:
     window = np.sort(p.window, axis=-1)
     if window.shape[1] > 1:
         margins.append(window[:, -1] - window[:, -2])
-    sure = np.asarray(np.all(np.abs(margins) > ROUGHLY, axis=0)) & ~(fails & found.by_three)
+    sure = (
+        np.asarray(np.all(np.abs(margins) > ROUGHLY, axis=0))
+        & ~(fails & found.by_three)
+        & ~found.cut_short
+    )
     if ladder.exact_known:
         open_still = np.flatnonzero(sure & ~_meets(ladder, p))
         if len(open_still):
@@ -317,17 +345,50 @@ def _is_only_noise(ladder: Ladder, factor: float) -> Flags:
     return np.asarray(np.all(d <= allowed, axis=-1))
 
 
-def _is_cut_short(ladder: Ladder, believed: Posterior) -> Flags:
-    """Say where noise that is far less than predicted ends the most probable window.
+def _least_noise(ladder: Ladder) -> Floats:
+    """Return the noise of every level if it grows no more than the finest differences show, shape (ladder, n).
 
-    The finest differences show how large noise is at most. At the coarsest level it is as predicted, since storing
-    numbers makes noise even where differences are 0.
+    At the coarsest level it is as predicted, since storing numbers makes noise even where differences are 0.
     """
-    last = _window(believed)[1]
-    predicted = ladder.floor[np.arange(len(last)), last]
     finest = np.sqrt(np.max(np.diagonal(ladder.gram, axis1=1, axis2=2)[:, -2:], axis=-1))
-    shown = np.maximum(ladder.floor[:, 0], NOISE_FACTOR * finest)
-    return np.asarray((last < len(ladder.h) - 1) & (predicted > NOISE_FACTOR * shown))
+    least = np.maximum(ladder.floor[:, :1], NOISE_FACTOR * finest[:, None])
+    return np.asarray(np.minimum(ladder.floor, least))
+
+
+def _is_cut_short(ladder: Ladder, believed: Posterior) -> Flags:
+    """Say where noise that may be far less than predicted ends the most probable window."""
+    every, last = np.arange(len(ladder.gram)), _window(believed)[1]
+    least = _least_noise(ladder)[every, last]
+    return np.asarray(NOISE_FACTOR * least < ladder.floor[every, last])
+
+
+def _with_less_noise(ladder: Ladder, found: _Found, question: _Question) -> _Found:
+    """Return what is found of ladders whose window is cut short by noise, with that noise and with less.
+
+    What is sure with one of the two counts, where it has at least the probability `RISK` with the other; else nothing.
+    """
+    rows = np.flatnonzero(found.cut_short & ~found.exact)
+    if not len(rows):
+        return found
+    first = found.some(rows, cut_short=False)
+    less = replace(_some(ladder, rows), floor=_least_noise(ladder)[rows])
+    other = _found(less, question, LEFT_OUT).some(np.arange(len(rows)), cut_short=False)
+    none = np.zeros(len(rows), dtype=bool)
+    code, code_of_other = (_reasons(one, none) for one in (first, other))
+    excluded = _probability(code, other) < RISK
+    added = ~np.isin(code, DECIDED) & np.isin(code_of_other, DECIDED)
+    added &= _probability(code_of_other, first) >= RISK
+    chosen = excluded | added
+    found.replace(rows[chosen], other, chosen)
+    found.cut_short[rows] = excluded & ~added
+    return found
+
+
+def _probability(codes: Integers, found: _Found) -> Floats:
+    """Return the probability of what is decided, 1 where nothing is."""
+    lower, right, higher = found.sides
+    right = np.where(codes == DECIDED[0], right, lower + higher)
+    return np.where(np.isin(codes, DECIDED), right, 1.0)
 
 
 def _is_away(ladder: Ladder, factor: float) -> Flags:
@@ -380,6 +441,12 @@ def _reasons(found: _Found, missed: Flags) -> Integers:
     ]
     codes = [REASON_NAMES.index(name) for _, name in cases]
     return np.select([mask for mask, _ in cases], codes, REASON_NAMES.index("pre_asymptotic"))
+
+
+def _rests_on_three(p: Posterior) -> Flags:
+    """Say where windows of three levels behind others that do not fit have most of the probability."""
+    three = [start > 0 and end - start == 2 for start, end in p.windows]
+    return np.asarray(np.sum(p.window[:, three], axis=-1) > 0.5)
 
 
 def _most_near_a_power(p: Posterior) -> Floats:

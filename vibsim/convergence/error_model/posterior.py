@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -85,6 +85,26 @@ class Posterior:
     def expansion(self) -> Floats:
         """Return the probability of an expansion in one or two powers."""
         return np.asarray(np.sum(self.window, axis=-1))
+
+    def some(self, rows: Integers) -> Posterior:
+        """Return what is believed of some of the ladders."""
+        return replace(self, **{name: getattr(self, name)[rows] for name in self.of_ladders()})
+
+    def replace(self, ladders: Integers, other: Posterior, rows: Flags) -> None:
+        """Believe of some ladders what another posterior of them, among fewer others, says in some of its rows."""
+        place = np.searchsorted(self.powers, other.powers)
+        for name in self.of_ladders():
+            values = getattr(other, name)[rows]
+            if name in ("alone", "lowest", "highest"):
+                every = np.zeros((len(values), len(self.powers)))
+                every[:, place] = values
+                values = every
+            getattr(self, name)[ladders] = values
+
+    def of_ladders(self) -> list[str]:
+        """Name what has a row for each ladder."""
+        names = [one.name for one in fields(self)]
+        return [name for name in names if name not in ("powers", "grid", "windows", "pairs")]
 
 
 def local_orders(ladder: Ladder) -> Floats:
