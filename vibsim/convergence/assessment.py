@@ -15,7 +15,12 @@ A power *dominates* where no other one has more than a tenth of it. The table of
 | errors that change their sign from level to level are | INCONCLUSIVE ``oscillating`` |
 | anything else | INCONCLUSIVE ``pre_asymptotic`` |
 
-*Surely* is a probability above ``1 - RISK``.
+*Surely* is a probability above ``1 - RISK``. For a FAIL it is one above ``1 - RISK_OF_THREE`` where it rests on three
+levels and coarser ones do not fit them: three levels may fall like a power by accident.
+
+Noise that is predicted to grow may not do so. Where it ends a window, and the finest differences show that it may be
+far less (`_least_noise`), the ladder is judged with less noise as well. Then a verdict is sure that is sure
+with one of the two, while it has at least the probability `RISK` with the other.
 """
 
 from __future__ import annotations
@@ -31,6 +36,8 @@ from vibsim.core.vocabulary import ORDER_TOLERANCE, REASON_NAMES, REASONS, STATU
 
 RISK = 0.01
 """Accepted probability that a verdict is wrong."""
+RISK_OF_THREE = 0.1 * RISK
+"""The same of a FAIL by three levels behind others that do not fit (seeds 1, 3, 11, 101-103)."""
 DEFINITE = 0.9
 """An order fails only where one power has so much of the probability, alone or as one of two of a size."""
 INTERVAL = 0.95
@@ -48,7 +55,13 @@ MISSED_SHARE = 0.5
 STATED_NOISE_FACTOR = 2.0
 """The same as `NOISE_FACTOR` of noise that a user states: differences of normal noise exceed it in one of 200."""
 NOISE_FACTOR = 10.0
-"""Noise may be so many times its prediction where levels are said to differ by nothing else."""
+"""Noise may be so many times its prediction where levels are said to differ by nothing else, and so many times their
+finest differences."""
+ASYMPTOTIC, ORDER_LOW, ORDER_HIGH, PRE_ASYMPTOTIC = (
+    REASON_NAMES.index(name) for name in ("asymptotic", "order_low", "order_high", "pre_asymptotic")
+)
+Sides = tuple[Floats, Floats, Floats]
+"""The probabilities that a lower power dominates, one that is expected, and a higher one."""
 
 
 @dataclass(frozen=True)
@@ -113,8 +126,23 @@ def assess(
                 of_limit = posterior(_without_exact(part), expected)
                 _, settled, _ = _sides(of_limit, None, None, tolerance)
                 missed = exact & _is_away(part, noise_factor)
-                missed |= (settled > 1.0 - RISK) & _is_missed(part, of_limit)
-            reason[rows] = _reasons(believed, sides, exact, missed)
+                risk = np.where(_rests_on_three(of_limit), RISK_OF_THREE, RISK)
+                missed |= (settled > 1.0 - risk) & _is_missed(part, of_limit)
+            codes = _reasons(believed, sides, exact, missed)
+            # finer levels may show more if their noise is less than predicted
+            less = _least_noise(part)
+            again = np.flatnonzero(_is_cut_short(part, less, believed) & ~exact & ~missed)
+            if len(again):
+                other = posterior(_with_noise(part, less, again), expected)
+                lower, right, higher = (side[again] for side in sides)
+                codes[again], chosen = _of_both(
+                    codes[again],
+                    (lower, right, higher),
+                    other,
+                    _sides(other, expected, at_least, tolerance),
+                )
+                believed.replace(again[chosen], other, chosen)
+            reason[rows] = codes
             numbers = _numbers(part, believed, of_limit, exact, missed, factors)
             for name, value in numbers.items():
                 in_units = name in ("error", "error_bound", "best_bound")
@@ -181,6 +209,56 @@ def _is_missed(ladder: Ladder, of_limit: Posterior) -> Flags:
     return np.asarray((distance > MISSED * bound) & (distance > MISSED_SHARE * error))
 
 
+def _least_noise(ladder: Ladder) -> Floats:
+    """Return the noise of every level if it grows no more than the finest differences show, shape (ladder, n).
+
+    At the coarsest level it is as predicted, since storing numbers makes noise even where differences are 0.
+    """
+    finest = np.sqrt(np.max(np.diagonal(ladder.gram, axis1=1, axis2=2)[:, -2:], axis=-1))
+    least = np.maximum(ladder.floor[:, :1], NOISE_FACTOR * finest[:, None])
+    return np.asarray(np.minimum(ladder.floor, least))
+
+
+def _is_cut_short(ladder: Ladder, less: Floats, believed: Posterior) -> Flags:
+    """Say where noise that may be far less than predicted ends the most probable window."""
+    every, last = np.arange(len(less)), _window(believed)[1]
+    return np.asarray(NOISE_FACTOR * less[every, last] < ladder.floor[every, last])
+
+
+def _with_noise(ladder: Ladder, noise: Floats, rows: Integers) -> Ladder:
+    """Return some of the ladders with other noise."""
+    return Ladder(
+        ladder.h, ladder.gram[rows], noise[rows], ladder.numbers[rows], ladder.exact_known
+    )
+
+
+def _of_both(
+    codes: Integers, sides: Sides, other: Posterior, sides_of_other: Sides
+) -> tuple[Integers, Flags]:
+    """Return the reasons of ladders that were judged with the predicted noise and with less, and where less counts.
+
+    A verdict is sure that is sure with one of the two, while the other does not exclude it.
+    """
+    none = np.zeros(len(codes), dtype=bool)
+    codes_of_other = _reasons(other, sides_of_other, none, none)
+    excluded = _probability(codes, sides_of_other) < RISK
+    added = ~_is_decided(codes) & _is_decided(codes_of_other)
+    added &= _probability(codes_of_other, sides) >= RISK
+    codes = np.where(added, codes_of_other, codes)
+    return np.where(excluded, PRE_ASYMPTOTIC, codes), excluded | added
+
+
+def _probability(codes: Integers, sides: Sides) -> Floats:
+    """Return the probability of what is decided, 1 where nothing is."""
+    lower, right, higher = sides
+    return np.select([codes == ASYMPTOTIC, _is_decided(codes)], [right, lower + higher], 1.0)
+
+
+def _is_decided(codes: Integers) -> Flags:
+    """Say where there is a verdict on the order."""
+    return np.isin(codes, (ASYMPTOTIC, ORDER_LOW, ORDER_HIGH))
+
+
 def _norm(path: Floats, gram: Floats) -> Floats:
     """Return the norm of a combination of rows with this Gram matrix, shape (ladder,)."""
     return np.asarray(np.sqrt(np.maximum(_square(path, gram), 0.0)))
@@ -198,13 +276,12 @@ def _variance(ladder: Ladder, of_limit: Posterior) -> Floats:
     return np.asarray(np.maximum(of_limit.path_squared - _square(path, differences), 0.0))
 
 
-def _reasons(
-    p: Posterior, sides: tuple[Floats, Floats, Floats], exact: Flags, missed: Flags
-) -> Integers:
+def _reasons(p: Posterior, sides: Sides, exact: Flags, missed: Flags) -> Integers:
     """Return the reasons of the verdicts, as positions in `REASON_NAMES`; see the head of this module."""
     lower, right, higher = sides
     definite = np.max(_near_each_power(p), axis=-1) > DEFINITE
-    another = (lower + higher > 1.0 - RISK) & (right < RISK) & definite
+    risk = np.where(_rests_on_three(p), RISK_OF_THREE, RISK)
+    another = (lower + higher > 1.0 - risk) & (right < risk) & definite
     cases = [
         (missed, "wrong_limit"),
         (exact, "exact"),
@@ -216,6 +293,12 @@ def _reasons(
     ]
     codes = [REASON_NAMES.index(name) for _, name in cases]
     return np.select([mask for mask, _ in cases], codes, REASON_NAMES.index("pre_asymptotic"))
+
+
+def _rests_on_three(p: Posterior) -> Flags:
+    """Say where windows of three levels behind others that do not fit have most of the probability."""
+    three = [start > 0 and end - start == 2 for start, end in p.windows]
+    return np.asarray(np.sum(p.window[:, three], axis=-1) > 0.5)
 
 
 def _near_each_power(p: Posterior) -> Floats:
@@ -240,7 +323,7 @@ def _numbers(
 ) -> dict[str, np.ndarray]:
     """Return what an `Assessment` holds beside status and reason, for ladders of three levels and more."""
     n, orders = len(ladder.h), believed.orders
-    first, last = np.array(believed.windows)[np.argmax(believed.window, axis=-1)].T
+    first, last = _window(believed)
     order = np.where(exact, np.nan, _finest_order(orders, last))
     # where the exact solution is missed, the levels alone have an order
     ends = zip(_interval(of_limit, order), _interval(believed, order), strict=True)
@@ -257,7 +340,7 @@ def _without_exact(ladder: Ladder) -> Ladder:
 
 def _sides(
     believed: Posterior, expected: float | None, at_least: float | None, tolerance: float
-) -> tuple[Floats, Floats, Floats]:
+) -> Sides:
     """Return the probabilities that a lower power dominates, one that is expected, and a higher one."""
     powers, alone, mixed = believed.powers, believed.alone, believed.of_pairs
     margin = tolerance + 1e-9
@@ -278,6 +361,12 @@ def _sides(
     if expected is None:
         right = right + np.sum(mixed[:, first >= least], axis=-1)
     return lower, right, higher
+
+
+def _window(believed: Posterior) -> tuple[Integers, Integers]:
+    """Return the coarsest and the finest level of the most probable window of each ladder."""
+    first, last = np.array(believed.windows)[np.argmax(believed.window, axis=-1)].T
+    return first, last
 
 
 def _finest_order(orders: Floats, last: Integers) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from vibsim.convergence.error_model.likelihood import (
     scale_free,
     weights,
 )
-from vibsim.core.array_types import Flags, Floats
+from vibsim.core.array_types import Flags, Floats, Integers
 
 LIKELY = 1e-3
 """Probability of a window, over that of the most probable one, from which on its limit counts."""
@@ -80,6 +80,12 @@ class Posterior:
     def expansion(self) -> Floats:
         """Return the probability of an expansion in one or two powers."""
         return np.asarray(np.sum(self.window, axis=-1))
+
+    def replace(self, ladders: Integers, other: Posterior, rows: Flags) -> None:
+        """Believe of some ladders what another posterior says in some of its rows."""
+        for one in fields(self):
+            if one.name not in ("powers", "windows", "pairs"):
+                getattr(self, one.name)[ladders] = getattr(other, one.name)[rows]
 
 
 def local_orders(ladder: Ladder) -> Floats:
