@@ -204,7 +204,7 @@ def falling(*powers: float) -> list[Floats]:
         (falling(3.501, 3.501), None, 2.0, (FAILS, "order_high")),
         (falling(4.5, 3.501), None, 2.0, (OPEN, "pre_asymptotic")),
         (falling(3.501, 3.501), -SHAPE, 2.0, (FAILS, "wrong_limit")),
-        (falling(4.5, 3.501), -SHAPE, 2.0, (OPEN, "pre_asymptotic")),
+        (falling(6.0, 3.501), -SHAPE, 2.0, (OPEN, "pre_asymptotic")),
     ],
     ids=["four levels", "three of four", "limit of four levels", "limit of three of four"],
 )
