@@ -42,7 +42,7 @@ def ladder(
     values: list[float] | list[Floats],
     *,
     exact: float | Floats | None = None,
-    noise: float | None = None,
+    noise: float | Floats | None = None,
 ) -> Ladder:
     """Return the ladder of one quantity, with the rounding of double precision as its noise."""
     u = [np.atleast_1d(np.asarray(value, dtype=float)) for value in values]
@@ -179,6 +179,49 @@ def test_a_first_order_part_of_more_than_a_tenth_is_no_second_order(
         given = ladder(h, series(h, (0.5, 2.0, SHAPE), (0.5 * first, 1.0, shape)))
     expected = (PASSES, "asymptotic") if share < 0.1 else (OPEN, "pre_asymptotic")
     assert found(assess(given, expected=2.0)) == expected
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["exact", "unknown"])
+@pytest.mark.parametrize(
+    ("share", "expected", "verdict"),
+    [
+        (0.0, 4.0, (PASSES, "asymptotic")),
+        (0.0, 2.0, (FAILS, "order_high")),
+        (1e-6, 4.0, (OPEN, "pre_asymptotic")),
+        (1e-6, 2.0, (OPEN, "pre_asymptotic")),
+    ],
+)
+def test_a_power_that_shows_below_the_predicted_noise_counts(
+    share: float, expected: float, verdict: tuple[str, str], known: bool
+) -> None:
+    """Noise that is predicted to grow like N^1.5 hides the finer levels, but they fall on, by another power."""
+    h = 0.5 ** np.arange(14)
+    values = [x**4 * SHAPE + share * x**2 * OTHER_SHAPE for x in h]
+    given = ladder(h, values, exact=0.0 * SHAPE if known else None, noise=1e-13 * h**-1.5)
+    assert found(assess(given, expected=expected)) == verdict
+
+
+def falling(*powers: float) -> list[Floats]:
+    """Return levels of one shape whose differences have these orders."""
+    sizes = [2.0 ** sum(powers[k:]) for k in range(len(powers) + 1)]
+    return [sum(sizes[k:]) * SHAPE for k in range(len(sizes) + 1)]
+
+
+@pytest.mark.parametrize(
+    ("values", "exact", "expected", "verdict"),
+    [
+        (falling(3.501, 3.501), None, 2.0, (FAILS, "order_high")),
+        (falling(4.5, 3.501), None, 2.0, (OPEN, "pre_asymptotic")),
+        (falling(3.501, 3.501), -SHAPE, 2.0, (FAILS, "wrong_limit")),
+        (falling(6.0, 3.501), -SHAPE, 2.0, (OPEN, "pre_asymptotic")),
+    ],
+    ids=["four levels", "three of four", "limit of four levels", "limit of three of four"],
+)
+def test_three_levels_behind_others_that_do_not_fit_may_fall_like_a_power_by_accident(
+    values: list[Floats], exact: Floats | None, expected: float, verdict: tuple[str, str]
+) -> None:
+    given = ladder(HALVED[: len(values)], values, exact=exact)
+    assert found(assess(given, expected=expected)) == verdict
 
 
 @pytest.mark.parametrize("factor", [1e-30, 1e30])
