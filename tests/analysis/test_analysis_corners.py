@@ -98,6 +98,25 @@ def test_an_order_below_that_of_the_corner_is_not_excused() -> None:
     assert (verdict.status, verdict.reason) == ("FAIL", "order_low")
 
 
+def test_an_accident_of_three_levels_beside_a_corner_is_no_lower_order() -> None:
+    """Errors fall like dt, then at once: the last local orders are near 1, while a power of 2.5 is believed."""
+    model = {
+        "kind": "oscillator",
+        "m": 1.0,
+        "spring": "u + 2*abs(u)",
+        "damping": {"linear": 0.1},
+    }
+    made = experiment(
+        ["rk3"],
+        model=model,
+        initial={"u": 1.0, "v": 0.4},
+        time={"end": 3.0},
+        levels=[9, 10, 11, 12, 13, 14],
+    )
+    (verdict,) = judged(made)
+    assert (verdict.status, verdict.reason) == ("INCONCLUSIVE", "non_smooth"), verdict.text
+
+
 def corner(model: dict[str, Any], **changes: Any) -> tuple[float, float, str]:
     """Return time, power and words of the first corner."""
     made = experiment(

@@ -222,7 +222,8 @@ def _cases(
     # a corner leaves all powers up to its own: a ladder that settles lower has another cause
     below = (b.order < p - tol) | np.any(orders[..., -2:] < (p - tol)[..., None], axis=-1)
     kinked = ~np.isnan(e.corner) & (p >= e.corner) & (below | alternating | noise)
-    deeper = b.order < e.corner - np.maximum(tol, th.HALF_SPACING)
+    # three levels beside a corner may have any order: the powers that are believed tell
+    deeper = b.high < e.corner - np.maximum(tol, th.HALF_SPACING)
     # finer levels show the power of the corner, not p: those that do not yet are no reason to add some
     limited = e.corner < p - tol
     far = far_from_exact(e)
