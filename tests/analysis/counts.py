@@ -96,7 +96,7 @@ def ladder_of(group: Group, read: Read) -> Ladder:
     return Ladder(h, gram, evidence.floor[0], evidence.numbers[0], group.known)
 
 
-def count(seed: int, folder: Path, number: int = 42, size: int = 55) -> tuple[Counts, Counts]:
+def tally(seed: int, folder: Path, number: int = 42, size: int = 55) -> tuple[Counts, Counts]:
     """Return the counts of the pipeline and of the error model on the ladders of a seed."""
     by_pipeline, by_model = Counts(), Counts()
     for group in groups(seed, number, size):
@@ -118,7 +118,7 @@ def main() -> None:
     print(HEAD)
     for seed in map(int, sys.argv[1:]):
         with tempfile.TemporaryDirectory() as folder:
-            pipeline, model = count(seed, Path(folder))
+            pipeline, model = tally(seed, Path(folder))
         print(f"| {seed} | pipeline | {pipeline.row()} |")
         print(f"| | error model | {model.row()} |", flush=True)
 

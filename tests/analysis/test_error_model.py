@@ -4,18 +4,28 @@ from __future__ import annotations
 
 import datetime
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
 import pytest
-from counts import HEAD, count
+from counts import HEAD, tally
 from synthetic import EPSILON, TOLERANCE, Group, groups
 
-from vibsim.convergence.assessment import Assessment, assess
-from vibsim.convergence.error_model import kernel, likelihood
-from vibsim.convergence.error_model.hypotheses import Promise, hypotheses_of
+from vibsim.convergence import assessment
+from vibsim.convergence.assessment import Assessment, Decision, assess, decide
+from vibsim.convergence.error_model import kernel, likelihood, priors
+from vibsim.convergence.error_model.hypotheses import (
+    Promise,
+    between,
+    form,
+    hypotheses_of,
+    inverse,
+    noise_of_rows,
+    outer,
+    packed,
+)
 from vibsim.convergence.error_model.posterior import Ladder, posterior
 from vibsim.core.array_types import Floats
 from vibsim.core.vocabulary import REASON_NAMES, STATUSES
@@ -33,7 +43,7 @@ def ladder(
     values: list[float] | list[Floats],
     *,
     exact: float | Floats | None = None,
-    noise: float | None = None,
+    noise: float | Floats | None = None,
 ) -> Ladder:
     """Return the ladder of one quantity, with the rounding of double precision as its noise."""
     u = [np.atleast_1d(np.asarray(value, dtype=float)) for value in values]
@@ -172,6 +182,49 @@ def test_a_first_order_part_of_more_than_a_tenth_is_no_second_order(
     assert found(assess(given, expected=2.0)) == expected
 
 
+@pytest.mark.parametrize("known", [True, False], ids=["exact", "unknown"])
+@pytest.mark.parametrize(
+    ("share", "expected", "verdict"),
+    [
+        (0.0, 4.0, (PASSES, "asymptotic")),
+        (0.0, 2.0, (FAILS, "order_high")),
+        (1e-6, 4.0, (OPEN, "pre_asymptotic")),
+        (1e-6, 2.0, (OPEN, "pre_asymptotic")),
+    ],
+)
+def test_a_power_that_shows_below_the_predicted_noise_counts(
+    share: float, expected: float, verdict: tuple[str, str], known: bool
+) -> None:
+    """Noise that is predicted to grow like N^1.5 hides the finer levels, but they fall on, by another power."""
+    h = 0.5 ** np.arange(14)
+    values = [x**4 * SHAPE + share * x**2 * OTHER_SHAPE for x in h]
+    given = ladder(h, values, exact=0.0 * SHAPE if known else None, noise=1e-13 * h**-1.5)
+    assert found(assess(given, expected=expected)) == verdict
+
+
+def falling(*powers: float) -> list[Floats]:
+    """Return levels of one shape whose differences have these orders."""
+    sizes = [2.0 ** sum(powers[k:]) for k in range(len(powers) + 1)]
+    return [sum(sizes[k:]) * SHAPE for k in range(len(sizes) + 1)]
+
+
+@pytest.mark.parametrize(
+    ("values", "exact", "expected", "verdict"),
+    [
+        (falling(3.501, 3.501), None, 2.0, (FAILS, "order_high")),
+        (falling(4.5, 3.501), None, 2.0, (OPEN, "pre_asymptotic")),
+        (falling(3.501, 3.501), -SHAPE, 2.0, (FAILS, "wrong_limit")),
+        (falling(6.0, 3.501), -SHAPE, 2.0, (OPEN, "pre_asymptotic")),
+    ],
+    ids=["four levels", "three of four", "limit of four levels", "limit of three of four"],
+)
+def test_three_levels_behind_others_that_do_not_fit_may_fall_like_a_power_by_accident(
+    values: list[Floats], exact: Floats | None, expected: float, verdict: tuple[str, str]
+) -> None:
+    given = ladder(HALVED[: len(values)], values, exact=exact)
+    assert found(assess(given, expected=expected)) == verdict
+
+
 @pytest.mark.parametrize("factor", [1e-30, 1e30])
 def test_units_do_not_matter(factor: float) -> None:
     usual = series(UNEVEN, (1.0, 2.0, SHAPE), (0.5, 3.0, OTHER_SHAPE))
@@ -193,7 +246,8 @@ def test_rounding_of_steep_differences_is_no_evidence(kind: str) -> None:
     none = np.empty((1, 0))
     for table in getattr(hypotheses_of((8.0, 4.0, 2.0, 1.0), Promise(6.0)), kind):
         one, other = (
-            likelihood.weights(table, g, np.array([2.0]), none)[0] for g in (gram, rounded)
+            likelihood.weights(table, g, np.array([2.0]), none, np.array([-np.inf]))[0]
+            for g in (gram, rounded)
         )
         assert other == pytest.approx(one, abs=1e-6)
 
@@ -242,12 +296,28 @@ def test_a_ladder_is_judged_the_same_alone_and_among_others(known: bool) -> None
     """Bit by bit, so that sweeps may be divided at will."""
     group = next(g for g in groups(7, size=20) if len(g.levels) == 5 and g.known == known)
     given, _ = of_group(group)
-    among = vars(assess(given, expected=2.0))
-    for i in range(3):
-        one = slice(i, i + 1)
-        alone = Ladder(given.h, given.gram[one], given.floor[one], given.numbers[one], known)
-        for name, values in vars(assess(alone, expected=2.0)).items():
-            np.testing.assert_array_equal(values[0], among[name][i], err_msg=name)
+    for judge in (assess, decide):
+        among = vars(judge(given, expected=2.0))
+        for i in range(3):
+            one = slice(i, i + 1)
+            alone = Ladder(given.h, given.gram[one], given.floor[one], given.numbers[one], known)
+            for name, values in vars(judge(alone, expected=2.0)).items():
+                np.testing.assert_array_equal(values[0], among[name][i], err_msg=name)
+
+
+def test_orders_of_other_ladders_do_not_count() -> None:
+    """How much is near a power is looked up at the same powers, whatever orders the other ladders have."""
+    h = 0.1 * 0.5 ** np.arange(5)
+    rows = np.array(
+        [np.cumprod([1.0, *(0.5**p for p in ps)]) for ps in ((1.88, 1.83, 2.14), (1.95, 2.0, 2.05))]
+    )
+    gram = rows[:, :, None] * rows[:, None]
+    found = []
+    for count in (1, 2):
+        floor, is_number = np.full((count, 5), 1e-15), np.full(count, fill_value=False)
+        given = Ladder(h, gram[:count], floor, is_number, exact_known=False)
+        found.append(assessment._most_near_a_power(posterior(given, Promise(4.0)))[0])
+    assert found[0] == found[1]
 
 
 def test_the_compiled_loop_has_the_bits_of_its_text(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -261,6 +331,68 @@ def test_the_compiled_loop_has_the_bits_of_its_text(monkeypatch: pytest.MonkeyPa
             by_text = assess(given, expected=2.0)
         for name, values in vars(by_text).items():
             np.testing.assert_array_equal(vars(compiled)[name], values, err_msg=name)
+
+
+# ---- What is left out
+
+
+@pytest.mark.parametrize("left_out", [1e-3, 1e-11])
+@pytest.mark.parametrize("known", [True, False], ids=["exact", "unknown"])
+def test_no_more_is_left_out_than_may_be(known: bool, left_out: float) -> None:
+    """Bounds that were too small would leave out what counts; ladders of every kind, with hardly anything left out."""
+    for group in groups(HELD_OUT, 10, 10):
+        if not 3 <= len(group.levels) <= 6 or group.known != known:
+            continue
+        given, _ = of_group(group)
+        whole, part = (posterior(given, Promise(2.0), left_out=x) for x in (1e-250, left_out))
+        for name in ("alone", "lowest", "highest", "window", "noise", "scattered", "alternating"):
+            off = np.abs(getattr(part, name) - getattr(whole, name))
+            assert np.max(off) <= left_out, name
+
+
+@pytest.mark.parametrize("expected", [None, 2.0])
+def test_a_decision_is_that_of_the_whole_posterior(expected: float | None) -> None:
+    for group in groups(HELD_OUT, 9, 12):
+        given, _ = of_group(group)
+        quick, whole = decide(given, expected=expected), assess(given, expected=expected)
+        for field in fields(Decision):
+            np.testing.assert_array_equal(
+                getattr(quick, field.name), getattr(whole, field.name), err_msg=field.name
+            )
+
+
+def test_a_clear_decision_needs_no_second_posterior(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(assessment, "_assessed")
+    for exact in (None, np.cos(T)):
+        values = series(HALVED, (1.0, 2.0, SHAPE), (0.5, 4.0, OTHER_SHAPE))
+        for order, expected in ((2.0, "asymptotic"), (4.0, "order_low")):
+            given = ladder(HALVED, values, exact=exact)
+            assert REASON_NAMES[decide(given, expected=order).reason[0]] == expected
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["exact", "unknown"])
+def test_the_inverse_of_one_power_is_that_of_its_covariance(
+    known: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # the inverse of a usual covariance would lose too many digits
+    monkeypatch.setattr(priors, "MISFIT", 0.1)
+    sizes = np.array([5.0, 3.0, 1.0, 0.0] if known else [7.0, 5.0, 3.0, 1.0])
+    powers, points = np.array([[0.5, 1.9, 4.0]]), np.array([[2.0]])
+    rows = np.random.default_rng(1).normal(size=(3, 9)) * np.array([[9.0], [3.0], [1.0]])
+    gram = (rows @ rows.T)[None]
+    errors = sizes ** powers[..., None]
+    c = between(errors)
+    precision, log_det = inverse(outer(c, c) + noise_of_rows((priors.MISFIT * errors) ** 2))
+    trace = np.sum(form(precision) * packed(gram)[:, None], axis=-1)
+    log, gains, square = likelihood.single_power(sizes, powers, gram, points)
+    expected = likelihood.scale_free(trace, log_det, points, 3)
+    np.testing.assert_allclose(log, expected, rtol=1e-9)
+    if not known:
+        path = np.einsum("lpij,lpj->lpi", precision, c)
+        left = 1.0 - np.sum(path * c, axis=-1)
+        np.testing.assert_allclose(gains, path, rtol=1e-9)
+        of_path = np.einsum("lpi,lij,lpj->lp", path, gram, path)
+        np.testing.assert_allclose(square, of_path + trace / 3 * left, rtol=1e-9)
 
 
 # ---- How often it is right
@@ -349,7 +481,7 @@ def check(c: Counts) -> None:
 
 
 def test_pipeline_and_error_model_are_counted_on_the_same_ladders(tmp_path: Path) -> None:
-    pipeline, model = count(HELD_OUT, tmp_path, number=5, size=6)
+    pipeline, model = tally(HELD_OUT, tmp_path, number=5, size=6)
     assert pipeline.decidable == model.decidable > 0
     assert pipeline.judged == model.judged > 100
     assert pipeline.right > 0 < model.right

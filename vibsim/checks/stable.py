@@ -59,7 +59,7 @@ FIELDS = {
 }
 
 LIMIT_ROUNDING = 1e-9
-"""w dt within this part of the limit is at the limit, as in `ladder_statistics.breakdown`."""
+"""w dt within this part of the limit is at the limit, as in `circumstances.breakdown`."""
 ALIKE = 0.15
 """Two levels fail at one time that fail within this part of it: the finer one sees it at most a step earlier."""
 NEAR = 0.1

@@ -15,30 +15,46 @@ A power *dominates* where no other one has more than a tenth of it. The table of
 | errors that change their sign from level to level are | INCONCLUSIVE ``oscillating`` |
 | anything else | INCONCLUSIVE ``pre_asymptotic`` |
 
-*Surely* is a probability above ``1 - RISK``.
+*Surely* is a probability above ``1 - RISK``. For a FAIL it is one above ``1 - RISK_OF_THREE`` where it rests on three
+levels and coarser ones do not fit them: three levels may fall like a power by accident.
+
+Noise that is predicted to grow may not do so. Where it ends the window, and the finest differences show that it may be
+far less, the ladder is judged with less noise as well (`_with_less_noise`). Then a verdict is sure that is sure with
+one of the two, while it has at least the probability `RISK` with the other.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from vibsim.convergence.error_model.hypotheses import Promise, times
-from vibsim.convergence.error_model.posterior import Ladder, Posterior, posterior
+from vibsim.convergence.error_model.posterior import LEFT_OUT, Ladder, Posterior, posterior
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
 from vibsim.core.vocabulary import ORDER_TOLERANCE, REASON_NAMES, REASONS, STATUSES
 
 RISK = 0.01
 """Accepted probability that a verdict is wrong."""
+RISK_OF_THREE = 0.1 * RISK
+"""The same of a FAIL by three levels behind others that do not fit (seeds 1, 3, 11, 101-103)."""
 DEFINITE = 0.9
 """An order fails only where one power has so much of the probability, alone or as one of two of a size."""
 INTERVAL = 0.95
 """Probability of the interval of an order."""
+OUTSIDE = 0.5 * (1.0 - INTERVAL)
+"""The same of what is below it, and above."""
 BOUND = 3.0
 """Standard deviations in the bound of an error: of the tails that the posterior has, these are 95 % (seeds 1 and 3)."""
-BLOCK = 256
+BLOCK = 512
 """So many ladders are judged together at most."""
+DECIDED = tuple(REASON_NAMES.index(name) for name in ("asymptotic", "order_low", "order_high"))
+"""Reasons of verdicts on an order."""
+ROUGHLY = 1e-3
+"""Part of all evidence that may be left out where only the verdict is asked, if that part cannot change it."""
+NEAR = 0.1
+"""Distance of an extrapolation from the exact solution, over the error of the finest level, that surely is no miss."""
 LARGEST_RATIO = 1e60
 """Of a difference to the largest finer one, and of noise to the largest difference: more says no more."""
 MISSED = 3.0
@@ -52,8 +68,8 @@ NOISE_FACTOR = 10.0
 
 
 @dataclass(frozen=True)
-class Assessment:
-    """What was decided of ladders; arrays of shape (ladder,) where no other is given."""
+class Decision:
+    """What was decided of ladders; arrays of shape (ladder,)."""
 
     status: Codes  # index into `vocabulary.STATUSES`
     reason: Codes  # index into `vocabulary.REASON_NAMES`
@@ -62,6 +78,12 @@ class Assessment:
     high: Floats  # upper end
     first: Integers  # coarsest level that the verdict rests on, as a position
     last: Integers  # finest one
+
+
+@dataclass(frozen=True)
+class Assessment(Decision):
+    """What was decided of ladders, and their best values; arrays of shape (ladder,) where no other is given."""
+
     error: Floats  # norm of the error of the finest level, estimated where the exact solution is not known
     error_bound: Floats  # what it is at most
     weights: Floats  # the best value is the sum of these times the values of the levels, shape (ladder, level)
@@ -94,13 +116,93 @@ def assess(
     by_theory
         Whether theory promises the order that is expected.
     """
-    promise = None if expected is None else Promise(expected, by_theory)
+    question = _Question(expected, at_least, tolerance, noise_factor, by_theory)
+    found = _in_blocks(ladder, question, _assessed)
+    return Assessment(**{field.name: found[field.name] for field in fields(Assessment)})
+
+
+def decide(
+    ladder: Ladder,
+    *,
+    expected: float | None = None,
+    at_least: float | None = None,
+    tolerance: float = ORDER_TOLERANCE,
+    noise_factor: float = NOISE_FACTOR,
+    by_theory: bool = False,
+) -> Decision:
+    """Decide whether ladders converge as expected; the same as `assess`, at a fraction of its cost.
+
+    Most ladders are so clear that a rough posterior has the same verdict (see `_is_sure`).
+    """
+    question = _Question(expected, at_least, tolerance, noise_factor, by_theory)
+    found = _in_blocks(ladder, question, _decided)
+    rest = np.flatnonzero(~found["sure"])
+    if len(rest):
+        assessed = _in_blocks(_some(ladder, rest), question, _assessed)
+        for field in fields(Decision):
+            found[field.name][rest] = assessed[field.name]
+    return Decision(**{field.name: found[field.name] for field in fields(Decision)})
+
+
+@dataclass(frozen=True)
+class _Question:
+    """What is asked; see `assess`."""
+
+    expected: float | None
+    at_least: float | None
+    tolerance: float
+    noise_factor: float
+    by_theory: bool
+
+    @property
+    def promise(self) -> Promise | None:
+        """The order that has a prior of its own."""
+        return None if self.expected is None else Promise(self.expected, self.by_theory)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """What the posterior of ladders leads to, but for an exact solution that is missed."""
+
+    posterior: Posterior
+    sides: tuple[Floats, Floats, Floats]
+    exact: Flags
+    away: Flags  # only noise, and not the exact solution
+    by_three: Flags  # whether three levels decide behind others that do not fit
+    cut_short: Flags  # whether noise that may be far less than predicted ends the window: nothing is decided
+
+    def some(self, rows: Integers, *, cut_short: bool) -> _Found:
+        """Return what was found of some of the ladders."""
+        lower, right, higher = (side[rows] for side in self.sides)
+        return _Found(
+            self.posterior.some(rows),
+            (lower, right, higher),
+            self.exact[rows],
+            self.away[rows],
+            self.by_three[rows],
+            np.full(len(rows), cut_short),
+        )
+
+    def replace(self, ladders: Integers, other: _Found, rows: Flags) -> None:
+        """Take what was found of some ladders from some rows of another one."""
+        self.posterior.replace(ladders, other.posterior, rows)
+        for one, of_other in zip(self.sides, other.sides, strict=True):
+            one[ladders] = of_other[rows]
+        self.by_three[ladders] = other.by_three[rows]
+
+
+def _in_blocks(
+    ladder: Ladder,
+    question: _Question,
+    work: Callable[[Ladder, Floats, _Question], dict[str, np.ndarray]],
+) -> dict[str, np.ndarray]:
+    """Return status, reason and the numbers of ladders."""
     n, count = len(ladder.h), len(ladder.gram)
     finite = np.all(np.isfinite(ladder.gram), axis=(-2, -1)) & np.all(
         np.isfinite(ladder.floor), axis=-1
     )
-    reason = np.full(count, REASON_NAMES.index("non_finite"))
     found = _nothing(count, n)
+    reason = found["reason"] = np.full(count, REASON_NAMES.index("non_finite"))
     if n < 3:
         reason[finite] = REASON_NAMES.index("too_few_levels")
     else:
@@ -108,24 +210,97 @@ def assess(
         for start in range(0, len(every), BLOCK):
             rows = every[start : start + BLOCK]
             part, size, factors = _scaled(ladder, rows)
-            believed = posterior(part, promise)
-            sides = _sides(believed, expected, at_least, tolerance)
-            exact = _is_only_noise(part, noise_factor)
-            # what the levels say of the limit without the exact solution
-            of_limit, missed = believed, np.zeros(len(rows), dtype=bool)
-            if part.exact_known:
-                of_limit = posterior(_without_exact(part), promise)
-                missed = exact & _is_away(part, noise_factor)
-                missed |= (of_limit.expansion > 1.0 - RISK) & _is_missed(part, of_limit)
-            reason[rows] = _reasons(believed, sides, exact, missed)
-            numbers = _numbers(part, believed, of_limit, exact, missed, factors)
-            for name, value in numbers.items():
+            for name, value in work(part, factors, question).items():
                 in_units = name in ("error", "error_bound", "best_bound")
                 found[name][rows] = value * size if in_units else value
-    status = np.array(
-        [STATUSES.index(REASONS[REASON_NAMES[code]]) for code in reason], dtype=np.int8
+    status = np.array([STATUSES.index(REASONS[REASON_NAMES[code]]) for code in reason])
+    return {**found, "status": status.astype(np.int8), "reason": reason.astype(np.int8)}
+
+
+def _assessed(ladder: Ladder, factors: Floats, question: _Question) -> dict[str, np.ndarray]:
+    """Return what an `Assessment` holds, of ladders of three levels and more."""
+    found = _with_less_noise(ladder, _found(ladder, question, LEFT_OUT), question)
+    of_limit, missed = found.posterior, found.away
+    if ladder.exact_known:
+        # what the levels say of the limit without the exact solution
+        of_limit = posterior(_without_exact(ladder), question.promise)
+        risk = np.where(_rests_on_three(of_limit), RISK_OF_THREE, RISK)
+        missed = missed | ((of_limit.expansion > 1.0 - risk) & _is_missed(ladder, of_limit))
+    numbers = _numbers(ladder, found, of_limit, missed)
+    return numbers | _best(ladder, of_limit, found.exact, factors)
+
+
+def _decided(ladder: Ladder, factors: Floats, question: _Question) -> dict[str, np.ndarray]:
+    """Return what a `Decision` holds, of ladders of three levels and more, and whether it is sure."""
+    del factors
+    found = _found(ladder, question, ROUGHLY)
+    numbers = _numbers(ladder, found, found.posterior, found.away)
+    return numbers | {"sure": _is_sure(ladder, found, question)}
+
+
+def _some(ladder: Ladder, rows: Integers) -> Ladder:
+    return replace(
+        ladder, gram=ladder.gram[rows], floor=ladder.floor[rows], numbers=ladder.numbers[rows]
     )
-    return Assessment(status=status, reason=reason.astype(np.int8), **found)
+
+
+def _found(ladder: Ladder, question: _Question, left_out: float) -> _Found:
+    believed = posterior(ladder, question.promise, left_out=left_out)
+    sides = _sides(believed, question.expected, question.at_least, question.tolerance)
+    exact = _is_only_noise(ladder, question.noise_factor)
+    away = np.zeros_like(exact)
+    if ladder.exact_known:
+        away = exact & _is_away(ladder, question.noise_factor)
+    by_three, cut_short = _rests_on_three(believed), _is_cut_short(ladder, believed)
+    return _Found(believed, sides, exact, away, by_three, cut_short)
+
+
+def _is_sure(ladder: Ladder, found: _Found, question: _Question) -> Flags:
+    """Say where the same is decided whatever the hypotheses are like that were left out.
+
+    Then no probability is nearer than `ROUGHLY` to what it is compared with. And either the extrapolation by the order
+    of the finest levels is so near the exact solution that no other one misses it, or the levels show no order.
+    """
+    p, (lower, right, higher) = found.posterior, found.sides
+    rest, fails = 1.0 - p.noise - p.alternating, lower + higher > 0.5
+    definite = np.zeros_like(right)
+    definite[fails] = _most_near_a_power(p)[fails]
+    margins = [
+        right - (1.0 - RISK),
+        right - RISK,
+        lower + higher - (1.0 - RISK),
+        np.where(fails, lower - higher, 1.0),
+        definite - DEFINITE,
+        p.noise - np.maximum(rest, p.alternating),
+        p.alternating - rest,
+        *(np.min(np.abs(tail - OUTSIDE), axis=-1) * p.expansion for tail in _tails(p)),
+    ]
+    window = np.sort(p.window, axis=-1)
+    if window.shape[1] > 1:
+        margins.append(window[:, -1] - window[:, -2])
+    sure = (
+        np.asarray(np.all(np.abs(margins) > ROUGHLY, axis=0))
+        & ~(fails & found.by_three)
+        & ~found.cut_short
+    )
+    if ladder.exact_known:
+        open_still = np.flatnonzero(sure & ~_meets(ladder, p))
+        if len(open_still):
+            levels = _without_exact(_some(ladder, open_still))
+            of_limit = posterior(levels, question.promise, left_out=ROUGHLY)
+            sure[open_still] = of_limit.expansion < 1.0 - RISK - ROUGHLY
+    return sure
+
+
+def _meets(ladder: Ladder, p: Posterior) -> Flags:
+    """Say where the extrapolation by the order of the finest levels is almost the exact solution."""
+    order, ratio = p.orders[:, -1], ladder.h[-2] / ladder.h[-1]
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        step = 1.0 / (ratio**order - 1.0)
+        distance = _norm(np.stack([-step, np.ones_like(step)], axis=-1), ladder.gram[:, -2:, -2:])
+        near = distance <= NEAR * step * np.sqrt(ladder.gram[:, -2, -2])
+    ends = np.array(p.windows)[np.argmax(p.window, axis=-1), 1]
+    return np.asarray((order > 0.0) & near & (ends == len(ladder.h) - 1))
 
 
 def _nothing(count: int, levels: int) -> dict[str, np.ndarray]:
@@ -133,7 +308,8 @@ def _nothing(count: int, levels: int) -> dict[str, np.ndarray]:
     names = ("order", "low", "high", "error", "error_bound", "best_bound")
     unknown = {name: np.full(count, np.nan) for name in names}
     window = {"first": np.zeros(count, dtype=np.int64), "last": np.full(count, levels - 1)}
-    return {**unknown, **window, "weights": np.full((count, levels), np.nan)}
+    flags = {"sure": np.ones(count, dtype=bool)}
+    return {**unknown, **window, **flags, "weights": np.full((count, levels), np.nan)}
 
 
 def _scaled(ladder: Ladder, rows: Integers) -> tuple[Ladder, Floats, Floats]:
@@ -169,6 +345,52 @@ def _is_only_noise(ladder: Ladder, factor: float) -> Flags:
     return np.asarray(np.all(d <= allowed, axis=-1))
 
 
+def _least_noise(ladder: Ladder) -> Floats:
+    """Return the noise of every level if it grows no more than the finest differences show, shape (ladder, n).
+
+    At the coarsest level it is as predicted, since storing numbers makes noise even where differences are 0.
+    """
+    finest = np.sqrt(np.max(np.diagonal(ladder.gram, axis1=1, axis2=2)[:, -2:], axis=-1))
+    least = np.maximum(ladder.floor[:, :1], NOISE_FACTOR * finest[:, None])
+    return np.asarray(np.minimum(ladder.floor, least))
+
+
+def _is_cut_short(ladder: Ladder, believed: Posterior) -> Flags:
+    """Say where noise that may be far less than predicted ends the most probable window."""
+    every, last = np.arange(len(ladder.gram)), _window(believed)[1]
+    least = _least_noise(ladder)[every, last]
+    return np.asarray(NOISE_FACTOR * least < ladder.floor[every, last])
+
+
+def _with_less_noise(ladder: Ladder, found: _Found, question: _Question) -> _Found:
+    """Return what is found of ladders whose window is cut short by noise, with that noise and with less.
+
+    What is sure with one of the two counts, where it has at least the probability `RISK` with the other; else nothing.
+    """
+    rows = np.flatnonzero(found.cut_short & ~found.exact)
+    if not len(rows):
+        return found
+    first = found.some(rows, cut_short=False)
+    less = replace(_some(ladder, rows), floor=_least_noise(ladder)[rows])
+    other = _found(less, question, LEFT_OUT).some(np.arange(len(rows)), cut_short=False)
+    none = np.zeros(len(rows), dtype=bool)
+    code, code_of_other = (_reasons(one, none) for one in (first, other))
+    excluded = _probability(code, other) < RISK
+    added = ~np.isin(code, DECIDED) & np.isin(code_of_other, DECIDED)
+    added &= _probability(code_of_other, first) >= RISK
+    chosen = excluded | added
+    found.replace(rows[chosen], other, chosen)
+    found.cut_short[rows] = excluded & ~added
+    return found
+
+
+def _probability(codes: Integers, found: _Found) -> Floats:
+    """Return the probability of what is decided, 1 where nothing is."""
+    lower, right, higher = found.sides
+    right = np.where(codes == DECIDED[0], right, lower + higher)
+    return np.where(np.isin(codes, DECIDED), right, 1.0)
+
+
 def _is_away(ladder: Ladder, factor: float) -> Flags:
     """Say where the finest level is further from the exact solution than noise explains."""
     return np.asarray(np.sqrt(ladder.gram[:, -1, -1]) > factor * ladder.floor[:, -1])
@@ -201,17 +423,17 @@ def _variance(ladder: Ladder, of_limit: Posterior) -> Floats:
     return np.asarray(np.maximum(of_limit.path_squared - _square(path, differences), 0.0))
 
 
-def _reasons(
-    p: Posterior, sides: tuple[Floats, Floats, Floats], exact: Flags, missed: Flags
-) -> Integers:
+def _reasons(found: _Found, missed: Flags) -> Integers:
     """Return the reasons of the verdicts, as positions in `REASON_NAMES`; see the head of this module."""
-    lower, right, higher = sides
-    definite = np.max(_near_each_power(p), axis=-1) > DEFINITE
-    another = (lower + higher > 1.0 - RISK) & (right < RISK) & definite
+    p, (lower, right, higher) = found.posterior, found.sides
+    risk = np.where(found.by_three, RISK_OF_THREE, RISK)
+    another = (lower + higher > 1.0 - risk) & (right < risk) & ~found.cut_short
+    if np.any(another):
+        another &= _most_near_a_power(p) > DEFINITE
     cases = [
         (missed, "wrong_limit"),
-        (exact, "exact"),
-        (right > 1.0 - RISK, "asymptotic"),
+        (found.exact, "exact"),
+        ((right > 1.0 - RISK) & ~found.cut_short, "asymptotic"),
         (another & (lower > higher), "order_low"),
         (another, "order_high"),
         (p.noise > np.maximum(1.0 - p.noise - p.alternating, p.alternating), "round_off"),
@@ -221,36 +443,56 @@ def _reasons(
     return np.select([mask for mask, _ in cases], codes, REASON_NAMES.index("pre_asymptotic"))
 
 
-def _near_each_power(p: Posterior) -> Floats:
-    """Return the probability that each power, within the usual tolerance, dominates or is one of two of a size."""
-    near = np.abs(p.powers[:, None] - p.powers) <= ORDER_TOLERANCE + 1e-9
-    one_of_two = np.any(np.abs(p.pairs[:, :, None] - p.powers) <= ORDER_TOLERANCE + 1e-9, axis=1)
-    return np.asarray(_sums(p.alone, near) + _sums(p.of_pairs, one_of_two))
+def _rests_on_three(p: Posterior) -> Flags:
+    """Say where windows of three levels behind others that do not fit have most of the probability."""
+    three = [start > 0 and end - start == 2 for start, end in p.windows]
+    return np.asarray(np.sum(p.window[:, three], axis=-1) > 0.5)
 
 
-def _sums(values: Floats, chosen: Flags) -> Floats:
-    """Return sums of the values along the last axis that are chosen in each column, shape (ladder, column)."""
-    return np.stack([np.sum(values[:, part], axis=-1) for part in chosen.T], axis=-1)
+def _most_near_a_power(p: Posterior) -> Floats:
+    """Return the most probability that a power, within the usual tolerance, dominates or is one of two of a size."""
+    # two powers of one size are further from each other than the tolerance
+    present = p.lowest + p.highest - p.alone
+    near = _sums_near(present, p, ORDER_TOLERANCE + 1e-9)
+    return np.asarray(np.max(near, axis=-1))
+
+
+def _sums_near(values: Floats, p: Posterior, margin: float) -> Floats:
+    """Return sums of the values of all powers so near each power of the grid, shape (ladder, power)."""
+    sums = _sums_up(values)
+    start = np.searchsorted(p.powers, p.grid - margin)
+    return np.asarray(
+        sums[:, np.searchsorted(p.powers, p.grid + margin, side="right")] - sums[:, start]
+    )
+
+
+def _sums_up(values: Floats) -> Floats:
+    """Return the sums of the first 0, 1, ... values along the last axis; further zeros change no bit of them."""
+    sums = np.zeros((len(values), values.shape[1] + 1))
+    np.cumsum(values, axis=-1, out=sums[:, 1:])
+    return sums
 
 
 def _numbers(
-    ladder: Ladder,
-    believed: Posterior,
-    of_limit: Posterior,
-    exact: Flags,
-    missed: Flags,
-    factors: Floats,
+    ladder: Ladder, found: _Found, of_limit: Posterior, missed: Flags
 ) -> dict[str, np.ndarray]:
-    """Return what an `Assessment` holds beside status and reason, for ladders of three levels and more."""
-    n, orders = len(ladder.h), believed.orders
-    first, last = np.array(believed.windows)[np.argmax(believed.window, axis=-1)].T
-    order = np.where(exact, np.nan, _finest_order(orders, last))
-    # where the exact solution is missed, the levels alone have an order
-    ends = zip(_interval(of_limit, order), _interval(believed, order), strict=True)
-    low, high = (np.where(exact, np.nan, np.where(missed, a, b)) for a, b in ends)
-    window = {"first": np.where(exact, 0, first), "last": np.where(exact, n - 1, last)}
-    best = _best(ladder, of_limit, exact, factors)
-    return {"order": order, "low": low, "high": high, **window, **best}
+    """Return what a `Decision` holds beside the status, for ladders of three levels and more."""
+    n, believed, exact = len(ladder.h), found.posterior, found.exact
+    first, last = _window(believed)
+    order = np.where(exact, np.nan, _finest_order(believed.orders, last))
+    low, high = _interval(believed, order)
+    if np.any(missed):
+        # where the exact solution is missed, the levels alone have an order
+        ends = zip(_interval(of_limit, order), (low, high), strict=True)
+        low, high = (np.where(missed, a, b) for a, b in ends)
+    return {
+        "reason": _reasons(found, missed),
+        "order": order,
+        "low": np.where(exact, np.nan, low),
+        "high": np.where(exact, np.nan, high),
+        "first": np.where(exact, 0, first),
+        "last": np.where(exact, n - 1, last),
+    }
 
 
 def _without_exact(ladder: Ladder) -> Ladder:
@@ -270,10 +512,11 @@ def _sides(
         least, most = at_least - margin, np.inf
     else:
         # the neighbourhood that holds most
-        right = np.max(_sums(alone, np.abs(powers[:, None] - powers) <= margin), axis=-1)
+        right = np.max(_sums_near(alone, believed, margin), axis=-1)
         return np.zeros(len(alone)), right, np.zeros(len(alone))
-    low, high = powers < least, powers > most
-    lower, right, higher = (np.sum(alone[:, part], axis=-1) for part in (low, ~low & ~high, high))
+    sums = _sums_up(alone)
+    low, high = np.searchsorted(powers, least), np.searchsorted(powers, most, side="right")
+    lower, right, higher = sums[:, low], sums[:, high] - sums[:, low], sums[:, -1] - sums[:, high]
     # two powers of one size are no order, but tell of one that both are below, or above
     first, second = believed.pairs.T
     lower = lower + np.sum(mixed[:, second < least], axis=-1)
@@ -281,6 +524,12 @@ def _sides(
     if expected is None:
         right = right + np.sum(mixed[:, first >= least], axis=-1)
     return lower, right, higher
+
+
+def _window(believed: Posterior) -> tuple[Integers, Integers]:
+    """Return the coarsest and the finest level of the most probable window of each ladder."""
+    first, last = np.array(believed.windows)[np.argmax(believed.window, axis=-1)].T
+    return first, last
 
 
 def _finest_order(orders: Floats, last: Integers) -> Floats:
@@ -295,13 +544,18 @@ def _finest_order(orders: Floats, last: Integers) -> Floats:
 
 def _interval(believed: Posterior, order: Floats) -> tuple[Floats, Floats]:
     """Return the range of powers that holds `INTERVAL` of what is believed, and the measured order."""
-    outside = 0.5 * (1.0 - INTERVAL)
+    below, above = _tails(believed)
+    low = believed.powers[np.argmax(below > OUTSIDE, axis=-1)]
+    high = believed.powers[::-1][np.argmax(above > OUTSIDE, axis=-1)]
+    return np.fmin(low, order), np.fmax(high, order)
+
+
+def _tails(believed: Posterior) -> tuple[Floats, Floats]:
+    """Return the parts of the expansions up to each power, and from each power on, the highest first."""
     whole = np.maximum(believed.expansion, 1e-300)[:, None]
     below = np.cumsum(believed.lowest, axis=-1) / whole
     above = np.cumsum(believed.highest[:, ::-1], axis=-1) / whole
-    low = believed.powers[np.argmax(below > outside, axis=-1)]
-    high = believed.powers[::-1][np.argmax(above > outside, axis=-1)]
-    return np.fmin(low, order), np.fmax(high, order)
+    return below, above
 
 
 def _best(ladder: Ladder, of_limit: Posterior, exact: Flags, factors: Floats) -> dict[str, Floats]:

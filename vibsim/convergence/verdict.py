@@ -42,7 +42,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vibsim.convergence import thresholds as th
-from vibsim.convergence.assessment import assess
+from vibsim.convergence.assessment import decide
 from vibsim.convergence.circumstances import (
     Evidence,
     at_rest,
@@ -167,7 +167,7 @@ def _believed(e: Evidence, asked: Flags) -> Believed:
             exact_known=bool(exact_known),
         )
         # what is exact is told from the predicted round-off of the scheme
-        a = assess(
+        a = decide(
             ladder,
             expected=expected,
             tolerance=e.tolerance,

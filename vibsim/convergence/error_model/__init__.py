@@ -24,6 +24,9 @@ rows share, this is a power of one ratio (see `hypotheses.Table`). Three kinds o
 Rows before a window are coarse levels that the expansion does not reach: each has a size of its own, for the price
 `PRICE`. Rows behind it are noise that grows as the steps shrink; noise as large as its prediction costs least.
 
+Hypotheses whose evidence is known to be next to nothing are not weighed: whole tables by the size of the last row, and
+groups of hypotheses by one quadratic form: where a covariance C exceeds all theirs, ``tr(K^-1 G) >= tr(C^-1 G)``.
+
 `hypotheses` lays the matrices of all hypotheses out in tables, `kernel` is the loop over ladders and hypotheses,
 `likelihood` makes logarithms of evidence of it, `posterior` adds the windows up, and `priors` holds the numbers.
 """

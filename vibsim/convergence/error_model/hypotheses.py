@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
 from typing import NamedTuple
@@ -39,14 +39,24 @@ class Table:
     """
 
     # forms of the precision K^-1, of the square of the first power, of the second, and of the limit without the
-    # differences behind the window; shape (4, packed, hypothesis)
+    # differences behind the window; shape (hypothesis, 4, packed)
     forms: Floats
     # root for one point and for two; variances over the scale that the rows leave to the first power, the second, and
-    # the limit; the limit less the finest level, as weights of the rows; shape (5 + w, hypothesis)
+    # the limit; the limit less the finest level, as weights of the rows; shape (hypothesis, 5 + w)
     columns: Floats
     pair: Integers  # position of its pair of powers, shape (hypothesis,)
+    groups: (
+        Integers  # first hypothesis of every group, and the end of the last one, shape (group + 1,)
+    )
+    # The evidence of a group is at most ``(root/tr(M G))^(N w/2)``: its root for one point and for two, and the form of
+    # M; shape (2 + packed, group).
+    bounds: Floats
+    # log of the evidence of all hypotheses at most, for one point and for two, where the last row has the square 1
+    limit: Floats
     # of one shape: form of the precision of what the other rows are beside multiples of the last one, over `TAIL`
     beside: Floats | None = None
+    # the same for whole groups: what is less than the forms of all, of the squares of the rows, shape (group, w - 1)
+    beside_bounds: Floats | None = None
 
 
 class Promise(NamedTuple):
@@ -113,13 +123,19 @@ def outer(one: Floats, other: Floats) -> Floats:
 
 def packed(matrices: Floats) -> Floats:
     """Return the entries (i, j), i <= j, of symmetric matrices, shape (..., packed)."""
-    i, j = np.triu_indices(matrices.shape[-1])
+    i, j = _upper(matrices.shape[-1])
     return np.ascontiguousarray(matrices[..., i, j])
+
+
+@lru_cache
+def _upper(size: int) -> tuple[Integers, Integers]:
+    i, j = np.triu_indices(size)
+    return i, j
 
 
 def form(matrices: Floats) -> Floats:
     """Return what to multiply packed Gram matrices with, and sum up, for ``tr(M G)``."""
-    i, j = np.triu_indices(matrices.shape[-1])
+    i, j = _upper(matrices.shape[-1])
     return np.where(i == j, 1.0, 2.0) * packed(matrices)
 
 
@@ -178,7 +194,7 @@ def _table(
     variance: Floats,
     c: tuple[Floats, Floats],
     prior: tuple[Floats, Floats, Floats],
-    beside: tuple[Floats, Floats] | None = None,
+    beside: Floats | None = None,
 ) -> Table:
     """Lay hypotheses out.
 
@@ -192,6 +208,9 @@ def _table(
         Both powers in the rows, at size 1, each of shape (hypothesis, row).
     prior
         Variance of the first power, covariance, and variance of the second, each of shape (hypothesis,).
+    beside
+        Of one shape: covariance of what the other rows are beside multiples of the last one, shape (hypothesis, w - 1,
+        w - 1).
     """
     precision, log_det = inverse(signal + noise_of_rows(variance))
     finest = np.flatnonzero(variance[0])[-1]
@@ -210,21 +229,76 @@ def _table(
     path = -times(precision, to_limit)
     whole = prior[0] + 2.0 * prior[1] + prior[2] + own_noise
     left_whole = np.maximum(whole + np.sum(path * to_limit, axis=-1), 0.0)
-    forms = np.stack([form(x) for x in (precision, *(outer(g, g) for g in (*gains, path)))])
-    if beside is None:
-        roots = [np.exp((2.0 / n * terms.log_prior - log_det) / w) for n in (1, 2)]
-        of_beside = None
-    else:
-        # one dimension along the last row, all others across it
-        log_det_beside, precision_beside = beside
-        roots = [
-            np.exp((2.0 * terms.log_prior - log_det - (n - 1) * log_det_beside) / w) for n in (1, 2)
+    forms = np.stack([form(x) for x in (precision, *(outer(g, g) for g in (*gains, path)))], axis=1)
+    precision_beside, log_det_beside = (None, 0.0) if beside is None else inverse(beside)
+    # of one shape there is one dimension along the last row, all others are across it
+    dimensions = [(n, n if beside is None else 1) for n in (1, 2)]
+    roots = np.stack(
+        [
+            np.exp((2.0 / d * terms.log_prior - log_det - (n - d) * log_det_beside) / w)
+            for n, d in dimensions
         ]
-        of_beside = np.ascontiguousarray(form(precision_beside).T)
-    columns = np.stack([*roots, *left, left_whole, *path.T])
+    )
+    columns = np.stack([*roots, *left, left_whole, *path.T], axis=1)
     pair = np.searchsorted(terms.first_of_pairs, np.arange(len(terms.lower)), side="right") - 1
-    layout = np.ascontiguousarray(np.swapaxes(forms, 1, 2))
-    return Table(layout, np.ascontiguousarray(columns), pair, of_beside)
+    groups = _groups(pair, terms.share)
+    exponents = np.array([[0.5 * d * w] for _, d in dimensions])
+    bounds = _bounds(
+        groups, terms.share, variance, c, roots, exponents, 1.0 if beside is None else 2.0
+    )
+    # tr(K^-1 G) is at least the square of the last row over its variance
+    last = signal[:, -1, -1] + np.sum(variance[:, -2:], axis=-1)
+    limit = np.log(np.sum((roots * last) ** exponents, axis=1))
+    table = Table(np.ascontiguousarray(forms), columns, pair, groups, bounds, limit)
+    if beside is None or precision_beside is None:
+        return table
+    # a covariance is exceeded by its diagonal times its size
+    diagonal = np.diagonal(beside, axis1=1, axis2=2) * (w - 1)
+    return replace(
+        table,
+        beside=np.ascontiguousarray(form(precision_beside)),
+        beside_bounds=1.0 / np.maximum.reduceat(diagonal, groups[:-1], axis=0),
+    )
+
+
+def _groups(pair: Integers, share: Floats) -> Integers:
+    """Return where groups begin: hypotheses on one pair of powers, with up to `TOGETHER` successive shares."""
+    size = np.abs(share)
+    differs = np.concatenate([[True], (np.diff(size) != 0.0) | (np.diff(pair) != 0)])
+    of_share = np.cumsum(differs) - 1
+    first = np.concatenate([[True], np.diff(pair) != 0])
+    within = of_share - np.maximum.accumulate(np.where(first, of_share, 0))
+    return np.append(np.flatnonzero(differs & (within % TOGETHER == 0)), len(pair))
+
+
+def _bounds(
+    groups: Integers,
+    share: Floats,
+    variance: Floats,
+    c: tuple[Floats, Floats],
+    roots: Floats,
+    exponents: Floats,
+    factor: float,
+) -> Floats:
+    """Return `Table.bounds`.
+
+    Where a matrix C exceeds ``K/t`` for all hypotheses of a group, ``tr(K^-1 G) >= tr(C^-1 G)/t``. C has the largest
+    variances over t of the group, with ``t = 1 + share^2``; what is correlated is at most `factor` of what is not.
+    """
+    start, t = groups[:-1], 1.0 + share**2
+    parts = [np.maximum.reduceat(part / t, start) for part in (np.ones_like(t), share**2)]
+    signal = sum(
+        factor * part[:, None, None] * outer(row[start], row[start])
+        for part, row in zip(parts, c, strict=True)
+    )
+    noise = noise_of_rows(np.maximum.reduceat(variance / t[:, None], start, axis=0))
+    precision, _ = inverse(signal + noise)
+    root = np.add.reduceat((roots * t) ** exponents, start, axis=1) ** (1.0 / exponents)
+    return np.ascontiguousarray(np.concatenate([root, form(precision).T]))
+
+
+TOGETHER = 5
+"""So many shares of the second power have a bound together."""
 
 
 def _two_shapes(sizes: Floats, terms: Terms, *, alternating: bool = False) -> list[Table]:
@@ -257,8 +331,7 @@ def _one_shape(sizes: Floats, terms: Terms) -> list[Table]:
     mixed = outer(part, noise[:, -1, :-1])
     across = across - mixed - np.swapaxes(mixed, 1, 2)
     variance = priors.TAIL * (priors.MISFIT / c[:, -1, None, None]) ** 2
-    precision, log_det = inverse(variance * across)
-    beside = log_det, precision
+    beside = variance * across
     ones = np.ones_like(terms.share)
     prior = ones, terms.share, terms.share**2
     return [
@@ -273,6 +346,7 @@ class Hypotheses(NamedTuple):
     two_shapes: list[Table]
     one_shape: list[Table]
     alternating: list[Table]
+    any_power: Floats  # of a single power of any value, the same as `Table.limit`
 
 
 @lru_cache(maxsize=48)
@@ -283,4 +357,16 @@ def hypotheses_of(sizes: tuple[float, ...], promise: Promise | None) -> Hypothes
         _two_shapes(relative, two_powers((1.0,), promise)),
         _one_shape(relative, two_powers((1.0, -1.0), promise)),
         _two_shapes(relative, pure(priors.POWERS), alternating=True),
+        _limit_of_any_power(relative),
     )
+
+
+def _limit_of_any_power(sizes: Floats) -> Floats:
+    """Return `Hypotheses.any_power`, read off closely spaced powers."""
+    errors = sizes ** np.arange(priors.BIN, priors.HIGHEST + priors.AROUND[-1], priors.BIN)[:, None]
+    c = between(errors)
+    covariance = outer(c, c) + noise_of_rows((priors.MISFIT * errors) ** 2)
+    _, log_det = inverse(covariance)
+    largest = np.max(c.shape[-1] * np.log(covariance[:, -1, -1]) - log_det)
+    prior = priors.OTHER_PRIOR / priors.HIGHEST * np.sum(np.gradient(priors.AROUND))
+    return np.array([math.log(2.0 * prior) + 0.5 * n * largest for n in (1, 2)])

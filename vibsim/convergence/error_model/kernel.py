@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 NEGLIGIBLE = 1e-9
 """Weights that are a smaller part of the largest one are left out."""
-KINDS = "f2 f2 i1 i2 f2 f2 f3 f2 f2 i1 i f2 f2"
+KINDS = "f2 f2 i1 i2 f1 f2 f2 f3 f2 f2 f2 i1 i1 f2 i i1 f1 f1 f1 f2"
 
 
 @cache
@@ -38,36 +38,28 @@ def weigh() -> Kernel:
     return load("\n\n".join(parts) + "\n", KINDS)
 
 
-def largest(room: Floats) -> float:
-    """Return the largest of the first row, none of which is negative."""
-    # four at a time: each comparison waits for the one before
-    a = b = c = d = 0.0
-    count = room.shape[1]
-    for h in range(0, count - 3, 4):
-        a = max(a, room[0, h])
-        b = max(b, room[0, h + 1])
-        c = max(c, room[0, h + 2])
-        d = max(d, room[0, h + 3])
-    for h in range(count - 3, count):
-        a = max(a, room[0, h])
-    return max(a, b, c, d)
+def largest(values: Floats, count: int) -> float:
+    """Return the largest of the first ones, none of which is negative."""
+    found = 0.0
+    for i in range(count):
+        found = max(found, values[i])
+    return found
 
 
-def to_half_power(room: Floats, power: int) -> None:
-    """Multiply the first row with the second to the power of half a whole number; the second is lost."""
-    count = room.shape[1]
+def to_half_power(found: Floats, base: Floats, power: int, count: int) -> None:
+    """Multiply with the base to the power of half a whole number; the base is lost."""
     if power % 2 == 1:
-        for h in range(count):
-            room[0, h] *= math.sqrt(room[1, h])
+        for i in range(count):
+            found[i] *= math.sqrt(base[i])
     left = power // 2
     while left > 0:
         if left % 2 == 1:
-            for h in range(count):
-                room[0, h] *= room[1, h]
+            for i in range(count):
+                found[i] *= base[i]
         left = left // 2
         if left > 0:
-            for h in range(count):
-                room[1, h] *= room[1, h]
+            for i in range(count):
+                base[i] *= base[i]
 
 
 def kernel(
@@ -75,14 +67,21 @@ def kernel(
     read: Floats,
     points: Integers,
     powers: Integers,
+    least: Floats,
     across: Floats,
     behind: Floats,
     forms: Floats,
     beside: Floats,
+    beside_bounds: Floats,
     columns: Floats,
     pair: Integers,
+    groups: Integers,
+    bounds: Floats,
     pairs: int,
-    room: Floats,
+    chosen: Integers,
+    traces: Floats,
+    base: Floats,
+    weights: Floats,
     found: Floats,
 ) -> None:
     """Weigh the hypotheses on a window of w rows, and sum up over them what they say of the error.
@@ -99,64 +98,84 @@ def kernel(
         N of each ladder, 1 or 2.
     powers
         a and b of each ladder, shape (ladder, 2).
+    least
+        Of each ladder: what has a smaller root over trace does not matter.
     across
         Packed X, what the rows have across the last one, shape (ladder, packed X), or none: (ladder, 0).
     behind
         Of the limit: the product of each row with the sum of all finer differences, and the square of that sum, shape
         (ladder, w + 1), or none: (ladder, 0).
-    forms, beside, columns, pair
+    forms, beside, beside_bounds, columns, pair, groups, bounds
         See `vibsim.convergence.error_model.hypotheses.Table`.
     pairs
         The number of pairs of powers.
-    room
-        Room for two numbers for every hypothesis.
+    chosen, traces, base, weights
+        Room for a number for every hypothesis.
     found
         The result, shape (ladder, 3 + w + 3 pairs): the largest root over trace; the sum of weights over its power;
         and with these weights the square of the distance to the limit, the expression of the limit in the rows, and
         of every pair of powers the weight, and the part of it where the first power dominates, and the second.
     """
-    packed, count = forms.shape[1], forms.shape[2]
-    w = columns.shape[0] - 5
+    packed = forms.shape[2]
+    w = columns.shape[1] - 5
     for ladder in range(gram.shape[0]):
         n = points[ladder]
-        for h in range(count):
-            room[0, h] = read[ladder, 0] * forms[0, 0, h]
+        for g in range(bounds.shape[1]):
+            base[g] = read[ladder, 0] * bounds[2, g]
         for k in range(1, packed):
-            for h in range(count):
-                room[0, h] += read[ladder, k] * forms[0, k, h]
-        # rounding may leave less than nothing, here and below
-        for h in range(count):
-            room[0, h] = columns[n - 1, h] / max(room[0, h], 1e-280)
-        top = largest(room)
-        for h in range(count):
-            room[1, h] = room[0, h] / top
-            room[0, h] = 1.0
-        to_half_power(room, powers[ladder, 0])
+            for g in range(bounds.shape[1]):
+                base[g] += read[ladder, k] * bounds[2 + k, g]
+        count = 0
+        for g in range(bounds.shape[1]):
+            bound = bounds[n - 1, g]
+            if powers[ladder, 1] > 0 and bound > least[ladder] * base[g]:
+                sum_of_all = 1.0
+                place = 0
+                for i in range(beside_bounds.shape[1]):
+                    sum_of_all += max(across[ladder, place], 0.0) * beside_bounds[g, i]
+                    place += beside_bounds.shape[1] - i
+                for _ in range(powers[ladder, 1] // powers[ladder, 0]):
+                    bound = bound / sum_of_all
+            # rounding may leave less than nothing, here and below
+            if bound > least[ladder] * base[g]:
+                for h in range(groups[g], groups[g + 1]):
+                    trace = read[ladder, 0] * forms[h, 0, 0]
+                    for k in range(1, packed):
+                        trace += read[ladder, k] * forms[h, 0, k]
+                    ratio = columns[h, n - 1] / max(trace, 1e-280)
+                    if ratio > least[ladder]:
+                        chosen[count] = h
+                        traces[count] = trace
+                        weights[count] = ratio
+                        count += 1
+        top = largest(weights, count)
+        for i in range(count):
+            base[i] = weights[i] / top
+            weights[i] = 1.0
+        to_half_power(weights, base, powers[ladder, 0], count)
         if powers[ladder, 1] > 0:
-            for h in range(count):
-                room[1, h] = 1.0
-            for k in range(across.shape[1]):
-                for h in range(count):
-                    room[1, h] += across[ladder, k] * beside[k, h]
-            for h in range(count):
-                room[1, h] = 1.0 / max(room[1, h], 1.0)
-            to_half_power(room, powers[ladder, 1])
-        most = largest(room)
+            for i in range(count):
+                h = chosen[i]
+                sum_of_all = 1.0
+                for k in range(across.shape[1]):
+                    sum_of_all += across[ladder, k] * beside[h, k]
+                base[i] = 1.0 / max(sum_of_all, 1.0)
+            to_half_power(weights, base, powers[ladder, 1], count)
+        most = largest(weights, count)
         found[ladder, 0] = top
         for i in range(1, found.shape[1]):
             found[ladder, i] = 0.0
-        for h in range(count):
-            weight = room[0, h]
+        for chosen_one in range(count):
+            weight = weights[chosen_one]
             if weight > NEGLIGIBLE * most:
-                trace = read[ladder, 0] * forms[0, 0, h]
-                for k in range(1, packed):
-                    trace += read[ladder, k] * forms[0, k, h]
+                h = chosen[chosen_one]
+                trace = traces[chosen_one]
                 # what the rows leave open of a power, beside the square of what they say
-                one = trace / w * columns[2, h]
-                other = trace / w * columns[3, h]
+                one = trace / w * columns[h, 2]
+                other = trace / w * columns[h, 3]
                 for k in range(packed):
-                    one += gram[ladder, k] * forms[1, k, h]
-                    other += gram[ladder, k] * forms[2, k, h]
+                    one += gram[ladder, k] * forms[h, 1, k]
+                    other += gram[ladder, k] * forms[h, 2, k]
                 if one + other > LEAST * trace / w:
                     place = 3 + w + pair[h]
                     found[ladder, place] += weight
@@ -166,10 +185,10 @@ def kernel(
                         found[ladder, place + 2 * pairs] += weight
                     found[ladder, 1] += weight
                     if behind.shape[1] > 0:
-                        square = trace / w * columns[4, h] + behind[ladder, w]
+                        square = trace / w * columns[h, 4] + behind[ladder, w]
                         for k in range(packed):
-                            square += gram[ladder, k] * forms[3, k, h]
+                            square += gram[ladder, k] * forms[h, 3, k]
                         for i in range(w):
-                            square += 2.0 * columns[5 + i, h] * behind[ladder, i]
-                            found[ladder, 3 + i] += weight * columns[5 + i, h]
+                            square += 2.0 * columns[h, 5 + i] * behind[ladder, i]
+                            found[ladder, 3 + i] += weight * columns[h, 5 + i]
                         found[ladder, 2] += weight * square

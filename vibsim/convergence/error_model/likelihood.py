@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
+from itertools import combinations
 
 import numpy as np
 
@@ -17,14 +19,17 @@ from vibsim.core.array_types import Floats
 
 TINY = 1e-300
 """Less is nothing."""
-UNTHINKABLE = -1e6
-"""Log evidence of what cannot be."""
 
 
 def log_gamma(n: Floats) -> Floats:
     """Return the logarithm of Gamma(n/2) for positive whole n."""
-    values, place = np.unique(n, return_inverse=True)
-    return np.array([math.lgamma(0.5 * x) for x in values])[place].reshape(n.shape)
+    whole = n.astype(np.int64)
+    return _log_gammas(256 * (1 + int(np.max(whole, initial=0)) // 256))[whole]
+
+
+@lru_cache
+def _log_gammas(count: int) -> Floats:
+    return np.array([math.inf, *(math.lgamma(0.5 * n) for n in range(1, count))])
 
 
 def scale_free(trace: Floats, log_det: Floats | float, points: Floats, rows: int) -> Floats:
@@ -41,9 +46,32 @@ def log_sum(logs: Floats) -> Floats:
     return np.asarray(largest + np.log(np.sum(np.exp(logs - largest[..., None]), axis=-1)))
 
 
+def _whole(table: Table, last: Floats, points: Floats, w: int) -> Floats:
+    """Return the log evidence of w rows for which root over trace is that of the square of the last row, and 1."""
+    if table.beside is None:
+        return scale_free(last, 0.0, points, w)
+    # one dimension along the last row, which may have any direction, and the others across it, of a Student's t
+    free = (points - 1.0) * (w - 1)
+    rest = math.log(2.0) + 0.5 * np.log(last) + scale_free(last, 0.0, points, 1)
+    rest += log_gamma(free + priors.TAIL) - math.lgamma(0.5 * priors.TAIL)
+    rest -= 0.5 * free * np.log(np.pi * last / points)
+    return rest + scale_free(last, 0.0, np.ones_like(points), w)
+
+
+def _last(gram: Floats) -> Floats:
+    """Return the square of the last row."""
+    return np.maximum(gram[:, -1, -1], TINY)
+
+
+def highest(table: Table, gram: Floats, points: Floats) -> Floats:
+    """Return what the log evidence of all hypotheses of a table on w rows is at most, shape (ladder,)."""
+    limit = np.where(points > 1.0, table.limit[1], table.limit[0])
+    return np.asarray(_whole(table, _last(gram), points, gram.shape[-1]) + limit)
+
+
 def weights(
-    table: Table, gram: Floats, points: Floats, behind: Floats
-) -> tuple[Floats, dict[str, Floats]]:
+    table: Table, gram: Floats, points: Floats, behind: Floats, least: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Weigh the hypotheses of a table on the rows of a window.
 
     Parameters
@@ -54,44 +82,104 @@ def weights(
         N, shape (ladder,).
     behind
         See `vibsim.convergence.error_model.kernel.kernel`; over the square of the last row.
+    least
+        Log of what does not matter: hypotheses with less evidence are left out, shape (ladder,).
 
     Returns
     -------
     tuple
-        The log of their evidence, with priors, summed up, shape (ladder,), and the means of what `kernel` finds.
+        The log of their evidence, with priors, summed up, shape (ladder,), and the means of what `kernel` finds: of
+        pairs of powers, shape (ladder, 3, pair), of the limit in the rows, shape (ladder, w), and of its square.
     """
     count, w = len(gram), gram.shape[-1]
-    last = np.maximum(gram[:, -1, -1], TINY)
-    relative = gram / last[:, None, None]
-    read, dimensions, rest = relative, points, np.zeros(count)
-    beside, across = np.empty((0, len(table.pair))), np.empty((count, 0))
+    last = _last(gram)
+    relative, whole = gram / last[:, None, None], _whole(table, last, points, w)
+    read, dimensions = relative, points
+    beside, bounds, across = np.empty((1, 0)), np.empty((1, 0)), np.empty((count, 0))
     powers = np.stack([points * w, np.zeros(count)], axis=-1)
-    if table.beside is not None:
-        # one dimension along the last row, which may have any direction, and the others across it, of a Student's t
+    if table.beside is not None and table.beside_bounds is not None:
         along = outer(relative[:, -1], relative[:, -1])
-        beside, across = table.beside, packed((relative - along)[:, :-1, :-1])
+        beside, bounds = table.beside, table.beside_bounds
+        across = packed((relative - along)[:, :-1, :-1])
         # numbers have nothing across
         read, dimensions = np.where(points[:, None, None] > 1.0, along, relative), np.ones(count)
         free = (points - 1.0) * (w - 1)
         powers = np.stack([dimensions * w, (free + priors.TAIL) * (free > 0.0)], axis=-1)
-        rest = math.log(2.0) + 0.5 * np.log(last) + scale_free(last, 0.0, points, 1)
-        rest += log_gamma(free + priors.TAIL) - math.lgamma(0.5 * priors.TAIL)
-        rest -= 0.5 * free * np.log(np.pi * last / points)
         across = across * points[:, None]
-    pairs = int(table.pair[-1]) + 1
+    pairs, size = int(table.pair[-1]) + 1, len(table.pair)
     found = np.empty((count, 3 + w + 3 * pairs))
+    smallest = np.exp(np.clip((least - whole) / (0.5 * powers[:, 0]), -600.0, 600.0))
     weigh()(
-        packed(relative), packed(read), points.astype(np.int64), powers.astype(np.int64), across, behind,
-        table.forms, beside, table.columns, table.pair, pairs, np.empty((2, len(table.pair))), found,
+        packed(relative), packed(read), points.astype(np.int64), powers.astype(np.int64), smallest, across, behind,
+        table.forms, beside, bounds, table.columns, table.pair, table.groups, table.bounds, pairs,
+        np.empty(size, dtype=np.int64), *np.empty((3, size)), found,
     )  # fmt: skip
     # rows that are nowhere near any hypothesis have no weight at all
-    top, total = np.maximum(found[:, 0], TINY), np.maximum(found[:, 1], TINY)
-    log = rest + scale_free(last / top, 0.0, dimensions, w) + np.log(total)
+    none = found[:, 1] <= 0.0
+    top, total = np.where(none, 1.0, found[:, 0]), np.where(none, 1.0, found[:, 1])
+    log = np.where(none, -np.inf, whole + 0.5 * dimensions * w * np.log(top) + np.log(total))
     found[:, 2:] /= total[:, None]
-    path, pair = found[:, 3 : 3 + w], found[:, 3 + w :].reshape(count, 3, pairs)
-    names = ("pairs", "first_alone", "second_alone")
-    means = {"path": path, "path_squared": found[:, 2] * last}
-    return log, means | {name: pair[:, i] for i, name in enumerate(names)}
+    return log, found[:, 3 + w :].reshape(count, 3, pairs), found[:, 3 : 3 + w], found[:, 2] * last
+
+
+def single_power(
+    sizes: Floats, powers: Floats, gram: Floats, points: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Weigh hypotheses of one power on the rows of a window.
+
+    They are those of two shapes without a second power, in terms of the errors of the levels, whose covariance
+    ``a a^T + m^2 diag(a^2)`` has an inverse of few terms.
+
+    Parameters
+    ----------
+    sizes
+        Of the levels, over that of the finest one; 0 last, if the last row is the error of that.
+    powers
+        Those of each ladder, shape (ladder, power).
+    gram
+        Of the w rows, shape (ladder, w, w).
+
+    Returns
+    -------
+    tuple
+        Log evidence, shape (ladder, power); the limit, with the opposite sign, as weights of the rows, shape (ladder,
+        power, w), and its mean square, both without the differences behind the window, and only where the error of
+        the finest level is not known.
+    """
+    w, known, m = gram.shape[-1], sizes[-1] == 0.0, priors.MISFIT**2
+    every = range(w if known else w + 1)
+    levels = len(every)
+    squares = np.zeros((len(gram), levels, levels))
+    squares[:, :w, :w] = gram[:, ::-1, ::-1].cumsum(axis=1).cumsum(axis=2)[:, ::-1, ::-1]
+    # a and 1/a, a level each
+    a = [sizes[k] ** powers for k in every]
+    b = [1.0 / x for x in a]
+
+    def square(x: list[Floats]) -> Floats:
+        found = sum(squares[:, k, k, None] * x[k] ** 2 for k in every)
+        for j, k in combinations(every, 2):
+            found = found + 2.0 * squares[:, j, k, None] * (x[j] * x[k])
+        return np.asarray(found)
+
+    trace = (sum(squares[:, k, k, None] * b[k] ** 2 for k in every) - square(b) / (m + levels)) / m
+    product = np.prod(sizes[:levels])
+    log_det = levels * math.log(m) + math.log(1.0 + levels / m) + 2.0 * powers * math.log(product)
+    gains, spread = np.zeros((*powers.shape, w)), np.zeros_like(powers)
+    if not known:
+        # any limit will do: K^-1 1, and its sum
+        mean = sum(b) / (m + levels)
+        of_limit = [(x**2 - x * mean) / m for x in b]
+        whole = sum(of_limit)
+        trace = trace - square(of_limit) / whole
+        log_det = log_det + np.log(whole)
+        of_levels = [x / (m + levels) - y * mean / whole for x, y in zip(b, of_limit, strict=True)]
+        gains = np.cumsum(np.stack(of_levels[:w], axis=-1), axis=-1)
+        left = m / (m + levels) + mean**2 / whole
+        spread = square(of_levels) + trace / w * left
+    # rounding leaves no less than the last row alone
+    c, noise_of_last = (a[-1], a[-1] ** 2) if known else (a[-2] - a[-1], a[-2] ** 2 + a[-1] ** 2)
+    trace = np.maximum(trace, _last(gram)[:, None] / (c**2 + m * noise_of_last))
+    return scale_free(trace, log_det, points, w), gains, spread
 
 
 def any_size(gram: Floats, points: Floats) -> Floats:

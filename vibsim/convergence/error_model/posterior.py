@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -11,28 +12,30 @@ from vibsim.convergence.differences import order_of_differences, safe_ratio
 from vibsim.convergence.error_model import priors
 from vibsim.convergence.error_model.hypotheses import (
     Promise,
-    between,
-    form,
+    Table,
     hypotheses_of,
-    inverse,
     noise_of_rows,
-    outer,
-    packed,
-    times,
     two_powers,
 )
 from vibsim.convergence.error_model.likelihood import (
     TINY,
-    UNTHINKABLE,
     any_size,
+    highest,
     log_sum,
     noise,
     noise_of_finest,
     scale_free,
+    single_power,
     weights,
 )
-from vibsim.core.array_types import Flags, Floats
+from vibsim.core.array_types import Flags, Floats, Integers
 
+LEFT_OUT = 1e-11
+"""Part of all evidence that may be left out: bounds of errors change by less than a digit, probabilities not at all."""
+TABLES, MOST_HYPOTHESES = 8, 6000
+"""There are no more of them on a window."""
+LARGEST_LOG = 600.0
+"""Of evidence over that of no expansion at all: more says no more."""
 LIKELY = 1e-3
 """Probability of a window, over that of the most probable one, from which on its limit counts."""
 
@@ -60,6 +63,7 @@ class Posterior:
     """What is believed of ladders: probabilities, of shape (ladder,) where no other is given."""
 
     powers: Floats  # the powers that are looked at, increasing, shape (power,)
+    grid: Floats  # the same, and those that only other ladders have
     orders: Floats  # of every three successive levels, shape (ladder, n-2); see `local_orders`
     windows: list[tuple[int, int]]  # coarsest and finest level
     alone: Floats  # that this power dominates, shape (ladder, power)
@@ -82,6 +86,26 @@ class Posterior:
         """Return the probability of an expansion in one or two powers."""
         return np.asarray(np.sum(self.window, axis=-1))
 
+    def some(self, rows: Integers) -> Posterior:
+        """Return what is believed of some of the ladders."""
+        return replace(self, **{name: getattr(self, name)[rows] for name in self.of_ladders()})
+
+    def replace(self, ladders: Integers, other: Posterior, rows: Flags) -> None:
+        """Believe of some ladders what another posterior of them, among fewer others, says in some of its rows."""
+        place = np.searchsorted(self.powers, other.powers)
+        for name in self.of_ladders():
+            values = getattr(other, name)[rows]
+            if name in ("alone", "lowest", "highest"):
+                every = np.zeros((len(values), len(self.powers)))
+                every[:, place] = values
+                values = every
+            getattr(self, name)[ladders] = values
+
+    def of_ladders(self) -> list[str]:
+        """Name what has a row for each ladder."""
+        names = [one.name for one in fields(self)]
+        return [name for name in names if name not in ("powers", "grid", "windows", "pairs")]
+
 
 def local_orders(ladder: Ladder) -> Floats:
     """Return the order of every three successive levels, shape (ladder, n-2); NaN where there is none.
@@ -98,48 +122,36 @@ def local_orders(ladder: Ladder) -> Floats:
     return np.stack(found, axis=-1)
 
 
-class _Sums:
-    """Sums over hypotheses, scaled by the largest evidence so far."""
-
-    def __init__(self, ladders: int) -> None:
-        self.top = np.full(ladders, -np.inf)
-        self.values: dict[str, Floats] = {}
-
-    def add(self, log: Floats, **means: Floats) -> None:
-        """Add means, of shape (ladder, ...), with weights of these logs, shape (ladder,)."""
-        top = np.maximum(self.top, log)
-        if np.any(top > self.top):
-            factor = np.exp(self.top - top)
-            for name, value in self.values.items():
-                self.values[name] = _by_ladder(factor, value) * value
-            self.top = top
-        weight = np.exp(log - top)
-        for name, mean in means.items():
-            value = _by_ladder(weight, mean) * mean
-            self.values[name] = self.values[name] + value if name in self.values else value
-
-
-def _by_ladder(factor: Floats, values: Floats) -> Floats:
-    return factor.reshape(-1, *[1] * (values.ndim - 1))
+Rows = slice | Integers
+"""Some ladders, or all."""
 
 
 class _Fit:
     """The posterior in the making: hypotheses are added window by window."""
 
-    def __init__(self, ladder: Ladder, promise: Promise | None) -> None:
+    def __init__(self, ladder: Ladder, promise: Promise | None, left_out: float) -> None:
         self.ladder, self.points, self.promise = ladder, ladder.points, promise
         terms = two_powers((1.0,), promise)
         usual = np.concatenate([terms.lower, terms.higher])
-        self.powers = np.unique(
+        every = np.unique(
             np.concatenate([usual, np.arange(priors.BIN, priors.HIGHEST, priors.BIN)])
         )
         self.orders = local_orders(ladder)
-        n = len(ladder.h)
+        # of the powers between the usual ones, those that are nearest to some order
+        nearest = np.searchsorted(0.5 * (every[1:] + every[:-1]), self.orders)
+        # and the ends, which are the interval of an order that nothing is known of
+        ends = np.array([0, len(every) - 1])
+        used = np.unique(np.concatenate([np.searchsorted(every, usual), nearest.ravel(), ends]))
+        self.grid, self.powers, self.nearest = every, every[used], np.searchsorted(used, nearest)
+        count, n = len(ladder.gram), len(ladder.h)
         self.windows = [
             (last - rows, last)
             for last in range(n - 1, 1, -1)
             for rows in range(min(priors.LONGEST_WINDOW, last), 1, -1)
         ]
+        # half of what may be left out is that of whole tables, half that of single hypotheses
+        part = 0.5 * left_out / len(self.windows)
+        self.of_table, self.of_one = math.log(part / TABLES), math.log(part / MOST_HYPOTHESES)
         # rounding is part of every row; that of a level is relative to what differs from there on
         squares = np.diagonal(ladder.gram, axis1=1, axis2=2)[:, : n - 1]
         largest = np.maximum.accumulate(squares[:, ::-1], axis=-1)[:, ::-1]
@@ -148,7 +160,20 @@ class _Fit:
         self.rounding = priors.ROUNDING * (ladder.floor**2 + priors.EPSILON**2 * largest + TINY)
         self.differences = self.rows(0, n - 1)
         self.alone_rows = any_size(self.differences, self.points) - priors.PRICE
-        self.sums = _Sums(len(ladder.gram))
+        # sums over hypotheses of their evidence, over that of differences that all have a size of their own
+        self.unit = np.sum(self.alone_rows, axis=-1)
+        if ladder.exact_known:
+            self.unit = self.unit + self.error_of(0)
+        self.total, self.every = np.ones(count), np.arange(count)
+        pairs, windows = len(terms.first_of_pairs), len(self.windows)
+        shapes: dict[str, tuple[int, ...]] = {
+            **dict.fromkeys(("alternating", "noise"), ()),
+            "pairs": (3, pairs),
+            **dict.fromkeys(("window", "path_squared"), (windows,)),
+            "any_power": (len(self.powers),),
+            "path": (windows, n - 1),
+        }
+        self.values = {name: np.zeros((count, *shape)) for name, shape in shapes.items()}
 
     def add_window(self, index: int) -> None:
         """Add the hypotheses that the expansion holds between two levels."""
@@ -159,31 +184,68 @@ class _Fit:
             ladder.h[end:], self.differences[:, end:, end:], self.points, ladder.floor[:, end:]
         )
         smallest = self.differences[:, end - 1, end - 1]
-        if ladder.exact_known:
-            smallest = np.minimum(smallest, self.rows(end, end, with_exact=True)[:, 0, 0])
-        noisy = noise_of_finest(ladder.floor[:, end], smallest)
         sizes = ladder.h[start : end + 1] / ladder.h[end]
         inside, behind = self.rows(start, end), np.empty((len(rest), 0))
         if ladder.exact_known:
             inside = self.rows(start, end, with_exact=True)
+            smallest = np.minimum(smallest, inside[:, -1, -1])
             sizes = np.append(sizes, 0.0)
         else:
             behind = self.behind(start, end)
+        noisy = [rest + part for part in noise_of_finest(ladder.floor[:, end], smallest)]
         # with a few digits less windows of one ratio are the same
         of_window = hypotheses_of(tuple(np.round(sizes, 12)), self.promise)
-        self.add_any_power(index, sizes, inside, rest + noisy[0])
         tables = [(table, noisy[i]) for i, table in enumerate(of_window.two_shapes)]
         tables += [
             (table, noisy[0] + math.log(priors.ONE_SHAPE_PRIOR * chance))
             for table, chance in zip(of_window.one_shape, priors.JITTER_PRIORS, strict=True)
         ]
         for table, prior in tables:
-            log, means = weights(table, inside, self.points, behind)
-            self.add(index, log + rest + prior, **means)
+            self.add_table(index, table, prior, inside, behind)
+        self.add_any_power(index, sizes, inside, behind, noisy[0], of_window.any_power)
         for i, table in enumerate(of_window.alternating):
-            log, _ = weights(table, inside, self.points, behind[:, :0])
-            log += rest + noisy[i] + math.log(priors.ALTERNATING)
-            self.sums.add(log, alternating=np.ones(len(log)))
+            prior = noisy[i] + math.log(priors.ALTERNATING)
+            self.add_table(index, table, prior, inside, behind[:, :0], name="alternating")
+
+    def matters(self, most: Floats) -> tuple[Rows, Floats]:
+        """Return the ladders of which a table with evidence up to this may matter, and what hypothesis would not."""
+        whole = self.unit + np.log(self.total)
+        keep = most > whole + self.of_table
+        return slice(None) if np.all(keep) else np.flatnonzero(keep), whole + self.of_one
+
+    def add_table(
+        self,
+        index: int,
+        table: Table,
+        prior: Floats,
+        inside: Floats,
+        behind: Floats,
+        *,
+        name: str = "window",
+    ) -> None:
+        """Add the hypotheses of a table on the rows of a window."""
+        rows, least = self.matters(prior + highest(table, inside, self.points))
+        part = inside[rows]
+        if not len(part):
+            return
+        log, pairs, path, squared = weights(
+            table, part, self.points[rows], behind[rows], (least - prior)[rows]
+        )
+        if not np.any(np.isfinite(log)):
+            return
+        if name == "window":
+            weight = self.add(index, rows, log + prior[rows], path=path, path_squared=squared)
+            self.values["pairs"][rows] += weight[:, None, None] * pairs
+        else:
+            self.weight(rows, log + prior[rows], name)
+
+    def weight(self, rows: Rows, log: Floats, name: str) -> Floats:
+        """Add hypotheses of some ladders to a sum, and return their weights."""
+        found = np.exp(np.minimum(log - self.unit[rows], LARGEST_LOG))
+        self.total[rows] += found
+        if name != "window":
+            self.values[name][rows] += found
+        return np.asarray(found)
 
     def rows(self, start: int, end: int, *, with_exact: bool = False) -> Floats:
         """Return the Gram matrix of the differences between two levels, and of the true error of the second one."""
@@ -216,65 +278,68 @@ class _Fit:
         return scale_free(np.maximum(squared, TINY), 0.0, self.points, 1) - priors.PRICE
 
     def add(
-        self, index: int, log: Floats, *, path: Floats, path_squared: Floats, **means: Floats
-    ) -> None:
-        """Add hypotheses on the rows of a window to all sums."""
-        of_window = np.arange(len(self.windows)) == index
-        chosen = np.broadcast_to(of_window, (len(log), len(of_window)))
+        self,
+        index: int,
+        rows: Rows,
+        log: Floats,
+        *,
+        path: Floats,
+        path_squared: Floats,
+    ) -> Floats:
+        """Add hypotheses on the rows of a window of some ladders, and return their weights."""
+        weight = self.weight(rows, log, "window")
+        self.values["window"][rows, index] += weight
         if not self.ladder.exact_known:
             (start, end), n = self.windows[index], len(self.ladder.h)
-            whole = np.zeros((len(log), n - 1))
+            whole = np.zeros((len(path), n - 1))
             whole[:, start:end] = path
             whole[:, end:] = 1.0
             # the limit is known no better than the noise behind the window
             if end < n - 1:
-                path_squared = path_squared + self.differences[:, end, end]
-            means["path"] = whole[:, None] * of_window[:, None]
-            means["path_squared"] = path_squared[:, None] * of_window
-        self.sums.add(log, window=chosen.astype(np.float64), **means)
+                path_squared = path_squared + self.differences[rows, end, end]
+            self.values["path"][rows, index] += weight[:, None] * whole
+            self.values["path_squared"][rows, index] += weight * path_squared
+        return weight
 
-    def add_any_power(self, index: int, sizes: Floats, inside: Floats, rest: Floats) -> None:
+    def add_any_power(
+        self,
+        index: int,
+        sizes: Floats,
+        inside: Floats,
+        behind: Floats,
+        prior: Floats,
+        limit: Floats,
+    ) -> None:
         """Add the hypotheses of one power of any value, close to that of the finest differences of the window."""
         w = len(sizes) - 1
         order = self.orders[:, self.windows[index][1] - 2]
         usable = (order > 0.0) & (order < priors.HIGHEST)
-        order = np.where(usable, order, 1.0)
-        powers = np.maximum(order[:, None] + priors.AROUND, TINY)
-        errors = sizes ** powers[..., None]
-        c = between(errors)
-        precision, log_det = inverse(outer(c, c) + noise_of_rows((priors.MISFIT * errors) ** 2))
-        trace = np.maximum(np.sum(form(precision) * packed(inside)[:, None], axis=-1), TINY)
-        log = scale_free(trace, log_det, self.points[:, None], w) + rest[:, None]
-        log += np.log(priors.OTHER_PRIOR / priors.HIGHEST * np.gradient(priors.AROUND))
-        log = np.where(usable[:, None], log, UNTHINKABLE)
-        total = log_sum(log)
-        weight = np.exp(log - total[:, None])
-        gains = times(precision, c)
-        left = 1.0 - np.sum(gains * c, axis=-1)
-        behind = (
-            self.behind(*self.windows[index]) * inside[:, -1:, -1]
-            if not self.ladder.exact_known
-            else None
+        last = np.maximum(inside[:, -1, -1], TINY)
+        most = prior + scale_free(last, 0.0, self.points, w)
+        most += np.where(self.points > 1.0, *limit[::-1])
+        rows, _ = self.matters(np.where(usable, most, -np.inf))
+        order, points, inside = order[rows], self.points[rows, None], inside[rows]
+        if not len(inside):
+            return
+        log, gains, squares = single_power(
+            sizes, np.maximum(order[:, None] + priors.AROUND, TINY), inside, points
         )
-        path, squared = np.zeros((len(log), w)), np.zeros(len(log))
-        if behind is not None:
+        log += np.log(priors.OTHER_PRIOR / priors.HIGHEST * np.gradient(priors.AROUND))
+        total = log_sum(log)
+        path, squared = np.zeros((len(order), w)), np.zeros(len(order))
+        if not self.ladder.exact_known:
+            weight = np.exp(log - total[:, None])
+            rest = behind[rows] * inside[:, -1:, -1]
             path = -np.sum(weight[..., None] * gains, axis=1)
-            of_each = np.sum(form(outer(gains, gains)) * packed(inside)[:, None], axis=-1)
-            of_each += trace / w * left + behind[:, -1:]
-            of_each -= 2.0 * np.sum(gains * behind[:, None, :-1], axis=-1)
-            squared = np.sum(weight * of_each, axis=-1)
-        nearest = np.argmin(np.abs(order[:, None] - self.powers), axis=-1)
-        of_power = (np.arange(len(self.powers)) == nearest[:, None]).astype(np.float64)
-        self.add(index, total, path=path, path_squared=squared, any_power=of_power)
+            squares += rest[:, -1:] - 2.0 * np.sum(gains * rest[:, None, :-1], axis=-1)
+            squared = np.sum(weight * squares, axis=-1)
+        weight = self.add(index, rows, total + prior[rows], path=path, path_squared=squared)
+        nearest = self.nearest[rows, self.windows[index][1] - 2]
+        self.values["any_power"][self.every[rows], nearest] += weight
 
     def add_no_expansion(self) -> None:
-        """Add the hypotheses without an expansion: rows of any size, behind which all may be noise."""
+        """Add the hypotheses that all rows behind one are noise, and those before it have a size of their own."""
         ladder, n = self.ladder, len(self.ladder.h)
-        ones = np.ones(len(ladder.gram))
-        scattered = np.sum(self.alone_rows, axis=-1)
-        if ladder.exact_known:
-            scattered = scattered + self.error_of(0)
-        self.sums.add(scattered, scattered=ones)
         for k in range(n - 1):
             log = np.sum(self.alone_rows[:, :k], axis=-1)
             log += noise(
@@ -283,58 +348,70 @@ class _Fit:
                 self.points,
                 ladder.floor[:, k:],
             )
-            self.sums.add(log, noise=ones)
+            self.weight(slice(None), log, "noise")
 
     def posterior(self) -> Posterior:
         """Return what is believed, after all hypotheses were added."""
-        values = self.sums.values
-        names = ("alternating", "scattered", "noise")
-        expansion = np.maximum(np.sum(values["window"], axis=-1), TINY)
-        total = expansion + sum(values[name] for name in names)
-        pairs, first, second, any_power = (
-            values.pop(name) / total[:, None]
-            for name in ("pairs", "first_alone", "second_alone", "any_power")
-        )
+        values, total = self.values, self.total
+        any_power = values.pop("any_power") / total[:, None]
+        pairs, first, second = np.moveaxis(values.pop("pairs") / total[:, None, None], 1, 0)
         terms = two_powers((1.0,), self.promise)
         of_pairs = np.stack(
             [terms.lower[terms.first_of_pairs], terms.higher[terms.first_of_pairs]], axis=-1
         )
-        lower, higher = (p[:, None] == self.powers for p in of_pairs.T)
-        for name in (*names, "window"):
-            values[name] = values[name] / _by_ladder(total, values[name])
+        lower, higher = (self.of_powers(p) for p in of_pairs.T)
         if self.ladder.exact_known:
-            values["path"], values["path_squared"] = self.alone_rows * np.nan, total * np.nan
+            values["path"] = np.full_like(self.alone_rows, np.nan)
+            values["path_squared"] = np.full_like(total, np.nan)
         else:
             # what hardly can be has limits far away
-            likely = values["window"] > LIKELY * np.max(values["window"], axis=-1, keepdims=True)
-            expansion = np.maximum(np.sum(values["window"] * likely, axis=-1), TINY) * total
+            window = values["window"]
+            likely = window > LIKELY * np.max(window, axis=-1, keepdims=True)
+            expansion = np.maximum(np.sum(window * likely, axis=-1), TINY)
             values["path"] = np.sum(values["path"] * likely[..., None], axis=1) / expansion[:, None]
             values["path_squared"] = np.sum(values["path_squared"] * likely, axis=1) / expansion
+        for name in ("alternating", "noise"):
+            values[name] = values[name] / total
+        values["window"] = values["window"] / total[:, None]
+        both = pairs - first - second
+        alone = any_power + lower(first) + higher(second)
         return Posterior(
             powers=self.powers,
+            grid=self.grid,
             orders=self.orders,
             windows=self.windows,
-            alone=any_power + _of_powers(first, lower) + _of_powers(second, higher),
-            of_pairs=pairs - first - second,
+            alone=alone,
+            of_pairs=both,
             pairs=of_pairs,
-            lowest=any_power + _of_powers(pairs - second, lower) + _of_powers(second, higher),
-            highest=any_power + _of_powers(first, lower) + _of_powers(pairs - first, higher),
+            lowest=alone + lower(both),
+            highest=alone + higher(both),
+            scattered=1.0 / total,
             **values,
         )
 
+    def of_powers(self, powers: Floats) -> Callable[[Floats], Floats]:
+        """Return what sums what belongs to pairs up over those that have each power, shape (ladder, power)."""
+        order = np.argsort(powers, kind="stable")
+        found, start = np.unique(powers[order], return_index=True)
+        places = np.searchsorted(self.powers, found)
 
-def _of_powers(of_pairs: Floats, chosen: Flags) -> Floats:
-    """Return the sums over the pairs that have each power, shape (ladder, power)."""
-    found = np.zeros((len(of_pairs), chosen.shape[1]))
-    for pair, power in zip(*np.nonzero(chosen), strict=True):
-        found[:, power] += of_pairs[:, pair]
-    return found
+        def summed(of_pairs: Floats) -> Floats:
+            whole = np.zeros((len(of_pairs), len(self.powers)))
+            whole[:, places] = np.add.reduceat(of_pairs[:, order], start, axis=1)
+            return whole
+
+        return summed
 
 
-def posterior(ladder: Ladder, promise: Promise | None = None) -> Posterior:
-    """Return what is believed of ladders of three levels and more, all of whose numbers are finite."""
-    fit = _Fit(ladder, promise)
+def posterior(
+    ladder: Ladder, promise: Promise | None = None, *, left_out: float = LEFT_OUT
+) -> Posterior:
+    """Return what is believed of ladders of three levels and more, all of whose numbers are finite.
+
+    Hypotheses are left out that surely have no more than the part `left_out` of the evidence of all.
+    """
+    fit = _Fit(ladder, promise, left_out)
+    fit.add_no_expansion()
     for index in range(len(fit.windows)):
         fit.add_window(index)
-    fit.add_no_expansion()
     return fit.posterior()

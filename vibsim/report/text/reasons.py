@@ -19,8 +19,8 @@ REASONS = {
     "asymptotic": Reason(
         "The error shrinks from level to level with the expected order. The rescaled differences coincide, "
         "more closely so on finer levels.",
-        "At least three levels, curves that coincide, ratios that settle, and differences well above round-off. "
-        "The levels named meet all four.",
+        "At least three levels, differences above round-off, and no likely explanation of them by another order. "
+        "The levels named meet all three.",
     ),
     "exact": Reason(
         "The levels differ by round-off only. The scheme has no truncation error here.",
@@ -33,8 +33,7 @@ REASONS = {
     "order_low": Reason(
         "The error does shrink, but more slowly than the scheme promises. A first-order start, a one-sided formula at "
         "the end, or a mistake in the code does this.",
-        "The ratios have settled at the wrong number, and more levels will not change it. Look for a step of lower "
-        "order.",
+        "The levels exclude the expected order, and finer ones will not change that. Look for a step of lower order.",
     ),
     "order_high": Reason(
         "The error shrinks faster than promised. Either the leading error term vanishes for this problem, or the order "
@@ -59,7 +58,7 @@ REASONS = {
         "A smaller step, or a look at the member, level and time listed under Failures.",
     ),
     "pre_asymptotic": Reason(
-        "The step is still too coarse. The ratios have not settled, so an order read from them is accidental.",
+        "The step is still too coarse. More than one order may explain the levels, or none does.",
         "Finer levels, until the ratios settle and the rescaled curves coincide.",
     ),
     "round_off": Reason(
@@ -67,7 +66,7 @@ REASONS = {
         "Coarser levels, or an arithmetic with a lower floor (increment or compensated).",
     ),
     "oscillating": Reason(
-        "The ratios swing from level to level instead of settling.",
+        "The error changes its sign from level to level.",
         "More levels, another norm, or a comparison at times where the error does not change its sign.",
     ),
     "non_smooth": Reason(
@@ -118,12 +117,12 @@ _BY_KIND = {
 _OF_PROMISE = {
     "order_low": Reason(
         "The error shrinks with the order that the scheme promises here, which is lower than the expected one.",
-        "Nothing more. The ratios have settled where they should. Ask for the order of the scheme, or take a scheme of "
-        "higher order.",
+        "Nothing more. The levels show the order that they should. Ask for the order of the scheme, or take a scheme "
+        "of higher order.",
     ),
     "order_high": Reason(
         "The error shrinks faster than expected, as the scheme promises here.",
-        "Nothing more. The ratios have settled where they should. Ask for the order of the scheme.",
+        "Nothing more. The levels show the order that they should. Ask for the order of the scheme.",
     ),
 }
 """What an order means that is not the one of the check, but the one of the scheme."""
