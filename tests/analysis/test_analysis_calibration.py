@@ -30,15 +30,14 @@ OPEN_BESIDE = 0.034
 A second power of the same shape covers a lower order than the true one.
 """
 PREDICTED = "noise is predicted so large that the finest of 13 or 16 levels, where a lower power emerges, are not read"
-ACCIDENT = "the last three levels happen to have the ratio of one power"
 KNOWN = {
     "2.13.8": PREDICTED,
     "2.15.6": "three levels, of which the first has blown up",
-    "2.23.22": ACCIDENT,
+    "2.23.22": "seven levels with errors that swing",
     "1.1.8": "three levels, of which the first two have blown up",
     "1.16.3": "three levels with errors that swing",
     "1.16.9": "three levels, of which the first has blown up",
-    "1.31.47": ACCIDENT,
+    "1.31.47": "the last three levels happen to have the ratio of one power",
 }
 """The false verdicts: ladders by seed, group and place in it, and why they are judged wrongly."""
 NEEDLESS = 0.06
