@@ -436,10 +436,16 @@ def test_where_orders_go_is_told(orders: tuple[float, ...], due: float, says: st
 def test_an_order_above_the_promised_one_is_said_to_fall_towards_it() -> None:
     """The error of Forward Euler on a pendulum is that of its growth, which a coarse step does not show."""
     check = {"converges": "theta", "order": "scheme"}
-    run = {**RUN, "time": {"end": 20.0}, "schemes": ["forward_euler"], "levels": [6, 7, 8]}
-    verdict = judged({**run, "checks": [check]})
+    run = {**RUN, "schemes": ["forward_euler"], "levels": [6, 7, 8], "checks": [check]}
+    verdict = judged({**run, "time": {"end": 10.0}})
     assert verdict.reason == "pre_asymptotic"
+    assert "The last estimate is order 1.487 on levels 6 to 8, which is above" in verdict.text
     assert "which is above order 1, because a higher power of dt still dominates" in verdict.text
+    # twice as late the differences turn round from level to level, which no power does
+    verdict = judged({**run, "time": {"end": 20.0}})
+    assert verdict.reason == "pre_asymptotic"
+    assert verdict.results[0].order is None
+    assert "last estimate" not in verdict.text
 
 
 def test_a_corner_is_not_blamed_for_an_order_that_the_scheme_does_not_have() -> None:

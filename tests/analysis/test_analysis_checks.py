@@ -362,7 +362,7 @@ def test_unstable_names_level_and_step() -> None:
 def test_a_failure_weighs_more_than_what_is_undecided() -> None:
     def some(t: Any, h: float, scheme: int, case: int) -> tuple[Any, Any]:
         theta, omega = standard_error(t, h, scheme, case)
-        return first_order(t, h, scheme, case) if case == 1 else (theta * (1 + 40 * h), omega)
+        return first_order(t, h, scheme, case) if case == 1 else (theta * (1 + 400 * h), omega)
 
     sweep = {"initial.theta": [0.1, 0.2, 0.3]}
     (found,) = run({"converges": "theta"}, error=some, sweep=sweep, levels=[6, 7, 8, 9])

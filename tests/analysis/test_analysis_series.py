@@ -136,14 +136,37 @@ def test_coincidence_and_proportionality() -> None:
     assert np.isnan(differences.proportionality(d, 0 * d))[0]
 
 
-def test_scatter_measures_the_angle_in_its_own_norm() -> None:
+def test_cosines_measure_the_angle_in_their_own_norm() -> None:
     a, b = np.array([[1.0, 0.0, 0.0]]), np.array([[1.0, 0.1, 0.0]])
-    angle = np.arctan(0.1)
-    assert differences.scatters([a, b], "l2")[0] == pytest.approx([2 * np.sin(angle / 2)])
-    assert differences.scatters([a, 5 * a], "l2")[0] == pytest.approx([0.0])
-    assert differences.scatters([a, -b], "l2")[0] == pytest.approx([-2 * np.sin(angle / 2)])
-    # only the end differs: linf_interior does not see it
+    found = differences.cosines([a, b, 5 * a, -b], "l2")[0]
+    turned = np.cos(np.arctan(0.1))
+    np.testing.assert_allclose(
+        found,
+        [
+            [1.0, turned, 1.0, -turned],
+            [turned, 1.0, turned, -1.0],
+            [1.0, turned, 1.0, -turned],
+            [-turned, -1.0, -turned, 1.0],
+        ],
+        rtol=1e-15,
+    )
+    # only the end differs: linf_interior does not see it, and what is largest sees it by the power of its size
     c = np.array([[1.0, 0.0, 0.5]])
-    assert differences.scatters([a, c], "linf_interior")[0] == pytest.approx([0.0])
-    assert differences.scatters([a, c], "linf")[0] == pytest.approx([0.5])
-    assert np.isnan(differences.scatters([a, 0 * a], "l2")[0])[0]
+    of_end = 0.5 ** (1 + differences.PEAKS)
+    for kind, cosine in (("linf_interior", 1.0), ("linf", 1.0 / np.hypot(1.0, of_end))):
+        assert differences.cosines([a, c], kind)[0, 0, 1] == pytest.approx(cosine, abs=1e-15)
+    assert np.all(differences.cosines([a, c], "linf_interior", end_included=False)[0, 0, 1] < 1.0)
+    np.testing.assert_array_equal(
+        differences.cosines([a, 0 * a], "l2")[0], [[1.0, 0.0], [0.0, 0.0]]
+    )
+
+
+@pytest.mark.parametrize("kind", NORMS)
+def test_no_cosine_depends_on_sizes_or_on_other_members(kind: str) -> None:
+    rows = [np.stack([E2, E4]), np.stack([E4, E2 + 0.1 * E4])]
+    found = differences.cosines(rows, kind)
+    for factor in (1e200, 1e-200):
+        scaled = differences.cosines([rows[0], factor * rows[1]], kind)
+        np.testing.assert_allclose(scaled, found, rtol=1e-14)
+    alone = differences.cosines([row[:1] for row in rows], kind)
+    np.testing.assert_array_equal(alone, found[:1])

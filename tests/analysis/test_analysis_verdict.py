@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ladders import T, Truth, evidence_of, evidence_with, random_truth, shape_in_time
+from ladders import T, Truth, evidence_of, random_truth, shape_in_time
 
-from vibsim.convergence import circumstances
+from vibsim.convergence import circumstances, verdict
 from vibsim.convergence.batches import LADDERS, batches
-from vibsim.convergence.verdict import Judgement, judge, judge_together
+from vibsim.convergence.verdict import judge, judge_together
 from vibsim.core.vocabulary import NORMS, REASON_NAMES, STATUSES
 
 EXACT = np.cos(T)
@@ -68,7 +68,7 @@ def test_three_levels_need_proportional_series() -> None:
 
 
 def test_unsettled_orders_are_pre_asymptotic() -> None:
-    fields = ladder(FOUR, (SMALL, 2, A), (3 * SMALL, 4, B))
+    fields = ladder(FOUR, (SMALL, 2, A), (20 * SMALL, 4, B))
     assert decide(fields, FOUR) == ("INCONCLUSIVE", "pre_asymptotic")
 
 
@@ -82,12 +82,15 @@ def test_an_emerging_lower_order_is_not_passed() -> None:
 
 
 @pytest.mark.parametrize("shape", [A, B])
-def test_an_emerging_lower_order_is_in_the_interval_of_a_pass(shape: np.ndarray) -> None:
-    fine = 2.0 ** -(FIVE[-1] - FIVE[0])
-    fields = ladder(FIVE, (SMALL, 2, A), (SMALL * fine / 14, 1, shape))
-    found = judge(evidence_of(fields, FIVE))
-    assert REASON_NAMES[int(found.reason[0])] == "asymptotic"
-    assert found.low[0] < 1 < 2 <= found.high[0]
+def test_a_lower_order_of_less_than_a_tenth_passes_until_levels_show_it(shape: np.ndarray) -> None:
+    """At the finest level the first-order term has this share of the second-order one."""
+    reasons = []
+    for count, share in ((5, 1 / 14), (6, 1 / 7), (7, 2 / 7), (9, 8 / 7)):
+        levels = FIVE[:1] + tuple(range(7, 6 + count))
+        fine = 2.0 ** -(levels[-1] - levels[0])
+        fields = ladder(levels, (SMALL, 2, A), (SMALL * fine * share, 1, shape))
+        reasons.append(decide(fields, levels)[1])
+    assert reasons == ["asymptotic", *["pre_asymptotic"] * 3]
 
 
 @pytest.mark.parametrize("levels", [THREE, FOUR, FIVE])
@@ -97,12 +100,14 @@ def test_alternating_differences_oscillate(levels: tuple[int, ...]) -> None:
     assert decide(fields, levels) == ("INCONCLUSIVE", "oscillating")
 
 
-def test_swinging_orders_oscillate() -> None:
+@pytest.mark.parametrize("order", [1.0, 1.5, 2.0])
+def test_orders_that_swing_are_no_order(order: float) -> None:
+    """Local orders 2, 1, 2, 1, 2: neither the last one nor their mean is believed."""
     levels = tuple(range(4, 11))
     sizes = np.cumprod([1.0, 4, 2, 4, 2, 4, 2])
     d = [SMALL / size * A for size in sizes]
     fields = [EXACT - sum(d[i:], np.zeros_like(A)) for i in range(len(levels))]
-    assert decide(fields, levels) == ("INCONCLUSIVE", "oscillating")
+    assert decide(fields, levels, order=order)[0] == "INCONCLUSIVE"
 
 
 def noise_like(size: float, seed: int) -> np.ndarray:
@@ -120,8 +125,7 @@ def test_a_floor_in_the_ladder_leaves_the_window_before_it(growth: float) -> Non
     assert REASON_NAMES[int(found.reason[0])] == "asymptotic"
     assert found.last[0] < levels[-1]
     assert np.any(np.abs(found.orders[0] - 2) > 0.5)
-    # where nothing predicts it, the data show the floor as well: the differences become unrelated twice as steeply as
-    # another power makes them; the window is the same, or a level shorter
+    # where nothing predicts it, the data show the floor as well: the window is the same, or a level shorter
     unknown = judge(evidence_of(fields, levels, floor=1e-15, exact=EXACT))
     assert REASON_NAMES[int(unknown.reason[0])] == "asymptotic"
     assert 0 <= found.last[0] - unknown.last[0] <= 1
@@ -220,9 +224,9 @@ def test_a_number_that_is_not_finite_never_passes(bad: float, where: int) -> Non
     assert found.first[0] == found.last[0] == -1
 
 
-@pytest.mark.parametrize("place", ["difference", "scatter", "floor", "order"])
+@pytest.mark.parametrize("place", ["difference", "cosines", "floor", "order"])
 def test_no_nan_among_the_evidence_passes(place: str) -> None:
-    evidence = evidence_of(ladder(FOUR, (SMALL, 2, A)), FOUR)
+    evidence = evidence_of(ladder(FOUR, (SMALL, 2, A)), FOUR, exact=EXACT)
     values = np.array(getattr(evidence, place), dtype=float)
     values[..., -1] = np.nan
     fields = {**vars(evidence), place: values}
@@ -256,7 +260,7 @@ def test_many_ladders_at_once_are_judged_as_one_by_one() -> None:
 @pytest.mark.parametrize("norm", ["l2", "linf"])
 def test_random_ladders_have_no_false_pass(norm: str) -> None:
     rng = np.random.default_rng(2026)
-    false_pass, false_fail, right, passed, widths = [], [], 0, 0, []
+    false_pass, hidden, false_fail, right, passed, widths = [], [], [], 0, 0, []
     of_levels: dict[tuple[int, ...], list[tuple[Truth, float, circumstances.Evidence]]] = {}
     for _ in range(700):
         truth = random_truth(rng)
@@ -280,8 +284,10 @@ def test_random_ladders_have_no_false_pass(norm: str) -> None:
             # with three clean levels, a mixture of two powers may look like the second one alone
             visible = min(truth.clean, len(truth.levels)) > 3
             in_it = found.low[i] <= min(p, q) and max(p, q) <= found.high[i]
-            if status == "PASS" and (truth.order != formal if not mixed else visible and not in_it):
+            if status == "PASS" and not mixed and truth.order != formal:
                 false_pass.append((truth.levels, formal, truth.orders, reason))
+            if status == "PASS" and mixed and visible and not in_it:
+                hidden.append((truth.levels, formal, truth.orders, reason))
             if truth.order == formal and truth.clean > 2:
                 right += 1
                 passed += status == "PASS"
@@ -289,6 +295,8 @@ def test_random_ladders_have_no_false_pass(norm: str) -> None:
                 if status == "FAIL":
                     false_fail.append((truth.levels, formal, reason, found.orders[i]))
     assert false_pass == []
+    # a second power of more than a tenth may go unseen in one ladder of some hundreds
+    assert len(hidden) <= 1, hidden
     assert len(false_fail) < 0.02 * right, false_fail
     assert passed > 0.6 * right
     assert np.nanmedian(widths) < 0.1
@@ -314,108 +322,169 @@ def test_broken_analyses_are_noticed(fault: str) -> None:
     assert decide(fields, FIVE, exact=EXACT)[0] != "PASS"
 
 
-def from_orders(
-    orders: list[float], scatter: list[float], *, floor: float = 1e-15, **more: Any
-) -> tuple[str, str]:
-    """Decide on a ladder of neighbouring levels from its local orders and its scatter alone."""
-    found = judged_orders(orders, scatter, floor=floor, **more)
-    return STATUSES[int(found.status[0])], REASON_NAMES[int(found.reason[0])]
-
-
-def judged_orders(
-    orders: list[float], scatter: list[float], *, floor: float = 1e-15, **more: Any
-) -> Judgement:
-    difference = SMALL / np.cumprod([1.0, *(2.0**p for p in orders)])
-    levels = tuple(range(6, 8 + len(orders)))
-    usual = {"order": np.array([2.0]), "size": np.ones(1)}
-    evidence = evidence_with(
-        levels=levels,
-        difference=difference[None],
-        scatter=np.array([scatter]),
-        floor=np.full((1, len(levels)), floor),
-        omega_dt=0.3 * 0.5 ** np.arange(len(levels))[None],
-        relative_floor=np.array([floor]),
-        **(usual | more),
-    )
-    return judge(evidence)
-
-
+FIRST, SECOND, FOURTH = (ladder(FOUR, (SMALL, p, A)) for p in (1, 2, 4))
+UNSETTLED = ladder(FOUR, (SMALL, 2, A), (20 * SMALL, 4, B))
+ALTERNATING = [EXACT - SMALL * (-1) ** i * 4.0**-i * A for i in range(4)]
+SAME = [EXACT] * 4
+LOUD = [EXACT + noise_like(1e-9, i) for i in range(4)]
+ONE_AWAY = [EXACT + SMALL * A, *LOUD[1:]]
+YES, NO = np.array([True]), np.array([False])
 UNDECIDED = ("INCONCLUSIVE", "pre_asymptotic")
+ROUGH = ("INCONCLUSIVE", "non_smooth")
+AT_REST = ("INCONCLUSIVE", "not_applicable")
+ROUND_OFF = ("INCONCLUSIVE", "round_off")
+RIGHT, LOW, HIGH = ("PASS", "asymptotic"), ("FAIL", "order_low"), ("FAIL", "order_high")
+SAME_LIMIT, WRONG_LIMIT = ("PASS", "exact"), ("FAIL", "wrong_limit")
 
 
-@pytest.mark.parametrize(
-    ("orders", "scatter", "expected"),
-    [
-        ([2.02], [0.03], ("PASS", "asymptotic")),
-        ([2.02], [0.06], UNDECIDED),
-        ([1.05], [0.09], ("FAIL", "order_low")),
-        ([1.05], [0.12], UNDECIDED),
-        ([1.3], [0.02], UNDECIDED),
-        ([1.05], [0.3], UNDECIDED),
-        # beside a third order, a second one of a tenth of it or more makes a scatter of 0.02
-        ([3.01], [0.01], ("FAIL", "order_high")),
-        ([3.01], [0.03], UNDECIDED),
-        ([3.01], [0.12], UNDECIDED),
-        ([2.02, 2.01], [0.04, 0.01], ("PASS", "asymptotic")),
-        # near the order, but still changing
-        ([2.2, 2.05], [0.1, 0.03], UNDECIDED),
-        # the change does not fade, but two ratios are right
-        ([2.06, 2.0], [0.03, 0.03], ("PASS", "asymptotic")),
-        ([2.06, 2.0], [0.06, 0.06], UNDECIDED),
-        ([2.12, 2.0], [0.03, 0.03], UNDECIDED),
-        # a lower order emerges
-        ([1.99, 1.97], [0.02, 0.04], UNDECIDED),
-        ([3.0, 3.0], [0.02, 0.04], UNDECIDED),
-        ([3.0, 3.0], [0.04, 0.02], ("FAIL", "order_high")),
-        ([4.4, 3.1], [0.3, 0.15], UNDECIDED),
-        # on the way to 2
-        ([0.7, 1.2], [0.4, 0.2], UNDECIDED),
-        ([0.8, 0.9], [0.1, 0.05], ("FAIL", "order_low")),
-        # series that have nothing to do with each other
-        ([1.6, 1.2], [0.9, 0.3], UNDECIDED),
-        ([1.2, 1.05, 1.01], [0.3, 0.1, 0.05], ("FAIL", "order_low")),
-        ([0.5, 0.5, 0.5], [0.01, 0.005, 0.002], ("FAIL", "order_low")),
-        ([0.7, 0.7, 0.7], [1e-9, 1e-9, 1e-9], ("FAIL", "order_low")),
-        ([1.73, 1.72, 1.74], [0.05, 0.03, 0.02], UNDECIDED),
-        ([2.0, 2.0, 2.0], [0.9, 0.9, 0.9], UNDECIDED),
-    ],
-)
-def test_the_borders_of_the_rules(
-    orders: list[float], scatter: list[float], expected: tuple[str, str]
-) -> None:
-    assert from_orders(orders, scatter) == expected
+def one(number: float) -> np.ndarray:
+    return np.array([number])
 
 
-def test_orders_that_hardly_swing_have_a_narrow_interval_where_the_scatter_fades() -> None:
-    """A lower power would make the scatter grow: the interval does not reach down to one."""
-    orders = [2.00021, 1.99925, 1.99977]
-    fading, steady = (
-        judged_orders(orders, scatter)
-        for scatter in ([0.093, 0.0232, 0.0058], [0.0058, 0.0058, 0.0058])
-    )
-    assert fading.low[0] > 1.99
-    assert steady.low[0] < 0.5
+# ladder, facts, the verdict with them, and the verdict without each of them that is named
+TABLE: dict[str, tuple[list[np.ndarray], dict[str, Any], Any, dict[str, Any]]] = {
+    "the quantity does not exist": (
+        SECOND, {"applicable": NO, "failed": np.array([[True] * 4])}, AT_REST, {"applicable": ("FAIL", "non_finite")},
+    ),
+    "beyond the stability limit, and broken down": (
+        SECOND, {"stability_limit": one(0.2), "failed": np.array([[True, False, False, False]])}, ("FAIL", "unstable"),
+        {"stability_limit": ("FAIL", "non_finite")},
+    ),
+    "growth": (SECOND, {"growth": np.full((1, 4), 50.0)}, ("FAIL", "unstable"), {"growth": RIGHT}),
+    "a level broke down": (
+        SECOND, {"failed": np.array([[False, True, False, False]])}, ("FAIL", "non_finite"), {"failed": RIGHT},
+    ),
+    "a jump that no level sees": (
+        SECOND, {"missed": YES, "jumps": YES}, ROUGH, {"missed": RIGHT, "jumps": UNDECIDED},
+    ),
+    "a pulse that no level sees": (SECOND, {"missed": YES}, UNDECIDED, {"missed": RIGHT}),
+    "a pulse that does not matter to the exact solution": (
+        SECOND, {"missed": YES, "jumps": YES, "exact": EXACT}, RIGHT, {"exact": ROUGH},
+    ),
+    "a pulse that matters to the exact solution": (
+        SECOND, {"missed": YES, "exact": EXACT + SMALL * C}, UNDECIDED, {"missed": WRONG_LIMIT},
+    ),
+    "nothing moves, but the exact solution": (
+        SAME, {"moved": one(0.0), "exact": EXACT + SMALL}, UNDECIDED, {"moved": WRONG_LIMIT, "exact": AT_REST},
+    ),
+    "nothing moves": (SAME, {"moved": one(0.0)}, AT_REST, {"moved": SAME_LIMIT}),
+    "nothing moves, and this is promised": (
+        SAME, {"moved": one(0.0), "order": np.inf}, AT_REST, {"moved": SAME_LIMIT},
+    ),
+    "a velocity is gone within a step": (FIRST, {"decay": one(2.0)}, UNDECIDED, {"decay": LOW}),
+    "a velocity is gone, and nothing else is left": (SAME, {"decay": one(2.0)}, UNDECIDED, {"decay": SAME_LIMIT}),
+    "a velocity is gone, and the limit is another one": (
+        SECOND, {"decay": one(2.0), "exact": EXACT + SMALL * C}, UNDECIDED, {"decay": WRONG_LIMIT, "exact": RIGHT},
+    ),
+    "a velocity is gone, with a higher order": (FOURTH, {"decay": one(2.0)}, UNDECIDED, {"decay": HIGH}),
+    "a velocity is gone, with the expected order": (SECOND, {"decay": one(2.0)}, RIGHT, {}),
+    "events at the same points of all levels": (
+        SAME, {"left_to_the_mesh": one(1.0), "exact": EXACT + 1e-6}, ROUGH,
+        {"left_to_the_mesh": WRONG_LIMIT, "exact": SAME_LIMIT},
+    ),
+    "all the same, and not the exact solution": (SAME, {"exact": EXACT + 1e-6}, WRONG_LIMIT, {"exact": SAME_LIMIT}),
+    "all the same": (SAME, {}, SAME_LIMIT, {}),
+    "exactness is promised, and kept": (SAME, {"order": np.inf}, SAME_LIMIT, {}),
+    "exactness is promised, and not kept": (SECOND, {"order": np.inf}, LOW, {"order": RIGHT}),
+    "exactness is promised, and noise may be larger than it": (
+        LOUD, {"order": np.inf, "floor": 1e-9}, ROUND_OFF, {"floor": LOW},
+    ),
+    "nothing moves but for one level and noise, and the exact solution does": (
+        ONE_AWAY, {"floor": 1e-9, "moved": one(0.0), "exact": EXACT + SMALL}, UNDECIDED,
+        {"moved": ROUND_OFF, "exact": ROUND_OFF},
+    ),
+    "noise as it is predicted": (LOUD, {"floor": 1e-9}, ROUND_OFF, {"floor": UNDECIDED}),
+    "noise within a corner": (LOUD, {"floor": 1e-9, "corner": one(2.0)}, ROUND_OFF, {}),
+    "alternating errors": (ALTERNATING, {}, ("INCONCLUSIVE", "oscillating"), {}),
+    "alternating errors beside a corner": (
+        ALTERNATING, {"corner": one(2.0)}, ROUGH, {"corner": ("INCONCLUSIVE", "oscillating")},
+    ),
+    "alternating errors of events": (
+        ALTERNATING, {"left_to_the_mesh": one(2.0)}, ROUGH, {"left_to_the_mesh": ("INCONCLUSIVE", "oscillating")},
+    ),
+    "another limit": (SECOND, {"exact": EXACT + SMALL * C}, WRONG_LIMIT, {"exact": RIGHT}),
+    "another limit, by what an event within a step makes": (
+        SECOND, {"exact": EXACT + SMALL * C, "left_to_the_mesh": one(2.0)}, ROUGH, {"left_to_the_mesh": WRONG_LIMIT},
+    ),
+    "another limit, by far more than an event within a step makes": (
+        SECOND, {"exact": EXACT + C, "left_to_the_mesh": one(2.0), "corner": one(2.0)}, WRONG_LIMIT, {"exact": RIGHT},
+    ),
+    "the expected order": (SECOND, {"exact": EXACT}, RIGHT, {}),
+    "the expected order of what is larger than the whole": (SECOND, {"scale": one(1e-9)}, UNDECIDED, {"scale": RIGHT}),
+    "a lower order of what is larger than the whole": (FIRST, {"scale": one(1e-9)}, UNDECIDED, {"scale": LOW}),
+    "the order that events leave": (SECOND, {"left_to_the_mesh": one(2.0)}, RIGHT, {}),
+    "another order than events leave": (SECOND, {"left_to_the_mesh": one(1.0)}, ROUGH, {"left_to_the_mesh": RIGHT}),
+    "the order that is expected, before the promised one": (
+        FOURTH, {"order": 4.0, "promised": one(2.0), "special": one(4.0)}, UNDECIDED,
+        {"promised": RIGHT},
+    ),
+    "a lower order": (FIRST, {}, LOW, {}),
+    "a lower order that events leave": (FIRST, {"left_to_the_mesh": one(1.0)}, LOW, {}),
+    "a lower order than events leave": (FIRST, {"left_to_the_mesh": one(2.0)}, ROUGH, {"left_to_the_mesh": LOW}),
+    "a lower order that a corner leaves": (FIRST, {"corner": one(1.0)}, ROUGH, {"corner": LOW}),
+    "a lower order than a corner leaves": (FIRST, {"corner": one(2.0)}, LOW, {}),
+    "a higher order": (FOURTH, {}, HIGH, {}),
+    "a higher order of events": (FOURTH, {"left_to_the_mesh": one(2.0)}, ROUGH, {"left_to_the_mesh": HIGH}),
+    "a higher order before the promised one": (
+        FOURTH, {"promised": one(2.0), "special": one(4.0)}, UNDECIDED, {"special": HIGH},
+    ),
+    "no order yet, and a jump that no level sees": (
+        UNSETTLED, {"missed": YES, "jumps": YES, "exact": EXACT}, ROUGH, {"jumps": UNDECIDED},
+    ),
+    "no order yet, a pulse that no level sees, and events": (
+        UNSETTLED, {"missed": YES, "exact": EXACT, "left_to_the_mesh": one(1.0)}, UNDECIDED, {"missed": ROUGH},
+    ),
+    "no order yet, and a corner that leaves less": (UNSETTLED, {"corner": one(1.0)}, ROUGH, {"corner": UNDECIDED}),
+    "no order yet, and a corner that leaves the expected order": (UNSETTLED, {"corner": one(2.0)}, UNDECIDED, {}),
+    "no order yet": (UNSETTLED, {}, UNDECIDED, {}),
+}  # fmt: skip
 
 
-def test_numbers_far_below_their_round_off_have_no_order() -> None:
-    """Two units in the last place and one behind them are no first order, unless a shape over time vouches for it."""
-    floor = 1000.0 * SMALL
-    one = {"order": np.array([1.0]), "size": np.array([1e4 * SMALL]), "floor": floor}
-    reasons = [
-        from_orders([1.0], [0.0], numbers=np.array([numbers]), **one) for numbers in (True, False)
-    ]
-    assert reasons == [("INCONCLUSIVE", "round_off"), ("PASS", "asymptotic")]
+@pytest.mark.parametrize("case", TABLE)
+def test_every_line_of_the_table_of_cases(case: str) -> None:
+    fields, facts, expected, without = TABLE[case]
+    assert decide(fields, FOUR, **facts) == expected
+    for fact, otherwise in without.items():
+        others = {name: value for name, value in facts.items() if name != fact}
+        assert otherwise != expected
+        assert decide(fields, FOUR, **others) == otherwise, fact
 
 
-def test_a_change_that_scatter_does_not_explain_is_no_round_off() -> None:
-    # the last two differences are within the blamed factor of the floor
-    floor = 5e-6
-    assert from_orders([2.0, 1.5], [0.02, 0.4], floor=floor) == ("PASS", "asymptotic")
-    assert from_orders([2.0, 1.5], [0.02, 0.03], floor=floor)[0] != "PASS"
+def test_no_line_of_the_table_of_cases_can_go(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without any one of them, some ladder of the table above is judged otherwise."""
+    cases, needed, lines = verdict._cases, set(), []
+
+    def without(line: int) -> Any:
+        def shorter(*given: Any) -> Any:
+            found, *others = cases(*given)
+            lines.append(len(found))
+            return [found[:line] + found[line + 1 :], *others]
+
+        return shorter
+
+    number = 20
+    for line in range(number):
+        with monkeypatch.context() as context:
+            context.setattr(verdict, "_cases", without(line))
+            for fields, facts, expected, _ in TABLE.values():
+                if decide(fields, FOUR, **facts) != expected:
+                    needed.add(line)
+                    break
+    assert set(lines) == {number}
+    assert needed == set(range(number))
+
+
+def test_numbers_as_small_as_their_round_off_have_no_order() -> None:
+    """Eight, four and two units in the last place are no first order, unless a shape over time vouches for it."""
+    reasons = [decide(FIRST, FOUR, order=1.0, floor=1e-5, numbers=x) for x in (YES, NO)]
+    assert reasons == [ROUND_OFF, RIGHT]
+    # a prediction as large as all that there is to see is believed even so
+    assert decide(FIRST, FOUR, order=1.0, floor=SMALL) == ROUND_OFF
 
 
 def test_three_levels_must_be_proportional_however_wide_the_tolerance() -> None:
-    assert from_orders([2.02], [0.2], tolerance=0.5) == UNDECIDED
+    turned = [EXACT, EXACT - A, EXACT - A - (B + A) / 8]
+    assert decide(turned, THREE, tolerance=0.5) == UNDECIDED
 
 
 def test_ladders_judged_together_are_judged_as_alone() -> None:
@@ -438,6 +507,7 @@ def test_ladders_judged_together_are_judged_as_alone() -> None:
                 floor=truth.floor,
                 exact=truth.exact if i % 3 else None,
                 promised=np.array([max(truth.orders[0] - 1.0, 1.0)]),
+                corner=np.array([1.0 if i % 5 == 0 else np.nan]),
                 special=np.array([9.0]),
                 combined=lambda which, pair, weights, part=part: np.full(which.sum(), part),
             )

@@ -5,18 +5,19 @@ from __future__ import annotations
 import datetime
 import math
 from dataclasses import dataclass, fields
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
 import pytest
-from side_by_side import compare
+from counts import HEAD, tally
 from synthetic import EPSILON, TOLERANCE, Group, groups
 
 from vibsim.convergence import assessment
 from vibsim.convergence.assessment import Assessment, Decision, assess, decide
 from vibsim.convergence.error_model import kernel, likelihood, priors
 from vibsim.convergence.error_model.hypotheses import (
+    Promise,
     between,
     form,
     hypotheses_of,
@@ -243,7 +244,7 @@ def test_rounding_of_steep_differences_is_no_evidence(kind: str) -> None:
     gram = np.outer(rows, rows)[None]
     rounded = gram * (1.0 - np.diag([1e-16, 0.0, 0.0]))
     none = np.empty((1, 0))
-    for table in getattr(hypotheses_of((8.0, 4.0, 2.0, 1.0), 6.0), kind):
+    for table in getattr(hypotheses_of((8.0, 4.0, 2.0, 1.0), Promise(6.0)), kind):
         one, other = (
             likelihood.weights(table, g, np.array([2.0]), none, np.array([-np.inf]))[0]
             for g in (gram, rounded)
@@ -283,8 +284,8 @@ def test_a_wrong_limit_is_told_whatever_order_is_expected() -> None:
 
 
 def test_probabilities_add_up_to_one() -> None:
-    for exact in (None, np.cos(T)):
-        p = posterior(ladder(HALVED, series(HALVED, (1.0, 2.0, SHAPE)), exact=exact), 2.0)
+    for exact, promise in product((None, np.cos(T)), (None, Promise(2.0), Promise(2.0, True))):
+        p = posterior(ladder(HALVED, series(HALVED, (1.0, 2.0, SHAPE)), exact=exact), promise)
         whole = p.expansion + p.alternating + p.scattered + p.noise
         assert whole == pytest.approx(1.0, abs=1e-9)
         assert np.all(p.of_pairs >= -1e-9)
@@ -479,10 +480,15 @@ def check(c: Counts) -> None:
     assert min(c.intervals, c.errors, c.best) >= 0.95 - margin, c
 
 
-def test_rules_and_error_model_can_be_compared(tmp_path: Path) -> None:
-    rules, model = compare(HELD_OUT, tmp_path, number=5, size=6)
-    assert rules.decidable == model.decidable > 0
-    assert rules.right > 0 < model.right
+def test_pipeline_and_error_model_are_counted_on_the_same_ladders(tmp_path: Path) -> None:
+    pipeline, model = tally(HELD_OUT, tmp_path, number=5, size=6)
+    assert pipeline.decidable == model.decidable > 0
+    assert pipeline.judged == model.judged > 100
+    assert pipeline.right > 0 < model.right
+    for one in (pipeline, model):
+        # few levels have no false verdict
+        assert (one.false_pass, one.false_fail) == (0, 0)
+        assert len(one.row().split("|")) == HEAD.splitlines()[0].count("|") - 3
 
 
 def test_verdicts_on_random_ladders_are_right() -> None:

@@ -47,7 +47,7 @@ LADDERS = {
         tuple(range(10, 23)),
         {"converges": "theta", "order": 2},
         ("PASS", "asymptotic"),
-        ("order 2.00", "on levels 10 to 17"),
+        ("order 2.00", "on levels 10 to 14"),
     ),
     "three_term, nothing but round-off": Ladder(
         {**PENDULUM, "time": {"end": 20.0}, "samples": {"every": 4096}},

@@ -1,6 +1,8 @@
-"""The table of docs/method.md: the rules and the error model on the same random ladders, each judged by nine orders.
+"""Verdicts on random ladders with known truth, each judged by nine orders: of the pipeline and of the error model.
 
-``python tests/analysis/side_by_side.py SEED ...`` prints a line a seed; a seed takes some minutes.
+The pipeline knows the scheme: what it promises, and facts from outside the ladder. The bare error model reads the same
+differences and the same predicted noise. ``python tests/analysis/counts.py SEED ...`` prints a line of both for every
+seed; a seed takes some minutes.
 """
 
 from __future__ import annotations
@@ -34,6 +36,7 @@ HEAD = """\
 class Counts:
     """Verdicts by what is true of their ladders; what is exact is not counted."""
 
+    judged: int = 0
     right: int = 0
     false_pass: int = 0
     mixed: int = 0
@@ -43,6 +46,7 @@ class Counts:
 
     def add(self, truth: Truth, asked: float, status: str, reason: str) -> None:
         mine, mixed = abs(truth.order - asked) <= TOLERANCE, math.isnan(truth.order)
+        self.judged += 1
         if status == "PASS" and reason != "exact":
             self.right += mine
             self.mixed += mixed
@@ -60,23 +64,23 @@ class Counts:
 
 @dataclass
 class Read:
-    """What the rules read of the quantity u: its series, and the noise that is predicted."""
+    """What the pipeline reads of the quantity u: its series, and the noise that is predicted."""
 
     found: list[Any] = field(default_factory=list)
 
 
 @contextmanager
 def reading() -> Iterator[Read]:
-    """Keep what the rules read of u."""
-    read, collect = Read(), order_evidence.evidences
+    """Keep what the pipeline reads of u."""
+    read, collect = Read(), order_evidence.evidence
 
-    def kept(q: Any, norms: Any, order: Any, tolerance: float) -> Any:
-        found = collect(q, norms, order, tolerance)
-        if q.name == "u" and "l2" in norms:
-            read.found.append((q, found[list(norms).index("l2")]))
+    def kept(q: Any, norm: str, order: Any, tolerance: float) -> Any:
+        found = collect(q, norm, order, tolerance)
+        if q.name == "u" and norm == "l2":
+            read.found.append((q, found))
         return found
 
-    with patch.object(order_evidence, "evidences", kept):
+    with patch.object(order_evidence, "evidence", kept):
         yield read
 
 
@@ -92,30 +96,30 @@ def ladder_of(group: Group, read: Read) -> Ladder:
     return Ladder(h, gram, evidence.floor[0], evidence.numbers[0], group.known)
 
 
-def compare(seed: int, folder: Path, number: int = 42, size: int = 55) -> tuple[Counts, Counts]:
-    """Return the counts of the rules and of the error model on the ladders of a seed."""
-    by_rules, by_model = Counts(), Counts()
+def tally(seed: int, folder: Path, number: int = 42, size: int = 55) -> tuple[Counts, Counts]:
+    """Return the counts of the pipeline and of the error model on the ladders of a seed."""
+    by_pipeline, by_model = Counts(), Counts()
     for group in groups(seed, number, size):
         if len(group.levels) < 3:
             continue
         with reading() as read:
             judged = findings(group, folder)
         for one in judged:
-            by_rules.add(one.ladder, one.formal, one.status, one.reason)
+            by_pipeline.add(one.ladder, one.formal, one.status, one.reason)
         ladder = ladder_of(group, read)
         for order in ORDERS:
             a = assess(ladder, expected=order)
             for truth, status, reason in zip(group.ladders, a.status, a.reason, strict=True):
                 by_model.add(truth, order, STATUSES[status], REASON_NAMES[reason])
-    return by_rules, by_model
+    return by_pipeline, by_model
 
 
 def main() -> None:
     print(HEAD)
     for seed in map(int, sys.argv[1:]):
         with tempfile.TemporaryDirectory() as folder:
-            rules, model = compare(seed, Path(folder))
-        print(f"| {seed} | rules | {rules.row()} |")
+            pipeline, model = tally(seed, Path(folder))
+        print(f"| {seed} | pipeline | {pipeline.row()} |")
         print(f"| | error model | {model.row()} |", flush=True)
 
 
