@@ -107,14 +107,16 @@ def test_orders_that_swing_are_no_order(order: float) -> None:
     sizes = np.cumprod([1.0, 4, 2, 4, 2, 4, 2])
     d = [SMALL / size * A for size in sizes]
     fields = [EXACT - sum(d[i:], np.zeros_like(A)) for i in range(len(levels))]
-    assert decide(fields, levels, order=order)[0] == "INCONCLUSIVE"
+    # of a scheme of second order
+    promised = np.array([2.0])
+    assert decide(fields, levels, order=order, promised=promised)[0] == "INCONCLUSIVE"
 
 
 def noise_like(size: float, seed: int) -> np.ndarray:
     return size * np.random.default_rng(seed).normal(size=len(T))
 
 
-@pytest.mark.parametrize("growth", [0.0, 0.5, 1.5])
+@pytest.mark.parametrize("growth", [0.5, 1.5])
 def test_a_floor_in_the_ladder_leaves_the_window_before_it(growth: float) -> None:
     levels = tuple(range(6, 16))
     floor = np.array([1e-8 * 2 ** (growth * (level - 12)) for level in levels])
@@ -129,6 +131,19 @@ def test_a_floor_in_the_ladder_leaves_the_window_before_it(growth: float) -> Non
     unknown = judge(evidence_of(fields, levels, floor=1e-15, exact=EXACT))
     assert REASON_NAMES[int(unknown.reason[0])] == "asymptotic"
     assert 0 <= found.last[0] - unknown.last[0] <= 1
+
+
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("predicted", [1e-8, 1e-15])
+def test_a_floor_that_does_not_grow_is_no_other_order(predicted: float, known: bool) -> None:
+    """A level whose difference holds some percent of noise may leave the verdict open, not more."""
+    levels = tuple(range(6, 16))
+    clean = ladder(levels, (SMALL, 2, A), (0.02 * SMALL, 4, B))
+    for seed in range(3):
+        fields = [u + noise_like(1e-8, 100 * seed + i) for i, u in enumerate(clean)]
+        exact = EXACT if known else None
+        assert decide(fields, levels, floor=predicted, exact=exact)[0] != "FAIL"
+        assert decide(fields, levels, floor=predicted, exact=exact, order=1.0)[0] != "PASS"
 
 
 def test_nothing_but_floor_is_round_off() -> None:

@@ -15,8 +15,9 @@ A power *dominates* where no other one has more than a tenth of it. The table of
 | errors that change their sign from level to level are | INCONCLUSIVE ``oscillating`` |
 | anything else | INCONCLUSIVE ``pre_asymptotic`` |
 
-*Surely* is a probability above ``1 - RISK``. For a FAIL it is one above ``1 - RISK_OF_THREE`` where it rests on three
-levels and coarser ones do not fit them: three levels may fall like a power by accident.
+*Surely* is a probability above ``1 - RISK``. Where it rests on three levels and coarser ones do not fit them, it is one
+above ``1 - RISK_OF_THREE`` for a FAIL, and for a PASS that theory promises: three levels may fall like a power by
+accident, and what theory promises must not decide alone.
 
 Noise that is predicted to grow may not do so. Where it ends the window, and the finest differences show that it may be
 far less, the ladder is judged with less noise as well (`_with_less_noise`). Then a verdict is sure that is sure with
@@ -38,7 +39,7 @@ from vibsim.core.vocabulary import ORDER_TOLERANCE, REASON_NAMES, REASONS, STATU
 RISK = 0.01
 """Accepted probability that a verdict is wrong."""
 RISK_OF_THREE = 0.1 * RISK
-"""The same of a FAIL by three levels behind others that do not fit (seeds 1, 3, 11, 101-103)."""
+"""The same where three levels decide behind others that do not fit (seeds 1, 3, 11, 101-103)."""
 DEFINITE = 0.9
 """An order fails only where one power has so much of the probability, alone or as one of two of a size."""
 INTERVAL = 0.95
@@ -169,6 +170,7 @@ class _Found:
     exact: Flags
     away: Flags  # only noise, and not the exact solution
     by_three: Flags  # whether three levels decide behind others that do not fit
+    by_theory: bool  # whether theory promises the order that is expected
     cut_short: Flags  # whether noise that may be far less than predicted ends the window: nothing is decided
 
     def some(self, rows: Integers, *, cut_short: bool) -> _Found:
@@ -180,6 +182,7 @@ class _Found:
             self.exact[rows],
             self.away[rows],
             self.by_three[rows],
+            self.by_theory,
             np.full(len(rows), cut_short),
         )
 
@@ -252,7 +255,7 @@ def _found(ladder: Ladder, question: _Question, left_out: float) -> _Found:
     if ladder.exact_known:
         away = exact & _is_away(ladder, question.noise_factor)
     by_three, cut_short = _rests_on_three(believed), _is_cut_short(ladder, believed)
-    return _Found(believed, sides, exact, away, by_three, cut_short)
+    return _Found(believed, sides, exact, away, by_three, question.by_theory, cut_short)
 
 
 def _is_sure(ladder: Ladder, found: _Found, question: _Question) -> Flags:
@@ -433,7 +436,7 @@ def _reasons(found: _Found, missed: Flags) -> Integers:
     cases = [
         (missed, "wrong_limit"),
         (found.exact, "exact"),
-        ((right > 1.0 - RISK) & ~found.cut_short, "asymptotic"),
+        ((right > 1.0 - (risk if found.by_theory else RISK)) & ~found.cut_short, "asymptotic"),
         (another & (lower > higher), "order_low"),
         (another, "order_high"),
         (p.noise > np.maximum(1.0 - p.noise - p.alternating, p.alternating), "round_off"),
