@@ -16,8 +16,8 @@ A power *dominates* where no other one has more than a tenth of it. The table of
 | anything else | INCONCLUSIVE ``pre_asymptotic`` |
 
 *Surely* is a probability above ``1 - RISK``. Where it rests on three levels and coarser ones do not fit them, it is one
-above ``1 - RISK_OF_THREE`` for a FAIL, and for a PASS that theory promises: three levels may fall like a power by
-accident, and what theory promises must not decide alone.
+above ``1 - RISK_OF_THREE`` for a FAIL, and for a PASS that theory promises and no exact solution confirms: three levels
+may fall like a power by accident, and what theory promises must not decide alone.
 
 Noise that is predicted to grow may not do so. Where it ends the window, and the finest differences show that it may be
 far less, the ladder is judged with less noise as well (`_with_less_noise`). Then a verdict is sure that is sure with
@@ -170,7 +170,9 @@ class _Found:
     exact: Flags
     away: Flags  # only noise, and not the exact solution
     by_three: Flags  # whether three levels decide behind others that do not fit
-    by_theory: bool  # whether theory promises the order that is expected
+    by_theory: (
+        bool  # whether theory promises the order that is expected, and no exact solution is known
+    )
     cut_short: Flags  # whether noise that may be far less than predicted ends the window: nothing is decided
 
     def some(self, rows: Integers, *, cut_short: bool) -> _Found:
@@ -255,7 +257,8 @@ def _found(ladder: Ladder, question: _Question, left_out: float) -> _Found:
     if ladder.exact_known:
         away = exact & _is_away(ladder, question.noise_factor)
     by_three, cut_short = _rests_on_three(believed), _is_cut_short(ladder, believed)
-    return _Found(believed, sides, exact, away, by_three, question.by_theory, cut_short)
+    by_theory = question.by_theory and not ladder.exact_known
+    return _Found(believed, sides, exact, away, by_three, by_theory, cut_short)
 
 
 def _is_sure(ladder: Ladder, found: _Found, question: _Question) -> Flags:
