@@ -91,15 +91,18 @@ def analyse_records(experiment: Experiment, records: Mapping[int, Record]) -> Re
     block = block_of(experiment, records)
     found = comparisons(block, compared(experiment, block.lean) + _centred(block))
     measured = (check.measured for check in experiment.checks)
-    judge_orders(found, [check for check in measured if check.kind == "converges"])
-    table: Table = {}
     asked_for = asked(experiment)
+    # a sweep too large for its series has verdicts on what checks ask about, and its sentences need
+    judged = [name for name in found if not block.lean or name in asked_for or is_error_part(name)]
+    judge_orders(found, judged, [check for check in measured if check.kind == "converges"])
+    table: Table = {}
     for q in found.values():
-        if is_error_part(q.name) and q.name not in asked_for:
+        is_shown = not is_error_part(q.name) or q.name in asked_for
+        if is_shown:
+            table |= numbers(q)
+        if q.name in judged:
             table |= _verdict(q) | phase_at_start(q)
-            continue
-        table |= numbers(q) | _verdict(q) | phase_at_start(q)
-        if not block.lean:
+        if is_shown and not block.lean:
             table |= over_time(q)
     table |= _scalars(block) | check_variables(block, found) | motion(block, found)
     if switches_of(block.model):

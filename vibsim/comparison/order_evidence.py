@@ -49,14 +49,14 @@ ROUGH = ("pre_asymptotic", "non_smooth")
 """What is said where the force has a pulse that no level sees."""
 
 
-def judge_orders(quantities: Mapping[str, Comparison], checks: Iterable[ConvergesCheck]) -> None:
-    """Judge quantities by the orders that their schemes promise, and by those that checks expect, in their norms.
+def judge_orders(
+    quantities: Mapping[str, Comparison], names: Iterable[str], checks: Iterable[ConvergesCheck]
+) -> None:
+    """Judge the named quantities by the orders that their schemes promise, and all by those that checks expect.
 
     `judgement` and `judge_check` return what was found.
     """
-    due: list[tuple[str, float | str, str]] = [
-        (name, "scheme", TYPICAL_NORM) for name in quantities
-    ]
+    due: list[tuple[str, float | str, str]] = [(name, "scheme", TYPICAL_NORM) for name in names]
     due += [
         (check.converges, _expected(quantities[check.converges], check), check.norm)
         for check in checks
