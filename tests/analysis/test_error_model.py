@@ -14,7 +14,7 @@ from counts import HEAD, tally
 from synthetic import EPSILON, TOLERANCE, Group, groups
 
 from vibsim.convergence import assessment
-from vibsim.convergence.assessment import Assessment, Decision, assess, decide
+from vibsim.convergence.assessment import Assessment, Decision, Question, assess, decide
 from vibsim.convergence.error_model import kernel, likelihood, priors
 from vibsim.convergence.error_model.hypotheses import (
     Promise,
@@ -296,12 +296,19 @@ def test_a_ladder_is_judged_the_same_alone_and_among_others(known: bool) -> None
     """Bit by bit, so that sweeps may be divided at will."""
     group = next(g for g in groups(7, size=20) if len(g.levels) == 5 and g.known == known)
     given, _ = of_group(group)
-    for judge in (assess, decide):
-        among = vars(judge(given, expected=2.0))
+
+    def in_full(ladder: Ladder) -> Assessment:
+        return assess(ladder, expected=2.0)
+
+    def quickly(ladder: Ladder) -> Decision:
+        return decide(ladder, Question(2.0))
+
+    for judge in (in_full, quickly):
+        among = vars(judge(given))
         for i in range(3):
             one = slice(i, i + 1)
             alone = Ladder(given.h, given.gram[one], given.floor[one], given.numbers[one], known)
-            for name, values in vars(judge(alone, expected=2.0)).items():
+            for name, values in vars(judge(alone)).items():
                 np.testing.assert_array_equal(values[0], among[name][i], err_msg=name)
 
 
@@ -354,7 +361,7 @@ def test_no_more_is_left_out_than_may_be(known: bool, left_out: float) -> None:
 def test_a_decision_is_that_of_the_whole_posterior(expected: float | None) -> None:
     for group in groups(HELD_OUT, 9, 12):
         given, _ = of_group(group)
-        quick, whole = decide(given, expected=expected), assess(given, expected=expected)
+        quick, whole = decide(given, Question(expected)), assess(given, expected=expected)
         for field in fields(Decision):
             np.testing.assert_array_equal(
                 getattr(quick, field.name), getattr(whole, field.name), err_msg=field.name
@@ -367,7 +374,7 @@ def test_a_clear_decision_needs_no_second_posterior(monkeypatch: pytest.MonkeyPa
         values = series(HALVED, (1.0, 2.0, SHAPE), (0.5, 4.0, OTHER_SHAPE))
         for order, expected in ((2.0, "asymptotic"), (4.0, "order_low")):
             given = ladder(HALVED, values, exact=exact)
-            assert REASON_NAMES[decide(given, expected=order).reason[0]] == expected
+            assert REASON_NAMES[decide(given, Question(order)).reason[0]] == expected
 
 
 @pytest.mark.parametrize("known", [True, False], ids=["exact", "unknown"])

@@ -7,7 +7,7 @@ A power *dominates* where no other one has more than a tenth of it. The table of
 | a value that is not finite | FAIL ``non_finite`` |
 | fewer than three levels | INCONCLUSIVE ``too_few_levels`` |
 | all differences are noise as expected, but not the distance from the exact solution | FAIL ``wrong_limit`` |
-| the levels show some order, surely, and the exact solution is far from their limit (`MISSED`) | FAIL ``wrong_limit`` |
+| the levels surely show an expansion, and the exact solution is far from its limit (`MISSED`) | FAIL ``wrong_limit`` |
 | all differences are noise as expected | PASS ``exact`` |
 | a power within the tolerance of the expected one dominates, surely | PASS ``asymptotic`` |
 | others dominate, surely, the expected one does not, and one is definite | FAIL ``order_low``, ``order_high`` |
@@ -69,6 +69,22 @@ NOISE_FACTOR = 10.0
 
 
 @dataclass(frozen=True)
+class Question:
+    """What is asked of ladders; see `assess`."""
+
+    expected: float | None = None
+    at_least: float | None = None
+    tolerance: float = ORDER_TOLERANCE
+    noise_factor: float = NOISE_FACTOR
+    by_theory: bool = False
+
+    @property
+    def promise(self) -> Promise | None:
+        """The order that has a prior of its own."""
+        return None if self.expected is None else Promise(self.expected, self.by_theory)
+
+
+@dataclass(frozen=True)
 class Decision:
     """What was decided of ladders; arrays of shape (ladder,)."""
 
@@ -117,25 +133,16 @@ def assess(
     by_theory
         Whether theory promises the order that is expected.
     """
-    question = _Question(expected, at_least, tolerance, noise_factor, by_theory)
+    question = Question(expected, at_least, tolerance, noise_factor, by_theory)
     found = _in_blocks(ladder, question, _assessed)
     return Assessment(**{field.name: found[field.name] for field in fields(Assessment)})
 
 
-def decide(
-    ladder: Ladder,
-    *,
-    expected: float | None = None,
-    at_least: float | None = None,
-    tolerance: float = ORDER_TOLERANCE,
-    noise_factor: float = NOISE_FACTOR,
-    by_theory: bool = False,
-) -> Decision:
+def decide(ladder: Ladder, question: Question) -> Decision:
     """Decide whether ladders converge as expected; the same as `assess`, at a fraction of its cost.
 
     Most ladders are so clear that a rough posterior has the same verdict (see `_is_sure`).
     """
-    question = _Question(expected, at_least, tolerance, noise_factor, by_theory)
     found = _in_blocks(ladder, question, _decided)
     rest = np.flatnonzero(~found["sure"])
     if len(rest):
@@ -143,22 +150,6 @@ def decide(
         for field in fields(Decision):
             found[field.name][rest] = assessed[field.name]
     return Decision(**{field.name: found[field.name] for field in fields(Decision)})
-
-
-@dataclass(frozen=True)
-class _Question:
-    """What is asked; see `assess`."""
-
-    expected: float | None
-    at_least: float | None
-    tolerance: float
-    noise_factor: float
-    by_theory: bool
-
-    @property
-    def promise(self) -> Promise | None:
-        """The order that has a prior of its own."""
-        return None if self.expected is None else Promise(self.expected, self.by_theory)
 
 
 @dataclass(frozen=True)
@@ -198,8 +189,8 @@ class _Found:
 
 def _in_blocks(
     ladder: Ladder,
-    question: _Question,
-    work: Callable[[Ladder, Floats, _Question], dict[str, np.ndarray]],
+    question: Question,
+    work: Callable[[Ladder, Floats, Question], dict[str, np.ndarray]],
 ) -> dict[str, np.ndarray]:
     """Return status, reason and the numbers of ladders."""
     n, count = len(ladder.h), len(ladder.gram)
@@ -222,7 +213,7 @@ def _in_blocks(
     return {**found, "status": status.astype(np.int8), "reason": reason.astype(np.int8)}
 
 
-def _assessed(ladder: Ladder, factors: Floats, question: _Question) -> dict[str, np.ndarray]:
+def _assessed(ladder: Ladder, factors: Floats, question: Question) -> dict[str, np.ndarray]:
     """Return what an `Assessment` holds, of ladders of three levels and more."""
     found = _with_less_noise(ladder, _found(ladder, question, LEFT_OUT), question)
     of_limit, missed = found.posterior, found.away
@@ -235,7 +226,7 @@ def _assessed(ladder: Ladder, factors: Floats, question: _Question) -> dict[str,
     return numbers | _best(ladder, of_limit, found.exact, factors)
 
 
-def _decided(ladder: Ladder, factors: Floats, question: _Question) -> dict[str, np.ndarray]:
+def _decided(ladder: Ladder, factors: Floats, question: Question) -> dict[str, np.ndarray]:
     """Return what a `Decision` holds, of ladders of three levels and more, and whether it is sure."""
     del factors
     found = _found(ladder, question, ROUGHLY)
@@ -249,7 +240,7 @@ def _some(ladder: Ladder, rows: Integers) -> Ladder:
     )
 
 
-def _found(ladder: Ladder, question: _Question, left_out: float) -> _Found:
+def _found(ladder: Ladder, question: Question, left_out: float) -> _Found:
     believed = posterior(ladder, question.promise, left_out=left_out)
     sides = _sides(believed, question.expected, question.at_least, question.tolerance)
     exact = _is_only_noise(ladder, question.noise_factor)
@@ -261,7 +252,7 @@ def _found(ladder: Ladder, question: _Question, left_out: float) -> _Found:
     return _Found(believed, sides, exact, away, by_three, by_theory, cut_short)
 
 
-def _is_sure(ladder: Ladder, found: _Found, question: _Question) -> Flags:
+def _is_sure(ladder: Ladder, found: _Found, question: Question) -> Flags:
     """Say where the same is decided whatever the hypotheses are like that were left out.
 
     Then no probability is nearer than `ROUGHLY` to what it is compared with. And either the extrapolation by the order
@@ -368,7 +359,7 @@ def _is_cut_short(ladder: Ladder, believed: Posterior) -> Flags:
     return np.asarray(NOISE_FACTOR * least < ladder.floor[every, last])
 
 
-def _with_less_noise(ladder: Ladder, found: _Found, question: _Question) -> _Found:
+def _with_less_noise(ladder: Ladder, found: _Found, question: Question) -> _Found:
     """Return what is found of ladders whose window is cut short by noise, with that noise and with less.
 
     What is sure with one of the two counts, where it has at least the probability `RISK` with the other; else nothing.

@@ -42,7 +42,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vibsim.convergence import thresholds as th
-from vibsim.convergence.assessment import decide
+from vibsim.convergence.assessment import Question, decide
 from vibsim.convergence.circumstances import (
     Evidence,
     at_rest,
@@ -167,13 +167,13 @@ def _believed(e: Evidence, asked: Flags) -> Believed:
             exact_known=bool(exact_known),
         )
         # what is exact is told from the predicted round-off of the scheme
-        a = decide(
-            ladder,
+        question = Question(
             expected=expected,
             tolerance=e.tolerance,
             noise_factor=0.0,
             by_theory=bool(by_theory),
         )
+        a = decide(ladder, question)
         for name, values in found._asdict().items():
             values[chosen] = getattr(a, name)
     return found
