@@ -15,6 +15,12 @@ def test_a_finished_experiment_at_another_place_has_nothing_to_do(place: Place) 
     ended = place.run()
     assert ended.returncode == 0
     assert "nothing to do" in ended.stdout
+    assert "PASS  adhoc/tiny  theta: order 2.0" in ended.stdout
+    assert f"report: {place.tiny / 'report.html'}\n" in ended.stdout
+    full = place.run("-v")
+    assert "adhoc/tiny  PASS\n  PASS  asymptotic  order  theta converges" in full.stdout
+    quiet = place.run("-q")
+    assert (quiet.returncode, quiet.stdout, quiet.stderr) == (0, "", "")
 
 
 MATRIX = {

@@ -15,8 +15,8 @@ from vibsim.core.vocabulary import RESTRICTIONS
 
 _NAMES = "experiment (name or collection/name), one member of its sweep (NAME@CASE), collection, or FILE.yaml"
 LISTS = ("models", "schemes", "checks", "experiments", "schema")
-_Row = tuple[str, dict[str, Any]]
-"""An option with what `argparse` takes of it."""
+_Row = tuple[str | tuple[str, str], dict[str, Any]]
+"""An option, perhaps with a short name before it, and what `argparse` takes of it."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -29,7 +29,8 @@ def parser() -> argparse.ArgumentParser:
         function = "list_" if name == "list" else name
         sub.set_defaults(command=partial(_perform, f"vibsim.cli.{module}", function))
         for option, settings in options:
-            sub.add_argument(option, **settings)
+            names = (option,) if isinstance(option, str) else option
+            sub.add_argument(*names, **settings)
     return top
 
 
@@ -67,6 +68,7 @@ def _commands() -> Iterator[tuple[str, str, str, Sequence[_Row]]]:
         _flag("--verify", verify),
         allow,
         _flag("--json", "print the outcome as JSON"),
+        *_detail(),
     )
     yield "run", "run.command", "Run experiments and show every verdict.", options
     yield "check", "plan", "Validate experiment files, without running them.", (files,)
@@ -114,6 +116,18 @@ def _commands() -> Iterator[tuple[str, str, str, Sequence[_Row]]]:
     formats = "formats of the figure files: svg, png, pdf; several with commas (default: svg)"
     formats_row = _row("--formats", _word, "LIST", formats)
     yield "report", "jobs.report", text, (*job, perhaps, folder, formats_row)
+
+
+def _detail() -> Iterator[_Row]:
+    """Yield the options that say how much is printed: the last one counts."""
+    for short, name, value, text in (
+        ("-v", "--verbose", "full", "show every check, also those that passed"),
+        ("-q", "--quiet", "quiet", "print nothing but errors; the exit status tells the rest"),
+    ):
+        yield (
+            (short, name),
+            {"action": "store_const", "const": value, "dest": "detail", "help": text},
+        )
 
 
 def _judge() -> Iterator[_Row]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 from argparse import Namespace
@@ -14,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from vibsim.cli import failure, resources, results_folder
+from vibsim.cli import failure, outcome_text, resources, results_folder, terminal
 from vibsim.cli.chosen_plans import plans_of
 from vibsim.cli.jobs.common import chosen_results
 from vibsim.cli.jobs.simulate import is_made
@@ -27,6 +26,8 @@ from vibsim.plan import Plan
 
 _STAGES = 4
 """How often the workflow is started at most: once, and once for each kind of file found bad."""
+_PAGES = 5
+"""Up to so many experiments, the report of each is named."""
 
 
 def run(options: Namespace) -> int:
@@ -54,31 +55,34 @@ def _run(options: Namespace) -> int:
         return _dry_run(plans, results, arguments, options)
     held = lock.hold(results)
     lock.claim(plans, results)
-    progress = Progress()
+    is_quiet = options.detail == "quiet"
+    progress = None if is_quiet else Progress()
     results_folder.deleted(results)
-    _clear(plans, results, options.verify)
+    _clear(plans, results, options)
     jobs: list[Job] = []
     for _ in range(_STAGES):
         ended = snakemake.run(plans, results, held, arguments, progress)
         if ended.jobs:
             _refuse_edited(plans, options)
         summaries = [outcome.collect(plan, results) for plan in plans]
-        progress.clear()
+        if progress:
+            progress.clear()
         jobs.extend(ended.jobs)
         changes.settle(plans, results, (path for job in ended.jobs for path in job.outputs))
         if not _tell_deleted(results):
             break
-    return _show(options, summaries, ended, results, bool(jobs))
+    return _show(options, plans, summaries, ended, results, bool(jobs))
 
 
-def _clear(plans: Sequence[Plan], results: Path, every: bool) -> None:
+def _clear(plans: Sequence[Plan], results: Path, options: Namespace) -> None:
     """Delete what is no longer as it was made, and remove what no experiment asks for any more."""
-    for error in changes.changed(plans, results, every=every):
+    for error in changes.changed(plans, results, every=options.verify):
         results_folder.delete(error, results)
     _tell_deleted(results)
     for path in changes.leftovers(plans, results):
         changes.remove(path)
-        print(f"vibsim: removed, no longer asked for: {path}", file=sys.stderr)
+        if options.detail != "quiet":
+            print(f"vibsim: removed, no longer asked for: {path}", file=sys.stderr)
 
 
 def _tell_deleted(results: Path) -> bool:
@@ -145,6 +149,7 @@ def _check(ended: snakemake.Outcome) -> None:
 
 def _show(
     options: Namespace,
+    plans: Sequence[Plan],
     summaries: list[outcome.Entry],
     ended: snakemake.Outcome,
     results: Path,
@@ -153,17 +158,32 @@ def _show(
     _check(ended)
     failures = [outcome.failed_job(str(job), results / job.log, results) for job in ended.failed]
     has_index = not failures or _write_index(results)
+    status = outcome.status(summaries, failures)
     if options.json:
         print(outcome.as_json(summaries, failures, results))
+    elif options.detail == "quiet":
+        errors = [entry for entry in summaries if "error" in entry]
+        lines = [*outcome_text.in_full(errors, terminal.UNCUT), *outcome_text.of_failures(failures)]
+        print(*lines, sep="\n", end="\n" * bool(lines), file=sys.stderr)
     else:
         if not worked:
             print("nothing to do: all results are up to date\n")
-        # what goes to a file is not cut
-        columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else 10_000
-        print(*outcome.as_text(summaries, failures, columns), sep="\n")
+        tell = outcome_text.in_full if options.detail == "full" else outcome_text.in_lines
+        print(*tell(summaries, terminal.columns()), sep="\n")
+        for line in outcome_text.of_failures(failures):
+            print(line)
+        print(f"\n{outcome_text.count(summaries, status)}")
+        for page in _pages(plans, results):
+            print(f"report: {page}")
         if has_index:
-            print(f"report: {results / 'index.html'}")
-    return 0 if outcome.status(summaries, failures) == "PASS" else 1
+            print(f"all results: {results / 'index.html'}")
+    return 0 if status == "PASS" else 1
+
+
+def _pages(plans: Sequence[Plan], results: Path) -> list[Path]:
+    """Return the reports of what was asked for; of many experiments none, since the index links to them."""
+    pages = [results / plan.page for plan in plans]
+    return [page for page in pages if page.is_file()] if len(pages) <= _PAGES else []
 
 
 def _write_index(results: Path) -> bool:
