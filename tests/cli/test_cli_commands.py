@@ -295,7 +295,9 @@ def test_the_formats_are_those_of_the_report() -> None:
 def test_a_dry_run_makes_no_folder(file: Path, tmp_path: Path, capsys: Capture) -> None:
     new = tmp_path / "new"
     assert main(["run", str(file), "--results", str(new), "--dry-run", "--cores", "1"]) == 0
-    assert "simulate adhoc/tiny level_05.nc: " in capsys.readouterr().out
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "adhoc/tiny: not made yet: levels 5 to 7, analysis, report"
+    assert lines[1] == "  simulate adhoc/tiny level_05.nc"
     assert not new.exists()
 
 

@@ -18,7 +18,7 @@ from vibsim.cli.chosen_plans import plans_of
 from vibsim.cli.jobs.common import chosen_results
 from vibsim.cli.jobs.simulate import is_made
 from vibsim.cli.jobs.solve import check_allowed
-from vibsim.cli.run import changes, lock, outcome, snakemake, supervise
+from vibsim.cli.run import changes, lock, outcome, reasons, snakemake, supervise
 from vibsim.cli.run.snakemake import Job, Progress
 from vibsim.core import private_cache
 from vibsim.core.errors import VibsimError
@@ -56,9 +56,11 @@ def _run(options: Namespace) -> int:
     held = lock.hold(results)
     lock.claim(plans, results)
     is_quiet = options.detail == "quiet"
-    progress = None if is_quiet else Progress()
     results_folder.deleted(results)
     _clear(plans, results, options)
+    if not is_quiet:
+        _tell_changes(plans, results)
+    progress = None if is_quiet else Progress()
     jobs: list[Job] = []
     for _ in range(_STAGES):
         ended = snakemake.run(plans, results, held, arguments, progress)
@@ -83,6 +85,14 @@ def _clear(plans: Sequence[Plan], results: Path, options: Namespace) -> None:
         changes.remove(path)
         if options.detail != "quiet":
             print(f"vibsim: removed, no longer asked for: {path}", file=sys.stderr)
+
+
+def _tell_changes(plans: Sequence[Plan], results: Path) -> None:
+    """Say why experiments run again that have results already."""
+    for plan in plans:
+        reason = reasons.why(plan, results)
+        if reason not in ("", reasons.NEW):
+            print(f"{plan.key}: {reason}", file=sys.stderr, flush=True)
 
 
 def _tell_deleted(results: Path) -> bool:
@@ -121,11 +131,14 @@ def _dry_run(plans: Sequence[Plan], results: Path, arguments: list[str], options
         ended = snakemake.run(plans, results, held, arguments)
         _check(ended)
         jobs = list(_one_by_one(ended.jobs, plans, results))
+        words = list(reasons.in_words(jobs, plans, results))
     if options.json:
         entries = [{"job": str(job), "rule": job.rule, "reason": job.reason} for job in jobs]
         print(json.dumps({"jobs": entries}, indent=1))
-    else:
+    elif options.detail == "full":
         print(*[f"{job}: {job.reason}" for job in jobs] or ["nothing to do"], sep="\n")
+    elif options.detail != "quiet":
+        print(*words or ["nothing to do"], sep="\n")
     return 0
 
 
