@@ -249,6 +249,12 @@ def test_a_wrong_command_line_is_refused(arguments: list[str]) -> None:
     assert caught.value.code == 2
 
 
+def test_an_unknown_command_comes_with_the_nearest(capsys: Capture) -> None:
+    with pytest.raises(SystemExit):
+        main(["jugde", "study.csv"])
+    assert "unknown command 'jugde': did you mean 'judge'?" in capsys.readouterr().err
+
+
 def test_results_that_cannot_be_written_are_named(
     file: Path, tmp_path: Path, capsys: Capture
 ) -> None:

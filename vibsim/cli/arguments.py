@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import vibsim
+from vibsim.core.errors import nearest
 from vibsim.core.vocabulary import RESTRICTIONS
 
 _NAMES = "experiment (name or collection/name), one member of its sweep (NAME@CASE), collection, or FILE.yaml"
@@ -32,6 +33,16 @@ def parser() -> argparse.ArgumentParser:
             names = (option,) if isinstance(option, str) else option
             sub.add_argument(*names, **settings)
     return top
+
+
+def parsed(arguments: Sequence[str]) -> argparse.Namespace:
+    """Return the options of a command line; one that is refused ends the program with status 2."""
+    top = parser()
+    known = [name for name, *_ in _commands()]
+    first = next((word for word in arguments if not word.startswith("-")), None)
+    if first is not None and first not in known:
+        top.error(f"unknown command '{first}': {nearest(first, known)}")
+    return top.parse_args(arguments)
 
 
 def _perform(module: str, name: str, options: argparse.Namespace) -> int:
