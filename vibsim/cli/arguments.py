@@ -85,6 +85,8 @@ def _commands() -> Iterator[tuple[str, str, str, Sequence[_Row]]]:
     yield "check", "plan", "Validate experiment files, without running them.", (files,)
     text = "Show members, jobs, steps, memory, disk space and time of experiments before they run."
     yield "plan", "plan", text, (results, files, _flag("--json", "print the plans as JSON"))
+    text = "Show verdicts, and the solution of the finest level down the screen."
+    yield "show", "show", text, (results, *_show())
     yield "judge", "judge", "Judge whether the results of any solver converge.", tuple(_judge())
     what: _Row = "what", {"choices": LISTS}
     yield (
@@ -141,6 +143,21 @@ def _detail() -> Iterator[_Row]:
         )
 
 
+def _show() -> Iterator[_Row]:
+    """Yield the options of ``vibsim show``."""
+    text = "experiment, one member of its sweep (NAME@CASE), FILE.yaml, or a level file (FILE.nc)"
+    yield _row("what", _word, "EXPERIMENT", text)
+    yield _row("--quantity", _word, "NAME", "what to draw (default: the first position)")
+    yield _row("--scheme", _word, "NAME", "scheme to draw (default: the first)")
+    yield _row(
+        "--level", _from_zero_whole, "L", "level to draw (default: the finest that is there)"
+    )
+    yield _row("--case", _from_zero_whole, "K", "member of a sweep to draw (default: 0)")
+    yield _row("--rows", _positive, "N", "lines of the plot (default: 40)", default=40)
+    yield _row("--from", _finite, "T", "time at which the plot begins", default=0.0, dest="start")
+    yield _flag("--no-plot", "show the verdicts alone")
+
+
 def _judge() -> Iterator[_Row]:
     """Yield the options of ``vibsim judge``."""
     text = "a table (CSV or TSV) with a row for each level, or a netCDF file for each level"
@@ -174,8 +191,8 @@ def _number(text: str, bound: str, least: float) -> float:
         found = float(text)
     except ValueError:
         found = math.nan
-    if not least <= found < math.inf:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a finite number {bound}")
+    if not least <= found < math.inf or math.isinf(found):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a finite number {bound}".rstrip())
     return found
 
 
@@ -188,6 +205,16 @@ def _word(text: str) -> str:
     if not text.strip():
         raise argparse.ArgumentTypeError("must not be empty")
     return text
+
+
+def _finite(text: str) -> float:
+    return _number(text, "", least=-math.inf)
+
+
+def _from_zero_whole(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 0")
+    return int(text)
 
 
 def _positive(text: str) -> int:
