@@ -23,8 +23,10 @@ def test_a_finished_experiment_at_another_place_has_nothing_to_do(place: Place) 
     assert f"report: {place.tiny / 'report.html'}\n" in ended.stdout
     full = place.run("-v")
     assert "adhoc/tiny  PASS\n  PASS  asymptotic  order  theta converges" in full.stdout
-    quiet = place.run("-q")
+    report = place.folder / "report.xml"
+    quiet = place.run("-q", "--junit", str(report))
     assert (quiet.returncode, quiet.stdout, quiet.stderr) == (0, "", "")
+    assert '<testsuite name="adhoc/tiny" tests="1" failures="0" errors="0">' in report.read_text()
 
 
 MATRIX = {

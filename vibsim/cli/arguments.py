@@ -79,6 +79,7 @@ def _commands() -> Iterator[tuple[str, str, str, Sequence[_Row]]]:
         _flag("--verify", verify),
         allow,
         _flag("--json", "print the outcome as JSON"),
+        _row("--junit", _path, "FILE", "write the verdicts as a JUnit report (XML)"),
         *_detail(),
     )
     yield "run", "run.command", "Run experiments and show every verdict.", options

@@ -15,10 +15,10 @@ from tempfile import TemporaryDirectory
 
 from vibsim.cli import failure, outcome_text, resources, results_folder, terminal
 from vibsim.cli.chosen_plans import plans_of
-from vibsim.cli.jobs.common import chosen_results
+from vibsim.cli.jobs.common import chosen_results, refusal
 from vibsim.cli.jobs.simulate import is_made
 from vibsim.cli.jobs.solve import check_allowed
-from vibsim.cli.run import changes, lock, outcome, reasons, snakemake, supervise
+from vibsim.cli.run import changes, junit, lock, outcome, reasons, snakemake, supervise
 from vibsim.cli.run.snakemake import Job, Progress
 from vibsim.core import private_cache
 from vibsim.core.errors import VibsimError
@@ -51,8 +51,12 @@ def _run(options: Namespace) -> int:
     if options.allow_commands:
         # on the command line alone: what a file says is not heard
         arguments += ["--config", "allow_commands=true"]
+    if options.dry_run and options.junit:
+        raise refusal("--junit", options.junit, "a dry run has no verdicts to write")
     if options.dry_run:
         return _dry_run(plans, results, arguments, options)
+    if options.junit:
+        junit.check_place(options.junit)
     held = lock.hold(results)
     lock.claim(plans, results)
     is_quiet = options.detail == "quiet"
@@ -172,6 +176,8 @@ def _show(
     failures = [outcome.failed_job(str(job), results / job.log, results) for job in ended.failed]
     has_index = not failures or _write_index(results)
     status = outcome.status(summaries, failures)
+    if options.junit:
+        junit.write(options.junit, summaries, failures)
     if options.json:
         print(outcome.as_json(summaries, failures, results))
     elif options.detail == "quiet":
