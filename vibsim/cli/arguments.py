@@ -27,7 +27,7 @@ def parser() -> argparse.ArgumentParser:
     commands = top.add_subparsers(required=True, metavar="COMMAND")
     for name, module, text, options in _commands():
         sub = commands.add_parser(name, help=text, description=text)
-        function = "list_" if name == "list" else name
+        function = f"{name}_" if name in ("list", "open") else name
         sub.set_defaults(command=partial(_perform, f"vibsim.cli.{module}", function))
         for option, settings in options:
             names = (option,) if isinstance(option, str) else option
@@ -94,8 +94,16 @@ def _commands() -> Iterator[tuple[str, str, str, Sequence[_Row]]]:
         "list",
         "listing",
         "List what there is to choose from, or print the JSON Schema of experiment files.",
-        (what,),
+        (what, _row("name", _word, "NAME", "one entry, in full", nargs="?")),
     )
+    text = "the reason of a verdict, such as order_low (default: list all of them)"
+    reason = _row("reason", _word, "REASON", text, nargs="?")
+    text = "Explain the reason of a verdict: what it means and what would settle the question."
+    yield "explain", "explain", text, (reason,)
+    text = "experiment whose report is opened (default: the index over all results)"
+    page = _row("experiment", _word, "EXPERIMENT", text, nargs="?")
+    text = "Open a report in the browser; print its path where there is none."
+    yield "open", "open", text, (results, page)
 
     digest = "refuse when the experiment or the code is not the one with this digest"
     discard = "delete a damaged or outdated input, so that the next run makes it again"
