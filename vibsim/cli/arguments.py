@@ -96,6 +96,8 @@ def _commands() -> Iterator[tuple[str, str, str, Sequence[_Row]]]:
         "List what there is to choose from, or print the JSON Schema of experiment files.",
         (what, _row("name", _word, "NAME", "one entry, in full", nargs="?")),
     )
+    text = "Write a commented experiment file to begin with, and the JSON Schema for editors."
+    yield "new", "new", text, tuple(_new())
     text = "the reason of a verdict, such as order_low (default: list all of them)"
     reason = _row("reason", _word, "REASON", text, nargs="?")
     text = "Explain the reason of a verdict: what it means and what would settle the question."
@@ -150,6 +152,13 @@ def _detail() -> Iterator[_Row]:
             (short, name),
             {"action": "store_const", "const": value, "dest": "detail", "help": text},
         )
+
+
+def _new() -> Iterator[_Row]:
+    """Yield the options of ``vibsim new``."""
+    yield _row("file", _path, "FILE", "experiment file to write; one that is there is kept")
+    yield _row("--model", _word, "KIND", "kind of the model (default: pendulum)")
+    yield _row("--like", _word, "EXPERIMENT", "begin with the text of a shipped experiment")
 
 
 def _show() -> Iterator[_Row]:

@@ -116,29 +116,31 @@ def _model(model: Model) -> Iterator[Row]:
         shape = "linear" if model.linear else "nonlinear"
         yield "is", f"{shape}, {'conservative' if model.conservative else 'not conservative'}"
     for number, state in enumerate(model.states):
-        yield "" if number else "initial", f"{state.name}: {state.long_name}{_unit(state.unit)}"
+        yield "" if number else "initial", f"{state.name}: {state.long_name}{unit_text(state.unit)}"
     for number, row in enumerate(model.parameters):
-        yield "" if number else "parameters", _parameter(row)
+        yield "" if number else "parameters", f"{row.key}: {parameter_text(row)}"
     for number, field in enumerate(model.formulas):
         default = f" (default {field.default})" if field.default else ""
         yield "" if number else "formulas", f"{field.name}: {field.description}{default}"
     for number, output in enumerate(model.outputs):
         label = "" if number else "also stored"
-        yield label, f"{output.name}: {output.long_name}{_unit(output.unit)}"
+        yield label, f"{output.name}: {output.long_name}{unit_text(output.unit)}"
     if not model.formulas:
         yield "exact solution", "known" if model.exact is not None else "not known"
     yield "write", f"model: {{kind: {model.kind}}}"
 
 
-def _unit(unit: str) -> str:
+def unit_text(unit: str) -> str:
+    """Write a unit behind what has it; nothing for a plain number."""
     return "" if unit == "1" else f" [{unit}]"
 
 
-def _parameter(row: Parameter) -> str:
+def parameter_text(row: Parameter) -> str:
+    """Say what a parameter is, with unit, default and bounds."""
     bounds = []
     if row.minimum is not None:
         bounds.append(f"{'above' if row.exclusive else 'from'} {row.minimum:g}")
     if row.maximum is not None:
         bounds.append(f"to {row.maximum:g}")
     bound = f", {' '.join(bounds)}" if bounds else ""
-    return f"{row.key}: {row.description}{_unit(row.unit)} (default {row.default:g}{bound})"
+    return f"{row.description}{unit_text(row.unit)} (default {row.default:g}{bound})"
