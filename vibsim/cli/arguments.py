@@ -98,6 +98,10 @@ def _commands() -> Iterator[tuple[str, str, str, Sequence[_Row]]]:
     )
     text = "Write a commented experiment file to begin with, and the JSON Schema for editors."
     yield "new", "new", text, tuple(_new())
+    text = "experiment, FILE.yaml, or a folder of results"
+    sides = (_row("first", _word, "A", text), _row("second", _word, "B", text))
+    text = "Show which settings, verdicts and numbers of two experiments or two results differ."
+    yield "diff", "diff", text, (results, *sides)
     text = "the reason of a verdict, such as order_low (default: list all of them)"
     reason = _row("reason", _word, "REASON", text, nargs="?")
     text = "Explain the reason of a verdict: what it means and what would settle the question."
