@@ -16,17 +16,20 @@ from vibsim.core.vocabulary import RESTRICTIONS
 
 _NAMES = "experiment (name or collection/name), one member of its sweep (NAME@CASE), collection, or FILE.yaml"
 LISTS = ("models", "schemes", "checks", "experiments", "schema")
+SHELLS = ("bash", "zsh", "fish", "words")
 _Row = tuple[str | tuple[str, str], dict[str, Any]]
 """An option, perhaps with a short name before it, and what `argparse` takes of it."""
+Command = tuple[str, str, str, Sequence[_Row]]
+"""The name of a command, the module of its function, what it does, and its options."""
 
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of all commands."""
     top = argparse.ArgumentParser(prog="vibsim", description="Verify vibration simulations.")
     top.add_argument("--version", action="version", version=f"vibsim {vibsim.__version__}")
-    commands = top.add_subparsers(required=True, metavar="COMMAND")
-    for name, module, text, options in _commands():
-        sub = commands.add_parser(name, help=text, description=text)
+    subparsers = top.add_subparsers(required=True, metavar="COMMAND")
+    for name, module, text, options in commands():
+        sub = subparsers.add_parser(name, help=text, description=text)
         function = f"{name}_" if name in ("list", "open") else name
         sub.set_defaults(command=partial(_perform, f"vibsim.cli.{module}", function))
         for option, settings in options:
@@ -38,7 +41,7 @@ def parser() -> argparse.ArgumentParser:
 def parsed(arguments: Sequence[str]) -> argparse.Namespace:
     """Return the options of a command line; one that is refused ends the program with status 2."""
     top = parser()
-    known = [name for name, *_ in _commands()]
+    known = [name for name, *_ in commands()]
     first = next((word for word in arguments if not word.startswith("-")), None)
     if first is not None and first not in known:
         top.error(f"unknown command '{first}': {nearest(first, known)}")
@@ -59,8 +62,8 @@ def _flag(name: str, text: str) -> _Row:
     return name, {"action": "store_true", "help": text}
 
 
-def _commands() -> Iterator[tuple[str, str, str, Sequence[_Row]]]:
-    """Yield the name of each command, the module of its function, what it does, and its options."""
+def commands() -> Iterator[Command]:
+    """Yield all commands."""
     text = "results folder (default: results/ of the checkout)"
     results = _row("--results", _path, "DIR", text)
     files = _row("experiments", _word, "FILE", _NAMES, nargs="+")
@@ -110,6 +113,11 @@ def _commands() -> Iterator[tuple[str, str, str, Sequence[_Row]]]:
     page = _row("experiment", _word, "EXPERIMENT", text, nargs="?")
     text = "Open a report in the browser; print its path where there is none."
     yield "open", "open", text, (results, page)
+
+    shell: _Row = "shell", {"choices": SHELLS, "help": "the shell; `words` is what its script asks"}
+    text = "Print what a shell needs to complete commands, options and names."
+    asked = _row("words", str, "WORD", "the command line so far", nargs="*")
+    yield "completion", "completion", text, (shell, asked)
 
     digest = "refuse when the experiment or the code is not the one with this digest"
     discard = "delete a damaged or outdated input, so that the next run makes it again"
