@@ -74,10 +74,11 @@ def commands() -> Iterator[Command]:
         "run commands and functions that experiment files name (`solver:`); trust the files first"
     )
     allow = _flag("--allow-commands", text)
+    cores = _row("--cores", _positive, "N", "jobs at once (default: all cores)")
     options: tuple[_Row, ...] = (
         results,
         _row("experiments", _word, "EXPERIMENT", _NAMES, nargs="*"),
-        _row("--cores", _positive, "N", "jobs at once (default: all cores)"),
+        cores,
         _flag("--dry-run", "show what would run and why"),
         _flag("--verify", verify),
         allow,
@@ -86,6 +87,9 @@ def commands() -> Iterator[Command]:
         *_detail(),
     )
     yield "run", "run.command", "Run experiments and show every verdict.", options
+    file = _row("file", _path, "FILE", "experiment file")
+    text = "Run an experiment file, and again whenever it is saved."
+    yield "watch", "watch", text, (results, file, cores, allow, *_detail())
     yield "check", "plan", "Validate experiment files, without running them.", (files,)
     text = "Show members, jobs, steps, memory, disk space and time of experiments before they run."
     yield "plan", "plan", text, (results, files, _flag("--json", "print the plans as JSON"))
