@@ -1,7 +1,7 @@
 """The JSON Schemas of ``workflow/schemas``: ``python workflow/schemas.py [--check]``.
 
-Written from the code that reads experiment files and writes summaries and verdicts, for editors and for programs that
-read results.
+Written from the code that reads experiment files, writes summaries and verdicts, and prints JSON: for editors and for
+programs that read results.
 """
 
 from __future__ import annotations
@@ -13,11 +13,14 @@ from pathlib import Path
 from typing import Any
 
 from vibsim.analysis import summary_schema
+from vibsim.cli import json_schemas
 from vibsim.convergence.study import verdict_schema
 from vibsim.experiment.schema import document, solver
 
 SCHEMAS: Mapping[str, Callable[[], dict[str, Any]]] = {
     "experiment": document.schema,
+    "plan": json_schemas.plan,
+    "run": json_schemas.run,
     "solver": solver.schema,
     "summary": summary_schema.schema,
     "verdict": verdict_schema.schema,

@@ -249,6 +249,12 @@ def test_a_wrong_command_line_is_refused(arguments: list[str]) -> None:
     assert caught.value.code == 2
 
 
+def test_an_unknown_command_comes_with_the_nearest(capsys: Capture) -> None:
+    with pytest.raises(SystemExit):
+        main(["jugde", "study.csv"])
+    assert "unknown command 'jugde': did you mean 'judge'?" in capsys.readouterr().err
+
+
 def test_results_that_cannot_be_written_are_named(
     file: Path, tmp_path: Path, capsys: Capture
 ) -> None:
@@ -295,7 +301,9 @@ def test_the_formats_are_those_of_the_report() -> None:
 def test_a_dry_run_makes_no_folder(file: Path, tmp_path: Path, capsys: Capture) -> None:
     new = tmp_path / "new"
     assert main(["run", str(file), "--results", str(new), "--dry-run", "--cores", "1"]) == 0
-    assert "simulate adhoc/tiny level_05.nc: " in capsys.readouterr().out
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "adhoc/tiny: not made yet: levels 5 to 7, analysis, report"
+    assert lines[1] == "  simulate adhoc/tiny level_05.nc"
     assert not new.exists()
 
 

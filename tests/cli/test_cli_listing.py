@@ -9,6 +9,7 @@ import pytest
 
 from vibsim import theory
 from vibsim.cli import main
+from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES
 
 
@@ -67,3 +68,71 @@ def test_the_list_and_the_numbers_of_theory_do_without_sympy() -> None:
         "assert 'sympy' not in sys.modules and 'scipy' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+@pytest.mark.parametrize("kind", SCHEMES)
+def test_a_scheme_in_full_has_its_facts_and_every_option(
+    kind: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["list", "schemes", kind]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 100
+    text = " ".join(" ".join(lines).split())
+    scheme = SCHEMES[kind]
+    for told in (scheme.title, scheme.source, scheme.start, f"schemes: [{kind}]"):
+        assert " ".join(told.split()) in text
+    for option in scheme.options:
+        assert f"{option.name}: " in text
+        assert " ".join(option.description.split()) in text
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_a_model_in_full_has_every_state_and_every_key(
+    kind: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["list", "models", kind]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    model = MODELS[kind]
+    assert " ".join(model.equation.split()) in text
+    for row in (*model.states, *model.formulas, *model.outputs):
+        assert f"{row.name}: " in text
+    for parameter in model.parameters:
+        assert f"{parameter.key}: {parameter.description}" in text
+        assert f"default {parameter.default:g}" in text
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["checks", "period_error"], "period_error: period over the exact period, less one"),
+        (["checks", "stable"], "stable: schemes are stable"),
+        (["experiments", "vehicle"], "vibration_text/vehicle: A vehicle on a bumpy road"),
+        (["experiments", "vibration_text/vehicle"], "vibration_text/vehicle: "),
+    ],
+)
+def test_an_entry_of_another_list_is_its_line(
+    words: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["list", *words]) == 0
+    assert capsys.readouterr().out.startswith(told)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["schemes", "rk5"], "rk5: is no scheme: did you mean 'rk4'?"),
+        (["models", "pendulm"], "did you mean 'pendulum'?"),
+        (["checks", "perid"], "did you mean 'period'?"),
+        (["experiments", "vehicel"], "did you mean 'vehicle'?"),
+        (["experiments", "qqqq"], "such as "),
+        (["schema", "model"], "has no entries"),
+    ],
+)
+def test_an_unknown_entry_comes_with_the_nearest(
+    words: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["list", *words]) == 2
+    captured = capsys.readouterr()
+    assert told in captured.err
+    assert len(captured.err) < 400
+    assert captured.out == ""

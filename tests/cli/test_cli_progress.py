@@ -183,3 +183,26 @@ def test_progress_counts_the_jobs_without_the_target_of_all(
         "2 of 3: index",
     ]
     assert progress.done == 1
+
+
+def test_the_line_of_a_terminal_tells_what_goes_on_and_how_long_the_rest_takes(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = iter(range(0, 1000, 5))
+    monkeypatch.setattr(snakemake.time, "monotonic", lambda: float(next(clock)))
+    monkeypatch.setenv("COLUMNS", "70")
+    progress = Progress()
+    progress.is_terminal = True
+    progress.count(0, 9)
+    progress.start(Job("analyse", ("a/x/convergence.nc",), "", ""))
+    progress.count(2, 9)
+    progress.count(4, 9)
+    shown = capsys.readouterr().err.split("\r\033[K")
+    assert shown[-3:] == [
+        "0 of 8 done: analyse a/x",
+        "2 of 8 done: analyse a/x",
+        "4 of 8 done, about 5.0 s left: analyse a/x",
+    ]
+    monkeypatch.setenv("COLUMNS", "20")
+    progress.count(8, 9)
+    assert capsys.readouterr().err == "\r\033[K8 of 8 done: analys"

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
+import jsonschema
 import pytest
 
 import vibsim as package
 from vibsim import analyse, simulate
 
 from .conftest import Runs
-from .door import FORMAT, build, strict_json, vibsim
+from .door import FORMAT, ROOT, build, strict_json, vibsim
 
 PUBLIC = {
     "Experiment",
@@ -60,6 +62,24 @@ def test_a_run_prints_its_outcome_as_json(runs: Runs) -> None:
         for one in printed["experiments"]:
             stored = runs.folder / name / "adhoc" / one["experiment"] / "summary.json"
             assert strict_json(stored.read_text())["checks"] == one["checks"]
+
+
+def test_what_is_printed_as_json_has_a_published_schema(runs: Runs, tmp_path: Path) -> None:
+    schema = {
+        name: json.loads((ROOT / f"workflow/schemas/{name}.schema.json").read_text())
+        for name in ("run", "plan")
+    }
+    for name in ("passing", "mixed"):
+        jsonschema.validate(strict_json(runs.printed(name)), schema["run"])
+    dry = vibsim("run", runs.file("swept"), "--results", tmp_path / "new", "--dry-run", "--json")
+    jobs = strict_json(dry.stdout)
+    assert jobs["jobs"]
+    jsonschema.validate(jobs, schema["run"])
+    planned = vibsim("plan", "--json", runs.file("swept"), runs.file("tiny"))
+    jsonschema.validate(strict_json(planned.stdout), schema["plan"])
+    for content, name in ((jobs, "run"), (strict_json(runs.printed("mixed")), "run")):
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate({**content, "unknown": 1}, schema[name])
 
 
 def test_a_second_run_makes_nothing_again(runs: Runs, tmp_path: Path) -> None:

@@ -119,3 +119,15 @@ def test_a_member_and_an_experiment_of_its_name_are_refused(root: Path) -> None:
     with pytest.raises(InputError, match="cannot share a name"):
         choose(["scale/big@1", "scale/big_case_1"], root)
     assert keys(["scale/big@1", "scale/big@2"], root) == ["scale/big_case_1", "scale/big_case_2"]
+
+
+def test_of_many_names_none_is_listed(root: Path) -> None:
+    for number in range(80):
+        (root / f"configs/scale/number_{number}.yaml").touch()
+    with pytest.raises(InputError) as caught:
+        choose(["qqqq", "numbr_17", "scale@3"], root)
+    hints = {fault.file: fault.hint for fault in caught.value.faults}
+    assert hints["qqqq"] == "`vibsim list experiments` shows all"
+    assert hints["numbr_17"] == "did you mean 'number_17'?"
+    assert hints["scale@3"].startswith("choose from 81, such as scale/")
+    assert len(hints["scale@3"]) < 100

@@ -87,7 +87,7 @@ def test_verify_compares_every_digest(place: Place) -> None:
     same_time(place.tiny / "figures/thumbnail.svg", flip)
     same_time(place.tiny / "level_08.nc", flip)
     assert place.changed() == set()
-    ended = place.run("--verify", "--dry-run")
+    ended = place.run("--verify", "--dry-run", "-v")
     assert "thumbnail.svg" in ended.stderr
     assert "level_08.nc" in ended.stderr
     assert [line.split()[0] for line in ended.stdout.splitlines()] == [

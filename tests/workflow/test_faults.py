@@ -212,6 +212,9 @@ def test_a_failing_job_is_named_with_its_log_and_the_others_go_on(place: Place, 
     ended = place.run(files=[place.file, other])
     assert ended.returncode == 1
     assert "failed: simulate adhoc/other level_06.nc to level_09.nc" in ended.stdout
+    quiet = place.run("-q", files=[place.file, other])
+    assert (quiet.returncode, quiet.stdout) == (1, "")
+    assert "level_07.nc: No space left on device" in quiet.stderr
     assert "level_06_to_09.log" in ended.stdout
     assert "vibsim: adhoc/other, level 7, member 0: " in ended.stdout
     assert "adhoc/other/level_07.nc: No space left on device" in ended.stdout

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 
 import pytest
+
+from vibsim.cli.chosen_plans import plans_of
+from vibsim.cli.run import reasons
 
 from .conftest import TEXT, Place
 
@@ -15,6 +19,14 @@ def test_a_finished_experiment_at_another_place_has_nothing_to_do(place: Place) 
     ended = place.run()
     assert ended.returncode == 0
     assert "nothing to do" in ended.stdout
+    assert "PASS  adhoc/tiny  theta: order 2.0" in ended.stdout
+    assert f"report: {place.tiny / 'report.html'}\n" in ended.stdout
+    full = place.run("-v")
+    assert "adhoc/tiny  PASS\n  PASS  asymptotic  order  theta converges" in full.stdout
+    report = place.folder / "report.xml"
+    quiet = place.run("-q", "--junit", str(report))
+    assert (quiet.returncode, quiet.stdout, quiet.stderr) == (0, "", "")
+    assert '<testsuite name="adhoc/tiny" tests="1" failures="0" errors="0">' in report.read_text()
 
 
 MATRIX = {
@@ -34,6 +46,49 @@ def test_exactly_what_uses_a_change_runs_again(
     found = place.jobs()
     assert set(found) == expected
     assert len(found) == len(expected)
+
+
+WORDS = {
+    "parameter": ("g: 1.0", "g: 1.5", "model.g: 1.0 -> 1.5: levels 6 to 9, analysis, report"),
+    "level": ("8, 9]", "8, 9, 10]", "levels: 6 to 9 -> 6 to 10: level 10, analysis, report"),
+    "title": ("A tiny", "Another", "title: A tiny pendulum -> Another pendulum: report"),
+    "check": (
+        "order: scheme",
+        "order: 2.1",
+        "checks.order.order: scheme -> 2.1: analysis, report",
+    ),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "told"), WORDS.values(), ids=WORDS)
+def test_a_dry_run_says_in_words_what_changed(place: Place, old: str, new: str, told: str) -> None:
+    place.change(old, new)
+    assert place.run("--dry-run").stdout.splitlines()[0] == f"adhoc/tiny: {told}"
+
+
+def test_a_dry_run_says_what_else_there_is_to_say(place: Place) -> None:
+    (place.tiny / "report.html").unlink()
+    lines = place.run("--dry-run").stdout.splitlines()
+    assert lines[0] == "adhoc/tiny: files are missing or out of date: report"
+    (place.tiny / "summary.json").unlink()
+    lines = place.run("--dry-run").stdout.splitlines()
+    assert lines[0] == "adhoc/tiny: not finished yet: analysis, report"
+    # what the results were made from is gone: nothing else is known of the change
+    place.change("g: 1.0", "g: 1.5")
+    (place.tiny / "convergence.nc").write_bytes(b"damaged")
+    lines = place.run("--dry-run").stdout.splitlines()
+    assert lines[0].startswith("adhoc/tiny: not finished yet: levels 6 to 9")
+
+
+def test_only_a_change_of_the_code_is_left_where_the_settings_are_the_same(
+    place: Place,
+) -> None:
+    (plan,) = plans_of([str(place.file)])
+    other = replace(plan, analysis="0" * 64)
+    assert reasons.why(plan, place.results) == ""
+    assert reasons.why(other, place.results) == "the code of vibsim changed"
+    newer = replace(other, versions={**other.versions, "numpy": "99.0"})
+    assert reasons.why(newer, place.results).endswith(" -> 99.0")
 
 
 @pytest.mark.slow

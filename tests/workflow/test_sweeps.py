@@ -114,7 +114,7 @@ def test_one_member_alone_is_run_and_has_then_nothing_to_do(empty: Place) -> Non
     ended = empty.run(files=[alone])
     assert ended.returncode == 0, ended.stdout + ended.stderr
     assert (empty.results / "adhoc/tiny_case_1/level_06.nc").is_file()
-    assert "adhoc/tiny_case_1  PASS" in ended.stdout
+    assert "PASS  adhoc/tiny_case_1" in ended.stdout
     assert empty.jobs(files=[alone]) == []
 
 
@@ -144,7 +144,7 @@ def test_a_tolerance_that_a_member_does_not_reach_is_told(empty: Place) -> None:
     write(empty, "initial.omega: {linspace: [1.2, 2.2, 40]}", text)
     ended = empty.run()
     assert ended.returncode == 1, ended.stdout + ended.stderr
-    assert "FAIL  mismatch    tolerance" in ended.stdout
+    assert "FAIL  mismatch  tolerance" in ended.stdout
     assert "FAIL in 1 of 40 results" in ended.stdout
     summary = json.loads((empty.tiny / "summary.json").read_text())
     verdict = summary["checks"][-1]

@@ -50,10 +50,10 @@ def _check_limits() -> None:
 
 def _perform(arguments: Sequence[str]) -> int:
     try:
-        from vibsim.cli.arguments import parser
+        from vibsim.cli.arguments import parsed
 
         try:
-            options = parser().parse_args(arguments)
+            options = parsed(arguments)
             status: int = options.command(options)
         finally:
             sys.stdout.flush()

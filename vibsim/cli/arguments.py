@@ -11,26 +11,41 @@ from pathlib import Path
 from typing import Any
 
 import vibsim
+from vibsim.core.errors import nearest
 from vibsim.core.vocabulary import RESTRICTIONS
 
 _NAMES = "experiment (name or collection/name), one member of its sweep (NAME@CASE), collection, or FILE.yaml"
 LISTS = ("models", "schemes", "checks", "experiments", "schema")
-_Row = tuple[str, dict[str, Any]]
-"""An option with what `argparse` takes of it."""
+SHELLS = ("bash", "zsh", "fish", "words")
+_Row = tuple[str | tuple[str, str], dict[str, Any]]
+"""An option, perhaps with a short name before it, and what `argparse` takes of it."""
+Command = tuple[str, str, str, Sequence[_Row]]
+"""The name of a command, the module of its function, what it does, and its options."""
 
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of all commands."""
     top = argparse.ArgumentParser(prog="vibsim", description="Verify vibration simulations.")
     top.add_argument("--version", action="version", version=f"vibsim {vibsim.__version__}")
-    commands = top.add_subparsers(required=True, metavar="COMMAND")
-    for name, module, text, options in _commands():
-        sub = commands.add_parser(name, help=text, description=text)
-        function = "list_" if name == "list" else name
+    subparsers = top.add_subparsers(required=True, metavar="COMMAND")
+    for name, module, text, options in commands():
+        sub = subparsers.add_parser(name, help=text, description=text)
+        function = f"{name}_" if name in ("list", "open") else name
         sub.set_defaults(command=partial(_perform, f"vibsim.cli.{module}", function))
         for option, settings in options:
-            sub.add_argument(option, **settings)
+            names = (option,) if isinstance(option, str) else option
+            sub.add_argument(*names, **settings)
     return top
+
+
+def parsed(arguments: Sequence[str]) -> argparse.Namespace:
+    """Return the options of a command line; one that is refused ends the program with status 2."""
+    top = parser()
+    known = [name for name, *_ in commands()]
+    first = next((word for word in arguments if not word.startswith("-")), None)
+    if first is not None and first not in known:
+        top.error(f"unknown command '{first}': {nearest(first, known)}")
+    return top.parse_args(arguments)
 
 
 def _perform(module: str, name: str, options: argparse.Namespace) -> int:
@@ -47,8 +62,8 @@ def _flag(name: str, text: str) -> _Row:
     return name, {"action": "store_true", "help": text}
 
 
-def _commands() -> Iterator[tuple[str, str, str, Sequence[_Row]]]:
-    """Yield the name of each command, the module of its function, what it does, and its options."""
+def commands() -> Iterator[Command]:
+    """Yield all commands."""
     text = "results folder (default: results/ of the checkout)"
     results = _row("--results", _path, "DIR", text)
     files = _row("experiments", _word, "FILE", _NAMES, nargs="+")
@@ -59,27 +74,54 @@ def _commands() -> Iterator[tuple[str, str, str, Sequence[_Row]]]:
         "run commands and functions that experiment files name (`solver:`); trust the files first"
     )
     allow = _flag("--allow-commands", text)
+    cores = _row("--cores", _positive, "N", "jobs at once (default: all cores)")
     options: tuple[_Row, ...] = (
         results,
         _row("experiments", _word, "EXPERIMENT", _NAMES, nargs="*"),
-        _row("--cores", _positive, "N", "jobs at once (default: all cores)"),
+        cores,
         _flag("--dry-run", "show what would run and why"),
         _flag("--verify", verify),
         allow,
         _flag("--json", "print the outcome as JSON"),
+        _row("--junit", _path, "FILE", "write the verdicts as a JUnit report (XML)"),
+        *_detail(),
     )
     yield "run", "run.command", "Run experiments and show every verdict.", options
+    file = _row("file", _path, "FILE", "experiment file")
+    text = "Run an experiment file, and again whenever it is saved."
+    yield "watch", "watch", text, (results, file, cores, allow, *_detail())
     yield "check", "plan", "Validate experiment files, without running them.", (files,)
     text = "Show members, jobs, steps, memory, disk space and time of experiments before they run."
     yield "plan", "plan", text, (results, files, _flag("--json", "print the plans as JSON"))
+    text = "Show verdicts, and the solution of the finest level down the screen."
+    yield "show", "show", text, (results, *_show())
     yield "judge", "judge", "Judge whether the results of any solver converge.", tuple(_judge())
     what: _Row = "what", {"choices": LISTS}
     yield (
         "list",
         "listing",
         "List what there is to choose from, or print the JSON Schema of experiment files.",
-        (what,),
+        (what, _row("name", _word, "NAME", "one entry, in full", nargs="?")),
     )
+    text = "Write a commented experiment file to begin with, and the JSON Schema for editors."
+    yield "new", "new", text, tuple(_new())
+    text = "experiment, FILE.yaml, or a folder of results"
+    sides = (_row("first", _word, "A", text), _row("second", _word, "B", text))
+    text = "Show which settings, verdicts and numbers of two experiments or two results differ."
+    yield "diff", "diff", text, (results, *sides)
+    text = "the reason of a verdict, such as order_low (default: list all of them)"
+    reason = _row("reason", _word, "REASON", text, nargs="?")
+    text = "Explain the reason of a verdict: what it means and what would settle the question."
+    yield "explain", "explain", text, (reason,)
+    text = "experiment whose report is opened (default: the index over all results)"
+    page = _row("experiment", _word, "EXPERIMENT", text, nargs="?")
+    text = "Open a report in the browser; print its path where there is none."
+    yield "open", "open", text, (results, page)
+
+    shell: _Row = "shell", {"choices": SHELLS, "help": "the shell; `words` is what its script asks"}
+    text = "Print what a shell needs to complete commands, options and names."
+    asked = _row("words", str, "WORD", "the command line so far", nargs="*")
+    yield "completion", "completion", text, (shell, asked)
 
     digest = "refuse when the experiment or the code is not the one with this digest"
     discard = "delete a damaged or outdated input, so that the next run makes it again"
@@ -116,6 +158,40 @@ def _commands() -> Iterator[tuple[str, str, str, Sequence[_Row]]]:
     yield "report", "jobs.report", text, (*job, perhaps, folder, formats_row)
 
 
+def _detail() -> Iterator[_Row]:
+    """Yield the options that say how much is printed: the last one counts."""
+    for short, name, value, text in (
+        ("-v", "--verbose", "full", "show every check, also those that passed"),
+        ("-q", "--quiet", "quiet", "print nothing but errors; the exit status tells the rest"),
+    ):
+        yield (
+            (short, name),
+            {"action": "store_const", "const": value, "dest": "detail", "help": text},
+        )
+
+
+def _new() -> Iterator[_Row]:
+    """Yield the options of ``vibsim new``."""
+    yield _row("file", _path, "FILE", "experiment file to write; one that is there is kept")
+    yield _row("--model", _word, "KIND", "kind of the model (default: pendulum)")
+    yield _row("--like", _word, "EXPERIMENT", "begin with the text of a shipped experiment")
+
+
+def _show() -> Iterator[_Row]:
+    """Yield the options of ``vibsim show``."""
+    text = "experiment, one member of its sweep (NAME@CASE), FILE.yaml, or a level file (FILE.nc)"
+    yield _row("what", _word, "EXPERIMENT", text)
+    yield _row("--quantity", _word, "NAME", "what to draw (default: the first position)")
+    yield _row("--scheme", _word, "NAME", "scheme to draw (default: the first)")
+    yield _row(
+        "--level", _from_zero_whole, "L", "level to draw (default: the finest that is there)"
+    )
+    yield _row("--case", _from_zero_whole, "K", "member of a sweep to draw (default: 0)")
+    yield _row("--rows", _positive, "N", "lines of the plot (default: 40)", default=40)
+    yield _row("--from", _finite, "T", "time at which the plot begins", default=0.0, dest="start")
+    yield _flag("--no-plot", "show the verdicts alone")
+
+
 def _judge() -> Iterator[_Row]:
     """Yield the options of ``vibsim judge``."""
     text = "a table (CSV or TSV) with a row for each level, or a netCDF file for each level"
@@ -149,8 +225,8 @@ def _number(text: str, bound: str, least: float) -> float:
         found = float(text)
     except ValueError:
         found = math.nan
-    if not least <= found < math.inf:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a finite number {bound}")
+    if not least <= found < math.inf or math.isinf(found):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a finite number {bound}".rstrip())
     return found
 
 
@@ -163,6 +239,16 @@ def _word(text: str) -> str:
     if not text.strip():
         raise argparse.ArgumentTypeError("must not be empty")
     return text
+
+
+def _finite(text: str) -> float:
+    return _number(text, "", least=-math.inf)
+
+
+def _from_zero_whole(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 0")
+    return int(text)
 
 
 def _positive(text: str) -> int:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from vibsim.plan import Plan, checkout, choose, load_all
+from vibsim.core.errors import Fault, InputError
+from vibsim.plan import Plan, checkout, choose, load, load_all
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment
@@ -26,3 +27,12 @@ def plans_of(words: Sequence[str], *, cached: bool = False) -> list[Plan]:
     all files.
     """
     return list(load_all(choose(words, checkout()), resolve, cached=cached).values())
+
+
+def one_plan_of(word: str) -> Plan:
+    """Return the plan of one experiment, perhaps one that was made before; InputError where `word` is a collection."""
+    choices = choose([word], checkout())
+    if len(choices) != 1:
+        rule = "must be one experiment, not a collection"
+        raise InputError([Fault("command line", 0, "EXPERIMENT", word, rule)])
+    return load(choices[0], resolve, cached=True)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from argparse import Namespace
 from collections.abc import Collection, Iterable
 from typing import TYPE_CHECKING
 
-from vibsim.core.errors import Fault, InputError
+from vibsim.cli.entry import choices, facts, in_full
+from vibsim.cli.jobs.common import refusal
+from vibsim.core.errors import Fault, InputError, nearest
 
 if TYPE_CHECKING:
     from vibsim.models import Model
-    from vibsim.schemes import AnyOption, Scheme
+    from vibsim.schemes import Scheme
 
 
 def list_(options: Namespace) -> int:
@@ -22,6 +23,8 @@ def list_(options: Namespace) -> int:
     InputError
         Behind the list, where a package offers something that cannot be had.
     """
+    if options.name is not None:
+        return _one(options.what, options.name)
     if options.what == "schema":
         return _schema()
     faults: list[Fault] = []
@@ -35,6 +38,26 @@ def list_(options: Namespace) -> int:
         print(f"{name.ljust(width)}  {text}".rstrip())
     if faults:
         raise InputError(faults)
+    return 0
+
+
+def _one(what: str, name: str) -> int:
+    """Print one entry in full: of models and schemes all there is to know, of other lists its line."""
+    if what in ("models", "schemes"):
+        print(*in_full(what, name), sep="\n")
+        return 0
+    if what == "schema":
+        raise refusal("NAME", name, "the JSON Schema has no entries")
+    rows = [
+        (key.strip(), text) for key, text in (_checks() if what == "checks" else _experiments())
+    ]
+    found = [row for row in rows if name in (row[0], row[0].rpartition("/")[2])]
+    if not found:
+        known = [key for key, _ in rows]
+        names = [*known, *(key.rpartition("/")[2] for key in known if "/" in key)]
+        raise refusal("NAME", name, f"is not in the list of {what}", nearest(name, names))
+    for key, text in found:
+        print(f"{key}: {text}")
     return 0
 
 
@@ -74,45 +97,18 @@ def _schemes() -> tuple[Iterable[tuple[str, str]], list[Fault]]:
 def _of_schemes(schemes: Collection[Scheme]) -> Iterable[tuple[str, str]]:
     """Yield a line of facts for each scheme, then what it is and where it comes from, then its options."""
     head = ("order", "step", "symplectic", "forces/step", "stability limit")
-    facts = {scheme.kind: _facts(scheme) for scheme in schemes}
-    widths = [max(map(len, column)) for column in zip(head, *facts.values(), strict=True)]
+    columns = {scheme.kind: facts(scheme) for scheme in schemes}
+    widths = [max(map(len, column)) for column in zip(head, *columns.values(), strict=True)]
 
-    def line(columns: Iterable[str]) -> str:
-        return "  ".join(text.ljust(width) for text, width in zip(columns, widths, strict=True))
+    def line(cells: Iterable[str]) -> str:
+        return "  ".join(text.ljust(width) for text, width in zip(cells, widths, strict=True))
 
     yield "kind", line(head)
     for scheme in schemes:
-        yield scheme.kind, line(facts[scheme.kind])
+        yield scheme.kind, line(columns[scheme.kind])
         yield "", f"{scheme.title}; {scheme.source}"
         for option in scheme.options:
-            yield f"  {option.name}", f"{_choices(option)}: {option.description}"
-
-
-def _facts(scheme: Scheme) -> tuple[str, ...]:
-    """Return what `_schemes` says of a scheme with its default options."""
-    from vibsim.theory import stability_limit
-
-    forces = str(scheme.force_evaluations)
-    symplectic = "yes" if scheme.symplectic else "no"
-    if scheme.adaptive:
-        return "-", "adaptive", symplectic, forces, "chooses its own steps"
-    options = scheme.defaults()
-    limit = stability_limit(scheme, options)
-    stable = {math.inf: "none", 0.0: "grows at every step"}.get(limit, f"w dt < {limit:.6g}")
-    kind = "explicit" if scheme.explicit else "implicit"
-    per_step = forces if scheme.explicit else f"{forces} x iterations"
-    return f"{scheme.orders(options).position:g}", kind, symplectic, per_step, stable
-
-
-def _choices(option: AnyOption) -> str:
-    """Return what an option may be, and what it is where nothing is said."""
-    from vibsim.schemes import Flag, Option
-
-    if isinstance(option, Option):
-        return f"{' | '.join(option.choices)} (default {option.default})"
-    if isinstance(option, Flag):
-        return f"true | false (default {str(option.default).lower()})"
-    return f"{option.least:g} to {option.most:g} (default {option.default:g})"
+            yield f"  {option.name}", f"{choices(option)}: {option.description}"
 
 
 def _checks() -> Iterable[tuple[str, str]]:

@@ -76,11 +76,24 @@ class StaleFileError(FileError):
     """A whole file that belongs to another job, another experiment or other code."""
 
 
+MOST_CHOICES = 60
+"""So many choices are listed; of more, the nearest are named."""
+_NEAREST = 3
+
+
 def nearest(value: object, choices: Sequence[str]) -> str:
-    """Name the choice nearest to what a user wrote, or list all of them."""
+    """Name the choice nearest to what a user wrote; where none is near, list all, or of many the nearest."""
     if not choices:
         return ""
     close = difflib.get_close_matches(str(value), choices, n=1, cutoff=0.6)
     if close:
         return f"did you mean '{close[0]}'?"
-    return "choose from " + ", ".join(choices)
+    return listed(choices, str(value))
+
+
+def listed(choices: Sequence[str], value: str = "") -> str:
+    """List what there is to choose from; of many those that are nearest to a value, or the first."""
+    if len(choices) <= MOST_CHOICES:
+        return "choose from " + ", ".join(choices)
+    near = difflib.get_close_matches(value, choices, n=_NEAREST, cutoff=0.0) if value else []
+    return f"choose from {len(choices)}, such as " + ", ".join(near or choices[:_NEAREST])

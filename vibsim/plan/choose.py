@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from vibsim.core.errors import Fault, InputError, VibsimError, nearest
+from vibsim.core.errors import MOST_CHOICES, Fault, InputError, VibsimError, listed, nearest
 from vibsim.experiment.collection import ENDINGS, collection_of, find_checkout
 
 DEFAULT = ("pendulum_lab", "showcase")
@@ -88,7 +88,7 @@ def _find_member(word: str, known: list[Choice], root: Path) -> Found:
     if not (case.isascii() and case.isdigit() and len(case) <= MAX_DIGITS):
         return [], ("a member is named by @ and its number, from 0", f"e.g. {name}@0")
     if found := [c for c in known if c.collection == name]:
-        return [], ("a collection has no members", "choose from " + _list(found))
+        return [], ("a collection has no members", _list(found))
     found, rule = _find(name, known, root)
     return [replace(choice, case=int(case)) for choice in found], rule
 
@@ -99,7 +99,7 @@ def _find(word: str, known: list[Choice], root: Path) -> Found:
     of_collection = [choice for choice in known if choice.collection == word]
     found = of_collection or [choice for choice in known if word in (choice.key, choice.name)]
     if len(found) > 1 and not of_collection:
-        return [], ("is the name of several experiments", "choose from " + _list(found))
+        return [], ("is the name of several experiments", _list(found))
     if found:
         return found, None
     if os.path.lexists(word):
@@ -107,7 +107,10 @@ def _find(word: str, known: list[Choice], root: Path) -> Found:
     names = [*dict.fromkeys(c.collection for c in known), *(c.key for c in known)]
     names += [c.name for c in known]
     rule = "is no experiment, no collection and no YAML file"
-    return [], (rule, nearest(word, names) if known else "")
+    hint = nearest(word, names) if known else ""
+    if len(names) > MOST_CHOICES and not hint.startswith("did you mean"):
+        hint = "`vibsim list experiments` shows all"
+    return [], (rule, hint)
 
 
 def _choice(file: Path, root: Path) -> Choice:
@@ -124,4 +127,4 @@ def _clashes(choices: list[Choice]) -> Iterator[Fault]:
 
 
 def _list(choices: list[Choice]) -> str:
-    return ", ".join(choice.key for choice in choices)
+    return listed([choice.key for choice in choices])

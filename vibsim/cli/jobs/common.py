@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 import vibsim
 from vibsim.cli import results_folder
-from vibsim.cli.chosen_plans import resolve
+from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.core.errors import Fault, FileError, InputError, VibsimError
-from vibsim.plan import Plan, checkout, choose, load
+from vibsim.plan import Plan, checkout
 
 if TYPE_CHECKING:
     from vibsim.core.record import Record
@@ -43,10 +43,7 @@ def chosen_results(options: Namespace) -> Path:
 def one_plan(options: Namespace) -> tuple[Plan, Path]:
     """Return the plan of the experiment of a job, and the results folder."""
     results = chosen_results(options)
-    choices = choose([options.experiment], checkout())
-    if len(choices) != 1:
-        raise refusal("EXPERIMENT", options.experiment, "must be one experiment, not a collection")
-    plan = load(choices[0], resolve, cached=True)
+    plan = one_plan_of(options.experiment)
     results_folder.check_folders(results, plan.key)
     return plan, results
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 from argparse import Namespace
@@ -14,12 +13,12 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from vibsim.cli import failure, resources, results_folder
+from vibsim.cli import failure, outcome_text, resources, results_folder, terminal
 from vibsim.cli.chosen_plans import plans_of
-from vibsim.cli.jobs.common import chosen_results
+from vibsim.cli.jobs.common import chosen_results, refusal
 from vibsim.cli.jobs.simulate import is_made
 from vibsim.cli.jobs.solve import check_allowed
-from vibsim.cli.run import changes, lock, outcome, snakemake, supervise
+from vibsim.cli.run import changes, junit, lock, outcome, reasons, snakemake, supervise
 from vibsim.cli.run.snakemake import Job, Progress
 from vibsim.core import private_cache
 from vibsim.core.errors import VibsimError
@@ -27,6 +26,8 @@ from vibsim.plan import Plan
 
 _STAGES = 4
 """How often the workflow is started at most: once, and once for each kind of file found bad."""
+_PAGES = 5
+"""Up to so many experiments, the report of each is named."""
 
 
 def run(options: Namespace) -> int:
@@ -50,35 +51,52 @@ def _run(options: Namespace) -> int:
     if options.allow_commands:
         # on the command line alone: what a file says is not heard
         arguments += ["--config", "allow_commands=true"]
+    if options.dry_run and options.junit:
+        raise refusal("--junit", options.junit, "a dry run has no verdicts to write")
     if options.dry_run:
         return _dry_run(plans, results, arguments, options)
+    if options.junit:
+        junit.check_place(options.junit)
     held = lock.hold(results)
     lock.claim(plans, results)
-    progress = Progress()
+    is_quiet = options.detail == "quiet"
     results_folder.deleted(results)
-    _clear(plans, results, options.verify)
+    _clear(plans, results, options)
+    if not is_quiet:
+        _tell_changes(plans, results)
+    progress = None if is_quiet else Progress()
     jobs: list[Job] = []
     for _ in range(_STAGES):
         ended = snakemake.run(plans, results, held, arguments, progress)
         if ended.jobs:
             _refuse_edited(plans, options)
         summaries = [outcome.collect(plan, results) for plan in plans]
-        progress.clear()
+        if progress:
+            progress.clear()
         jobs.extend(ended.jobs)
         changes.settle(plans, results, (path for job in ended.jobs for path in job.outputs))
         if not _tell_deleted(results):
             break
-    return _show(options, summaries, ended, results, bool(jobs))
+    return _show(options, plans, summaries, ended, results, bool(jobs))
 
 
-def _clear(plans: Sequence[Plan], results: Path, every: bool) -> None:
+def _clear(plans: Sequence[Plan], results: Path, options: Namespace) -> None:
     """Delete what is no longer as it was made, and remove what no experiment asks for any more."""
-    for error in changes.changed(plans, results, every=every):
+    for error in changes.changed(plans, results, every=options.verify):
         results_folder.delete(error, results)
     _tell_deleted(results)
     for path in changes.leftovers(plans, results):
         changes.remove(path)
-        print(f"vibsim: removed, no longer asked for: {path}", file=sys.stderr)
+        if options.detail != "quiet":
+            print(f"vibsim: removed, no longer asked for: {path}", file=sys.stderr)
+
+
+def _tell_changes(plans: Sequence[Plan], results: Path) -> None:
+    """Say why experiments run again that have results already."""
+    for plan in plans:
+        reason = reasons.why(plan, results)
+        if reason not in ("", reasons.NEW):
+            print(f"{plan.key}: {reason}", file=sys.stderr, flush=True)
 
 
 def _tell_deleted(results: Path) -> bool:
@@ -117,11 +135,14 @@ def _dry_run(plans: Sequence[Plan], results: Path, arguments: list[str], options
         ended = snakemake.run(plans, results, held, arguments)
         _check(ended)
         jobs = list(_one_by_one(ended.jobs, plans, results))
+        words = list(reasons.in_words(jobs, plans, results))
     if options.json:
         entries = [{"job": str(job), "rule": job.rule, "reason": job.reason} for job in jobs]
         print(json.dumps({"jobs": entries}, indent=1))
-    else:
+    elif options.detail == "full":
         print(*[f"{job}: {job.reason}" for job in jobs] or ["nothing to do"], sep="\n")
+    elif options.detail != "quiet":
+        print(*words or ["nothing to do"], sep="\n")
     return 0
 
 
@@ -145,6 +166,7 @@ def _check(ended: snakemake.Outcome) -> None:
 
 def _show(
     options: Namespace,
+    plans: Sequence[Plan],
     summaries: list[outcome.Entry],
     ended: snakemake.Outcome,
     results: Path,
@@ -153,17 +175,34 @@ def _show(
     _check(ended)
     failures = [outcome.failed_job(str(job), results / job.log, results) for job in ended.failed]
     has_index = not failures or _write_index(results)
+    status = outcome.status(summaries, failures)
+    if options.junit:
+        junit.write(options.junit, summaries, failures)
     if options.json:
         print(outcome.as_json(summaries, failures, results))
+    elif options.detail == "quiet":
+        errors = [entry for entry in summaries if "error" in entry]
+        lines = [*outcome_text.in_full(errors, terminal.UNCUT), *outcome_text.of_failures(failures)]
+        print(*lines, sep="\n", end="\n" * bool(lines), file=sys.stderr)
     else:
         if not worked:
             print("nothing to do: all results are up to date\n")
-        # what goes to a file is not cut
-        columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else 10_000
-        print(*outcome.as_text(summaries, failures, columns), sep="\n")
+        tell = outcome_text.in_full if options.detail == "full" else outcome_text.in_lines
+        print(*tell(summaries, terminal.columns()), sep="\n")
+        for line in outcome_text.of_failures(failures):
+            print(line)
+        print(f"\n{outcome_text.count(summaries, status)}")
+        for page in _pages(plans, results):
+            print(f"report: {page}")
         if has_index:
-            print(f"report: {results / 'index.html'}")
-    return 0 if outcome.status(summaries, failures) == "PASS" else 1
+            print(f"all results: {results / 'index.html'}")
+    return 0 if status == "PASS" else 1
+
+
+def _pages(plans: Sequence[Plan], results: Path) -> list[Path]:
+    """Return the reports of what was asked for; of many experiments none, since the index links to them."""
+    pages = [results / plan.page for plan in plans]
+    return [page for page in pages if page.is_file()] if len(pages) <= _PAGES else []
 
 
 def _write_index(results: Path) -> bool:

@@ -1,10 +1,9 @@
-"""What a run found: status, reason and sentence of every check, as a table or as JSON."""
+"""What a run found: status, reason and sentence of every check, as plain data or as JSON."""
 
 from __future__ import annotations
 
 import json
-import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -66,37 +65,3 @@ def as_json(summaries: Sequence[Entry], failures: Sequence[Entry], results: Path
         "failed_jobs": failures,
     }
     return json.dumps(content, indent=1, ensure_ascii=False)
-
-
-def as_text(summaries: Sequence[Entry], failures: Sequence[Entry], columns: int) -> Iterator[str]:
-    """Yield the lines of the table, the failed jobs and the count of all checks.
-
-    The terminal has so many `columns`: a check that passed has one line, any other its whole text.
-    """
-    for entry in summaries:
-        yield f"{entry['collection']}/{entry['experiment']}  {entry['status']}"
-        yield from (
-            [f"  {entry['error']}"] if "error" in entry else _checks(entry["checks"], columns)
-        )
-    for failure in failures:
-        yield f"\nfailed: {failure['job']} (log: {failure['log']})"
-        yield from (f"  {line}" for line in failure["tail"])
-    checks = [check["status"] for entry in summaries for check in entry["checks"]]
-    counted = "1 experiment" if len(summaries) == 1 else f"{len(summaries)} experiments"
-    passed = f"{checks.count('PASS')} of {len(checks)} checks passed"
-    yield f"\n{counted}, {passed}: {status(summaries, failures)}"
-
-
-def _checks(checks: Sequence[Entry], columns: int) -> Iterator[str]:
-    fields = ("status", "reason", "id")
-    rows = [[str(check[field] or "") for field in fields] for check in checks]
-    widths = [max(len(row[i]) for row in rows) for i in range(3)]
-    for row, check in zip(rows, checks, strict=True):
-        head = "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-        if check["status"] == "PASS":
-            room = max(columns - len(head) - 2, 30)
-            yield f"{head}  {textwrap.shorten(check['text'], room, placeholder=' ...')}"
-            continue
-        yield head.rstrip()
-        for text in filter(None, (check["text"], check["advice"])):
-            yield textwrap.indent(textwrap.fill(text, max(columns - 6, 30)), " " * 6)

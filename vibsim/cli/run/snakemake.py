@@ -9,13 +9,14 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Thread
 from typing import Any, BinaryIO
 
-from vibsim.cli import results_folder
+from vibsim.cli import resources, results_folder
 from vibsim.cli.run import lock, supervise
 from vibsim.core import private_cache
 from vibsim.core.errors import VibsimError
@@ -27,6 +28,8 @@ _SEARCH_PATHS = (
     *("BASH_ENV", "HDF5_PLUGIN_PATH", "MPLCONFIGDIR"),
 )
 """Variables with folders and files that code is loaded from."""
+_TELLING = 3
+"""From so many finished jobs on, they tell how long the others take."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +72,9 @@ class Progress:
         self.done = 0
         self.started = 0
         self.total = 0
-        self.current = ""
+        self.current = "starting the workflow"
+        self.began = time.monotonic()
+        self._show()
 
     def count(self, done: int, total: int) -> None:
         """Take how many jobs are done of how many, both with the target of all, which is no job."""
@@ -77,6 +82,7 @@ class Progress:
         self.done = min(done, self.total)
         if not done:
             self.started = 0
+            self.began = time.monotonic()
         self._show()
 
     def start(self, job: Job) -> None:
@@ -95,8 +101,15 @@ class Progress:
 
     def _show(self) -> None:
         if self.is_terminal:
-            count = f"{self.done} of {self.total}: " if self.total else ""
+            count = f"{self.done} of {self.total} done{self._left()}: " if self.total else ""
             self._rewrite(f"{count}{self.current}")
+
+    def _left(self) -> str:
+        """Say how long the rest takes if its jobs are like those that are done, where some are."""
+        if self.done < _TELLING or self.done == self.total:
+            return ""
+        each = (time.monotonic() - self.began) / self.done
+        return f", about {resources.duration(each * (self.total - self.done))} left"
 
     def _rewrite(self, text: str) -> None:
         width = shutil.get_terminal_size().columns - 1

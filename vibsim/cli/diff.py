@@ -1,0 +1,133 @@
+"""``vibsim diff``: what differs between two experiments, or two results: settings, verdicts and numbers."""
+
+from __future__ import annotations
+
+import math
+from argparse import Namespace
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from vibsim.cli import settings
+from vibsim.cli.chosen_plans import one_plan_of
+from vibsim.cli.jobs.common import chosen_results
+from vibsim.cli.settings import Change
+from vibsim.cli.terminal import clean, painted
+from vibsim.plan.digests import analysed, solved_and_judged
+from vibsim.store import read_json
+
+_DIGITS = 6
+_RESULTS = ("summary.json", "convergence.nc", "report.html")
+"""Files that stand for the folder of results that they are in."""
+
+
+class Side(NamedTuple):
+    """One of two experiments."""
+
+    content: Mapping[str, Any]
+    """The settings that its results depend on, in normal form."""
+    title: str
+    summary: Mapping[str, Any] | None
+    """Its verdicts; None where there are none of these settings."""
+
+
+def diff(options: Namespace) -> int:
+    """Show the differences; the exit status is 0 where there is none, and 1 where there are some."""
+    results = chosen_results(options)
+    first, second = (_side(word, results) for word in (options.first, options.second))
+    titles = {"title": first.title}, {"title": second.title}
+    parts = {
+        "settings": [
+            *settings.differences(*titles),
+            *settings.differences(first.content, second.content),
+        ]
+    }
+    missing = [
+        word
+        for word, side in ((options.first, first), (options.second, second))
+        if side.summary is None
+    ]
+    if first.summary is not None and second.summary is not None:
+        pairs = _pairs(first.summary, second.summary)
+        parts["verdicts"] = list(_verdicts(pairs))
+        parts["numbers"] = list(_numbers(pairs))
+    for name, changes in parts.items():
+        if changes:
+            print(painted(name, "bold"))
+            print(*(f"  {change}" for change in changes), sep="\n")
+    for word in missing:
+        print(f"{word}: there are no verdicts of these settings yet: vibsim run {word}")
+    if any(parts.values()):
+        return 1
+    if not missing:
+        print("no difference")
+    return 0
+
+
+def _side(word: str, results: Path) -> Side:
+    """Return what a word means: a folder of results, or an experiment with the results that it may have.
+
+    Raises
+    ------
+    FileError
+        Where results are damaged.
+    """
+    path = Path(word)
+    folder = path.parent if path.name in _RESULTS else path
+    if (folder / "summary.json").exists():
+        from vibsim.store.provenance import read_provenance
+
+        summary = read_json(folder / "summary.json")
+        made = read_provenance(folder / "convergence.nc")
+        return Side(made["experiment"], str(summary["title"]), summary)
+    plan = one_plan_of(word)
+    uses = (solved_and_judged if plan.has_solver else analysed)(plan.content)
+    found = None
+    if (results / plan.summary).exists():
+        found = read_json(results / plan.summary, name=plan.key)
+        found = found if found["digest"] == plan.analysis else None
+    return Side(uses, plan.title, found)
+
+
+Pair = tuple[str, Mapping[str, Any] | None, Mapping[str, Any] | None]
+"""Name of a check, and it on both sides, None where there is none."""
+
+
+def _pairs(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[Pair]:
+    before, after = ({row["id"]: row for row in side["checks"]} for side in (first, second))
+    return [(name, before.get(name), after.get(name)) for name in dict.fromkeys([*before, *after])]
+
+
+def _verdicts(pairs: Sequence[Pair]) -> Iterator[Change]:
+    for name, *sides in pairs:
+        old, new = ("" if row is None else f"{row['status']} ({row['reason']})" for row in sides)
+        if old != new:
+            yield Change(clean(name), old, new)
+
+
+def _numbers(pairs: Sequence[Pair]) -> Iterator[Change]:
+    """Compare the numbers of the results that both sides list."""
+    for name, *sides in pairs:
+        old, new = ({} if row is None else _facts(row) for row in sides)
+        for key in (key for key in old if key in new):
+            if old[key] != new[key]:
+                yield Change(clean(f"{name}.{key}"), *_written(old[key], new[key]))
+
+
+def _facts(check: Mapping[str, Any]) -> dict[str, float]:
+    """Return the numbers of a check by scheme, member and name, these only where there are several."""
+    rows = check["results"]
+    several = len({row["scheme"] for row in rows}) > 1, len({row["case"] for row in rows}) > 1
+    found = {}
+    for row in rows:
+        place = [row["scheme"]] * several[0] + [f"case {row['case']}"] * several[1]
+        for name, value in row["facts"].items():
+            if isinstance(value, float) and math.isfinite(value):
+                found[".".join([*place, name])] = value
+    return found
+
+
+def _written(old: float, new: float) -> tuple[str, str]:
+    """Write two numbers with as many digits as tell them apart."""
+    texts = ((f"{old:.{digits}g}", f"{new:.{digits}g}") for digits in range(_DIGITS, 18))
+    return next(pair for pair in texts if pair[0] != pair[1])

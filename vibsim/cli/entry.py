@@ -1,0 +1,146 @@
+"""One entry of ``vibsim list`` in full: what a user needs to know to write it into an experiment file."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from vibsim.cli import terminal
+from vibsim.cli.jobs.common import refusal
+from vibsim.core.errors import nearest
+
+if TYPE_CHECKING:
+    from vibsim.models import Model
+    from vibsim.models.base import Parameter
+    from vibsim.schemes import AnyOption, Scheme
+
+_WIDEST = 100
+Row = tuple[str, str]
+"""A label, empty where the last one goes on, and a text."""
+
+
+def in_full(what: str, name: str) -> list[str]:
+    """Return the lines of a model or a scheme.
+
+    Raises
+    ------
+    InputError
+        Where there is none of that name, with the nearest.
+    """
+    from vibsim.models import MODELS
+    from vibsim.schemes import SCHEMES
+
+    known = sorted(MODELS if what == "models" else SCHEMES)
+    if name not in known:
+        raise refusal("NAME", name, f"is no {what.removesuffix('s')}", nearest(name, known))
+    rows = list(_model(MODELS[name]) if what == "models" else _scheme(SCHEMES[name]))
+    width = max(len(label) for label, _ in rows)
+    columns = min(terminal.columns(), _WIDEST)
+    lines = []
+    for label, text in rows:
+        head = f"{label.ljust(width)}  "
+        rest = " " * len(head)
+        filled = textwrap.fill(
+            text, max(columns, len(head) + 20), subsequent_indent=rest, initial_indent=head
+        )
+        lines.append(filled)
+    return lines
+
+
+def _scheme(scheme: Scheme) -> Iterator[Row]:
+    order, step, symplectic, forces, stable = facts(scheme)
+    yield "scheme", f"{scheme.kind}: {scheme.title}"
+    yield "source", scheme.source
+    yield "family", scheme.family
+    if not scheme.adaptive:
+        orders = scheme.orders(scheme.defaults())
+        of = {"position": order, "velocity": f"{orders.velocity:g}", "energy": f"{orders.energy:g}"}
+        told = ", ".join(f"{number} of the {name}" for name, number in of.items())
+        if orders.energy_linear != orders.energy:
+            exact = math.isinf(orders.energy_linear)
+            linear = "none, it is exact" if exact else f"{orders.energy_linear:g}"
+            told += f" (on a linear, conservative model: {linear})"
+        yield "orders", told
+        if orders.velocity_dependent is not None:
+            with_damping = orders.velocity_dependent.position
+            yield "", f"{with_damping:g} of the position where a force depends on the velocity"
+    yield "step", step
+    yield "first step", scheme.start
+    yield "symplectic", symplectic
+    yield "symmetric", "yes" if scheme.symmetric else "no"
+    yield "forces per step", forces
+    yield "stability limit", stable
+    if not scheme.velocity_forces:
+        kinds = ", ".join(kind for kind, _ in scheme.damped if " " not in kind) or "none"
+        yield "damping", f"of its own treatment: {kinds}; any other is refused"
+    for number, option in enumerate(scheme.options):
+        label = "" if number else "options"
+        yield label, f"{option.name}: {choices(option)}: {option.description}"
+    yield "write", f"schemes: [{scheme.kind}]"
+
+
+def facts(scheme: Scheme) -> tuple[str, ...]:
+    """Return order, kind of step, symplectic or not, forces per step and stability limit, with default options."""
+    from vibsim.theory import stability_limit
+
+    forces = str(scheme.force_evaluations)
+    symplectic = "yes" if scheme.symplectic else "no"
+    if scheme.adaptive:
+        return "-", "adaptive", symplectic, forces, "chooses its own steps"
+    options = scheme.defaults()
+    limit = stability_limit(scheme, options)
+    stable = {math.inf: "none", 0.0: "grows at every step"}.get(limit, f"w dt < {limit:.6g}")
+    kind = "explicit" if scheme.explicit else "implicit"
+    per_step = forces if scheme.explicit else f"{forces} x iterations"
+    return f"{scheme.orders(options).position:g}", kind, symplectic, per_step, stable
+
+
+def choices(option: AnyOption) -> str:
+    """Return what an option may be, and what it is where nothing is said."""
+    from vibsim.schemes import Flag, Option
+
+    if isinstance(option, Option):
+        return f"{' | '.join(option.choices)} (default {option.default})"
+    if isinstance(option, Flag):
+        return f"true | false (default {str(option.default).lower()})"
+    return f"{option.least:g} to {option.most:g} (default {option.default:g})"
+
+
+def _model(model: Model) -> Iterator[Row]:
+    yield "model", f"{model.kind}: {model.title}"
+    yield "equation", model.equation
+    yield "source", model.source
+    if not model.formulas:
+        shape = "linear" if model.linear else "nonlinear"
+        yield "is", f"{shape}, {'conservative' if model.conservative else 'not conservative'}"
+    for number, state in enumerate(model.states):
+        yield "" if number else "initial", f"{state.name}: {state.long_name}{unit_text(state.unit)}"
+    for number, row in enumerate(model.parameters):
+        yield "" if number else "parameters", f"{row.key}: {parameter_text(row)}"
+    for number, field in enumerate(model.formulas):
+        default = f" (default {field.default})" if field.default else ""
+        yield "" if number else "formulas", f"{field.name}: {field.description}{default}"
+    for number, output in enumerate(model.outputs):
+        label = "" if number else "also stored"
+        yield label, f"{output.name}: {output.long_name}{unit_text(output.unit)}"
+    if not model.formulas:
+        yield "exact solution", "known" if model.exact is not None else "not known"
+    yield "write", f"model: {{kind: {model.kind}}}"
+
+
+def unit_text(unit: str) -> str:
+    """Write a unit behind what has it; nothing for a plain number."""
+    return "" if unit == "1" else f" [{unit}]"
+
+
+def parameter_text(row: Parameter) -> str:
+    """Say what a parameter is, with unit, default and bounds."""
+    bounds = []
+    if row.minimum is not None:
+        bounds.append(f"{'above' if row.exclusive else 'from'} {row.minimum:g}")
+    if row.maximum is not None:
+        bounds.append(f"to {row.maximum:g}")
+    bound = f", {' '.join(bounds)}" if bounds else ""
+    return f"{row.description}{unit_text(row.unit)} (default {row.default:g}{bound})"

@@ -1,0 +1,66 @@
+"""``vibsim explain``: what the reason of a verdict means, why it happens, and what would settle the question.
+
+The words are those of the pages (`vibsim.report.text.reasons`).
+"""
+
+from __future__ import annotations
+
+import textwrap
+from argparse import Namespace
+from collections.abc import Iterator
+
+from vibsim.cli import terminal
+from vibsim.cli.jobs.common import refusal
+from vibsim.core.errors import nearest
+from vibsim.core.vocabulary import DECISIVE, REASONS, STATUSES
+
+_WIDEST = 100
+
+
+def explain(options: Namespace) -> int:
+    """Explain one reason; without one, list all of them with their statuses."""
+    if options.reason is None:
+        width = max(map(len, REASONS))
+        for status in STATUSES:
+            for word in (word for word, of in REASONS.items() if of == status):
+                print(f"{word.ljust(width)}  {terminal.painted(status, status)}")
+        return 0
+    if options.reason not in REASONS:
+        hint = nearest(options.reason, list(REASONS))
+        raise refusal("REASON", options.reason, "is no reason of a verdict", hint)
+    print(*_lines(options.reason), sep="\n")
+    return 0
+
+
+def _lines(word: str) -> Iterator[str]:
+    from vibsim.report.text.reasons import REASONS as EXPLAINED
+    from vibsim.report.text.reasons import Reason, reason
+
+    status = REASONS[word]
+    yield f"{terminal.painted(word, 'bold')}: {terminal.painted(status, status)}"
+    own = EXPLAINED[word]
+    yield from _paragraphs(own, "")
+    # what a kind of check means by the same word
+    told: dict[Reason, list[str]] = {}
+    for kind in DECISIVE:
+        told.setdefault(reason(word, kind), []).append(f"`{kind}`")
+    for other, kinds in told.items():
+        if other != own:
+            yield from _paragraphs(other, f"For {', '.join(kinds)}: ")
+    promised = reason(word, "converges", is_promised=True)
+    if promised != own:
+        yield from _paragraphs(promised, "Where the scheme promises that order: ")
+    yield "\nMore: docs/verdicts.md, section Reasons"
+
+
+def _paragraphs(found: tuple[str, str], head: str) -> Iterator[str]:
+    meaning, needs = found
+    width = min(terminal.columns(), _WIDEST)
+    for title, text in (("meaning", f"{head}{meaning}"), ("needed", needs)):
+        indent = " " * 9
+        filled = textwrap.fill(text, width, initial_indent=indent, subsequent_indent=indent)
+        yield (
+            f"{title.ljust(9)}{filled[9:]}"
+            if title == "needed"
+            else f"\n{title.ljust(9)}{filled[9:]}"
+        )

@@ -1,0 +1,32 @@
+"""``vibsim open``: the report of an experiment, or the index over all results, in the browser."""
+
+from __future__ import annotations
+
+import webbrowser
+from argparse import Namespace
+
+from vibsim.cli.chosen_plans import one_plan_of
+from vibsim.cli.jobs.common import chosen_results
+from vibsim.core.errors import VibsimError
+
+
+def open_(options: Namespace) -> int:
+    """Open a page, or print its path where there is no browser.
+
+    Raises
+    ------
+    VibsimError
+        Where there is no such page yet.
+    """
+    results = chosen_results(options)
+    word = options.experiment
+    page = results / ("index.html" if word is None else one_plan_of(word).page)
+    if not page.is_file():
+        rest = "" if word is None else f" {word}"
+        raise VibsimError(f"{page}: there is no report yet: vibsim run{rest}")
+    try:
+        is_open = webbrowser.open(page.as_uri())
+    except webbrowser.Error:
+        is_open = False
+    print(page if not is_open else f"opened {page}")
+    return 0

@@ -1,0 +1,111 @@
+"""Verdicts for a terminal: one line for each experiment, below it what did not pass; or every check."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from vibsim.cli.terminal import clean, painted
+from vibsim.core.vocabulary import SEVERITY
+
+Entry = Mapping[str, Any]
+"""The summary of an experiment, or one of its checks; or a failed job."""
+_NARROWEST = 30
+"""Columns that a text has at least, however narrow the terminal."""
+
+
+def in_lines(summaries: Sequence[Entry], columns: int) -> Iterator[str]:
+    """Yield a line for each experiment, with its headline; below it the checks that did not pass, with advice."""
+    names = [_name(entry) for entry in summaries]
+    width = max(map(len, names), default=0)
+    badge = max((len(entry["status"]) for entry in summaries), default=0)
+    for entry, name in zip(summaries, names, strict=True):
+        status = painted(entry["status"].ljust(badge), entry["status"])
+        line = headline(entry, max(columns - badge - width - 4, _NARROWEST))
+        yield f"{status}  {name.ljust(width)}  {line}".rstrip()
+        yield from checks([row for row in entry["checks"] if row["status"] != "PASS"], columns)
+
+
+def in_full(summaries: Sequence[Entry], columns: int) -> Iterator[str]:
+    """Yield every check of every experiment: one that passed has one line, any other its whole text."""
+    for entry in summaries:
+        yield f"{_name(entry)}  {painted(entry['status'], entry['status'])}"
+        yield from [f"  {entry['error']}"] if "error" in entry else checks(entry["checks"], columns)
+
+
+def of_failures(failures: Sequence[Entry]) -> Iterator[str]:
+    """Yield the jobs that failed, each with the end of its log."""
+    for failure in failures:
+        yield f"\nfailed: {failure['job']} (log: {failure['log']})"
+        yield from (f"  {line}" for line in failure["tail"])
+
+
+def count(summaries: Sequence[Entry], status: str) -> str:
+    """Count the checks that passed, with the status of the whole run."""
+    found = [check["status"] for entry in summaries for check in entry["checks"]]
+    counted = "1 experiment" if len(summaries) == 1 else f"{len(summaries)} experiments"
+    passed = f"{found.count('PASS')} of {len(found)} checks passed"
+    return f"{counted}, {passed}: {painted(status, status)}"
+
+
+def checks(rows: Sequence[Entry], columns: int) -> Iterator[str]:
+    """Yield checks of one experiment: one that passed in one line, any other with its whole text and its advice."""
+    fields = ("status", "reason", "id")
+    table = [[str(check[field] or "") for field in fields] for check in rows]
+    widths = [max((len(row[i]) for row in table), default=0) for i in range(3)]
+    for row, check in zip(table, rows, strict=True):
+        cells = [cell.ljust(width) for cell, width in zip(row, widths, strict=True)]
+        plain = "  " + "  ".join(cells)
+        head = plain.replace(cells[0], painted(cells[0], row[0]), 1)
+        if check["status"] == "PASS":
+            room = max(columns - len(plain) - 2, _NARROWEST)
+            text = textwrap.shorten(clean(check["text"]), room, placeholder=" ...")
+            yield f"{head}  {text}"
+            continue
+        yield head.rstrip()
+        for text in filter(None, (check["text"], check["advice"])):
+            filled = textwrap.fill(clean(text), max(columns - 6, _NARROWEST))
+            yield textwrap.indent(filled, " " * 6)
+
+
+def headline(entry: Entry, columns: int) -> str:
+    """Say in at most so many columns what an experiment found: its order and error, or why it did not pass."""
+    rows: Sequence[Entry] = entry["checks"]
+    missed = [row for row in rows if row["status"] != "PASS"]
+    told = [str(entry.get("error") or (rows[0]["text"] if rows else "no checks"))]
+    if missed:
+        first = max(missed, key=lambda row: SEVERITY[row["status"]])
+        told = [f"{first['reason']} ({len(missed)} of {len(rows)} checks did not pass)"]
+        told.append(str(first["reason"]))
+    else:
+        # what was meant to fail says less than what was meant to pass
+        plain = [row for row in rows if row["expected"] == "PASS"] or rows
+        told = next(filter(None, map(numbers, plain)), told)
+    fitting = next((text for text in told if len(text) <= columns), told[-1])
+    return textwrap.shorten(clean(fitting), columns, placeholder=" ...")
+
+
+def numbers(check: Entry) -> list[str]:
+    """Write the order of a check, its interval and the error of the finest level: all, and then in fewer words.
+
+    Nothing where it has no order.
+    """
+    facts = check["results"][0]["facts"] if check["results"] else {}
+    order, low, high = (facts.get(name) for name in ("order", "order_low", "order_high"))
+    if order is None:
+        return []
+    from vibsim.checks.sentences import order_interval
+
+    head = f"{check['quantity']}: order {order:.3f}"
+    ends = order_interval(low, high) if low is not None and high is not None else ()
+    between = f" ({' to '.join(ends)})" if len(ends) > 1 else ""
+    error = facts.get("relative_error")
+    if error is None:
+        return [f"{head}{between}", head]
+    told = f", relative error {error:.2g}"
+    return [head + between + told, head + told, head]
+
+
+def _name(entry: Entry) -> str:
+    return f"{entry['collection']}/{entry['experiment']}"

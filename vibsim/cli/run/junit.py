@@ -1,0 +1,90 @@
+"""The verdicts as a JUnit report, which continuous integration shows: experiments are suites, checks are cases.
+
+A check that fails is a failure, and so is one that decides nothing, with its reason. What has no verdict, because a job
+failed or a result is damaged, is an error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+from vibsim.cli.terminal import clean
+from vibsim.core.errors import Fault, InputError
+from vibsim.store import write_text
+
+Entry = Mapping[str, Any]
+JOBS = "jobs of the workflow"
+"""Name of the suite of jobs that failed."""
+
+
+def check_place(path: Path) -> None:
+    """Refuse a path where no report can be written, before anything runs, and remove the report of an earlier run.
+
+    Raises
+    ------
+    InputError
+        Where its folder does not exist, or it is no file.
+    """
+    rule = "" if path.parent.is_dir() else f"there is no folder {path.parent}"
+    if path.exists() and not path.is_file():
+        rule = "must be a file"
+    if rule:
+        raise InputError([Fault("command line", 0, "--junit", str(path), rule)])
+    path.unlink(missing_ok=True)
+
+
+def write(path: Path, summaries: Sequence[Entry], failures: Sequence[Entry]) -> None:
+    """Write the report of a run in one step."""
+    root = Element("testsuites", name="vibsim")
+    for entry in summaries:
+        suite = SubElement(root, "testsuite", name=f"{entry['collection']}/{entry['experiment']}")
+        for check in entry["checks"]:
+            _check(suite, entry, check)
+        if "error" in entry:
+            _case(suite, entry, "verdicts", "error", "no_verdicts", str(entry["error"]), "")
+    if failures:
+        suite = SubElement(root, "testsuite", name=JOBS)
+        for failure in failures:
+            lines = "\n".join(map(clean, failure["tail"]))
+            case = {"collection": "vibsim", "experiment": "jobs"}
+            _case(suite, case, failure["job"], "error", "failed_job", "the job failed", lines)
+    for element in (*root, root):
+        counts = {
+            "tests": len(element.findall(".//testcase")),
+            "failures": len(element.findall(".//failure")),
+            "errors": len(element.findall(".//error")),
+        }
+        element.attrib.update({name: str(count) for name, count in counts.items()})
+    ElementTree.indent(root)
+    text = ElementTree.tostring(root, encoding="unicode")
+    write_text(path, f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')
+
+
+def _check(suite: Element, entry: Entry, check: Entry) -> None:
+    if check["status"] == "PASS":
+        case = _case(suite, entry, check["id"])
+        SubElement(case, "system-out").text = clean(check["text"])
+        return
+    told = "\n".join(clean(text) for text in (check["text"], check["advice"]) if text)
+    message = f"{check['status']}: {check['reason']}"
+    _case(suite, entry, check["id"], "failure", str(check["reason"]), message, told)
+
+
+def _case(
+    suite: Element,
+    entry: Entry,
+    name: str,
+    problem: str = "",
+    kind: str = "",
+    message: str = "",
+    text: str = "",
+) -> Element:
+    of = f"{entry['collection']}.{entry['experiment']}"
+    case = SubElement(suite, "testcase", classname=of, name=clean(name))
+    if problem:
+        SubElement(case, problem, type=kind, message=clean(message)).text = text
+    return case

@@ -1,0 +1,93 @@
+"""Why jobs run again, in words: ``model.w: 2.0 -> 2.5: levels 7 to 11, analysis, report``.
+
+Snakemake knows that a digest changed, but not what the digest is of. The results say what they were made from.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from vibsim.cli import settings
+from vibsim.cli.jobs.common import provenance
+from vibsim.cli.run.snakemake import Job
+from vibsim.core.errors import FileError
+from vibsim.plan import Plan
+from vibsim.plan.digests import analysed, solved_and_judged
+from vibsim.store import read_json
+
+NEW = "not made yet"
+_SHOWN = 3
+"""So many changes are named."""
+_LEVEL = re.compile(r"/level_(\d+)(?:/shard_\d+)?\.nc$")
+_DONE = {"analyse": "analysis", "extrapolate": "extrapolated solution"}
+"""What a job makes, where it has another name than the job."""
+
+
+def why(plan: Plan, results: Path) -> str:
+    """Say what changed since the results of an experiment were made; empty where that is not known."""
+    if not (results / plan.key).is_dir():
+        return NEW
+    try:
+        summary = read_json(results / plan.summary, name=plan.key)
+    except FileError:
+        return "not finished yet"
+    if summary["digest"] == plan.analysis:
+        title = settings.Change("title", settings.shown(summary["title"]), plan.title)
+        return "" if title.old == title.new else str(title)
+    from vibsim.store.provenance import read_provenance
+
+    try:
+        made = read_provenance(results / plan.convergence)
+    except FileError:
+        return "not finished yet"
+    return _told(plan, made)
+
+
+def _told(plan: Plan, made: Mapping[str, Any]) -> str:
+    uses = (solved_and_judged if plan.has_solver else analysed)(plan.content)
+    found = settings.differences(made["experiment"], uses)
+    if not found:
+        # an unknown version says nothing, and no record of it is no change
+        now = provenance(plan, uses)["versions"]
+        match made.get("versions"):
+            case dict() as before:
+                now = {key: now.get(key, value) for key, value in before.items()}
+                found = settings.differences(before, now)
+    if not found:
+        return (
+            "the solver, its inputs or the code of vibsim changed"
+            if plan.has_solver
+            else "the code of vibsim changed"
+        )
+    more = [f"{len(found) - _SHOWN} more changes"] if len(found) > _SHOWN + 1 else []
+    shown = found[:_SHOWN] if more else found
+    return "; ".join([*map(str, shown), *more])
+
+
+def in_words(jobs: Sequence[Job], plans: Sequence[Plan], results: Path) -> Iterator[str]:
+    """Yield a line for each experiment with jobs, why they are to run and what they make; below it the jobs."""
+    known = {plan.key: plan for plan in plans}
+    for folder in dict.fromkeys(job.folder for job in jobs):
+        own = [job for job in jobs if job.folder == folder]
+        if folder in known:
+            reason = why(known[folder], results) or "files are missing or out of date"
+            yield f"{folder}: {reason}: {', '.join(what(own))}"
+        yield from (f"  {job}" for job in own)
+
+
+def what(jobs: Sequence[Job]) -> list[str]:
+    """Say what jobs of one experiment make: ``levels 7 to 11``, ``analysis``, ``report``."""
+    levels = sorted(
+        {
+            int(match[1])
+            for job in jobs
+            for path in job.outputs
+            if job.simulates and (match := _LEVEL.search(path))
+        }
+    )
+    others = dict.fromkeys(_DONE.get(job.rule, job.rule) for job in jobs if not job.simulates)
+    head = f"level{'s' if len(levels) > 1 else ''} {settings.shown(levels)}"
+    return [head, *others] if levels else list(others)

@@ -1,0 +1,102 @@
+"""The text of a new experiment file, with a comment on every key: from the kind of a model, or a shipped experiment."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from vibsim.cli.entry import parameter_text, unit_text
+
+if TYPE_CHECKING:
+    from vibsim.models import Model
+
+EDITOR = "# yaml-language-server: $schema="
+"""Before the path of the JSON Schema, for editors that complete keys and mark faults."""
+_END, _FIRST, _LAST = 6.0, 6, 9
+_START = 0.5
+"""End of the time, levels, and initial value of the first position, with which every model resolves its motion."""
+_WIDEST = 120
+"""Columns of a line at most."""
+
+
+def of_model(model: Model, schema: str) -> str:
+    """Return a file with a model, its default parameters, four levels and two checks."""
+    return "\n".join(_lines(model, schema)) + "\n"
+
+
+def of_text(text: str, schema: str) -> str:
+    """Return the text of an experiment file with another schema line."""
+    lines = [line for line in text.splitlines() if not line.startswith(EDITOR)]
+    return "\n".join([f"{EDITOR}{schema}", *lines]) + "\n"
+
+
+def _lines(model: Model, schema: str) -> Iterator[str]:
+    yield f"{EDITOR}{schema}"
+    yield "# Check this file with `vibsim check FILE`, run it with `vibsim run FILE`, and see what it costs with"
+    yield '# `vibsim plan FILE`. Numbers may have units: "50 cm".'
+    yield f"title: {model.title} on four levels"
+    yield ""
+    yield from textwrap.wrap(model.equation, 100, initial_indent="# ", subsequent_indent="# ")
+    yield "model:"
+    yield f"  kind: {model.kind}"
+    yield from _column(
+        [(f"  {row.key}: {row.default!r}", parameter_text(row)) for row in model.parameters]
+    )
+    yield from _column(
+        [
+            (f"  # {field.name}: {field.default}".rstrip(), field.description)
+            for field in model.formulas
+        ]
+    )
+    yield ""
+    if model.start is None:
+        yield "initial:"
+        yield from _column(
+            [
+                (
+                    f"  {state.name}: {_START if state.name == model.position else 0.0!r}",
+                    f"{state.long_name}{unit_text(state.unit)}",
+                )
+                for state in model.states
+            ]
+        )
+        yield ""
+    yield from _column(
+        [
+            ("time:", "the same for every level"),
+            (f"  end: {_END!r}", "or {periods: 10, steps_per_period: 4}"),
+            (
+                f"levels: {{from: {_FIRST}, to: {_LAST}}}",
+                f"level l has 2^l steps: {2**_FIRST} to {2**_LAST}",
+            ),
+            ("schemes:", "all of them: vibsim list schemes"),
+            ("  - rk4", "one in full: vibsim list schemes rk4"),
+        ]
+    )
+    yield ""
+    yield "checks:                       # all kinds and all numbers: vibsim list checks"
+    position = model.position
+    yield f"  # the error of {position} vanishes with the order that the scheme promises"
+    yield f"  - {{converges: {position}, order: scheme}}"
+    yield "  # the error of the finest level is small enough"
+    yield f"  - {{accurate: {position}, relative: 1e-2}}"
+    yield ""
+    yield "# A sweep makes a member for each value:"
+    yield "# sweep:"
+    if model.start is None:
+        yield f"#   initial.{position}: {{linspace: [0.1, 1.0, 10]}}"
+    else:
+        first = model.parameters[0]
+        yield f"#   model.{first.key}: [{0.9 * first.default:.3g}, {first.default:g}]"
+
+
+def _column(rows: list[tuple[str, str]]) -> Iterator[str]:
+    """Yield lines with their comments below each other; a long comment stands above its line."""
+    width = max((len(line) for line, _ in rows), default=0)
+    for line, comment in rows:
+        if width + len(comment) + 4 > _WIDEST:
+            yield f"{' ' * (len(line) - len(line.lstrip()))}# {comment}"
+            yield line
+        else:
+            yield f"{line.ljust(width)}  # {comment}"

@@ -1,0 +1,71 @@
+"""``vibsim watch``: runs an experiment file again whenever it, or a table that it names, is saved."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from argparse import Namespace
+from pathlib import Path
+
+from vibsim.cli.chosen_plans import one_plan_of
+from vibsim.cli.jobs.common import refusal
+from vibsim.cli.run import supervise
+from vibsim.core.errors import VibsimError
+from vibsim.experiment.collection import ENDINGS
+
+PAUSE = 0.3
+"""Seconds between two looks at the files."""
+_Saved = dict[Path, tuple[int, int, int] | None]
+"""Time, size and inode of each file; None where it is not there, as some editors leave it for a moment."""
+
+
+def watch(options: Namespace) -> int:
+    """Run, wait for a change, and run again, until a signal ends it.
+
+    Raises
+    ------
+    InputError
+        Where there is no such file.
+    """
+    file: Path = options.file
+    if file.suffix not in ENDINGS or not file.is_file():
+        raise refusal("FILE", file, "must be an experiment file that is there (.yaml)")
+    while True:
+        watched = _files(file)
+        before = _saved(watched)
+        subprocess.run(_command(options), env=os.environ | supervise.environment(), check=False)
+        print(f"watching {file}: save it to run again, Ctrl-C to end", file=sys.stderr, flush=True)
+        while _saved(watched) == before or not file.exists():
+            time.sleep(PAUSE)
+
+
+def _command(options: Namespace) -> list[str]:
+    words = [sys.executable, "-P", "-m", "vibsim", "run", str(options.file)]
+    if options.results:
+        words += ["--results", str(options.results)]
+    if options.cores:
+        words += ["--cores", str(options.cores)]
+    if options.detail:
+        words.append({"full": "--verbose", "quiet": "--quiet"}[options.detail])
+    return words + ["--allow-commands"] * options.allow_commands
+
+
+def _files(file: Path) -> list[Path]:
+    """Return the file and the tables that it names, these only as long as it is valid."""
+    try:
+        return [file, *(file.parent / name for name, _ in one_plan_of(str(file)).inputs)]
+    except VibsimError:
+        return [file]
+
+
+def _saved(files: list[Path]) -> _Saved:
+    found: _Saved = {}
+    for file in files:
+        try:
+            status = file.stat()
+            found[file] = status.st_mtime_ns, status.st_size, status.st_ino
+        except OSError:
+            found[file] = None
+    return found
