@@ -39,7 +39,7 @@ def inline(document: str, alt: str, *, is_scaled: bool = True) -> str:
         element = re.sub(r'(<svg[^>]*?) width="[^"]*" height="[^"]*"', r"\1", element, count=1)
     # the paper is that of the page
     element = re.sub(r"<rect [^>]*/>\n", "", element, count=1)
-    return element.replace("<svg", f'<svg role="img" aria-label="{escape(alt)}"', 1)
+    return element.replace("<svg", f'<svg class="plot" role="img" aria-label="{escape(alt)}"', 1)
 
 
 def element(picture: Picture) -> str:

@@ -8,7 +8,8 @@ replace, and what a script needs to find values again stands beside the curves:
 ``<g data-axis="time" data-box="left top width height" data-x="low high" data-y="low high" data-log="xy">``
     a panel whose axes have a group id (``ax.set_gid("time")``); its limits are in units of its labels
 ``<g data-curve="label" data-key="key">``
-    a curve or what belongs to it; the key is its group id, else its label
+    a curve or what belongs to it; the key is its group id, else its label. A label that begins with an underscore,
+    which leaves it out of the legend, counts too
 ``<g data-entry="key">``
     the handle or the text of a legend entry
 """
@@ -31,7 +32,6 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager, get_font
 from matplotlib.ft2font import LoadFlags
 from matplotlib.legend import Legend
-from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 from matplotlib.transforms import Affine2D
 
@@ -141,7 +141,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         for artist in _in_order(artists):
             if artist is ax.xaxis or artist is ax.yaxis:
                 self._axis(ax, artist, 0 if artist is ax.xaxis else 1)
-            elif tag and (isinstance(artist, Line2D) or artist.get_gid()):
+            elif tag and not isinstance(artist, (Legend, Axes)):
                 self._curve(artist)
             else:
                 self.add(artist)
@@ -151,15 +151,17 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
     def _curve(self, artist: Any) -> None:
         """Draw what belongs to a curve of a panel that a script can read."""
         label = str(artist.get_label())
-        has_label = not label.startswith("_")
+        has_label = bool(label) and not label.startswith("_child")
+        # what begins with an underscore is left out of legends
+        label = label.removeprefix("_")
         key = artist.get_gid() or (label if has_label else "")
-        if not key:
-            self.add(artist)
-            return
-        name = f' data-curve="{escape(label)}"' if has_label else ""
-        self._body.append(f'<g{name} data-key="{escape(key)}">')
+        before = len(self._body)
         self.add(artist)
-        self._body.append("</g>")
+        # what is empty, or wholly outside, leaves nothing to be read
+        if key and len(self._body) > before:
+            name = f' data-curve="{escape(label)}"' if has_label else ""
+            self._body.insert(before, f'<g{name} data-key="{escape(key)}">')
+            self._body.append("</g>")
 
     def _axis(self, ax: Any, axis: Any, i: int) -> None:
         """Draw grid, ticks, their numbers and the label of an axis: of x with `i` 0, of y with 1."""
@@ -258,7 +260,13 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         """Draw a legend, with the key of its curve at every entry."""
         parent = legend.parent
         every = parent.axes if isinstance(parent, Figure) else [parent]
-        lines = [line for ax in every if ax.get_gid() for line in ax.get_lines()]
+        lines = [
+            line
+            for ax in every
+            if ax.get_gid()
+            for line in ax.get_lines()
+            if np.size(line.get_xdata())
+        ]
         keys = {str(line.get_label()): str(line.get_gid() or line.get_label()) for line in lines}
         for i, (handle, text) in enumerate(
             zip(legend.legend_handles, legend.get_texts(), strict=True)
