@@ -8,8 +8,8 @@ replace, and what a script needs to find values again stands beside the curves:
 ``<g data-axis="time" data-box="left top width height" data-x="low high" data-y="low high" data-log="xy">``
     a panel whose axes have a group id (``ax.set_gid("time")``); its limits are in units of its labels
 ``<g data-curve="label" data-key="key">``
-    a curve or what belongs to it; the key is its group id, else its label. A label that begins with an underscore,
-    which leaves it out of the legend, counts too
+    a curve, or what else has a place on the axes; the key is its group id, else its label. A label that begins with an
+    underscore, which leaves it out of the legend, counts too
 ``<g data-entry="key">``
     the handle or the text of a legend entry
 """
@@ -32,6 +32,7 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager, get_font
 from matplotlib.ft2font import LoadFlags
 from matplotlib.legend import Legend
+from matplotlib.text import Text
 from matplotlib.ticker import NullLocator
 from matplotlib.transforms import Affine2D
 
@@ -158,7 +159,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         before = len(self._body)
         self.add(artist)
         # what is empty, or wholly outside, leaves nothing to be read
-        if key and len(self._body) > before:
+        if not isinstance(artist, Text) and len(self._body) > before:
             name = f' data-curve="{escape(label)}"' if has_label else ""
             self._body.insert(before, f'<g{name} data-key="{escape(key)}">')
             self._body.append("</g>")

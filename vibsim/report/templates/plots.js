@@ -31,9 +31,7 @@ function readPanel(node) {
   const panel = { kind, left, top, width, height, svg: node.ownerSVGElement, across: scale("x"), up: scale("y") };
   panel.x = numbers(node.dataset.x);
   panel.y = numbers(node.dataset.y).map(panel.up.to);
-  const isClipped = (e) => e.hasAttribute("clip-path") || e.parentNode.hasAttribute("clip-path");
-  panel.moved = [...node.querySelectorAll("path, use")]
-    .filter((e) => e.closest("[data-key]") || isClipped(e))
+  panel.moved = [...node.querySelectorAll("[data-key] :is(path, use)")]
     .map((e) => ({ e, from: e.getAttribute(e.localName === "use" ? "x" : "d") }));
   panel.curves = [...node.querySelectorAll("[data-curve]")].map(readCurve);
   const stops = panel.curves.flatMap((curve) => curve.points.map((point) => point[0]));
