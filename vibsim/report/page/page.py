@@ -14,7 +14,7 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.report import choice, data, style
 from vibsim.report.figures import drawing, gallery, thumbnail
-from vibsim.report.page import cards
+from vibsim.report.page import cards, player
 from vibsim.report.style import Picture
 from vibsim.report.tables import best, checks, degrees, levels, members, published, theory, work
 from vibsim.report.tables.scales import table as scales_table
@@ -101,6 +101,7 @@ def write(
         "shown": left_out,
         "digits": members.digits(convergence),
         "pictures": drawn,
+        "player": markup(player.element(experiment, convergence, environment())),
     }
     page = environment().get_template("report.html").render(context)
     store.write_text(directory / "report.html", page)
