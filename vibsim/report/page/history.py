@@ -71,7 +71,12 @@ def _entry(
     entry = {"made": made, "seconds": _seconds(folder), "status": status, "number": number}
     if before is None:
         return entry | {"new": True}
-    was = {key: before[key] for key in ("status", "number") if before[key] != entry[key]}
+    # what has no number now, or had none, tells no change of it
+    was = {
+        key: before[key]
+        for key in ("status", "number")
+        if before[key] and entry[key] and before[key] != entry[key]
+    }
     return entry | ({"was": was} if was else {})
 
 

@@ -20,7 +20,7 @@
     card.id = `card-${card.dataset.key}`;
     link.href = `#${card.id}`;
     link.textContent = card.dataset.key;
-    line.append(link, was ? `: ${was || "nothing"} became ${now || "nothing"}` : ": new");
+    line.append(link, was ? `: ${was} became ${now}` : ": new");
     changes.hidden = false;
   }
   if (entries.length) {
