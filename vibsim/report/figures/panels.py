@@ -17,7 +17,6 @@ LOG_RATIO = 1e6
 LOG_SPREAD = 8.0  # spreads that differ by more than this are drawn on a logarithmic scale
 LONG_LABEL = 36  # letters of a label above which its unit stands in a line of its own
 LEGEND_COLUMNS = 7  # most columns of a legend above panels
-STAMP = (136, 64)  # width and height of the small figure of the index [pixel]
 
 
 @dataclass(frozen=True)
@@ -210,21 +209,3 @@ def draw_spread(ax: Axes, t: Floats, curves: list[Curve], measure: str) -> None:
         ax.set_ylim(*style.limits(*(gap / 10.0**exponent for gap in shown)))
     ax.set_ylabel(style.label("|spread|" if logarithmic else "spread", measure, exponent))
     ax.set_title(f"Spread: distance from {reference.label}", fontweight="normal", fontsize=9)
-
-
-def stamp(t: Floats, curves: list[Curve]) -> Figure:
-    """Return a figure the size of a stamp for the index, with every sound curve as one line and without axes."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(STAMP[0] / 96.0, STAMP[1] / 96.0))
-    ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    whole = [curve for curve in curves if curve.is_whole] or curves
-    sound = [curve for curve in whole if curve.sound] or whole
-    for i, curve in enumerate(sound):
-        width = 2.4 - 1.6 * i / max(1, len(sound) - 1)
-        x, y = style.thin(t, curve.values, STAMP[0] // 2)
-        ax.plot(x, y, color=style.look(i)["color"], linewidth=width)
-    ax.set_xlim(float(t[0]), float(t[-1]) if t[-1] > t[0] else float(t[0]) + 1.0)
-    ax.set_ylim(*style.limits(*(curve.values for curve in sound), margin=0.1))
-    ax.set_axis_off()
-    return figure

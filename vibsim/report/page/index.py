@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -12,20 +12,47 @@ from urllib.parse import quote
 from vibsim import store
 from vibsim.core.errors import FileError
 from vibsim.core.vocabulary import SEVERITY, worst
-from vibsim.report.page.page import environment
+from vibsim.experiment.collection import ADHOC
+from vibsim.report.page import history
+from vibsim.report.page.page import environment, markup
 from vibsim.report.tables.checks import error_of, measured_order, number_of
 from vibsim.report.tables.table import Column, Table, to_csv
 from vibsim.report.text import words
 
 UNREADABLE = ("DAMAGED", "MISSING")
 """Words for an experiment whose verdict cannot be read: it counts as failed."""
-ORDER = ("FAIL", *UNREADABLE, "INCONCLUSIVE", "PASS")
-"""The order in which the sentence counts experiments."""
+TRAP, AS_CLAIMED = "trap caught", "as claimed"
+"""Marks of an experiment whose check expected a failure and got it, and of one that refuted a statement."""
+FILTERS = (
+    ("PASS", "passed"),
+    ("INCONCLUSIVE", "undecided"),
+    ("FAIL", "failed"),
+    ("UNREADABLE", "damaged or missing"),
+    (TRAP, TRAP),
+    (AS_CLAIMED, AS_CLAIMED),
+)
+"""What cards can be filtered by, with its words."""
 HEADERS = (
     "collection", "experiment", "title", "experiment status", "check", "kind", "text", "quantity", "expected",
     "status", "reason", "scheme", "case", "order", "order_low", "order_high", "levels", "value",
     "error", "error_bound", "relative_error", "advice", "failures",
 )  # fmt: skip
+LONGEST = 90  # characters of a finding that stands in place of numbers
+
+
+@dataclass(frozen=True)
+class Headline:
+    """What was measured of an experiment, in two numbers or in words."""
+
+    order: str = ""
+    interval: str = ""
+    error: str = ""
+    text: str = ""
+    """What was found, where no check has an order or an error."""
+
+    def __str__(self) -> str:
+        """Return the number that a later run is compared with."""
+        return f"order {self.order}" if self.order else self.error or self.text
 
 
 @dataclass(frozen=True)
@@ -36,32 +63,77 @@ class Row:
     name: str
     title: str
     status: str
-    why: str  # text and reason of the worst check, or what is wrong with the file
-    counts: str = "–"
-    failures: str = "–"
+    why: str  # text and reason of the worst check, or what is wrong with the file; empty where all passed
+    passed: int = 0
     link: str = ""
-    thumbnail: str = ""
+    picture: str = ""
     checks: Sequence[Mapping[str, Any]] = ()
     broken: int = 0  # number of runs that broke down
+    headline: Headline = field(default_factory=Headline)
+    marks: Sequence[tuple[str, int]] = ()
+    """`TRAP` and `AS_CLAIMED`, with the number of checks."""
+
+    @property
+    def key(self) -> str:
+        """Name of its folder in the results."""
+        return f"{self.collection}/{self.name}"
+
+    @property
+    def tags(self) -> list[str]:
+        """The filters that it comes under."""
+        status = "UNREADABLE" if self.status in UNREADABLE else self.status
+        return [status, *(mark for mark, _ in self.marks)]
+
+    @property
+    def counts(self) -> str:
+        """How many checks passed."""
+        return f"{self.passed} of {len(self.checks)}"
+
+    @property
+    def search(self) -> str:
+        """What a search looks through, in small letters."""
+        found = (result.get("scheme") for check in self.checks for result in check["results"])
+        asked = (check["quantity"] for check in self.checks)
+        known = dict.fromkeys(str(word) for word in (*found, *asked) if word)
+        return " ".join((self.title, self.key, *known)).lower()
 
 
 def write_index(results: Path) -> None:
     """Write ``index.html`` and ``summary.csv`` over all experiments below a results folder.
 
     It holds ``<collection>/<experiment>/summary.json``. A damaged summary, and an experiment with results but without a
-    summary, have a row of their own: what is not known to be right is not passed over.
+    summary, have a card of their own: what is not known to be right is not passed over. What no two runs share, dates
+    and what changed, is in a file beside it (`history`).
     """
     patterns = ("*/*/summary.json", "*/*/convergence.nc", "*/*/level_*")
     folders = {path.parent for pattern in patterns for path in results.glob(pattern)}
     rows = [_row(results, folder) for folder in sorted(folders)]
-    grouped = [(key, list(group)) for key, group in groupby(rows, key=lambda row: row.collection)]
     status = worst("FAIL" if row.status in UNREADABLE else row.status for row in rows)
-    context = {"status": status, "sentence": _sentence(rows), "collections": grouped}
-    page = environment().get_template("index.html").render(context)
-    store.write_text(results / "index.html", page)
+    shipped = [row for row in rows if row.collection != ADHOC]
+    tags = [tag for row in rows for tag in row.tags]
+    template = environment().get_template("index.html")
+    context = {
+        "status": status,
+        "heading": _heading(rows),
+        "filters": [(tag, word, tags.count(tag)) for tag, word in FILTERS],
+        "own": [row for row in rows if row.collection == ADHOC],
+        "shipped": [(key, list(group)) for key, group in groupby(shipped, lambda r: r.collection)],
+        "history": history.FILE,
+        "script": markup(_script()),
+        "script_digest": history.digest_of(_script()),
+    }
+    store.write_text(results / "index.html", template.render(context))
     cells = tuple(line for row in rows for line in _lines(row))
     table = Table("summary", "All checks", tuple(map(Column, HEADERS)), cells)
     store.write_text(results / "summary.csv", to_csv(table))
+    history.update(results, {row.key: (row.status, str(row.headline)) for row in rows})
+
+
+def _script() -> str:
+    """Return the script of the page as it stands between its tags."""
+    loader = environment().loader
+    assert loader is not None
+    return loader.get_source(environment(), "index.js")[0]
 
 
 def _row(results: Path, folder: Path) -> Row:
@@ -78,33 +150,86 @@ def _row(results: Path, folder: Path) -> Row:
         summary = store.read_json(folder / "summary.json", name=f"{collection}/{name}")
     except FileError as error:
         return Row(collection, name, name, "DAMAGED", f"summary.json: {error.reason}")
-    checks, broken = summary["checks"], words.broken(summary)
-    passed = sum(check["status"] == "PASS" for check in checks)
+    checks = summary["checks"]
     return Row(
-        collection, name, summary["title"], summary["status"], _why(checks), f"{passed} of {len(checks)}",
-        str(broken), relative("report.html"), relative("figures/thumbnail.svg"), checks, broken,
+        collection, name, summary["title"], summary["status"], _why(checks),
+        sum(check["status"] == "PASS" for check in checks), relative("report.html"),
+        relative("figures/thumbnail.svg"), checks, words.broken(summary), headline(checks), marks(checks),
     )  # fmt: skip
 
 
 def _why(checks: Sequence[Mapping[str, Any]]) -> str:
-    """Return the worst check and its reason."""
+    """Return the worst check and its reason; empty where all passed."""
     if not checks:
         return "no checks"
     first = max(checks, key=lambda check: SEVERITY[check["status"]])
     if first["status"] == "PASS":
-        return ", ".join(dict.fromkeys(str(check["reason"]) for check in checks))
+        return ""
     # what is conserved goes by its name on its page, too
     quantity = None if first["kind"] == "conserves" else first["quantity"]
     return f"{first['reason']}: {words.labelled(first['text'], quantity)}"
 
 
-def _sentence(rows: Sequence[Row]) -> str:
+def headline(checks: Sequence[Mapping[str, Any]]) -> Headline:
+    """Return the numbers of the first of the worst checks that has any, else what the first check found.
+
+    The order of a trap counts for nothing. What went wrong is told elsewhere.
+    """
+    ranked = sorted(checks, key=lambda check: -SEVERITY[check["status"]])
+    found = [(check, _decides(check)) for check in ranked]
+    wanted = [(check, result) for check, result in found if not is_trap(check)]
+    for _, result in wanted:
+        order, relative = (words.fact(result, name) for name in ("order", "relative_error"))
+        if order is not None or relative is not None:
+            interval = words.interval(words.interval_of(result))
+            return Headline(
+                "" if order is None else words.number(order, "order"),
+                "" if interval == "–" else interval,
+                "" if relative is None else f"{words.number(relative, 'brief')} of its size",
+            )
+    for check, result in found:
+        if check["status"] != "PASS":
+            break
+        sentence = str(result.get("sentence") or "")
+        text = words.labelled(sentence.partition("; ")[0].rstrip("."), check["quantity"])
+        if text:
+            return Headline(text=f"{text[: LONGEST - 1]}…" if len(text) > LONGEST else text)
+    return Headline()
+
+
+def marks(checks: Sequence[Mapping[str, Any]]) -> list[tuple[str, int]]:
+    """Return `TRAP` and `AS_CLAIMED` with the number of checks that passed because something went wrong."""
+    passed = [check for check in checks if check["status"] == "PASS"]
+    refuted = [check for check in passed if is_refuted(check)]
+    traps = [check for check in passed if is_trap(check) and check not in refuted]
+    return [(mark, len(found)) for mark, found in ((TRAP, traps), (AS_CLAIMED, refuted)) if found]
+
+
+def is_refuted(check: Mapping[str, Any]) -> bool:
+    """Say whether a check expects a statement to be false."""
+    return bool(check["kind"] == "claim" and check["expected"] == "false")
+
+
+def is_trap(check: Mapping[str, Any]) -> bool:
+    """Say whether a check expects something else than a success: a failure, or a statement to be false."""
+    is_failure = str(check["expected"]).startswith(("FAIL", "INCONCLUSIVE"))
+    return is_refuted(check) or is_failure
+
+
+def _heading(rows: Sequence[Row]) -> str:
+    """Return the finding over all experiments."""
     if not rows:
-        return "There is no experiment here yet."
-    statuses = [row.status for row in rows]
-    told = [f"{statuses.count(word)} {word}" for word in ORDER if word in statuses]
+        return "There is no experiment here yet"
     whole = "experiment" if len(rows) == 1 else "experiments"
-    return f"{len(rows)} {whole}: {', '.join(told)}."
+    total, passed = sum(len(row.checks) for row in rows), sum(row.passed for row in rows)
+    return f"{len(rows)} {whole}, {passed} of {total} checks passed"
+
+
+def _decides(check: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the worst result of a check."""
+    results = check.get("results") or [{}]
+    found: Mapping[str, Any] = max(results, key=lambda r: SEVERITY[r.get("status") or "PASS"])
+    return found
 
 
 def _lines(row: Row) -> Iterator[tuple[Any, ...]]:
@@ -114,8 +239,7 @@ def _lines(row: Row) -> Iterator[tuple[Any, ...]]:
         yield (*head, *[None] * 5, row.status, row.why, *[None] * 11, row.broken)
     of_check = ("id", "kind", "text", "quantity", "expected", "status", "reason")
     for check in row.checks:
-        results = check.get("results") or [{}]
-        decides = max(results, key=lambda r: SEVERITY[r.get("status") or "PASS"])
+        decides = _decides(check)
         measured = (
             decides.get("scheme"),
             decides.get("case"),

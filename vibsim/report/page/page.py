@@ -8,22 +8,18 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from vibsim import store
 from vibsim.core.errors import VibsimError, nearest
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
-from vibsim.report import choice, data, finest_level, style
-from vibsim.report.data import Member
-from vibsim.report.figures import drawing, gallery, time
-from vibsim.report.figures.panels import Curve, stamp
-from vibsim.report.page import cards
+from vibsim.report import choice, data, style
+from vibsim.report.figures import drawing, gallery, thumbnail
+from vibsim.report.page import cards, player
 from vibsim.report.style import Picture
 from vibsim.report.tables import best, checks, degrees, levels, members, published, theory, work
 from vibsim.report.tables.scales import table as scales_table
 from vibsim.report.tables.table import Table, to_csv, to_latex
-from vibsim.report.types import Environment, Experiment, Figure, Plan
+from vibsim.report.types import Environment, Experiment, Plan
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
 NOTHING: Mapping[str, Any] = {}
@@ -77,7 +73,7 @@ def write(
             files[f"{picture.name}.svg"] = text.encode()
             for form in (form for form in formats if form != "svg"):
                 files[f"{picture.name}.{form}"] = drawing.binary(picture.figure, form)
-    small = drawing.svg(_stamp(position, convergence, shown[0]), "thumbnail")
+    small = thumbnail.thumbnail(experiment, convergence, shown[0])
     replace_files(directory / "figures", {**files, "thumbnail.svg": small.encode()})
     listed, folded = _tables(experiment, convergence)
     scales = scales_table(experiment, convergence)
@@ -105,6 +101,7 @@ def write(
         "shown": left_out,
         "digits": members.digits(convergence),
         "pictures": drawn,
+        "player": markup(player.element(experiment, convergence, environment())),
     }
     page = environment().get_template("report.html").render(context)
     store.write_text(directory / "report.html", page)
@@ -156,21 +153,6 @@ def replace_files(directory: Path, files: Mapping[str, bytes], others: Sequence[
     for path in directory.iterdir() if directory.is_dir() else ():
         if path.is_file() and path.name not in {*files, *others}:
             path.unlink()
-
-
-def _stamp(quantity: str, record: Record, member: Member) -> Figure:
-    """Return the small figure of the index: the rescaled differences; with a single level the solution.
-
-    Without series it is the error, or what two levels say of it, against the level.
-    """
-    if data.is_lean(record):
-        levels = np.array(data.whole(record, "level"), dtype=np.float64)
-        size = finest_level.norms(record, quantity, member)
-        return stamp(levels, [Curve("", np.log10(size))])
-    t = data.times(record, member.case)
-    if not data.whole(record, "pair"):
-        return stamp(t, [Curve("", data.at(record, f"{quantity}_finest", member))])
-    return stamp(t, time.differences(record, quantity, member))
 
 
 def _tables(

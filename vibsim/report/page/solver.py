@@ -14,8 +14,7 @@ from vibsim.convergence import LadderVerdict
 from vibsim.core.record import Record
 from vibsim.experiment.solver import SolverExperiment, restore
 from vibsim.report import style
-from vibsim.report.figures import drawing
-from vibsim.report.figures.panels import Curve, stamp
+from vibsim.report.figures import drawing, thumbnail
 from vibsim.report.page import study
 from vibsim.report.page.cards import provenance_rows
 from vibsim.report.page.page import environment, replace_files
@@ -129,9 +128,7 @@ def _thumbnail(verdict: LadderVerdict) -> Iterator[tuple[str, bytes]]:
     places = np.flatnonzero(found)
     if len(places) > 1:
         sizes = np.log10(np.array(found)[places])
-        with style.applied():
-            figure = stamp(places.astype(np.float64), [Curve("", sizes)])
-            yield "thumbnail.svg", drawing.svg(figure, "thumbnail").encode()
+        yield "thumbnail.svg", thumbnail.document([(places.astype(np.float64), sizes)]).encode()
 
 
 def _setup(experiment: SolverExperiment) -> Iterator[tuple[str, str]]:

@@ -1,0 +1,297 @@
+"""Drawings of systems that move: which lines, springs, bodies and forces, and where they are at every time.
+
+A drawing is a list of parts whose numbers are series over time, in the pixels of a frame of `WIDTH` times `HEIGHT`.
+The page draws a part in the same way at every time (`path_of`, and the same in ``player.js``).
+
+Source: vibration text, section 10.6 (pendulum with its forces, the drag five times larger), 10.7, 10.8 (vehicle), 10.9,
+10.3; sketches of figures 12 to 17.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vibsim.core.array_types import Floats
+from vibsim.formula import parse, values
+from vibsim.models import Model
+
+WIDTH, HEIGHT = 320.0, 220.0
+WEIGHT = 0.45  # length of an arrow as long as the weight, over that of the wire
+MAGNIFIED = 5.0  # how much larger than other forces the drag is drawn
+LONGEST = 1.3  # longest arrow over the length of the wire
+REACH = 92.0  # pixels of the largest displacement of a body on a spring
+COILS = 9  # turns of a spring
+AROUND = 1.2  # seen part of a road over the reach of the body, in its height
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What is known of a motion: series over time of shape (t,), and numbers."""
+
+    model: Model
+    t: Floats
+    states: Mapping[str, Floats]
+    parameters: Mapping[str, Any]
+    reach: Mapping[str, float]
+    """Largest size of each state, in all motions that are drawn side by side."""
+
+    def number(self, name: str) -> float:
+        """Return a parameter."""
+        return float(self.parameters[name])
+
+    def output(self, name: str) -> Floats:
+        """Return the series of an output of the model, shape (t,)."""
+        formula = next(row.formula for row in self.model.outputs if row.name == name)
+        numbers = {"t": self.t, **self.states, **self.parameters}
+        expression = parse(formula, tuple(numbers)) if isinstance(formula, str) else formula
+        return np.broadcast_to(values(expression, numbers), self.t.shape)
+
+    def has(self, name: str) -> bool:
+        """Say whether the model has an output of this name."""
+        return any(row.name == name for row in self.model.outputs)
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a drawing."""
+
+    shape: str
+    """``line`` and ``spring`` between two points, ``circle`` with its radius, ``box`` with its sizes, ``arrow`` along a
+    vector, ``track``: a fixed outline that moves to the left."""
+    look: str
+    """Class of the style."""
+    at: tuple[Floats | float, ...]
+    outline: str = ""
+    """Of a track."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A drawing, and what its colours stand for."""
+
+    parts: tuple[Part, ...]
+    legend: tuple[tuple[str, str], ...] = ()
+    """Look and words of the parts that need a name."""
+
+
+def scene_of(model: Model) -> Callable[[Motion], Scene] | None:
+    """Return what draws the motions of a model; None where its system cannot be drawn."""
+    if model.kind in SCENES:
+        return SCENES[model.kind]
+    is_displacement = model.coordinates == 1 and model.states[0].unit in {"m", "1"}
+    return spring_mass if is_displacement else None
+
+
+def pendulum(motion: Motion) -> Scene:
+    """Draw a pendulum with the forces on its bob."""
+    theta = motion.states["theta"]
+    goes_up = motion.reach["theta"] > 1.9
+    x0, y0, length = (160.0, 110.0, 72.0) if goes_up else (160.0, 22.0, 118.0)
+    along = np.sin(theta), np.cos(theta)
+    x, y = x0 + length * along[0], y0 + length * along[1]
+    parts = [
+        Part("line", "guide", (x0, y0, x0, y0 + 1.1 * length)),
+        Part("line", "wire", (x0, y0, x, y)),
+        Part("circle", "pivot", (x0, y0, 3.0)),
+        # beneath the arrows, so that a small force is seen
+        Part("circle", "body", (x, y, 9.0)),
+    ]
+    legend = []
+    weight, heavy = WEIGHT * length, motion.number("m") * motion.number("g")
+    for name, rod in (("wire_force", "wire"), ("pivot_force", "pivot")):
+        if motion.has(name):
+            pull = weight * _shortened(motion.output(name) / heavy)
+            parts.append(Part("arrow", "gravity", (x, y, 0.0, weight)))
+            parts.append(Part("arrow", "pull", (x, y, -pull * along[0], -pull * along[1])))
+            legend += [("gravity", "gravity"), ("pull", f"force of the {rod}")]
+    for name, arm in (("drag_force", 1.0), ("drag_moment", motion.number("L"))):
+        if motion.has(name):
+            drag = weight * _shortened(MAGNIFIED * motion.output(name) / (heavy * arm))
+            parts.append(Part("arrow", "drag", (x, y, drag * along[1], -drag * along[0])))
+            legend.append(("drag", f"drag, {MAGNIFIED:g} times larger"))
+    return Scene(tuple(parts), tuple(legend))
+
+
+def _shortened(force: Floats) -> Floats:
+    """Return a force over the weight, no longer than the frame has room for."""
+    return np.clip(force, -LONGEST / WEIGHT, LONGEST / WEIGHT)
+
+
+def elastic_pendulum(motion: Motion) -> Scene:
+    """Draw a body on an elastic wire, with its forces."""
+    across, up = motion.states["x"], motion.states["y"]
+    # pivot at (0, 1), and all that is reached
+    widest = max(motion.reach["x"], 0.3)
+    lowest, highest = 1.0 + max(motion.reach["y"], 0.1), max(motion.reach["y"] - 1.0, 0.0)
+    scale = min(0.44 * WIDTH / widest, 0.9 * HEIGHT / (lowest + highest + WEIGHT))
+    x0, y0 = 160.0, 14.0 + scale * highest
+    x, y = x0 + scale * across, y0 + scale * (1.0 - up)
+    pull = _shortened(motion.output("wire_force"))
+    length = np.maximum(np.hypot(across, 1.0 - up), 1e-9)
+    weight = WEIGHT * scale
+    parts = [
+        Part("line", "guide", (x0, y0, x0, y0 + 1.05 * scale)),
+        Part("spring", "wire", (x0, y0, x, y)),
+        Part("circle", "pivot", (x0, y0, 3.0)),
+        Part("circle", "body", (x, y, 9.0)),
+        Part("arrow", "gravity", (x, y, 0.0, weight)),
+        Part("arrow", "pull", (x, y, -weight * pull * across / length, -weight * pull * (1.0 - up) / length)),
+    ]  # fmt: skip
+    legend = [("gravity", "gravity"), ("pull", "force of the wire")]
+    if motion.has("drag_force"):
+        vx, vy = motion.states["vx"], motion.states["vy"]
+        speed = np.maximum(np.hypot(vx, vy), 1e-300)
+        size = weight * _shortened(MAGNIFIED * motion.output("drag_force"))
+        parts.append(Part("arrow", "drag", (x, y, -size * vx / speed, size * vy / speed)))
+        legend.append(("drag", f"drag, {MAGNIFIED:g} times larger"))
+    return Scene(tuple(parts), tuple(legend))
+
+
+def vehicle(motion: Motion) -> Scene:
+    """Draw a wheel on its road, and the body on its spring above; the vehicle stays and the road moves."""
+    place, road = motion.number("speed") * motion.t, _road(motion)
+    body = motion.states["u"] + road
+    tallest = max(float(np.max(np.abs(road))), motion.reach["u"], 1e-9)
+    # the same scale across, unless the road would rush by
+    up = 34.0 / tallest
+    across = min(up, 0.5 * WIDTH / max(AROUND, 0.02 * float(place[-1])))
+    # it is level before the start and behind the end
+    ends = across * place[0] - WIDTH, across * place[-1] + WIDTH
+    seen = np.concatenate([ends[:1], across * place, ends[1:]])
+    heights = np.pad(178.0 - up * road, 1, mode="edge")
+    wheel = 178.0 - up * road - 13.0
+    parts = (
+        Part("track", "ground", (across * place - 160.0,), _outline(seen, heights)),
+        Part("spring", "wire", (160.0, wheel, 160.0, 96.0 - up * body)),
+        Part("circle", "wheel", (160.0, wheel, 13.0)),
+        Part("box", "body", (160.0, 84.0 - up * body, 84.0, 24.0)),
+    )  # fmt: skip
+    return Scene(parts)
+
+
+def _road(motion: Motion) -> Floats:
+    """Return the height of the road under the wheel, shape (t,)."""
+    lookup = motion.model.lookup
+    if lookup is None:
+        return motion.output("road_height")
+    table = lookup.table
+    places = table.first + table.spacing * np.arange(table.points)
+    return np.interp(motion.number("speed") * motion.t, places, table.heights)
+
+
+def bouncing_ball(motion: Motion) -> Scene:
+    """Draw a ball above the ground."""
+    scale = 170.0 / max(motion.reach["h"], 1e-9)
+    y = 195.0 - 10.0 - scale * motion.states["h"]
+    return Scene(
+        (
+            Part("line", "ground", (60.0, 195.0, 260.0, 195.0)),
+            Part("circle", "body", (160.0, y, 10.0)),
+        )
+    )
+
+
+def spring_mass(motion: Motion) -> Scene:
+    """Draw a body that moves to and fro, held by a spring."""
+    return Scene(tuple(_on_spring(motion, "wheel", 18.0)))
+
+
+def sliding_box(motion: Motion) -> Scene:
+    """Draw a box on a floor, held by a spring."""
+    return Scene(tuple(_on_spring(motion, "", 20.0)))
+
+
+def _on_spring(motion: Motion, wheels: str, half: float) -> list[Part]:
+    """Return wall, floor, spring and box, which stands on wheels where it does not slide."""
+    u = motion.states[motion.model.position]
+    floor, middle = 150.0, 180.0
+    x = middle + REACH * u / max(motion.reach[motion.model.position], 1e-300)
+    y = floor - half - (8.0 if wheels else 0.0)
+    parts = [
+        Part("line", "ground", (22.0, 90.0, 22.0, floor)),
+        Part("line", "ground", (22.0, floor, 310.0, floor)),
+        Part("line", "guide", (middle, 84.0, middle, floor)),
+        Part("spring", "wire", (22.0, y, x - half, y)),
+        Part("box", "body", (x, y, 2.0 * half, 2.0 * half)),
+    ]
+    if wheels:
+        parts += [Part("circle", wheels, (x + s * 0.6 * half, floor - 4.0, 4.0)) for s in (-1, 1)]
+    return parts
+
+
+def washing_machine(motion: Motion) -> Scene:
+    """Draw a machine on a spring, with the unbalance that turns in it."""
+    up = 34.0 * motion.states["u"] / max(motion.reach["u"], 1e-300)
+    y = 95.0 - up
+    angle = motion.number("speed") * motion.t
+    # the force e W^2 cos(W t) points upwards at first
+    return Scene(
+        (
+            Part("line", "ground", (70.0, 205.0, 250.0, 205.0)),
+            Part("spring", "wire", (130.0, 205.0, 130.0, y + 46.0)),
+            Part("spring", "wire", (190.0, 205.0, 190.0, y + 46.0)),
+            Part("box", "body", (160.0, y, 104.0, 92.0)),
+            Part("circle", "wheel", (160.0, y, 34.0)),
+            Part("circle", "mark", (160.0 + 26.0 * np.sin(angle), y - 26.0 * np.cos(angle), 6.0)),
+        ),
+        (("mark", "unbalance"),),
+    )
+
+
+SCENES: Mapping[str, Callable[[Motion], Scene] | None] = {
+    "pendulum": pendulum,
+    "linear_pendulum": pendulum,
+    "physical_pendulum": pendulum,
+    "elastic_pendulum": elastic_pendulum,
+    "vehicle": vehicle,
+    "bouncing_ball": bouncing_ball,
+    "sliding_box": sliding_box,
+    "washing_machine": washing_machine,
+}
+"""What draws the motions of a kind of model; another one with a displacement is a body on a spring."""
+
+
+def _outline(x: Floats, y: Floats) -> str:
+    """Return a line through points as the data of a path."""
+    points = zip(np.round(x).astype(int).tolist(), np.round(y, 1).tolist(), strict=True)
+    kept: dict[int, float] = {}
+    for across, height in points:
+        kept.setdefault(across, height)
+    return "M" + "L".join(f"{across} {height:g}" for across, height in kept.items())
+
+
+def path_of(part: Part, k: int) -> str:
+    """Return the data of the path of a part at the k-th time, as ``player.js`` does."""
+    values = [float(np.ravel(column)[k if np.size(column) > 1 else 0]) for column in part.at]
+    match part.shape, values:
+        case "line", [x0, y0, x1, y1]:
+            return f"M{x0:.1f} {y0:.1f}L{x1:.1f} {y1:.1f}"
+        case "spring", [x0, y0, x1, y1]:
+            length = math.hypot(x1 - x0, y1 - y0) or 1.0
+            dx, dy = (x1 - x0) / length, (y1 - y0) / length
+            text = f"M{x0:.1f} {y0:.1f}"
+            for i in range(2 * COILS):
+                s, side = length * (0.1 + 0.8 * (i + 0.5) / (2 * COILS)), 5.0 - 10.0 * (i % 2)
+                text += f"L{x0 + s * dx - side * dy:.1f} {y0 + s * dy + side * dx:.1f}"
+            return f"{text}L{x1:.1f} {y1:.1f}"
+        case "circle", [x, y, r]:
+            return f"M{x - r:.1f} {y:.1f}a{r:g} {r:g} 0 1 0 {2 * r:g} 0a{r:g} {r:g} 0 1 0 {-2 * r:g} 0z"
+        case "box", [x, y, w, h]:
+            return f"M{x - w / 2:.1f} {y - h / 2:.1f}h{w:g}v{h:g}h{-w:g}z"
+        case "arrow", [x, y, dx, dy]:
+            length = math.hypot(dx, dy)
+            if length < 2.0:
+                return ""
+            head = min(8.0, 0.6 * length) / length
+            bx, by = x + dx * (1.0 - head), y + dy * (1.0 - head)
+            nx, ny = -dy * 0.45 * head, dx * 0.45 * head
+            return (
+                f"M{x:.1f} {y:.1f}L{x + dx:.1f} {y + dy:.1f}M{bx + nx:.1f} {by + ny:.1f}"
+                f"L{x + dx:.1f} {y + dy:.1f}L{bx - nx:.1f} {by - ny:.1f}"
+            )
+    raise ValueError(f"{part.shape} of {len(values)} numbers")

@@ -1,0 +1,196 @@
+"""The small picture of an experiment for the index: a map, a response curve, a path in the plane, or the solution.
+
+It is written as SVG of its own, some kilobytes, with colours for light and dark.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibsim.core.array_types import Floats
+from vibsim.core.record import Record
+from vibsim.core.vocabulary import MEMBER
+from vibsim.report import data, finest_level, frame, style, sweep_layout
+from vibsim.report.data import Member
+from vibsim.report.types import Experiment
+
+WIDTH, HEIGHT = 240.0, 96.0
+EDGE = 5.0  # free space around curves
+CURVES = 3  # most curves in one picture
+CELLS = 48, 24  # most cells of a map across and up
+SHADES = 7  # colours of a map
+FLAT = 1e-2  # a number that varies by less than this part of its size makes no curve and no map
+FEWEST = 8  # swept values that make a response curve; of fewer the solutions are drawn
+WIDE = 1e3  # a number whose largest value exceeds its median by this factor is drawn on a logarithmic scale
+BEYOND = 1.5
+"""What leaves the smallest of several solutions by more than this factor is cut off."""
+NUMBERS = ("amplitude", "period", "growth_per_period")
+"""What is drawn over swept parameters: the first that varies."""
+
+_STYLE = (
+    ":root{color-scheme:light dark}path{fill:none;stroke-width:1.8;stroke-linejoin:round;stroke-linecap:round}"
+    ".c0{stroke:#1f3a93}.c1{stroke:#d1495b}.c2{stroke:#d9902f}.map path{stroke:none}"
+    "@media(prefers-color-scheme:dark){.c0{stroke:#9db4ff}.c1{stroke:#ef7f8e}.c2{stroke:#f0b35b}}"
+)
+_ENDS = (38, 44, 120), (209, 73, 91), (246, 211, 133)
+"""Colours of a map for the least, a middle and the largest value."""
+
+Lines = list[tuple[Floats, Floats]]
+
+
+def thumbnail(experiment: Experiment, record: Record, member: Member) -> str:
+    """Return the small picture as an SVG document; `member` is the one whose motion is drawn where no sweep is."""
+    keys = sweep_layout.keys(record)
+    along = sweep_layout.along_of(keys) if keys else None
+    grid = sweep_layout.grid_of(keys) if keys and along is None else None
+    model = experiment.model.definition
+    if along is not None and (lines := _response(record, along)):
+        return document(lines)
+    if grid is not None and (cells := _map(record, grid, model.position)):
+        return _document("".join(cells), "map")
+    if data.is_lean(record):
+        levels = np.array(data.whole(record, "level"), dtype=np.float64)
+        return document([(levels, np.log10(finest_level.norms(record, model.position, member)))])
+    positions = model.states[: model.coordinates]
+    series = [data.at(record, f"{row.name}_finest", member) for row in positions]
+    reach = [_reach(values) for values in series]
+    widest = int(np.argmax(reach))
+    if len(series) == 2 and min(reach) > FLAT * reach[widest]:
+        return document([(series[0], series[1])], is_equal=True)
+    return document(_solutions(record, positions[widest].name, member, along))
+
+
+def _reach(values: Floats) -> float:
+    """Return the distance of the largest from the smallest finite value; 0 where there is none."""
+    there = style.finite(values)
+    return float(np.ptp(there)) if there.size else 0.0
+
+
+def _solutions(
+    record: Record, position: str, member: Member, along: sweep_layout.Along | None
+) -> Lines:
+    """Return the finest level of some members of a sweep, else of each scheme; of one also the coarsest level."""
+    t = data.times(record, member.case)
+    cases = along.lines[0][1][:CURVES].tolist() if along else [member.case]
+    schemes = [member.scheme] if along else list(range(min(len(record["scheme"]), CURVES)))
+    of = [Member(scheme, case, "") for case in reversed(cases) for scheme in reversed(schemes)]
+    if len(of) > 1:
+        series = [data.at(record, f"{position}_finest", one) for one in of]
+    else:
+        levels = [0, len(data.whole(record, "level")) - 1]
+        series = [data.of_level(record, position, member, level) for level in levels]
+    largest = [data.largest(values) for values in series if np.isfinite(values).all()]
+    known = frame.sizes(record, position)
+    lines = []
+    for i, values in enumerate(series):
+        size = float(known[of[i % len(of)].case])
+        most = BEYOND * (size if np.isfinite(size) else min(largest, default=np.inf))
+        lines.append((t, np.where(np.abs(values) <= most, values, np.nan)))
+    return lines
+
+
+def _response(record: Record, along: sweep_layout.Along) -> Lines:
+    """Return a number over the swept key, a curve for each of the other values; nothing where none varies."""
+    key = along.key
+    if key.distinct.size < FEWEST:
+        return []
+    for name in NUMBERS:
+        values = np.abs(data.known(record, name, MEMBER, level=-1)[0])
+        if is_telling(values):
+            if data.largest(values) > WIDE * np.median(style.finite(values)):
+                values = np.log10(style.no_zeros(values))
+            x = np.log(key.values) if key.is_log else key.values
+            return [(x[members], values[members]) for _, members in along.lines[:CURVES]]
+    return []
+
+
+def _map(record: Record, grid: sweep_layout.Grid, position: str) -> list[str]:
+    """Return the cells of a map in colours; nothing where no number varies over it."""
+    found = [np.abs(data.known(record, name, MEMBER, level=-1)[0]) for name in NUMBERS]
+    found.append(np.log10(style.no_zeros(finest_level.error(record, position).best[0])))
+    values = next((values for values in found if is_telling(values)), None)
+    if values is None:
+        return []
+    table = grid.worst(values)
+    steps = [-(-size // most) for size, most in zip(table.shape[::-1], CELLS, strict=True)]
+    table = table[:: steps[1], :: steps[0]]
+    low, high = np.quantile(style.finite(values), (0.02, 0.98))
+    with np.errstate(invalid="ignore"):
+        part = np.clip((table - low) / (high - low or 1.0), 0.0, 1.0)
+        shade = np.where(np.isfinite(part), np.round(part * (SHADES - 1)), -1).astype(int)
+    return list(_cells(shade))
+
+
+def _cells(shade: NDArray[Any]) -> Iterator[str]:
+    """Yield a path of all cells of each shade; the first row is at the bottom."""
+    rows, columns = shade.shape
+    width, height = WIDTH / columns, HEIGHT / rows
+    for k in range(SHADES):
+        parts = []
+        for row in range(rows):
+            there = np.flatnonzero(np.diff(np.concatenate([[0], shade[row] == k, [0]])))
+            for begin, end in there.reshape(-1, 2).tolist():
+                x, y = begin * width, HEIGHT - (row + 1) * height
+                parts.append(f"M{x:.1f} {y:.1f}h{(end - begin) * width:.1f}v{height:.1f}H{x:.1f}z")
+        if parts:
+            place = k / (SHADES - 1) * (len(_ENDS) - 1)
+            i = min(int(place), len(_ENDS) - 2)
+            mixed = np.array(_ENDS[i]) + (place - i) * np.subtract(_ENDS[i + 1], _ENDS[i])
+            red, green, blue = np.round(mixed).astype(int).tolist()
+            yield f'<path style="fill:rgb({red},{green},{blue})" d="{"".join(parts)}"/>'
+
+
+def is_telling(values: Floats) -> bool:
+    """Say whether values vary enough to be drawn."""
+    is_known = 2 * style.finite(values).size > values.size
+    return bool(is_known and _reach(values) > FLAT * data.largest(values))
+
+
+def document(lines: Lines, *, is_equal: bool = False) -> str:
+    """Return curves without axes as an SVG document; the last one on top.
+
+    With `is_equal` both directions have the same scale.
+    """
+    x, y = (style.finite(*(line[i] for line in lines)) for i in (0, 1))
+    if not x.size or not y.size:
+        return _document("")
+    span = [_reach(values) or 1.0 for values in (x, y)]
+    scale = [(WIDTH - 2 * EDGE) / span[0], (HEIGHT - 2 * EDGE) / span[1]]
+    if is_equal:
+        scale = [min(scale)] * 2
+    middle = [0.5 * float(values.min() + values.max()) for values in (x, y)]
+    paths = []
+    for i, (across, up) in enumerate(lines):
+        thinned = style.thin(across, up, int(WIDTH) // 2) if not is_equal else (across, up)
+        horizontal = 0.5 * WIDTH + (thinned[0] - middle[0]) * scale[0]
+        vertical = 0.5 * HEIGHT - (thinned[1] - middle[1]) * scale[1]
+        colour = len(lines) - 1 - i
+        paths.append(f'<path class="c{colour}" d="{outline(horizontal, vertical)}"/>')
+    return _document("".join(paths))
+
+
+def outline(x: Floats, y: Floats) -> str:
+    """Return points as the data of a path, in tenths of a pixel; it is interrupted where one is not finite."""
+    parts, before = [], ""
+    pen = "M"
+    for across, up in zip(x.tolist(), y.tolist(), strict=True):
+        if not (math.isfinite(across) and math.isfinite(up)):
+            pen = "M"
+            continue
+        point = f"{across:.1f} {up:.1f}"
+        if point != before or pen == "M":
+            parts.append(pen + point)
+        pen, before = "L", point
+    return "".join(parts)
+
+
+def _document(content: str, kind: str = "curves") -> str:
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH:g} {HEIGHT:g}">'
+        f'<style>{_STYLE}</style><g class="{kind}">{content}</g></svg>\n'
+    )

@@ -1,0 +1,311 @@
+"""The player of a report: a drawing of the system that moves as the finest level found, above the position over time.
+
+What moves is in the page as numbers, thinned and rounded to tenths of a pixel. Without scripts a picture with several
+positions stands in its place. A second motion is drawn beside the first where the two differ visibly: of all schemes,
+that coarsest level which is furthest from the finest level of the first scheme.
+
+Source: vibration text, sections 3.1 (a window that moves along a long run) and 3.2 (players), note hpl 2 (two motions
+side by side), 10.6 (pendulum with its forces).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from vibsim.core.array_types import Floats
+from vibsim.core.record import Record
+from vibsim.report import choice, data, frame, style
+from vibsim.report.data import Member
+from vibsim.report.figures import scenes
+from vibsim.report.figures.scenes import Motion, Part, Scene
+from vibsim.report.text import words
+from vibsim.report.types import Environment, Experiment
+
+FRAMES_A_PERIOD = 48  # where there is room
+FEWEST_FRAMES_A_PERIOD = 20  # of a longer run the beginning is shown
+NUMBERS_A_FRAME = 8  # of one motion, about
+MOST_NUMBERS = 30_000  # of all series together, which keeps the data below 200 kB
+LEAST_FRAMES = 240
+SECONDS_A_PERIOD = 2.0  # at speed 1
+WINDOW_PERIODS = 6.0  # the position over time is shown whole up to 1.5 times as many
+VISIBLE = 0.03  # difference of two motions that is seen, over the size of the motion
+UNBOUNDED = 3.0  # a motion larger than this, over the size of the finest one, is not drawn
+POSITIONS = 6  # in the picture that stands still
+TRACE = 640.0, 150.0  # width and height of the position over time [pixel]
+EDGE = 8.0
+
+
+@dataclass(frozen=True)
+class Lane:
+    """A motion that is shown."""
+
+    title: str
+    motion: Motion
+    scene: Scene
+    period: float
+    """About how long the motion takes to come back."""
+
+
+def element(experiment: Experiment, record: Record, environment: Environment) -> str:
+    """Return the player as HTML, with its script and its style; empty where the system cannot be drawn.
+
+    `environment` is that of the templates.
+    """
+    shown = lanes(experiment, record)
+    if not shown:
+        return ""
+    files = {name: _source(environment, f"player.{name}") for name in ("js", "css")}
+    return environment.get_template("player.html").render(_context(record, shown) | files)
+
+
+def lanes(experiment: Experiment, record: Record) -> list[Lane]:
+    """Return the one or two motions that are shown; none where the system cannot be drawn or does not move."""
+    model = experiment.model.definition
+    draw = scenes.scene_of(model)
+    if draw is None or data.is_lean(record) or f"{model.position}_finest" not in record:
+        return []
+    chosen = _chosen(experiment, record, _member(experiment, record))
+    if not chosen:
+        return []
+    first, _, states = chosen[0]
+    samples = data.times(record, first.case)
+    period = _period(samples, states[model.position])
+    t = _times(samples, period, len(chosen))
+    there = samples <= t[-1] * (1.0 + 1e-12)
+    reach = {
+        name: max(float(np.max(np.abs(series[name][there]))) for _, _, series in chosen)
+        for name in states
+    }
+    parameters = _parameters(experiment, record, first.case)
+    found = []
+    for one, level, series in chosen:
+        at = {name: _at(t, samples, x) for name, x in series.items()}
+        if model.kind == "bouncing_ball":
+            at["h"] = _flight(t, samples, series, at["h"], float(parameters["g"]))
+        motion = Motion(model, t, at, parameters, reach)
+        found.append(Lane(_title(record, one, level, chosen), motion, draw(motion), period))
+    return found
+
+
+def _member(experiment: Experiment, record: Record) -> Member:
+    """Return what is shown: the first scheme, and of a sweep a typical member."""
+    found = choice.quantities(experiment, record)
+    if not found:
+        return Member(0, 0, record.words("scheme")[0], data.case_name(record, 0))
+    members = choice.with_levels(experiment, choice.members(record, found[0]))
+    return next((member for member in members if member.role == "typical"), members[0])
+
+
+def _chosen(
+    experiment: Experiment, record: Record, member: Member
+) -> list[tuple[Member, int, dict[str, Floats]]]:
+    """Return the one or two motions that are shown: member, position of the level, series of the states."""
+    model = experiment.model.definition
+    names = [state.name for state in model.states if f"{state.name}_finest" in record]
+    finest = len(data.whole(record, "level")) - 1
+
+    def series(one: Member, level: int) -> dict[str, Floats]:
+        return {name: data.of_level(record, name, one, level) for name in names}
+
+    first = series(member, finest)
+    if len(names) < len(model.states) or not all(np.isfinite(x).all() for x in first.values()):
+        return []
+    positions = [state.name for state in model.states[: model.coordinates]]
+    size = max(data.largest(first[name]) for name in positions)
+    known = float(frame.sizes(record, model.position)[member.case])
+    if size == 0.0 or (math.isfinite(known) and size > frame.UNBOUNDED * known):
+        return []
+    others = []
+    for k, scheme in enumerate(record.words("scheme")):
+        one = Member(k, member.case, scheme, member.case_name)
+        found = series(one, 0)
+        apart = max(float(np.max(np.abs(found[name] - first[name]))) for name in positions)
+        largest = max(float(np.max(np.abs(found[name]))) for name in positions)
+        if VISIBLE * size < apart and largest < UNBOUNDED * size:
+            others.append((apart, one, found))
+    if not others:
+        return [(member, finest, first)]
+    _, one, found = max(others, key=lambda other: other[0])
+    return [(member, finest, first), (one, 0, found)]
+
+
+def _title(
+    record: Record, member: Member, level: int, chosen: list[tuple[Member, int, Any]]
+) -> str:
+    """Name a motion by what it differs in from the others, or by its level."""
+    step = words.number(float(data.steps_of(record, member.case)[level]), "brief")
+    text = f"level {data.whole(record, 'level')[level]}, dt = {step} {data.time_unit(record)}"
+    several = len({one.scheme for one, _, _ in chosen}) > 1 or len(record["scheme"]) > 1
+    parts = [member.scheme_name] if several else []
+    parts += [text.strip()]
+    parts += [member.case_name] if member.case_name else []
+    return ", ".join(parts)
+
+
+def _parameters(experiment: Experiment, record: Record, case: int) -> Mapping[str, Any]:
+    """Return the parameters of a member: what is swept has its value."""
+    found: dict[str, Any] = dict(experiment.model.parameters)
+    for name in data.swept(record):
+        section, _, key = data.swept_label(record, name)[0].partition(".")
+        if section == "model":
+            found[key] = data.pick(record, name, case=case).item()
+    # a declared parameter goes by its own name in formulas
+    return {key.rpartition(".")[2]: value for key, value in found.items()}
+
+
+def _period(t: Floats, u: Floats) -> float:
+    """Return about how long the motion takes to come back, counted by its turns; the whole time without any."""
+    step = np.diff(u)
+    step = step[np.abs(step) > 1e-9 * data.largest(u)]
+    turns = int(np.sum(np.signbit(step[1:]) != np.signbit(step[:-1])))
+    return float(t[-1] - t[0]) / max(1.0, 0.5 * turns)
+
+
+def _times(t: Floats, period: float, count: int) -> Floats:
+    """Return the times that are shown of samples `t`, for so many motions, shape (frame,)."""
+    most = MOST_NUMBERS // (NUMBERS_A_FRAME * count)
+    end = min(float(t[-1] - t[0]), period * most / FEWEST_FRAMES_A_PERIOD)
+    wanted = max(LEAST_FRAMES, math.ceil(FRAMES_A_PERIOD * end / period))
+    return np.linspace(float(t[0]), float(t[0]) + end, min(most, wanted) + 1)
+
+
+def _at(times: Floats, t: Floats, x: Floats) -> Floats:
+    """Return a series at other times, by the cubic of each interval whose slopes are those of its neighbours."""
+    slope = np.gradient(x, t)
+    i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, t.size - 2)
+    h = t[i + 1] - t[i]
+    s = (times - t[i]) / h
+    a, b = x[i] + h * s * slope[i], x[i + 1] - h * (1.0 - s) * slope[i + 1]
+    weight = s * s * (3.0 - 2.0 * s)
+    return np.asarray(a + (b - a) * weight)
+
+
+def _flight(times: Floats, t: Floats, series: Mapping[str, Floats], h: Floats, g: float) -> Floats:
+    """Return the height of a ball, with its impacts: between samples it falls until it meets the rise to the next.
+
+    `h` is the height at `times` as if nothing happened between the samples at `t`.
+    """
+    i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, t.size - 2)
+    height, v = series["h"], series["v"]
+    falls, rises = (
+        height[j] + v[j] * x - 0.5 * g * x * x for j, x in ((i, times - t[i]), (i + 1, times - t[i + 1]))
+    )  # fmt: skip
+    # behind its last impact it lies
+    rises = np.where((height[i + 1] <= 0.0) & (v[i + 1] == 0.0), 0.0, rises)
+    meets = (v[i] < 0.0) & (v[i + 1] >= 0.0)
+    return np.maximum(np.where(meets, np.maximum(falls, rises), h), 0.0)
+
+
+def _context(record: Record, shown: list[Lane]) -> dict[str, Any]:
+    """Return what the template shows."""
+    t, period, position = shown[0].motion.t, shown[0].period, shown[0].motion.model.position
+    whole = float(t[-1] - t[0])
+    window = whole if whole <= 1.5 * WINDOW_PERIODS * period else WINDOW_PERIODS * period
+    series = [lane.motion.states[position] for lane in shown]
+    low, high = min(float(u.min()) for u in series), max(float(u.max()) for u in series)
+    scale = (TRACE[1] - 2.0 * EDGE) / (high - low or 1.0)
+    traces = [EDGE + scale * (high - u) for u in series]
+    zero = EDGE + scale * high
+    content = {
+        "t": [float(t[0]), float(t[-1])],
+        "unit": data.time_unit(record),
+        "pace": period / SECONDS_A_PERIOD,
+        "window": window,
+        "size": TRACE,
+        "lanes": [
+            {"parts": [_packed(part) for part in lane.scene.parts], "u": _rounded(trace)}
+            for lane, trace in zip(shown, traces, strict=True)
+        ],
+    }
+    last = float(data.times(record, 0)[-1])
+    unit = data.unit(record, f"{position}_finest")
+    return {
+        "data": _json(content),
+        "stages": [(lane.title, _markup(_still(lane))) for lane in shown],
+        "legend": shown[0].scene.legend,
+        "frames": t.size - 1,
+        "width": scenes.WIDTH,
+        "height": scenes.HEIGHT,
+        "trace": TRACE,
+        "zero": round(zero, 1) if 0.0 <= zero <= TRACE[1] else None,
+        "curves": [(i, _curve(t, trace, window)) for i, trace in reversed(list(enumerate(traces)))],
+        "names": [lane.title for lane in shown],
+        "label": style.label(words.symbol(position), unit),
+        "from": words.number(float(t[0]), "step"),
+        "to": words.number(float(f"{t[0] + window:.3g}"), "step"),
+        "unit": data.time_unit(record),
+        "shown": words.number(float(f"{t[-1]:.3g}"), "step") if t[-1] < 0.999 * last else "",
+        "length": words.number(last, "step"),
+    }
+
+
+def _curve(t: Floats, trace: Floats, window: float) -> str:
+    """Return the part of the position over time that lies in the first window, as the data of a path."""
+    there = t <= t[0] + window * (1.0 + 1e-12)
+    x = (t[there] - t[0]) / window * TRACE[0]
+    points = zip(x.tolist(), trace[there].tolist(), strict=True)
+    return "M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in points)
+
+
+def _packed(part: Part) -> dict[str, Any]:
+    """Return a part for the script: a number that does not change once, others for every time in tenths."""
+    columns = [
+        float(np.ravel(column)[0])
+        if np.ptp(np.asarray(column)) < 0.05
+        else _rounded(np.asarray(column))
+        for column in part.at
+    ]
+    return {"shape": part.shape, "at": columns}
+
+
+def _rounded(values: Floats) -> list[int]:
+    """Return pixels in tenths."""
+    found: list[int] = np.round(10.0 * np.clip(values, -1e6, 1e6)).astype(int).tolist()
+    return found
+
+
+def _still(lane: Lane) -> str:
+    """Return the parts at the start, and behind them fainter bodies at other times of the first period."""
+    scene, t = lane.scene, lane.motion.t
+    ghosts = []
+    last = min(t.size - 1, FRAMES_A_PERIOD // 2 if t.size > FRAMES_A_PERIOD else t.size - 1)
+    for k in np.linspace(0, last, POSITIONS).astype(int).tolist()[1:]:
+        ghosts += [
+            _shape(part, k) for part in scene.parts if part.look in ("wire", "body", "wheel")
+        ]
+    moving = [_shape(part, 0) for part in scene.parts]
+    return f'<g class="ghosts">{"".join(ghosts)}</g><g class="now">{"".join(moving)}</g>'
+
+
+def _shape(part: Part, k: int) -> str:
+    """Return a part at the k-th time as an element."""
+    look = escape(part.look)
+    if part.shape == "track":
+        offset = float(np.ravel(part.at[0])[k])
+        return f'<path class="{look}" transform="translate({-offset:.1f})" d="{part.outline}"/>'
+    return f'<path class="{look}" d="{scenes.path_of(part, k)}"/>'
+
+
+def _json(content: Any) -> str:
+    """Return data for a script element, which no text can end."""
+    text = json.dumps(content, separators=(",", ":"))
+    return _markup(text.replace("<", "\\u003c"))
+
+
+def _source(environment: Environment, name: str) -> str:
+    """Return a file of the templates as it is, for a script or a style."""
+    assert environment.loader is not None
+    return _markup(environment.loader.get_source(environment, name)[0])
+
+
+def _markup(text: str) -> str:
+    from markupsafe import Markup
+
+    return Markup(text)
