@@ -255,6 +255,20 @@ def test_every_cause_ends_with_advice(reason: str, cause: str, order: float) -> 
             assert tell(one).endswith(".")
 
 
+@pytest.mark.parametrize(
+    ("order", "told"),
+    [
+        (2.04, "The rescaled differences coincide."),
+        (2.24, "It raises the measured order."),
+        (1.75, "It lowers the measured order."),
+    ],
+)
+def test_a_measured_order_away_from_the_one_that_dominates_is_explained(
+    order: float, told: str
+) -> None:
+    assert told in tell(story(reason="asymptotic", order=order))
+
+
 def test_what_is_predicted_is_told_with_its_cost() -> None:
     few = advise(story(reason="too_few_levels", levels=(4, 5)))
     assert few == "Add levels 6 and 7 to `levels:` (2 levels)."

@@ -13,7 +13,7 @@ import pytest
 from counts import HEAD, tally
 from synthetic import EPSILON, TOLERANCE, Group, groups
 
-from vibsim.convergence import assessment
+from vibsim.convergence import assessment, likely_powers
 from vibsim.convergence.assessment import Assessment, Decision, Question, assess, decide
 from vibsim.convergence.error_model import kernel, likelihood, priors
 from vibsim.convergence.error_model.hypotheses import (
@@ -323,7 +323,7 @@ def test_orders_of_other_ladders_do_not_count() -> None:
     for count in (1, 2):
         floor, is_number = np.full((count, 5), 1e-15), np.full(count, fill_value=False)
         given = Ladder(h, gram[:count], floor, is_number, exact_known=False)
-        found.append(assessment._most_near_a_power(posterior(given, Promise(4.0)))[0])
+        found.append(likely_powers.most_near_a_power(posterior(given, Promise(4.0)))[0])
     assert found[0] == found[1]
 
 

@@ -261,6 +261,17 @@ def test_the_sentence_says_order_error_and_bound() -> None:
     assert "The extrapolated value is 3.0000" in sentence
 
 
+def test_a_measured_order_away_from_the_one_that_dominates_is_explained() -> None:
+    x = np.linspace(0, 1, 33)
+    steps = 2.0 ** -np.arange(5)
+    for size, told in ((-3.0, "It raises"), (3.0, "It lowers"), (0.1, "")):
+        fields = [h**2 * np.sin(3 * x) + size * h**4 * np.cos(5 * x) for h in steps]
+        found = judge(steps, fields, order=2)
+        assert found.status == "PASS"
+        assert told in found.sentence
+        assert ("the measured order" in found.sentence) == bool(told)
+
+
 def test_every_reason_has_a_sentence() -> None:
     from vibsim.convergence.study.sentences import SENTENCES, Facts, describe
 

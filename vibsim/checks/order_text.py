@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from vibsim.checks.order_context import OrderContext
 from vibsim.checks.sentences import Description, Found, Template, order_interval
+from vibsim.convergence.study.sentences import higher_part
 from vibsim.convergence.thresholds import HALF_SPACING
 from vibsim.schemes.base import is_on_the_mesh
 
@@ -52,8 +53,8 @@ PULSE = (
 )
 DIAGNOSES: Words = {
     "asymptotic": (
-        "{subject} converges with {measured}, as {whose} (order {expected}). The rescaled differences "
-        "coincide.{error}{doubt}{unseen}",
+        "{subject} converges with {measured}, as {whose} (order {expected}).{coincidence}{error}"
+        "{doubt}{unseen}",
         "",
     ),
     "exact": (
@@ -324,6 +325,11 @@ class _Phrases(OrderContext):
         """Say whose the order is: the scheme's, or that of the check alone, where theory has none or another one."""
         differs = self.promises_less or self.promises_more
         return "promised" if self.has_promise and not differs else "expected"
+
+    def coincidence(self) -> str:
+        """Say whether the levels agree, or why the measured order is not yet the one that dominates."""
+        moved = higher_part(self.order, self.expected, self.tolerance)
+        return f" {moved or 'The rescaled differences coincide.'}"
 
     def doubt(self) -> str:
         """Say of an order that passes why its interval reaches far down; empty where it does not."""

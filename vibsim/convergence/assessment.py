@@ -7,7 +7,7 @@ A power *dominates* where no other one has more than a tenth of it. The table of
 | a value that is not finite | FAIL ``non_finite`` |
 | fewer than three levels | INCONCLUSIVE ``too_few_levels`` |
 | all differences are noise as expected, but not the distance from the exact solution | FAIL ``wrong_limit`` |
-| the levels surely show an expansion, and the exact solution is far from its limit (`MISSED`) | FAIL ``wrong_limit`` |
+| the levels surely show an expansion with another limit than the exact solution (`is_missed`) | FAIL ``wrong_limit`` |
 | all differences are noise as expected | PASS ``exact`` |
 | a power within the tolerance of the expected one dominates, surely | PASS ``asymptotic`` |
 | others dominate, surely, the expected one does not, and one is definite | FAIL ``order_low``, ``order_high`` |
@@ -31,8 +31,19 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from vibsim.convergence.error_model.hypotheses import Promise, times
+from vibsim.convergence.best_value import best_value, is_missed, norm
+from vibsim.convergence.error_model.hypotheses import Promise
 from vibsim.convergence.error_model.posterior import LEFT_OUT, Ladder, Posterior, posterior
+from vibsim.convergence.likely_powers import (
+    OUTSIDE,
+    finest_order,
+    interval,
+    likely_window,
+    most_near_a_power,
+    rests_on_three,
+    sides,
+    tails,
+)
 from vibsim.core.array_types import Codes, Flags, Floats, Integers
 from vibsim.core.vocabulary import ORDER_TOLERANCE, REASON_NAMES, REASONS, STATUSES
 
@@ -42,12 +53,6 @@ RISK_OF_THREE = 0.1 * RISK
 """The same where three levels decide behind others that do not fit (seeds 1, 3, 11, 101-103)."""
 DEFINITE = 0.9
 """An order fails only where one power has so much of the probability, alone or as one of two of a size."""
-INTERVAL = 0.95
-"""Probability of the interval of an order."""
-OUTSIDE = 0.5 * (1.0 - INTERVAL)
-"""The same of what is below it, and above."""
-BOUND = 3.0
-"""Standard deviations in the bound of an error: of the tails that the posterior has, these are 95 % (seeds 1 and 3)."""
 BLOCK = 512
 """So many ladders are judged together at most."""
 DECIDED = tuple(REASON_NAMES.index(name) for name in ("asymptotic", "order_low", "order_high"))
@@ -58,10 +63,6 @@ NEAR = 0.1
 """Distance of an extrapolation from the exact solution, over the error of the finest level, that surely is no miss."""
 LARGEST_RATIO = 1e60
 """Of a difference to the largest finer one, and of noise to the largest difference: more says no more."""
-MISSED = 3.0
-"""A limit is missed that is so many bounds of the best value away from it,"""
-MISSED_SHARE = 0.5
-"""and at least so large a part of the estimated error of the finest level."""
 STATED_NOISE_FACTOR = 2.0
 """The same as `NOISE_FACTOR` of noise that a user states: differences of normal noise exceed it in one of 200."""
 NOISE_FACTOR = 10.0
@@ -220,10 +221,10 @@ def _assessed(ladder: Ladder, factors: Floats, question: Question) -> dict[str, 
     if ladder.exact_known:
         # what the levels say of the limit without the exact solution
         of_limit = posterior(_without_exact(ladder), question.promise)
-        risk = np.where(_rests_on_three(of_limit), RISK_OF_THREE, RISK)
-        missed = missed | ((of_limit.expansion > 1.0 - risk) & _is_missed(ladder, of_limit))
+        risk = np.where(rests_on_three(of_limit), RISK_OF_THREE, RISK)
+        missed = missed | ((of_limit.expansion > 1.0 - risk) & is_missed(ladder, of_limit))
     numbers = _numbers(ladder, found, of_limit, missed)
-    return numbers | _best(ladder, of_limit, found.exact, factors)
+    return numbers | best_value(ladder, of_limit, found.exact, factors)
 
 
 def _decided(ladder: Ladder, factors: Floats, question: Question) -> dict[str, np.ndarray]:
@@ -242,14 +243,14 @@ def _some(ladder: Ladder, rows: Integers) -> Ladder:
 
 def _found(ladder: Ladder, question: Question, left_out: float) -> _Found:
     believed = posterior(ladder, question.promise, left_out=left_out)
-    sides = _sides(believed, question.expected, question.at_least, question.tolerance)
+    of_sides = sides(believed, question.expected, question.at_least, question.tolerance)
     exact = _is_only_noise(ladder, question.noise_factor)
     away = np.zeros_like(exact)
     if ladder.exact_known:
         away = exact & _is_away(ladder, question.noise_factor)
-    by_three, cut_short = _rests_on_three(believed), _is_cut_short(ladder, believed)
+    by_three, cut_short = rests_on_three(believed), _is_cut_short(ladder, believed)
     by_theory = question.by_theory and not ladder.exact_known
-    return _Found(believed, sides, exact, away, by_three, by_theory, cut_short)
+    return _Found(believed, of_sides, exact, away, by_three, by_theory, cut_short)
 
 
 def _is_sure(ladder: Ladder, found: _Found, question: Question) -> Flags:
@@ -261,7 +262,7 @@ def _is_sure(ladder: Ladder, found: _Found, question: Question) -> Flags:
     p, (lower, right, higher) = found.posterior, found.sides
     rest, fails = 1.0 - p.noise - p.alternating, lower + higher > 0.5
     definite = np.zeros_like(right)
-    definite[fails] = _most_near_a_power(p)[fails]
+    definite[fails] = most_near_a_power(p)[fails]
     margins = [
         right - (1.0 - RISK),
         right - RISK,
@@ -270,7 +271,7 @@ def _is_sure(ladder: Ladder, found: _Found, question: Question) -> Flags:
         definite - DEFINITE,
         p.noise - np.maximum(rest, p.alternating),
         p.alternating - rest,
-        *(np.min(np.abs(tail - OUTSIDE), axis=-1) * p.expansion for tail in _tails(p)),
+        *(np.min(np.abs(tail - OUTSIDE), axis=-1) * p.expansion for tail in tails(p)),
     ]
     window = np.sort(p.window, axis=-1)
     if window.shape[1] > 1:
@@ -294,7 +295,7 @@ def _meets(ladder: Ladder, p: Posterior) -> Flags:
     order, ratio = p.orders[:, -1], ladder.h[-2] / ladder.h[-1]
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         step = 1.0 / (ratio**order - 1.0)
-        distance = _norm(np.stack([-step, np.ones_like(step)], axis=-1), ladder.gram[:, -2:, -2:])
+        distance = norm(np.stack([-step, np.ones_like(step)], axis=-1), ladder.gram[:, -2:, -2:])
         near = distance <= NEAR * step * np.sqrt(ladder.gram[:, -2, -2])
     ends = np.array(p.windows)[np.argmax(p.window, axis=-1), 1]
     return np.asarray((order > 0.0) & near & (ends == len(ladder.h) - 1))
@@ -354,7 +355,7 @@ def _least_noise(ladder: Ladder) -> Floats:
 
 def _is_cut_short(ladder: Ladder, believed: Posterior) -> Flags:
     """Say where noise that may be far less than predicted ends the most probable window."""
-    every, last = np.arange(len(ladder.gram)), _window(believed)[1]
+    every, last = np.arange(len(ladder.gram)), likely_window(believed)[1]
     least = _least_noise(ladder)[every, last]
     return np.asarray(NOISE_FACTOR * least < ladder.floor[every, last])
 
@@ -393,40 +394,13 @@ def _is_away(ladder: Ladder, factor: float) -> Flags:
     return np.asarray(np.sqrt(ladder.gram[:, -1, -1]) > factor * ladder.floor[:, -1])
 
 
-def _is_missed(ladder: Ladder, of_limit: Posterior) -> Flags:
-    """Say where the exact solution is far outside of the bound of the best value."""
-    # the best value less the exact one, in the rows
-    path = np.concatenate([of_limit.path, np.ones((len(of_limit.path), 1))], axis=-1)
-    distance = _norm(path, ladder.gram)
-    bound = BOUND * np.sqrt(_variance(ladder, of_limit) + ladder.floor[:, -1] ** 2)
-    error = _norm(of_limit.path, ladder.gram[:, :-1, :-1])
-    return np.asarray((distance > MISSED * bound) & (distance > MISSED_SHARE * error))
-
-
-def _norm(path: Floats, gram: Floats) -> Floats:
-    """Return the norm of a combination of rows with this Gram matrix, shape (ladder,)."""
-    return np.asarray(np.sqrt(np.maximum(_square(path, gram), 0.0)))
-
-
-def _square(path: Floats, gram: Floats) -> Floats:
-    """Return the square of the same norm."""
-    return np.asarray(np.sum(path * times(gram, path), axis=-1))
-
-
-def _variance(ladder: Ladder, of_limit: Posterior) -> Floats:
-    """Return the mean square distance of the limit from its mean over all hypotheses."""
-    path, n = of_limit.path, len(ladder.h)
-    differences = ladder.gram[:, : n - 1, : n - 1]
-    return np.asarray(np.maximum(of_limit.path_squared - _square(path, differences), 0.0))
-
-
 def _reasons(found: _Found, missed: Flags) -> Integers:
     """Return the reasons of the verdicts, as positions in `REASON_NAMES`; see the head of this module."""
     p, (lower, right, higher) = found.posterior, found.sides
     risk = np.where(found.by_three, RISK_OF_THREE, RISK)
     another = (lower + higher > 1.0 - risk) & (right < risk) & ~found.cut_short
     if np.any(another):
-        another &= _most_near_a_power(p) > DEFINITE
+        another &= most_near_a_power(p) > DEFINITE
     cases = [
         (missed, "wrong_limit"),
         (found.exact, "exact"),
@@ -440,47 +414,17 @@ def _reasons(found: _Found, missed: Flags) -> Integers:
     return np.select([mask for mask, _ in cases], codes, REASON_NAMES.index("pre_asymptotic"))
 
 
-def _rests_on_three(p: Posterior) -> Flags:
-    """Say where windows of three levels behind others that do not fit have most of the probability."""
-    three = [start > 0 and end - start == 2 for start, end in p.windows]
-    return np.asarray(np.sum(p.window[:, three], axis=-1) > 0.5)
-
-
-def _most_near_a_power(p: Posterior) -> Floats:
-    """Return the most probability that a power, within the usual tolerance, dominates or is one of two of a size."""
-    # two powers of one size are further from each other than the tolerance
-    present = p.lowest + p.highest - p.alone
-    near = _sums_near(present, p, ORDER_TOLERANCE + 1e-9)
-    return np.asarray(np.max(near, axis=-1))
-
-
-def _sums_near(values: Floats, p: Posterior, margin: float) -> Floats:
-    """Return sums of the values of all powers so near each power of the grid, shape (ladder, power)."""
-    sums = _sums_up(values)
-    start = np.searchsorted(p.powers, p.grid - margin)
-    return np.asarray(
-        sums[:, np.searchsorted(p.powers, p.grid + margin, side="right")] - sums[:, start]
-    )
-
-
-def _sums_up(values: Floats) -> Floats:
-    """Return the sums of the first 0, 1, ... values along the last axis; further zeros change no bit of them."""
-    sums = np.zeros((len(values), values.shape[1] + 1))
-    np.cumsum(values, axis=-1, out=sums[:, 1:])
-    return sums
-
-
 def _numbers(
     ladder: Ladder, found: _Found, of_limit: Posterior, missed: Flags
 ) -> dict[str, np.ndarray]:
     """Return what a `Decision` holds beside the status, for ladders of three levels and more."""
     n, believed, exact = len(ladder.h), found.posterior, found.exact
-    first, last = _window(believed)
-    order = np.where(exact, np.nan, _finest_order(believed.orders, last))
-    low, high = _interval(believed, order)
+    first, last = likely_window(believed)
+    order = np.where(exact, np.nan, finest_order(believed.orders, last))
+    low, high = interval(believed, order)
     if np.any(missed):
         # where the exact solution is missed, the levels alone have an order
-        ends = zip(_interval(of_limit, order), (low, high), strict=True)
+        ends = zip(interval(of_limit, order), (low, high), strict=True)
         low, high = (np.where(missed, a, b) for a, b in ends)
     return {
         "reason": _reasons(found, missed),
@@ -495,95 +439,3 @@ def _numbers(
 def _without_exact(ladder: Ladder) -> Ladder:
     m = len(ladder.h) - 1
     return Ladder(ladder.h, ladder.gram[:, :m, :m], ladder.floor, ladder.numbers, exact_known=False)
-
-
-def _sides(
-    believed: Posterior, expected: float | None, at_least: float | None, tolerance: float
-) -> tuple[Floats, Floats, Floats]:
-    """Return the probabilities that a lower power dominates, one that is expected, and a higher one."""
-    powers, alone, mixed = believed.powers, believed.alone, believed.of_pairs
-    margin = tolerance + 1e-9
-    if expected is not None:
-        least, most = expected - margin, expected + margin
-    elif at_least is not None:
-        least, most = at_least - margin, np.inf
-    else:
-        # the neighbourhood that holds most
-        right = np.max(_sums_near(alone, believed, margin), axis=-1)
-        return np.zeros(len(alone)), right, np.zeros(len(alone))
-    sums = _sums_up(alone)
-    low, high = np.searchsorted(powers, least), np.searchsorted(powers, most, side="right")
-    lower, right, higher = sums[:, low], sums[:, high] - sums[:, low], sums[:, -1] - sums[:, high]
-    # two powers of one size are no order, but tell of one that both are below, or above
-    first, second = believed.pairs.T
-    lower = lower + np.sum(mixed[:, second < least], axis=-1)
-    higher = higher + np.sum(mixed[:, first > most], axis=-1)
-    if expected is None:
-        right = right + np.sum(mixed[:, first >= least], axis=-1)
-    return lower, right, higher
-
-
-def _window(believed: Posterior) -> tuple[Integers, Integers]:
-    """Return the coarsest and the finest level of the most probable window of each ladder."""
-    first, last = np.array(believed.windows)[np.argmax(believed.window, axis=-1)].T
-    return first, last
-
-
-def _finest_order(orders: Floats, last: Integers) -> Floats:
-    """Return the order of the finest three levels up to `last` that have one."""
-    index = np.arange(orders.shape[-1])
-    usable = np.isfinite(orders) & (index <= last[:, None] - 2)
-    usable = np.where(np.any(usable, axis=-1, keepdims=True), usable, np.isfinite(orders))
-    finest = np.max(np.where(usable, index, -1), axis=-1)
-    picked = np.take_along_axis(orders, np.maximum(finest, 0)[:, None], axis=-1)[:, 0]
-    return np.where(finest >= 0, picked, np.nan)
-
-
-def _interval(believed: Posterior, order: Floats) -> tuple[Floats, Floats]:
-    """Return the range of powers that holds `INTERVAL` of what is believed, and the measured order."""
-    below, above = _tails(believed)
-    low = believed.powers[np.argmax(below > OUTSIDE, axis=-1)]
-    high = believed.powers[::-1][np.argmax(above > OUTSIDE, axis=-1)]
-    return np.fmin(low, order), np.fmax(high, order)
-
-
-def _tails(believed: Posterior) -> tuple[Floats, Floats]:
-    """Return the parts of the expansions up to each power, and from each power on, the highest first."""
-    whole = np.maximum(believed.expansion, 1e-300)[:, None]
-    below = np.cumsum(believed.lowest, axis=-1) / whole
-    above = np.cumsum(believed.highest[:, ::-1], axis=-1) / whole
-    return below, above
-
-
-def _best(ladder: Ladder, of_limit: Posterior, exact: Flags, factors: Floats) -> dict[str, Floats]:
-    """Return the best value, its bound, and the error of the finest level.
-
-    Three levels have the extrapolation by their own order, more levels the mean over all hypotheses. Where levels
-    differ by noise alone, the finest one is the best.
-    """
-    n = len(ladder.h)
-    path = of_limit.path
-    differences = ladder.gram[:, : n - 1, : n - 1]
-    spread = _variance(ladder, of_limit)
-    floor = ladder.floor[:, -1]
-    if n == 3:
-        p, ratio = of_limit.orders[:, 0], ladder.h[1] / ladder.h[2]
-        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-            step = np.where(p > 0.0, -1.0 / (ratio**p - 1.0), np.nan)
-        other = np.stack([np.zeros_like(step), step], axis=-1) - path
-        spread = spread + _square(other, differences)
-        path = path + other
-    path = np.where(exact[:, None], 0.0, path)
-    spread = np.where(exact, differences[:, -1, -1], spread)
-    weights = np.zeros((len(path), n))
-    weights[:, -1] = 1.0
-    weights[:, :-1] += path * factors
-    weights[:, 1:] -= path * factors
-    bound = BOUND * np.sqrt(spread + floor**2)
-    if ladder.exact_known:
-        error = np.sqrt(ladder.gram[:, -1, -1])
-        largest = error + floor
-    else:
-        error = _norm(path, differences)
-        largest = error + bound
-    return {"weights": weights, "best_bound": bound, "error": error, "error_bound": largest}

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
+from vibsim.core.vocabulary import ORDER_TOLERANCE
+
 
 @dataclass(frozen=True)
 class Facts:
@@ -131,6 +133,7 @@ def describe(facts: Facts) -> tuple[str, str]:
     phrases = _phrases(facts)
     sentence, advice = (template.format_map(phrases) for template in SENTENCES[key])
     more = [
+        _higher_part(facts),
         _interval(facts),
         _error(facts),
         _best(facts),
@@ -188,6 +191,20 @@ def _as_expected(facts: Facts) -> str:
     if facts.expected is not None:
         return ", as expected"
     return f", at least {facts.at_least:g} as expected" if facts.at_least is not None else ""
+
+
+def higher_part(order: float, expected: float, tolerance: float) -> str:
+    """Say why the measured order is away from the one that dominates; empty where it is near."""
+    if abs(order - expected) <= tolerance:
+        return ""
+    moves = "raises" if order > expected else "lowers"
+    return f"A part of the error of higher order is still seen. It {moves} the measured order."
+
+
+def _higher_part(facts: Facts) -> str:
+    if facts.reason != "asymptotic" or facts.expected is None or facts.order is None:
+        return ""
+    return higher_part(facts.order, facts.expected, ORDER_TOLERANCE)
 
 
 def _wanted(facts: Facts) -> str:
