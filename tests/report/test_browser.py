@@ -1,0 +1,166 @@
+"""The index and the player in a browser, where one is installed: scripts run under the page's own policy."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+
+import pytest
+from test_index import put
+from test_player import made
+
+from vibsim import report
+from vibsim.report.figures import scenes
+from vibsim.report.page import history, player
+from vibsim.report.page.page import environment
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+pytestmark = pytest.mark.slow
+
+
+def shown(path, *, wait=3000):
+    """Return the content of a page after its scripts have run for some virtual milliseconds."""
+    browser = next(filter(None, map(shutil.which, NAMES)), None)
+    if browser is None:
+        missing = "no Chromium is on the PATH, so nothing tells whether pages work in a browser"
+        (pytest.fail if os.environ.get("CI") else pytest.skip)(missing)
+    options = ["--headless=new", "--no-sandbox", "--disable-gpu", f"--virtual-time-budget={wait}"]
+    options.append(f"--user-data-dir={path.parent / 'profile'}")
+    command = [browser, *options, "--dump-dom", path.as_uri()]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    return ended.stdout
+
+
+def test_the_index_tells_dates_and_what_changed_and_can_be_filtered(tmp_path):
+    (tmp_path / ".vibsim").mkdir()
+    folder, *_ = put(tmp_path, "a", "one")
+    put(tmp_path, "adhoc", "two")
+    report.write_index(tmp_path)
+    put(tmp_path, "a", "one", status="FAIL")
+    os.utime(folder / "summary.json", (1.7e9, 1.7e9))
+    report.write_index(tmp_path)
+    page = shown(tmp_path / "index.html")
+    found = dict(re.findall(r'data-key="([^"]*)".*?class="when">([^<]*)<', page, re.DOTALL))
+    assert "2023" in found["a/one"]
+    assert re.search(r'<ul id="changes">.*a/one</a>: PASS became FAIL</li></ul>', page)
+    # what only works with scripts is there
+    assert not re.search(r"<(?:label|input)[^>]* hidden", page)
+    assert "disabled" not in page.partition("<main>")[2].partition("<script")[0]
+    # and without the history the rest works
+    (tmp_path / history.FILE).unlink()
+    page = shown(tmp_path / "index.html")
+    assert not re.search(r"<(?:label|input)[^>]* hidden", page)
+
+
+FILTER = """
+const click = (tag) => document.querySelector(`[data-tag="${tag}"]`).click();
+const find = (text) => {
+  const field = document.querySelector("input[type=search]");
+  field.value = text;
+  field.dispatchEvent(new Event("input"));
+};
+const seen = () => [...document.querySelectorAll("main .card:not([hidden])")].map((card) => card.dataset.key).join(" ");
+const told = [];
+click("FAIL"); told.push(seen());
+click("PASS"); told.push(seen());
+click("FAIL"); click("PASS"); find("Two Central"); told.push(seen());
+find("nothing of this name"); told.push(seen() + String(document.querySelector("#none").hidden));
+find(""); told.push(seen());
+for (const box of document.querySelectorAll("main .card input")) box.click();
+told.push([...document.querySelectorAll("#compare .card")].map((card) => card.dataset.key).join(" "));
+document.title = told.join("|");
+"""
+
+
+def test_filter_search_and_comparison(tmp_path):
+    for name, status in (("one", "FAIL"), ("two", "PASS"), ("three", "INCONCLUSIVE")):
+        put(tmp_path, "a", name, status=status, title=f"Experiment {name}")
+    report.write_index(tmp_path)
+    path = tmp_path / "index.html"
+    # the page's own policy lets no other script run
+    page = re.sub(r"<meta http-equiv=[^>]*>", "", path.read_text())
+    path.write_text(page.replace("</body>", f"<script>{FILTER}</script></body>"))
+    told = re.search(r"<title>([^<]*)</title>", shown(path))
+    assert told is not None
+    assert told.group(1).split("|") == [
+        "a/one",
+        "a/one a/two",
+        "a/two",
+        "false",
+        "a/one a/three a/two",
+        "a/three a/two",
+    ]
+
+
+def paths(page):
+    """Return what the parts of all motions are drawn as, in the order of the page."""
+    moving = re.findall(r'<g class="now">(.*?)</g>', page, re.DOTALL)
+    return [re.findall(r'<path [^>]*\bd="([^"]*)"', group) for group in moving]
+
+
+def numbers(text):
+    return [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", text)]
+
+
+GO = """
+<script>
+const slider = document.querySelector(".player input");
+slider.value = FRAME;
+slider.dispatchEvent(new Event("input"));
+</script>
+"""
+
+
+@pytest.mark.parametrize(
+    "name", ["dragged", "elastic_pendulum", "vehicle", "sliding_box", "washing_machine"]
+)
+def test_the_script_draws_what_the_still_picture_draws(tmp_path, name):
+    exp, record = made(name)
+    lanes = player.lanes(exp, record)
+    path, frame = tmp_path / "page.html", 37
+    go = GO.replace("FRAME", str(frame))
+    path.write_text(f"<!DOCTYPE html><body>{player.element(exp, record, environment())}{go}</body>")
+    found = paths(shown(path))
+    assert len(found) == len(lanes)
+    for lane, drawn in zip(lanes, found, strict=True):
+        for part, text in zip(lane.scene.parts, drawn, strict=True):
+            if part.shape != "track":
+                wanted = scenes.path_of(part, frame)
+                assert re.sub(r"[-\d. ]+", "", text) == re.sub(r"[-\d. ]+", "", wanted)
+                assert numbers(text) == pytest.approx(numbers(wanted), abs=0.25)
+
+
+KEYS = """
+<script>
+const figure = document.querySelector(".player"), slider = figure.querySelector("input");
+const press = (key) => figure.dispatchEvent(new KeyboardEvent("keydown", {key, bubbles: true, cancelable: true}));
+const told = [];
+const tell = () => told.push(slider.value);
+press("ArrowRight"); press("ArrowRight"); tell();
+press("ArrowLeft"); tell();
+press("End"); tell();
+press("Home"); tell();
+press(" ");
+setTimeout(() => {
+  press(" ");
+  tell();
+  const before = slider.value;
+  setTimeout(() => { told.push(String(slider.value === before)); document.title = told.join(" "); }, 500);
+}, 1500);
+</script>
+"""
+
+
+def test_the_player_plays_pauses_and_steps_by_keys(tmp_path):
+    exp, record = made()
+    text, path = player.element(exp, record, environment()), tmp_path / "page.html"
+    path.write_text(f"<!DOCTYPE html><head><title></title></head><body>{text}{KEYS}</body>")
+    told = re.search(r"<title>([^<]*)</title>", shown(path, wait=6000))
+    assert told is not None
+    on, back, last, first, played, is_paused = told.group(1).split()
+    frames = player.lanes(exp, record)[0].motion.t.size - 1
+    assert (on, back, int(last), first) == ("2", "1", frames, "0")
+    assert 0 < int(played) < frames
+    assert is_paused == "true"
