@@ -4,7 +4,7 @@ BIN := .venv/bin
 
 .DEFAULT_GOAL := run
 CATALOGUE := $(filter-out scale,$(notdir $(wildcard configs/*)))
-.PHONY: run catalogue test test-slow lint bench mutation scale clean help set-up-run set-up-dev
+.PHONY: run catalogue test test-slow lint bench mutation scale clean help set-up-run set-up-dev set-up-browser
 
 run: set-up-run  ## run the default experiments and write results/index.html (this is what plain `make` does)
 	@$(BIN)/vibsim run
@@ -12,7 +12,7 @@ run: set-up-run  ## run the default experiments and write results/index.html (th
 test: set-up-dev  ## run the tests, without those marked slow
 	$(BIN)/pytest -n 2 --dist worksteal --durations 10 -m "not slow"
 
-test-slow: set-up-dev  ## run the tests marked slow
+test-slow: set-up-dev set-up-browser  ## run the tests marked slow
 	$(BIN)/pytest -n 2 --dist worksteal --durations 10 -m slow
 
 lint: set-up-dev  ## check style, types, layers, workflow and generated files
@@ -49,3 +49,6 @@ set-up-run:
 
 set-up-dev:
 	@sh requirements/install.sh dev
+
+set-up-browser:
+	@sh requirements/browser.sh

@@ -22,10 +22,12 @@ from vibsim.report.figures import order as figures_order
 from vibsim.report.figures import sweep as figures_sweep
 from vibsim.report.figures import time
 from vibsim.report.page import cards
+from vibsim.report.page.page import TEMPLATES
 from vibsim.report.tables import checks as check_tables
 from vibsim.report.text import reasons, setting
 
 PROVENANCE = {"versions": {"vibsim": "1.2", "python": "3.99", "numpy": "9.9"}, "digest": "d1"}
+PLOTS = (TEMPLATES / "plots.js").read_text(encoding="utf-8").strip()
 VOID = {"meta", "br", "img", "link", "hr", "input", "col"}
 
 
@@ -64,7 +66,8 @@ class Reader(HTMLParser):
             self.faults.append(tag)
 
     def handle_data(self, data):
-        self.text.append(data)
+        if not {"script", "style"} & set(self.open[-1:]):
+            self.text.append(data)
 
 
 def read(path):
@@ -114,6 +117,7 @@ def test_the_page_is_well_formed_and_loads_nothing(which, request):
     assert len(reader.ids) == len(set(reader.ids))
     assert not {"link", "iframe", "object", "embed"} & set(reader.tags)
     assert "<script src" not in text
+    assert f"<script>\n{PLOTS}</script>" in text
     inside = {f"#{name}" for name in reader.ids}
     for tag, address in reader.addresses:
         assert address in inside | {"../../index.html"} or address.startswith("data:image/png"), (
@@ -360,7 +364,7 @@ def test_one_promise_of_several_schemes_is_drawn_once():
     assert choice.promises(exp, record, "theta") == [(2.0, 0.1)]
     with style.applied():
         text = samples.svg(figures_order.against_step(exp, record, "theta", 0))
-    assert text.count("slope 2 (promised)") == 1
+    assert text.count(">slope 2 (promised)</text>") == 1
 
 
 PANELS = [

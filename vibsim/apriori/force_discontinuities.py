@@ -25,7 +25,7 @@ from vibsim.core.vocabulary import MEMBER
 from vibsim.formula import Name, Switch, names_in, to_formula
 from vibsim.models import Model
 from vibsim.models.events import Friction
-from vibsim.simulation import Members
+from vibsim.simulation.members import Members
 from vibsim.simulation.reference.one_sided_forces import TABLE, Sides, sides
 
 ON_A_POINT = 1e-6

@@ -22,7 +22,7 @@ from vibsim.core.array_types import Floats, Integers
 from vibsim.core.record import Attribute, Record, Variable, attributes
 from vibsim.core.vocabulary import MEMBER, SERIES
 from vibsim.observe.common_grid import Grid, check_belonging, common_grid, take
-from vibsim.simulation import Members, members
+from vibsim.simulation.members import Members, members
 from vibsim.simulation.scaled import in_scales
 
 if TYPE_CHECKING:

@@ -32,7 +32,7 @@ from vibsim.core.array_types import Floats, Integers
 from vibsim.core.errors import Fault, InputError, VibsimError
 from vibsim.experiment.schema.fields import MAX_LEVEL
 from vibsim.ladder.solving import climb
-from vibsim.simulation import Members, members
+from vibsim.simulation.members import Members, members
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment

@@ -10,8 +10,8 @@ from vibsim.comparison.best_solution import in_order, methods, record_of, start_
 from vibsim.comparison.extrapolate_members import Extrapolated, joined
 from vibsim.ladder.choosing import resolve
 from vibsim.ladder.solving import climb
-from vibsim.simulation import Members, members
 from vibsim.simulation.level import coordinates
+from vibsim.simulation.members import Members, members
 
 if TYPE_CHECKING:
     import xarray

@@ -28,7 +28,7 @@ from vibsim.observe.missed_pulses import Missed, missed_pulses
 from vibsim.observe.sensitivity import in_columns, sensitivity
 from vibsim.observe.stiffness import decay_rate, stiffest
 from vibsim.observe.thresholds import FEW_RADIANS
-from vibsim.simulation import Members, members
+from vibsim.simulation.members import Members, members
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment

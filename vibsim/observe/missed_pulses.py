@@ -11,7 +11,7 @@ from vibsim.core.record import Record, Variable, attributes
 from vibsim.formula import Pulses
 from vibsim.models import Model
 from vibsim.observe.thresholds import MOST_GAPS
-from vibsim.simulation import Members
+from vibsim.simulation.members import Members
 from vibsim.simulation.reference.one_sided_forces import pulses_of_force, varies_in_time
 
 AROUND = np.arange(-2, 4)  # points around a pulse

@@ -25,7 +25,7 @@ from vibsim.convergence.differences import laid_out, largest
 from vibsim.core.array_types import Flags, Floats
 from vibsim.models import Model
 from vibsim.observe.thresholds import DISTURBANCE, INSTANT, NEAR_REST, PLACES
-from vibsim.simulation import Members
+from vibsim.simulation.members import Members
 
 if TYPE_CHECKING:
     from vibsim.experiment import Experiment

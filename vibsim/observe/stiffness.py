@@ -22,7 +22,7 @@ from vibsim.formula import derivative, names_in, values
 from vibsim.models.base import Formula, Model, tree
 from vibsim.observe.common_grid import Grid, take
 from vibsim.observe.thresholds import A_WHILE
-from vibsim.simulation import Members
+from vibsim.simulation.members import Members
 
 
 def applies(model: Model) -> bool:

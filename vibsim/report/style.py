@@ -40,6 +40,8 @@ ALLOWED = dict[str, Any](color="#ececec", zorder=0)
 """Of a band of what a tolerance allows."""
 BESIDE = dict[str, Any](loc="upper left", bbox_to_anchor=(1.01, 1.03), borderaxespad=0.0)
 """The place of a legend at the right of its axes."""
+TIME, STEP = "time", "step"
+"""Group ids of axes whose curves a page can read: over time, and against the step (`vibsim.report.figures.svg`)."""
 MISSING = "#d4d4d4"  # colour of what has no value
 WIDTH = 9.0  # of a figure [inch]
 THINNED_POINTS = 400  # horizontal resolution to which a long series is thinned
@@ -97,8 +99,21 @@ def applied() -> Iterator[None]:
     """Use the look of this module while figures are built and saved."""
     import matplotlib
 
+    _import_matplotlib()
     with matplotlib.rc_context(_RC):
         yield
+
+
+def _import_matplotlib() -> None:
+    """Import what draws, without the help text that matplotlib writes for each of its classes: a tenth of a second."""
+    import matplotlib.artist
+
+    module: Any = matplotlib.artist
+    written, module.kwdoc = module.kwdoc, lambda _: ""
+    try:
+        import matplotlib.figure
+    finally:
+        module.kwdoc = written
 
 
 def canvas(height: float) -> Figure:
@@ -161,6 +176,11 @@ def positive(values: Floats) -> Floats:
 def no_zeros(values: Floats) -> Floats:
     """Return absolute values; NaN for zero, which a logarithmic axis cannot show."""
     return np.where(values == 0.0, np.nan, np.abs(values))
+
+
+def of_level(level: int) -> str:
+    """Return the group id of what belongs to one level, or to several of which it is the coarsest."""
+    return f"level-{level}"
 
 
 def entry(text: str) -> str:

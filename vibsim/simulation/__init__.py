@@ -6,7 +6,25 @@ is bounded (`vibsim.experiment.storage.is_lean`), of the series only those of
 `vibsim.experiment.storage.lean_series`.
 """
 
-from vibsim.simulation.level import simulate, simulate_record
-from vibsim.simulation.members import Members, members
+from __future__ import annotations
 
-__all__ = ["Members", "members", "simulate", "simulate_record"]
+from typing import TYPE_CHECKING
+
+from vibsim.core.lazy import loader
+
+if TYPE_CHECKING:
+    from vibsim.simulation.level import simulate, simulate_record
+
+__all__ = ["simulate", "simulate_record"]
+
+__getattr__ = loader(
+    __name__,
+    {
+        "simulate": "vibsim.simulation.level",
+        "simulate_record": "vibsim.simulation.level",
+    },
+)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -39,6 +40,7 @@ def picture(record: Record, check: EqualCheck, name: str, member: Member) -> Pic
     title = style.label(f"difference of {words.symbol(check.quantity)}", measure)
     figure = style.canvas(1.0)
     ax = frame.panel(figure, title, data.time_label(record), frame.WIDE)
+    ax.set_gid(style.TIME)
     ends = data.ends_of(record)
     t = np.linspace(0.0, ends[member.case if ends.size > 1 else 0], distance.size)
     ax.set_xlim(t[0], t[-1])
@@ -48,7 +50,8 @@ def picture(record: Record, check: EqualCheck, name: str, member: Member) -> Pic
         frame.below(ax, bound)
     # 0 lies below every frame
     lowest = ax.get_ylim()[0]
-    ax.plot(t, np.where(distance == 0.0, lowest, distance), color=frame.COLOUR, linewidth=0.9)
+    look: dict[str, Any] = {"color": frame.COLOUR, "linewidth": 0.9, "label": "difference"}
+    ax.plot(t, np.where(distance == 0.0, lowest, distance), **look)
     nearest = int(np.nanargmax(np.where(np.isfinite(distance), distance, np.nan)))
     largest = float(distance[nearest])
     frame.points(ax, [t[nearest]], distance[[nearest]], [True])

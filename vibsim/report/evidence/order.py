@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -50,12 +51,14 @@ def _draw_differences(figure: Figure, record: Record, quantity: str, member: Mem
     measure = data.unit(record, f"{quantity}_rescaled")
     title = style.label(f"rescaled differences of {words.symbol(quantity)}", measure)
     ax = frame.panel(figure, title, data.time_label(record))
+    ax.set_gid(style.TIME)
     ax.set_xlim(float(t[0]), float(t[-1]))
     frame.scale(ax, *(curve.values for curve in shown), margin=0.05)
     ax.axhline(0.0, color=frame.BAND, linewidth=0.8, zorder=0)
     for i, curve in enumerate(shown):
         width = 2.7 - 2.0 * i / max(1, len(shown) - 1)
-        ax.plot(*style.thin(t, curve.values, 120), color=style.COLOURS[i], linewidth=width)
+        look: dict[str, Any] = {"color": style.COLOURS[i], "linewidth": width, "gid": curve.group}
+        ax.plot(*style.thin(t, curve.values, 120), label=curve.label, **look)
 
 
 def _draw_orders(

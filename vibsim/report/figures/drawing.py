@@ -9,14 +9,7 @@ from vibsim.report.style import Picture
 from vibsim.report.types import Bbox, Figure
 
 FORMATS = ("svg", "png", "pdf")  # formats of figures
-FAMILY = "'DejaVu Sans', Verdana, Arial, Helvetica, sans-serif"
 MARGIN = 0.05  # between words and the border of a figure [inch]
-_PLACES = re.compile(r' (?:d|x|y)="[^"]*"')
-_DIGITS = re.compile(r"(\.\d\d)\d+")
-_NOTHING = re.compile(
-    r"<!--.*?-->\s*|<metadata>.*?</metadata>\s*|<!DOCTYPE.*?>\s*| transform=\"rotate\(-0 [^\"]*\"",
-    flags=re.DOTALL,
-)
 
 
 def box(figure: Figure) -> Bbox:
@@ -28,33 +21,9 @@ def box(figure: Figure) -> Bbox:
 
 def svg(figure: Figure, name: str) -> str:
     """Return the SVG document of a figure; the ids in it begin with `name`, which is unique on the page."""
-    import matplotlib
+    from vibsim.report.figures.svg import document
 
-    stream = io.StringIO()
-    nothing = {"Date": None, "Creator": None, "Format": None, "Type": None}
-    with matplotlib.rc_context({"svg.hashsalt": name}):
-        figure.savefig(stream, format="svg", metadata=nothing, bbox_inches=box(figure))
-    return _tidy(stream.getvalue(), name)
-
-
-def _tidy(text: str, name: str) -> str:
-    """Make ids unique among the figures of one page, drop what says nothing, and let the reader's fonts serve."""
-    used = set(re.findall(r'(?:url\(#|href="#)([^)"]+)', text))
-    text = re.sub(r' id="([^"]*)"', lambda m: f' id="{name}-{m[1]}"' if m[1] in used else "", text)
-    text = re.sub(r'(url\(#|href="#)', rf"\g<1>{name}-", text)
-    # hundredths of a point are more than anyone sees
-    text = _PLACES.sub(lambda match: _DIGITS.sub(r"\1", match[0]), text)
-    text = _NOTHING.sub("", text).replace("<svg ", f'<svg font-family="{FAMILY}" ', 1)
-    text = re.sub(r"<g ?/>", "", re.sub(r"; font-family: [^;\"]*", "", text))
-    bare: list[bool] = []
-
-    def without_bare_groups(match: re.Match[str]) -> str:
-        if match[0] != "</g>":
-            bare.append(match[0] == "<g>")
-            return "" if bare[-1] else match[0]
-        return "" if bare.pop() else match[0]
-
-    return re.sub(r"\s*\n\s*", "\n", re.sub(r"<g(?: [^>]*[^/])?>|</g>", without_bare_groups, text))
+    return document(figure, name)
 
 
 def inline(document: str, alt: str, *, is_scaled: bool = True) -> str:
@@ -68,9 +37,9 @@ def inline(document: str, alt: str, *, is_scaled: bool = True) -> str:
     element = re.sub(r' xmlns(:xlink)?="[^"]*"', "", element).replace("xlink:href", "href")
     if is_scaled:
         element = re.sub(r'(<svg[^>]*?) width="[^"]*" height="[^"]*"', r"\1", element, count=1)
-    # a style sheet within the page would hold for all of it; the page has the same rule for its figures
-    element = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>\s*", "", element, flags=re.DOTALL)
-    return element.replace("<svg", f'<svg role="img" aria-label="{escape(alt)}"', 1)
+    # the paper is that of the page
+    element = re.sub(r"<rect [^>]*/>\n", "", element, count=1)
+    return element.replace("<svg", f'<svg class="plot" role="img" aria-label="{escape(alt)}"', 1)
 
 
 def element(picture: Picture) -> str:

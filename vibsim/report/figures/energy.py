@@ -48,7 +48,7 @@ def running(record: Record, case: int) -> Picture | None:
     most = frame.UNBOUNDED * min(sizes, default=1.0)
     names = record.words("scheme")
     groups = [range(i, min(i + TOGETHER, len(names))) for i in range(0, len(names), TOGETHER)]
-    axes = stacked([2.5] * len(groups))
+    axes = stacked([2.5] * len(groups), style.TIME)
     leaves = False
     for ax, group in zip(axes, groups, strict=True):
         for s in group:

@@ -37,6 +37,7 @@ def against_step(experiment: Experiment, record: Record, quantity: str, case: in
     panel = max(2.2, 0.17 * len(schemes)) if many else 2.2
     second = (6.1, 2.7) if many else (5.0, 3.8)
     figure, (left, right) = rows_of(2, [(0.8, 3.3), second], panel, 0.6, 0.5)
+    left.set_gid(style.STEP)
     members = [Member(s, case, scheme) for s, scheme in enumerate(schemes)]
     kinds = _draw_norms(left, experiment, record, quantity, members)
     draw = _draw_each if many else _draw_by_level
@@ -96,8 +97,10 @@ def _draw_norms(
         name = style.entry(member.scheme_name)
         ax.plot(dt[: difference.size], difference, **look, markersize=5, linewidth=1.1, label=name)
         if np.isfinite(true).any():
-            ax.plot(dt, true, **look | KINDS["true"][1] | {"marker": look["marker"]})
-        ax.plot(dt, floor, color=look["color"], **KINDS["floor"][1])
+            hollow = look | KINDS["true"][1] | {"marker": look["marker"], "gid": name}
+            ax.plot(dt, true, **hollow, label=f"_true error, {name}")
+        text, dotted = KINDS["floor"]
+        ax.plot(dt, floor, color=look["color"], **dotted, gid=name, label=f"_{text}, {name}")
         for kind, values in zip(kinds, (difference, true, floor), strict=True):
             kinds[kind].append(values)
     # two schemes apart, differences and errors stand by turns

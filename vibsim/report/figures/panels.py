@@ -28,6 +28,8 @@ class Curve:
     sound: bool = True  # whether it stands above round-off
     lost: str = ""
     """Why it does not, in words; round-off where nothing is said."""
+    group: str | None = None
+    """Group id of what is switched off together with it in a page."""
 
     @property
     def is_whole(self) -> bool:
@@ -48,8 +50,11 @@ def note(ax: Axes, text: str, height: float = 0.9) -> None:
     ax.text(0.99, height, text, transform=ax.transAxes, ha="right", fontsize=8.5)
 
 
-def stacked(heights: list[float]) -> list[Axes]:
-    """Return axes below each other with one common axis of abscissae; room for a legend at the right."""
+def stacked(heights: list[float], over: str | None = None) -> list[Axes]:
+    """Return axes below each other with one common axis of abscissae; room for a legend at the right.
+
+    `over` is the group id of axes whose curves a page can read.
+    """
     total = sum(heights) + 0.28 * len(heights) + 0.42
     figure = style.canvas(total)
     axes: list[Any] = []
@@ -57,7 +62,7 @@ def stacked(heights: list[float]) -> list[Axes]:
     for height in heights:
         top -= 0.28
         box = (0.088, (top - height) / total, 0.652, height / total)
-        axes.append(figure.add_axes(box, sharex=axes[0] if axes else None))
+        axes.append(figure.add_axes(box, sharex=axes[0] if axes else None, gid=over))
         top -= height
         axes[-1].yaxis.set_label_coords(-0.088, 0.5)
     for ax in axes[:-1]:
@@ -113,7 +118,7 @@ def draw_curves(ax: Axes, t: Floats, curves: list[Curve], text: str, measure: st
         look = _look(i, len(curves), x.size)
         if not curve.sound and any(c.sound for c in curves):
             look = {"color": "#a0a0a0", "linewidth": 0.6, "zorder": 1.5}
-        ax.plot(x, y, label=curve.label + fate, **look)
+        ax.plot(x, y, label=curve.label + fate, gid=curve.group, **look)
     stop_at_breakdown(ax, t, [curve.values for curve in curves])
     if wild:
         style.log_axis(ax, "y", *decades(shown))
@@ -195,7 +200,7 @@ def draw_spread(ax: Axes, t: Floats, curves: list[Curve], measure: str) -> None:
         values = style.no_zeros(gap) if logarithmic else gap / 10.0**exponent
         x, y = style.thin(t, values)
         look = _look(i, len(curves), x.size) | {"linewidth": 1.3, "alpha": 1.0, "markersize": 4.0}
-        ax.plot(x, y, **look)
+        ax.plot(x, y, label=f"_{curves[i].label}", gid=curves[i].group, **look)
     if logarithmic:
         highest = min(max(float(np.nanmax(np.abs(gap))) for gap in shown), style.LARGEST)
         style.log_axis(ax, "y", max(0.02 * min(sizes), style.TINIEST), 2 * highest)

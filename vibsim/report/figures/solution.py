@@ -32,7 +32,7 @@ def solution(record: Record, quantity: str, member: Member) -> Picture:
     exact = data.exact_series(record, quantity, member)
     best, bound = (data.at(record, f"{quantity}_richardson{end}", member) for end in ("", "_error"))
     is_known = bool(np.isfinite(exact).any())
-    axes = panels.stacked([2.3, 2.5])
+    axes = panels.stacked([2.3, 2.5], style.TIME)
     finest = data.at(record, f"{quantity}_finest", member)
     _draw_solution(axes[0], t, finest, best, exact, data.whole(record, "level")[-1])
     axes[0].set(ylabel=style.label(letter, measure), title=f"Solution {letter}(t)")
@@ -75,7 +75,7 @@ def _draw_solution(
     ax: Axes, t: Floats, finest: Floats, best: Floats, exact: Floats, level: int
 ) -> None:
     pale: dict[str, Any] = {"color": PALE, "linewidth": 4.5, "alpha": 0.7}
-    solid: dict[str, Any] = {"color": "#0072B2", "linewidth": 1.4}
+    solid: dict[str, Any] = {"color": "#0072B2", "linewidth": 1.4, "gid": style.of_level(level)}
     dotted: dict[str, Any] = {"color": "black", "linewidth": 1.4, "linestyle": (0, (1, 3))}
     rows = [
         (best, "extrapolated (Richardson)", pale),
@@ -119,6 +119,7 @@ def _draw_errors(
             every = slice(None, None, max(1, t.size // 60))
             mark: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 3.2}
             mark |= {"color": look["color"], "markerfacecolor": "white", "markeredgewidth": 0.9}
+            mark["gid"] = look.get("gid")
             ax.plot(t[every], drawn[-1][every], label=true_of, **mark)
 
     estimates = [
@@ -131,6 +132,7 @@ def _draw_errors(
         error = data.at(record, f"{quantity}_error", member, pair=i)
         text = f"level {pairs[i]}"
         look = {"color": style.COLOURS[k], "linestyle": style.DASHES[k]}
+        look["gid"] = style.of_level(pairs[i])
         add(estimates[i], error, f"estimate, {text}", f"true, {text}", **look)
     if np.isfinite(bound).all():
         of, true_of = "bound, extrapolated", "true, extrapolated"

@@ -198,7 +198,7 @@ def growing(experiment: Experiment, record: Record) -> Picture | None:
         return None
     quantity = position(experiment)
     letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_finest")
-    upper, lower = stacked([2.2, 2.6])
+    upper, lower = stacked([2.2, 2.6], style.TIME)
     sizes, reference = [], 0.0
     for k, (member, level) in enumerate(runs):
         t, colour = data.times(record, member.case), style.look(k)["color"]

@@ -36,7 +36,7 @@ def overlay(record: Record, quantity: str, member: Member) -> Picture:
     curves = differences(record, quantity, member)
     spread, ratios = panels.comparable(curves), bool(good)
     orders = ratios and has_order(record, quantity, member)
-    axes = panels.stacked([2.4, *[1.3] * spread, *[1.5] * ratios, *[1.5] * orders])
+    axes = panels.stacked([2.4, *[1.3] * spread, *[1.5] * ratios, *[1.5] * orders], style.TIME)
     panels.draw_curves(axes[0], t, curves, f"rescaled difference of {letter}", measure)
     axes[0].set_title("Rescaled differences between successive levels")
     if spread:
@@ -90,9 +90,10 @@ def energy(record: Record, member: Member) -> Picture:
         values = data.at(record, f"{name}_scaled", member, level=i)
         factor = words.factor(float(gap_ratio(order, levels[i] - levels[0])), 2.0**order)
         text = f"{factor}dE{words.lowered(levels[i])}"
-        curves.append(panels.Curve(text, values, above[i], _lost(record, name, member, [i])))
+        lost = _lost(record, name, member, [i])
+        curves.append(panels.Curve(text, values, above[i], lost, style.of_level(levels[i])))
     spread = panels.comparable(curves)
-    axes = panels.stacked([2.4, *[1.3] * spread])
+    axes = panels.stacked([2.4, *[1.3] * spread], style.TIME)
     panels.draw_curves(axes[0], t, curves, "rescaled dE", measure)
     axes[0].set_title("Energy deviation dE = E(t) − E(0), rescaled")
     if spread:
@@ -125,7 +126,8 @@ def differences(record: Record, quantity: str, member: Member) -> list[panels.Cu
         factor = words.factor(float(rescaling(order, levels[: i + 2])), 2.0**order)
         values = data.at(record, f"{quantity}_rescaled", member, pair=i)
         lost = _lost(record, quantity, member, [i, i + 1])
-        curves.append(panels.Curve(f"{factor}({gap})" if factor else gap, values, above[i], lost))
+        text = f"{factor}({gap})" if factor else gap
+        curves.append(panels.Curve(text, values, above[i], lost, style.of_level(levels[i])))
     return curves
 
 
@@ -176,7 +178,7 @@ def _draw_ratios(
             look = {"color": style.COLOURS[k], "linestyle": style.DASHES[k], "linewidth": 1.3}
             drawn.append(values)
         text = _triple(levels, i) + ("" if good[i] else f"\n({lost[i]})")
-        ax.plot(*style.thin(t, values), label=text, **look)
+        ax.plot(*style.thin(t, values), label=text, gid=style.of_level(levels[i]), **look)
     if not drawn:
         style.remark(ax, _why_no_ratio(good, lost))
     targets = sorted({float(target_ratio(order, levels[i : i + 3])) for i in _few(good)})
@@ -238,18 +240,20 @@ def _draw_orders(
         sure = high - low <= UNSURE
         k = colours.index(i) if i in colours else i
         colour, dashes = (part[k % style.MANY] for part in (style.COLOURS, style.DASHES))
-        band: dict[str, Any] = {"color": colour, "alpha": 0.18, "linewidth": 0}
+        group = style.of_level(levels[i])
+        band: dict[str, Any] = {"color": colour, "alpha": 0.18, "linewidth": 0, "gid": group}
         ax.fill_between(t[:-1], low[:-1], high[:-1], where=sure[:-1].tolist(), **band)
         inner = style.thin(t[:-1], np.where(sure, order, np.nan)[:-1])
-        ax.plot(*inner, color=colour, linestyle=dashes, linewidth=1.3, label=_triple(levels, i))
+        line: dict[str, Any] = {"color": colour, "linestyle": dashes, "linewidth": 1.3}
+        ax.plot(*inner, label=_triple(levels, i), gid=group, **line)
         point: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 4.2}
-        point |= {"markerfacecolor": "white", "markeredgecolor": colour}
+        point |= {"markerfacecolor": "white", "markeredgecolor": colour, "gid": group}
         ax.plot(t[-1:], order[-1:], clip_on=False, zorder=5, **point)
         unsure = np.isfinite(order) & ~sure
         if unsure.any():
             every = max(1, int(np.count_nonzero(unsure)) // 60)
             x, y = t[unsure][::every], order[unsure][::every]
-            ax.plot(x, y, ".", color="#a0a0a0", markersize=2.6, zorder=1.5)
+            ax.plot(x, y, ".", color="#a0a0a0", markersize=2.6, zorder=1.5, gid=group)
         drawn += [order[sure] if sure.any() else order, order[-1:]]
     found = style.finite(*drawn)
     ends = np.array([found.min(), found.max()] if found.size else [])

@@ -1,0 +1,69 @@
+"""A real browser that opens a page, acts on it, and says what it found."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import json
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+MISSING = (
+    "no Chromium is on the PATH, so nothing tells whether pages work in a browser: install it "
+    "(`apt-get install chromium`; as root, `make test-slow` does)"
+)
+WATCH = """
+window.found = {errors: []};
+addEventListener("error", (event) => found.errors.push(String(event.message)));
+addEventListener("securitypolicyviolation", (event) => found.errors.push(`refused: ${event.violatedDirective}`));
+"""
+TOLD = """
+addEventListener("load", () => {
+  try { act(); } catch (error) { found.errors.push(String(error)); }
+  const told = document.createElement("pre");
+  told.id = "found";
+  told.textContent = JSON.stringify(found);
+  document.body.append(told);
+});
+"""
+
+
+def program() -> str:
+    """Return the path of a browser; without one the test fails in continuous integration, and is skipped elsewhere."""
+    found = next(filter(None, map(shutil.which, NAMES)), None)
+    if found is None:
+        (pytest.fail if os.environ.get("CI") else pytest.skip)(MISSING)
+    return found
+
+
+def run(page: Path, act: str, folder: Path, *options: str) -> dict[str, Any]:
+    """Open a page offline under a strict policy, run the body of a function, and return what it put into `found`."""
+    text = page.read_text(encoding="utf-8")
+    added = [WATCH, f"function act() {{{act}}}{TOLD}"]
+    scripts = [*re.findall(r"<script>(.*?)</script>", text, flags=re.DOTALL), *added]
+    policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src " + " ".join(
+        f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
+        for script in scripts
+    )
+    first, last = (f"<script>{script}</script>" for script in added)
+    head = f'<meta http-equiv="Content-Security-Policy" content="{policy}">{first}'
+    text = text.replace('<meta charset="utf-8">', f'<meta charset="utf-8">{head}', 1)
+    changed = folder / "page.html"
+    changed.write_text(text.replace("</body>", f"{last}</body>"), encoding="utf-8")
+    command = [
+        program(), "--headless=new", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder / 'profile'}", *options,
+        "--dump-dom", changed.as_uri(),
+    ]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    told = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, flags=re.DOTALL)
+    assert told, "the page told nothing"
+    found: dict[str, Any] = json.loads(html.unescape(told[1]))
+    return found
