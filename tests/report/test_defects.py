@@ -76,7 +76,7 @@ def test_svg_is_written_whatever_else_is_asked_for(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "notes", "absent"),
     [
-        ({"levels": [6, 7]}, ["it takes three levels"], ["three successive", "bar", "dotted"]),
+        ({"levels": [6, 7]}, ["it takes three levels"], ["from three levels", "bar", "dotted"]),
         (REST, ["nothing to draw", "no ratio of differences"], ["dotted", "hollow", "bar", "band"]),
         ({}, [], ["dotted", "Nothing"]),
     ],

@@ -47,7 +47,7 @@ def test_every_reason_and_every_kind_of_check_has_a_title():
         ({"levels": [6, 7]}, "There are too few levels to judge the angle θ"),
         ({"sweep": {"initial.theta": [0.5, 1.0]}}, "The angle θ converges at second order in all 2 members"),
         ({"schemes": ["central", "rk4"]},
-         "The angle θ converges at the order that each scheme promises by all 2 schemes"),
+         "The angle θ converges at the order that each of 2 schemes promises"),
         ({"checks": [{"value": "period", "below": 1.0}]}, "Period is not as expected"),
         ({"checks": [{"claim": "so", "that": {"value": "period", "above": 1.0}}]}, "1 statement confirmed"),
         ({"schemes": [*WRONG, {"kind": "central", "label": "sound"}],

@@ -75,9 +75,15 @@ def pictures(
     position = choice.position(experiment)
     moving: Drawn = [motion.motion(record, position, lead.member)] if has_series else []
     if has_series:
+        # beside the worst member a typical one
+        typical = [member for member in series if member.role == "typical"]
+        moving += [motion.motion(record, position, member) for member in typical[:1]]
         moving += [plane.path(experiment, record, series)]
     tabs: list[Tab] = []
-    own = sorted(series, key=lambda member: member != lead.member)
+    own = [member for member in series if member.role != "typical"]
+    own.sort(
+        key=lambda member: (member.scheme, member.case) != (lead.member.scheme, lead.member.case)
+    )
     for quantity in sorted(found, key=lambda one: one != lead.quantity):
         letter, is_lead, drawn = words.symbol(quantity), quantity == lead.quantity, Drawn()
         is_energy = quantity == "energy_deviation" and "energy_deviation_scaled" in record
@@ -89,7 +95,7 @@ def pictures(
             if has_pairs and (not is_energy or quantity in asked(experiment)):
                 each.append(time.overlay(record, quantity, member))
             if is_lead and len(own) > 1:
-                tabs += tab(f"{letter}, {member.scheme_name}{_role(member)}", each)
+                tabs += tab(f"{letter}, {member.scheme_name}", each)
             else:
                 drawn += each
         tabs += tab(letter if not is_lead or len(own) < 2 else f"{letter}, order", drawn)
@@ -108,10 +114,6 @@ def pictures(
         tabs += tab("work", [work.precision(experiment, record, case) for case in cases])
     shown_below = (picture for picture in moving if picture and picture.name not in first)
     return Gallery(tuple(shown_below), tuple(tabs), tuple(over_members(experiment, record, found)))
-
-
-def _role(member: Member) -> str:
-    return f", {member.role} member" if member.role else ""
 
 
 def over_members(experiment: Experiment, record: Record, found: list[str]) -> list[Tab]:

@@ -90,6 +90,8 @@ def _title_of_differences(record: Record, lead: Lead, count: int) -> str:
     name = f"{lead.quantity}_coincidence"
     found = data.at(record, name, lead.member) if name in record else np.empty(0)
     last = float(found[-1]) if found.size else math.nan
+    if lead.result.get("reason") in ("exact", "round_off"):
+        return "What is left is round-off"
     if count < 2 or not math.isfinite(last):
         return "What is left between the levels"
     if last > COINCIDE:
@@ -123,7 +125,10 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
             ring = mark | {"markerfacecolor": "none", "markersize": 9 if is_lead else 6.5}
             ax.plot(dt, true, **ring, label="true" if alone else "")
             drawn.append(true)
-        if is_lead:
+        has_order = math.isfinite(
+            data.stated_order(record, quantity, member, data.norm_index(record))[0]
+        )
+        if is_lead and (has_order or lead.is_on_order) and lead.result.get("reason") != "exact":
             _slope(
                 ax,
                 dt,

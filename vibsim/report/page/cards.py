@@ -22,8 +22,9 @@ from vibsim.report.types import Check, Experiment, Measurement
 
 BRIEF = 5  # results of a check that passed which the page lists; the table of checks has all
 BADGES = {"PASS": "passed", "INCONCLUSIVE": "undecided", "FAIL": "failed"}
-SAID_BY_THE_LINE = ("value", "equal")
+SAID_BY_THE_LINE = ("value", "equal", "converges")
 """Kinds of checks of which the line says all where they pass."""
+WIDE = 1.0  # an interval that reaches further below its order is worth a sentence
 
 
 def cards(
@@ -69,12 +70,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
     facts = (decisive[key] for key in ("scheme", "case", "status", "reason", "facts"))
     result = Result(*facts)
     decides = worst(word for word, count in counts.items() if count)
-    is_said = status == "PASS" and measured is not None and measured.kind in SAID_BY_THE_LINE
-    told = (
-        ""
-        if is_said and sum(counts.values()) == 1
-        else wording.text(result, counts, check["where"])
-    )
+    told = "" if _is_said(asserted, check) else wording.text(result, counts, check["where"])
     results, more = _results(record, check, unit)
     return {
         "id": check["id"],
@@ -101,6 +97,16 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
     }
 
 
+def _is_said(asserted: Check | None, check: Mapping[str, Any]) -> bool:
+    """Say whether the line of a check tells all: one result, as asked for, and no doubt about it."""
+    if check["status"] != "PASS" or asserted is None or sum(check["counts"].values()) > 1:
+        return False
+    order, low = (words.fact(check["results"][0], f"order{end}") for end in ("", "_low"))
+    is_doubtful = order is not None and low is not None and order - low > WIDE
+    is_plain = asserted.measured.kind in SAID_BY_THE_LINE and not is_trap(asserted)
+    return is_plain and not is_doubtful
+
+
 def _wanted(experiment: Experiment, asserted: Check | None, check: Mapping[str, Any]) -> str:
     """Say in a few words what is asked for."""
     if asserted is None:
@@ -116,7 +122,7 @@ def _wanted(experiment: Experiment, asserted: Check | None, check: Mapping[str, 
 def _got(check: Mapping[str, Any], wording: Wording, result: Result) -> str:
     """Say in a few words what was measured where it decides."""
     order, reason = words.fact(check["results"][0], "order"), check["results"][0]["reason"]
-    if order is not None:
+    if order is not None and check["results"][0]["status"] != "INCONCLUSIVE":
         between = words.interval(words.interval_of(check["results"][0]))
         return f"order {words.number(order, 'order')}{f' ({between})' if between != '–' else ''}"
     if check["kind"] == "converges" or "order" in (check["results"][0].get("facts") or {}):

@@ -26,7 +26,7 @@ from vibsim.report.types import Experiment
 
 NUMBERS = 3  # large numbers on the first screen
 NAMED = 3  # schemes that are named
-LONG_NAME = 22  # letters of a number above which it is set smaller
+MOST_LETTERS = 14  # of a best value; tables have every digit
 MEASURED = {
     "stable": "Growth per period", "conserves": "Largest energy error over E(0)", "equal": "Largest difference",
     "accurate": "Error of the finest level", "tolerance": "Error bound of the best solution",
@@ -44,13 +44,10 @@ def context(
 ) -> dict[str, Any]:
     """Return the words of the first screen by the names that its template uses."""
     statuses = [check["status"] for check in summary["checks"]]
-    count = (
-        f"{statuses.count('PASS')} of {len(statuses)} {'check' if len(statuses) == 1 else 'checks'}"
-    )
     levels = len(data.whole(record, "level"))
     return {
         "finding": findings.title(experiment, record, lead, published.ids(experiment)),
-        "counts": count if statuses else "no check",
+        "counts": words.passed(statuses),
         "facts": findings.sentence(*_facts(experiment, record)),
         "numbers": list(numbers(experiment, record, lead))[:NUMBERS],
         "meaning": findings.paragraph(experiment, record, lead, levels),
@@ -111,9 +108,14 @@ def _measured(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Nu
         unit, form = data.pretty_unit(unit_of(experiment, record, check)), "close"
         subject = assertions.subject(check)
         label = words.PAGE.opening(subject)
-    wanted = lead.entry["expected"]
+    if kind in ("equal", "accurate"):
+        unit = data.norm_unit(record, lead.quantity, "l2" if kind == "accurate" else "linf")
+    allowed = (lead.result.get("facts") or {}).get("allowed")
+    note = f"asked for: {words.labelled(lead.entry['expected'], None)}"
+    if allowed is not None:
+        note = f"{words.number(allowed, 'brief')} is allowed"
     value = f"{words.number(number, form)} {unit}".rstrip()
-    yield {"label": label, "value": value, "note": f"asked for: {words.labelled(wanted, None)}"}
+    yield {"label": label, "value": value, "note": note}
 
 
 def _order(record: Record, lead: Lead) -> Iterator[Number]:
@@ -141,7 +143,9 @@ def _order(record: Record, lead: Lead) -> Iterator[Number]:
     elif reason == "exact":
         yield {"label": label, "value": "exact", "note": "the levels differ by round-off only"}
     elif order is None or not math.isfinite(order):
-        yield {"label": label, "value": "not known", "note": due}
+        # beside another number it says nothing that there is none
+        if lead.is_on_order or lead.entry is None:
+            yield {"label": label, "value": "not known", "note": due}
     else:
         between = words.interval((low, high))
         span = f"between {between.replace(' to ', ' and ')}; " if between != "–" else ""
@@ -199,10 +203,12 @@ def _best(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number
         text = f"{words.symbol(row.quantity)} {WORDS[row.value]}" if is_named else row.words
         unit, size = data.unit(record, field), error_size(bound)
         levels = len(data.whole(record, "level"))
+        told = rounded(value, bound).text
+        told = told if len(told) <= MOST_LETTERS else words.number(value, "value")
         note = f"± {size.text if size else '0'} {unit}".rstrip()
         yield {
             "label": f"Best value: {text}",
-            "value": f"{rounded(value, bound).text} {unit}".rstrip(),
+            "value": f"{told} {unit}".rstrip(),
             "note": f"{note}, extrapolated over {levels} levels",
         }
         return

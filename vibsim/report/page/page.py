@@ -27,8 +27,8 @@ from vibsim.report.types import Environment, Experiment, Plan
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
 NOTHING: Mapping[str, Any] = {}
-MOST_ROWS = 10  # of a table that the page itself holds; the CSV file holds all
-ROOM = 400  # cells of all tables of numbers together; a table beyond is a file only
+MOST_ROWS = 8  # of a table that the page itself holds; the CSV file holds all
+ROOM = 220  # cells of all tables of numbers together; a table beyond is a file only
 LONG_HEADING = 90  # letters of a caption of which a heading has the first words only
 PYTHON = """\
 from vibsim import Experiment, analyse, simulate, verdicts

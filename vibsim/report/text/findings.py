@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from typing import Any
 
+from vibsim.convergence import LadderVerdict
 from vibsim.core.record import Record
 from vibsim.report import data
 from vibsim.report.lead import Lead, is_trap
@@ -83,10 +85,22 @@ def title(experiment: Experiment, record: Record, lead: Lead, printed: Collectio
         return NO_CHECK
     entry, told = lead.entry, _by_check(experiment, record, lead)
     if entry["status"] != "PASS":
-        return told
+        return f"{told}{_of_some(record, entry)}"
     if entry["id"] in printed:
         return f"All {len(printed)} printed numbers are as expected"
     return f"{told}{_caught(experiment, lead)}" if not _is_claim(lead) else _of_claims(experiment)
+
+
+def _of_some(record: Record, entry: Mapping[str, Any]) -> str:
+    """Say of how many members or schemes a verdict is that not all of them have; empty where all do."""
+    count, total = entry["counts"][entry["status"]], sum(entry["counts"].values())
+    if not 0 < count < total:
+        return ""
+    noun = (
+        "schemes" if not data.swept(record) else "members" if len(record["scheme"]) == 1 else "runs"
+    )
+    few, all_of = (words.number(n, "integer") for n in (count, total))
+    return f", in {few} of {all_of} {noun}"
 
 
 def _is_claim(lead: Lead) -> bool:
@@ -171,7 +185,10 @@ def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, st
     }
     is_of_all = getattr(measured, "order", None) == "scheme" and len(named) > 1
     if is_of_all and len(promised) > 1 and measured.kind == "converges":
-        filled |= {"at": "at the order that each scheme promises"}
+        filled |= {
+            "at": f"at the order that each of {len(named)} schemes promises",
+            "everywhere": "",
+        }
     return filled
 
 
@@ -211,6 +228,17 @@ def _at(*orders: float | None) -> str:
 def _opened(text: str) -> str:
     """Begin a sentence: with a capital where it begins with an article."""
     return text[:1].upper() + text[1:] if text.startswith("the ") else text
+
+
+def of_ladder(verdict: LadderVerdict) -> str:
+    """Return the finding on a ladder that another solver computed, in one line."""
+    expected = verdict.expected or verdict.at_least
+    words_of = {
+        "what": verdict.quantity, "What": verdict.quantity, "everywhere": "",
+        "at": _at(expected, verdict.order), "at_measured": _at(verdict.order),
+        "expected_order": _at(expected).removesuffix(" order"),
+    }  # fmt: skip
+    return ON_ORDER[verdict.reason].format_map(words_of)
 
 
 def factor(lead: Lead) -> float | None:
