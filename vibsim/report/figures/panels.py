@@ -216,7 +216,8 @@ def stamp(t: Floats, curves: list[Curve]) -> Figure:
     """Return a figure the size of a stamp for the index, with every sound curve as one line and without axes."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(STAMP[0] / 96.0, STAMP[1] / 96.0))
+    # it lies on the paper of the index, light or dark
+    figure = Figure(figsize=(STAMP[0] / 96.0, STAMP[1] / 96.0), facecolor="none")
     ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     whole = [curve for curve in curves if curve.is_whole] or curves
     sound = [curve for curve in whole if curve.sound] or whole
