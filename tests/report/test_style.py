@@ -10,10 +10,12 @@ import pytest
 import samples
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.colors import to_rgb
 
 from vibsim.report import style
 from vibsim.report.data import Member
-from vibsim.report.figures import drawing, time
+from vibsim.report.figures import drawing, gallery, time
+from vibsim.report.page.page import TEMPLATES
 
 VALUES = st.lists(
     st.floats(allow_infinity=False, width=32) | st.just(float("nan")), min_size=1, max_size=400
@@ -126,3 +128,43 @@ def test_a_name_with_markup_stays_text_in_a_figure():
         text = samples.svg(order.against_step(exp, record, "theta", 0))
     assert "<script" not in text
     ElementTree.fromstring(text)
+
+
+SHEET = (TEMPLATES / "plots.css").read_text(encoding="utf-8")
+PAPERS = {"light": "#ffffff", "dark": "#15161a"}
+
+
+def shades(which):
+    """Return the colours that the style sheet of a page gives to figures on light or on dark paper."""
+    light, dark = (block for block in re.findall(r":root \{(.*?)\}", SHEET, flags=re.DOTALL))
+    found = re.findall(r"--(\w+): (#\w+)", {"light": light, "dark": dark}[which])
+    return {name: to_rgb(colour) for name, colour in found}
+
+
+def contrast(one, other):
+    """Return the ratio of contrast of two colours (Web Content Accessibility Guidelines 2.2)."""
+    weights = np.array([0.2126, 0.7152, 0.0722])
+    parts = (np.asarray(to_rgb(colour)) for colour in (one, other))
+    linear = (np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4) for x in parts)
+    low, high = sorted(float(weights @ x) for x in linear)
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.parametrize("which", PAPERS)
+def test_lines_stand_out_from_light_and_dark_paper(which):
+    colours = shades(which)
+    assert len([name for name in colours if re.fullmatch(r"c\d", name)]) == len(style.COLOURS)
+    for name, colour in colours.items():
+        least = {"grid": 1.0, "band": 1.0, "mute": 4.5}.get(name, 3.0)
+        assert contrast(colour, PAPERS[which]) >= least, name
+
+
+def test_a_page_replaces_the_colour_of_every_line_of_its_figures(documents):
+    exp = samples.several()
+    record = samples.record(exp)
+    shown, _ = gallery.choose(exp, record)
+    with style.applied():
+        drawn = [samples.svg(picture) for picture in gallery.pictures(exp, record, shown)]
+    used = set(re.findall(r' stroke="(#\w+)"', "".join([*documents, *drawn])))
+    assert len(used) > len(style.COLOURS)
+    assert {colour for colour in used if f'[stroke="{colour}"]' not in SHEET} == set()
