@@ -240,7 +240,7 @@ def replace_files(directory: Path, files: Mapping[str, bytes], others: Sequence[
 def _tables(experiment: Experiment, record: Record) -> tuple[list[Table], list[Table]]:
     """Return the tables that the page shows, as far as it has room for them, and those that are files only."""
     found, model = choice.quantities(experiment, record), experiment.model.definition
-    shown = choice.with_levels(experiment, choice.members(record, found[0]))
+    shown = choice.with_levels(experiment, choice.members(record, choice.first(experiment, record)))
     norms = [name for name in record.words("norm") if name != TYPICAL_NORM]
     orders = [levels.orders(record, quantity, shown) for quantity in found]
     wanted = [
