@@ -10,7 +10,7 @@ import pytest
 import samples
 from matplotlib.text import Text
 
-from vibsim.report import frame, style, sweep_layout
+from vibsim.report import frame, lead, style, sweep_layout
 from vibsim.report.data import Member
 from vibsim.report.figures import (
     drawing,
@@ -127,8 +127,11 @@ def test_no_word_leaves_a_figure(case):
     exp = spring(**CASES[case])
     record = samples.record(exp)
     shown, _ = gallery.choose(exp, record)
+    decisive = lead.find(exp, record, samples.summary(exp, record))
     with style.applied():
-        for picture in gallery.pictures(exp, record, shown):
+        below = gallery.pictures(exp, record, shown, decisive, [])
+        tabs = (*below.belief, *below.members)
+        for picture in (*below.motion, *(one for tab in tabs for one in tab.pictures)):
             FigureCanvasAgg(picture.figure)
             assert not drawn_outside(picture.figure), picture.name
 

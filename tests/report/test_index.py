@@ -14,7 +14,7 @@ from test_page import make, read
 
 from vibsim import report, store
 from vibsim.report.page import cards, history
-from vibsim.report.page.index import AS_CLAIMED, TRAP
+from vibsim.report.page.index import AS_CLAIMED, TRAP, Headline, headline
 from vibsim.report.text import words
 
 
@@ -135,6 +135,20 @@ def test_a_card_has_the_order_with_its_interval_and_the_error(tmp_path):
     interval = words.interval((facts["order_low"], facts["order_high"]))
     for part in (f"{facts['order']:.3f}", interval, words.number(facts["relative_error"], "brief")):
         assert part in told
+
+
+def test_the_finding_of_a_trap_is_no_headline():
+    def check(expected, sentence, **facts):
+        result = {"status": "PASS", "facts": facts, "sentence": sentence}
+        row = {"kind": "stable", "status": "PASS", "quantity": "u", "results": [result]}
+        return row | {"expected": expected}
+
+    trap = check("FAIL (unstable)", "It is unstable.", order=9.0)
+    good = check("PASS", "It grows by 1.5e-07; that is below 1.")
+    assert headline([trap, good]).text == "It grows by 1.5·10⁻⁷"
+    assert headline([trap]).text == "It is unstable"
+    assert headline([trap, good | {"status": "FAIL"}]) == Headline()
+    assert headline([]) == Headline()
 
 
 @pytest.mark.parametrize("broken", [0, 1, 3])

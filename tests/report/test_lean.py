@@ -77,3 +77,31 @@ def test_the_worst_members_are_listed_with_their_command(tmp_path):
     for result in check["results"]:
         assert f".venv/bin/vibsim run pendulum_lab/theta@{result['case']} " in text
     assert "all with model.g of 300 or more." in text
+
+
+@pytest.mark.usefixtures("unrendered")
+def test_a_sweep_whose_checks_ask_about_no_order_has_a_page(tmp_path):
+    check = {"value": "amplitude", "below": 4.0}
+    exp = samples.experiment(sweep=ACROSS, checks=[check])
+    whole = samples.record(exp)
+    summary = samples.summary(exp, whole)
+    record = lean(whole, False)
+    of_orders = (
+        "order",
+        "order_low",
+        "order_high",
+        "status",
+        "reason",
+        "window_first",
+        "window_last",
+    )
+    quantities = ("theta", "omega", "energy", "energy_deviation")
+    lacking = {f"{quantity}_{name}" for quantity in quantities for name in of_orders}
+    assert lacking & record.variables.keys()
+    kept = {name: row for name, row in record.variables.items() if name not in lacking}
+    plan = SimpleNamespace(experiment=exp)
+    report.write(plan, Record(record.coords, kept, record.attrs), summary, tmp_path)
+    head, *rows = (tmp_path / "tables/members.csv").read_text().splitlines()
+    assert len(rows) == exp.members
+    assert "amplitude" in head
+    assert "here the first, run it alone" in (tmp_path / "report.html").read_text(encoding="utf-8")

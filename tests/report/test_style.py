@@ -12,9 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.colors import to_rgb
 
+from vibsim import report
 from vibsim.report import style
 from vibsim.report.data import Member
-from vibsim.report.figures import drawing, gallery, time
+from vibsim.report.figures import drawing, time
 from vibsim.report.page.page import TEMPLATES
 
 VALUES = st.lists(
@@ -159,12 +160,13 @@ def test_lines_stand_out_from_light_and_dark_paper(which):
         assert contrast(colour, PAPERS[which]) >= least, name
 
 
-def test_a_page_replaces_the_colour_of_every_line_of_its_figures(documents):
+def test_a_page_replaces_the_colour_of_every_line_of_its_figures(documents, tmp_path):
     exp = samples.several()
     record = samples.record(exp)
-    shown, _ = gallery.choose(exp, record)
-    with style.applied():
-        drawn = [samples.svg(picture) for picture in gallery.pictures(exp, record, shown)]
+    report.write(samples.plan(exp), record, samples.summary(exp, record), tmp_path)
+    # the small picture has a sheet of its own
+    files = [path for path in (tmp_path / "figures").glob("*.svg") if path.stem != "thumbnail"]
+    drawn = [path.read_text() for path in files]
     used = set(re.findall(r' stroke="(#\w+)"', "".join([*documents, *drawn])))
     assert len(used) > len(style.COLOURS)
     assert {colour for colour in used if f'[stroke="{colour}"]' not in SHEET} == set()

@@ -236,6 +236,7 @@ IN_THE_WAY = [
     ".vibsim/lock",
     ".vibsim/run.json",
     ".vibsim/deleted.txt",
+    ".vibsim/history.js",
     ".vibsim/logs/index.log",
     ".snakemake/metadata/planted",
     "index.html",

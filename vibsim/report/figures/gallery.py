@@ -153,20 +153,23 @@ def over_members(experiment: Experiment, record: Record, found: list[str]) -> li
 
 def choose(experiment: Experiment, record: Record) -> tuple[list[Member], str]:
     """Return what gets figures of its own, and a sentence saying what was left out."""
-    quantity = choice.quantities(experiment, record)[0]
+    quantity = choice.first(experiment, record)
     everyone = choice.with_levels(experiment, choice.members(record, quantity))
-    status = data.flags(record, f"{quantity}_status")
-    severity = [SEVERITY[status[m.scheme, m.case]] for m in everyone]
+    severity = [0] * len(everyone)
+    if f"{quantity}_status" in record:
+        status = data.flags(record, f"{quantity}_status")
+        severity = [SEVERITY[status[m.scheme, m.case]] for m in everyone]
     room = MOST_SHOWN if len(record["scheme"]) <= MOST_SHOWN else MOST_SHOWN // 2
     ranked = sorted(range(len(everyone)), key=lambda i: (-severity[i], i))[:room]
     shown = [everyone[i] for i in sorted(ranked)]
     parts, is_swept = [], bool(data.swept(record))
     if data.is_lean(record):
         case = int(record["case"][shown[0].case])
+        which = "here the worst" if shown[0].role == "worst" else "here the first"
         command = f".venv/bin/vibsim run {quote(f'{experiment.word}@{case}')}"
         parts.append(
             "The sweep is large, so no series over time are stored, and there are no figures over time. To see the "
-            f"series of one member, here the worst, run it alone: `{command}`."
+            f"series of one member, {which}, run it alone: `{command}`."
         )
     elif is_swept:
         parts.append("The worst and a typical member are shown over time, for every scheme.")

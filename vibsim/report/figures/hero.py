@@ -168,7 +168,7 @@ def solution(record: Record, quantity: str, member: Member) -> Picture:
     letter, exact = words.symbol(quantity), data.exact_series(record, quantity, member)
     ax = _panel(RIGHT, style.label(letter, data.unit(record, f"{quantity}_finest")))
     if np.isfinite(exact).any():
-        ax.plot(*style.thin(t, exact, 200), color="#b8b8b8", linewidth=4.5, label="exact")
+        ax.plot(*style.thin(t, exact, 200), color="#b0b0b0", linewidth=4.5, label="exact")
     steps = words.number(int(record["steps"][-1]), "integer")
     ax.plot(
         *style.thin(t, values, 200), color=style.COLOURS[0], linewidth=1.4, label=f"{steps} steps"

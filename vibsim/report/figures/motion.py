@@ -16,7 +16,7 @@ from vibsim.report.text import words
 from vibsim.report.types import Axes
 
 MOST = 6  # most levels that can be told apart
-PALE = "#b8b8b8"  # colour of what the levels are compared with
+PALE = "#b0b0b0"  # colour of what the levels are compared with
 BEYOND = 3.0
 """A level that grows beyond so many times the solution it is compared with leaves the frame."""
 

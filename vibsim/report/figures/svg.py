@@ -27,7 +27,7 @@ import numpy as np
 from matplotlib import _path
 from matplotlib.axes import Axes
 from matplotlib.backend_bases import RendererBase
-from matplotlib.colors import to_hex
+from matplotlib.colors import to_hex, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager, get_font
 from matplotlib.ft2font import LoadFlags
@@ -52,7 +52,7 @@ def document(figure: Figure, name: str) -> str:
     figure.set_dpi(POINT)
     if (engine := figure.get_layout_engine()) is not None:
         engine.execute(figure)
-    writer = Writer(*figure.bbox.size, name)
+    writer = Writer(*figure.bbox.size, name, has_paper=to_rgba(figure.get_facecolor())[3] > 0.0)
     for artist in _in_order([*figure.axes, *figure.legends, *figure.texts]):
         writer.add(artist)
     return writer.document()
@@ -84,8 +84,9 @@ def _numbers(*values: float) -> str:
 class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
     """What matplotlib draws on: elements of SVG, and how far the words among them reach."""
 
-    def __init__(self, width: float, height: float, name: str) -> None:
+    def __init__(self, width: float, height: float, name: str, *, has_paper: bool = True) -> None:
         super().__init__()
+        self._has_paper = has_paper
         self._size = (width, height)
         self._name = name
         self._flip = Affine2D().scale(1.0, -1.0).translate(0.0, height)
@@ -105,7 +106,8 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
             '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
             f'width="{_number(width)}pt" height="{_number(height)}pt" '
             f'viewBox="{_numbers(left, top, width, height)}" font-family="{FAMILY}" stroke-linejoin="round">\n'
-            f'<rect {place} fill="#ffffff"/>\n' + (f"<defs>{defs}</defs>\n" if defs else "")
+            + (f'<rect {place} fill="#ffffff"/>\n' if self._has_paper else "")
+            + (f"<defs>{defs}</defs>\n" if defs else "")
             + "\n".join(self._body) + "\n</svg>\n"
         )  # fmt: skip
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -37,6 +38,7 @@ HEADERS = (
     "status", "reason", "scheme", "case", "order", "order_low", "order_high", "levels", "value",
     "error", "error_bound", "relative_error", "advice", "failures",
 )  # fmt: skip
+_FLOAT = re.compile(r"\b\d[\d.]*e[-+]?\d+\b")
 LONGEST = 90  # characters of a finding that stands in place of numbers
 
 
@@ -187,11 +189,11 @@ def headline(checks: Sequence[Mapping[str, Any]]) -> Headline:
                 "" if interval == "–" else interval,
                 "" if relative is None else f"{words.number(relative, 'brief')} of its size",
             )
-    for check, result in found:
-        if check["status"] != "PASS":
-            break
+    passed = [] if ranked and ranked[0]["status"] != "PASS" else wanted or found
+    for check, result in passed:
         sentence = str(result.get("sentence") or "")
         text = words.labelled(sentence.partition("; ")[0].rstrip("."), check["quantity"])
+        text = _FLOAT.sub(lambda number: words.PAGE.digits(number.group()), text)
         if text:
             return Headline(text=f"{text[: LONGEST - 1]}…" if len(text) > LONGEST else text)
     return Headline()

@@ -85,7 +85,7 @@ def write(
             "belief": [drawn.tab(tab) for tab in below.belief],
             "members": [drawn.tab(tab) for tab in below.members],
         }
-    small = thumbnail.thumbnail(experiment, convergence, shown[0])
+        small = thumbnail.thumbnail(experiment, convergence, shown[0])
     replace_files(directory / "figures", {**drawn.files, "thumbnail.svg": small.encode()})
     listed, others = _tables(experiment, convergence)
     scales = scales_table(experiment, convergence)
@@ -126,11 +126,11 @@ def write(
             else "",
             "numbers_shown": [cut(table) for table in listed],
             "scales": scales,
+            "player": markup(player.element(experiment, convergence, environment())),
             "printed": printed,
             "printed_sentence": published.sentence(printed),
             "shown": left_out,
             "digits": members.digits(convergence),
-            "player": markup(player.element(experiment, convergence, environment())),
             "equation": equation.mathml(experiment.model.definition.equation),
             "setup": list(setting.setup(experiment, convergence)),
             "experiment_file": experiment_file.text(experiment),
@@ -240,7 +240,7 @@ def replace_files(directory: Path, files: Mapping[str, bytes], others: Sequence[
 def _tables(experiment: Experiment, record: Record) -> tuple[list[Table], list[Table]]:
     """Return the tables that the page shows, as far as it has room for them, and those that are files only."""
     found, model = choice.quantities(experiment, record), experiment.model.definition
-    shown = choice.with_levels(experiment, choice.members(record, found[0]))
+    shown = choice.with_levels(experiment, choice.members(record, choice.first(experiment, record)))
     norms = [name for name in record.words("norm") if name != TYPICAL_NORM]
     orders = [levels.orders(record, quantity, shown) for quantity in found]
     wanted = [
