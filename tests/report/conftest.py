@@ -10,7 +10,7 @@ EMPTY = '<svg xmlns="http://www.w3.org/2000/svg" width="1pt" height="1pt"></svg>
 @pytest.fixture
 def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Write pages without pictures, which take most of the time: for what words and tables say."""
-    monkeypatch.setattr(gallery, "pictures", lambda *_: [])
+    monkeypatch.setattr(gallery, "pictures", lambda *_: gallery.Gallery())
     monkeypatch.setattr(drawing, "svg", lambda *_: EMPTY)
 
 

@@ -107,4 +107,4 @@ def test_latex_has_every_row() -> None:
     ],
 )
 def test_rounding(value: float, error: float, text: str) -> None:
-    assert best._rounded(value, error).text == text
+    assert best.rounded(value, error).text == text

@@ -118,13 +118,17 @@ def test_the_separatrix_is_found_where_the_energy_says(across):
     np.testing.assert_allclose(y, 2.0 * np.cos(x / 2.0), atol=1e-9)
 
 
+def drawn_over_members(exp, record, found):
+    return [picture for tab in gallery.over_members(exp, record, found) for picture in tab.pictures]
+
+
 def test_the_separatrix_is_searched_once_for_all_maps(across, monkeypatch):
     exp, record = across
     searches = []
     peaks = separatrix._peaks
     monkeypatch.setattr(separatrix, "_peaks", lambda *a: searches.append(1) or peaks(*a))
     with style.applied():
-        pictures = gallery.over_members(exp, record, ["theta", "omega"])
+        pictures = drawn_over_members(exp, record, ["theta", "omega"])
     marked = [p for p in pictures if "separatrix" in p.caption]
     assert len(marked) >= 3
     # down and across
@@ -234,7 +238,7 @@ def test_a_sample_of_three_keys_is_shown_against_each(cloud):
     assert sweep_layout.along_of(sweep_layout.keys(record)) is None
     assert sweep_layout.grid_of(sweep_layout.keys(record)) is None
     with style.applied():
-        drawn = gallery.over_members(exp, record, ["theta"])
+        drawn = drawn_over_members(exp, record, ["theta"])
     assert [picture.name for picture in drawn] == ["projections_theta_0", "spread_theta"]
     labels = [ax.get_xlabel() for ax in drawn[0].figure.axes]
     assert labels[::3] == ["initial.theta [rad]", "model.g [m s⁻²]", "model.L [m]"]
@@ -354,8 +358,11 @@ def test_without_an_exact_solution_maps_show_the_estimate_and_its_error_bar(monk
 def test_few_levels_make_the_pages_of_a_sweep(tmp_path, sweep, levels):
     exp = samples.experiment(sweep=sweep, levels=levels)
     record = samples.record(exp)
-    report.write(samples.plan(exp), record, samples.summary(exp, record), tmp_path)
-    assert "too_few_levels" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    summary = samples.summary(exp, record)
+    report.write(samples.plan(exp), record, summary, tmp_path)
+    assert "too_few_levels" in (tmp_path / "tables/members.csv").read_text(encoding="utf-8")
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert all(check["reason"] in page for check in summary["checks"])
 
 
 def test_numbers_of_checks_have_maps_unless_they_are_shown_already():
@@ -369,7 +376,7 @@ def test_numbers_of_checks_have_maps_unless_they_are_shown_already():
     grid = sweep_layout.grid_of(sweep_layout.keys(record))
     with style.applied():
         picture = maps.numbers(exp, record, grid, 0)
-        pictures = gallery.over_members(exp, record, ["theta"])
+        pictures = drawn_over_members(exp, record, ["theta"])
     panel, bar = picture.figure.axes
     assert (panel.get_title(loc="left"), bar.get_xlabel()) == ("kept", "relative energy error")
     shown = panel.collections[0].get_array().ravel()

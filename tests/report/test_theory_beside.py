@@ -109,7 +109,7 @@ def test_printed_digits_stand_beside_ours(text, tmp_path):
 @pytest.mark.usefixtures("without_pictures")
 def test_only_printed_numbers_that_surprise_have_a_card(text, tmp_path):
     page = write(tmp_path, *text)
-    cards = set(re.findall(r"<dd>(published_\d_\d) ", page))
+    cards = set(re.findall(r'id="check-(published_\d_\d)"', page))
     assert cards == {"published_1_4"}
 
 

@@ -86,12 +86,10 @@ class Wording:
         """Say what was measured of one result."""
         return self._describe(result).sentence
 
-    def measured(self, result: Result, counts: Mapping[str, int]) -> str:
-        """Say in a few words what was measured where it decides, for a table of checks that passed."""
+    def brief(self, result: Result) -> str:
+        """Say in a few words what was measured of one result."""
         description = self._describe(result)
-        told = description.brief or description.sentence.removesuffix(".")
-        total = sum(counts.values())
-        return told if total == 1 else f"{told} ({self._place(result)}, the hardest of {total})"
+        return description.brief or description.sentence.removesuffix(".")
 
     def text(self, result: Result, counts: Mapping[str, int], where: Mapping[str, Any]) -> str:
         """Say what was measured where it decides, and of how many results that is so.

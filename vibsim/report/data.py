@@ -122,7 +122,10 @@ def norm_unit(record: Record, quantity: str, norm: str = TYPICAL_NORM) -> str:
     """Return the unit of a norm over time: l1 and l2 carry the time, or its root, too."""
     time = time_unit(record)
     extra = {"l1": time, "l2": f"√{time}" if time else ""}.get(norm, "")
-    return f"{unit(record, f'{quantity}_difference_norm')} {extra}".strip()
+    # of a single level there are errors only
+    names = (f"{quantity}_{of}_norm" for of in ("difference", "error"))
+    own = next((unit(record, name) for name in names if name in record), "")
+    return f"{own} {extra}".strip()
 
 
 def norm_index(record: Record, norm: str = TYPICAL_NORM) -> int:

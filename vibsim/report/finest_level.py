@@ -51,8 +51,7 @@ class Error:
 
 def error(record: Record, quantity: str) -> Error:
     """Return the error of a quantity at the finest level, in the typical norm."""
-    norm = norm_index(record)
-    true = known(record, f"{quantity}_error_norm", MEMBER, norm=norm, level=-1)
+    norm, true = norm_index(record), true_error(record, quantity)
     if not whole(record, "pair"):
         nothing = np.full_like(true, np.nan)
         return Error(true, nothing, nothing, nothing)
@@ -60,6 +59,12 @@ def error(record: Record, quantity: str) -> Error:
     order, low, high = orders(record, quantity)
     stated = np.where(np.isfinite(order), order, formal_orders(record, quantity))
     return Error(true, *(last * _part(record, p) for p in (stated, high, low)))
+
+
+def true_error(record: Record, quantity: str) -> Floats:
+    """Return the norm of the true error of the finest level, shape (scheme, case); NaN where there is none."""
+    norm = norm_index(record)
+    return known(record, f"{quantity}_error_norm", MEMBER, norm=norm, level=-1)
 
 
 def norms(record: Record, quantity: str, member: Member) -> Floats:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from shlex import quote
 
 from vibsim.core.record import Record
@@ -14,6 +16,7 @@ from vibsim.report.figures import (
     extrema,
     maps,
     members,
+    motion,
     order,
     plane,
     solution,
@@ -23,7 +26,9 @@ from vibsim.report.figures import (
     work,
 )
 from vibsim.report.figures.separatrix import with_separatrix
+from vibsim.report.lead import Lead
 from vibsim.report.style import Picture
+from vibsim.report.text import words
 from vibsim.report.types import Experiment
 
 FEW_SCHEMES = 3
@@ -34,68 +39,116 @@ MOST_SHOWN = 6
 Drawn = list[Picture | None]
 
 
-def pictures(experiment: Experiment, record: Record, shown: list[Member]) -> list[Picture]:
-    """Return the figures of a report in the order of the page."""
+@dataclass(frozen=True)
+class Tab:
+    """Figures that stand together behind one label."""
+
+    label: str
+    pictures: tuple[Picture, ...]
+
+
+@dataclass(frozen=True)
+class Gallery:
+    """The figures of a page below its first screen, by section."""
+
+    motion: tuple[Picture, ...] = ()
+    belief: tuple[Tab, ...] = ()
+    members: tuple[Tab, ...] = ()
+
+
+def tab(label: str, drawn: Iterable[Picture | None]) -> list[Tab]:
+    """Return one tab with the pictures that there are; none without a picture."""
+    found = tuple(
+        picture for picture in drawn if picture is not None and picture.figure is not None
+    )
+    return [Tab(label, found)] if found else []
+
+
+def pictures(
+    experiment: Experiment, record: Record, shown: list[Member], lead: Lead, first: Sequence[str]
+) -> Gallery:
+    """Return the figures of a report, those left out that the first screen has; `first` names these."""
     found = choice.quantities(experiment, record)
-    cases = sorted({member.case for member in shown})
+    cases = sorted({member.case for member in shown}, key=lambda case: case != lead.member.case)
     has_series, has_pairs = not data.is_lean(record), bool(data.whole(record, "pair"))
     series = shown if has_series else []
-    drawn: Drawn = [theory.order_and_stability(experiment, record)]
-    if has_series:
-        drawn.append(theory.growing(experiment, record))
-    drawn += over_members(experiment, record, found)
-    alone: Drawn = []
-    # of several schemes what they have in common comes first, and what each does over time behind it
-    own = alone if len(record["scheme"]) > FEW_SCHEMES else drawn
-    for quantity in found:
-        is_energy = quantity == "energy_deviation" and "energy_deviation_scaled" in record
-        if is_energy:
-            own += [time.energy(record, member) for member in series]
-        if has_pairs and (not is_energy or quantity in asked(experiment)):
-            own += [time.overlay(record, quantity, member) for member in series]
-        if has_pairs:
-            drawn += [order.against_step(experiment, record, quantity, case) for case in cases]
-    if series:
-        drawn.append(plane.path(experiment, record, series))
-        drawn += [energy.running(record, case) for case in cases]
-        drawn += [work.precision(experiment, record, case) for case in cases]
-        drawn.append(extrema.local(experiment, record, series))
-        if not data.swept(record) and experiment.model.definition.coordinates == 1:
-            drawn.append(plane.phase(experiment, record, series))
     position = choice.position(experiment)
-    drawn += [*alone, *(solution.solution(record, position, member) for member in series)]
-    return [picture for picture in drawn if picture is not None]
+    moving: Drawn = [motion.motion(record, position, lead.member)] if has_series else []
+    if has_series:
+        # beside the worst member a typical one
+        typical = [member for member in series if member.role == "typical"]
+        moving += [motion.motion(record, position, member) for member in typical[:1]]
+        moving += [plane.path(experiment, record, series)]
+    tabs: list[Tab] = []
+    own = [member for member in series if member.role != "typical"]
+    own.sort(
+        key=lambda member: (member.scheme, member.case) != (lead.member.scheme, lead.member.case)
+    )
+    for quantity in sorted(found, key=lambda one: one != lead.quantity):
+        letter, is_lead, drawn = words.symbol(quantity), quantity == lead.quantity, Drawn()
+        is_energy = quantity == "energy_deviation" and "energy_deviation_scaled" in record
+        if has_pairs:
+            # of a sweep the map has the rest
+            drawn += [order.against_step(experiment, record, quantity, c) for c in cases[:1]]
+        for member in own if is_lead else own[:1]:
+            each: Drawn = [time.energy(record, member)] if is_energy else []
+            if has_pairs and (not is_energy or quantity in asked(experiment)):
+                each.append(time.overlay(record, quantity, member))
+            if is_lead and len(own) > 1:
+                tabs += tab(f"{letter}, {member.scheme_name}", each)
+            else:
+                drawn += each
+        tabs += tab(letter if not is_lead or len(own) < 2 else f"{letter}, order", drawn)
+    if has_pairs:
+        tabs += tab("estimated error", [solution.solution(record, position, m) for m in own[:1]])
+    if series:
+        tabs += tab("energy", [energy.running(record, case) for case in cases])
+        beside: Drawn = [extrema.local(experiment, record, series)]
+        if not data.swept(record) and experiment.model.definition.coordinates == 1:
+            beside.append(plane.phase(experiment, record, series))
+        tabs += tab("phase and amplitude", beside)
+    theories: Drawn = [theory.order_and_stability(experiment, record)]
+    theories += [theory.growing(experiment, record)] if has_series else []
+    tabs += tab("theory", theories)
+    if series:
+        tabs += tab("work", [work.precision(experiment, record, case) for case in cases])
+    shown_below = (picture for picture in moving if picture and picture.name not in first)
+    return Gallery(tuple(shown_below), tuple(tabs), tuple(over_members(experiment, record, found)))
 
 
-def over_members(experiment: Experiment, record: Record, found: list[str]) -> list[Picture]:
-    """Return the figures over the swept parameters: along a line, on a map, or against each key."""
+def over_members(experiment: Experiment, record: Record, found: list[str]) -> list[Tab]:
+    """Return the figures over the swept parameters, a tab for each quantity: along a line, on a map, or by key."""
     keys = sweep_layout.keys(record)
     if not keys:
         return []
     along, grid = sweep_layout.along_of(keys), sweep_layout.grid_of(keys)
     schemes = range(min(len(record["scheme"]), MOST_SHOWN))
-    drawn: Drawn = []
+    tabs: list[Tab] = []
     if grid is not None:
         grid = with_separatrix(experiment, grid)
     if along is not None:
-        drawn.append(sweep.period(experiment, record, along))
-        drawn.append(sweep.amplitude(experiment, record, along))
+        tabs += tab("period", [sweep.period(experiment, record, along)])
+        tabs += tab("amplitude", [sweep.amplitude(experiment, record, along)])
     elif grid is not None:
-        drawn += [maps.motion(experiment, record, grid, scheme) for scheme in schemes]
+        drawn = [maps.motion(experiment, record, grid, scheme) for scheme in schemes]
+        tabs += tab("period and amplitude", drawn)
     for quantity in found:
+        letter, each = words.symbol(quantity), Drawn()
         if along is not None and data.whole(record, "triple"):
-            drawn.append(sweep.orders(experiment, record, along, quantity))
+            each.append(sweep.orders(experiment, record, along, quantity))
         for scheme in schemes:
             if grid is not None:
-                drawn.append(maps.verdicts(experiment, record, grid, quantity, scheme))
+                each.append(maps.verdicts(experiment, record, grid, quantity, scheme))
             elif along is None:
-                drawn.append(members.projections(experiment, record, keys, quantity, scheme))
+                each.append(members.projections(experiment, record, keys, quantity, scheme))
         if data.whole(record, "pair"):
             # the verdict that colours them is on the order
-            drawn.append(members.histograms(experiment, record, quantity))
+            each.append(members.histograms(experiment, record, quantity))
+        tabs += tab(f"order and error of {letter}", each)
     if grid is not None:
-        drawn += [maps.numbers(experiment, record, grid, scheme) for scheme in schemes]
-    return [picture for picture in drawn if picture is not None]
+        drawn = [maps.numbers(experiment, record, grid, scheme) for scheme in schemes]
+        tabs += tab("numbers of the checks", drawn)
+    return tabs
 
 
 def choose(experiment: Experiment, record: Record) -> tuple[list[Member], str]:

@@ -61,20 +61,17 @@ def _caption(kinds: set[str], is_settled: bool | None, many: bool, due: str) -> 
     shown = "size of the level differences (filled)" if "difference" in kinds else ""
     true = "size of the true error (hollow)" if "true" in kinds else ""
     orders = {
-        True: "Right: the stated order of every scheme with its interval; where none is stated, hollow, the order of "
-        f"the finest three levels; the vertical stroke is the {due} one.",
-        False: "Right: the order that three successive levels give, drawn at the coarsest of the three; it should "
-        "settle inside a grey band; orders beyond the frame come from levels that are too coarse, within "
-        "round-off, or of runs that grow without bound. A scheme that differs by round-off alone has none.",
+        True: f"Right: the stated order of every scheme with its interval (hollow: of the finest three levels, where "
+        f"none is stated); the stroke is the {due} one.",
+        False: "Right: the order from three levels, at the coarsest of them; it should settle inside a grey band. "
+        "Beyond the frame levels are too coarse, within round-off, or grow without bound.",
     }
     return style.sentences(
         f"Left: {' and '.join(filter(None, [shown, true]))} against dt.",
         f"Parallel to a dashed line means that {due} order." if "slope" in kinds else "",
         "Points on the dotted line are round-off." if "floor" in kinds else "",
         "" if is_settled is None else orders[many],
-        "The bar is the stated order with its interval, over the levels it rests on."
-        if is_settled and not many
-        else "",
+        "The bar is the stated order with its interval." if is_settled and not many else "",
     )
 
 

@@ -1,10 +1,9 @@
-"""The words of a page: the verdict on every check, what was computed, and where it came from."""
+"""The checks of a page: a line for each, its evidence, and what to change where it did not pass."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
-from shlex import quote
+from dataclasses import replace
 from typing import Any
 
 from vibsim.checks.outcome import Result
@@ -12,87 +11,42 @@ from vibsim.checks.value import unit_of
 from vibsim.checks.verdict_text import Wording, expectation
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import worst
-from vibsim.experiment.collection import ADHOC, ENDINGS
 from vibsim.plan.versions import DRAWING, versions
 from vibsim.report import data
 from vibsim.report.evidence import figure
+from vibsim.report.lead import is_trap
 from vibsim.report.tables import checks as check_tables
 from vibsim.report.tables import published
-from vibsim.report.text import assertions, reasons, setting, words
+from vibsim.report.text import assertions, changes, reasons, words
 from vibsim.report.types import Check, Experiment, Measurement
 
-MANY_CHECKS = 6  # from so many checks on, those that passed share a table; fewer have a card each
-WITH_AN_ORDER = ("asymptotic", "order_low", "order_high")
-"""Reasons of a result whose order is known: any other has at most an estimate that may be an accident."""
-BRIEF = 3  # with more checks than this, the evidence of those that passed is folded away
-PYTHON = """\
-from vibsim import Experiment, analyse, simulate, verdicts
-
-experiment = Experiment.from_yaml("{file}"){alone}
-convergence = analyse(experiment, {{level: simulate(experiment, level) for level in experiment.levels}})
-for verdict in verdicts(experiment, convergence):
-    print(verdict.id, verdict.status, verdict.reason)"""
+BRIEF = 5  # results of a check that passed which the page lists; the table of checks has all
+BADGES = {"PASS": "passed", "INCONCLUSIVE": "undecided", "FAIL": "failed"}
+SAID_BY_THE_LINE = ("value", "equal", "converges")
+"""Kinds of checks of which the line says all where they pass."""
+WIDE = 1.0  # an interval that reaches further below its order is worth a sentence
 
 
-def context(
-    experiment: Experiment,
-    record: Record,
-    summary: Mapping[str, Any],
-    provenance: Mapping[str, Any],
-) -> dict[str, Any]:
-    """Return the words of a page by the names that its template uses."""
+def cards(
+    experiment: Experiment, record: Record, summary: Mapping[str, Any]
+) -> list[dict[str, Any]]:
+    """Return what the page says of every check; of printed numbers of those that did not come out as expected."""
     in_tables = published.ids(experiment)
-    asserted = {spec.id: spec for spec in experiment.checks}
-    made = {check["id"]: card(experiment, record, check) for check in summary["checks"]}
-    unsettled = [made[check["id"]] for check in summary["checks"] if check["status"] != "PASS"]
-    # of printed numbers those get a card that did not come out as expected
-    carded = [
-        check
+    return [
+        card(experiment, record, check)
         for check in summary["checks"]
         if check["id"] not in in_tables or check["status"] != "PASS"
     ]
-    plain = [check["id"] for check in carded if _is_plain(asserted.get(check["id"]), check)]
-    plain = plain if len(carded) >= MANY_CHECKS else []
-    used = provenance.get("experiment")
-    broken, listed = words.broken(summary), len(summary.get("failures") or [])
-    return {
-        "collection": experiment.collection,
-        "name": experiment.name,
-        "title": experiment.title,
-        "source": experiment.source,
-        "status": summary["status"],
-        "sentence": words.overall(summary),
-        "unsettled": unsettled if len(summary["checks"]) > 1 else [],
-        "checks": [made[check["id"]] for check in carded if check["id"] not in plain],
-        "plain": [made[name] | assertions.row(asserted[name]) for name in plain],
-        "brief": len(carded) > BRIEF,
-        "failures": check_tables.failures(summary, record),
-        "unlisted": f"In all {broken} runs broke down; listed are the first {listed}."
-        if broken > listed
-        else "",
-        "setup": list(setting.setup(experiment, record)),
-        "provenance": list(provenance_rows(provenance)),
-        "used": json.dumps(used, indent=1, ensure_ascii=False, default=str) if used else "",
-        "target": quote(experiment.word),
-        "python": _python(experiment),
-    }
 
 
-def _python(experiment: Experiment) -> str:
-    """Return the lines of Python that do the same as the command."""
-    word, is_ours = experiment.word, experiment.collection != ADHOC
-    file, at, case = word.rpartition("@")
-    if not at or word.endswith(ENDINGS):
-        file, case = word, ""
-    named = f"configs/{file}.yaml" if is_ours else file
-    return PYTHON.format(file=named, alone=f".alone({case})" if case else "")
-
-
-def _is_plain(asserted: Check | None, check: Mapping[str, Any]) -> bool:
-    """Say whether a row tells all of a check: it passed, has no note and refutes no statement."""
-    if check["status"] != "PASS" or asserted is None or getattr(asserted, "note", None):
-        return False
-    return asserted.kind != "claim" or asserted.holds
+def badge(asserted: Check | None, status: str) -> str:
+    """Return the word on a check: passed, as claimed, trap caught, refuted, undecided or failed."""
+    if status == "PASS" and asserted is not None:
+        if asserted.kind == "claim":
+            return "as claimed" if asserted.holds else "refuted"
+        if is_trap(asserted):
+            return "trap caught"
+    return BADGES.get(status, status)
 
 
 def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> dict[str, Any]:
@@ -112,39 +66,81 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
     is_refuted = is_false and check["reason"] == "match"
     unit = data.pretty_unit(unit_of(experiment, record, value)) if value else ""
     wording = Wording(experiment, record, asserted, words.PAGE)
-    decisive, counts = check["results"][0], check["counts"]
+    decisive, counts, status = check["results"][0], check["counts"], check["status"]
     facts = (decisive[key] for key in ("scheme", "case", "status", "reason", "facts"))
     result = Result(*facts)
     decides = worst(word for word, count in counts.items() if count)
-    told = ", ".join(f"{n} {word}" for word, n in counts.items() if n)
-    listed = len(check["results"])
-    more = f"In all: {told}. Listed are the {listed} worst."
-    # the result that decides has a settled order
-    settled = check["status"] != "INCONCLUSIVE" and decisive["reason"] in WITH_AN_ORDER
+    told = "" if _is_said(asserted, check) else wording.text(result, counts, check["where"])
+    results, more = _results(record, check, unit)
     return {
         "id": check["id"],
-        "kind": check["kind"],
-        "heading": assertions.heading(asserted)
-        if asserted
-        else assertions.of_tolerance(check["expected"]),
-        "background": assertions.background(asserted) if asserted else "",
+        "status": status,
+        "measures": measured.kind if measured else check["kind"],
+        "badge": badge(asserted, status),
+        "what": assertions.about(asserted) if asserted else assertions.OF_TOLERANCE,
+        "source": assertions.source(asserted) if asserted else "",
+        "wanted": _wanted(experiment, asserted, check),
+        "got": _got(check, wording, result),
         "note": getattr(asserted, "note", None) or "",
-        "status": check["status"],
         "reason": check["reason"] or "–",
         "meaning": reasons.REFUTED if is_refuted else explained.meaning,
         "needs": explained.needs,
-        "expected": expectation(experiment, asserted, words.PAGE),
-        "factor": words.ratio(words.fact(decisive, "order")) if settled else "",
-        "results": check_tables.results(record, check, unit),
-        "more": more if sum(counts.values()) > listed else "",
+        "results": results,
+        "more": more,
         # but for those that the check's own text has
         "where": [f"{place['text']}." for word, place in check["where"].items() if word != decides],
         "alone": _alone(check),
         "picture": figure.picture(experiment, record, asserted, check),
-        "text": wording.text(result, counts, check["where"]),
-        "measured": wording.measured(result, counts),
-        "advice": wording.advice(check["status"], result, counts),
+        "text": told,
+        "advice": wording.advice(status, result, counts),
+        "change": changes.change(experiment, measured, check),
     }
+
+
+def _is_said(asserted: Check | None, check: Mapping[str, Any]) -> bool:
+    """Say whether the line of a check tells all: one result, as asked for, and no doubt about it."""
+    if check["status"] != "PASS" or asserted is None or sum(check["counts"].values()) > 1:
+        return False
+    order, low = (words.fact(check["results"][0], f"order{end}") for end in ("", "_low"))
+    is_doubtful = order is not None and low is not None and order - low > WIDE
+    is_plain = asserted.measured.kind in SAID_BY_THE_LINE and not is_trap(asserted)
+    return is_plain and not is_doubtful
+
+
+def _wanted(experiment: Experiment, asserted: Check | None, check: Mapping[str, Any]) -> str:
+    """Say in a few words what is asked for."""
+    if asserted is None:
+        return expectation(experiment, None, words.PAGE)
+    asked = asserted.measured
+    told = ""
+    if asked.kind == "converges":
+        told = assertions.order_asked(asked, words.fact(check["results"][0], "expected"))
+    told = told or words.labelled(expectation(experiment, asked, words.PAGE), None)
+    return told if asserted.kind != "claim" or asserted.holds else f"not: {told}"
+
+
+def _got(check: Mapping[str, Any], wording: Wording, result: Result) -> str:
+    """Say in a few words what was measured where it decides."""
+    order, reason = words.fact(check["results"][0], "order"), check["results"][0]["reason"]
+    if order is not None and check["results"][0]["status"] != "INCONCLUSIVE":
+        between = words.interval(words.interval_of(check["results"][0]))
+        return f"order {words.number(order, 'order')}{f' ({between})' if between != '–' else ''}"
+    if check["kind"] == "converges" or "order" in (check["results"][0].get("facts") or {}):
+        return str(reason).replace("_", " ")
+    return wording.brief(result)
+
+
+def _results(record: Record, check: Mapping[str, Any], unit: str) -> tuple[Any, str]:
+    """Return the table of the results, and a sentence that says how many it leaves out; of one result neither."""
+    table, counts = check_tables.results(record, check, unit), check["counts"]
+    total = sum(counts.values())
+    if table is None or total < 2:
+        return None, ""
+    if check["status"] == "PASS":
+        table = replace(table, rows=table.rows[:BRIEF])
+    told = ", ".join(f"{n} {word}" for word, n in counts.items() if n)
+    listed = len(table.rows)
+    return table, f"In all: {told}. Listed are the {listed} worst." if total > listed else ""
 
 
 def _keeps_promise(record: Record, measured: Measurement | None, check: Mapping[str, Any]) -> bool:

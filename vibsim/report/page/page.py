@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import numpy as np
@@ -14,22 +16,31 @@ from vibsim import store
 from vibsim.core.errors import VibsimError, nearest
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
-from vibsim.report import choice, data, finest_level, style
+from vibsim.experiment.collection import ADHOC, ENDINGS
+from vibsim.report import choice, data, finest_level, lead, style
 from vibsim.report.data import Member
 from vibsim.report.figures import drawing, gallery, time
 from vibsim.report.figures.panels import Curve, stamp
-from vibsim.report.page import cards
+from vibsim.report.page import cards, hero
 from vibsim.report.style import Picture
 from vibsim.report.tables import best, checks, degrees, levels, members, published, theory, work
 from vibsim.report.tables.scales import table as scales_table
 from vibsim.report.tables.table import Table, to_csv, to_latex
+from vibsim.report.text import equation, experiment_file, glossary, setting, words
 from vibsim.report.types import Environment, Experiment, Figure, Plan
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
 NOTHING: Mapping[str, Any] = {}
-LONG_TABLE = 24  # rows above which a table is folded away
-FOLDED = 500  # most rows of members that the page itself holds; the CSV file holds more
+MOST_ROWS = 8  # of a table that the page itself holds; the CSV file holds all
+ROOM = 220  # cells of all tables of numbers together; a table beyond is a file only
 LONG_HEADING = 90  # letters of a caption of which a heading has the first words only
+PYTHON = """\
+from vibsim import Experiment, analyse, simulate, verdicts
+
+experiment = Experiment.from_yaml("{file}"){alone}
+convergence = analyse(experiment, {{level: simulate(experiment, level) for level in experiment.levels}})
+for verdict in verdicts(experiment, convergence):
+    print(verdict.id, verdict.status, verdict.reason)"""
 
 
 def write(
@@ -67,23 +78,24 @@ def write(
         raise VibsimError(f"figure format '{unknown[0]}': {nearest(unknown[0], drawing.FORMATS)}")
     experiment, position = plan.experiment, choice.position(plan.experiment)
     shown, left_out = gallery.choose(experiment, convergence)
-    drawn, files = [], dict[str, bytes]()
+    decisive = lead.find(experiment, convergence, summary)
+    drawn = _Drawn(formats)
     with style.applied():
-        for picture in gallery.pictures(experiment, convergence, shown):
-            if picture.figure is None:
-                continue
-            text = drawing.svg(picture.figure, picture.name)
-            drawn.append((picture, markup(drawing.inline(text, picture.alt))))
-            files[f"{picture.name}.svg"] = text.encode()
-            for form in (form for form in formats if form != "svg"):
-                files[f"{picture.name}.{form}"] = drawing.binary(picture.figure, form)
-    small = drawing.svg(_stamp(position, convergence, shown[0]), "thumbnail")
-    replace_files(directory / "figures", {**files, "thumbnail.svg": small.encode()})
-    listed, folded = _tables(experiment, convergence)
+        first = [drawn.add(one) for one in hero.pictures(experiment, convergence, decisive)]
+        names = [picture.name for picture, _ in first]
+        below = gallery.pictures(experiment, convergence, shown, decisive, names)
+        drawings = {"hero": first, "motion": [drawn.add(picture) for picture in below.motion]}
+        tabs = {
+            "belief": [drawn.tab(tab) for tab in below.belief],
+            "members": [drawn.tab(tab) for tab in below.members],
+        }
+        small = drawing.svg(_stamp(position, convergence, shown[0]), "thumbnail")
+    replace_files(directory / "figures", {**drawn.files, "thumbnail.svg": small.encode()})
+    listed, others = _tables(experiment, convergence)
     scales = scales_table(experiment, convergence)
     printed = published.tables(experiment, convergence, summary)
-    every = [*printed, *listed, *(table for _, group in folded for table in group), scales]
-    every += [checks.checks(summary), checks.failures(summary, convergence)]
+    broken = checks.failures(summary, convergence)
+    every = [*printed, *listed, *others, scales, checks.checks(summary), broken]
     every.append(members.table(convergence, position))
     files = {}
     for table in every:
@@ -95,19 +107,88 @@ def write(
         members.write_csv(directory / "tables/members.csv", convergence, position)
         files.pop("members.csv", None)
     replace_files(directory / "tables", files, kept)
-    context = cards.context(experiment, convergence, summary, provenance) | {
-        "tables": listed,
-        "scales": scales,
-        "several": len(data.whole(convergence, "level")) > 1,
-        "folded": folded,
-        "printed": printed,
-        "printed_sentence": published.sentence(printed),
-        "shown": left_out,
-        "digits": members.digits(convergence),
-        "pictures": drawn,
-    }
-    page = environment().get_template("report.html").render(context)
+    made = cards.cards(experiment, convergence, summary)
+    if "hero_evidence" in names and decisive.entry is not None:
+        made = [c | {"picture": None} if c["id"] == decisive.entry["id"] else c for c in made]
+    failures, more = words.broken(summary), len(summary.get("failures") or [])
+    page = environment().get_template("report.html").render(
+        hero.context(experiment, convergence, summary, decisive)
+        | {
+            "collection": experiment.collection,
+            "name": experiment.name,
+            "title": experiment.title,
+            "status": summary["status"],
+            "lead": next((c for c in made if decisive.entry and c["id"] == decisive.entry["id"]), None),
+            "figures": drawings | tabs,
+            "reading": {name: _captions(group) for name, group in drawings.items()}
+            | {name: _captions(p for _, group in found for p in group) for name, found in tabs.items()},
+            "checks": made,
+            "reading_of_checks": _reading_of_checks(made),
+            "failures": broken and cut(broken),
+            "unlisted": f"In all {failures} runs broke down; listed are the first {more}."
+            if failures > more
+            else "",
+            "numbers_shown": [cut(table) for table in listed],
+            "scales": scales,
+            "printed": printed,
+            "printed_sentence": published.sentence(printed),
+            "shown": left_out,
+            "digits": members.digits(convergence),
+            "equation": equation.mathml(experiment.model.definition.equation),
+            "setup": list(setting.setup(experiment, convergence)),
+            "experiment_file": experiment_file.text(experiment),
+            "provenance": list(cards.provenance_rows(provenance)),
+            "target": quote(experiment.word),
+            "python": _python(experiment),
+        }
+    )  # fmt: skip
     store.write_text(directory / "report.html", page)
+
+
+class _Drawn:
+    """Pictures as markup for the page, and as files beside it."""
+
+    def __init__(self, formats: Sequence[str]) -> None:
+        self.formats = [form for form in formats if form != "svg"]
+        self.files: dict[str, bytes] = {}
+
+    def add(self, picture: Picture) -> tuple[Picture, str]:
+        """Return a picture with its markup, and keep its files."""
+        assert picture.figure is not None
+        text = drawing.svg(picture.figure, picture.name)
+        self.files[f"{picture.name}.svg"] = text.encode()
+        for form in self.formats:
+            self.files[f"{picture.name}.{form}"] = drawing.binary(picture.figure, form)
+        return picture, markup(drawing.inline(text, picture.alt))
+
+    def tab(self, tab: gallery.Tab) -> tuple[str, list[tuple[Picture, str]]]:
+        """Return the label of a tab with its pictures."""
+        return tab.label, [self.add(picture) for picture in tab.pictures]
+
+
+def _captions(drawn: Iterable[tuple[Picture, str]]) -> list[tuple[str, str]]:
+    """Return how to read each kind of picture, once: what stands before the first colon of its title, and a caption."""
+    found: dict[str, tuple[str, str]] = {}
+    for picture, _ in drawn:
+        kind = picture.title.partition(":")[0].partition("?")[0]
+        found.setdefault(kind, (kind + "?" * ("?" in picture.title), picture.caption))
+    return list(found.values())
+
+
+def _reading_of_checks(made: Iterable[Mapping[str, Any]]) -> list[tuple[str, str]]:
+    """Return how to read the picture of each kind of check that passed, once."""
+    found: dict[str, str] = {}
+    for check in made:
+        if check["picture"] and check["status"] == "PASS":
+            found.setdefault(check["measures"], check["picture"].caption)
+    return list(found.items())
+
+
+def cut(table: Table) -> tuple[str, Table, str]:
+    """Return the heading of a table, its first rows, and a sentence on the rows that only its file has."""
+    more = len(table.rows) - MOST_ROWS
+    told = f"{more} more rows are in tables/{table.name}.csv." if more > 0 else ""
+    return _heading(table.caption), replace(table, rows=table.rows[:MOST_ROWS]), told
 
 
 @cache
@@ -119,7 +200,8 @@ def environment() -> Environment:
         loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
     )  # fmt: skip
-    made.filters |= {"code": _code, "drawn": _drawn}
+    made.filters |= {"code": _code, "drawn": _drawn, "explained": glossary.explained}
+    made.globals |= {"term": glossary.term}
     return made
 
 
@@ -173,52 +255,41 @@ def _stamp(quantity: str, record: Record, member: Member) -> Figure:
     return stamp(t, time.differences(record, quantity, member))
 
 
-def _tables(
-    experiment: Experiment, record: Record
-) -> tuple[list[Table], list[tuple[str, list[Table]]]]:
-    """Return the tables of the page, and those that it folds away under a heading."""
+def _tables(experiment: Experiment, record: Record) -> tuple[list[Table], list[Table]]:
+    """Return the tables that the page shows, as far as it has room for them, and those that are files only."""
     found, model = choice.quantities(experiment, record), experiment.model.definition
     shown = choice.with_levels(experiment, choice.members(record, found[0]))
     norms = [name for name in record.words("norm") if name != TYPICAL_NORM]
-    first = [theory.schemes(experiment, record)]
     orders = [levels.orders(record, quantity, shown) for quantity in found]
-    beside = [degrees.table(experiment), *theory.predictions(record)]
-    beside += [levels.velocities(record), levels.events(record)]
-    optional = [
-        best.table(model, record, shown),
+    wanted = [
+        *orders[:1], best.table(model, record, shown), theory.schemes(experiment, record), *orders[1:],
+        degrees.table(experiment), levels.scalars(record, shown), levels.events(record), *theory.predictions(record),
+        levels.velocities(record),
         # what damping or a force changes says nothing of a scheme
         levels.maxima(record, shown) if model.conservative else None,
-        levels.scalars(record, shown),
         None if data.is_lean(record) else work.table(experiment, record),
-    ]
-    if len(record["scheme"]) > gallery.FEW_SCHEMES:
-        # a row for each scheme says more than many for each
-        kept, rest = [*first, *beside], [*orders, *optional]
-    else:
-        kept, rest = [*first, *orders, *beside, *optional], []
-    listed = [table for table in kept if table is not None]
-    # the first table is what the page is about; a long one after it would push the figures away
-    long = [table for table in listed[1:] if len(table.rows) > LONG_TABLE]
-    listed = [table for table in listed if table not in long]
-    folded = _folded([table for table in [*long, *rest] if table is not None])
-    other = [levels.orders(record, quantity, shown, norm) for quantity in found for norm in norms]
-    if other:
-        folded.append(("Other norms", other))
-    everyone = members.table(record, found[0])
-    if everyone is not None and len(everyone.rows) <= FOLDED:
-        folded.append((f"All {len(record['case'])} members", [everyone]))
-    return listed, folded
-
-
-def _folded(tables: Sequence[Table]) -> list[tuple[str, list[Table]]]:
-    """Return tables with their headings, which differ: of two that would be the same each says more."""
-    short = [_heading(table.caption) for table in tables]
-    more = [re.split(r"[,;]|\. ", table.caption, maxsplit=1)[0] for table in tables]
-    headings = (b if short.count(a) > 1 else a for a, b in zip(short, more, strict=True))
-    return [(text, [table]) for text, table in zip(headings, tables, strict=True)]
+    ]  # fmt: skip
+    listed, room = list[Table](), ROOM
+    others = [levels.orders(record, quantity, shown, norm) for quantity in found for norm in norms]
+    for table in wanted:
+        if table is None:
+            continue
+        room -= len(table.columns) * min(len(table.rows), MOST_ROWS)
+        (listed if room >= 0 or not listed else others).append(table)
+    return listed, others
 
 
 def _heading(caption: str) -> str:
-    """Return what stands above a table that is folded away."""
+    """Return what stands above a table."""
     found = (re.split(end, caption, maxsplit=1)[0] for end in ("$", r"; |\. ", r": | \("))
     return next((text for text in found if len(text) <= LONG_HEADING), caption)
+
+
+def _python(experiment: Experiment) -> str:
+    """Return the lines of Python that do the same as the command."""
+    word, is_ours = experiment.word, experiment.collection != ADHOC
+    file, at, case = word.rpartition("@")
+    if not at or word.endswith(ENDINGS):
+        file, case = word, ""
+    named = f"configs/{file}.yaml" if is_ours else file
+    return PYTHON.format(file=named, alone=f".alone({case})" if case else "")

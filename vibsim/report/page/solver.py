@@ -53,7 +53,8 @@ def write(
     replace_files(directory / "tables", files)
     context = {
         "status": summary["status"],
-        "sentence": words.overall(summary),
+        "counts": words.passed([entry["status"] for entry in summary["checks"]]),
+        "finding": study.finding([card["verdict"] for card in cards]),
         "path": f"{plan.collection} / {plan.name}",
         "title": plan.title,
         "source": plan.source or "",

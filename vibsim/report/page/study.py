@@ -15,7 +15,7 @@ from vibsim.report import style
 from vibsim.report.page.page import environment
 from vibsim.report.style import Picture
 from vibsim.report.tables.table import Column, Table
-from vibsim.report.text import words
+from vibsim.report.text import findings, words
 
 UNSEEN = (
     "Levels can agree with each other and still approach a wrong answer. Only an exact solution shows that, and none "
@@ -56,9 +56,10 @@ def write(
     ]
     context = {
         "status": worst(verdict.status for verdict in verdicts),
-        "sentence": _overall(verdicts) if len(verdicts) > 1 else "",
+        "counts": words.passed([verdict.status for verdict in verdicts], "quantity", "quantities"),
         "path": "vibsim judge",
         "title": "Convergence study",
+        "finding": finding(verdicts),
         "cards": cards,
         "facts": "verdict.json",
     }
@@ -68,10 +69,33 @@ def write(
     store.write_text(directory / "verdict.json", text + "\n")
 
 
-def _overall(verdicts: Sequence[LadderVerdict]) -> str:
-    """Return the verdict on several quantities."""
-    passed = [verdict.status for verdict in verdicts].count("PASS")
-    return f"{passed} of {len(verdicts)} quantities passed."
+def finding(verdicts: Sequence[LadderVerdict]) -> str:
+    """Return the finding on the quantity that decides: the first of the worst."""
+    status = worst(verdict.status for verdict in verdicts)
+    return findings.of_ladder(next(verdict for verdict in verdicts if verdict.status == status))
+
+
+def numbers(verdict: LadderVerdict) -> list[dict[str, str]]:
+    """Return the large numbers of a ladder: the order, the error of the finest level, and the best value."""
+    between = words.interval((verdict.order_low, verdict.order_high))
+    asked = verdict.expected or verdict.at_least
+    wanted = (
+        "" if asked is None else f"expected{'' if verdict.expected else ' at least'}: {asked:g}"
+    )
+    span = f"between {between.replace(' to ', ' and ')}" if between != "–" else ""
+    share = verdict.relative_error
+    rows = (
+        ("Observed order", words.number(verdict.order, "order"), "; ".join(filter(None, [span, wanted]))),
+        ("Error of the finest level", words.number(abs(verdict.error) if verdict.error is not None else None, "brief"),
+         f"{words.number(100.0 * share, 'brief')} % of its size" if share is not None else ""),
+        ("Best value", words.number(verdict.best, "value"),
+         f"± {words.number(verdict.best_bound, 'brief')}, extrapolated" if verdict.best_bound is not None else ""),
+    )  # fmt: skip
+    keys = ("label", "value", "note")
+    return [
+        dict(zip(keys, row, strict=True)) | {"value": row[1] if row[1] != "–" else "not known"}
+        for row in rows
+    ]
 
 
 def _asked(verdict: LadderVerdict) -> str:
@@ -102,6 +126,7 @@ def card(name: str, verdict: LadderVerdict, asked: str, files: Sequence[str]) ->
         "heading": verdict.quantity,
         "verdict": verdict,
         "facts": rows,
+        "numbers": numbers(verdict),
         "table": _table(verdict),
         "picture": _picture(name, verdict),
         "doubt": UNSEEN if verdict.status == "PASS" and not verdict.is_exact_known else "",

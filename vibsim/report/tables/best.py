@@ -76,9 +76,9 @@ def _rows(model: Model, record: Record, shown: Sequence[Member]) -> Iterator[tup
                 member.scheme_name,
                 *([member.case_name] if swept(record) else []),
                 *(_finest(record, index, k, member) if has_series else nothing),
-                _rounded(value, bound if math.isfinite(bound) else index),
-                Written(bound, "unknown") if math.isnan(bound) else _error(bound),
-                _error(abs(value - _exact(record, name, member))),
+                rounded(value, bound if math.isfinite(bound) else index),
+                Written(bound, "unknown") if math.isnan(bound) else error_size(bound),
+                error_size(abs(value - _exact(record, name, member))),
                 *(_approach(record, k, member) if has_series else nothing),
             )
 
@@ -88,10 +88,10 @@ def _finest(record: Record, index: float, k: int, member: Member) -> tuple[Cell,
     value, relative = (
         float(at(record, f"scalar_{of}", member, scalar=k)) for of in ("finest", "gci")
     )
-    return _rounded(value, index), _error(index), _error(relative)
+    return rounded(value, index), error_size(index), error_size(relative)
 
 
-def _error(size: float) -> Written | None:
+def error_size(size: float) -> Written | None:
     """Write the size of an error with two digits; nothing where there is none."""
     if not math.isfinite(size):
         return None
@@ -99,7 +99,7 @@ def _error(size: float) -> Written | None:
     return Written(size, f"{mantissa}·{power(int(exponent))}" if size else "0")
 
 
-def _rounded(value: float, error: float) -> Written:
+def rounded(value: float, error: float) -> Written:
     """Write a number with one digit beyond the first that its error touches."""
     if not (math.isfinite(error) and error > 0.0):
         return Written(value, f"{value:.12g}".replace("-", "−"))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from vibsim.checks.accurate import rule
 from vibsim.checks.value import SAMPLED, what
+from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.report.text import words
-from vibsim.report.types import Check, Measurement
+from vibsim.report.types import Check, ConvergesCheck, Measurement
 
 PLACES = ("t", "step", "level", "scheme", "case")  # where a number may be taken
 STABLE = {
@@ -24,38 +25,44 @@ SOLUTIONS = {"exact": "the exact solution", "discrete": "the exact solution of i
 """What a solution may be compared with, beside that of another scheme."""
 
 
-def heading(check: Check | Measurement) -> str:
-    """Return the assertion of a check in one line."""
+OF_TOLERANCE = "Error of the extrapolated solution, in the unit of each state, at every stored time"
+"""What an experiment with a tolerance asserts."""
+
+
+def about(check: Check) -> str:
+    """Return in one line what a check is about: a statement, or what it measures."""
     if check.kind == "claim":
-        return f"Claim: {check.claim}"
-    return words.PAGE.opening(_measured(check))
+        return f"“{check.claim}”"
+    if check.kind == "converges":
+        return f"Order of {words.title(check.converges)}{_of_norm(check)}"
+    if check.kind == "accurate":
+        only = f" ({_listed(check.schemes)})" if check.schemes else ""
+        return f"Error of {words.title(check.accurate)} at the finest level{only}"
+    return words.PAGE.opening(subject(check))
 
 
-def of_tolerance(bound: str) -> str:
-    """Return in one line what an experiment with a tolerance asserts; `bound` is what its verdict expects."""
-    return f"The error of the extrapolated solution is {bound}, in the unit of each state, at every stored time"
+def _of_norm(check: ConvergesCheck) -> str:
+    """Say in brackets in which norm, unless it is the usual one, and which schemes an order is about."""
+    parts = [] if check.norm == TYPICAL_NORM else [f"{check.norm} norm"]
+    parts += [_listed(check.schemes)] if check.schemes else []
+    return f" ({', '.join(parts)})" if parts else ""
 
 
-def row(check: Check) -> dict[str, str]:
-    """Return the words of a check in the table of those that passed: what it is about, and what it asks for."""
-    if check.kind == "claim":
-        origin = f"Source: {check.source}" if check.source else ""
-        asked = f"true: {heading(check.that)}"
-        return {"subject": f"Claim: {check.claim}", "origin": origin, "asked": asked}
-    asked = ""
-    if check.kind == "converges" and check.expect.status == "PASS":
-        order = f"order {check.order:g} ± {check.tolerance:g}" if check.order != "scheme" else ""
-        asked = order or "as its scheme promises"
-    return {"subject": words.PAGE.opening(subject(check)), "origin": "", "asked": asked}
+def order_asked(check: ConvergesCheck, promised: float | None) -> str:
+    """Return which order a check asks for, or which verdict a trap expects; `promised` is that of the scheme."""
+    order = words.number(promised, "step") if check.order == "scheme" else f"{check.order:g}"
+    if check.expect.status != "PASS":
+        why = f" ({check.expect.reason})" if check.expect.reason else ""
+        return f"{check.expect.status}{why} against order {order}"
+    return f"order {order} ± {check.tolerance:g}{', promised' * (check.order == 'scheme')}"
 
 
-def background(check: Check) -> str:
+def source(check: Check) -> str:
     """Return where a claim stands and what measures it; empty for the other kinds."""
     if check.kind != "claim":
         return ""
-    source = f"Source: {check.source}. " if check.source else ""
-    truth = "true" if check.holds else "false"
-    return f"{source}Expected to be {truth}. Measured by: {_measured(check.that)}."
+    stands = f"{check.source}. " if check.source else ""
+    return f"{stands}Measured by: {_measured(check.that)}."
 
 
 def _measured(check: Measurement) -> str:

@@ -70,27 +70,11 @@ def labelled(text: str, quantity: str | None) -> str:
     return "`".join(parts)
 
 
-def overall(summary: Mapping[str, Any]) -> str:
-    """Return the verdict on a whole experiment in one or two sentences."""
-    failures = broken(summary)
-    parts = [_counted([check["status"] for check in summary["checks"]])]
-    if failures:
-        parts.append(f"{failures} {'run' if failures == 1 else 'runs'} broke down (see Failures).")
-    return " ".join(parts)
-
-
-def _counted(statuses: Sequence[str]) -> str:
-    total = len(statuses)
-    if not total:
-        return "There is no check, so nothing was decided."
-    failed, undecided, passed = map(statuses.count, ("FAIL", "INCONCLUSIVE", "PASS"))
-    if passed == total:
-        return "The check passed." if total == 1 else f"All {total} checks passed."
-    parts = [f"{failed} {'check' if failed == 1 else 'checks'} failed"] if failed else []
-    parts += [f"{undecided} {'is' if undecided == 1 else 'are'} undecided"] if undecided else []
-    parts += [f"{passed} passed"] if passed else []
-    start = "" if failed else "No check failed; "
-    return f"{start}{', '.join(parts)}."
+def passed(statuses: Sequence[str], one: str = "check", many: str = "checks") -> str:
+    """Say how many of some checks passed: `9 of 9 checks`."""
+    if not statuses:
+        return f"no {one}"
+    return f"{statuses.count('PASS')} of {len(statuses)} {one if len(statuses) == 1 else many}"
 
 
 def broken(summary: Mapping[str, Any]) -> int:

@@ -1,0 +1,157 @@
+"""The first screen: it names the check that decides, says the finding in words, and what to change in the file."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+import samples
+import yaml
+
+from vibsim.core.vocabulary import REASONS
+from vibsim.experiment import Experiment
+from vibsim.experiment.experiment import canonical
+from vibsim.experiment.schema.checks import MEASURED
+from vibsim.report import lead
+from vibsim.report.page import cards, hero
+from vibsim.report.text import changes, equation, experiment_file, findings, glossary
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+WRONG = [{"kind": "central", "start": "first_order"}]
+
+
+def found(exp):
+    record = samples.record(exp)
+    summary = samples.summary(exp, record)
+    return record, summary, lead.find(exp, record, summary)
+
+
+def first(exp):
+    record, summary, decisive = found(exp)
+    return hero.context(exp, record, summary, decisive)
+
+
+def test_every_reason_and_every_kind_of_check_has_a_title():
+    assert set(findings.ON_ORDER) == set(REASONS)
+    for table in (findings.MATCHED, findings.MISSED, findings.OPEN):
+        assert set(table) == set(MEASURED) - {"converges"} | {"tolerance"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "title"),
+    [
+        ({}, "The angle θ converges at second order"),
+        ({"schemes": WRONG, "checks": [{"converges": "theta", "order": 2}]},
+         "The angle θ converges at first order, not at second"),
+        ({"levels": [6, 7]}, "There are too few levels to judge the angle θ"),
+        ({"sweep": {"initial.theta": [0.5, 1.0]}}, "The angle θ converges at second order in all 2 members"),
+        ({"schemes": ["central", "rk4"]},
+         "The angle θ converges at the order that each of 2 schemes promises"),
+        ({"checks": [{"value": "period", "below": 1.0}]}, "Period is not as expected"),
+        ({"checks": [{"claim": "so", "that": {"value": "period", "above": 1.0}}]}, "1 statement confirmed"),
+        ({"schemes": [*WRONG, {"kind": "central", "label": "sound"}],
+          "checks": [{"converges": "theta", "order": 2, "schemes": ["sound"]},
+                     {"converges": "theta", "order": 2, "schemes": ["central"], "expect": {"status": "FAIL"}}]},
+         "The angle θ converges at second order, and the trap is caught"),
+    ],
+)  # fmt: skip
+def test_the_title_says_the_finding(changes, title):
+    assert first(samples.experiment(**changes))["finding"] == title
+
+
+def test_the_worst_check_leads_and_a_trap_never_does_where_another_passed():
+    trap = {"id": "trap", "converges": "theta", "order": 3, "expect": {"status": "FAIL"}}
+    number = {"id": "number", "value": "period", "above": 1.0}
+    order = {"id": "order", "converges": "omega"}
+    wrong = {"id": "wrong", "value": "period", "below": 1.0}
+    leads = [
+        found(samples.experiment(checks=checks))[2].entry["id"]
+        for checks in ([trap, number, order], [trap, number], [trap, order, wrong])
+    ]
+    assert leads == ["order", "number", "wrong"]
+
+
+def test_the_large_numbers_are_those_of_the_facts():
+    exp = samples.experiment()
+    record, summary, decisive = found(exp)
+    order, error, best = list(hero.numbers(exp, record, decisive))[:3]
+    facts = summary["checks"][0]["results"][0]["facts"]
+    assert order["value"] == f"{facts['order']:.3f}"
+    # the L2 norm over 20 s as a root of the mean of squares
+    assert error["value"] == f"{facts['error'] / 20.0**0.5 * 1e4:.1f}·10⁻⁴ rad"
+    assert float(best["value"].split()[0]) == pytest.approx(0.9958006771, abs=1e-6)
+
+
+def test_a_single_level_says_what_is_known():
+    shown = first(samples.experiment(levels=[7], checks=[{"value": "period", "above": 1.0}]))
+    assert [number["label"] for number in shown["numbers"]][:2] == [
+        "Period",
+        "Error of θ at 128 steps",
+    ]
+    assert all(number["value"] for number in shown["numbers"])
+
+
+@pytest.mark.parametrize(
+    ("options", "checks", "line"),
+    [
+        ({"schemes": WRONG}, [{"converges": "theta", "order": 2}], "schemes: [{kind: central, start: centred}]"),
+        ({"levels": [6, 7, 8]}, [{"accurate": "theta", "relative": 1e-4}], "levels: {from: 6, to: 11}"),
+        ({}, [{"converges": "theta", "order": 2}], ""),
+    ],
+)  # fmt: skip
+def test_a_change_of_the_file_mends_what_did_not_pass(options, checks, line):
+    exp = samples.experiment(checks=checks, **options)
+    _, summary, _ = found(exp)
+    (entry,) = summary["checks"]
+    told = changes.change(exp, exp.checks[0].measured, entry)
+    assert told == line
+    if told:
+        mended = samples.experiment(**{"checks": checks} | options | yaml.safe_load(told))
+        assert samples.summary(mended, samples.record(mended))["status"] == "PASS"
+
+
+def test_badges_tell_a_claim_and_a_trap_from_a_check_that_passed():
+    period = {"value": "period", "above": 1.0}
+    checks = [
+        period,
+        {"claim": "so", "that": period},
+        {"claim": "not so", "that": {"value": "period", "below": 1.0}, "holds": False},
+        {"converges": "theta", "order": 3, "expect": {"status": "FAIL"}},
+        {"converges": "theta", "order": 3},
+    ]
+    exp = samples.experiment(checks=checks)
+    record, summary, _ = found(exp)
+    assert [card["badge"] for card in cards.cards(exp, record, summary)] == [
+        "passed", "as claimed", "refuted", "trap caught", "failed",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("path", sorted(CONFIGS.glob("*/*.yaml")), ids=lambda path: path.stem)
+def test_the_file_that_a_page_shows_means_the_same_experiment(path):
+    exp = Experiment.from_yaml(path)
+    if exp.model.tables:
+        pytest.skip("a table is a file of its own")
+    content = yaml.safe_load(experiment_file.text(exp))
+    again = Experiment.from_dict(content, name=exp.name, collection=exp.collection)
+    told, ours = canonical(again), canonical(exp)
+    # numbers stand in the units of the run, and printed numbers in their tables
+    left_out = {"units", "published"}
+    assert {k: v for k, v in told.items() if k not in left_out} == {
+        k: v for k, v in ours.items() if k not in left_out
+    }
+
+
+def test_an_equation_becomes_markup():
+    made = str(equation.mathml("m u'' + w_0^2 u = F(t)"))
+    assert "<mrow><mi>u</mi><mo" in made
+    assert "″" in made
+    assert "<msup><msub><mi>w</mi><mi>0</mi></msub><mn>2</mn></msup>" in made
+    assert re.sub(r"<[^>]*>", "", made) == "mu″+w02u=F(t)"
+    assert "&lt;" in equation.mathml("a < b")
+
+
+def test_a_term_is_explained_once_and_text_stays_text():
+    made = str(glossary.explained("Round-off <b> and round-off"))
+    assert made.count("<abbr") == 1
+    assert "&lt;b&gt; and round-off" in made

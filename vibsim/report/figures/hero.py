@@ -1,0 +1,425 @@
+"""The two pictures at the top of a page: the one that decides, and the error against the step.
+
+Of a sweep they are the response over the swept parameters, with the member that decides marked, and the orders of all
+members. Source: pendulum lecture, section 2.5.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from vibsim.core.array_types import Floats
+from vibsim.core.record import Record
+from vibsim.report import choice, data, finest_level, style, sweep_layout
+from vibsim.report.data import Member
+from vibsim.report.figures import panels, time
+from vibsim.report.lead import Lead
+from vibsim.report.style import Picture
+from vibsim.report.text import findings, words
+from vibsim.report.types import Axes, Experiment, Figure
+
+LEFT, RIGHT, WHOLE, HEIGHT = 5.4, 3.9, 9.6, 2.75
+"""Widths of the left picture, of the right one and of one that stands alone, and their height [inch]."""
+FEW = 300  # of more members a histogram of the orders says more than dots
+FEWEST = 2  # errors that a picture over the step needs
+MOST_SCHEMES = 6  # schemes that the right picture can tell apart
+VARIES = 1e-6  # relative spread below which a number is the same for all members
+COINCIDE = 0.05  # curves that differ by less are said to coincide
+
+
+def _panel(width: float, title: str, left: float = 0.72, right: float = 0.14) -> Axes:
+    """Return the axes of a picture, whose label of the vertical axis stands above them."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, HEIGHT))
+    box = (left / width, 0.46 / HEIGHT, (width - left - right) / width, (HEIGHT - 0.78) / HEIGHT)
+    ax = figure.add_axes(box)
+    ax.set_title(title, fontweight="normal", fontsize=8.5, color=style.GREY)
+    return ax
+
+
+def _root(ax: Axes) -> Figure:
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    return figure
+
+
+def differences(record: Record, lead: Lead) -> Picture | None:
+    """Draw the rescaled differences of the levels; None where no series are kept, or no two levels."""
+    if data.is_lean(record) or not data.whole(record, "pair"):
+        return None
+    quantity, member = lead.quantity, lead.member
+    t, curves = data.times(record, member.case), time.differences(record, quantity, member)
+    shown = [curve for curve in curves if curve.is_whole and curve.sound] or curves
+    values = [curve.values for curve in shown]
+    if not style.finite(*values).size or not np.any(style.finite(*values)):
+        return None
+    wild = panels.explosive(values)
+    exponent = 0 if wild else style.scale(*values)
+    letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_difference")
+    ax = _panel(LEFT, style.label(f"rescaled differences of {letter}", measure, exponent))
+    for i, curve in enumerate(shown):
+        y = style.no_zeros(curve.values) if wild else curve.values / 10.0**exponent
+        look: dict[str, Any] = {
+            "color": style.COLOURS[i % style.MANY],
+            "linewidth": 5.5 - 4.2 * i / max(1, len(shown) - 1),
+        }
+        ax.plot(*style.thin(t, y, 200), label=curve.label, **look)
+    if wild:
+        style.log_axis(ax, "y", *panels.decades(values))
+    else:
+        ax.set_ylim(*style.limits(*(part / 10.0**exponent for part in values)))
+    ax.set_xlim(float(t[0]), float(t[-1]) if t[-1] > t[0] else 1.0)
+    ax.set_xlabel(data.time_label(record))
+    ax.legend(loc="best", fontsize=8, handlelength=1.6, borderaxespad=0.2)
+    return Picture(
+        "hero_differences",
+        _title_of_differences(record, lead, len(shown)),
+        "The difference between each level and the next finer one, multiplied so that the curves fall on one another "
+        "where the error has the promised order.",
+        f"Rescaled differences of {words.name(quantity)} between successive levels against time, {member.title}",
+        _root(ax),
+    )
+
+
+def _title_of_differences(record: Record, lead: Lead, count: int) -> str:
+    """Say whether the curves coincide, and how well."""
+    name = f"{lead.quantity}_coincidence"
+    found = data.at(record, name, lead.member) if name in record else np.empty(0)
+    last = float(found[-1]) if found.size else math.nan
+    if lead.result.get("reason") in ("exact", "round_off"):
+        return "What is left is round-off"
+    if count < 2 or not math.isfinite(last):
+        return "What is left between the levels"
+    if last > COINCIDE:
+        return "The rescaled curves do not coincide"
+    return f"{count} curves, one shape: they agree to {words.number(100.0 * last, 'brief')} %"
+
+
+def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
+    """Draw the error of every level against the step, of every scheme; None where there is none to draw."""
+    quantity, case = lead.quantity, lead.member.case
+    letter, measure = words.symbol(quantity), data.norm_unit(record, quantity, "linf")
+    names = record.words("scheme")
+    others = [s for s in range(len(names)) if s != lead.member.scheme][: MOST_SCHEMES - 1]
+    dt, scale = data.steps_of(record, case), root_of_duration(record, case)
+    ax = _panel(RIGHT, style.label(f"root-mean-square error of {letter}", measure))
+    drawn: list[Floats] = []
+    for s in [*others, lead.member.scheme]:
+        member = Member(s, case, names[s])
+        if not math.isfinite(data.formal_order(record, member, quantity)):
+            continue
+        estimate, true = (part / scale for part in _errors(record, quantity, member))
+        colour = style.COLOURS[s % style.MANY]
+        is_lead = s == lead.member.scheme
+        mark: dict[str, Any] = {"color": colour, "linestyle": "none", "marker": "o"}
+        alone = len(names) == 1
+        text = "estimated" if alone else style.entry(names[s])
+        if style.finite(estimate).size:
+            ax.plot(dt, estimate, **mark, markersize=5 if is_lead else 3.5, label=text)
+            drawn.append(estimate)
+        if style.finite(true).size:
+            ring = mark | {"markerfacecolor": "none", "markersize": 9 if is_lead else 6.5}
+            ax.plot(dt, true, **ring, label="true" if alone else "")
+            drawn.append(true)
+        has_order = math.isfinite(
+            data.stated_order(record, quantity, member, data.norm_index(record))[0]
+        )
+        if is_lead and (has_order or lead.is_on_order) and lead.result.get("reason") != "exact":
+            _slope(
+                ax,
+                dt,
+                estimate,
+                true,
+                data.formal_order(record, member, quantity),
+                record,
+                quantity,
+            )
+    if sum(style.finite(part).size for part in drawn) < FEWEST:
+        return None
+    high = max(float(part[np.isfinite(part)].max()) for part in drawn)
+    style.fit_log_axis(ax, "y", *drawn, least=1e-18, room=2.5, most=5)
+    style.log_axis(ax, "x", float(dt.min()) / 1.4, float(dt.max()) * 1.4, most=4)
+    ax.set_ylim(top=min(2.5 * high, style.LARGEST))
+    ax.set_xlabel(style.label("time step", data.time_unit(record, "dt")))
+    ax.legend(loc="best", fontsize=7.5, handlelength=1.8, borderaxespad=0.2)
+    title, found = "The error at every step", findings.factor(lead)
+    if found is not None:
+        due = words.fact(lead.result, "expected")
+        is_other = lead.result["reason"] != "asymptotic" and due is not None
+        missed = f", not by {2.0**due:.2g}" if is_other else ""
+        title = f"The error falls by {found:.2g} a level{missed}"
+    return Picture(
+        "hero_error",
+        title,
+        "Both axes are logarithmic, so an error of order p is a line of slope p. Filled: estimated from the "
+        "differences of the levels. Rings: the true error.",
+        f"Error of {words.name(quantity)} against the time step",
+        _root(ax),
+    )
+
+
+def solution(record: Record, quantity: str, member: Member) -> Picture:
+    """Draw a quantity at the finest level, and the exact solution."""
+    t, values = data.times(record, member.case), data.at(record, f"{quantity}_finest", member)
+    letter, exact = words.symbol(quantity), data.exact_series(record, quantity, member)
+    ax = _panel(RIGHT, style.label(letter, data.unit(record, f"{quantity}_finest")))
+    if np.isfinite(exact).any():
+        ax.plot(*style.thin(t, exact, 200), color="#b8b8b8", linewidth=4.5, label="exact")
+    steps = words.number(int(record["steps"][-1]), "integer")
+    ax.plot(
+        *style.thin(t, values, 200), color=style.COLOURS[0], linewidth=1.4, label=f"{steps} steps"
+    )
+    if panels.explosive([values]):
+        for line in ax.lines:
+            line.set_ydata(style.no_zeros(np.asarray(line.get_ydata(), dtype=np.float64)))
+        style.log_axis(ax, "y", *panels.decades([values]))
+    else:
+        ax.set_ylim(*style.limits(values, exact))
+    panels.stop_at_breakdown(ax, t, [values])
+    ax.set_xlabel(data.time_label(record))
+    ax.legend(loc="best", fontsize=8, handlelength=1.8)
+    return Picture(
+        "hero_solution", f"{letter}(t), {member.scheme_name}",
+        "Wide and grey is the exact solution, where it is known.",
+        f"{words.name(quantity)} against time for {member.title}", _root(ax),
+    )  # fmt: skip
+
+
+def root_of_duration(record: Record, case: int) -> float:
+    """Return by what an L2 norm over time is divided for the root of the mean square."""
+    ends = data.ends_of(record)
+    return math.sqrt(float(ends[case if ends.size > 1 else 0]))
+
+
+def _errors(record: Record, quantity: str, member: Member) -> tuple[Floats, Floats]:
+    """Return the estimated and the true error of every level in the typical norm, shape (level,); NaN for none.
+
+    The difference d of two levels is d r/(r - 1) as error of the coarser one, and d/(r - 1) of the finer, with r the
+    ratio of their errors.
+    """
+    norm, levels = data.norm_index(record), data.whole(record, "level")
+    true = data.known(
+        record, f"{quantity}_error_norm", ("level",), scheme=member.scheme, case=member.case, norm=norm
+    )  # fmt: skip
+    estimate = np.full(len(levels), np.nan)
+    if data.whole(record, "pair"):
+        gap = data.at(record, f"{quantity}_difference_norm", member, norm=norm)
+        order, *_ = data.stated_order(record, quantity, member, norm)
+        order = order if math.isfinite(order) else data.formal_order(record, member, quantity)
+        if math.isfinite(order) and order > 0.0:
+            rest = 2.0 ** (order * np.diff(levels)) - 1.0
+            estimate = np.append(gap * (rest + 1.0) / rest, gap[-1] / rest[-1])
+    return style.positive(estimate), style.positive(true)
+
+
+def _slope(
+    ax: Axes, dt: Floats, estimate: Floats, true: Floats, order: float, record: Record, quantity: str
+) -> None:  # fmt: skip
+    """Draw the promised slope through the finest error that is known."""
+    known = np.where(np.isfinite(true), true, estimate)
+    places = np.flatnonzero(np.isfinite(known))
+    if not places.size or not math.isfinite(order):
+        return
+    last = places[-1]
+    line = known[last] * (dt / dt[last]) ** order
+    text = f"order {order:g}, {data.due(record, quantity)}"
+    ax.plot(dt, line, **style.REFERENCE | {"color": style.GREY}, label=text)
+
+
+def response(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
+    """Draw a number of every member over the swept parameters, the one that decides marked; None without a sweep."""
+    keys = sweep_layout.keys(record)
+    found = _number(experiment, record, lead) if keys else None
+    if found is None:
+        return None
+    name, text, values = found
+    along, grid = sweep_layout.along_of(keys), sweep_layout.grid_of(keys)
+    if along is not None:
+        ax = _curves(record, lead, along, values, text)
+    elif grid is not None:
+        ax = _map(lead, grid, values, text)
+    else:
+        ax = _dots(lead, max(keys, key=lambda key: key.distinct.size), values, text)
+    count = words.number(len(record["case"]), "integer")
+    return Picture(
+        "hero_response",
+        f"{name[:1].upper()}{name[1:]} of {count} members",
+        "Each member is one run of the sweep, at its finest level. The ring is the member that decides.",
+        f"{name} of every member over the swept parameters",
+        _root(ax),
+    )
+
+
+def _number(experiment: Experiment, record: Record, lead: Lead) -> tuple[str, str, Floats] | None:
+    """Return the name, the label and the values of the first number that differs between members, shape (case,).
+
+    First comes what a check asks for, then period and amplitude, then the error of the finest level.
+    """
+    position, scheme = choice.position(experiment), lead.member.scheme
+    asked = [check.measured.value for check in experiment.checks if check.measured.kind == "value"]
+    usual = ["period", "amplitude"]
+    usual = usual if experiment.model.definition.conservative else usual[::-1]
+    for name in [*(name for name in asked if name in usual), *usual]:
+        if name in record:
+            values = finest_level.measured(record, name, position).value[scheme]
+            if _varies(values):
+                return name, style.label(name, data.unit(record, name)), values
+    quantity = lead.quantity
+    error = finest_level.error(record, quantity).best[scheme]
+    if not _varies(error):
+        return None
+    label = style.label(f"error of {words.symbol(quantity)}", data.norm_unit(record, quantity))
+    return f"error of {words.symbol(quantity)}", label, error
+
+
+def _varies(values: Floats) -> bool:
+    known = style.finite(values)
+    return known.size > 1 and bool(np.ptp(known) > VARIES * np.abs(known).max())
+
+
+def _scaled(ax: Axes, which: str, values: Floats) -> None:
+    """Make an axis logarithmic where positive values spread over decades."""
+    known = style.finite(values)
+    if known.min() > 0.0 and known.max() > sweep_layout.LOG_RATIO * known.min():
+        style.log_axis(ax, which, *style.log_limits(known), most=5)
+    else:
+        ax.set(**{f"{which}lim": style.limits(known)})
+
+
+def _across(ax: Axes, key: sweep_layout.Key) -> None:
+    """Give the horizontal axis the range, the scale and the words of a key."""
+    if key.is_log:
+        style.log_axis(ax, "x", *style.log_limits(key.distinct, margin=0.02), most=5)
+    else:
+        ax.set_xlim(*style.limits(key.distinct, margin=0.02))
+    if key.words:
+        ax.set_xticks(key.distinct, key.words)
+    ax.set_xlabel(key.label)
+
+
+def _ring(ax: Axes, x: float, y: float) -> None:
+    if math.isfinite(x) and math.isfinite(y):
+        look: dict[str, Any] = {"markerfacecolor": "none", "markeredgewidth": 1.8, "zorder": 6}
+        ax.plot(
+            [x], [y], "o", color="black", markersize=9, **look, label="decides", linestyle="none"
+        )
+
+
+def _curves(
+    record: Record, lead: Lead, along: sweep_layout.Along, values: Floats, text: str
+) -> Axes:
+    ax = _panel(LEFT, text)
+    for i, (name, cases) in enumerate(along.lines):
+        x, y = along.key.values[cases], values[cases]
+        few: dict[str, Any] = {"marker": "o", "markersize": 3.5} if x.size <= 40 else {}
+        ax.plot(x, y, color=style.COLOURS[i % style.MANY], linewidth=1.6, label=name or None, **few)
+    _across(ax, along.key)
+    _scaled(ax, "y", values)
+    _ring(ax, float(along.key.values[lead.member.case]), float(values[lead.member.case]))
+    ax.legend(loc="best", fontsize=8, handlelength=1.8)
+    return ax
+
+
+def _map(lead: Lead, grid: sweep_layout.Grid, values: Floats, text: str) -> Axes:
+    from matplotlib.colors import LogNorm, Normalize
+
+    ax = _panel(LEFT, text, right=0.95)
+    known = style.finite(values)
+    is_log = known.min() > 0.0 and known.max() > sweep_layout.LOG_RATIO * known.min()
+    ends = float(known.min()), float(known.max())
+    norm = LogNorm(*ends) if is_log else Normalize(*ends)
+    table = np.ma.masked_invalid(grid.worst(values))
+    mesh = ax.pcolormesh(*grid.borders, table, cmap="viridis", norm=norm, rasterized=True)
+    _across(ax, grid.x)
+    if grid.y.is_log:
+        style.log_axis(ax, "y", float(grid.borders[1][0]), float(grid.borders[1][-1]), most=5)
+    if grid.y.words:
+        ax.set_yticks(grid.y.distinct, grid.y.words)
+    ax.set_title(
+        f"{text} over {grid.x.key} and {grid.y.label}",
+        fontsize=8.5,
+        color=style.GREY,
+        fontweight="normal",
+    )
+    ax.set_ylabel(grid.y.label)
+    ax.grid(visible=False)
+    inside = ax.inset_axes((1.03, 0.0, 0.035, 1.0))
+    bar = _root(ax).colorbar(mesh, cax=inside)
+    if is_log:
+        style.log_ticks(bar.ax.yaxis, *ends, most=5)
+    case = lead.member.case
+    x, y = float(grid.x.values[case]), float(grid.y.values[case])
+    ax.plot(
+        [x], [y], "o", color="white", markersize=11, markerfacecolor="none", markeredgewidth=3.0
+    )
+    _ring(ax, x, y)
+    return ax
+
+
+def _dots(lead: Lead, key: sweep_layout.Key, values: Floats, text: str) -> Axes:
+    ax = _panel(LEFT, text)
+    ax.plot(
+        key.values, values, ".", color=style.COLOURS[0], markersize=3, rasterized=values.size > 500
+    )
+    _across(ax, key)
+    _scaled(ax, "y", values)
+    _ring(ax, float(key.values[lead.member.case]), float(values[lead.member.case]))
+    return ax
+
+
+def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
+    """Draw the stated orders of all members: dots over the key with most values, or of many a histogram."""
+    keys, quantity = sweep_layout.keys(record), lead.quantity
+    if not keys or not data.whole(record, "triple"):
+        return None
+    order = finest_level.orders(record, quantity)[0][lead.member.scheme]
+    promised = data.formal_orders(record, quantity)[lead.member.scheme]
+    known = np.isfinite(order)
+    if not known.any():
+        return None
+    letter = words.symbol(quantity)
+    allowed = choice.tolerance(experiment, quantity, record.words("scheme")[lead.member.scheme])
+    due = np.unique(promised[np.isfinite(promised)])
+    around = np.concatenate([due - 2 * allowed, due + 2 * allowed]) if due.size else order[known]
+    shown = np.clip(order, around.min() - 1.0, around.max() + 1.0)
+    missing = int(np.sum(~known))
+    if order.size > FEW:
+        ax = _panel(RIGHT, "members (logarithmic)")
+        borders = np.linspace(*style.limits(shown[known], around), 41)
+        ax.hist(shown[known], borders.tolist(), color=style.COLOURS[0])
+        for value in due:
+            ax.axvspan(value - allowed, value + allowed, **style.ALLOWED)
+        ax.set_yscale("log")
+        most = float(np.histogram(shown[known], borders)[0].max())
+        style.log_axis(ax, "y", 0.7, 2.0 * most, most=5)
+        ax.set_xlabel(f"observed order of {letter}")
+    else:
+        key = max(keys, key=lambda one: one.distinct.size)
+        ax = _panel(RIGHT, f"observed order of {letter}")
+        for value in due:
+            ax.axhspan(value - allowed, value + allowed, **style.ALLOWED)
+        ax.plot(key.values, shown, ".", color=style.COLOURS[0], markersize=4)
+        _across(ax, key)
+        ax.set_ylim(*style.limits(shown[known], around))
+        case = lead.member.case
+        _ring(ax, float(key.values[case]), float(shown[case]))
+    inside = known & (np.abs(order - promised) <= allowed)
+    kept, every = (words.number(int(n), "integer") for n in (inside.sum(), order.size))
+    title = (
+        "All members keep their order"
+        if inside.all()
+        else f"{kept} of {every} members keep their order"
+    )
+    more = (
+        f" {words.number(missing, 'integer')} members have no order and are left out."
+        if missing
+        else ""
+    )
+    return Picture(
+        "hero_orders", title, f"The band is what the tolerance allows around the promised order.{more}",
+        f"Observed orders of {words.name(quantity)} of all members", _root(ax),
+    )  # fmt: skip

@@ -1,0 +1,247 @@
+"""The first screen of a page: the finding, three numbers, two pictures, and what to do where it did not pass."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from vibsim.checks.value import unit_of
+from vibsim.comparison.best_values import WORDS, scalars
+from vibsim.core.record import Record
+from vibsim.core.vocabulary import decisive_number
+from vibsim.report import choice, data, finest_level, style
+from vibsim.report.evidence import figure
+from vibsim.report.figures import hero as drawn
+from vibsim.report.figures import motion
+from vibsim.report.lead import Lead
+from vibsim.report.style import Picture
+from vibsim.report.tables import published
+from vibsim.report.tables.best import error_size, rounded
+from vibsim.report.text import findings, words
+from vibsim.report.types import Experiment
+
+NUMBERS = 3  # large numbers on the first screen
+NAMED = 3  # schemes that are named
+MOST_LETTERS = 14  # of a best value; tables have every digit
+MEASURED = {
+    "stable": "Growth per period", "conserves": "Largest energy error over E(0)", "equal": "Largest difference",
+    "accurate": "Error of the finest level", "tolerance": "Error bound of the best solution",
+}  # fmt: skip
+"""Kind of a check to the name of the number that decides it."""
+
+_SECTION = re.compile(r"\b(?:model|initial|schemes)\.(?:parameters\.)?")
+"""What a swept key begins with."""
+Number = dict[str, str]
+"""``label``, ``value`` with its unit, and ``note`` of a large number."""
+
+
+def context(
+    experiment: Experiment, record: Record, summary: Mapping[str, Any], lead: Lead
+) -> dict[str, Any]:
+    """Return the words of the first screen by the names that its template uses."""
+    statuses = [check["status"] for check in summary["checks"]]
+    levels = len(data.whole(record, "level"))
+    return {
+        "finding": findings.title(experiment, record, lead, published.ids(experiment)),
+        "counts": words.passed(statuses),
+        "facts": findings.sentence(*_facts(experiment, record)),
+        "numbers": list(numbers(experiment, record, lead))[:NUMBERS],
+        "meaning": findings.paragraph(experiment, record, lead, levels),
+    }
+
+
+def _facts(experiment: Experiment, record: Record) -> Iterator[str]:
+    """Yield what was run: the title, the schemes, the members, the steps and the source."""
+    yield experiment.title
+    names = [spec.name for spec in experiment.schemes]
+    yield ", ".join(names) if len(names) <= NAMED else f"{len(names)} schemes"
+    if data.swept(record):
+        yield f"{words.number(len(record['case']), 'integer')} members"
+    steps = [words.number(int(n), "integer") for n in record["steps"]]
+    ends = np.unique(data.ends_of(record))
+    over = f" over {words.number(float(ends[0]), 'step')} {data.time_unit(record, 'dt')}".rstrip()
+    span = steps[0] if len(steps) == 1 else f"{steps[0]} to {steps[-1]}"
+    yield f"{span} steps{over if ends.size == 1 else ''}"
+    yield experiment.source or ""
+
+
+def numbers(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number]:
+    """Yield the large numbers, the most telling first: what decides, order, error, best value, member."""
+    if lead.entry is not None and not lead.is_on_order:
+        yield from _measured(experiment, record, lead)
+    if data.whole(record, "triple") or lead.is_on_order:
+        yield from _order(record, lead)
+    if lead.measured is None or lead.measured.kind != "accurate":
+        yield from _error(record, lead)
+    if data.swept(record) and lead.result.get("command"):
+        text = _SECTION.sub("", lead.member.case_name)
+        command = f".venv/bin/{lead.result['command']}"
+        yield {"label": "Hardest member", "value": text, "note": f"To run it alone: `{command}`"}
+    yield from _best(experiment, record, lead)
+    level, dt = data.whole(record, "level")[-1], data.steps_of(record, lead.member.case)
+    step = f"{words.number(float(dt[-1]), 'step')} {data.time_unit(record, 'dt')}".rstrip()
+    largest = data.omega_dt(record)[lead.member.case, -1]
+    note = f"level {level}" + (
+        f"; w dt = {words.number(float(largest), 'step')}" if np.isfinite(largest) else ""
+    )
+    yield {"label": "Finest time step", "value": step, "note": note}
+    yield {
+        "label": "Steps", "value": words.number(int(record["steps"][-1]), "integer"), "note": "at the finest level",
+    }  # fmt: skip
+
+
+def _measured(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number]:
+    """Yield the number that decides a check on something else than an order."""
+    number = decisive_number(lead.result.get("facts") or {})
+    if number is None or lead.entry is None or not math.isfinite(number):
+        return
+    check = lead.measured
+    kind = check.kind if check else "tolerance"
+    unit, label, form = "", MEASURED.get(kind, ""), "brief"
+    if check is not None and check.kind == "value":
+        from vibsim.report.text import assertions
+
+        unit, form = data.pretty_unit(unit_of(experiment, record, check)), "close"
+        subject = assertions.subject(check)
+        label = words.PAGE.opening(subject)
+    if kind in ("equal", "accurate"):
+        unit = data.norm_unit(record, lead.quantity, "l2" if kind == "accurate" else "linf")
+    allowed = (lead.result.get("facts") or {}).get("allowed")
+    note = f"asked for: {words.labelled(lead.entry['expected'], None)}"
+    if allowed is not None:
+        note = f"{words.number(allowed, 'brief')} is allowed"
+    value = f"{words.number(number, form)} {unit}".rstrip()
+    yield {"label": label, "value": value, "note": note}
+
+
+def _order(record: Record, lead: Lead) -> Iterator[Number]:
+    """Yield the observed order with its interval, of a sweep the range over all members, and the promised one."""
+    quantity, member = lead.quantity, lead.member
+    if f"{quantity}_order" not in record:
+        return
+    label = f"Observed order of {words.symbol(quantity)}"
+    promised = data.promised_text(record, quantity, member.scheme)
+    of = data.due(record, quantity)
+    due = f"the scheme promises {promised}" if of == "promised" else f"{promised} is expected"
+    facts = lead.result.get("facts") or {}
+    norm = data.norm_index(record)
+    if lead.is_on_order:
+        order, low, high = (facts.get(f"order{end}") for end in ("", "_low", "_high"))
+    else:
+        order, low, high = data.stated_order(record, quantity, member, norm)
+    reason = lead.result.get("reason") if lead.is_on_order else None
+    every = style.finite(finest_level.orders(record, quantity)[0][member.scheme])
+    if data.swept(record) and every.size > 1:
+        ends = [words.number(float(end), "order") for end in (every.min(), every.max())]
+        value = ends[0] if ends[0] == ends[1] else " to ".join(ends)
+        known = words.number(every.size, "integer")
+        yield {"label": label, "value": value, "note": f"of {known} members; {due}"}
+    elif reason == "exact":
+        yield {"label": label, "value": "exact", "note": "the levels differ by round-off only"}
+    elif order is None or not math.isfinite(order):
+        # beside another number it says nothing that there is none
+        if lead.is_on_order or lead.entry is None:
+            yield {"label": label, "value": "not known", "note": due}
+    else:
+        between = words.interval((low, high))
+        span = f"between {between.replace(' to ', ' and ')}; " if between != "–" else ""
+        yield {"label": label, "value": words.number(float(order), "order"), "note": f"{span}{due}"}
+
+
+def _error(record: Record, lead: Lead) -> Iterator[Number]:
+    """Yield the root-mean-square error of the finest level, in its unit and over the size of the solution."""
+    quantity, member = lead.quantity, lead.member
+    facts = lead.result.get("facts") or {}
+    error, relative = facts.get("error"), facts.get("relative_error")
+    word = "estimated"
+    true = float(finest_level.true_error(record, quantity)[member.scheme, member.case])
+    if math.isfinite(true):
+        error, word = true if error is None else error, "true"
+    if error is None or not math.isfinite(error):
+        if lead.is_on_order:
+            note = "the levels do not tell it"
+            yield {"label": "Error of the finest level", "value": "not known", "note": note}
+        return
+    mean = error / drawn.root_of_duration(record, member.case)
+    unit = data.norm_unit(record, quantity, "linf")
+    size = (
+        f"{words.number(100.0 * relative, 'brief')} % of the size of {words.symbol(quantity)}, "
+        if relative
+        else ""
+    )
+    steps = words.number(int(record["steps"][-1]), "integer")
+    yield {
+        "label": f"Error of {words.symbol(quantity)} at {steps} steps",
+        "value": f"{words.number(mean, 'brief')} {unit}".rstrip(),
+        "note": f"{size}{word}, root mean square",
+    }
+
+
+def _best(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number]:
+    """Yield the best value of the first number that is asked for, or of the end or the period."""
+    position, model = choice.position(experiment), experiment.model.definition
+    asked = [check.measured for check in experiment.checks if check.measured.kind == "value"]
+    wanted = [
+        f"{check.quantity}_{check.value}" if check.quantity else check.value for check in asked
+    ]
+    rows = {row.variable: row for row in scalars(model, "scalar" not in record)}
+    for name in [*wanted, f"{position}_end", "period", "amplitude"]:
+        field = f"{name}_richardson"
+        if name not in rows or field not in record:
+            continue
+        value = float(data.at(record, field, lead.member))
+        bound = float(data.at(record, f"{field}_error", lead.member))
+        # a bound as large as the value says that nothing is known
+        if not (math.isfinite(value) and bound < abs(value)):
+            continue
+        row = rows[name]
+        is_named = row.quantity in words.NAMES or row.quantity == position
+        text = f"{words.symbol(row.quantity)} {WORDS[row.value]}" if is_named else row.words
+        unit, size = data.unit(record, field), error_size(bound)
+        levels = len(data.whole(record, "level"))
+        told = rounded(value, bound).text
+        told = told if len(told) <= MOST_LETTERS else words.number(value, "value")
+        note = f"± {size.text if size else '0'} {unit}".rstrip()
+        yield {
+            "label": f"Best value: {text}",
+            "value": f"{told} {unit}".rstrip(),
+            "note": f"{note}, extrapolated over {levels} levels",
+        }
+        return
+
+
+def pictures(experiment: Experiment, record: Record, lead: Lead) -> list[Picture]:
+    """Return the one or two pictures of the first screen, the decisive one first."""
+    left: Picture | None = None
+    has_order = f"{lead.quantity}_order" in record
+    if data.swept(record):
+        left = drawn.response(experiment, record, lead)
+        right = drawn.orders(experiment, record, lead) if has_order else None
+        if lead.entry is not None and not right:
+            right = _evidence(experiment, record, lead)
+    else:
+        right = drawn.against_step(experiment, record, lead) if has_order else None
+        if lead.entry is not None and not lead.is_on_order:
+            left = _evidence(experiment, record, lead)
+        elif has_order:
+            left = drawn.differences(record, lead)
+    found = [picture for picture in (left, right) if picture is not None]
+    if data.is_lean(record) or len(found) == 2:
+        return found
+    if not found:
+        return [motion.motion(record, choice.position(experiment), lead.member)]
+    return [*found, drawn.solution(record, choice.position(experiment), lead.member)]
+
+
+def _evidence(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
+    """Return the picture that shows why the check came out as it did."""
+    if lead.entry is None:
+        return None
+    found = figure.picture(experiment, record, lead.asserted, lead.entry)
+    if found is None or found.figure is None:
+        return None
+    return Picture("hero_evidence", "What decides", found.caption, found.alt, found.figure)

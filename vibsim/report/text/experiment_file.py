@@ -1,0 +1,120 @@
+"""The experiment as a file that can be copied: what it asks for, without what is as by default."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from vibsim.report.types import Check, Experiment, SchemeSpec
+
+WIDTH = 100  # characters of a line
+DEFAULTS: Mapping[str, Any] = {
+    "tolerance": 0.1, "norm": "l2", "expect": {"status": "PASS", "reason": None}, "holds": True,
+}  # fmt: skip
+"""What a check need not say."""
+_PLAIN = re.compile(r"[A-Za-z][\w .,()/%^+*=-]*(?<! )")
+_WORDS = re.compile(r"(?i)true|false|yes|no|on|off|null|y|n|\d.*|[-+.].*")
+
+
+def text(experiment: Experiment) -> str:
+    """Return the experiment as YAML; numbers that a file gave in other units stand in those of the run."""
+    lines = [f"title: {_value(experiment.title)}"]
+    lines += [f"source: {_value(experiment.source)}"] if experiment.source else []
+    model, scaling = experiment.model, experiment.scaling
+    named: dict[str, Any] = {"kind": model.kind}
+    for key, value in (scaling or model).parameters.items():
+        _put(named, key.split("."), value)
+    named |= {key: formula for key, formula in model.formulas.items() if key not in named}
+    named |= {name: {"table": spec.file} for name, spec in model.tables.items()}
+    lines += [
+        f"model: {_value(named)}",
+        f"initial: {_value(dict((scaling or experiment).initial))}",
+    ]
+    time = experiment.time.model_dump(exclude_none=True)
+    if time.get("periods") is not None:
+        time = {
+            "periods": time["periods"],
+            "steps_per_period": time["base_steps"] / time["periods"],
+        }
+    elif time["base_steps"] == 1:
+        del time["base_steps"]
+    if scaling is not None:
+        time = time | {"end": scaling.end}
+        lines.append("scaled: true")
+    lines += [f"time: {_value(time)}", f"levels: {_value(_levels(experiment.levels))}"]
+    lines += _listed("schemes", [_scheme(spec) for spec in experiment.schemes])
+    if experiment.sweep:
+        axes = [_axis(axis) for axis in experiment.sweep.model_dump(mode="json")["axes"]]
+        lines += ["sweep:", *(f"  {line}" for axis in axes for line in axis)]
+    if experiment.samples != "auto":
+        every = experiment.samples
+        lines.append(f"samples: {every if isinstance(every, str) else f'{{every: {every}}}'}")
+    if experiment.output != "verdict":
+        lines.append(f"output: {experiment.output}")
+    if experiment.published:
+        lines.append("# and the printed numbers, which the page lists")
+    if experiment.tolerance is not None:
+        lines.append(f"tolerance: {_value(experiment.tolerance)}")
+    return "\n".join([*lines, *_listed("checks", [_check(check) for check in experiment.checks])])
+
+
+def _put(section: dict[str, Any], keys: Sequence[str], value: Any) -> None:
+    for key in keys[:-1]:
+        section = section.setdefault(key, {})
+    section[keys[-1]] = value
+
+
+def _levels(levels: Sequence[int]) -> Any:
+    is_run = list(levels) == list(range(levels[0], levels[-1] + 1)) and len(levels) > 2
+    return {"from": levels[0], "to": levels[-1]} if is_run else list(levels)
+
+
+def _scheme(spec: SchemeSpec) -> Any:
+    usual = {option.name: option.default for option in spec.method.options}
+    options = {k: v for k, v in spec.options.items() if usual.get(k, ...) != v}
+    label = {"label": spec.name} if spec.name != spec.kind else {}
+    return {"kind": spec.kind, **label, **options} if label or options else spec.kind
+
+
+def _axis(axis: Mapping[str, Any]) -> list[str]:
+    keys, values = axis["keys"], axis["values"]
+    if not isinstance(values, list):
+        return [f"{', '.join(keys)}: {_value(values)}"]
+    rows = [f"{key}: {_value(found)}" for key, found in zip(keys, values, strict=True)]
+    return rows if len(rows) == 1 else ["zip:", *(f"  {row}" for row in rows)]
+
+
+def _check(check: Check) -> dict[str, Any]:
+    found = check.model_dump(mode="json")
+    if check.kind == "claim":
+        found["that"] = _bare(_check(check.that), "id")
+    if isinstance(found.get("at"), dict):
+        found["at"] = _bare(found["at"])
+    found = {k: v for k, v in found.items() if k not in DEFAULTS or DEFAULTS[k] != v}
+    return {k: v for k, v in _bare(found).items() if v != {}}
+
+
+def _bare(section: Mapping[str, Any], *keys: str) -> dict[str, Any]:
+    return {k: v for k, v in section.items() if v is not None and k not in keys}
+
+
+def _listed(name: str, rows: Sequence[Any]) -> list[str]:
+    """Write a section that is a list, in one line where it fits."""
+    if not rows:
+        return []
+    short = f"{name}: {_value(list(rows))}"
+    return [short] if len(short) <= WIDTH else [f"{name}:", *(f"  - {_value(row)}" for row in rows)]
+
+
+def _value(value: Any) -> str:
+    """Write a value in flow style, which YAML shares with JSON but for the quotes."""
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{key}: {_value(one)}' for key, one in value.items())}}}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_value, value))}]"
+    if isinstance(value, str):
+        is_plain = _PLAIN.fullmatch(value) and not _WORDS.fullmatch(value) and "," not in value
+        return value if is_plain else json.dumps(value, ensure_ascii=False)
+    return json.dumps(value)

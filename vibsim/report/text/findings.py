@@ -1,0 +1,287 @@
+"""What was found, in one line and in one short paragraph: templates by status and reason, filled from facts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from typing import Any
+
+from vibsim.convergence import LadderVerdict
+from vibsim.core.record import Record
+from vibsim.report import data
+from vibsim.report.lead import Lead, is_trap
+from vibsim.report.text import assertions, reasons, words
+from vibsim.report.types import Experiment
+
+ORDINALS = {1: "first", 2: "second", 3: "third", 4: "fourth", 5: "fifth", 6: "sixth", 8: "eighth"}
+WITH_AN_ORDER = ("asymptotic", "order_low", "order_high")
+"""Reasons of a result whose order is known: any other has at most an estimate that may be an accident."""
+NEAR = 0.15
+"""An order this near to a whole number is spoken of as that number."""
+
+ON_ORDER = {
+    "asymptotic": "{What} converges {at}{everywhere}",
+    "exact": "{What} is exact{everywhere}: the levels differ by round-off only",
+    "match": "{What} behaves as the check expects{everywhere}",
+    "order_low": "{What} converges {at_measured}, not {expected_order}",
+    "order_high": "{What} converges {at_measured}, not {expected_order}",
+    "mismatch": "{What} does not behave as the check expects",
+    "wrong_limit": "{What} approaches a wrong solution",
+    "unstable": "The run is unstable, so {what} shows no order",
+    "non_finite": "The run breaks down before its end",
+    "pre_asymptotic": "The levels are too coarse to show the order of {what}",
+    "round_off": "{What} has reached round-off, so it shows no order",
+    "oscillating": "The error of {what} changes its sign from level to level",
+    "non_smooth": "{What} has no regular order, because the problem is not smooth",
+    "too_few_levels": "There are too few levels to judge {what}",
+    "not_applicable": "There is nothing to judge of {what} here",
+}
+"""Reason to the title of a page about an order."""
+MATCHED = {
+    "value": "{Subject} is as expected{everywhere}",
+    "accurate": "{What} is as accurate as asked{everywhere}",
+    "stable": "{Schemes} {stability}, as expected{everywhere}",
+    "conserves": "The energy {drift}{everywhere}",
+    "equal": "{What} by {first} equals {second}{everywhere}",
+    "tolerance": "The solution is within the tolerance{everywhere}",
+}
+"""Kind of a check that passed to the title of a page about it."""
+MISSED = {
+    "value": "{Subject} is not as expected",
+    "accurate": "{What} is not as accurate as asked",
+    "stable": "{Schemes} {not_stability}",
+    "conserves": "The energy does not keep what is asked: that it {drift}",
+    "equal": "{What} by {first} differs from {second}",
+    "tolerance": "The error bound is beyond the tolerance",
+}
+"""Kind of a check that failed to the title of a page about it."""
+OPEN = {
+    "value": "It is undecided whether {subject} is as expected",
+    "accurate": "It is undecided whether {what} is as accurate as asked",
+    "stable": "It is undecided whether the run is stable",
+    "conserves": "It is undecided how the energy behaves",
+    "equal": "It is undecided whether {what} by {first} equals {second}",
+    "tolerance": "It is undecided whether the tolerance is reached",
+}
+"""Kind of a check that stayed open to the title of a page about it."""
+NO_CHECK = "The motion was computed, and nothing was asked of it"
+BROKE_DOWN = "The run breaks down before its end"
+CONFIRMED = "{count} confirmed"
+NOTHING_ASKED = (
+    "Without a check there is no verdict. Add `checks:` to the experiment, such as `- {{converges: {position}}}`, and "
+    "three levels at least."
+)
+TRUSTED = (
+    "Halving the step divides the error by about {factor}. The rescaled differences of the levels coincide, so the "
+    "estimate of the error can be trusted.{beside}{unseen}"
+)
+BESIDE = " The true error is known here, and the estimate is right to {part} of it."
+UNSEEN = " There is no exact solution, so convergence to a wrong answer would go unnoticed."
+
+
+def title(experiment: Experiment, record: Record, lead: Lead, printed: Collection[str]) -> str:
+    """Return the finding of an experiment in one line; `printed` names the checks of printed numbers."""
+    if lead.entry is None:
+        return NO_CHECK
+    entry, told = lead.entry, _by_check(experiment, record, lead)
+    if entry["status"] != "PASS":
+        return f"{told}{_of_some(record, entry)}"
+    if entry["id"] in printed:
+        return f"All {len(printed)} printed numbers are as expected"
+    return f"{told}{_caught(experiment, lead)}" if not _is_claim(lead) else _of_claims(experiment)
+
+
+def _of_some(record: Record, entry: Mapping[str, Any]) -> str:
+    """Say of how many members or schemes a verdict is that not all of them have; empty where all do."""
+    count, total = entry["counts"][entry["status"]], sum(entry["counts"].values())
+    if not 0 < count < total:
+        return ""
+    noun = (
+        "schemes" if not data.swept(record) else "members" if len(record["scheme"]) == 1 else "runs"
+    )
+    few, all_of = (words.number(n, "integer") for n in (count, total))
+    return f", in {few} of {all_of} {noun}"
+
+
+def _is_claim(lead: Lead) -> bool:
+    return lead.asserted is not None and lead.asserted.kind == "claim"
+
+
+def _of_claims(experiment: Experiment) -> str:
+    """Return the title of an experiment that is about statements, all of which came out as expected."""
+    claims = [check for check in experiment.checks if check.kind == "claim"]
+    true = sum(claim.holds for claim in claims)
+    false = len(claims) - true
+    parts = [f"{true} {_plural('statement', true)} confirmed"] if true else []
+    parts += [f"{false} refuted as expected"] if parts and false else []
+    parts += [f"{false} {_plural('statement', false)} refuted, as expected"] if not parts else []
+    return ", ".join(parts)
+
+
+def _plural(word: str, count: int) -> str:
+    return word if count == 1 else f"{word}s"
+
+
+def _caught(experiment: Experiment, lead: Lead) -> str:
+    """Say that traps were caught, where the page is about something else."""
+    traps = [check for check in experiment.checks if check.kind != "claim" and is_trap(check)]
+    if not traps:
+        return ""
+    if is_trap(lead.asserted):
+        return ": the trap is caught"
+    return f", and {'the trap is' if len(traps) == 1 else f'{len(traps)} traps are'} caught"
+
+
+def _by_check(experiment: Experiment, record: Record, lead: Lead) -> str:
+    """Return the title that the check deserves which decides."""
+    assert lead.entry is not None
+    status, reason = lead.entry["status"], lead.entry["reason"]
+    kind = lead.measured.kind if lead.measured else "tolerance"
+    filled = _phrases(experiment, record, lead)
+    if kind == "converges":
+        # of a trap, what was found says more than that it was expected
+        word = lead.result["reason"] if reason == "match" else reason
+        return ON_ORDER.get(word, ON_ORDER["mismatch"]).format_map(filled)
+    if reason == "non_finite":
+        return BROKE_DOWN
+    table = {"PASS": MATCHED, "FAIL": MISSED}.get(status, OPEN)
+    return table[kind].format_map(filled)
+
+
+def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, str]:
+    """Return the words that fill a title."""
+    measured, what = lead.measured, _named(experiment, lead.quantity)
+    facts = lead.result.get("facts") or {}
+    order, expected = facts.get("order"), facts.get("expected")
+    named = getattr(measured, "schemes", None) or record.words("scheme")
+    filled = {
+        "what": what, "What": _opened(what), "everywhere": _everywhere(record, lead),
+        "at": _at(expected, order), "at_measured": _at(order), "expected_order": _at(expected).removesuffix(" order"),
+        "Schemes": f"Scheme {named[0]}" if len(named) == 1 else "The schemes",
+        "first": "", "second": "", "drift": "", "stability": "", "not_stability": "", "subject": "", "Subject": "",
+    }  # fmt: skip
+    if measured is None:
+        return filled
+    ends = "s" if len(named) == 1 else ""
+    is_are = "is" if len(named) == 1 else "are"
+    match measured.kind:
+        case "value":
+            subject = assertions.subject(measured)
+            filled |= {"subject": subject, "Subject": _opened(words.PAGE.opening(subject))}
+        case "equal":
+            second = assertions.SOLUTIONS.get(measured.second, f"that by {measured.second}")
+            filled |= {"first": measured.first, "second": second}
+        case "conserves":
+            filled["drift"] = assertions.DRIFTS[measured.drift]
+        case "stable":
+            grow = f"make{ends} the amplitude grow"
+            tame, wild = f"{is_are} stable", grow
+            found = (tame, wild) if measured.stable else (wild, tame)
+            filled |= {"stability": found[0], "not_stability": f"{found[1]}, against what is asked"}
+    promised = {
+        float(x)
+        for x in data.formal_orders(record, lead.quantity).ravel()
+        if f"{lead.quantity}_formal_order" in record
+    }
+    is_of_all = getattr(measured, "order", None) == "scheme" and len(named) > 1
+    if is_of_all and len(promised) > 1 and measured.kind == "converges":
+        filled |= {
+            "at": f"at the order that each of {len(named)} schemes promises",
+            "everywhere": "",
+        }
+    return filled
+
+
+def _named(experiment: Experiment, quantity: str) -> str:
+    """Return a quantity in words: those of the model where it has no letter of its own."""
+    told, model = words.name(quantity), experiment.model.definition
+    long = {state.name: state.long_name for state in model.states}
+    long |= {output.name: output.long_name for output in model.outputs}
+    return f"the {long[quantity]} {quantity}" if told == quantity and quantity in long else told
+
+
+def _everywhere(record: Record, lead: Lead) -> str:
+    """Say of how many members and schemes it holds; empty for one result."""
+    assert lead.entry is not None
+    total = sum(lead.entry["counts"].values())
+    schemes = {result["scheme"] for result in lead.entry["results"]}
+    if total < 2:
+        return ""
+    if data.swept(record):
+        return f" in all {words.number(total, 'integer')} members" if len(schemes) == 1 else (
+            f" in all {words.number(total, 'integer')} runs"
+        )  # fmt: skip
+    return f" by all {total} schemes"
+
+
+def _at(*orders: float | None) -> str:
+    """Say with which order something converges: the first that is known."""
+    order = next((x for x in orders if x is not None and math.isfinite(x)), None)
+    if order is None:
+        return "with no order"
+    whole = round(order)
+    if whole in ORDINALS and abs(order - whole) <= NEAR:
+        return f"at {ORDINALS[whole]} order"
+    return f"with order {order:.2f}"
+
+
+def _opened(text: str) -> str:
+    """Begin a sentence: with a capital where it begins with an article."""
+    return text[:1].upper() + text[1:] if text.startswith("the ") else text
+
+
+def of_ladder(verdict: LadderVerdict) -> str:
+    """Return the finding on a ladder that another solver computed, in one line."""
+    expected = verdict.expected or verdict.at_least
+    words_of = {
+        "what": verdict.quantity, "What": verdict.quantity, "everywhere": "",
+        "at": _at(expected, verdict.order), "at_measured": _at(verdict.order),
+        "expected_order": _at(expected).removesuffix(" order"),
+    }  # fmt: skip
+    return ON_ORDER[verdict.reason].format_map(words_of)
+
+
+def factor(lead: Lead) -> float | None:
+    """Return by what halving the step divides the error; None where the result that decides has no settled order."""
+    if lead.entry is None or not lead.is_on_order or lead.entry["status"] == "INCONCLUSIVE":
+        return None
+    order = words.fact(lead.result, "order")
+    is_settled = lead.result["reason"] in WITH_AN_ORDER and order is not None
+    return 2.0**order if is_settled else None
+
+
+def paragraph(experiment: Experiment, record: Record, lead: Lead, levels: int) -> str:
+    """Return what the finding means, for who meets it for the first time."""
+    if lead.entry is None:
+        return NOTHING_ASKED.format(position=experiment.model.definition.position)
+    found = factor(lead)
+    if (
+        found is not None
+        and lead.entry["status"] == "PASS"
+        and lead.result["reason"] == "asymptotic"
+    ):
+        part = _estimate_over_true(record, lead)
+        beside = "" if part is None else BESIDE.format(part=f"{max(100.0 * part, 0.1):.1g} %")
+        unseen = "" if part is not None else UNSEEN
+        return TRUSTED.format(factor=f"{found:.2g}", beside=beside, unseen=unseen)
+    kind = lead.measured.kind if lead.measured else lead.entry["kind"]
+    value = getattr(lead.measured, "value", "") if kind == "value" else ""
+    word = lead.result.get("reason") if lead.is_on_order else lead.entry["reason"]
+    return reasons.reason(word, kind, value=value, levels=levels).meaning
+
+
+def _estimate_over_true(record: Record, lead: Lead) -> float | None:
+    """Return how far the estimated error of the finest level is from the true one; None where that is not known."""
+    from vibsim.report import finest_level
+
+    found = finest_level.error(record, lead.quantity)
+    place = lead.member.scheme, lead.member.case
+    true, estimate = float(found.true[place]), float(found.estimate[place])
+    if not (math.isfinite(true) and math.isfinite(estimate) and true > 0.0):
+        return None
+    return abs(estimate / true - 1.0)
+
+
+def sentence(*parts: str) -> str:
+    """Join the facts of the line below the title."""
+    return " · ".join(part for part in parts if part)
