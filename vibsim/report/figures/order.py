@@ -176,17 +176,11 @@ def _step_limits(ax: Axes, dt: Floats, seen: list[Floats], floors: list[Floats])
 
 def _level_axis(ax: Axes, dt: Floats, levels: list[int]) -> None:
     """Write the levels along the top."""
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-
-    top = ax.secondary_xaxis("top")
+    above: dict[str, Any] = {"va": "bottom", "fontsize": 8.5}
     every = max(1, len(levels) // 8)
-    chosen = dict(zip(dt[::every].tolist(), levels[::every], strict=True))
-    top.xaxis.set_major_locator(FixedLocator(list(chosen)))
-    top.xaxis.set_minor_locator(NullLocator())
-    top.xaxis.set_major_formatter(
-        FuncFormatter(lambda x, _: str(chosen[min(chosen, key=lambda d: abs(d - x))]))
-    )
-    ax.text(-0.02, 1.03, "level", transform=ax.transAxes, ha="right", va="bottom", fontsize=8.5)
+    for x, level in zip(dt[::every].tolist(), levels[::every], strict=True):
+        ax.text(x, 1.03, str(level), transform=ax.get_xaxis_transform(), ha="center", **above)
+    ax.text(-0.02, 1.03, "level", transform=ax.transAxes, ha="right", **above)
 
 
 def _has_order(ax: Axes, record: Record, quantity: str, case: int) -> bool:

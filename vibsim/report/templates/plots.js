@@ -6,6 +6,7 @@
 const NAMES = { time: "t", step: "dt" };
 const LEAST = 1 / 200; // of the whole time, the least that is shown
 const NEAR = 8; // how far from a point its value is shown [point]
+const LETTER = 4.7; // about the width of a letter of the values [point]
 const HINT = "Arrow keys move a line that reads values, plus and minus zoom, Shift and arrows pan, 0 shows all.";
 const LINEAR = { to: (v) => v, from: (v) => v };
 const LOGARITHMIC = { to: Math.log10, from: (v) => 10 ** v };
@@ -51,7 +52,8 @@ function readCurve(node) {
   const points = line
     ? line.getAttribute("d").match(/[ML][^MLz]+/g).map((part) => [...numbers(part.slice(1)), part[0] === "M"])
     : uses.map((e) => [Number(e.getAttribute("x")), Number(e.getAttribute("y")), true]);
-  return { node, label: node.dataset.curve.split("\n")[0], points, line, coloured: line || uses[0].parentNode };
+  const colour = (line || uses[0].parentNode).getAttribute("stroke");
+  return { node, label: node.dataset.curve.split("\n")[0], points, line, colour };
 }
 
 // Places and values
@@ -88,7 +90,7 @@ function valuesOf(panel, at) {
     const y = heightAt(curve, x, panel.kind === "step");
     if (y === null) return [];
     const value = panel.up.from(panel.y[0] + (1 - (y - panel.top) / panel.height) * (panel.y[1] - panel.y[0]));
-    return [{ y, colour: getComputedStyle(curve.coloured).stroke, text: `${curve.label}: ${written(value)}` }];
+    return [{ y, colour: curve.colour, text: `${curve.label}: ${written(value)}` }];
   });
 }
 
@@ -123,19 +125,18 @@ function draw(group) {
 function writeValues({ over, left, top, width, height }, x, rows) {
   if (!rows.length) return;
   const box = make("g", { "font-size": 8 }, over);
-  const paper = make("rect", { fill: "#ffffff", "fill-opacity": 0.86, rx: 2, height: 10.5 * rows.length + 4 }, box);
-  let wide = 0;
+  // to measure letters would lay out the page for every panel
+  const wide = Math.max(...rows.map(({ colour, text }) => LETTER * text.length + (colour ? 18 : 8)));
+  const paper = { fill: "#ffffff", "fill-opacity": 0.86, rx: 2, width: wide, height: 10.5 * rows.length + 4 };
+  make("rect", paper, box);
   rows.forEach(({ y, colour, text }, i) => {
     const down = 10.5 * (i + 1);
-    const word = make("text", { x: colour ? 14 : 4, y: down }, box);
-    word.textContent = text;
-    wide = Math.max(wide, word.getComputedTextLength() + (colour ? 18 : 8));
+    make("text", { x: colour ? 14 : 4, y: down }, box).textContent = text;
     if (!colour) return;
     make("path", { d: `M4 ${down - 3}h7`, stroke: colour, "stroke-width": 2 }, box);
     if (y < top || y > top + height) return;
     make("circle", { cx: x, cy: y, r: 2.4, fill: "#ffffff", stroke: colour, "stroke-width": 1.2 }, over);
   });
-  paper.setAttribute("width", wide);
   const start = x + 6 + wide <= left + width ? x + 6 : Math.max(x - 6 - wide, 0);
   box.setAttribute("transform", `translate(${start} ${top + 2})`);
   over.append(box);
@@ -233,11 +234,14 @@ function listen(svg) {
     } else group.at = now.value;
     draw(group);
   });
-  on("pointerleave", () => start || leave());
+  // a finger that is lifted leaves the line where it was
+  on("pointerleave", (event) => start || event.pointerType === "touch" || leave());
   on("pointerdown", (event) => {
     const now = under(event);
     if (event.button !== 0 || now?.group.kind !== "time") return;
     start = now;
+    now.group.at = now.value;
+    draw(now.group);
     if (event.isTrusted) svg.setPointerCapture(event.pointerId);
   });
   on("pointerup", finish(true));
