@@ -58,7 +58,7 @@ def _verdicts(plan: Plan, results: Path) -> None:
         print(f"{plan.key}: there are no verdicts yet")
         return
     summary = read_json(path, name=plan.key)
-    if summary["digest"] != plan.analysis:
+    if summary.get("digest") != plan.analysis:
         print(_OUTDATED)
     print(*outcome_text.in_full([summary], terminal.columns()), sep="\n")
     page = results / plan.page
