@@ -98,6 +98,8 @@ def test_a_run_says_first_what_changed(place: Place, capsys: pytest.CaptureFixtu
     plans = plans_of([str(place.file)])
     command._tell_changes(plans, place.results)
     assert capsys.readouterr().err == "adhoc/tiny: model.g: 1.0 -> 1.5\n"
+    command._tell_changes(plans * 6, place.results)
+    assert capsys.readouterr().err == "6 experiments: model.g: 1.0 -> 1.5\n"
     # what was never made has no reason to be made again
     command._tell_changes(plans, place.folder / "new")
     assert capsys.readouterr().err == ""
