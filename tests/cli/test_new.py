@@ -95,6 +95,7 @@ def test_a_shipped_experiment_comes_with_its_tables(tmp_path: Path) -> None:
         (["mine.yaml", "--like", "vehicel"], "did you mean 'vehicle'?"),
         (["mine.yaml", "--like", "pendulum_lab"], "must be one experiment"),
         (["mine.yaml", "--like", "period_against_amplitude@1"], "not one member of it"),
+        (["mine.yaml", "--like", str(checkout() / "examples/heat/heat.yaml")], "copy its folder"),
         (["mine.yaml", "--like", "vehicle", "--model", "spring"], "together with --model"),
     ],
 )

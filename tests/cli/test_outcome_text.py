@@ -22,6 +22,7 @@ def check(name: str = "order", status: str = "PASS", **more: Any) -> dict[str, A
         "text": "theta does something.",
         "advice": "" if status == "PASS" else "Use another start.",
         "results": [{"facts": FACTS}],
+        "counts": {"PASS": 1, "FAIL": 0, "INCONCLUSIVE": 0},
     } | more
 
 
@@ -38,6 +39,12 @@ class Terminal(io.StringIO):
 def test_an_experiment_that_passes_is_one_line_with_its_order_and_error() -> None:
     (line,) = outcome_text.in_lines([entry(check())], 200)
     assert line == "PASS  adhoc/tiny  theta: order 2.002 (2.000 to 2.002), relative error 0.0006"
+
+
+def test_of_a_sweep_the_hardest_member_is_told_as_such() -> None:
+    row = check(counts={"PASS": 31, "FAIL": 0, "INCONCLUSIVE": 0})
+    assert outcome_text.headline(entry(row), 99).endswith("error 0.0006, the hardest of 31")
+    assert outcome_text.headline(entry(row), 60).endswith("(2.000 to 2.002), relative error 0.0006")
 
 
 @pytest.mark.parametrize(

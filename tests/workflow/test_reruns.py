@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from vibsim.cli.chosen_plans import plans_of
-from vibsim.cli.run import reasons
+from vibsim.cli.run import command, reasons
 
 from .conftest import TEXT, Place
 
@@ -89,6 +89,20 @@ def test_only_a_change_of_the_code_is_left_where_the_settings_are_the_same(
     assert reasons.why(other, place.results) == "the code of vibsim changed"
     newer = replace(other, versions={**other.versions, "numpy": "99.0"})
     assert reasons.why(newer, place.results).endswith(" -> 99.0")
+
+
+def test_a_run_says_first_what_changed(place: Place, capsys: pytest.CaptureFixture[str]) -> None:
+    command._tell_changes(plans_of([str(place.file)]), place.results)
+    assert capsys.readouterr().err == ""
+    place.change("g: 1.0", "g: 1.5")
+    plans = plans_of([str(place.file)])
+    command._tell_changes(plans, place.results)
+    assert capsys.readouterr().err == "adhoc/tiny: model.g: 1.0 -> 1.5\n"
+    command._tell_changes(plans * 6, place.results)
+    assert capsys.readouterr().err == "6 experiments: model.g: 1.0 -> 1.5\n"
+    # what was never made has no reason to be made again
+    command._tell_changes(plans, place.folder / "new")
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.slow

@@ -85,7 +85,7 @@ def _side(word: str, results: Path) -> Side:
     found = None
     if (results / plan.summary).exists():
         found = read_json(results / plan.summary, name=plan.key)
-        found = found if found["digest"] == plan.analysis else None
+        found = found if found.get("digest") == plan.analysis else None
     return Side(uses, plan.title, found)
 
 

@@ -64,6 +64,9 @@ def _like(word: str, schema: str) -> dict[str, bytes]:
     source = plan.source_file
     if source is None or plan.file != str(source):
         raise refusal("--like", word, "must be a whole experiment, not one member of it")
+    if plan.has_solver:
+        rule = "has a solver of its own, whose programs and files are not copied; copy its folder"
+        raise refusal("--like", word, rule)
     found = {"": template.of_text(source.read_text("utf-8"), schema).encode()}
     for path, _ in plan.inputs:
         if Path(path).name != path:

@@ -101,10 +101,10 @@ def numbers(check: Entry) -> list[str]:
     ends = order_interval(low, high) if low is not None and high is not None else ()
     between = f" ({' to '.join(ends)})" if len(ends) > 1 else ""
     error = facts.get("relative_error")
-    if error is None:
-        return [f"{head}{between}", head]
-    told = f", relative error {error:.2g}"
-    return [head + between + told, head + told, head]
+    told = "" if error is None else f", relative error {error:.2g}"
+    total = sum(check["counts"].values())
+    of = f", the hardest of {total}" if total > 1 else ""
+    return [head + between + told + of, head + between + told, head + told, head]
 
 
 def _name(entry: Entry) -> str:

@@ -44,8 +44,9 @@ def show(options: Namespace) -> int:
         level = made[-1] if options.level is None else options.level
         _draw(_of_level(plan, results, level, case), options, f"{plan.key}, level {level}")
     if len(made) < len(levels):
-        there = f"level{'s' if len(made) > 1 else ''} {settings.shown(made)}"
-        print(f"{there} of {settings.shown(levels)}: the run has not ended")
+        one = len(made) == 1
+        there = f"level{'' if one else 's'} {settings.shown(made)} {'is' if one else 'are'} there"
+        print(f"{there}, of levels {settings.shown(levels)}; the others are not made yet")
     _verdicts(plan, results)
     return 0
 
@@ -57,7 +58,7 @@ def _verdicts(plan: Plan, results: Path) -> None:
         print(f"{plan.key}: there are no verdicts yet")
         return
     summary = read_json(path, name=plan.key)
-    if summary["digest"] != plan.analysis:
+    if summary.get("digest") != plan.analysis:
         print(_OUTDATED)
     print(*outcome_text.in_full([summary], terminal.columns()), sep="\n")
     page = results / plan.page

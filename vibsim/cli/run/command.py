@@ -28,6 +28,8 @@ _STAGES = 4
 """How often the workflow is started at most: once, and once for each kind of file found bad."""
 _PAGES = 5
 """Up to so many experiments, the report of each is named."""
+_NAMED = 5
+"""Up to so many experiments are named that run again for the same reason."""
 
 
 def run(options: Namespace) -> int:
@@ -92,11 +94,15 @@ def _clear(plans: Sequence[Plan], results: Path, options: Namespace) -> None:
 
 
 def _tell_changes(plans: Sequence[Plan], results: Path) -> None:
-    """Say why experiments run again that have results already."""
+    """Say why experiments run again that have results already; once for many with the same reason."""
+    found: dict[str, list[str]] = {}
     for plan in plans:
-        reason = reasons.why(plan, results)
+        found.setdefault(reasons.why(plan, results), []).append(plan.key)
+    for reason, keys in found.items():
         if reason not in ("", reasons.NEW):
-            print(f"{plan.key}: {reason}", file=sys.stderr, flush=True)
+            who = [f"{len(keys)} experiments"] if len(keys) > _NAMED else keys
+            for name in who:
+                print(f"{name}: {reason}", file=sys.stderr, flush=True)
 
 
 def _tell_deleted(results: Path) -> bool:

@@ -34,8 +34,9 @@ def why(plan: Plan, results: Path) -> str:
         summary = read_json(results / plan.summary, name=plan.key)
     except FileError:
         return "not finished yet"
-    if summary["digest"] == plan.analysis:
-        title = settings.Change("title", settings.shown(summary["title"]), plan.title)
+    if summary.get("digest") == plan.analysis:
+        titles = (settings.shown(title) for title in (summary.get("title"), plan.title))
+        title = settings.Change("title", *titles)
         return "" if title.old == title.new else str(title)
     from vibsim.store.provenance import read_provenance
 
