@@ -269,7 +269,7 @@ def _tables(experiment: Experiment, record: Record) -> tuple[list[Table], list[T
         levels.maxima(record, shown) if model.conservative else None,
         None if data.is_lean(record) else work.table(experiment, record),
     ]  # fmt: skip
-    everyone = members.table(record, position)
+    everyone = members.table(record, choice.position(experiment))
     if everyone is not None and len(everyone.rows) <= MOST_ROWS:
         wanted.append(everyone)
     listed, room = list[Table](), ROOM
