@@ -134,7 +134,8 @@ def _series(record: Record, quantity: str, scheme: int) -> Series:
     row = record.variable(quantity)
     name = f"{quantity}_exact"
     exact: Floats | None = record[name][0] if name in record else None
-    times = record["t"] if record.variable("t").dims == ("t",) else record["t"][0]
+    # members that end at times of their own have these as fractions of them
+    times = record["t"] * (float(record["end"][0]) if "end" in record.coords else 1.0)
     unit = str(row.attrs.get("units", ""))
     return Series(quantity, unit, times, row.values[scheme, 0], exact, _period(record, scheme))
 
