@@ -126,6 +126,7 @@ def test_a_member_with_an_end_of_its_own_has_its_own_times(made: Made, capsys: C
         assert made.vibsim("show", made.file, "--case", case, "--rows", 3) == 0
         shown = capsys.readouterr().out
         assert f" of {end}; see more" in shown
+        assert shown.startswith(f"adhoc/small, level 6, member {case} (time.end = {end}), scheme ")
         times = [float(line.split()[0]) for line in shown.splitlines()[2:5]]
         assert times == pytest.approx([0.0, step, 2 * step], rel=1e-4)
 
