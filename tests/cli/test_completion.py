@@ -72,6 +72,9 @@ def test_the_shells_are_those_with_a_script() -> None:
 def test_words_are_printed_a_line_each(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["completion", "words", "--", "run", "--dr"]) == 0
     assert capsys.readouterr().out == "--dry-run\n"
+    # an empty line would be offered as a word
+    assert main(["completion", "words", "--", "fly", ""]) == 0
+    assert capsys.readouterr().out == ""
     assert main(["completion", "words", "--", ""]) == 0
     assert "show\n" in capsys.readouterr().out
 

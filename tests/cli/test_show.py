@@ -117,6 +117,20 @@ def test_what_there_is_not_is_refused(
     assert told in capsys.readouterr().err
 
 
+def test_a_member_with_an_end_of_its_own_has_its_own_times(made: Made, capsys: Capture) -> None:
+    made.change("checks:", "sweep: {time.end: [10.0, 40.0]}\nchecks:")
+    assert made.vibsim("simulate", made.file, "--level", 6) == 0
+    # of 64 steps every second one, or each, for at most 20 lines in a period of 6.3 s
+    for case, end, step in ((0, 10, 10 / 32), (1, 40, 40 / 64)):
+        capsys.readouterr()
+        assert made.vibsim("show", made.file, "--case", case, "--rows", 3) == 0
+        shown = capsys.readouterr().out
+        assert f" of {end}; see more" in shown
+        assert shown.startswith(f"adhoc/small, level 6, member {case} (time.end = {end}), scheme ")
+        times = [float(line.split()[0]) for line in shown.splitlines()[2:5]]
+        assert times == pytest.approx([0.0, step, 2 * step], rel=1e-4)
+
+
 def test_a_run_in_progress_shows_what_there_is(made: Made, capsys: Capture) -> None:
     for name in ("level_08.nc", "convergence.nc", "summary.json"):
         (made.small / name).unlink()

@@ -10,6 +10,7 @@ import sys
 import pytest
 
 from .conftest import Made
+from .test_outcome_text import check, entry
 
 SLOW = {"matplotlib", "snakemake", "xarray", "scipy", "sympy", "jinja2", "pint"}
 NUMBERS = {"numpy", "pydantic", "netCDF4", "llvmlite", "yaml"}
@@ -49,6 +50,21 @@ def test_a_command_starts_without_libraries_that_take_long(
         command, capture_output=True, text=True, check=True, env={"PATH": "", **_kept()}
     )
     assert not spared & set(json.loads(ended.stderr.splitlines()[-1]))
+
+
+def test_a_run_with_nothing_to_do_prints_its_lines_without_numbers_libraries() -> None:
+    program = (
+        "import json, sys\n"
+        "from vibsim.cli import outcome_text\n"
+        "from vibsim.cli.run import command\n"
+        "print(*outcome_text.in_lines(json.loads(sys.argv[1]), 99))\n"
+        "print(json.dumps(sorted(sys.modules)))"
+    )
+    command = [sys.executable, "-c", program, json.dumps([entry(check())])]
+    ended = subprocess.run(command, capture_output=True, text=True, check=True)
+    line, modules = ended.stdout.splitlines()
+    assert "order 2.002 (2.000 to 2.002)" in line
+    assert not (SLOW | NUMBERS) & set(json.loads(modules))
 
 
 def _kept() -> dict[str, str]:

@@ -14,6 +14,9 @@ import numpy as np
 from vibsim.checks.fields import measured, name_of
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
+
+# quick commands, which import no numpy, write the interval of an order in the same way
+from vibsim.core.vocabulary import order_interval as order_interval
 from vibsim.experiment.cost import load_of
 
 if TYPE_CHECKING:
@@ -82,15 +85,6 @@ def beside(notation: Notation, value: float, limit: float) -> str:
         if (told > limit, told < limit) == (value > limit, value < limit):
             return notation.number(value, digits)
     return notation.number(value, 16)
-
-
-def order_interval(low: float, high: float) -> tuple[str, ...]:
-    """Write the ends of the interval of an order with the decimals that tell them apart, 3 to 6; once if none do."""
-    for decimals in range(3, 7):
-        ends = f"{low:.{decimals}f}", f"{high:.{decimals}f}"
-        if ends[0] != ends[1]:
-            return ends
-    return (f"{low:.3f}",)
 
 
 class Template(string.Formatter):

@@ -43,7 +43,8 @@ WORDS = "words"
 def completion(options: Namespace) -> int:
     """Print the script of a shell, or the words that may stand at the end of a command line."""
     if options.shell == WORDS:
-        print(*candidates(options.words or [""]), sep="\n")
+        for word in candidates(options.words or [""]):
+            print(word)
     else:
         print(SCRIPTS[options.shell], end="")
     return 0

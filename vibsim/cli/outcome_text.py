@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from vibsim.cli.terminal import clean, painted
-from vibsim.core.vocabulary import SEVERITY
+from vibsim.core.vocabulary import SEVERITY, order_interval
 
 Entry = Mapping[str, Any]
 """The summary of an experiment, or one of its checks; or a failed job."""
@@ -95,8 +95,6 @@ def numbers(check: Entry) -> list[str]:
     order, low, high = (facts.get(name) for name in ("order", "order_low", "order_high"))
     if order is None:
         return []
-    from vibsim.checks.sentences import order_interval
-
     head = f"{check['quantity']}: order {order:.3f}"
     ends = order_interval(low, high) if low is not None and high is not None else ()
     between = f" ({' to '.join(ends)})" if len(ends) > 1 else ""

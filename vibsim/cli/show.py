@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from vibsim.cli import outcome_text, settings, terminal
 from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.cli.jobs.common import chosen_results, refusal
+from vibsim.cli.terminal import clean
 from vibsim.core.errors import VibsimError, nearest
 from vibsim.plan import Plan
 from vibsim.store import read_json
@@ -110,7 +111,7 @@ def _draw(record: Record, options: Namespace, title: str) -> None:
     scheme = schemes.index(_chosen("--scheme", options.scheme, schemes))
     series = _series(record, quantity, scheme)
     drawing = draw(series, terminal.columns(), options.rows, options.start)
-    print(f"{title}, scheme {schemes[scheme]}: {legend(series)}")
+    print(f"{title}{_member(record)}, scheme {schemes[scheme]}: {legend(series)}")
     print(*drawing.lines, sep="\n")
     if not drawing.shown:
         print(f"  nothing from t = {options.start:g} on: the last time is {series.t[-1]:g}")
@@ -118,6 +119,16 @@ def _draw(record: Record, options: Namespace, title: str) -> None:
         last = f"{series.t[drawing.shown[-1]]:.5g}"
         print(f"  to t = {last} of {series.t[-1]:.5g}; see more with --from {last} or --rows N")
     print()
+
+
+def _member(record: Record) -> str:
+    """Name the member of a sweep with its swept values; empty without a sweep."""
+    swept = []
+    for name, row in record.coords.items():
+        if "sweep_key" in row.attrs:
+            value = record.words(name)[0] if row.values.dtype.kind in "SU" else f"{row.values[0]:g}"
+            swept.append(clean(f"{row.attrs['sweep_key']} = {value}"))
+    return f", member {record['case'][0]} ({', '.join(swept)})" if swept else ""
 
 
 def _chosen(option: str, wanted: str | None, names: Sequence[str]) -> str:
@@ -134,7 +145,8 @@ def _series(record: Record, quantity: str, scheme: int) -> Series:
     row = record.variable(quantity)
     name = f"{quantity}_exact"
     exact: Floats | None = record[name][0] if name in record else None
-    times = record["t"] if record.variable("t").dims == ("t",) else record["t"][0]
+    # members that end at times of their own have these as fractions of them
+    times = record["t"] * (float(record["end"][0]) if "end" in record.coords else 1.0)
     unit = str(row.attrs.get("units", ""))
     return Series(quantity, unit, times, row.values[scheme, 0], exact, _period(record, scheme))
 

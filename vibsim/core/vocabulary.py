@@ -70,6 +70,15 @@ def decisive_number(facts: Mapping[str, Any]) -> float | None:
     return None if DECISIVE["converges"] in facts else found
 
 
+def order_interval(low: float, high: float) -> tuple[str, ...]:
+    """Write the ends of the interval of an order with the decimals that tell them apart, 3 to 6; once if none do."""
+    for decimals in range(3, 7):
+        ends = f"{low:.{decimals}f}", f"{high:.{decimals}f}"
+        if ends[0] != ends[1]:
+            return ends
+    return (f"{low:.3f}",)
+
+
 FORMAT = 2
 """Version of the file format, ``vibsim_format`` in every file."""
 
