@@ -132,11 +132,16 @@ def test_badges_tell_a_claim_and_a_trap_from_a_check_that_passed():
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("path", sorted(CONFIGS.glob("*/*.yaml")), ids=lambda path: path.stem)
+# a table is a file of its own
+WITHOUT_TABLES = [
+    path for path in sorted(CONFIGS.glob("*/*.yaml")) if ".csv" not in path.read_text("utf-8")
+]
+
+
+@pytest.mark.parametrize("path", WITHOUT_TABLES, ids=lambda path: path.stem)
 def test_the_file_that_a_page_shows_means_the_same_experiment(path):
     exp = Experiment.from_yaml(path)
-    if exp.model.tables:
-        pytest.skip("a table is a file of its own")
+    assert not exp.model.tables
     content = yaml.safe_load(experiment_file.text(exp))
     again = Experiment.from_dict(content, name=exp.name, collection=exp.collection)
     told, ours = canonical(again), canonical(exp)
