@@ -27,6 +27,7 @@ FEW = 300  # of more members a histogram of the orders says more than dots
 FEWEST = 2  # errors that a picture over the step needs
 MOST_SCHEMES = 6  # schemes that the right picture can tell apart
 VARIES = 1e-6  # relative spread below which a number is the same for all members
+LONG = 24  # letters of a label above which it is set smaller
 COINCIDE = 0.05  # curves that differ by less are said to coincide
 
 
@@ -74,7 +75,8 @@ def differences(record: Record, lead: Lead) -> Picture | None:
         ax.set_ylim(*style.limits(*(part / 10.0**exponent for part in values)))
     ax.set_xlim(float(t[0]), float(t[-1]) if t[-1] > t[0] else 1.0)
     ax.set_xlabel(data.time_label(record))
-    ax.legend(loc="best", fontsize=8, handlelength=1.6, borderaxespad=0.2)
+    size = 8.0 if max(len(curve.label) for curve in shown) < LONG else 6.0
+    ax.legend(loc="best", fontsize=size, handlelength=1.6, borderaxespad=0.2)
     return Picture(
         "hero_differences",
         _title_of_differences(record, lead, len(shown)),
@@ -162,11 +164,13 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
     )
 
 
-def solution(record: Record, quantity: str, member: Member) -> Picture:
+def solution(record: Record, quantity: str, member: Member, *, is_left: bool) -> Picture:
     """Draw a quantity at the finest level, and the exact solution."""
     t, values = data.times(record, member.case), data.at(record, f"{quantity}_finest", member)
     letter, exact = words.symbol(quantity), data.exact_series(record, quantity, member)
-    ax = _panel(RIGHT, style.label(letter, data.unit(record, f"{quantity}_finest")))
+    ax = _panel(
+        LEFT if is_left else RIGHT, style.label(letter, data.unit(record, f"{quantity}_finest"))
+    )
     if np.isfinite(exact).any():
         ax.plot(*style.thin(t, exact, 200), color="#b8b8b8", linewidth=4.5, label="exact")
     steps = words.number(int(record["steps"][-1]), "integer")
@@ -320,7 +324,8 @@ def _curves(
     _across(ax, along.key)
     _scaled(ax, "y", values)
     _ring(ax, float(along.key.values[lead.member.case]), float(values[lead.member.case]))
-    ax.legend(loc="best", fontsize=8, handlelength=1.8)
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(loc="best", fontsize=8, handlelength=1.8)
     return ax
 
 

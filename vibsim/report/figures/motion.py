@@ -71,8 +71,8 @@ def _draw(
     whole = [values for values in series.values() if np.isfinite(values).all()]
     whole = whole or list(series.values())
     size = data.largest(best)
-    if 0.0 < size < max(map(data.largest, whole)) / BEYOND:
-        near = [v for v in whole if data.largest(v) <= BEYOND * size]
+    near = [values for values in whole if data.largest(values) <= BEYOND * size]
+    if near and len(near) < len(whole):
         ax.set_ylim(*style.limits(best, *near, np.array([-size, size])))
         panels.note(ax, "coarse levels leave the frame", 0.03)
     elif panels.explosive(whole):
