@@ -26,7 +26,6 @@ LEFT, RIGHT, WHOLE, HEIGHT = 5.4, 3.9, 9.6, 2.75
 FEW = 300  # of more members a histogram of the orders says more than dots
 FEWEST = 2  # errors that a picture over the step needs
 MOST_SCHEMES = 6  # schemes that the right picture can tell apart
-VARIES = 1e-6  # relative spread below which a number is the same for all members
 LONG = 24  # letters of a label above which it is set smaller
 COINCIDE = 0.05  # curves that differ by less are said to coincide
 
@@ -79,7 +78,7 @@ def differences(record: Record, lead: Lead) -> Picture | None:
     ax.legend(loc="best", fontsize=size, handlelength=1.6, borderaxespad=0.2)
     return Picture(
         "hero_differences",
-        _title_of_differences(record, lead, len(shown)),
+        _title_of_differences(record, lead, len(shown)) + data.of_several(record, member.scheme),
         "The difference between each level and the next finer one, multiplied so that the curves fall on one another "
         "where the error has the promised order.",
         f"Rescaled differences of {words.name(quantity)} between successive levels against time, {member.title}",
@@ -270,19 +269,14 @@ def _number(experiment: Experiment, record: Record, lead: Lead) -> tuple[str, st
     for name in [*(name for name in asked if name in usual), *usual]:
         if name in record:
             values = finest_level.measured(record, name, position).value[scheme]
-            if _varies(values):
+            if finest_level.varies(values):
                 return name, style.label(name, data.unit(record, name)), values
     quantity = lead.quantity
     error = finest_level.error(record, quantity).best[scheme]
-    if not _varies(error):
+    if not finest_level.varies(error):
         return None
     label = style.label(f"error of {words.symbol(quantity)}", data.norm_unit(record, quantity))
     return f"error of {words.symbol(quantity)}", label, error
-
-
-def _varies(values: Floats) -> bool:
-    known = style.finite(values)
-    return known.size > 1 and bool(np.ptp(known) > VARIES * np.abs(known).max())
 
 
 def _scaled(ax: Axes, which: str, values: Floats) -> None:
