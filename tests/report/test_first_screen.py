@@ -9,6 +9,7 @@ import pytest
 import samples
 import yaml
 
+from vibsim import report
 from vibsim.core.vocabulary import REASONS
 from vibsim.experiment import Experiment
 from vibsim.experiment.experiment import canonical
@@ -18,6 +19,7 @@ from vibsim.report.page import cards, hero
 from vibsim.report.text import changes, equation, experiment_file, findings, glossary
 
 CONFIGS = Path(__file__).parents[2] / "configs"
+WRONG_AS_TRAP = [{"kind": "central", "label": "wrong", "start": "first_order"}]
 WRONG = [{"kind": "central", "start": "first_order"}]
 
 
@@ -49,7 +51,10 @@ def test_every_reason_and_every_kind_of_check_has_a_title():
         ({"schemes": ["central", "rk4"]},
          "The angle θ converges at the order that each of 2 schemes promises"),
         ({"checks": [{"value": "period", "below": 1.0}]}, "Period is not as expected"),
-        ({"checks": [{"claim": "so", "that": {"value": "period", "above": 1.0}}]}, "1 statement confirmed"),
+        ({"checks": [{"claim": "so", "that": {"value": "period", "above": 1.0}}]}, "So"),
+        ({"checks": [{"claim": "so", "that": {"value": "period", "above": 1.0}, "holds": False}]},
+         "Not confirmed: So"),
+        ({"checks": [{"claim": "so", "that": {"value": "period", "below": 1.0}, "holds": False}]}, "Refuted: So"),
         ({"schemes": [*WRONG, {"kind": "central", "label": "sound"}],
           "checks": [{"converges": "theta", "order": 2, "schemes": ["sound"]},
                      {"converges": "theta", "order": 2, "schemes": ["central"], "expect": {"status": "FAIL"}}]},
@@ -155,3 +160,29 @@ def test_a_term_is_explained_once_and_text_stays_text():
     made = str(glossary.explained("Round-off <b> and round-off"))
     assert made.count("<abbr") == 1
     assert "&lt;b&gt; and round-off" in made
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {
+            "schemes": ["central", "rk4", "velocity_verlet", *WRONG_AS_TRAP],
+            "levels": [6, 7, 8, 9, 10],
+        },
+        {
+            "sweep": {
+                "initial.theta": {"linspace": [0.1, 3.1, 20]},
+                "model.g": {"linspace": [1.0, 9.0, 20]},
+            }
+        },
+    ],
+    ids=["schemes", "sweep"],
+)
+def test_a_page_stays_short(options, tmp_path):
+    exp = samples.experiment(**options)
+    record, summary, _ = found(exp)
+    report.write(samples.plan(exp), record, summary, tmp_path)
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert len(page.encode()) <= 1_500_000
+    body = re.sub(r"<(style|script).*?</\1>", "", page, flags=re.DOTALL)
+    assert len(re.sub(r"<[^>]*>", " ", body).split()) <= 3000

@@ -77,3 +77,33 @@ def test_the_worst_members_are_listed_with_their_command(tmp_path):
     for result in check["results"]:
         assert f".venv/bin/vibsim run pendulum_lab/theta@{result['case']} " in text
     assert "all with model.g of 300 or more." in text
+
+
+@pytest.mark.usefixtures("unrendered")
+def test_a_sweep_that_no_check_asks_for_an_order_has_a_page(tmp_path):
+    check = {"value": "amplitude", "at": {"level": 10, "case": 0}, "above": 0.0}
+    exp = samples.experiment(
+        sweep={"initial.theta": {"linspace": [0.1, 3.1, 12]}}, checks=[check], levels=[8, 9, 10]
+    )
+    whole = samples.record(exp)
+    verdicts = (
+        "order",
+        "order_low",
+        "order_high",
+        "status",
+        "reason",
+        "window_first",
+        "window_last",
+    )
+    kept = {
+        name: v
+        for name, v in lean(whole, times=False).variables.items()
+        if not any(name.endswith(f"_{of}") for of in verdicts) or name.startswith(("check_", "scalar_"))
+        or name.endswith(("formal_order", "observed_order"))
+    }  # fmt: skip
+    assert "theta_order" not in kept
+    record = Record(lean(whole, times=False).coords, kept, {**whole.attrs, "storage": "lean"})
+    report.write(SimpleNamespace(experiment=exp), record, samples.summary(exp, whole), tmp_path)
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Period of 12 members" in text or "Amplitude of 12 members" in text
+    assert len((tmp_path / "tables/members.csv").read_text().splitlines()) == 13

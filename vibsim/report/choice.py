@@ -65,8 +65,9 @@ def members(record: Record, quantity: str) -> list[Member]:
     promised one (of several schemes the worst decides), and a typical one of those that pass, if any does.
     """
     schemes = record.words("scheme")
-    if not swept(record):
-        return [Member(s, 0, name) for s, name in enumerate(schemes)]
+    if not swept(record) or f"{quantity}_status" not in record:
+        # a large sweep has verdicts on what checks ask about only
+        return [Member(s, 0, name, case_name(record, 0)) for s, name in enumerate(schemes)]
     status = flags(record, f"{quantity}_status")
     severity = np.max([(status == word) * rank for word, rank in SEVERITY.items()], axis=(0, 1))
     away = np.abs(deviation(record, quantity))

@@ -80,7 +80,8 @@ def norms(record: Record, quantity: str, member: Member) -> Floats:
 def orders(record: Record, quantity: str) -> tuple[Floats, Floats, Floats]:
     """Return the stated order of every scheme and member and the ends of its interval, shape (scheme, case)."""
     order, low, high = (
-        np.asarray(data.pick(record, f"{quantity}_order{end}", norm=norm_index(record)), np.float64)
+        # a large sweep has orders of what checks ask about only
+        known(record, f"{quantity}_order{end}", MEMBER, norm=norm_index(record))
         for end in ("", "_low", "_high")
     )
     return order, low, high

@@ -79,30 +79,38 @@ def pictures(
         typical = [member for member in series if member.role == "typical"]
         moving += [motion.motion(record, position, member) for member in typical[:1]]
         moving += [plane.path(experiment, record, series)]
-    tabs: list[Tab] = []
     own = [member for member in series if member.role != "typical"]
     own.sort(
         key=lambda member: (member.scheme, member.case) != (lead.member.scheme, lead.member.case)
     )
-    for quantity in sorted(found, key=lambda one: one != lead.quantity):
-        letter, is_lead, drawn = words.symbol(quantity), quantity == lead.quantity, Drawn()
+
+    def of(quantity: str) -> list[Tab]:
+        letter, is_lead, drawn, tabs = (
+            words.symbol(quantity),
+            quantity == lead.quantity,
+            Drawn(),
+            list[Tab](),
+        )
         is_energy = quantity == "energy_deviation" and "energy_deviation_scaled" in record
         if has_pairs:
             # of a sweep the map has the rest
             drawn += [order.against_step(experiment, record, quantity, c) for c in cases[:1]]
-        for member in own if is_lead else own[:1]:
+        several = is_lead and len(own) > 1
+        for member in own[:FEW_SCHEMES] if is_lead else own[:1]:
             each: Drawn = [time.energy(record, member)] if is_energy else []
             if has_pairs and (not is_energy or quantity in asked(experiment)):
                 each.append(time.overlay(record, quantity, member))
-            if is_lead and len(own) > 1:
+            if several:
                 tabs += tab(f"{letter}, {member.scheme_name}", each)
             else:
                 drawn += each
-        tabs += tab(letter if not is_lead or len(own) < 2 else f"{letter}, order", drawn)
+        return [*tab(f"{letter}, order" if several else letter, drawn), *tabs]
+
+    tabs = [one for quantity in found if quantity == lead.quantity for one in of(quantity)]
     if has_pairs:
         tabs += tab("estimated error", [solution.solution(record, position, m) for m in own[:1]])
     if series:
-        tabs += tab("energy", [energy.running(record, case) for case in cases])
+        tabs += tab("energy", [energy.running(record, case) for case in cases[:1]])
         beside: Drawn = [extrema.local(experiment, record, series)]
         if not data.swept(record) and experiment.model.definition.coordinates == 1:
             beside.append(plane.phase(experiment, record, series))
@@ -111,7 +119,8 @@ def pictures(
     theories += [theory.growing(experiment, record)] if has_series else []
     tabs += tab("theory", theories)
     if series:
-        tabs += tab("work", [work.precision(experiment, record, case) for case in cases])
+        tabs += tab("work", [work.precision(experiment, record, case) for case in cases[:1]])
+    tabs += [one for quantity in found if quantity != lead.quantity for one in of(quantity)]
     shown_below = (picture for picture in moving if picture and picture.name not in first)
     return Gallery(tuple(shown_below), tuple(tabs), tuple(over_members(experiment, record, found)))
 
@@ -153,10 +162,11 @@ def over_members(experiment: Experiment, record: Record, found: list[str]) -> li
 
 def choose(experiment: Experiment, record: Record) -> tuple[list[Member], str]:
     """Return what gets figures of its own, and a sentence saying what was left out."""
-    quantity = choice.quantities(experiment, record)[0]
+    quantity = choice.position(experiment)
     everyone = choice.with_levels(experiment, choice.members(record, quantity))
-    status = data.flags(record, f"{quantity}_status")
-    severity = [SEVERITY[status[m.scheme, m.case]] for m in everyone]
+    name = f"{quantity}_status"
+    status = data.flags(record, name) if name in record else None
+    severity = [0 if status is None else SEVERITY[status[m.scheme, m.case]] for m in everyone]
     room = MOST_SHOWN if len(record["scheme"]) <= MOST_SHOWN else MOST_SHOWN // 2
     ranked = sorted(range(len(everyone)), key=lambda i: (-severity[i], i))[:room]
     shown = [everyone[i] for i in sorted(ranked)]

@@ -27,6 +27,7 @@ FEW = 300  # of more members a histogram of the orders says more than dots
 FEWEST = 2  # errors that a picture over the step needs
 MOST_SCHEMES = 6  # schemes that the right picture can tell apart
 VARIES = 1e-6  # relative spread below which a number is the same for all members
+LONG = 24  # letters of a label above which it is set smaller
 COINCIDE = 0.05  # curves that differ by less are said to coincide
 
 
@@ -61,20 +62,22 @@ def differences(record: Record, lead: Lead) -> Picture | None:
     exponent = 0 if wild else style.scale(*values)
     letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_difference")
     ax = _panel(LEFT, style.label(f"rescaled differences of {letter}", measure, exponent))
+    ax.set_gid(style.TIME)
     for i, curve in enumerate(shown):
         y = style.no_zeros(curve.values) if wild else curve.values / 10.0**exponent
         look: dict[str, Any] = {
             "color": style.COLOURS[i % style.MANY],
             "linewidth": 5.5 - 4.2 * i / max(1, len(shown) - 1),
         }
-        ax.plot(*style.thin(t, y, 200), label=curve.label, **look)
+        ax.plot(*style.thin(t, y, 200), label=curve.label, gid=curve.group, **look)
     if wild:
         style.log_axis(ax, "y", *panels.decades(values))
     else:
         ax.set_ylim(*style.limits(*(part / 10.0**exponent for part in values)))
     ax.set_xlim(float(t[0]), float(t[-1]) if t[-1] > t[0] else 1.0)
     ax.set_xlabel(data.time_label(record))
-    ax.legend(loc="best", fontsize=8, handlelength=1.6, borderaxespad=0.2)
+    size = 8.0 if max(len(curve.label) for curve in shown) < LONG else 6.0
+    ax.legend(loc="best", fontsize=size, handlelength=1.6, borderaxespad=0.2)
     return Picture(
         "hero_differences",
         _title_of_differences(record, lead, len(shown)),
@@ -107,6 +110,7 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
     others = [s for s in range(len(names)) if s != lead.member.scheme][: MOST_SCHEMES - 1]
     dt, scale = data.steps_of(record, case), root_of_duration(record, case)
     ax = _panel(RIGHT, style.label(f"root-mean-square error of {letter}", measure))
+    ax.set_gid(style.STEP)
     drawn: list[Floats] = []
     for s in [*others, lead.member.scheme]:
         member = Member(s, case, names[s])
@@ -118,12 +122,13 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
         mark: dict[str, Any] = {"color": colour, "linestyle": "none", "marker": "o"}
         alone = len(names) == 1
         text = "estimated" if alone else style.entry(names[s])
+        mark["gid"] = None if alone else text
         if style.finite(estimate).size:
             ax.plot(dt, estimate, **mark, markersize=5 if is_lead else 3.5, label=text)
             drawn.append(estimate)
         if style.finite(true).size:
             ring = mark | {"markerfacecolor": "none", "markersize": 9 if is_lead else 6.5}
-            ax.plot(dt, true, **ring, label="true" if alone else "")
+            ax.plot(dt, true, **ring, label="true" if alone else f"_true, {names[s]}")
             drawn.append(true)
         has_order = math.isfinite(
             data.stated_order(record, quantity, member, data.norm_index(record))[0]
@@ -162,11 +167,14 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
     )
 
 
-def solution(record: Record, quantity: str, member: Member) -> Picture:
+def solution(record: Record, quantity: str, member: Member, *, is_left: bool) -> Picture:
     """Draw a quantity at the finest level, and the exact solution."""
     t, values = data.times(record, member.case), data.at(record, f"{quantity}_finest", member)
     letter, exact = words.symbol(quantity), data.exact_series(record, quantity, member)
-    ax = _panel(RIGHT, style.label(letter, data.unit(record, f"{quantity}_finest")))
+    ax = _panel(
+        LEFT if is_left else RIGHT, style.label(letter, data.unit(record, f"{quantity}_finest"))
+    )
+    ax.set_gid(style.TIME)
     if np.isfinite(exact).any():
         ax.plot(*style.thin(t, exact, 200), color="#b8b8b8", linewidth=4.5, label="exact")
     steps = words.number(int(record["steps"][-1]), "integer")
@@ -320,7 +328,8 @@ def _curves(
     _across(ax, along.key)
     _scaled(ax, "y", values)
     _ring(ax, float(along.key.values[lead.member.case]), float(values[lead.member.case]))
-    ax.legend(loc="best", fontsize=8, handlelength=1.8)
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(loc="best", fontsize=8, handlelength=1.8)
     return ax
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from typing import Any
 
 from vibsim.checks.outcome import Result
@@ -20,7 +19,6 @@ from vibsim.report.tables import published
 from vibsim.report.text import assertions, changes, reasons, words
 from vibsim.report.types import Check, Experiment, Measurement
 
-BRIEF = 5  # results of a check that passed which the page lists; the table of checks has all
 BADGES = {"PASS": "passed", "INCONCLUSIVE": "undecided", "FAIL": "failed"}
 SAID_BY_THE_LINE = ("value", "equal", "converges")
 """Kinds of checks of which the line says all where they pass."""
@@ -70,7 +68,9 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
     facts = (decisive[key] for key in ("scheme", "case", "status", "reason", "facts"))
     result = Result(*facts)
     decides = worst(word for word, count in counts.items() if count)
-    told = "" if _is_said(asserted, check) else wording.text(result, counts, check["where"])
+    told = wording.text(result, counts, check["where"])
+    if _is_said(asserted, check):
+        told = _hardest(record, check)
     results, more = _results(record, check, unit)
     return {
         "id": check["id"],
@@ -98,13 +98,23 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
 
 
 def _is_said(asserted: Check | None, check: Mapping[str, Any]) -> bool:
-    """Say whether the line of a check tells all: one result, as asked for, and no doubt about it."""
-    if check["status"] != "PASS" or asserted is None or sum(check["counts"].values()) > 1:
+    """Say whether the line of a check tells all of what was measured: it is as asked for, without a doubt."""
+    if check["status"] != "PASS" or asserted is None:
         return False
     order, low = (words.fact(check["results"][0], f"order{end}") for end in ("", "_low"))
     is_doubtful = order is not None and low is not None and order - low > WIDE
     is_plain = asserted.measured.kind in SAID_BY_THE_LINE and not is_trap(asserted)
     return is_plain and not is_doubtful
+
+
+def _hardest(record: Record, check: Mapping[str, Any]) -> str:
+    """Name the result that decides, of several."""
+    total, result = sum(check["counts"].values()), check["results"][0]
+    if total < 2:
+        return ""
+    named = check_tables.member(record, result["case"])
+    place = f"{result['scheme']}{f', {named}' if named else ''}"
+    return f"The hardest of {words.number(total, 'integer')}: {place}."
 
 
 def _wanted(experiment: Experiment, asserted: Check | None, check: Mapping[str, Any]) -> str:
@@ -134,10 +144,9 @@ def _results(record: Record, check: Mapping[str, Any], unit: str) -> tuple[Any, 
     """Return the table of the results, and a sentence that says how many it leaves out; of one result neither."""
     table, counts = check_tables.results(record, check, unit), check["counts"]
     total = sum(counts.values())
-    if table is None or total < 2:
+    # where all passed, the table of checks has the hardest
+    if table is None or total < 2 or check["status"] == "PASS":
         return None, ""
-    if check["status"] == "PASS":
-        table = replace(table, rows=table.rows[:BRIEF])
     told = ", ".join(f"{n} {word}" for word, n in counts.items() if n)
     listed = len(table.rows)
     return table, f"In all: {told}. Listed are the {listed} worst." if total > listed else ""

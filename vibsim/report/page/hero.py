@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from vibsim.checks.value import unit_of
+from vibsim.checks.verdict_text import expectation
 from vibsim.comparison.best_values import WORDS, scalars
 from vibsim.core.record import Record
 from vibsim.core.vocabulary import decisive_number
@@ -101,17 +102,18 @@ def _measured(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Nu
         return
     check = lead.measured
     kind = check.kind if check else "tolerance"
-    unit, label, form = "", MEASURED.get(kind, ""), "brief"
+    unit, label, form = "", MEASURED.get(kind, ""), "brief"  # a size has two digits
     if check is not None and check.kind == "value":
         from vibsim.report.text import assertions
 
-        unit, form = data.pretty_unit(unit_of(experiment, record, check)), "close"
+        unit, form = data.pretty_unit(unit_of(experiment, record, check)), "step"
         subject = assertions.subject(check)
         label = words.PAGE.opening(subject)
     if kind in ("equal", "accurate"):
         unit = data.norm_unit(record, lead.quantity, "l2" if kind == "accurate" else "linf")
     allowed = (lead.result.get("facts") or {}).get("allowed")
-    note = f"asked for: {words.labelled(lead.entry['expected'], None)}"
+    wanted = expectation(experiment, check, words.PAGE)
+    note = f"asked for: {words.labelled(wanted, None)}"
     if allowed is not None:
         note = f"{words.number(allowed, 'brief')} is allowed"
     value = f"{words.number(number, form)} {unit}".rstrip()
@@ -234,7 +236,8 @@ def pictures(experiment: Experiment, record: Record, lead: Lead) -> list[Picture
         return found
     if not found:
         return [motion.motion(record, choice.position(experiment), lead.member)]
-    return [*found, drawn.solution(record, choice.position(experiment), lead.member)]
+    moving = drawn.solution(record, choice.position(experiment), lead.member, is_left=left is None)
+    return [moving, *found] if left is None else [*found, moving]
 
 
 def _evidence(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:

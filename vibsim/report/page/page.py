@@ -33,6 +33,8 @@ TEMPLATES = Path(__file__).parents[1] / "templates"
 NOTHING: Mapping[str, Any] = {}
 MOST_ROWS = 8  # of a table that the page itself holds; the CSV file holds all
 ROOM = 220  # cells of all tables of numbers together; a table beyond is a file only
+BYTES = 1_000_000  # of all figures behind tabs; figures beyond are files only
+FIGURES = 8  # most figures behind the tabs of a section
 LONG_HEADING = 90  # letters of a caption of which a heading has the first words only
 PYTHON = """\
 from vibsim import Experiment, analyse, simulate, verdicts
@@ -86,8 +88,8 @@ def write(
         below = gallery.pictures(experiment, convergence, shown, decisive, names)
         drawings = {"hero": first, "motion": [drawn.add(picture) for picture in below.motion]}
         tabs = {
-            "belief": [drawn.tab(tab) for tab in below.belief],
-            "members": [drawn.tab(tab) for tab in below.members],
+            "belief": drawn.tabs(below.belief, FIGURES),
+            "members": drawn.tabs(below.members, FIGURES),
         }
         small = drawing.svg(_stamp(position, convergence, shown[0]), "thumbnail")
     replace_files(directory / "figures", {**drawn.files, "thumbnail.svg": small.encode()})
@@ -133,10 +135,12 @@ def write(
             "printed": printed,
             "printed_sentence": published.sentence(printed),
             "shown": left_out,
+            "more_figures": ", ".join(drawn.left_out),
             "digits": members.digits(convergence),
             "equation": equation.mathml(experiment.model.definition.equation),
             "setup": list(setting.setup(experiment, convergence)),
             "experiment_file": experiment_file.text(experiment),
+            "experiment_shown": experiment_file.shown(experiment),
             "provenance": list(cards.provenance_rows(provenance)),
             "target": quote(experiment.word),
             "python": _python(experiment),
@@ -151,6 +155,9 @@ class _Drawn:
     def __init__(self, formats: Sequence[str]) -> None:
         self.formats = [form for form in formats if form != "svg"]
         self.files: dict[str, bytes] = {}
+        self.room = BYTES
+        self.left_out: list[str] = []
+        """Labels of tabs that are files only."""
 
     def add(self, picture: Picture) -> tuple[Picture, str]:
         """Return a picture with its markup, and keep its files."""
@@ -161,9 +168,20 @@ class _Drawn:
             self.files[f"{picture.name}.{form}"] = drawing.binary(picture.figure, form)
         return picture, markup(drawing.inline(text, picture.alt))
 
-    def tab(self, tab: gallery.Tab) -> tuple[str, list[tuple[Picture, str]]]:
-        """Return the label of a tab with its pictures."""
-        return tab.label, [self.add(picture) for picture in tab.pictures]
+    def tabs(
+        self, tabs: Sequence[gallery.Tab], most: int
+    ) -> list[tuple[str, list[tuple[Picture, str]]]]:
+        """Return the labels of tabs with their pictures, as long as the page has room; the others are files only."""
+        found = []
+        for tab in tabs:
+            added = [self.add(picture) for picture in tab.pictures]
+            most -= len(added)
+            self.room -= sum(len(text) for _, text in added)
+            if most >= 0 and self.room >= 0:
+                found.append((tab.label, added))
+            else:
+                self.left_out.append(tab.label)
+        return found
 
 
 def _captions(drawn: Iterable[tuple[Picture, str]]) -> list[tuple[str, str]]:
@@ -258,7 +276,8 @@ def _stamp(quantity: str, record: Record, member: Member) -> Figure:
 def _tables(experiment: Experiment, record: Record) -> tuple[list[Table], list[Table]]:
     """Return the tables that the page shows, as far as it has room for them, and those that are files only."""
     found, model = choice.quantities(experiment, record), experiment.model.definition
-    shown = choice.with_levels(experiment, choice.members(record, found[0]))
+    position = choice.position(experiment)
+    shown = choice.with_levels(experiment, choice.members(record, position))
     norms = [name for name in record.words("norm") if name != TYPICAL_NORM]
     orders = [levels.orders(record, quantity, shown) for quantity in found]
     wanted = [
@@ -269,6 +288,9 @@ def _tables(experiment: Experiment, record: Record) -> tuple[list[Table], list[T
         levels.maxima(record, shown) if model.conservative else None,
         None if data.is_lean(record) else work.table(experiment, record),
     ]  # fmt: skip
+    everyone = members.table(record, position)
+    if everyone is not None and len(everyone.rows) <= MOST_ROWS:
+        wanted.append(everyone)
     listed, room = list[Table](), ROOM
     others = [levels.orders(record, quantity, shown, norm) for quantity in found for norm in norms]
     for table in wanted:

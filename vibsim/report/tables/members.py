@@ -41,7 +41,11 @@ def fields(record: Record, quantity: str) -> list[Field]:
     found: list[Field] = [
         (Column("case", form="integer"), np.asarray(record["case"])),
         *((Column(*swept_label(record, name), "step"), record[name]) for name in swept(record)),
-        *((Column(name), flags(record, f"{quantity}_{name}")) for name in ("status", "reason")),
+        *(
+            (Column(name), flags(record, f"{quantity}_{name}"))
+            for name in ("status", "reason")
+            if f"{quantity}_{name}" in record
+        ),
         *((Column(name, form="order"), values) for name, values in orders),
         (Column(f"true error, level {level}", measure, "norm"), error.true),
         (Column(f"estimated error, level {level}", measure, "norm"), error.estimate),

@@ -10,6 +10,7 @@ from typing import Any
 from vibsim.report.types import Check, Experiment, SchemeSpec
 
 WIDTH = 100  # characters of a line
+LONG = 160  # words of a file above which a page leaves its checks out
 DEFAULTS: Mapping[str, Any] = {
     "tolerance": 0.1, "norm": "l2", "expect": {"status": "PASS", "reason": None}, "holds": True,
 }  # fmt: skip
@@ -18,8 +19,23 @@ _PLAIN = re.compile(r"[A-Za-z][\w .,()/%^+*=-]*(?<! )")
 _WORDS = re.compile(r"(?i)true|false|yes|no|on|off|null|y|n|\d.*|[-+.].*")
 
 
+def shown(experiment: Experiment) -> str:
+    """Return what a page shows of the file: all of it, or where it is long all but the checks, which the page lists."""
+    whole = text(experiment)
+    if len(whole.split()) <= LONG:
+        return whole
+    rest = "\n".join(_head(experiment))
+    return f"{rest}\n# checks: {len(experiment.checks)}, which the page lists"
+
+
 def text(experiment: Experiment) -> str:
     """Return the experiment as YAML; numbers that a file gave in other units stand in those of the run."""
+    checks = _listed("checks", [_check(check) for check in experiment.checks])
+    return "\n".join([*_head(experiment), *checks])
+
+
+def _head(experiment: Experiment) -> list[str]:
+    """Return the lines of all sections but the checks."""
     lines = [f"title: {_value(experiment.title)}"]
     lines += [f"source: {_value(experiment.source)}"] if experiment.source else []
     model, scaling = experiment.model, experiment.scaling
@@ -57,7 +73,7 @@ def text(experiment: Experiment) -> str:
         lines.append("# and the printed numbers, which the page lists")
     if experiment.tolerance is not None:
         lines.append(f"tolerance: {_value(experiment.tolerance)}")
-    return "\n".join([*lines, *_listed("checks", [_check(check) for check in experiment.checks])])
+    return lines
 
 
 def _put(section: dict[str, Any], keys: Sequence[str], value: Any) -> None:

@@ -66,7 +66,14 @@ OPEN = {
 """Kind of a check that stayed open to the title of a page about it."""
 NO_CHECK = "The motion was computed, and nothing was asked of it"
 BROKE_DOWN = "The run breaks down before its end"
-CONFIRMED = "{count} confirmed"
+CLAIMS = {
+    "PASS": "",
+    "PASS, false": "Refuted: ",
+    "FAIL": "Not confirmed: ",
+    "INCONCLUSIVE": "Undecided: ",
+}
+"""Status of a statement, and whether it is expected to be false, to what stands before it in a title."""
+LONG_CLAIM = 110  # letters of a statement above which it is no title
 NOTHING_ASKED = (
     "Without a check there is no verdict. Add `checks:` to the experiment, such as `- {{converges: {position}}}`, and "
     "three levels at least."
@@ -83,12 +90,15 @@ def title(experiment: Experiment, record: Record, lead: Lead, printed: Collectio
     """Return the finding of an experiment in one line; `printed` names the checks of printed numbers."""
     if lead.entry is None:
         return NO_CHECK
-    entry, told = lead.entry, _by_check(experiment, record, lead)
+    entry, told = lead.entry, _of_claim(lead) or _by_check(experiment, record, lead)
     if entry["status"] != "PASS":
         return f"{told}{_of_some(record, entry)}"
     if entry["id"] in printed:
         return f"All {len(printed)} printed numbers are as expected"
-    return f"{told}{_caught(experiment, lead)}" if not _is_claim(lead) else _of_claims(experiment)
+    numbers = sum(check.kind == "value" for check in experiment.checks)
+    if numbers > 1 and lead.asserted is not None and lead.asserted.kind == "value":
+        told = f"All {numbers} numbers are as expected"
+    return f"{told}{_caught(experiment, lead)}"
 
 
 def _of_some(record: Record, entry: Mapping[str, Any]) -> str:
@@ -103,23 +113,16 @@ def _of_some(record: Record, entry: Mapping[str, Any]) -> str:
     return f", in {few} of {all_of} {noun}"
 
 
-def _is_claim(lead: Lead) -> bool:
-    return lead.asserted is not None and lead.asserted.kind == "claim"
-
-
-def _of_claims(experiment: Experiment) -> str:
-    """Return the title of an experiment that is about statements, all of which came out as expected."""
-    claims = [check for check in experiment.checks if check.kind == "claim"]
-    true = sum(claim.holds for claim in claims)
-    false = len(claims) - true
-    parts = [f"{true} {_plural('statement', true)} confirmed"] if true else []
-    parts += [f"{false} refuted as expected"] if parts and false else []
-    parts += [f"{false} {_plural('statement', false)} refuted, as expected"] if not parts else []
-    return ", ".join(parts)
-
-
-def _plural(word: str, count: int) -> str:
-    return word if count == 1 else f"{word}s"
+def _of_claim(lead: Lead) -> str:
+    """Return the title of a page about a statement: the statement, and whether it is so; empty for a long one."""
+    assert lead.entry is not None
+    check = lead.asserted
+    if check is None or check.kind != "claim" or len(check.claim) > LONG_CLAIM:
+        return ""
+    claim = check.claim[:1].upper() + check.claim[1:]
+    status = lead.entry["status"]
+    word = CLAIMS["PASS, false" if status == "PASS" and not check.holds else status]
+    return f"{word}{claim}"
 
 
 def _caught(experiment: Experiment, lead: Lead) -> str:
@@ -197,7 +200,10 @@ def _named(experiment: Experiment, quantity: str) -> str:
     told, model = words.name(quantity), experiment.model.definition
     long = {state.name: state.long_name for state in model.states}
     long |= {output.name: output.long_name for output in model.outputs}
-    return f"the {long[quantity]} {quantity}" if told == quantity and quantity in long else told
+    if told != quantity or quantity not in long:
+        return told
+    # a name of several words is no letter
+    return f"the {long[quantity]}" if "_" in quantity else f"the {long[quantity]} {quantity}"
 
 
 def _everywhere(record: Record, lead: Lead) -> str:
