@@ -10,7 +10,7 @@ import pytest
 import samples
 from matplotlib.text import Text
 
-from vibsim.report import frame, style, sweep_layout
+from vibsim.report import frame, lead, style, sweep_layout
 from vibsim.report.data import Member
 from vibsim.report.figures import (
     drawing,
@@ -24,6 +24,7 @@ from vibsim.report.figures import (
     work,
 )
 from vibsim.report.figures.panels import Curve
+from vibsim.report.page import hero
 from vibsim.report.tables.work import lines
 
 TEXT = ["forward_euler", "backward_euler", "crank_nicolson", "euler_cromer", "central"]
@@ -127,8 +128,11 @@ def test_no_word_leaves_a_figure(case):
     exp = spring(**CASES[case])
     record = samples.record(exp)
     shown, _ = gallery.choose(exp, record)
+    decisive = lead.find(exp, record, samples.summary(exp, record))
     with style.applied():
-        for picture in gallery.pictures(exp, record, shown):
+        below = gallery.pictures(exp, record, shown, decisive, [])
+        tabs = [picture for tab in (*below.belief, *below.members) for picture in tab.pictures]
+        for picture in (*hero.pictures(exp, record, decisive), *below.motion, *tabs):
             FigureCanvasAgg(picture.figure)
             assert not drawn_outside(picture.figure), picture.name
 
