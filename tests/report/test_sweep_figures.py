@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vibsim import report
+from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import REASONS
 from vibsim.models import MODELS
 from vibsim.report import finest_level, style, sweep_layout
@@ -406,3 +407,19 @@ def test_an_order_of_a_part_is_promised_where_theory_has_one(model, order, word)
     for picture in (swept, figures_order.against_step(exp, record, part, 0)):
         assert word in picture.caption
         assert other not in picture.caption
+
+
+def test_what_is_the_same_for_all_members_is_not_drawn():
+    sweep = {"model.g": {"linspace": [1.0, 9.0, 7]}}
+    exp = samples.experiment(model={"kind": "linear_pendulum"}, sweep=sweep, levels=[8, 9, 10])
+    record = samples.record(exp)
+    # the period depends on g, the amplitude of a linear pendulum does not
+    record = Record(record.coords, record.variables | {"amplitude": constant(record)}, record.attrs)
+    with style.applied():
+        labels = [tab.label for tab in gallery.over_members(exp, record, ["theta"])]
+    assert labels == ["period", "order and error of θ"]
+
+
+def constant(record):
+    amplitude = record.variables["amplitude"]
+    return Variable(amplitude.dims, np.full_like(amplitude.values, 1.0), amplitude.attrs)

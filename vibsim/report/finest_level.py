@@ -15,7 +15,10 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import MEMBER
 from vibsim.report import data
 from vibsim.report.data import Member, formal_orders, known, norm_index, whole
-from vibsim.report.style import no_zeros
+from vibsim.report.style import finite, no_zeros
+
+VARIES = 1e-6
+"""Relative spread below which a number is the same for all members."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +111,12 @@ def measured(record: Record, name: str, position: str) -> Measured:
         coarser = np.abs(known(record, name, MEMBER, level=-2))
         error = np.abs(value - coarser) * _part(record, formal_orders(record, position))
     return Measured(name, data.unit(record, name), value, error)
+
+
+def varies(values: Floats) -> bool:
+    """Say whether some numbers of members differ by more than their own rounding."""
+    found = np.abs(finite(values))
+    return found.size > 1 and bool(np.ptp(found) > VARIES * found.max())
 
 
 def period_error(record: Record, level: int) -> Floats:

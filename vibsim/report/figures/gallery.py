@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from shlex import quote
 
 from vibsim.core.record import Record
-from vibsim.core.vocabulary import SEVERITY
+from vibsim.core.vocabulary import MEMBER, SEVERITY
 from vibsim.experiment.storage import asked
-from vibsim.report import choice, data, sweep_layout
+from vibsim.report import choice, data, finest_level, sweep_layout
 from vibsim.report.data import Member
 from vibsim.report.figures import (
     energy,
@@ -136,8 +136,10 @@ def over_members(experiment: Experiment, record: Record, found: list[str]) -> li
     if grid is not None:
         grid = with_separatrix(experiment, grid)
     if along is not None:
-        tabs += tab("period", [sweep.period(experiment, record, along)])
-        tabs += tab("amplitude", [sweep.amplitude(experiment, record, along)])
+        for name, draw in (("period", sweep.period), ("amplitude", sweep.amplitude)):
+            # what is the same for all members is a number, no picture
+            if finest_level.varies(data.known(record, name, MEMBER, level=-1)):
+                tabs += tab(name, [draw(experiment, record, along)])
     elif grid is not None:
         drawn = [maps.motion(experiment, record, grid, scheme) for scheme in schemes]
         tabs += tab("period and amplitude", drawn)

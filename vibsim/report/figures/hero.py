@@ -26,7 +26,6 @@ LEFT, RIGHT, WHOLE, HEIGHT = 5.4, 3.9, 9.6, 2.75
 FEW = 300  # of more members a histogram of the orders says more than dots
 FEWEST = 2  # errors that a picture over the step needs
 MOST_SCHEMES = 6  # schemes that the right picture can tell apart
-VARIES = 1e-6  # relative spread below which a number is the same for all members
 LONG = 24  # letters of a label above which it is set smaller
 COINCIDE = 0.05  # curves that differ by less are said to coincide
 
@@ -274,19 +273,14 @@ def _number(experiment: Experiment, record: Record, lead: Lead) -> tuple[str, st
     for name in [*(name for name in asked if name in usual), *usual]:
         if name in record:
             values = finest_level.measured(record, name, position).value[scheme]
-            if _varies(values):
+            if finest_level.varies(values):
                 return name, style.label(name, data.unit(record, name)), values
     quantity = lead.quantity
     error = finest_level.error(record, quantity).best[scheme]
-    if not _varies(error):
+    if not finest_level.varies(error):
         return None
     label = style.label(f"error of {words.symbol(quantity)}", data.norm_unit(record, quantity))
     return f"error of {words.symbol(quantity)}", label, error
-
-
-def _varies(values: Floats) -> bool:
-    known = style.finite(values)
-    return known.size > 1 and bool(np.ptp(known) > VARIES * np.abs(known).max())
 
 
 def _scaled(ax: Axes, which: str, values: Floats) -> None:

@@ -112,7 +112,8 @@ def motion(experiment: Experiment, record: Record, grid: Grid, scheme: int) -> P
     panels = [
         Panel(title, grid.worst(values), text, **more)
         for title, values, text, more in rows
-        if np.isfinite(values).any()
+        # what is the same for all members is a number, no map
+        if finest_level.varies(values)
     ]
     if not panels:
         return None

@@ -55,7 +55,7 @@ REASONS = {
     ),
     "non_finite": Reason(
         "The calculation overflowed or produced an undefined number. Nothing after that moment has a meaning.",
-        "A smaller step, or a look at the member, level and time listed under Failures.",
+        "A smaller step, or a look at the member, level and time in the table of runs that broke down.",
     ),
     "pre_asymptotic": Reason(
         "The step is still too coarse. More than one order may explain the levels, or none does.",
