@@ -84,6 +84,7 @@ def test_the_large_numbers_are_those_of_the_facts():
     facts = summary["checks"][0]["results"][0]["facts"]
     assert order["value"] == f"{facts['order']:.3f}"
     # the L2 norm over 20 s as a root of the mean of squares
+    assert error["label"] == "Error of θ at 512 steps"
     assert error["value"] == f"{facts['error'] / 20.0**0.5 * 1e4:.1f}·10⁻⁴ rad"
     assert float(best["value"].split()[0]) == pytest.approx(0.9958006771, abs=1e-6)
 
@@ -186,3 +187,14 @@ def test_a_page_stays_short(options, tmp_path):
     assert len(page.encode()) <= 1_500_000
     body = re.sub(r"<(style|script).*?</\1>", "", page, flags=re.DOTALL)
     assert len(re.sub(r"<[^>]*>", " ", body).split()) <= 3000
+
+
+def test_of_several_schemes_the_one_that_decides_is_named():
+    wrong = {"kind": "central", "label": "wrong", "start": "first_order"}
+    exp = samples.experiment(
+        schemes=["central", wrong], checks=[{"converges": "theta", "order": 2}]
+    )
+    shown = first(exp)
+    title = "The angle θ converges at first order, not at second, in 1 of 2 schemes"
+    assert shown["finding"] == title
+    assert all(number["label"].endswith(", wrong") for number in shown["numbers"])

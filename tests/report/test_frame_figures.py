@@ -128,11 +128,11 @@ def test_no_word_leaves_a_figure(case):
     exp = spring(**CASES[case])
     record = samples.record(exp)
     shown, _ = gallery.choose(exp, record)
-    decisive = lead.find(exp, record, samples.summary(exp, record))
     with style.applied():
+        decisive = lead.find(exp, record, samples.summary(exp, record))
         below = gallery.pictures(exp, record, shown, decisive, [])
-        tabs = [picture for tab in (*below.belief, *below.members) for picture in tab.pictures]
-        for picture in (*hero.pictures(exp, record, decisive), *below.motion, *tabs):
+        behind = [picture for tab in (*below.belief, *below.members) for picture in tab.pictures]
+        for picture in [*hero.pictures(exp, record, decisive), *below.motion, *behind]:
             FigureCanvasAgg(picture.figure)
             assert not drawn_outside(picture.figure), picture.name
 

@@ -79,7 +79,7 @@ def differences(record: Record, lead: Lead) -> Picture | None:
     ax.legend(loc="best", fontsize=size, handlelength=1.6, borderaxespad=0.2)
     return Picture(
         "hero_differences",
-        _title_of_differences(record, lead, len(shown)),
+        _title_of_differences(record, lead, len(shown)) + data.of_several(record, member.scheme),
         "The difference between each level and the next finer one, multiplied so that the curves fall on one another "
         "where the error has the promised order.",
         f"Rescaled differences of {words.name(quantity)} between successive levels against time, {member.title}",

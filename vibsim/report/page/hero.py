@@ -125,7 +125,7 @@ def _order(record: Record, lead: Lead) -> Iterator[Number]:
     quantity, member = lead.quantity, lead.member
     if f"{quantity}_order" not in record:
         return
-    label = f"Observed order of {words.symbol(quantity)}"
+    label = f"Observed order of {words.symbol(quantity)}{data.of_several(record, member.scheme)}"
     promised = data.promised_text(record, quantity, member.scheme)
     of = data.due(record, quantity)
     due = f"the scheme promises {promised}" if of == "promised" else f"{promised} is expected"
@@ -177,7 +177,7 @@ def _error(record: Record, lead: Lead) -> Iterator[Number]:
     )
     steps = words.number(int(record["steps"][-1]), "integer")
     yield {
-        "label": f"Error of {words.symbol(quantity)} at {steps} steps",
+        "label": f"Error of {words.symbol(quantity)} at {steps} steps{data.of_several(record, member.scheme)}",
         "value": f"{words.number(mean, 'brief')} {unit}".rstrip(),
         "note": f"{size}{word}, root mean square",
     }
@@ -209,7 +209,7 @@ def _best(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Number
         told = told if len(told) <= MOST_LETTERS else words.number(value, "value")
         note = f"± {size.text if size else '0'} {unit}".rstrip()
         yield {
-            "label": f"Best value: {text}",
+            "label": f"Best value: {text}{data.of_several(record, lead.member.scheme)}",
             "value": f"{told} {unit}".rstrip(),
             "note": f"{note}, extrapolated over {levels} levels",
         }
