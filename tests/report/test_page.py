@@ -117,7 +117,7 @@ def test_the_page_is_well_formed_and_loads_nothing(which, request):
     assert len(reader.ids) == len(set(reader.ids))
     assert not {"link", "iframe", "object", "embed"} & set(reader.tags)
     assert "<script src" not in text
-    assert f"<script>\n{PLOTS}" in text
+    assert f"<script>\n{PLOTS}</script>" in text
     inside = {f"#{name}" for name in reader.ids}
     for tag, address in reader.addresses:
         assert address in inside | {"../../index.html"} or address.startswith("data:image/png"), (

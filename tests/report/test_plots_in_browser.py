@@ -30,7 +30,8 @@ const fire = (svg, type, x, y = 100, more = {}) => {
 const press = (svg, key, more = {}) =>
   svg.dispatchEvent(new KeyboardEvent("keydown", {key, bubbles: true, cancelable: true, ...more}));
 
-const drawn = [data(first), data(other)], labels = ticks(first);
+const frames = (svg) => [...svg.querySelectorAll("g[data-axis] > path")].map((e) => e.getAttribute("d")).join();
+const drawn = [data(first), data(other)], labels = ticks(first), framed = frames(first);
 fire(first, "pointermove", 57.02 + 422.5 / 4);
 found.lines = lines(first); found.linked = lines(other); found.words = words(first);
 fire(first, "pointermove", 20);
@@ -40,6 +41,7 @@ fire(first, "pointerdown", 57.02 + 422.5 / 4); fire(first, "pointermove", 57.02 
 found.selected = first.querySelectorAll("rect[fill-opacity='0.15']").length;
 fire(first, "pointerup", 57.02 + 422.5 / 2);
 found.dragged = [ticks(first), ticks(other)];
+found.frames = frames(first) === framed;
 found.moved = data(other).some((d, i) => d !== drawn[1][i]);
 found.button = document.querySelector("button.zoomed").hidden;
 fire(other, "dblclick", 200);
@@ -114,6 +116,7 @@ def test_a_drag_zooms_all_plots_over_time_and_a_double_click_resets_them(found):
     assert found["selected"] == 4
     assert found["dragged"] == [["5", "6", "7", "8", "9", "10"]] * 2
     assert found["moved"]
+    assert found["frames"]
     assert found["button"] is False
     assert found["reset"] == [found["labels"]] * 2
     assert found["restored"]

@@ -156,7 +156,7 @@ def test_lines_stand_out_from_light_and_dark_paper(which):
     colours = shades(which)
     assert len([name for name in colours if re.fullmatch(r"c\d", name)]) == len(style.COLOURS)
     for name, colour in colours.items():
-        least = {"grid": 1.0, "band": 1.0, "mute": 4.5}.get(name, 3.0)
+        least = {"grid": 1.0, "band": 1.0, "pale": 1.0, "mute": 4.5}.get(name, 3.0)
         assert contrast(colour, PAPERS[which]) >= least, name
 
 

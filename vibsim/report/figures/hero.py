@@ -61,13 +61,14 @@ def differences(record: Record, lead: Lead) -> Picture | None:
     exponent = 0 if wild else style.scale(*values)
     letter, measure = words.symbol(quantity), data.unit(record, f"{quantity}_difference")
     ax = _panel(LEFT, style.label(f"rescaled differences of {letter}", measure, exponent))
+    ax.set_gid(style.TIME)
     for i, curve in enumerate(shown):
         y = style.no_zeros(curve.values) if wild else curve.values / 10.0**exponent
         look: dict[str, Any] = {
             "color": style.COLOURS[i % style.MANY],
             "linewidth": 5.5 - 4.2 * i / max(1, len(shown) - 1),
         }
-        ax.plot(*style.thin(t, y, 200), label=curve.label, **look)
+        ax.plot(*style.thin(t, y, 200), label=curve.label, gid=curve.group, **look)
     if wild:
         style.log_axis(ax, "y", *panels.decades(values))
     else:
@@ -108,6 +109,7 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
     others = [s for s in range(len(names)) if s != lead.member.scheme][: MOST_SCHEMES - 1]
     dt, scale = data.steps_of(record, case), root_of_duration(record, case)
     ax = _panel(RIGHT, style.label(f"root-mean-square error of {letter}", measure))
+    ax.set_gid(style.STEP)
     drawn: list[Floats] = []
     for s in [*others, lead.member.scheme]:
         member = Member(s, case, names[s])
@@ -119,12 +121,13 @@ def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture 
         mark: dict[str, Any] = {"color": colour, "linestyle": "none", "marker": "o"}
         alone = len(names) == 1
         text = "estimated" if alone else style.entry(names[s])
+        mark["gid"] = None if alone else text
         if style.finite(estimate).size:
             ax.plot(dt, estimate, **mark, markersize=5 if is_lead else 3.5, label=text)
             drawn.append(estimate)
         if style.finite(true).size:
             ring = mark | {"markerfacecolor": "none", "markersize": 9 if is_lead else 6.5}
-            ax.plot(dt, true, **ring, label="true" if alone else "")
+            ax.plot(dt, true, **ring, label="true" if alone else f"_true, {names[s]}")
             drawn.append(true)
         has_order = math.isfinite(
             data.stated_order(record, quantity, member, data.norm_index(record))[0]
@@ -170,6 +173,7 @@ def solution(record: Record, quantity: str, member: Member, *, is_left: bool) ->
     ax = _panel(
         LEFT if is_left else RIGHT, style.label(letter, data.unit(record, f"{quantity}_finest"))
     )
+    ax.set_gid(style.TIME)
     if np.isfinite(exact).any():
         ax.plot(*style.thin(t, exact, 200), color="#b0b0b0", linewidth=4.5, label="exact")
     steps = words.number(int(record["steps"][-1]), "integer")

@@ -17,6 +17,7 @@ from vibsim.report.types import Axes
 
 MOST = 6  # most levels that can be told apart
 PALE = "#b0b0b0"  # colour of what the levels are compared with
+Look = dict[str, Any]
 BEYOND = 3.0
 """A level that grows beyond so many times the solution it is compared with leaves the frame."""
 
@@ -32,16 +33,16 @@ def motion(record: Record, quantity: str, member: Member) -> Picture:
     chosen = style.spaced(len(levels), MOST)
     series = {i: data.of_level(record, quantity, member, i) for i in chosen}
     has_errors = bool(np.isfinite(best).any()) and len(levels) > (0 if is_known else 1)
-    axes = panels.stacked([2.3, *[1.7] * has_errors])
+    axes = panels.stacked([2.3, *[1.7] * has_errors], style.TIME)
     if is_known or len(levels) > 1:
         text = "exact" if is_known else "extrapolated"
         axes[0].plot(*style.thin(t, best), color=PALE, linewidth=5.0, label=text, zorder=1)
-    counts = {i: words.number(int(record["steps"][i]), "integer") for i in chosen}
-    _draw(axes[0], t, series, counts, best)
+    looks = {i: _look(k, record, i) for k, i in enumerate(chosen)}
+    _draw(axes[0], t, series, looks, best)
     axes[0].set(ylabel=style.label(letter, measure), title=f"{letter}(t)")
     if has_errors:
         errors = {i: values - best for i, values in series.items()}
-        exponent = _draw_errors(axes[1], t, errors, counts)
+        exponent = _draw_errors(axes[1], t, errors, looks)
         of = "the exact solution" if is_known else "the extrapolated one"
         axes[1].set_title(f"Distance of each level from {of}", fontweight="normal", fontsize=9)
         axes[1].set_ylabel(style.label(f"error of {letter}", measure, exponent))
@@ -57,16 +58,19 @@ def motion(record: Record, quantity: str, member: Member) -> Picture:
     )
 
 
-def _look(k: int) -> dict[str, Any]:
-    return {"color": style.COLOURS[k % style.MANY], "linewidth": 1.3}
+def _look(k: int, record: Record, i: int) -> Look:
+    """Return the look of the k-th line, of the level at position `i`."""
+    steps = words.number(int(record["steps"][i]), "integer")
+    look = {"color": style.COLOURS[k % style.MANY], "linewidth": 1.3, "label": f"{steps} steps"}
+    return look | {"gid": style.of_level(data.whole(record, "level")[i])}
 
 
 def _draw(
-    ax: Axes, t: Floats, series: dict[int, Floats], counts: dict[int, str], best: Floats
+    ax: Axes, t: Floats, series: dict[int, Floats], looks: dict[int, Look], best: Floats
 ) -> None:
     for k, (i, values) in enumerate(series.items()):
         dashes = "-" if i == max(series) else style.DASHES[1 + k % (style.MANY - 1)]
-        ax.plot(*style.thin(t, values), label=f"{counts[i]} steps", linestyle=dashes, **_look(k))
+        ax.plot(*style.thin(t, values), linestyle=dashes, **looks[i])
     panels.stop_at_breakdown(ax, t, list(series.values()))
     whole = [values for values in series.values() if np.isfinite(values).all()]
     whole = whole or list(series.values())
@@ -85,14 +89,14 @@ def _draw(
     style.beside(ax)
 
 
-def _draw_errors(ax: Axes, t: Floats, errors: dict[int, Floats], counts: dict[int, str]) -> int:
+def _draw_errors(ax: Axes, t: Floats, errors: dict[int, Floats], looks: dict[int, Look]) -> int:
     """Draw errors, on a logarithmic scale where they grow without bound; return the exponent of the axis."""
     shown = [e for e in errors.values() if np.isfinite(e).all()] or list(errors.values())
     wild = panels.explosive(shown)
     exponent = 0 if wild else style.scale(*shown)
-    for k, (i, values) in enumerate(errors.items()):
+    for i, values in errors.items():
         y = style.no_zeros(values) if wild else values / 10.0**exponent
-        ax.plot(*style.thin(t, y), label=f"{counts[i]} steps", **_look(k))
+        ax.plot(*style.thin(t, y), **looks[i])
     if wild:
         style.log_axis(ax, "y", *panels.decades(shown), most=5)
     else:

@@ -32,6 +32,7 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager, get_font
 from matplotlib.ft2font import LoadFlags
 from matplotlib.legend import Legend
+from matplotlib.spines import Spine
 from matplotlib.text import Text
 from matplotlib.ticker import NullLocator
 from matplotlib.transforms import Affine2D
@@ -144,7 +145,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         for artist in _in_order(artists):
             if artist is ax.xaxis or artist is ax.yaxis:
                 self._axis(ax, artist, 0 if artist is ax.xaxis else 1)
-            elif tag and not isinstance(artist, (Legend, Axes)):
+            elif tag and not isinstance(artist, (Axes, Legend, Spine, Text)):
                 self._curve(artist)
             else:
                 self.add(artist)
@@ -161,7 +162,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         before = len(self._body)
         self.add(artist)
         # what is empty, or wholly outside, leaves nothing to be read
-        if not isinstance(artist, Text) and len(self._body) > before:
+        if len(self._body) > before:
             name = f' data-curve="{escape(label)}"' if has_label else ""
             self._body.insert(before, f'<g{name} data-key="{escape(key)}">')
             self._body.append("</g>")

@@ -1,16 +1,17 @@
 // Plots of a page: a line that follows the pointer through all plots of one kind, zoom of their common time axis, and
-// curves that their legend entries switch off. A panel is a group with data-axis; vibsim/report/figures/svg.py says
-// what it carries. Nothing is loaded, and without this script every plot is as it was drawn.
+// curves that their legend entries switch off. vibsim/report/figures/svg.py says what a panel (data-axis) carries.
+// Nothing is loaded; without this script every plot is as it was drawn.
 (() => {
 "use strict";
 const NAMES = { time: "t", step: "dt" };
 const LEAST = 1 / 200; // of the whole time, the least that is shown
 const NEAR = 8; // how far from a point its value is shown [point]
-const LETTER = 4.7; // about the width of a letter of the values [point]
-const HINT = "Arrow keys move a line that reads values, plus and minus zoom, Shift and arrows pan, 0 shows all.";
+const LETTER = 4.7; // about the width of a letter [point]
+const HINT = "Point at a plot to read its values. Drag to zoom in time, double-click to see all of it, click a legend "
+  + "entry to hide it. Keys: arrows, + and −, Shift with arrows, 0.";
 const LINEAR = { to: (v) => v, from: (v) => v };
 const LOGARITHMIC = { to: Math.log10, from: (v) => 10 ** v };
-const groups = new Map(); // by the kind of their axis: panels, view (null: the whole), at (null: no line)
+const groups = new Map(); // by kind of axis: panels, view (null: whole), at (null: no line)
 
 const numbers = (text) => text.split(" ").map(Number);
 const between = (value, low, high) => Math.min(Math.max(value, low), high);
@@ -311,6 +312,9 @@ const said = document.body.appendChild(document.createElement("p"));
 Object.assign(back, { type: "button", className: "zoomed", textContent: "Show the whole time", hidden: true });
 back.addEventListener("click", () => groups.forEach((group) => show(group, null)));
 setAll(said, { class: "said", role: "status" });
+const hint = setAll(document.createElement("p"), { class: "soft hint" });
+hint.textContent = HINT;
+(panels[0].svg.closest("section") ?? document.body).append(hint);
 new Set(panels.map((panel) => panel.svg)).forEach(listen);
 document.querySelectorAll("[data-entry]").forEach(listenToEntry);
 })();
