@@ -237,7 +237,7 @@ def test_units_do_not_matter(factor: float) -> None:
     np.testing.assert_allclose(other.weights, one.weights, rtol=1e-6)
 
 
-@pytest.mark.parametrize("kind", ["two_shapes", "one_shape"])
+@pytest.mark.parametrize("kind", ["two_shapes", "factors", "factors_of_shapes"])
 def test_rounding_of_steep_differences_is_no_evidence(kind: str) -> None:
     """Behind levels that have blown up, what rows have across the last one may be rounded to less than nothing."""
     rows = np.array([1e7, 1e3, 1.0])

@@ -16,9 +16,10 @@ the hypothesis gives them. G is all that is read of the data. Without logarithms
 rows share, this is a power of one ratio (see `hypotheses.Table`). Three kinds of hypotheses compete:
 
 - *two shapes*: A and B are unrelated. ``K = c(p) c(p)^T + s^2 c(q) c(q)^T + noise``;
-- *one shape*: B is a multiple of A, and the error of every level is off by a factor of its own (`JITTERS`), as where
-  events fall between grid points. The rows are read along the last one only, as numbers; what they have across it
-  follows Student's t with the size `MISFIT` and `TAIL` degrees of freedom;
+- *off by factors*: the error of every level is off by a factor of its own (`JITTERS`), as where events fall between
+  grid points. B is a multiple of A, or has beside that a shape of its own. The rows are read along the last one only,
+  as numbers; what they have across it follows Student's t with `TAIL` degrees of freedom and the size that `MISFIT`
+  and the shape of B give it;
 - *no expansion*: every row has a size of its own, all of them or up to one behind which all rows are noise.
 
 Rows before a window are coarse levels that the expansion does not reach: each has a size of its own, for the price

@@ -73,7 +73,8 @@ def two_powers(signs: tuple[float, ...], promise: Promise | None) -> Terms:
     """Return the hypotheses on the powers: one of `POWERS` with or without a second one."""
     order, by_theory = promise or (math.nan, False)
     usual = sorted({*priors.POWERS, *(p for p in [order] if 0.0 < p < math.inf)})
-    of_promise = priors.THEORY if by_theory else priors.EXPECTED
+    # no method has most of the orders between whole numbers that a user may expect
+    of_promise = priors.THEORY if by_theory else priors.EXPECTED * (order % 1.0 == 0.0)
     of_promise *= order in usual
 
     def chance(p: float) -> float:
@@ -319,8 +320,12 @@ def _two_shapes(sizes: Floats, terms: Terms, *, alternating: bool = False) -> li
     return found
 
 
-def _one_shape(sizes: Floats, terms: Terms) -> list[Table]:
-    """Return the hypotheses of one shape, whose sizes are off by chance, for each of `JITTERS`."""
+def _off_by_factors(sizes: Floats, terms: Terms, *, own_shape: bool) -> list[Table]:
+    """Return the hypotheses of levels whose errors are off by a factor each.
+
+    The second power is a multiple of the first (`JITTERS`), or has beside that as large a part of an own shape
+    (`JITTERS_OF_SHAPES`).
+    """
     first, second, squares = _sizes(terms, sizes)
     powers = between(first), between(second)
     c = powers[0] + terms.share[:, None] * powers[1]
@@ -329,14 +334,16 @@ def _one_shape(sizes: Floats, terms: Terms) -> list[Table]:
     part = c[:, :-1] / c[:, -1:]
     across = noise[:, :-1, :-1] + outer(part, part) * noise[:, -1:, -1:]
     mixed = outer(part, noise[:, -1, :-1])
-    across = across - mixed - np.swapaxes(mixed, 1, 2)
-    variance = priors.TAIL * (priors.MISFIT / c[:, -1, None, None]) ** 2
-    beside = variance * across
+    across = priors.MISFIT**2 * (across - mixed - np.swapaxes(mixed, 1, 2))
+    if own_shape:
+        beside_last = terms.share[:, None] * (powers[1][:, :-1] - part * powers[1][:, -1:])
+        across = across + outer(beside_last, beside_last)
+    beside = priors.TAIL * across / c[:, -1, None, None] ** 2
     ones = np.ones_like(terms.share)
     prior = ones, terms.share, terms.share**2
     return [
         _table(terms, outer(c, c), jitter**2 * squares, powers, prior, beside)
-        for jitter in priors.JITTERS
+        for jitter in (priors.JITTERS_OF_SHAPES if own_shape else priors.JITTERS)
     ]
 
 
@@ -344,7 +351,10 @@ class Hypotheses(NamedTuple):
     """All hypotheses on the rows of a window."""
 
     two_shapes: list[Table]
-    one_shape: list[Table]
+    factors: list[
+        Table
+    ]  # that levels are off by, where the second power is a multiple of the first
+    factors_of_shapes: list[Table]  # the same where it has a shape of its own as well
     alternating: list[Table]
     any_power: Floats  # of a single power of any value, the same as `Table.limit`
 
@@ -353,9 +363,11 @@ class Hypotheses(NamedTuple):
 def hypotheses_of(sizes: tuple[float, ...], promise: Promise | None) -> Hypotheses:
     """Return the hypotheses for levels of these sizes; windows of ladders of one ratio share them."""
     relative = np.array(sizes)
+    terms = two_powers((1.0, -1.0), promise)
     return Hypotheses(
         _two_shapes(relative, two_powers((1.0,), promise)),
-        _one_shape(relative, two_powers((1.0, -1.0), promise)),
+        _off_by_factors(relative, terms, own_shape=False),
+        _off_by_factors(relative, terms, own_shape=True),
         _two_shapes(relative, pure(priors.POWERS), alternating=True),
         _limit_of_any_power(relative),
     )
