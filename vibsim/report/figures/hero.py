@@ -79,7 +79,7 @@ def differences(record: Record, lead: Lead) -> Picture | None:
     ax.legend(loc="best", fontsize=size, handlelength=1.6, borderaxespad=0.2)
     return Picture(
         "hero_differences",
-        _title_of_differences(record, lead, len(shown)) + data.of_several(record, member.scheme),
+        _title_of_differences(record, lead, len(shown)),
         "The difference between each level and the next finer one, multiplied so that the curves fall on one another "
         "where the error has the promised order.",
         f"Rescaled differences of {words.name(quantity)} between successive levels against time, {member.title}",
@@ -92,13 +92,14 @@ def _title_of_differences(record: Record, lead: Lead, count: int) -> str:
     name = f"{lead.quantity}_coincidence"
     found = data.at(record, name, lead.member) if name in record else np.empty(0)
     last = float(found[-1]) if found.size else math.nan
+    of = f" ({lead.member.scheme_name})" if len(record["scheme"]) > 1 else ""
     if lead.result.get("reason") in ("exact", "round_off"):
-        return "What is left is round-off"
+        return f"What is left is round-off{of}"
     if count < 2 or not math.isfinite(last):
-        return "What is left between the levels"
+        return f"What is left between the levels{of}"
     if last > COINCIDE:
-        return "The rescaled curves do not coincide"
-    return f"{count} curves, one shape: they agree to {words.number(100.0 * last, 'brief')} %"
+        return f"The rescaled curves do not coincide{of}"
+    return f"{count} curves, one shape: they agree to {words.number(100.0 * last, 'brief')} %{of}"
 
 
 def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
