@@ -320,11 +320,12 @@ def _two_shapes(sizes: Floats, terms: Terms, *, alternating: bool = False) -> li
     return found
 
 
-def _off_by_factors(sizes: Floats, terms: Terms, *, own_shape: bool) -> list[Table]:
-    """Return the hypotheses of levels whose errors are off by a factor each.
+def _off_by_factors(
+    sizes: Floats, terms: Terms, jitter: float, *, own_shape: bool = False
+) -> Table:
+    """Return the hypotheses of levels whose errors are off by a factor each, which is 1 but for a `jitter`.
 
-    The second power is a multiple of the first (`JITTERS`), or has beside that as large a part of an own shape
-    (`JITTERS_OF_SHAPES`).
+    The second power is a multiple of the first, or has beside that as large a part of an `own_shape`.
     """
     first, second, squares = _sizes(terms, sizes)
     powers = between(first), between(second)
@@ -341,20 +342,16 @@ def _off_by_factors(sizes: Floats, terms: Terms, *, own_shape: bool) -> list[Tab
     beside = priors.TAIL * across / c[:, -1, None, None] ** 2
     ones = np.ones_like(terms.share)
     prior = ones, terms.share, terms.share**2
-    return [
-        _table(terms, outer(c, c), jitter**2 * squares, powers, prior, beside)
-        for jitter in (priors.JITTERS_OF_SHAPES if own_shape else priors.JITTERS)
-    ]
+    return _table(terms, outer(c, c), jitter**2 * squares, powers, prior, beside)
 
 
 class Hypotheses(NamedTuple):
     """All hypotheses on the rows of a window."""
 
     two_shapes: list[Table]
-    factors: list[
-        Table
-    ]  # that levels are off by, where the second power is a multiple of the first
-    factors_of_shapes: list[Table]  # the same where it has a shape of its own as well
+    # levels are off by factors: the second power is a multiple of the first, or has a shape of its own as well
+    factors: list[Table]
+    factors_with_shape: Table
     alternating: list[Table]
     any_power: Floats  # of a single power of any value, the same as `Table.limit`
 
@@ -366,8 +363,8 @@ def hypotheses_of(sizes: tuple[float, ...], promise: Promise | None) -> Hypothes
     terms = two_powers((1.0, -1.0), promise)
     return Hypotheses(
         _two_shapes(relative, two_powers((1.0,), promise)),
-        _off_by_factors(relative, terms, own_shape=False),
-        _off_by_factors(relative, terms, own_shape=True),
+        [_off_by_factors(relative, terms, jitter) for jitter in priors.JITTERS],
+        _off_by_factors(relative, terms, priors.JITTER_OF_SHAPES, own_shape=True),
         _two_shapes(relative, pure(priors.POWERS), alternating=True),
         _limit_of_any_power(relative),
     )

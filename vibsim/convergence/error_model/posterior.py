@@ -32,7 +32,7 @@ from vibsim.core.array_types import Flags, Floats, Integers
 
 LEFT_OUT = 1e-11
 """Part of all evidence that may be left out: bounds of errors change by less than a digit, probabilities not at all."""
-TABLES, MOST_HYPOTHESES = 10, 7500
+TABLES, MOST_HYPOTHESES = 9, 6500
 """There are no more of them on a window."""
 LARGEST_LOG = 600.0
 """Of evidence over that of no expansion at all: more says no more."""
@@ -200,13 +200,11 @@ class _Fit:
         own = np.where(self.points > 1.0, priors.OWN_SHAPE, 0.0)
         with np.errstate(divide="ignore"):
             one, several = (noisy[0] + np.log(priors.JITTER_PRIOR * x) for x in (1.0 - own, own))
-        for found, chances, prior in (
-            (of_window.factors, priors.JITTER_PRIORS, one),
-            (of_window.factors_of_shapes, priors.JITTER_PRIORS_OF_SHAPES, several),
-        ):
-            tables += [
-                (table, prior + math.log(p)) for table, p in zip(found, chances, strict=True)
-            ]
+        tables += [
+            (table, one + math.log(p))
+            for table, p in zip(of_window.factors, priors.JITTER_PRIORS, strict=True)
+        ]
+        tables += [(of_window.factors_with_shape, several)]
         for table, prior in tables:
             self.add_table(index, table, prior, inside, behind)
         self.add_any_power(index, sizes, inside, behind, noisy[0], of_window.any_power)

@@ -31,14 +31,14 @@ SHARES = tuple(10.0 ** (-4.25 + 0.5 * k) for k in range(15))
 MISFIT = 3e-4  # of a level from its expansion, over its error [calibrated]
 LEAST = 0.1  # square of the size that both powers together have at least, over that expected of them [chosen]
 TAIL = 40.0  # degrees of freedom of the misfit of shapes that are one: nearly normal [chosen]
-JITTER_PRIOR = 0.2  # of levels that are off by a factor each [calibrated]
-JITTERS, JITTER_PRIORS = (
-    (5e-3, 2.5e-2, 0.1),
-    (0.5, 0.3, 0.2),
-)  # size of that factor less 1 [calibrated]
-OWN_SHAPE = 0.5  # of a shape that the second power has beside a multiple of the first [chosen]
-# The factors then: one of a tenth would explain, with any shape, almost any three levels.
-JITTERS_OF_SHAPES, JITTER_PRIORS_OF_SHAPES = (5e-3, 2.5e-2), (0.6, 0.4)  # [calibrated]
+JITTER_PRIOR = 0.15  # of levels that are off by a factor each [calibrated]
+JITTERS, JITTER_PRIORS = (5e-3, 2.5e-2, 0.1), (0.5, 0.3, 0.2)  # size of factors less 1 [calibrated]
+OWN_SHAPE = (
+    0.4  # that the second power has a shape beside a multiple of the first, too, [calibrated]
+)
+JITTER_OF_SHAPES = (
+    5e-3  # and the size then: with more, a third power looks like factors [calibrated]
+)
 FINEST_NOISE = (0.0, 0.1)  # noise of the finest level of a window, over its error [chosen]
 UNEXPECTED = 0.03  # prior of noise that nothing predicts [chosen]
 PREDICTION = 10.0  # noise is predicted within this factor [arithmetic]
