@@ -37,6 +37,7 @@ KNOWN = {
     "1.1.8": "three levels, of which the first two have blown up",
     "1.16.3": "three levels with errors that swing",
     "1.16.9": "three levels, of which the first has blown up",
+    "1.20.4": "five levels, of which the first three have blown up",
     "1.31.47": "the last three levels happen to have the ratio of one power",
 }
 """The false verdicts: ladders by seed, group and place in it, and why they are judged wrongly."""

@@ -194,7 +194,7 @@ def test_a_user_without_a_home_and_files_of_others_below(file: Path, tmp_path: P
     # levels as coarse as these may leave a check open
     assert "failed" not in ended.stdout, ended.stdout
     assert (results / "index.html").is_file()
-    assert f"report: {results / 'index.html'}\n" in ended.stdout
+    assert f"all results: {results / 'index.html'}\n" in ended.stdout
     assert not list(results.rglob("~*"))
     for path in (results / "index.html", results):
         os.chown(path, 0, 0)

@@ -10,6 +10,8 @@ import os
 import re
 import shutil
 import subprocess
+import tempfile
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -36,12 +38,40 @@ addEventListener("load", () => {
 """
 
 
-def program() -> str:
-    """Return the path of a browser; without one the test is skipped, or fails where one is said to be needed."""
+OPTIONS = ("--headless=new", "--no-sandbox", "--disable-gpu")
+
+
+def dumped(address: str, profile: Path, *options: str) -> str:
+    """Return the document that a browser makes of a page; without a browser the test is skipped, or fails if needed."""
+    found = _program()
+    if not found.startswith("/"):
+        (pytest.fail if os.environ.get("VIBSIM_NEEDS_BROWSER") else pytest.skip)(found)
+    return _started(found, address, profile, *options)
+
+
+@cache
+def _program() -> str:
+    """Return the path of a browser that starts, or a sentence saying why there is none."""
     found = next(filter(None, map(shutil.which, NAMES)), None)
     if found is None:
-        (pytest.fail if os.environ.get("VIBSIM_NEEDS_BROWSER") else pytest.skip)(MISSING)
+        return MISSING
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            _started(found, "about:blank", Path(folder))
+        except subprocess.SubprocessError as error:
+            told = (getattr(error, "stderr", "") or "").strip().splitlines()[-3:]
+            return (
+                f"no page can be opened, because {found} does not start: {error} {' '.join(told)}"
+            )
     return found
+
+
+def _started(program: str, address: str, profile: Path, *options: str) -> str:
+    command = [program, *OPTIONS, f"--user-data-dir={profile}", *options, "--dump-dom", address]
+    ended = subprocess.run(
+        command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120, check=True
+    )
+    return ended.stdout
 
 
 def run(page: Path, act: str, folder: Path, *options: str) -> dict[str, Any]:
@@ -58,12 +88,8 @@ def run(page: Path, act: str, folder: Path, *options: str) -> dict[str, Any]:
     text = text.replace('<meta charset="utf-8">', f'<meta charset="utf-8">{head}', 1)
     changed = folder / "page.html"
     changed.write_text(text.replace("</body>", f"{last}</body>"), encoding="utf-8")
-    command = [
-        program(), "--headless=new", "--no-sandbox", "--disable-gpu", f"--user-data-dir={folder / 'profile'}", *options,
-        "--dump-dom", changed.as_uri(),
-    ]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
-    told = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, flags=re.DOTALL)
+    document = dumped(changed.as_uri(), folder / "profile", *options)
+    told = re.search(r'<pre id="found">(.*?)</pre>', document, flags=re.DOTALL)
     assert told, "the page told nothing"
     found: dict[str, Any] = json.loads(html.unescape(told[1]))
     return found

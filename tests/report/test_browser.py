@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import subprocess
 
 import browser
 import pytest
@@ -21,11 +20,8 @@ pytestmark = pytest.mark.slow
 
 def shown(path, *, wait=3000):
     """Return the content of a page after its scripts have run for some virtual milliseconds."""
-    options = ["--headless=new", "--no-sandbox", "--disable-gpu", f"--virtual-time-budget={wait}"]
-    options.append(f"--user-data-dir={path.parent / 'profile'}")
-    command = [browser.program(), *options, "--dump-dom", path.as_uri()]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
-    return ended.stdout
+    profile = path.parent / "profile"
+    return browser.dumped(path.as_uri(), profile, f"--virtual-time-budget={wait}")
 
 
 def test_the_index_tells_dates_and_what_changed_and_can_be_filtered(tmp_path):

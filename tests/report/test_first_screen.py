@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 import samples
 import yaml
 
 from vibsim import report
+from vibsim.convergence import judge
 from vibsim.core.vocabulary import REASONS
 from vibsim.experiment import Experiment
 from vibsim.experiment.experiment import canonical
@@ -53,12 +55,18 @@ def test_every_reason_and_every_kind_of_check_has_a_title():
         ({"checks": [{"value": "period", "below": 1.0}]}, "Period is not as expected"),
         ({"checks": [{"claim": "so", "that": {"value": "period", "above": 1.0}}]}, "So"),
         ({"checks": [{"claim": "so", "that": {"value": "period", "above": 1.0}, "holds": False}]},
-         "Not confirmed: So"),
+         "Not refuted: So"),
+        ({"checks": [{"claim": "so", "that": {"value": "period", "below": 1.0}}]}, "Not confirmed: So"),
+        ({"checks": [{"claim": "s" * 120, "that": {"stable": False}, "holds": False}]}, f"Refuted: S{'s' * 108}…"),
+        ({"checks": [{"accurate": "theta", "relative": 1e-9, "expect": {"status": "FAIL"}}]},
+         "The angle θ is not as accurate as asked: the trap is caught"),
+        ({"checks": [{"accurate": "theta", "relative": 0.5, "expect": {"status": "FAIL"}}]},
+         "The angle θ is as accurate as asked, against what the check expects"),
         ({"checks": [{"claim": "so", "that": {"value": "period", "below": 1.0}, "holds": False}]}, "Refuted: So"),
         ({"schemes": [*WRONG, {"kind": "central", "label": "sound"}],
           "checks": [{"converges": "theta", "order": 2, "schemes": ["sound"]},
                      {"converges": "theta", "order": 2, "schemes": ["central"], "expect": {"status": "FAIL"}}]},
-         "The angle θ converges at second order, and the trap is caught"),
+         "The angle θ converges at second order with scheme sound, and the trap is caught"),
     ],
 )  # fmt: skip
 def test_the_title_says_the_finding(changes, title):
@@ -151,6 +159,20 @@ def test_the_file_that_a_page_shows_means_the_same_experiment(path):
     assert {k: v for k, v in told.items() if k not in left_out} == {
         k: v for k, v in ours.items() if k not in left_out
     }
+
+
+def test_the_title_of_a_ladder_with_a_least_order_names_the_measured_one():
+    h = 0.4 * 0.5 ** np.arange(5)
+    verdict = judge(h, 3.0 + h**2, at_least=1)
+    assert findings.of_ladder(verdict) == "u converges at second order"
+    verdict = judge(h, 3.0 + h, at_least=2)
+    assert findings.of_ladder(verdict) == "u converges at first order, not at second order or above"
+
+
+def test_an_estimate_is_no_observed_order():
+    shown = first(samples.experiment(levels=[2, 3, 4], time={"end": 20.0}))
+    orders = [n for n in shown["numbers"] if n["label"].startswith("Observed order")]
+    assert [n["value"] for n in orders] == ["not known"]
 
 
 def test_an_equation_becomes_markup():

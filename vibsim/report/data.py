@@ -21,6 +21,7 @@ from vibsim.report.style import RAISE, finite, label
 from vibsim.simulation.scaled import has_time_unit
 
 ABOVE = 3.0  # a difference counts as more than round-off when it exceeds this many times the floor
+COINCIDE = 0.1  # rescaled differences that are further apart do not coincide
 _LONGEST = 40  # characters of the name of a scheme in the name of a file
 
 
@@ -274,6 +275,18 @@ def sound_triples(record: Record, quantity: str, member: Member) -> list[bool]:
     """Say of every triple of levels whether its differences stand above round-off."""
     above = sound_pairs(record, quantity, member)
     return [all(above[i : i + 2]) for i in range(len(whole(record, "triple")))]
+
+
+def coincidence(record: Record, quantity: str, member: Member) -> float:
+    """Return how far the finest two sound rescaled differences are apart, over the finer one; NaN where not known."""
+    name = f"{quantity}_coincidence"
+    if name not in record:
+        return math.nan
+    found = at(record, name, member)
+    sound = [
+        x for x, good in zip(found, sound_triples(record, quantity, member), strict=True) if good
+    ]
+    return float(sound[-1]) if sound else math.nan
 
 
 def floor_norm(record: Record, quantity: str, member: Member, norm: str) -> Floats:

@@ -68,7 +68,8 @@ def find(experiment: Experiment, record: Record, summary: Mapping[str, Any]) -> 
     entry = min(listed, key=rank)
     check = asserted.get(entry["id"])
     named = str(entry.get("quantity") or position)
-    quantity = named if f"{named}_difference_norm" in record else position
+    is_compared = any(f"{named}_{of}_norm" in record for of in ("difference", "error"))
+    quantity = named if is_compared else position
     return Lead(quantity, _member(record, entry["results"][0]), entry, check)
 
 

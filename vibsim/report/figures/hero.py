@@ -27,7 +27,6 @@ FEW = 300  # of more members a histogram of the orders says more than dots
 FEWEST = 2  # errors that a picture over the step needs
 MOST_SCHEMES = 6  # schemes that the right picture can tell apart
 LONG = 24  # letters of a label above which it is set smaller
-COINCIDE = 0.05  # curves that differ by less are said to coincide
 
 
 def _panel(width: float, title: str, left: float = 0.72, right: float = 0.14) -> Axes:
@@ -89,17 +88,15 @@ def differences(record: Record, lead: Lead) -> Picture | None:
 
 def _title_of_differences(record: Record, lead: Lead, count: int) -> str:
     """Say whether the curves coincide, and how well."""
-    name = f"{lead.quantity}_coincidence"
-    found = data.at(record, name, lead.member) if name in record else np.empty(0)
-    last = float(found[-1]) if found.size else math.nan
+    last = data.coincidence(record, lead.quantity, lead.member)
     of = f" ({lead.member.scheme_name})" if len(record["scheme"]) > 1 else ""
     if lead.result.get("reason") in ("exact", "round_off"):
         return f"What is left is round-off{of}"
     if count < 2 or not math.isfinite(last):
         return f"What is left between the levels{of}"
-    if last > COINCIDE:
+    if last > data.COINCIDE:
         return f"The rescaled curves do not coincide{of}"
-    return f"{count} curves, one shape: they agree to {words.number(100.0 * last, 'brief')} %{of}"
+    return f"The finest curves agree to {words.number(100.0 * last, 'brief')} %{of}"
 
 
 def against_step(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
@@ -416,7 +413,7 @@ def orders(experiment: Experiment, record: Record, lead: Lead) -> Picture | None
     title = (
         "All members keep their order"
         if inside.all()
-        else f"{kept} of {every} members keep their order"
+        else f"{kept} of {every} members have an order within the band"
     )
     more = (
         f" {words.number(missing, 'integer')} members have no order and are left out."

@@ -18,11 +18,11 @@ from vibsim.report import choice, data, finest_level, style
 from vibsim.report.evidence import figure
 from vibsim.report.figures import hero as drawn
 from vibsim.report.figures import motion
-from vibsim.report.lead import Lead
+from vibsim.report.lead import Lead, is_trap
 from vibsim.report.style import Picture
 from vibsim.report.tables import published
 from vibsim.report.tables.best import error_size, rounded
-from vibsim.report.text import findings, words
+from vibsim.report.text import assertions, findings, words
 from vibsim.report.types import Experiment
 
 NUMBERS = 3  # large numbers on the first screen
@@ -81,7 +81,9 @@ def numbers(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Numb
     if data.swept(record) and lead.result.get("command"):
         text = _SECTION.sub("", lead.member.case_name)
         command = f".venv/bin/{lead.result['command']}"
-        yield {"label": "Hardest member", "value": text, "note": f"To run it alone: `{command}`"}
+        is_one = lead.entry is not None and sum(lead.entry["counts"].values()) < 2
+        label = "Member" if is_one else "Hardest member"
+        yield {"label": label, "value": text, "note": f"To run it alone: `{command}`"}
     yield from _best(experiment, record, lead)
     level, dt = data.whole(record, "level")[-1], data.steps_of(record, lead.member.case)
     step = f"{words.number(float(dt[-1]), 'step')} {data.time_unit(record, 'dt')}".rstrip()
@@ -104,16 +106,27 @@ def _measured(experiment: Experiment, record: Record, lead: Lead) -> Iterator[Nu
     kind = check.kind if check else "tolerance"
     unit, label, form = "", MEASURED.get(kind, ""), "brief"  # a size has two digits
     if check is not None and check.kind == "value":
-        from vibsim.report.text import assertions
-
         unit, form = data.pretty_unit(unit_of(experiment, record, check)), "step"
         subject = assertions.subject(check)
         label = words.PAGE.opening(subject)
     if kind in ("equal", "accurate"):
         unit = data.norm_unit(record, lead.quantity, "l2" if kind == "accurate" else "linf")
-    allowed = (lead.result.get("facts") or {}).get("allowed")
+    facts = lead.result.get("facts") or {}
+    if check is not None and check.kind == "accurate" and check.is_relative:
+        number, unit = (
+            facts.get("relative_error") or number,
+            f"of the size of {words.symbol(lead.quantity)}",
+        )
+    allowed = facts.get("allowed")
     wanted = expectation(experiment, check, words.PAGE)
-    note = f"asked for: {words.labelled(wanted, None)}"
+    if check is not None and check.kind == "conserves":
+        wanted = assertions.DRIFTS[check.drift]
+    is_refuted = (
+        lead.asserted is not None and lead.asserted.kind == "claim" and not lead.asserted.holds
+    )
+    note = f"{'the statement' if is_refuted else 'asked for'}: {words.labelled(wanted, None)}"
+    if is_trap(lead.asserted) and not is_refuted:
+        note = "the check expects that it is not as asked"
     if allowed is not None:
         note = f"{words.number(allowed, 'brief')} is allowed"
     value = f"{words.number(number, form)} {unit}".rstrip()
@@ -129,6 +142,7 @@ def _order(record: Record, lead: Lead) -> Iterator[Number]:
     promised = data.promised_text(record, quantity, member.scheme)
     of = data.due(record, quantity)
     due = f"the scheme promises {promised}" if of == "promised" else f"{promised} is expected"
+    due = f"what is {of} depends on the member" if promised == of else due
     facts = lead.result.get("facts") or {}
     norm = data.norm_index(record)
     if lead.is_on_order:
@@ -136,7 +150,13 @@ def _order(record: Record, lead: Lead) -> Iterator[Number]:
     else:
         order, low, high = data.stated_order(record, quantity, member, norm)
     reason = lead.result.get("reason") if lead.is_on_order else None
-    every = style.finite(finest_level.orders(record, quantity)[0][member.scheme])
+    orders = finest_level.orders(record, quantity)[0][member.scheme]
+    if f"{quantity}_status" in record:
+        # what is undecided has an estimate at most
+        orders = orders[data.flags(record, f"{quantity}_status")[member.scheme] != "INCONCLUSIVE"]
+    every = style.finite(orders)
+    if lead.is_on_order and lead.result.get("status") == "INCONCLUSIVE":
+        order = None
     if data.swept(record) and every.size > 1:
         ends = [words.number(float(end), "order") for end in (every.min(), every.max())]
         value = ends[0] if ends[0] == ends[1] else " to ".join(ends)

@@ -182,6 +182,8 @@ def headline(checks: Sequence[Mapping[str, Any]]) -> Headline:
     wanted = [(check, result) for check, result in found if not is_trap(check)]
     for _, result in wanted:
         order, relative = (words.fact(result, name) for name in ("order", "relative_error"))
+        if result.get("status") == "INCONCLUSIVE":
+            order = None  # an estimate at most
         if order is not None or relative is not None:
             interval = words.interval(words.interval_of(result))
             return Headline(

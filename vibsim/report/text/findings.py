@@ -70,19 +70,21 @@ CLAIMS = {
     "PASS": "",
     "PASS, false": "Refuted: ",
     "FAIL": "Not confirmed: ",
+    "FAIL, false": "Not refuted: ",
     "INCONCLUSIVE": "Undecided: ",
 }
 """Status of a statement, and whether it is expected to be false, to what stands before it in a title."""
-LONG_CLAIM = 110  # letters of a statement above which it is no title
+LONG_CLAIM = 110  # most letters of a statement in a title
 NOTHING_ASKED = (
     "Without a check there is no verdict. Add `checks:` to the experiment, such as `- {{converges: {position}}}`, and "
     "three levels at least."
 )
+CONVERGES = "Halving the step divides the error by about {factor}. {trust}{beside}{unseen}"
 TRUSTED = (
-    "Halving the step divides the error by about {factor}. The rescaled differences of the levels coincide, so the "
-    "estimate of the error can be trusted.{beside}{unseen}"
+    "The rescaled differences of the levels coincide, so the estimate of the error can be trusted."
 )
-BESIDE = " The true error is known here, and the estimate is right to {part} of it."
+ROUGH = "The rescaled differences of the levels do not coincide yet, so the estimate of the error is rough."
+BESIDE = " The true error is known here, and the estimate is within {part} % of it."
 UNSEEN = " There is no exact solution, so convergence to a wrong answer would go unnoticed."
 
 
@@ -92,7 +94,8 @@ def title(experiment: Experiment, record: Record, lead: Lead, printed: Collectio
         return NO_CHECK
     entry, told = lead.entry, _of_claim(lead) or _by_check(experiment, record, lead)
     if entry["status"] != "PASS":
-        return f"{told}{_of_some(record, entry)}"
+        against = ", against what the check expects" if _is_trap_of_a_number(lead) else ""
+        return f"{told}{against}{_of_some(record, entry)}"
     if entry["id"] in printed:
         return f"All {len(printed)} printed numbers are as expected"
     numbers = sum(check.kind == "value" for check in experiment.checks)
@@ -114,15 +117,22 @@ def _of_some(record: Record, entry: Mapping[str, Any]) -> str:
 
 
 def _of_claim(lead: Lead) -> str:
-    """Return the title of a page about a statement: the statement, and whether it is so; empty for a long one."""
+    """Return the title of a page about a statement: the statement, and whether it is so; empty of another check."""
     assert lead.entry is not None
     check = lead.asserted
-    if check is None or check.kind != "claim" or len(check.claim) > LONG_CLAIM:
+    if check is None or check.kind != "claim":
         return ""
     claim = check.claim[:1].upper() + check.claim[1:]
+    claim = claim if len(claim) <= LONG_CLAIM else f"{claim[: LONG_CLAIM - 1]}…"
     status = lead.entry["status"]
-    word = CLAIMS["PASS, false" if status == "PASS" and not check.holds else status]
-    return f"{word}{claim}"
+    is_false = not check.holds and status != "INCONCLUSIVE"
+    return f"{CLAIMS[f'{status}, false' if is_false else status]}{claim}"
+
+
+def _is_trap_of_a_number(lead: Lead) -> bool:
+    """Say whether the check expects that something else than an order is not as asked."""
+    check = lead.asserted
+    return check is not None and check.kind not in ("claim", "converges") and is_trap(check)
 
 
 def _caught(experiment: Experiment, lead: Lead) -> str:
@@ -147,6 +157,9 @@ def _by_check(experiment: Experiment, record: Record, lead: Lead) -> str:
         return ON_ORDER.get(word, ON_ORDER["mismatch"]).format_map(filled)
     if reason == "non_finite":
         return BROKE_DOWN
+    if _is_trap_of_a_number(lead):
+        # what was found says more than that it was expected
+        status = lead.result.get("status", status)
     table = {"PASS": MATCHED, "FAIL": MISSED}.get(status, OPEN)
     return table[kind].format_map(filled)
 
@@ -159,7 +172,7 @@ def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, st
     named = getattr(measured, "schemes", None) or record.words("scheme")
     filled = {
         "what": what, "What": _opened(what), "everywhere": _everywhere(record, lead),
-        "at": _at(expected, order), "at_measured": _at(order), "expected_order": _at(expected).removesuffix(" order"),
+        "at": _at(expected, order), **_apart(order, expected),
         "Schemes": f"Scheme {named[0]}" if len(named) == 1 else "The schemes",
         "first": "", "second": "", "drift": "", "stability": "", "not_stability": "", "subject": "", "Subject": "",
     }  # fmt: skip
@@ -186,13 +199,27 @@ def _phrases(experiment: Experiment, record: Record, lead: Lead) -> dict[str, st
         for x in data.formal_orders(record, lead.quantity).ravel()
         if f"{lead.quantity}_formal_order" in record
     }
-    is_of_all = getattr(measured, "order", None) == "scheme" and len(named) > 1
-    if is_of_all and len(promised) > 1 and measured.kind == "converges":
+    is_of_scheme = getattr(measured, "order", None) == "scheme" and len(promised) > 1
+    if is_of_scheme and len(named) > 1:
         filled |= {
             "at": f"at the order that each of {len(named)} schemes promises",
             "everywhere": "",
         }
+    elif is_of_scheme:
+        filled["at"] = "at the order that its scheme promises"
     return filled
+
+
+def _apart(order: float | None, expected: float | None) -> dict[str, str]:
+    """Return the words for a measured order and for another one that was expected."""
+    if expected is None or not math.isfinite(expected):
+        return {"at_measured": _at(order), "expected_order": "exact"}
+    if order is not None and _at(order) == _at(expected):
+        return {
+            "at_measured": f"with order {order:.2f}",
+            "expected_order": f"with order {expected:g}",
+        }
+    return {"at_measured": _at(order), "expected_order": _at(expected).removesuffix(" order")}
 
 
 def _named(experiment: Experiment, quantity: str) -> str:
@@ -207,17 +234,19 @@ def _named(experiment: Experiment, quantity: str) -> str:
 
 
 def _everywhere(record: Record, lead: Lead) -> str:
-    """Say of how many members and schemes it holds; empty for one result."""
+    """Say of how many members and schemes it holds; empty for one result of the only scheme."""
     assert lead.entry is not None
-    total = sum(lead.entry["counts"].values())
-    schemes = {result["scheme"] for result in lead.entry["results"]}
+    total, schemes = sum(lead.entry["counts"].values()), record.words("scheme")
+    named = getattr(lead.measured, "schemes", None) or schemes
+    kind = lead.measured.kind if lead.measured else ""
+    is_named = kind in ("converges", "accurate") and len(named) == 1 < len(schemes)
+    by = f" with scheme {named[0]}" if is_named else ""
     if total < 2:
-        return ""
+        return by
     if data.swept(record):
-        return f" in all {words.number(total, 'integer')} members" if len(schemes) == 1 else (
-            f" in all {words.number(total, 'integer')} runs"
-        )  # fmt: skip
-    return f" by all {total} schemes"
+        noun = "members" if total <= len(record["case"]) else "runs"
+        return f" in all {words.number(total, 'integer')} {noun}{by}"
+    return f" by {'all' if total == len(schemes) else f'{total} of'} {len(schemes)} schemes"
 
 
 def _at(*orders: float | None) -> str:
@@ -238,12 +267,12 @@ def _opened(text: str) -> str:
 
 def of_ladder(verdict: LadderVerdict) -> str:
     """Return the finding on a ladder that another solver computed, in one line."""
-    expected = verdict.expected or verdict.at_least
     words_of = {
         "what": verdict.quantity, "What": verdict.quantity, "everywhere": "",
-        "at": _at(expected, verdict.order), "at_measured": _at(verdict.order),
-        "expected_order": _at(expected).removesuffix(" order"),
+        "at": _at(verdict.expected, verdict.order), **_apart(verdict.order, verdict.expected),
     }  # fmt: skip
+    if verdict.expected is None and verdict.at_least is not None:
+        words_of["expected_order"] = f"{_at(verdict.at_least)} or above"
     return ON_ORDER[verdict.reason].format_map(words_of)
 
 
@@ -267,9 +296,23 @@ def paragraph(experiment: Experiment, record: Record, lead: Lead, levels: int) -
         and lead.result["reason"] == "asymptotic"
     ):
         part = _estimate_over_true(record, lead)
-        beside = "" if part is None else BESIDE.format(part=f"{max(100.0 * part, 0.1):.1g} %")
-        unseen = "" if part is not None else UNSEEN
-        return TRUSTED.format(factor=f"{found:.2g}", beside=beside, unseen=unseen)
+        apart = data.coincidence(record, lead.quantity, lead.member)
+        is_rough = apart > data.COINCIDE or (part is not None and part > data.COINCIDE)
+        percent = "" if part is None else words.number(max(100.0 * part, 0.1), "brief")
+        return CONVERGES.format(
+            factor=f"{found:.2g}",
+            trust=ROUGH if is_rough else TRUSTED,
+            beside="" if part is None else BESIDE.format(part=percent),
+            unseen=UNSEEN if part is None else "",
+        )
+    claim = lead.asserted
+    if (
+        claim is not None
+        and claim.kind == "claim"
+        and not claim.holds
+        and lead.entry["reason"] == "match"
+    ):
+        return reasons.REFUTED
     kind = lead.measured.kind if lead.measured else lead.entry["kind"]
     value = getattr(lead.measured, "value", "") if kind == "value" else ""
     word = lead.result.get("reason") if lead.is_on_order else lead.entry["reason"]
