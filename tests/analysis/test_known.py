@@ -103,3 +103,19 @@ def test_the_budget_is_known_no_better_than_the_energy():
     energy = float(levels[9]["energy"].max())
     floor = convergence["energy_budget_floor"].values
     assert np.all(floor >= 1e-17 * energy)
+
+
+@pytest.mark.parametrize("norm", ["l2", "linf"])
+def test_a_single_level_without_an_exact_solution_has_its_numbers_and_no_order(norm):
+    # no row at all whose directions could be compared
+    experiment, _, convergence = run(
+        model={"kind": "elastic_pendulum", "beta": 0.9, "Theta": 40, "gamma": 0.05},
+        initial={},
+        time={"end": 25},
+        levels=[9],
+        schemes=["rk4"],
+        checks=[{"value": "period", "above": 0}, {"converges": "x", "norm": norm}],
+    )
+    value, order = verdicts(experiment, convergence)
+    assert (value.status, value.reason) == ("PASS", "match")
+    assert (order.status, order.reason) == ("INCONCLUSIVE", "too_few_levels")

@@ -110,6 +110,15 @@ def test_text_from_a_results_folder_gives_a_terminal_no_orders() -> None:
         assert "\r" not in text
 
 
+def test_text_of_a_solver_gives_a_terminal_no_orders() -> None:
+    lost = entry(error="\033[2Jgone\x07", status="FAIL")
+    failure = {"job": "adhoc/tiny", "log": "log", "tail": ["\033]0;title\x07", "broken\r"]}
+    text = "".join([*outcome_text.in_full([lost], 200), *outcome_text.of_failures([failure])])
+    assert "gone" in text
+    assert "broken" in text
+    assert not {"\033", "\x07", "\r"} & set(text)
+
+
 def test_colours_are_for_terminals_that_want_them(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NO_COLOR", raising=False)
     monkeypatch.setenv("TERM", "xterm")

@@ -110,7 +110,12 @@ def test_a_single_level_says_what_is_known():
     ("options", "checks", "line"),
     [
         ({"schemes": WRONG}, [{"converges": "theta", "order": 2}], "schemes: [{kind: central, start: centred}]"),
+        ({"schemes": [{"kind": "central", "label": "bad", "start": "first_order", "arithmetic": "three_term"}, "rk4"]},
+         [{"converges": "theta"}],
+         "schemes: [{kind: central, label: bad, start: centred, arithmetic: three_term}, rk4]"),
         ({"levels": [6, 7, 8]}, [{"accurate": "theta", "relative": 1e-4}], "levels: {from: 6, to: 11}"),
+        ({"levels": [4, 6, 8]}, [{"accurate": "theta", "relative": 1e-4}], ""),
+        ({}, [{"value": "period", "above": 6.7006, "at": {"level": 9}}], ""),
         ({}, [{"converges": "theta", "order": 2}], ""),
     ],
 )  # fmt: skip

@@ -17,6 +17,7 @@ from vibsim.report.figures import (
     energy,
     extrema,
     gallery,
+    motion,
     order,
     sweep,
     theory,
@@ -268,3 +269,14 @@ def test_what_is_left_out_is_named():
     exp = spring(schemes=MANY, levels=[0, 1])
     _, told = gallery.choose(exp, samples.record(exp))
     assert "more schemes have no figures over time" in told
+
+
+@pytest.mark.parametrize("levels", [[7], [7, 8, 9]])
+def test_the_grey_line_of_a_motion_is_named_where_it_is_drawn(levels):
+    model = {"kind": "elastic_pendulum", "beta": 0.9, "Theta": 40, "gamma": 0.05}
+    exp = samples.experiment(model=model, initial={}, levels=levels)
+    with style.applied():
+        picture = motion.motion(samples.record(exp), "x", Member(0, 0, "central", ""))
+    lines = picture.figure.axes[0].lines
+    assert ("grey" in picture.caption) == any(line.get_color() == motion.PALE for line in lines)
+    assert ("grey" in picture.caption) == (len(levels) > 1)

@@ -188,6 +188,15 @@ def test_a_member_of_a_sweep_is_drawn_with_its_own_parameters():
     assert np.ptp(offsets) == pytest.approx(last - scenes.WIDTH, abs=1.0)
 
 
+def test_a_run_that_is_shown_whole_is_not_called_cut_where_its_members_differ_in_length():
+    sweep = {"model.w": [0.5, 0.7, 1.0, 2.0, 3.0]}
+    time = {"periods": 5, "steps_per_period": 2}
+    exp, record = made("spring", sweep=sweep, time=time, levels=[5, 6, 7])
+    text = element(exp, record)
+    assert "model.w = 2 " in text
+    assert "are shown" not in text
+
+
 def test_data_cannot_end_its_script(monkeypatch):
     exp, record = made()
     monkeypatch.setattr(player.data, "time_unit", lambda *_: "</script><b>")

@@ -31,14 +31,17 @@ def in_full(summaries: Sequence[Entry], columns: int) -> Iterator[str]:
     """Yield every check of every experiment: one that passed has one line, any other its whole text."""
     for entry in summaries:
         yield f"{_name(entry)}  {painted(entry['status'], entry['status'])}"
-        yield from [f"  {entry['error']}"] if "error" in entry else checks(entry["checks"], columns)
+        if "error" in entry:
+            yield f"  {clean(entry['error'])}"
+        else:
+            yield from checks(entry["checks"], columns)
 
 
 def of_failures(failures: Sequence[Entry]) -> Iterator[str]:
     """Yield the jobs that failed, each with the end of its log."""
     for failure in failures:
         yield f"\nfailed: {failure['job']} (log: {failure['log']})"
-        yield from (f"  {line}" for line in failure["tail"])
+        yield from (f"  {clean(line)}" for line in failure["tail"])
 
 
 def count(summaries: Sequence[Entry], status: str) -> str:

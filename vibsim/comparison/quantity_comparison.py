@@ -115,6 +115,9 @@ class Comparison:
     def cosines(self, kind: str) -> Floats:
         """Return cosines between the differences, and the last error where known, shape (scheme, case, row, row)."""
         rows = self.differences + ([] if self.errors is None else [-self.errors[-1]])
+        if not rows:
+            # of a single level whose error is not known
+            return np.zeros((*self.block.shape, 0, 0))
         return differences.cosines(rows, kind, self.block.grid.end_included)
 
     def combined(self, kind: str, rows: Flags, first: int, weights: Floats) -> Floats:

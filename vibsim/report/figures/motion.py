@@ -34,7 +34,7 @@ def motion(record: Record, quantity: str, member: Member) -> Picture:
     series = {i: data.of_level(record, quantity, member, i) for i in chosen}
     has_errors = bool(np.isfinite(best).any()) and len(levels) > (0 if is_known else 1)
     axes = panels.stacked([2.3, *[1.7] * has_errors], style.TIME)
-    if is_known or len(levels) > 1:
+    if has_errors:
         text = "exact" if is_known else "extrapolated"
         axes[0].plot(*style.thin(t, best), color=PALE, linewidth=5.0, label=text, zorder=1)
     looks = {i: _look(k, record, i) for k, i in enumerate(chosen)}
@@ -47,11 +47,14 @@ def motion(record: Record, quantity: str, member: Member) -> Picture:
         axes[1].set_title(f"Distance of each level from {of}", fontweight="normal", fontsize=9)
         axes[1].set_ylabel(style.label(f"error of {letter}", measure, exponent))
     axes[-1].set_xlabel(data.time_label(record))
-    below = "; below it, how far each level is from it" if has_errors else ""
+    told = (
+        f"Wide and grey is the {'exact' if is_known else 'extrapolated'} solution, the lines are the levels; "
+        "below it, how far each level is from it."
+    )
     return Picture(
         f"motion_{quantity}_{member.stem}",
         f"{words.title(quantity)}(t), {member.title}",
-        f"Wide and grey is the {'exact' if is_known else 'extrapolated'} solution, the lines are the levels{below}.",
+        told if has_errors else "Each line is a level.",
         f"{words.name(quantity)} against time on all levels for {member.title}"
         + (", and the error of each level" if has_errors else ""),
         axes[0].get_figure(root=True),

@@ -51,6 +51,8 @@ class Lane:
     scene: Scene
     period: float
     """About how long the motion takes to come back."""
+    end: float
+    """The last time of the run, of which the beginning may be all that is shown."""
 
 
 def element(experiment: Experiment, record: Record, environment: Environment) -> str:
@@ -90,7 +92,11 @@ def lanes(experiment: Experiment, record: Record) -> list[Lane]:
         if model.kind == "bouncing_ball":
             at["h"] = _flight(t, samples, series, at["h"], float(parameters["g"]))
         motion = Motion(model, t, at, parameters, reach)
-        found.append(Lane(_title(record, one, level, chosen), motion, draw(motion), period))
+        found.append(
+            Lane(
+                _title(record, one, level, chosen), motion, draw(motion), period, float(samples[-1])
+            )
+        )
     return found
 
 
@@ -224,7 +230,7 @@ def _context(record: Record, shown: list[Lane]) -> dict[str, Any]:
             for lane, trace in zip(shown, traces, strict=True)
         ],
     }
-    last = float(data.times(record, 0)[-1])
+    last = shown[0].end
     unit = data.unit(record, f"{position}_finest")
     return {
         "data": _json(content),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from vibsim.report.text import experiment_file
 from vibsim.report.types import Experiment, Measurement
 
 MOST_LEVELS = 6
@@ -20,16 +21,19 @@ def change(experiment: Experiment, measured: Measurement | None, check: Mapping[
     facts, reason = result.get("facts") or {}, result.get("reason")
     spec = next((spec for spec in experiment.schemes if spec.name == result["scheme"]), None)
     if reason == "order_low" and spec is not None and spec.options.get("start") == "first_order":
-        label = f", label: {spec.name}" if spec.name != spec.kind else ""
-        return f"schemes: [{{kind: {spec.kind}{label}, start: centred}}]"
-    return _levels(next(iter(_ends(list(experiment.levels), reason, facts)), None))
+        return "\n".join(experiment_file.schemes(experiment, spec.name, start="centred"))
+    levels = list(experiment.levels)
+    if levels != list(range(levels[0], levels[-1] + 1)):
+        return ""
+    # of a check of a value that fact is a code, not a count
+    more = (facts.get("levels_needed") or 0) if measured.kind == "converges" else 0
+    return _levels(next(iter(_ends(levels, reason, facts, more)), None))
 
 
 def _ends(
-    levels: list[int], reason: str | None, facts: Mapping[str, Any]
+    levels: list[int], reason: str | None, facts: Mapping[str, Any], more: int
 ) -> Iterator[tuple[int, int]]:
     """Yield the first and the last level that would settle the question."""
-    more = facts.get("levels_needed") or 0
     if 0 < more <= MOST_LEVELS:
         yield levels[0], levels[-1] + more
     for name in ("level_needed", "level_as_asked"):

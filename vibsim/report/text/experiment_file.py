@@ -60,7 +60,7 @@ def _head(experiment: Experiment) -> list[str]:
         time = time | {"end": scaling.end}
         lines.append("scaled: true")
     lines += [f"time: {_value(time)}", f"levels: {_value(_levels(experiment.levels))}"]
-    lines += _listed("schemes", [_scheme(spec) for spec in experiment.schemes])
+    lines += schemes(experiment)
     if experiment.sweep:
         axes = [_axis(axis) for axis in experiment.sweep.model_dump(mode="json")["axes"]]
         lines += ["sweep:", *(f"  {line}" for axis in axes for line in axis)]
@@ -76,6 +76,12 @@ def _head(experiment: Experiment) -> list[str]:
     return lines
 
 
+def schemes(experiment: Experiment, name: str = "", **changed: Any) -> list[str]:
+    """Return the lines of the schemes; the options `changed` of the scheme `name` are written whatever they are."""
+    rows = [_scheme(spec, changed if spec.name == name else {}) for spec in experiment.schemes]
+    return _listed("schemes", rows)
+
+
 def _put(section: dict[str, Any], keys: Sequence[str], value: Any) -> None:
     for key in keys[:-1]:
         section = section.setdefault(key, {})
@@ -87,10 +93,11 @@ def _levels(levels: Sequence[int]) -> Any:
     return {"from": levels[0], "to": levels[-1]} if is_run else list(levels)
 
 
-def _scheme(spec: SchemeSpec) -> Any:
+def _scheme(spec: SchemeSpec, changed: Mapping[str, Any]) -> Any:
     usual = {option.name: option.default for option in spec.method.options}
     options = {k: v for k, v in spec.options.items() if usual.get(k, ...) != v}
     label = {"label": spec.name} if spec.name != spec.kind else {}
+    options |= changed
     return {"kind": spec.kind, **label, **options} if label or options else spec.kind
 
 
