@@ -68,9 +68,11 @@ def _program() -> str:
 
 def _started(program: str, address: str, profile: Path, *options: str) -> str:
     command = [program, *OPTIONS, f"--user-data-dir={profile}", *options, "--dump-dom", address]
+    # its socket lies in the temporary folder, and the name of a socket has a hundred letters at most
+    environment = {**os.environ, "TMPDIR": "/tmp"}
     ended = subprocess.run(
-        command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120, check=True
-    )
+        command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=120, check=True, env=environment,
+    )  # fmt: skip
     return ended.stdout
 
 
