@@ -82,13 +82,8 @@ def _draw(
     if near and len(near) < len(whole):
         ax.set_ylim(*style.limits(best, *near, np.array([-size, size])))
         panels.note(ax, "coarse levels leave the frame", 0.03)
-    elif panels.explosive(whole):
-        for line in ax.lines:
-            line.set_ydata(style.no_zeros(np.asarray(line.get_ydata(), dtype=np.float64)))
-        style.log_axis(ax, "y", *panels.decades(whole))
-        panels.note(ax, "size, without the sign", 0.11)
     else:
-        ax.set_ylim(*style.limits(*whole, best))
+        panels.fit_values(ax, whole, best)
     style.beside(ax)
 
 

@@ -141,6 +141,17 @@ def stop_at_breakdown(ax: Axes, t: Floats, series: list[Floats]) -> None:
         note(ax, f"ends with the breakdown, of {t[-1]:g} in all", 0.03)
 
 
+def fit_values(ax: Axes, shown: list[Floats], *others: Floats) -> None:
+    """Let an axis hold drawn values; where they grow without bound, draw their sizes on a logarithmic scale."""
+    if explosive(shown):
+        for line in ax.lines:
+            line.set_ydata(style.no_zeros(np.asarray(line.get_ydata(), dtype=np.float64)))
+        style.log_axis(ax, "y", *decades(shown))
+        note(ax, "size, without the sign", 0.11)
+    else:
+        ax.set_ylim(*style.limits(*shown, *others))
+
+
 def explosive(series: list[Floats]) -> bool:
     """Say whether values grow beyond all bounds, so that on a linear scale only the last of them would be seen."""
     sizes = _sizes(series)

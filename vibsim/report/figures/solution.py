@@ -93,13 +93,8 @@ def _draw_solution(
     if 0.0 < size < max(map(data.largest, drawn)) / CUT:
         ax.set_ylim(-CUT * size, CUT * size)
         panels.note(ax, f"cut off at {CUT:g} times the exact solution", 0.11)
-    elif panels.explosive(ranged):
-        for line in ax.lines:
-            line.set_ydata(style.no_zeros(np.asarray(line.get_ydata(), dtype=np.float64)))
-        style.log_axis(ax, "y", *panels.decades(ranged))
-        panels.note(ax, "size, without the sign", 0.11)
     else:
-        ax.set_ylim(*style.limits(*ranged))
+        panels.fit_values(ax, ranged)
     style.beside(ax)
 
 
