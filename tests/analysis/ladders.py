@@ -118,9 +118,12 @@ def shape_in_time(rng: np.random.Generator) -> Floats:
 
 
 def random_truth(rng: np.random.Generator) -> Truth:
-    """Make a ladder: random orders, sizes, floors and shapes in time."""
+    """Make a ladder: random orders, sizes, floors and shapes in time.
+
+    Those of as many levels have the same levels, so that they can be judged together.
+    """
     count = int(rng.integers(3, 8))
-    start = int(rng.integers(3, 9))
+    start = 3 + 5 * count % 6
     levels = tuple(range(start, start + count))
     p = float(rng.integers(1, 5))
     q = p + float(rng.integers(1, 3))
