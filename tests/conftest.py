@@ -15,6 +15,9 @@ sys.dont_write_bytecode = False
 # core of the other worker: with them the tests of the error model cost four times as much.
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
+# No test outlives the machine that it runs on, so that nothing need wait until a file is on its disk: some ms each.
+os.fsync = lambda descriptor: None
+
 
 def pytest_collection_finish() -> None:
     """Let the garbage collector look at what tests make, and at that less often: it took 5 % of all work."""

@@ -18,7 +18,7 @@ from vibsim.experiment.reading import build
 from vibsim.experiment.yaml.parse import parse
 
 QUIET = settings(
-    max_examples=300, deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
+    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
 )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -56,7 +57,7 @@ def test_values_are_read_with_the_digits_that_are_known() -> None:
 def test_what_is_unknown_is_said() -> None:
     record, _ = table(samples.plain())
     bound = record.variables["period_richardson_error"]
-    bound.values[...] = np.nan
+    record.variables["period_richardson_error"] = replace(bound, values=np.nan * bound.values)
     found = best.table(samples.plain().model.definition, record, choice.members(record, "theta"))
     assert found is not None
     assert any("unknown" in row for row in found.text_rows())

@@ -3,7 +3,6 @@ from __future__ import annotations
 import fcntl
 import io
 import json
-import os
 import shutil
 import subprocess
 from collections.abc import Sequence
@@ -115,6 +114,5 @@ def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Place:
 @pytest.fixture
 def place(finished: Place, tmp_path: Path) -> Place:
     """Return a copy of the finished results, at another place."""
-    os.sync()
     shutil.copytree(finished.folder, tmp_path / "copy")
     return Place(tmp_path / "copy")

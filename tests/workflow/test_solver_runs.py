@@ -127,7 +127,7 @@ class Study:
 
 @pytest.fixture(scope="session")
 def made(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Study:
-    """One run of all kinds of solvers, made by the first process that asks."""
+    """One run of all kinds of solvers, made by the first process that asks; of three kinds, their finest levels."""
     base = tmp_path_factory.getbasetemp()
     study = Study((base if worker_id == "master" else base.parent) / "solvers")
     study.folder.mkdir(exist_ok=True)
@@ -142,6 +142,9 @@ def made(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Study:
             (study.folder / "my files/solver_in_a_module.py").write_text(MODULE)
             for h in (0.25, 0.125, 0.0625):
                 (study.folder / f"my files/runs/dt_{h}.csv").write_text(f"u\n{1 + h * h!r}\n")
+            for name, finest in (("command", 2), ("function", 3), ("files", 2)):
+                for level in range(finest):
+                    assert study.make(name, level) == (0, "")
             ended = study.run(*texts, options=("--allow-commands", "--json"))
             (study.folder / "run.json").write_text(ended.stdout)
             (study.folder / "run.err").write_text(ended.stderr)
@@ -152,7 +155,6 @@ def made(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Study:
 @pytest.fixture
 def study(made: Study, tmp_path: Path) -> Study:
     """A copy of the finished run, at another place."""
-    os.sync()
     shutil.copytree(made.folder, tmp_path / "copy")
     return Study(tmp_path / "copy")
 
