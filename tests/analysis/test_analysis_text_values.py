@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from vibsim import Experiment, analyse, simulate, verdicts
-from vibsim.theory.differences import error_fraction
 
 
 def measured(name, quantity, at, w, levels=(0, 1, 2), steps=30, periods=8):
@@ -50,4 +49,3 @@ def test_the_second_difference_of_a_cosine(steps):
     fraction = measured("second_difference_fraction", None, {"level": 0}, 1.3, (0,), steps)
     p = 2 * math.pi / steps
     assert fraction == pytest.approx((2 / p * math.sin(p / 2)) ** 2, rel=1e-12)
-    assert fraction == pytest.approx(float(error_fraction(p)), rel=1e-12)

@@ -7,7 +7,6 @@ import sympy
 from vibsim import theory
 from vibsim.schemes import FIXED_STEP, SCHEMES
 from vibsim.theory import symbolic
-from vibsim.theory.differences import error_fraction
 
 P, X, N = (symbolic.symbol(name) for name in ("p", "x", "n"))
 BEGIN, PUSH, W = (symbolic.symbol(name) for name in ("I", "V", "w"))
@@ -116,15 +115,3 @@ def test_a_solution_is_the_exact_discrete_one(kind):
     n = np.arange(200)
     u, _ = theory.discrete(method, 2.0, 0.25, 1.1, -0.6, n)
     np.testing.assert_allclose(formula(n, 0.5, 1.1, -0.6, 2.0), u, atol=1e-12)
-
-
-def test_the_error_fraction_of_exercise_7():
-    """``[D_t D_t u]^n/u''(t_n)`` of ``u = exp(i w t)``, worked out from the difference."""
-    wave = sympy.exp(sympy.I * P)
-    fraction = (wave - 2 + 1 / wave) / -(P**2)
-    wanted = (2 / P) ** 2 * sympy.sin(P / 2) ** 2
-    assert sympy.simplify((fraction - wanted).rewrite(sympy.exp)) == 0
-    assert wanted.series(P, 0, 5).removeO() == 1 - P**2 / 12 + P**4 / 360
-    numbers = np.array([0.1, 1.3, 3.0])
-    expected = [float(wanted.subs(P, p)) for p in numbers]
-    np.testing.assert_allclose(error_fraction(numbers), expected, rtol=1e-14)

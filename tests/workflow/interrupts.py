@@ -69,6 +69,11 @@ class Stress:
     def results(self) -> Path:
         return self.folder / "results"
 
+    @property
+    def environment(self) -> dict[str, str]:
+        """Return that of a run, which has temporary files of its own."""
+        return {**os.environ, "TMPDIR": str(self.folder / "tmp")}
+
     def command(self, *more: str) -> list[str]:
         file = self.folder / "tiny.yaml"
         file.write_text(TEXT)
@@ -88,7 +93,12 @@ class Stress:
         """Run to the end: nothing that was interrupted may have left a wrong byte."""
         start = time.monotonic()
         ended = subprocess.run(
-            self.command("run"), capture_output=True, text=True, check=False, timeout=600
+            self.command("run"),
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=600,
         )
         self.duration = time.monotonic() - start
         self.counts["whole runs"] += 1
@@ -123,6 +133,7 @@ class Stress:
         name = f"{number}: {kind}, {sent.name} to {target} after {delay:.2f} s"
         with subprocess.Popen(
             command,
+            env=self.environment,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -189,7 +200,6 @@ class Stress:
 def stress(folder: Path, number: int, seed: int, every: int = 25) -> Stress:
     """Interrupt `number` runs; finish one after `every` of them."""
     (folder / "tmp").mkdir()
-    os.environ["TMPDIR"] = str(folder / "tmp")
     # a shell starts what runs in the background with signals ignored, and they would stay so
     for sent in SIGNALS:
         signal.signal(sent, signal.SIG_DFL)

@@ -140,13 +140,8 @@ def order_of_ratio(ratio: Floats, levels: Sequence[float]) -> Floats:
     return np.asarray(np.where(usable, 0.5 * (low + high), np.nan))
 
 
-def difference_ratio(order: Floats | float, h: Floats) -> Floats:
-    """Return the ratio of the two differences of three levels with step sizes `h`, shape (3,), for some orders."""
-    return target_ratio(order, (-np.log2(h)).tolist())
-
-
 def order_of_differences(ratio: Floats, h: Floats) -> Floats:
-    """Solve `difference_ratio` for the order, for any three step sizes."""
+    """Return the order of two differences with such a ratio, of three levels with step sizes `h`, shape (3,)."""
     return order_of_ratio(ratio, (-np.log2(h)).tolist())
 
 

@@ -16,9 +16,6 @@ from vibsim.core.errors import SimulationError
 from vibsim.schemes.base import NumberOption, Options, Scheme, Stepper
 from vibsim.schemes.orders import Orders, same_orders
 
-LEAST_RELATIVE = 100 * 2.0**-52
-"""Relative tolerance that SciPy does not go below, 2.2e-14; a smaller one acts on the absolute tolerance alone."""
-
 TOLERANCE = NumberOption(
     name="tolerance",
     default=1e-10,

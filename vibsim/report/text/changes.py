@@ -36,10 +36,9 @@ def _ends(
     """Yield the first and the last level that would settle the question."""
     if 0 < more <= MOST_LEVELS:
         yield levels[0], levels[-1] + more
-    for name in ("level_needed", "level_as_asked"):
-        finer = facts.get(name) or -1
-        if levels[-1] < finer <= levels[-1] + MOST_LEVELS:
-            yield levels[0], finer
+    finer = facts.get("level_needed") or -1
+    if levels[-1] < finer <= levels[-1] + MOST_LEVELS:
+        yield levels[0], finer
     readable = facts.get("readable_level") or -1
     if reason == "round_off" and WINDOW - 1 <= readable < levels[-1]:
         yield max(readable - WINDOW, 0), readable
