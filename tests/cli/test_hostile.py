@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import os
 import resource
 import subprocess
@@ -34,13 +36,10 @@ def vibsim(*arguments: object) -> subprocess.CompletedProcess[str]:
     return ended
 
 
-def started(
-    *arguments: object, before: Callable[[], None] | None = None, **variables: str
-) -> subprocess.CompletedProcess[str]:
-    """Run a command by an interpreter of its own: where its limits or its environment count."""
+def started(*arguments: object, before: Callable[[], None]) -> subprocess.CompletedProcess[str]:
+    """Run a command by an interpreter of its own: where its limits count."""
     ended = subprocess.run(
         [sys.executable, "-m", "vibsim", *map(str, arguments)],
-        env={**os.environ, **variables},
         capture_output=True,
         text=True,
         check=False,
@@ -139,20 +138,15 @@ def test_an_index_on_a_full_disk(small_disk: Callable[[int], Path]) -> None:
     assert ended.stderr.endswith("No space left on device\n")
 
 
-NO_LOCKS = """
-import fcntl
-def flock(*_):
-    raise OSError({number}, "no locks")
-fcntl.flock = flock
-"""
+@pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP])
+def test_a_file_system_without_locks_is_refused(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    def flock(*_: object) -> None:
+        raise OSError(number, "no locks")
 
-
-@pytest.mark.parametrize("name", ["ENOLCK", "ENOSYS", "EOPNOTSUPP"])
-def test_a_file_system_without_locks_is_refused(file: Path, tmp_path: Path, name: str) -> None:
-    import errno
-
-    (tmp_path / "sitecustomize.py").write_text(NO_LOCKS.format(number=getattr(errno, name)))
-    ended = started("run", file, "--results", tmp_path / "results", PYTHONPATH=str(tmp_path))
+    monkeypatch.setattr(fcntl, "flock", flock)
+    ended = vibsim("run", file, "--results", tmp_path / "results")
     assert ended.returncode == 1
     assert "file system has no file locks (flock)" in ended.stderr
     assert "--results" in ended.stderr
