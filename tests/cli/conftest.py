@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from made_once import change, made_once
 
 from vibsim.cli import main
 
@@ -45,9 +46,7 @@ class Made:
         return main([command, *map(str, arguments), "--results", str(self.results)])
 
     def change(self, old: str, new: str) -> None:
-        text = self.file.read_text()
-        assert old in text
-        self.file.write_text(text.replace(old, new))
+        change(self.file, old, new)
 
     def make(self) -> None:
         assert self.vibsim("simulate", self.file, "--level", 6, 7, 8) == 0
@@ -55,15 +54,17 @@ class Made:
 
 
 @pytest.fixture(scope="session")
-def made_once(tmp_path_factory: pytest.TempPathFactory) -> Made:
-    made = Made(tmp_path_factory.mktemp("made"))
-    made.file.write_text(TEXT)
-    made.make()
-    return made
+def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Made:
+    def make(folder: Path) -> None:
+        made = Made(folder)
+        made.file.write_text(TEXT)
+        made.make()
+
+    return Made(made_once(tmp_path_factory, worker_id, "made", make))
 
 
 @pytest.fixture
-def made(made_once: Made, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Made:
-    shutil.copytree(made_once.folder, tmp_path / "made")
+def made(finished: Made, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Made:
+    shutil.copytree(finished.folder, tmp_path / "made")
     capsys.readouterr()
     return Made(tmp_path / "made")

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import fcntl
-import json
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from made_once import made_once
 
 from .door import vibsim
 
@@ -102,18 +101,13 @@ class Runs:
 
 @pytest.fixture(scope="session")
 def runs(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Runs:
-    """Made by the first process that asks; others wait for it."""
-    base = tmp_path_factory.getbasetemp()
-    shared = base if worker_id == "master" else base.parent
-    folder = shared / "contract runs"
-    folder.mkdir(exist_ok=True)
-    found = Runs(folder)
-    with (shared / "contract.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not (folder / "done").exists():
-            for name, text in FILES.items():
-                found.file(name).write_text(text)
-            found.run("passing", 2, "tiny", "swept")
-            found.run("mixed", 1, "tiny", "failing")
-            (folder / "done").write_text(json.dumps(sorted(FILES)))
-    return found
+    """Made by the first process that asks."""
+
+    def make(folder: Path) -> None:
+        found = Runs(folder)
+        for name, text in FILES.items():
+            found.file(name).write_text(text)
+        found.run("passing", 2, "tiny", "swept")
+        found.run("mixed", 1, "tiny", "failing")
+
+    return Runs(made_once(tmp_path_factory, worker_id, "contract runs", make))

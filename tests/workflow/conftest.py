@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import fcntl
 import io
 import json
 import shutil
@@ -12,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from forked import vibsim
+from made_once import change, made_once
 
 from vibsim.cli import main
 from vibsim.cli.chosen_plans import plans_of
@@ -73,9 +73,7 @@ class Place:
         return {Path(e.path).name for e in changes.changed(plans, self.results, every=False)}
 
     def change(self, old: str, new: str) -> None:
-        text = self.file.read_text()
-        assert old in text
-        self.file.write_text(text.replace(old, new))
+        change(self.file, old, new)
 
     def content(self) -> dict[str, bytes]:
         """Return every result that must come back with the same bytes."""
@@ -95,20 +93,16 @@ def short(job: str) -> str:
 
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Place:
-    """Run the tiny experiment once: the first process that asks does, others wait for it."""
-    base = tmp_path_factory.getbasetemp()
-    shared = base if worker_id == "master" else base.parent
-    place, done = Place(shared / "finished"), shared / "finished.done"
-    with (shared / "finished.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not done.exists():
-            shutil.rmtree(place.folder, ignore_errors=True)
-            place.file.parent.mkdir(parents=True)
-            place.file.write_text(TEXT)
-            ended = place.run()
-            assert ended.returncode == 0, ended.stdout + ended.stderr
-            done.touch()
-    return place
+    """Run the tiny experiment once."""
+
+    def make(folder: Path) -> None:
+        place = Place(folder)
+        place.file.parent.mkdir()
+        place.file.write_text(TEXT)
+        ended = place.run()
+        assert ended.returncode == 0, ended.stdout + ended.stderr
+
+    return Place(made_once(tmp_path_factory, worker_id, "finished", make))
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import fcntl
 import json
 import os
 import shutil
@@ -17,6 +16,7 @@ import jsonschema
 import netCDF4
 import pytest
 from forked import vibsim
+from made_once import made_once
 
 from vibsim.cli import main
 
@@ -127,29 +127,24 @@ class Study:
 
 @pytest.fixture(scope="session")
 def made(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Study:
-    """One run of all kinds of solvers, made by the first process that asks; of three kinds, their finest levels."""
-    base = tmp_path_factory.getbasetemp()
-    study = Study((base if worker_id == "master" else base.parent) / "solvers")
-    study.folder.mkdir(exist_ok=True)
-    with (study.folder / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not (study.folder / "run.json").exists():
-            (study.folder / "my files/runs").mkdir(parents=True)
-            texts = {"command": COMMAND, "function": FUNCTION, "files": FILES, "broken": BROKEN}
-            for name, text in texts.items():
-                study.write(name, text)
-            (study.folder / "my files/solver.py").write_text(SOLVER)
-            (study.folder / "my files/solver_in_a_module.py").write_text(MODULE)
-            for h in (0.25, 0.125, 0.0625):
-                (study.folder / f"my files/runs/dt_{h}.csv").write_text(f"u\n{1 + h * h!r}\n")
-            for name, finest in (("command", 2), ("function", 3), ("files", 2)):
-                for level in range(finest):
-                    assert study.make(name, level) == (0, "")
-            ended = study.run(*texts, options=("--allow-commands", "--json"))
-            (study.folder / "run.json").write_text(ended.stdout)
-            (study.folder / "run.err").write_text(ended.stderr)
-            (study.folder / "exit").write_text(str(ended.returncode))
-    return study
+    """One run of all kinds of solvers."""
+
+    def make(folder: Path) -> None:
+        study = Study(folder)
+        (folder / "my files/runs").mkdir(parents=True)
+        texts = {"command": COMMAND, "function": FUNCTION, "files": FILES, "broken": BROKEN}
+        for name, text in texts.items():
+            study.write(name, text)
+        (folder / "my files/solver.py").write_text(SOLVER)
+        (folder / "my files/solver_in_a_module.py").write_text(MODULE)
+        for h in (0.25, 0.125, 0.0625):
+            (folder / f"my files/runs/dt_{h}.csv").write_text(f"u\n{1 + h * h!r}\n")
+        ended = study.run(*texts, options=("--allow-commands", "--json"))
+        (folder / "run.json").write_text(ended.stdout)
+        (folder / "run.err").write_text(ended.stderr)
+        (folder / "exit").write_text(str(ended.returncode))
+
+    return Study(made_once(tmp_path_factory, worker_id, "solvers", make))
 
 
 @pytest.fixture
