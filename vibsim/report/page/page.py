@@ -20,8 +20,9 @@ from vibsim.report.figures import drawing, gallery, thumbnail
 from vibsim.report.page import cards, hero, player
 from vibsim.report.style import Picture
 from vibsim.report.tables import best, checks, degrees, levels, members, published, theory, work
+from vibsim.report.tables.latex import to_latex
 from vibsim.report.tables.scales import table as scales_table
-from vibsim.report.tables.table import Table, to_csv, to_latex
+from vibsim.report.tables.table import Table, to_csv
 from vibsim.report.text import equation, experiment_file, glossary, setting, words
 from vibsim.report.types import Environment, Experiment, Plan
 
