@@ -226,5 +226,12 @@ def test_the_page_the_table_and_the_index_name_the_figures(tmp_path) -> None:
         ("a text, figure 1", [("theta", "pendulum_lab/theta/report.html#phase_plane_0")]),
         ("a text, figure 12", [("theta", "pendulum_lab/theta/report.html#player")]),
     ]
+    rows = "figure,shows,place\nfigure 10,path,a\nfigure 2,path,b\nfigure 2,path,c\n,path,d\nfigure 3,path,\n"
+    (folder / source_figures.FILE).write_text(rows)
+    found = source_figures.listed(tmp_path, [folder])
+    assert [(figure, [p.link[-2:] for p in places]) for figure, places in found] == [
+        ("figure 2", ["#b"]),
+        ("figure 10", ["#a"]),
+    ]
     (folder / source_figures.FILE).write_bytes(b"\xff\x00")
     assert source_figures.listed(tmp_path, [folder]) == []

@@ -45,10 +45,11 @@ def listed(results: Path, folders: Iterable[Path]) -> list[tuple[str, list[Place
         page = quote((folder / PAGE).relative_to(results).as_posix())
         for row in rows:
             figure, shows, place = (row.get(name) or "" for name in HEADERS)
-            if figure and place:
-                link = f"{page}#{quote(place)}"
-                found.setdefault(figure, []).append(Place(folder.name, shows, link))
-    return sorted(found.items(), key=lambda item: _order(item[0]))
+            places = found.setdefault(figure, [])
+            # of several pictures the first one has the link
+            if place and (folder.name, shows) not in {(p.name, p.shows) for p in places}:
+                places.append(Place(folder.name, shows, f"{page}#{quote(place)}"))
+    return sorted(((f, p) for f, p in found.items() if f and p), key=lambda row: _order(row[0]))
 
 
 def _order(figure: str) -> list[tuple[int, str]]:
