@@ -139,6 +139,21 @@ def test_members_are_divided_into_figures_and_panels() -> None:
     assert line == pytest.approx(3.0 * t)
 
 
+def test_what_is_left_out_is_said() -> None:
+    figure = {"shows": "over_time", "quantities": ["energy_deviation"]}
+    ((_, [picture]),), _ = drawn(spring(figure, levels=[5, 6]))
+    assert "are drawn" not in picture.caption
+    # its exact value is zero, which is no measure for what leaves the frame
+    assert np.isfinite(lines(picture)[0][-1][2]).all()
+    ((_, [picture]),), _ = drawn(
+        spring({"shows": "over_time"}, sweep={"model.w": {"linspace": [1, 2, 9]}}, levels=[5, 6])
+    )
+    assert "7 runs in a panel" in picture.caption
+    names = [name for name, *_ in lines(picture)[0]]
+    assert len(names) == 7
+    assert names[-1] == "model.w = 2 rad s⁻¹"
+
+
 def test_a_velocity_that_jumps_has_gaps_and_the_position_none() -> None:
     exp = samples.experiment(
         model={"kind": "bouncing_ball"}, initial={"h": 1.0}, time={"end": 8.0}, levels=[5, 6], schemes=["rk4"],

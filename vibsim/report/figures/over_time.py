@@ -30,6 +30,8 @@ SMOOTH = 700  # points of an exact solution: with its gaps so few that none is t
 FEW = 90  # points of a run up to which each has a marker
 LEAVES_FRAME = 8.0
 """What is beyond so many times the exact solution leaves the frame."""
+SEEN = 0.2
+"""Only runs that stay within the frame for so much of the time leave it at all."""
 PALE = "#b0b0b0"  # colour of the exact solution
 SUBTLE: dict[str, Any] = {"linestyle": (0, (5, 2)), "linewidth": 1.2, "zorder": 1.5}
 """The look of further curves."""
@@ -87,8 +89,12 @@ def _picture(
     shown = _panels(experiment, record, asked, members)
     tall = 2.2 if len(shown) < 4 else 1.6
     axes = panels.stacked([tall] * len(shown), style.TIME)
+    ends = [
+        float(data.times(record, member.case)[-1]) for panel in shown for _, member in panel.runs
+    ]
+    end = max(ends) if asked.until is None else min(asked.until, max(ends))
     for ax, panel in zip(axes, shown, strict=True):
-        if not _draw(ax, experiment, record, asked, panel):
+        if not _draw(ax, experiment, record, asked, panel, end):
             return None
     axes[-1].set_xlabel(data.time_label(record))
     letters = ", ".join(dict.fromkeys(words.symbol(panel.quantity) for panel in shown))
@@ -100,10 +106,23 @@ def _picture(
         style.sentences(
             f"Wide and grey: the exact solution{'' if is_known else ', or its reference'}, where it is known.",
             f"Markers are steps. What grows beyond {LEAVES_FRAME:g} times the exact solution leaves the frame.",
+            f"At most {MOST} figures and {MOST} panels are drawn, and {style.MANY} runs in a panel."
+            if _is_thinned(record, asked, members)
+            else "",
         ),
         f"{letters} against time, {len(shown)} {'panel' if len(shown) == 1 else 'panels'}",
         axes[0].get_figure(root=True),
     )
+
+
+def _is_thinned(record: Record, asked: FigureOfSource, members: list[Member]) -> bool:
+    """Say whether figures, panels or runs are left out."""
+    is_by_level = asked.panels == LEVEL
+    figures = _divided(record, data.everyone(record), asked.each)
+    groups = _divided(record, members, None if is_by_level else asked.panels)
+    levels = data.whole(record, "level") if is_by_level else []
+    runs = max(len(group) for _, group in groups)
+    return max(len(figures), len(groups), len(levels)) > MOST or runs > style.MANY
 
 
 def _panels(
@@ -144,7 +163,8 @@ def _named(
     keys = [data.swept_label(record, name)[0] for name in data.swept(record)]
     own = [] if MEMBER in divided else [key for key in keys if key not in divided]
     found = []
-    for member in members[: style.MANY]:
+    for i in style.spaced(len(members), style.MANY):
+        member = members[i]
         parts = [member.scheme_name] if several else []
         parts += [data.case_name(record, member.case, key) for key in own]
         found.append((", ".join(parts) or member.scheme_name, member))
@@ -152,13 +172,11 @@ def _named(
 
 
 def _draw(
-    ax: Axes, experiment: Experiment, record: Record, asked: FigureOfSource, panel: _Panel
-) -> bool:
-    """Draw a panel; return whether its quantity is known."""
+    ax: Axes, experiment: Experiment, record: Record, asked: FigureOfSource, panel: _Panel, end: float
+) -> bool:  # fmt: skip
+    """Draw a panel up to the time `end`; return whether its quantity is known."""
     model = experiment.model.definition
     first = panel.runs[0][1]
-    t = data.times(record, first.case)
-    end = float(t[-1]) if asked.until is None else min(asked.until, float(t[-1]))
     exact: list[Floats] = []
     if len({member.case for _, member in panel.runs}) == 1:
         fine, best = _exact(experiment, record, panel.quantity, first, end)
@@ -174,8 +192,10 @@ def _draw(
             return False
         there = t <= end * (1.0 + 1e-12)
         t, found = t[there], found[there]
-        if size > 0.0:
-            found = np.where(np.abs(found) <= LEAVES_FRAME * size, found, np.nan)
+        within = np.abs(found) <= LEAVES_FRAME * size
+        # an exact solution of zero is no measure
+        if within.mean() >= SEEN:
+            found = np.where(within, found, np.nan)
         ax.plot(*style.thin(t, found), label=style.entry(text), **_look(k, t.size, jumps))
         drawn.append(found)
     fine = np.linspace(float(t[0]), end, SMOOTH)
@@ -210,7 +230,7 @@ def _exact(
 ) -> tuple[Floats, Floats]:
     """Return the exact solution up to a time, at times of its own; at the common ones where only these are known."""
     t = data.times(record, member.case)
-    fine = np.linspace(float(t[0]), end, SMOOTH)
+    fine = np.linspace(float(t[0]), min(end, float(t[-1])), SMOOTH)
     best = series.exact(experiment, record, quantity, member, fine)
     if best is None or not np.isfinite(best).any():
         there = t <= end * (1.0 + 1e-12)
