@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from vibsim.core.errors import InputError
 from vibsim.experiment import Experiment
 from vibsim.experiment.experiment import canonical, restore
+from vibsim.experiment.schema.figures import KINDS, OVER_TIME
 from vibsim.plan.build import build as build_plan
 
 SERIES = {"source": "a text, figure 1", "shows": "over_time"}
@@ -78,3 +81,11 @@ def test_what_an_experiment_has_not_is_refused(
     assert fault.key == f"figures{key}"
     assert rule in fault.rule
     assert hint in fault.hint
+
+
+def test_the_documentation_names_everything_that_a_figure_may_show() -> None:
+    text = (Path(__file__).parents[2] / "docs/experiment-file.md").read_text(encoding="utf-8")
+    section = text.partition("\n## figures\n")[2].partition("\n## ")[0]
+    assert [name for name in (*KINDS, *OVER_TIME) if f"`{name}`" not in section] == []
+    found = yaml.safe_load(section.partition("```yaml\n")[2].partition("```")[0])
+    Experiment.from_dict({"title": "Figures"} | found, name="figures", collection="tests")
