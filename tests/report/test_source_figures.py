@@ -170,6 +170,21 @@ def test_a_velocity_that_jumps_has_gaps_and_the_position_none() -> None:
     assert all(line.get_linestyle() == "None" for line in picture.figure.axes[0].lines[1:])
 
 
+def test_the_frequency_found_in_a_solution_is_that_of_the_scheme() -> None:
+    exp = spring({"shows": "local_frequency"}, levels=[6, 7], time={"end": 20.0})
+    ((_, [picture]),), _ = drawn(exp)
+    frequency, amplitude = lines(picture)
+    for k, steps in enumerate((64, 128)):
+        name, number, found = frequency[k]
+        dt = 20.0 / steps
+        assert name == f"dt = {dt:g} s"
+        assert number[0] == 1.0
+        assert found == pytest.approx(2.0 / dt * np.arcsin(dt), rel=3e-3)
+    assert frequency[-1][2] == pytest.approx(2.0)
+    assert amplitude[-1][2] == pytest.approx(1.0)
+    assert picture.figure.axes[0].get_ylabel() == "angular frequency [rad s⁻¹]"
+
+
 def test_the_frequency_lies_on_its_formula_and_the_series_touches_it() -> None:
     exp = spring(
         {"shows": "frequency"},

@@ -10,8 +10,8 @@ from pydantic import AfterValidator, Field
 from vibsim.experiment.schema.fields import MAX_ENTRIES, FrozenDict, Positive, Section, Text, short
 
 Shows = Literal[
-    "over_time", "phase_plane", "path", "peaks", "growth", "frequency", "second_difference", "differences",
-    "energy_error", "grids", "spring", "player",
+    "over_time", "phase_plane", "path", "peaks", "local_frequency", "growth", "frequency", "second_difference",
+    "differences", "energy_error", "grids", "spring", "player",
 ]  # fmt: skip
 KINDS: tuple[str, ...] = get_args(Shows)
 OVER_TIME = ("quantities", "panels", "each", "until", "beside")

@@ -11,6 +11,7 @@ from vibsim.report import choice, data
 from vibsim.report.figures import (
     accuracy,
     extrema,
+    local_frequency,
     model_curves,
     over_time,
     plane,
@@ -42,6 +43,7 @@ DRAWN: Mapping[str, Draw] = {
     "phase_plane": lambda e, r, _: plane.phase(e, r, data.everyone(r)),
     "path": lambda e, r, _: plane.path(e, r, data.everyone(r)),
     "peaks": lambda e, r, _: extrema.local(e, r, data.everyone(r)),
+    "local_frequency": lambda e, r, _: local_frequency.local_frequency(e, r),
     "growth": lambda e, r, _: theory.growing(e, r),
     "frequency": lambda e, r, _: accuracy.frequency(e, r),
     "second_difference": lambda e, r, _: accuracy.second_difference(r),
