@@ -15,7 +15,8 @@ from vibsim.analysis import analyse_records
 from vibsim.core.record import Record
 from vibsim.report import choice
 from vibsim.report.tables import best
-from vibsim.report.tables.table import to_csv, to_latex
+from vibsim.report.tables.latex import to_latex
+from vibsim.report.tables.table import to_csv
 from vibsim.simulation import simulate_record
 
 

@@ -105,7 +105,8 @@ slider.dispatchEvent(new Event("input"));
 
 
 @pytest.mark.parametrize(
-    "name", ["dragged", "elastic_pendulum", "vehicle", "sliding_box", "washing_machine"]
+    "name",
+    ["dragged", "elastic_pendulum", "vehicle", "sliding_box", "washing_machine", "oscillator"],
 )
 def test_the_script_draws_what_the_still_picture_draws(tmp_path, name):
     exp, record = made(name)

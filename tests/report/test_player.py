@@ -36,6 +36,10 @@ MODELS = {
     "washing_machine": ({"kind": "washing_machine"}, {"u": 0.1}),
     "spring": ({"kind": "spring"}, {"u": 1.0}),
     "duffing": ({"kind": "duffing"}, {"u": 1.0}),
+    "oscillator": (
+        {"kind": "oscillator", "damping": {"linear": 0.2}, "force": "2*cos(3*t)"},
+        {"u": 1.0},
+    ),
 }
 
 
@@ -203,3 +207,20 @@ def test_data_cannot_end_its_script(monkeypatch):
     text = element(exp, record)
     assert text.count("</script>") == 2
     assert data(text)["unit"] == "</script><b>"
+
+
+def test_a_body_on_a_spring_has_its_dashpot_and_its_force_where_it_has_any():
+    exp, record = made("oscillator")
+    lane = player.lanes(exp, record)[0]
+    arrow = next(part for part in lane.scene.parts if part.shape == "arrow")
+    ratio = arrow.at[2] / np.cos(3.0 * lane.motion.t)
+    assert ratio == pytest.approx(scenes.FORCE, rel=1e-6)
+    body = next(part for part in lane.scene.parts if part.look == "body")
+    rod = [part for part in lane.scene.parts if part.shape == "line"][-1]
+    assert rod.at[2] == pytest.approx(body.at[0] - 18.0)
+    assert ("pull", "driving force") in lane.scene.legend
+    exp, record = made("spring")
+    shapes = [part.shape for part in player.lanes(exp, record)[0].scene.parts]
+    assert shapes.count("spring") == 1
+    assert "arrow" not in shapes
+    assert shapes.count("box") == 1

@@ -1,4 +1,4 @@
-"""Tables: digits for reading, every digit for computing, nothing that LaTeX or HTML would take for a command."""
+"""Tables: digits for reading, every digit for computing, nothing that HTML would take for a command."""
 
 from __future__ import annotations
 
@@ -42,32 +42,6 @@ def test_norms_of_a_column_have_a_power_of_ten_where_one_needs_it():
 def test_a_row_of_the_wrong_length_is_refused():
     with pytest.raises(ValueError, match="3 cells"):
         _table(("a", 1.0))
-
-
-def test_latex_is_booktabs_and_escaped():
-    text = table.to_latex(_table((r"a_b & \input{x} 50% #1 $x^2~", 1.5e-12, 2.0)))
-    assert r"\toprule" in text
-    assert r"\caption{Orders of 100 \% \& more}" in text
-    assert (
-        r"a\_b \& \textbackslash{}input\{x\} 50\% \#1 \$x\textasciicircum{}2\textasciitilde{}"
-        in text
-    )
-    assert r"1.500$\cdot$10$^{-12}$" in text
-    assert r"\begin{tabular}{lrr}" in text
-
-
-@given(st.text())
-def test_latex_escapes_every_special_character(text):
-    bare = table.escape(text)
-    for token in table._SPECIAL.values():
-        bare = bare.replace(token, "")
-    assert not set("&%#_~^\\") & set(_without_powers(bare))
-
-
-def _without_powers(text):
-    import re
-
-    return re.sub(r"\$\^\{-?[-0-9]*\}\$", "", text)
 
 
 @pytest.mark.parametrize(

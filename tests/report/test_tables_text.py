@@ -8,7 +8,8 @@ import re
 
 import pytest
 
-from vibsim.report.tables.table import Cell, Column, Table, to_csv, to_latex
+from vibsim.report.tables.latex import to_latex
+from vibsim.report.tables.table import Cell, Column, Table, to_csv
 
 FORMULAS = [
     "=1+1",

@@ -26,6 +26,7 @@ from vibsim.experiment.schema.fields import (
     Section,
     Text,
 )
+from vibsim.experiment.schema.figures import FigureOfSource
 from vibsim.experiment.schema.published import PublishedTable
 from vibsim.experiment.schema.sweep import Axis
 from vibsim.models import MODELS, Model, centred, natural_end, quantities
@@ -218,6 +219,8 @@ class ExperimentSpec(Section):
     """As written, and behind them one claim for every row of `published`."""
     published: tuple[PublishedTable, ...] = ()
     """Tables of numbers that a source printed."""
+    figures: tuple[FigureOfSource, ...] = ()
+    """Figures that a source shows, which the page draws."""
     units: Annotated[dict[str, str], AfterValidator(FrozenDict)] = FrozenDict()
     """Units that the file defines, in SI base units; every number is converted already."""
     scaling: Scaling | None = None

@@ -21,6 +21,7 @@ from vibsim.experiment.schema.checks import (
 )
 from vibsim.experiment.schema.document import Levels
 from vibsim.experiment.schema.fields import FrozenDict
+from vibsim.experiment.schema.figures import LEVEL, FigureOfSource
 from vibsim.experiment.schema.published import PublishedTable, claims
 from vibsim.experiment.schema.sweep import as_option
 from vibsim.experiment.sweep_columns import columns
@@ -69,6 +70,7 @@ def alone(experiment: AnyExperiment, case: int) -> AnyExperiment:
             "sweep": None,
             "checks": tuple(checks),
             "published": published,
+            "figures": tuple(_figure_of_member(figure) for figure in experiment.figures),
         }
     )
     return update_tables(found)
@@ -95,6 +97,12 @@ def _published_of(
         if rows:
             found.append(table.model_copy(update={"rows": rows}))
     return tuple(found)
+
+
+def _figure_of_member(figure: FigureOfSource) -> FigureOfSource:
+    """Leave out what a figure divides by members."""
+    divided = None if figure.panels != LEVEL else LEVEL
+    return figure.model_copy(update={"panels": divided, "each": None})
 
 
 def _of_member(check: Check, unit: float) -> Check:

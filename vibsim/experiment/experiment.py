@@ -115,12 +115,12 @@ def canonical(experiment: Experiment) -> dict[str, Any]:
 
     The sections stand apart, so that a digest can take those that a job uses: ``collection``, ``name``, ``title``,
     ``source``, ``model``, ``initial``, ``time``, ``levels``, ``schemes``, ``sweep``, ``samples``, ``output``,
-    ``tolerance``, ``checks``, and ``published``, ``units`` and ``scaling`` where there is any.
+    ``tolerance``, ``checks``, and ``published``, ``figures``, ``units`` and ``scaling`` where there is any.
     """
     data = experiment.model_dump(mode="json", exclude={"checks"})
     data["sweep"] = data["sweep"] and data["sweep"]["axes"]
     data["checks"] = [_with_kind(check) for check in experiment.checks]
-    for name in ("published", "units", "scaling"):
+    for name in ("published", "figures", "units", "scaling"):
         if not getattr(experiment, name):
             del data[name]
     if not experiment.model.tables:

@@ -17,6 +17,7 @@ from vibsim.experiment.kinds import Kinds
 from vibsim.experiment.rules import members, size_limits, timing
 from vibsim.experiment.rules import schemes as scheme_rules
 from vibsim.experiment.rules.checks import check_published, finish_checks
+from vibsim.experiment.rules.figures import check_figures
 from vibsim.experiment.rules.levels import rising_levels
 from vibsim.experiment.rules.model import equation as read_equation
 from vibsim.experiment.rules.scaling import Numbers, characteristic
@@ -168,6 +169,7 @@ def build(
     size_limits.check(setting, report)
     _check_output(document, model, levels, report)
     checks = _checks(document, setting, report)
+    check_figures(document.figures, setting, report)
     report.raise_any()
     assert model is not None
     assert numbers.time is not None
@@ -193,6 +195,7 @@ def build(
         tolerance=document.tolerance,
         checks=checks,
         published=document.published,
+        figures=document.figures,
         units=document.units,
         scaling=numbers.scaling,
     )

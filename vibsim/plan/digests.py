@@ -14,18 +14,18 @@ if TYPE_CHECKING:
 
 def simulated(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return the part of an experiment in normal form that every member shares."""
-    other = "title source checks levels samples sweep output tolerance published units"
+    other = "title source checks levels samples sweep output tolerance published figures units"
     return _without(content, other)
 
 
 def extrapolated(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return the part of an experiment in normal form that an extrapolation depends on and tells of."""
-    return _without(content, "title source checks published units")
+    return _without(content, "title source checks published figures units")
 
 
 def analysed(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return the part of an experiment in normal form that an analysis depends on and tells of."""
-    return _without(content, "title source output units")
+    return _without(content, "title source output figures units")
 
 
 def solved(experiment: SolverExperiment, level: int, member: int) -> dict[str, Any]:

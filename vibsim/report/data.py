@@ -178,13 +178,14 @@ def swept_label(record: Record, name: str) -> tuple[str, str]:
     return str(record.coords[name].attrs["sweep_key"]), unit(record, name)
 
 
-def case_name(record: Record, case: int) -> str:
-    """Name a member by its swept values; empty without a sweep."""
+def case_name(record: Record, case: int, of: str | None = None) -> str:
+    """Name a member by its swept values, or by that of one key; empty without a sweep."""
     parts = []
     for name in swept(record):
         (key, measure), value = swept_label(record, name), pick(record, name, case=case).item()
         text = f"{value:.6g}" if isinstance(value, float) else str(value)
-        parts.append(f"{key} = {text} {measure}".strip())
+        if of in (None, key):
+            parts.append(f"{key} = {text} {measure}".strip())
     return ", ".join(parts)
 
 

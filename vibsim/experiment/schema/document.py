@@ -27,6 +27,7 @@ from vibsim.experiment.schema.fields import (
     tag,
     tagged,
 )
+from vibsim.experiment.schema.figures import FigureOfSource
 from vibsim.experiment.schema.model_and_schemes import model_section, scheme_section
 from vibsim.experiment.schema.published import PublishedTable
 from vibsim.experiment.schema.sweep import SweepSection, swept_options
@@ -186,6 +187,8 @@ class Document(Section):
     """What must come out; when left out, that the position converges as the scheme promises."""
     published: Annotated[tuple[PublishedTable, ...], short(MAX_ENTRIES)] = ()
     """Tables that a source printed: every row is a claim, shown beside our number."""
+    figures: Annotated[tuple[FigureOfSource, ...], short(MAX_ENTRIES)] = ()
+    """Figures that a source shows: each is drawn on the page under its number there."""
 
 
 class _Generator(GenerateJsonSchema):

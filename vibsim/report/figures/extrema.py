@@ -36,18 +36,18 @@ def local(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     if "peak_time" not in record or not shown:
         return None
     case = shown[0].case
-    runs = _runs(record, [member for member in shown if member.case == case])
+    runs = runs_of(record, [member for member in shown if member.case == case])
     if not runs:
         return None
     axes = stacked([2.1, 2.1, 2.1])
     exact = float(data.exact_periods(record)[case])
     start = first_peak(experiment, record, case, exact)
-    looks = _looks(runs)
+    looks = looks_of(runs)
     each = [
         _draw(axes, record, run, look, exact, start) for run, look in zip(runs, looks, strict=True)
     ]
     drawn = list(zip(*each, strict=True))
-    size = _amplitude(experiment, record, case)
+    size = exact_amplitude(experiment, record, case)
     for ax, value in zip(axes, (exact, size, 0.0), strict=True):
         if math.isfinite(value):
             ax.axhline(value, label="exact" if ax is axes[0] else "", **style.REFERENCE)
@@ -81,7 +81,7 @@ def local(experiment: Experiment, record: Record, shown: list[Member]) -> Pictur
     )
 
 
-def _runs(record: Record, members: list[Member]) -> list[Run]:
+def runs_of(record: Record, members: list[Member]) -> list[Run]:
     """Choose the curves: of one or two schemes several levels, of more schemes the coarsest level."""
     levels = whole(record, "level")
     each = max(1, min(len(levels), 4, MOST_CURVES // max(1, len(members))))
@@ -95,7 +95,7 @@ def _runs(record: Record, members: list[Member]) -> list[Run]:
     return found
 
 
-def _looks(runs: list[Run]) -> list[dict[str, Any]]:
+def looks_of(runs: list[Run]) -> list[dict[str, Any]]:
     """Return the look of each run: of several schemes a colour is a scheme, and dashes and marker are a level."""
     levels = sorted({level for _, _, level in runs})
     if len({member.scheme for _, member, _ in runs}) == 1:
@@ -191,7 +191,7 @@ def _start(experiment: Experiment, record: Record, case: int) -> tuple[float, fl
     return u, v
 
 
-def _amplitude(experiment: Experiment, record: Record, case: int) -> float:
+def exact_amplitude(experiment: Experiment, record: Record, case: int) -> float:
     """Return the exact amplitude where it is known: of a linear model, or of a start at rest."""
     u, v = _start(experiment, record, case)
     if v == 0.0:

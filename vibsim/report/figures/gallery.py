@@ -67,7 +67,7 @@ def tab(label: str, drawn: Iterable[Picture | None]) -> list[Tab]:
 def pictures(
     experiment: Experiment, record: Record, shown: list[Member], lead: Lead, first: Sequence[str]
 ) -> Gallery:
-    """Return the figures of a report, those left out that the first screen has; `first` names these."""
+    """Return the figures of a report, those left out that stand above already; `first` names these."""
     found = choice.quantities(experiment, record)
     cases = sorted({member.case for member in shown}, key=lambda case: case != lead.member.case)
     has_series, has_pairs = not data.is_lean(record), bool(data.whole(record, "pair"))
@@ -122,7 +122,15 @@ def pictures(
         tabs += tab("work", [work.precision(experiment, record, case) for case in cases[:1]])
     tabs += [one for quantity in found if quantity != lead.quantity for one in of(quantity)]
     shown_below = (picture for picture in moving if picture and picture.name not in first)
-    return Gallery(tuple(shown_below), tuple(tabs), tuple(over_members(experiment, record, found)))
+    belief = tuple(
+        one for one in (_without(found_tab, first) for found_tab in tabs) if one.pictures
+    )
+    return Gallery(tuple(shown_below), belief, tuple(over_members(experiment, record, found)))
+
+
+def _without(tab: Tab, names: Sequence[str]) -> Tab:
+    """Return a tab without pictures that stand elsewhere."""
+    return Tab(tab.label, tuple(one for one in tab.pictures if one.name not in names))
 
 
 def over_members(experiment: Experiment, record: Record, found: list[str]) -> list[Tab]:

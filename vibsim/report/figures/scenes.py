@@ -19,12 +19,15 @@ import numpy as np
 from vibsim.core.array_types import Floats
 from vibsim.formula import parse, values
 from vibsim.models import Model
+from vibsim.models.base import Formula
 
 WIDTH, HEIGHT = 320.0, 220.0
 WEIGHT = 0.45  # length of an arrow as long as the weight, over that of the wire
 MAGNIFIED = 5.0  # how much larger than other forces the drag is drawn
 LONGEST = 1.3  # longest arrow over the length of the wire
 REACH = 92.0  # pixels of the largest displacement of a body on a spring
+FORCE = 60.0  # pixels of the largest driving force
+CYLINDER = 26.0  # length of that of a dashpot [pixel]
 COILS = 9  # turns of a spring
 AROUND = 1.2  # seen part of a road over the reach of the body, in its height
 
@@ -47,7 +50,11 @@ class Motion:
     def output(self, name: str) -> Floats:
         """Return the series of an output of the model, shape (t,)."""
         formula = next(row.formula for row in self.model.outputs if row.name == name)
-        numbers = {"t": self.t, **self.states, **self.parameters}
+        return self.value(formula)
+
+    def value(self, formula: Formula, **instead: float) -> Floats:
+        """Return the series of a formula of the model, shape (t,), with other values for some of its names."""
+        numbers = {"t": self.t, **self.states, **self.parameters, **instead}
         expression = parse(formula, tuple(numbers)) if isinstance(formula, str) else formula
         return np.broadcast_to(values(expression, numbers), self.t.shape)
 
@@ -197,8 +204,36 @@ def bouncing_ball(motion: Motion) -> Scene:
 
 
 def spring_mass(motion: Motion) -> Scene:
-    """Draw a body that moves to and fro, held by a spring."""
-    return Scene(tuple(_on_spring(motion, "wheel", 18.0)))
+    """Draw a body that moves to and fro, held by a spring, with its dashpot and the force on it where it has any."""
+    half, model = 18.0, motion.model
+    parts = _on_spring(motion, "wheel", half)
+    *_, middle = (part for part in parts if part.look == "body")
+    x, y = middle.at[0], middle.at[1]
+    if model.dissipation is not None:
+        spring = next(part for part in parts if part.shape == "spring")
+        parts[parts.index(spring)] = Part("spring", "wire", (22.0, y - 9.0, x - half, y - 9.0))
+        parts += _dashpot(22.0, x - half, y + 9.0)
+    legend = []
+    if model.driving is not None:
+        # its power is the force times the velocity
+        force = motion.value(model.driving, **{model.velocity: 1.0})
+        largest = max(float(np.max(np.abs(force))), 1e-300)
+        parts.append(Part("arrow", "pull", (x, y, FORCE * force / largest, 0.0)))
+        legend.append(("pull", "driving force"))
+    return Scene(tuple(parts), tuple(legend))
+
+
+def _dashpot(x0: float, x1: Floats | float, y: Floats | float) -> list[Part]:
+    """Return a cylinder held at `x0`, and the piston of what stands at `x1`, both along with its motion."""
+    gap = x1 - x0
+    cylinder, piston = x0 + 0.5 * gap, x0 + 0.55 * gap
+    half = 0.5 * CYLINDER
+    return [
+        Part("line", "wire", (x0, y, cylinder - half, y)),
+        Part("box", "wire", (cylinder, y, CYLINDER, 12.0)),
+        Part("box", "wire", (piston, y, 2.0, 8.0)),
+        Part("line", "wire", (piston, y, x1, y)),
+    ]
 
 
 def sliding_box(motion: Motion) -> Scene:

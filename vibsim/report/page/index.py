@@ -14,7 +14,7 @@ from vibsim import store
 from vibsim.core.errors import FileError
 from vibsim.core.vocabulary import SEVERITY, worst
 from vibsim.experiment.collection import ADHOC
-from vibsim.report.page import history
+from vibsim.report.page import history, source_figures
 from vibsim.report.page.page import environment, markup
 from vibsim.report.tables.checks import error_of, measured_order, number_of
 from vibsim.report.tables.table import Column, Table, to_csv
@@ -120,6 +120,7 @@ def write_index(results: Path) -> None:
         "filters": [(tag, word, tags.count(tag)) for tag, word in FILTERS],
         "own": [row for row in rows if row.collection == ADHOC],
         "shipped": [(key, list(group)) for key, group in groupby(shipped, lambda r: r.collection)],
+        "figures": source_figures.listed(results, sorted(folders)),
         "history": history.FILE,
         "script": markup(_script()),
         "script_digest": history.digest_of(_script()),

@@ -16,12 +16,13 @@ from vibsim.core.record import Record
 from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.experiment.collection import ADHOC, ENDINGS
 from vibsim.report import choice, data, lead, style
-from vibsim.report.figures import drawing, gallery, thumbnail
+from vibsim.report.figures import drawing, gallery, of_source, thumbnail
 from vibsim.report.page import cards, hero, player
 from vibsim.report.style import Picture
 from vibsim.report.tables import best, checks, degrees, levels, members, published, theory, work
+from vibsim.report.tables.latex import to_latex
 from vibsim.report.tables.scales import table as scales_table
-from vibsim.report.tables.table import Table, to_csv, to_latex
+from vibsim.report.tables.table import Table, to_csv
 from vibsim.report.text import equation, experiment_file, glossary, setting, words
 from vibsim.report.types import Environment, Experiment, Plan
 
@@ -80,9 +81,15 @@ def write(
     drawn = _Drawn(formats)
     with style.applied():
         first = [drawn.add(one) for one in hero.pictures(experiment, convergence, decisive)]
-        names = [picture.name for picture, _ in first]
+        sources = of_source.pictures(experiment, convergence, decisive)
+        sourced = [drawn.add(picture) for _, found in sources for picture in found]
+        names = [picture.name for picture, _ in (*first, *sourced)]
         below = gallery.pictures(experiment, convergence, shown, decisive, names)
-        drawings = {"hero": first, "motion": [drawn.add(picture) for picture in below.motion]}
+        drawings = {
+            "hero": first,
+            "source": sourced,
+            "motion": [drawn.add(picture) for picture in below.motion],
+        }
         tabs = {
             "belief": drawn.tabs(below.belief, FIGURES),
             "members": drawn.tabs(below.members, FIGURES),
@@ -94,7 +101,7 @@ def write(
     printed = published.tables(experiment, convergence, summary)
     broken = checks.failures(summary, convergence)
     every = [*printed, *listed, *others, scales, checks.checks(summary), broken]
-    every.append(members.table(convergence, position))
+    every += [of_source.table(sources), members.table(convergence, position)]
     files = {}
     for table in every:
         if table is not None:
@@ -105,6 +112,7 @@ def write(
         members.write_csv(directory / "tables/members.csv", convergence, position)
         files.pop("members.csv", None)
     replace_files(directory / "tables", files, kept)
+    moving = player.element(experiment, convergence, environment())
     made = cards.cards(experiment, convergence, summary)
     if "hero_evidence" in names and decisive.entry is not None:
         made = [c | {"picture": None} if c["id"] == decisive.entry["id"] else c for c in made]
@@ -128,7 +136,9 @@ def write(
             else "",
             "numbers_shown": [cut(table) for table in listed],
             "scales": scales,
-            "player": markup(player.element(experiment, convergence, environment())),
+            "undrawn": of_source.undrawn(sources, has_player=bool(moving)),
+            "player_source": of_source.of_player(experiment),
+            "player": markup(moving),
             "printed": printed,
             "printed_sentence": published.sentence(printed),
             "shown": left_out,

@@ -19,7 +19,8 @@ from vibsim.report.page import study
 from vibsim.report.page.cards import provenance_rows
 from vibsim.report.page.page import environment, replace_files
 from vibsim.report.tables import checks as check_tables
-from vibsim.report.tables.table import Cell, Column, Table, to_csv, to_latex
+from vibsim.report.tables.latex import to_latex
+from vibsim.report.tables.table import Cell, Column, Table, to_csv
 from vibsim.report.text import words
 from vibsim.report.types import Plan
 from vibsim.solver import analysis

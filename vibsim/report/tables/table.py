@@ -1,18 +1,16 @@
-"""Tables: one object, written for reading (HTML, LaTeX) and for computing (CSV with every digit)."""
+"""Tables: one object, written for reading and for computing (CSV with every digit); LaTeX is in `latex.py`."""
 
 from __future__ import annotations
 
 import csv
 import io
 import math
-import re
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report.data import Member, steps_of, swept, time_unit, whole
-from vibsim.report.style import LOWER, SUPERSCRIPTS
 from vibsim.report.text import words
 
 Cell = str | int | float | None
@@ -179,41 +177,3 @@ def _exact(cell: Cell) -> str:
     if cell is None or (isinstance(cell, float) and math.isnan(cell)):
         return ""
     return repr(float(cell)) if isinstance(cell, float) else str(cell)
-
-
-def to_latex(table: Table) -> str:
-    r"""Return a table as LaTeX for the package ``booktabs``: ``\input`` it into a document."""
-    alignment = "".join("l" if column.form == "text" else "r" for column in table.columns)
-    texts = [[column.title for column in table.columns], *table.text_rows()]
-    head, *body = [" & ".join(map(escape, row)) + r" \\" for row in texts]
-    rows = "\n".join([head, r"\midrule", *body])
-    return LATEX % (escape(table.caption), alignment, rows)
-
-
-LATEX = r"""\begin{table}
-\centering
-\caption{%s}
-\begin{tabular}{%s}
-\toprule
-%s
-\bottomrule
-\end{tabular}
-\end{table}
-"""
-_SPECIAL = {
-    "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "&": r"\&", "%": r"\%",
-    "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}", "<": r"\textless{}", ">": r"\textgreater{}",
-    "|": r"\textbar{}", '"': r"\textquotedbl{}", "\n": " ", "\r": " ", "\t": " ", "–": "--", "−": "$-$",
-    "±": r"$\pm$", "·": r"$\cdot$", "∞": r"$\infty$", "θ": r"$\theta$", "ω": r"$\omega$", "Δ": r"$\Delta$",
-    "\N{NARROW NO-BREAK SPACE}": r"\,",
-}  # fmt: skip
-
-
-def escape(text: str) -> str:
-    """Return text that LaTeX prints as it stands."""
-    parts = re.split(f"([{SUPERSCRIPTS}]+)", text)
-    raised = [rf"$^{{{part.translate(LOWER)}}}$" for part in parts[1::2]]
-    plain = [
-        "".join(_SPECIAL.get(character, character) for character in part) for part in parts[::2]
-    ]
-    return "".join(a + b for a, b in zip(plain, [*raised, ""], strict=True))

@@ -31,7 +31,8 @@ def shown(experiment: Experiment) -> str:
 def text(experiment: Experiment) -> str:
     """Return the experiment as YAML; numbers that a file gave in other units stand in those of the run."""
     checks = _listed("checks", [_check(check) for check in experiment.checks])
-    return "\n".join([*_head(experiment), *checks])
+    figures = [figure.model_dump(exclude_defaults=True) for figure in experiment.figures]
+    return "\n".join([*_head(experiment), *checks, *_listed("figures", figures)])
 
 
 def _head(experiment: Experiment) -> list[str]:

@@ -1,0 +1,267 @@
+"""Figures of the source texts: each one of the list has its page, and what it shows is what the text shows."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import samples
+import yaml
+
+from vibsim import report
+from vibsim.experiment import Experiment
+from vibsim.experiment.schema.figures import KINDS
+from vibsim.report import lead, style
+from vibsim.report.figures import accuracy, of_source
+from vibsim.report.page import player, source_figures
+from vibsim.report.page.page import environment
+
+ROOT = Path(__file__).parents[2]
+CONFIGS = ROOT / "configs"
+ROW = re.compile(r"\| ([^|`]+) \| `(\w+)` \| \[([\w/]+)\]\(\.\./configs/([\w/]+)\.yaml\) \|")
+LISTED = ROW.findall((ROOT / "docs/figures.md").read_text(encoding="utf-8"))
+ASKED = {
+    (figure["source"], figure["shows"], f"{path.parent.name}/{path.stem}")
+    for path in CONFIGS.glob("*/*.yaml")
+    for figure in yaml.safe_load(path.read_text(encoding="utf-8")).get("figures", [])
+}
+TEXTS = [
+    *(f"vibration text, figure {i}" for i in range(1, 18)),
+    *(f"vibration text, section {part}" for part in ("3.3", "10.6")),
+    *(f"vibration text, exercise {part}" for part in ("7", "18 b", "19 a", "20", "21 b", "22 a")),
+    *(f"pendulum lecture, section{part}" for part in ("s 2.1 and 2.5", " 1.1", " 2.5", " 2.6")),
+]
+"""The figures of the two texts that show data or sketch a system, and what exercises ask to draw."""
+
+
+def test_the_list_says_what_the_experiments_ask_for() -> None:
+    assert {row[:3] for row in LISTED} == ASKED
+    assert all(name == target for _, _, name, target in LISTED)
+    assert len(LISTED) == len(ASKED)
+
+
+@pytest.mark.parametrize("figure", TEXTS)
+def test_every_figure_of_the_texts_is_on_a_page(figure: str) -> None:
+    assert figure in {row[0] for row in LISTED}
+
+
+def drawn(exp: Experiment) -> tuple[list, list[str]]:
+    record = samples.record(exp)
+    decisive = lead.find(exp, record, samples.summary(exp, record))
+    with style.applied():
+        found = of_source.pictures(exp, record, decisive)
+    has_player = bool(player.element(exp, record, environment()))
+    return found, of_source.undrawn(found, has_player=has_player)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted({name for _, _, name in ASKED}))
+def test_every_experiment_shows_its_figures(name: str) -> None:
+    found, undrawn = drawn(Experiment.from_yaml(CONFIGS / f"{name}.yaml"))
+    assert undrawn == []
+    names = [picture.name for _, pictures in found for picture in pictures]
+    assert len(names) == len(set(names))
+
+
+SPRING = {"model": {"kind": "spring", "w": 2.0}, "initial": {"u": 1.0}, "time": {"end": 10.0}}
+
+
+def spring(*figures: dict, **changes) -> Experiment:
+    asked = [{"source": "a text, figure 1", **figure} for figure in figures]
+    return samples.experiment(**(SPRING | {"figures": asked, "checks": []} | changes))
+
+
+def lines(picture) -> list[list[tuple[str, np.ndarray, np.ndarray]]]:
+    """Return the named curves of every panel."""
+    return [
+        [(line.get_label(), *(np.asarray(part, float) for part in line.get_data())) for line in ax.lines]
+        for ax in picture.figure.axes
+    ]  # fmt: skip
+
+
+def test_every_kind_draws_or_says_that_it_cannot() -> None:
+    kinds = [{"shows": kind} for kind in KINDS]
+    found, undrawn = drawn(spring(*kinds, levels=[6, 7, 8]))
+    cannot = {asked.shows for asked, pictures in found if not pictures} - {"player"}
+    assert cannot == {"path", "growth"}
+    assert undrawn == ["A text, figure 1"] * 2
+    for asked, pictures in found:
+        for picture in pictures:
+            assert picture.title.startswith("A text, figure 1: "), asked.shows
+
+
+def test_levels_schemes_and_the_exact_solution_share_panels() -> None:
+    exp = spring(
+        {"shows": "over_time", "panels": "level", "until": 5.0},
+        levels=[4, 5],
+        schemes=["central", "rk4"],
+    )
+    ((_, [picture]),), _ = drawn(exp)
+    panels = lines(picture)
+    assert [[text for text, *_ in panel] for panel in panels] == [["exact", "central", "rk4"]] * 2
+    for panel in panels:
+        _, t, exact = panel[0]
+        # also where a scheme has few points in a period
+        assert t.size > 300
+        assert exact == pytest.approx(np.cos(2.0 * t), abs=1e-12)
+        assert t[-1] == panel[1][1][-1] == pytest.approx(5.0)
+    coarse, fine = (np.max(np.abs(panel[1][2] - np.cos(2.0 * panel[1][1]))) for panel in panels)
+    assert coarse > 3.0 * fine
+
+
+def test_what_is_not_stored_follows_from_the_states() -> None:
+    names = ["u", "kinetic_energy", "potential_energy", "energy"]
+    ((_, [picture]),), _ = drawn(spring({"shows": "over_time", "quantities": names}, levels=[7, 8]))
+    (_, kinetic, potential, energy) = (panel[-1][2] for panel in lines(picture))
+    assert kinetic + potential == pytest.approx(energy, rel=1e-12)
+    assert lines(picture)[1][0][2][0] == 0.0
+    assert picture.figure.axes[0].get_ylabel() == "u [m]"
+
+
+def test_members_are_divided_into_figures_and_panels() -> None:
+    sweep = {"model.w": [1.0, 2.0, 3.0], "initial.u": [1.0, 2.0]}
+    figure = {
+        "shows": "over_time",
+        "each": "initial.u",
+        "panels": "model.w",
+        "beside": {"one": "w*t"},
+    }
+    ((_, pictures),), _ = drawn(spring(figure, sweep=sweep, levels=[5, 6]))
+    assert [picture.title.rpartition(", ")[2] for picture in pictures] == [
+        "initial.u = 1 m",
+        "initial.u = 2 m",
+    ]
+    titles = [ax.get_title(loc="left") for ax in pictures[0].figure.axes]
+    assert titles == [f"model.w = {w} rad s⁻¹" for w in (1, 2, 3)]
+    _, t, line = lines(pictures[1])[2][-1]
+    assert line == pytest.approx(3.0 * t)
+
+
+def test_what_is_left_out_is_said() -> None:
+    figure = {"shows": "over_time", "quantities": ["energy_deviation"]}
+    ((_, [picture]),), _ = drawn(spring(figure, levels=[5, 6]))
+    assert "are drawn" not in picture.caption
+    # its exact value is zero, which is no measure for what leaves the frame
+    assert np.isfinite(lines(picture)[0][-1][2]).all()
+    ((_, [picture]),), _ = drawn(
+        spring({"shows": "over_time"}, sweep={"model.w": {"linspace": [1, 2, 9]}}, levels=[5, 6])
+    )
+    assert "7 runs in a panel" in picture.caption
+    names = [name for name, *_ in lines(picture)[0]]
+    assert len(names) == 7
+    assert names[-1] == "model.w = 2 rad s⁻¹"
+
+
+def test_a_velocity_that_jumps_has_gaps_and_the_position_none() -> None:
+    exp = samples.experiment(
+        model={"kind": "bouncing_ball"}, initial={"h": 1.0}, time={"end": 8.0}, levels=[5, 6], schemes=["rk4"],
+        checks=[], figures=[{"source": "a", "shows": "over_time", "quantities": ["h", "v"]}],
+    )  # fmt: skip
+    ((_, [picture]),), _ = drawn(exp)
+    height, velocity = (panel[0][2] for panel in lines(picture))
+    assert np.isfinite(height).all()
+    gaps = np.flatnonzero(np.isnan(velocity))
+    assert gaps.size >= 2
+    assert (velocity[gaps - 1] < 0.0).all()
+    assert (velocity[gaps + 1] >= 0.0).all()
+    # between grid points lies an impact, which no line crosses
+    assert all(line.get_linestyle() == "None" for line in picture.figure.axes[0].lines[1:])
+
+
+def test_the_frequency_found_in_a_solution_is_that_of_the_scheme() -> None:
+    exp = spring({"shows": "local_frequency"}, levels=[6, 7], time={"end": 20.0})
+    ((_, [picture]),), _ = drawn(exp)
+    frequency, amplitude = lines(picture)
+    for k, steps in enumerate((64, 128)):
+        name, number, found = frequency[k]
+        dt = 20.0 / steps
+        assert name == f"dt = {dt:g} s"
+        assert number[0] == 1.0
+        assert found == pytest.approx(2.0 / dt * np.arcsin(dt), rel=3e-3)
+    assert frequency[-1][2] == pytest.approx(2.0)
+    assert amplitude[-1][2] == pytest.approx(1.0)
+    assert picture.figure.axes[0].get_ylabel() == "angular frequency [rad s⁻¹]"
+
+
+def test_the_frequency_lies_on_its_formula_and_the_series_touches_it() -> None:
+    exp = spring(
+        {"shows": "frequency"},
+        model={"kind": "spring", "w": 1.0},
+        time={"end": 64.0},
+        levels=[6, 7, 8],
+    )
+    ((_, [picture]),), _ = drawn(exp)
+    ((_, *_), (name, p, curve), (series, _, approximation), (_, places, measured)) = lines(picture)[
+        0
+    ]
+    assert (name, series) == ("central", "1 + (w dt)²/24")
+    assert curve == pytest.approx(2.0 * np.arcsin(p / 2.0) / p, rel=1e-9)
+    assert approximation == pytest.approx(1.0 + p**2 / 24.0, rel=1e-6)
+    assert measured == pytest.approx(2.0 * np.arcsin(places / 2.0) / places, rel=1e-3)
+
+
+def test_the_first_term_of_a_series_is_written_as_a_fraction() -> None:
+    start = np.array([0.5, 1.0]) * accuracy.SMALL
+    assert accuracy._leading(-(start**4) / 120.0)[1] == "1 − (w dt)⁴/120"
+    assert accuracy._leading(5.0 * start**2 / 12.0)[1] == "1 + 5 (w dt)²/12"
+    assert accuracy._leading(np.zeros(2)) is None
+
+
+def test_the_second_difference_is_measured_on_its_formula() -> None:
+    sweep = {"model.w": [0.5, 2.0, 3.0]}
+    exp = spring(
+        {"shows": "second_difference"},
+        sweep=sweep,
+        time={"end": 32.0, "base_dt": 1.0},
+        levels=[0, 1],
+    )
+    ((_, [picture]),), _ = drawn(exp)
+    _, p, measured = lines(picture)[0][-1]
+    assert p == pytest.approx([0.5, 2.0, 3.0])
+    assert measured == pytest.approx((2.0 / p * np.sin(p / 2.0)) ** 2, rel=1e-9)
+
+
+def test_springs_of_members_are_their_own() -> None:
+    exp = samples.experiment(
+        model={"kind": "sliding_box", "mu": 0.01}, initial={"u": 1.0}, time={"end": 8.0}, levels=[6, 7],
+        schemes=["rk4"], sweep={"model.alpha": [0.0, 2.0]}, checks=[], figures=[{"source": "a", "shows": "spring"}],
+    )  # fmt: skip
+    ((_, [picture]),), _ = drawn(exp)
+    (_, u, linear), (_, _, yielding) = lines(picture)[0]
+    assert linear == pytest.approx(u)
+    assert yielding == pytest.approx(np.tanh(2.0 * u) / 2.0)
+    assert u[-1] == pytest.approx(1.0)
+
+
+@pytest.mark.usefixtures("unrendered")
+def test_the_page_the_table_and_the_index_name_the_figures(tmp_path) -> None:
+    exp = spring(
+        {"shows": "phase_plane"},
+        {"shows": "player", "source": "a text, figure 12"},
+        levels=[5, 6, 7],
+    )
+    record, folder = samples.record(exp), tmp_path / "pendulum_lab/theta"
+    summary = samples.summary(exp, record)
+    report.write(samples.plan(exp), record, summary, folder)
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert re.search(r'<figure id="phase_plane_0">\s*<h3>A text, figure 1: Phase plane', page)
+    # it is not drawn a second time below
+    assert page.count('id="phase_plane_0"') == 1
+    assert "A text, figure 12: in motion" in page
+    (folder / "summary.json").write_text("{}")
+    found = source_figures.listed(tmp_path, [folder, tmp_path / "a/missing"])
+    assert [(figure, [(p.name, p.link) for p in places]) for figure, places in found] == [
+        ("a text, figure 1", [("theta", "pendulum_lab/theta/report.html#phase_plane_0")]),
+        ("a text, figure 12", [("theta", "pendulum_lab/theta/report.html#player")]),
+    ]
+    rows = "figure,shows,place\nfigure 10,path,a\nfigure 2,path,b\nfigure 2,path,c\n,path,d\nfigure 3,path,\n"
+    (folder / source_figures.FILE).write_text(rows)
+    found = source_figures.listed(tmp_path, [folder])
+    assert [(figure, [p.link[-2:] for p in places]) for figure, places in found] == [
+        ("figure 2", ["#b"]),
+        ("figure 10", ["#a"]),
+    ]
+    (folder / source_figures.FILE).write_bytes(b"\xff\x00")
+    assert source_figures.listed(tmp_path, [folder]) == []

@@ -1,0 +1,155 @@
+"""How far a mesh changes a wave, over w dt: the frequency of schemes with its series, and the second difference.
+
+Source: vibration text, sections 4.1 and 4.2 (figure 3) and exercise 7; theory from the matrix of a scheme's own step.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from vibsim.core.array_types import Floats
+from vibsim.core.record import Record
+from vibsim.core.vocabulary import OF_LEVEL
+from vibsim.report import data, style
+from vibsim.report.data import Member, known, omega_dt
+from vibsim.report.figures import panels
+from vibsim.report.style import Picture
+from vibsim.report.text import words
+from vibsim.report.types import Experiment
+
+POINTS = 240  # of a curve
+SMALL = 0.02  # w dt from which the leading term of a series is taken
+EXACT = 1e-3  # part by which a coefficient may differ from a fraction that is written for it
+MOST_DENOMINATOR = 400
+
+
+def frequency(experiment: Experiment, record: Record) -> Picture | None:
+    """Draw the frequency of every scheme over the exact one against w dt, with its series up to the first term."""
+    from vibsim import theory
+
+    p = omega_dt(record)
+    sound = p[np.isfinite(p) & (p > 0.0)]
+    if not sound.size or "measured_phase_error" not in record:
+        return None
+    limits = known(record, "stability_limit", ("scheme", "case"))
+    grid = np.linspace(1e-3, float(sound.max()), POINTS)
+    measured = 1.0 / (1.0 - _phase(record, p))
+    (ax,) = panels.stacked([3.0])
+    ax.axhline(1.0, **style.REFERENCE)
+    drawn = [np.ones(1)]
+    for s, spec in enumerate(experiment.schemes):
+        if spec.method.adaptive:
+            continue
+        look = style.look(s)
+        stepper = spec.method.stepper(spec.options)
+        with np.errstate(all="ignore"):
+            # what a period is too short by
+            curve = 1.0 / (1.0 - theory.phase_error_per_period(stepper, grid))
+            few = theory.phase_error_per_period(stepper, np.array([0.5 * SMALL, SMALL]))
+        start = few / (1.0 - few)
+        limit = float(np.nanmax(limits[s])) if np.isfinite(limits[s]).any() else math.inf
+        curve = np.where(grid <= limit, curve, np.nan)
+        ax.plot(grid, curve, color=look["color"], label=style.entry(spec.name))
+        found = _leading(start)
+        if found is not None:
+            order, text, factor = found
+            series = 1.0 + factor * grid**order
+            ax.plot(grid, series, color=look["color"], linestyle=(0, (4, 2)), label=text)
+            drawn.append(series)
+        mark = {"color": look["color"], "marker": look["marker"], "linestyle": "none"}
+        ax.plot(p.ravel(), measured[s].ravel(), **mark, markersize=4, label="_measured")
+        drawn += [curve, measured[s].ravel()]
+    ax.set_ylim(*style.limits(*drawn))
+    ax.set_xlim(0.0, 1.03 * float(grid[-1]))
+    ax.set_xlabel("w dt")
+    ax.set_ylabel("numerical over exact frequency")
+    style.beside(ax)
+    return Picture(
+        "frequency",
+        "The numerical frequency against w dt, with its series",
+        "Lines: the frequency that the matrix of one step predicts, up to the limit of stability. Dashed: one plus the "
+        "first term of its series. Markers: what was measured. Above one the numerical solution oscillates too fast.",
+        "Numerical over exact frequency of every scheme against w dt, predicted, as a series and measured",
+        ax.get_figure(root=True),
+    )
+
+
+def _phase(record: Record, p: Floats) -> Floats:
+    """Return the measured phase error over a period, shape (scheme, case, level)."""
+    variable = record.variable("dt")
+    dt = np.asarray(variable.values, dtype=np.float64)
+    by_level = dt.T if variable.dims == ("level", "case") else dt[None, :]
+    return known(record, "measured_phase_error", OF_LEVEL) * (p / (2.0 * np.pi) / by_level)
+
+
+def _leading(start: Floats) -> tuple[int, str, float] | None:
+    """Return the first term c p^k of a series from its values at half of `SMALL` and there: k, its words, and c."""
+    half, whole = (float(value) for value in start)
+    if not (math.isfinite(half) and math.isfinite(whole)) or half == 0.0 or whole / half <= 1.0:
+        return None
+    order = round(math.log2(whole / half))
+    # the next term is smaller by the square of w dt
+    factor = (4.0 * half / (0.5 * SMALL) ** order - whole / SMALL**order) / 3.0
+    near = Fraction(factor).limit_denominator(MOST_DENOMINATOR)
+    is_near = near != 0 and abs(float(near) - factor) <= EXACT * abs(factor)
+    size = words.number(abs(factor), "brief")
+    raised = f"(w dt){words.raised(order)}"
+    term = f"{size} {raised}"
+    if is_near:
+        top = "" if abs(near.numerator) == 1 else f"{abs(near.numerator)} "
+        term = f"{top}{raised}/{near.denominator}" if near.denominator > 1 else f"{top}{raised}"
+    return order, f"1 {'+' if factor > 0 else '−'} {term}", factor
+
+
+def second_difference(record: Record) -> Picture | None:
+    """Draw the fraction of the second derivative that the second difference of a cosine gives, against w dt."""
+    from vibsim.theory.differences import error_fraction
+
+    found, p = _measured_fractions(record)
+    if not p.size:
+        return None
+    grid = np.linspace(0.0, max(math.pi, float(p.max())), POINTS)
+    (ax,) = panels.stacked([3.0])
+    ax.axhline(1.0, **style.REFERENCE)
+    curve, series = error_fraction(grid), 1.0 - grid**2 / 12.0 + grid**4 / 360.0
+    ax.plot(grid, curve, color=style.COLOURS[0], label="(2/p)² sin²(p/2)")
+    dashed: dict[str, Any] = {"color": style.COLOURS[1], "linestyle": (0, (4, 2))}
+    ax.plot(grid, series, **dashed, label="1 − p²/12 + p⁴/360")
+    ax.plot(p, found, "o", color=style.COLOURS[0], markersize=4.5, label="measured")
+    ax.set_xlim(0.0, 1.03 * float(grid[-1]))
+    ax.set_ylim(*style.limits(curve, series, found, np.array([0.0, 1.0])))
+    ax.set_xlabel("p = w dt")
+    ax.set_ylabel("E")
+    style.beside(ax)
+    return Picture(
+        "second_difference",
+        "Accuracy of the second difference: E against p = w dt",
+        "E is the second difference of a cosine over its second derivative. Line: its formula; dashed: its Taylor "
+        "polynomial of the fourth degree; markers: measured of the exact solution on the coarsest mesh. No wave with p "
+        "above π lives on a mesh.",
+        "The second difference of a cosine over its second derivative against w dt",
+        ax.get_figure(root=True),
+    )
+
+
+def _measured_fractions(record: Record) -> tuple[Floats, Floats]:
+    """Return E of the exact solution of every member on the mesh of the coarsest level, and w dt there."""
+    from vibsim.theory.differences import second_difference as difference
+
+    found = []
+    for case in range(len(record["case"])):
+        member = Member(0, case, "")
+        u, w = data.exact_series(record, "u", member), data.natural_frequency(record, case)
+        t = data.times(record, case)
+        if not np.isfinite(u).all() or t.size < 3 or not w > 0.0:
+            continue
+        dt = float(t[1] - t[0])
+        inner = u[1:-1]
+        fraction = -float(np.dot(difference(u, dt), inner) / (w * w * np.dot(inner, inner)))
+        found.append((fraction, w * dt))
+    fractions, p = np.reshape(np.array(found), (-1, 2)).T
+    return fractions, p

@@ -1,0 +1,115 @@
+"""What an experiment is before it runs: the meshes of its levels, and the force of its spring.
+
+Source: pendulum lecture, sections 2.1 and 2.5 (one mesh, and three with their common points); vibration text,
+exercise 19 a (springs that yield).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from vibsim.core.array_types import Floats
+from vibsim.core.record import Record
+from vibsim.formula import values
+from vibsim.models.base import tree
+from vibsim.report import data, series, style
+from vibsim.report.figures import panels
+from vibsim.report.style import Picture
+from vibsim.report.text import words
+from vibsim.report.types import Experiment
+
+MESHES = 4  # most levels whose meshes are drawn
+INTERVALS = 4  # of the coarsest mesh
+POINTS = 200  # of a curve
+
+
+def grids(record: Record) -> Picture | None:
+    """Draw the first points of the meshes of the coarsest levels, with those that all of them have."""
+    levels, dt = data.whole(record, "level")[:MESHES], data.steps_of(record, 0)
+    figure = style.canvas(0.75 + 0.36 * len(levels))
+    height = figure.get_figheight()
+    ax = figure.add_axes((0.2, 0.45 / height, 0.75, (height - 0.6) / height))
+    count = min(INTERVALS, int(record["steps"][0]))
+    common = dt[0] * np.arange(count + 1)
+    for row, level in enumerate(levels):
+        t = dt[row] * np.arange(count * round(dt[0] / dt[row]) + 1)
+        colour, y = style.COLOURS[row % style.MANY], len(levels) - 1.0 - row
+        ax.plot(
+            t, np.full(t.size, y), color=colour, marker="o", markersize=4, gid=style.of_level(level)
+        )
+    top, bottom = len(levels) - 0.6, -0.4
+    for place in common.tolist():
+        ax.plot(
+            [place, place],
+            [bottom, top],
+            color=style.GREY,
+            linewidth=0.8,
+            linestyle=(0, (2, 2)),
+            zorder=1,
+        )
+    for row in range(len(levels)):
+        squares: dict[str, Any] = {"marker": "s", "markersize": 8, "linestyle": "none"}
+        squares |= {"markerfacecolor": "none", "color": "black"}
+        ax.plot(common, np.full(common.size, len(levels) - 1.0 - row), **squares)
+    unit = data.time_unit(record, "dt")
+    steps = [f"{words.number(float(dt[i]), 'step')} {unit}".rstrip() for i in range(len(levels))]
+    texts = [f"level {level}, dt = {steps[i]}" for i, level in enumerate(levels)]
+    ax.set_yticks(range(len(levels)), texts[::-1])
+    ax.set_ylim(bottom, top)
+    ax.grid(visible=False)
+    ax.set_xlabel(data.time_label(record))
+    end = words.number(float(dt[0] * record["steps"][0]), "step")
+    return Picture(
+        "grids",
+        "The meshes of the levels and their common points",
+        f"Each level halves the step of the one before. Squares: the points of the coarsest level, which all levels "
+        f"have, so that their solutions can be compared there. Drawn are the first {count} of "
+        f"{words.number(int(record['steps'][0]), 'integer')} steps of the coarsest level; the run ends at {end}.",
+        f"Points in time of {len(levels)} levels, with the common ones marked",
+        figure,
+    )
+
+
+def spring(experiment: Experiment, record: Record) -> Picture | None:
+    """Draw the force of the spring against the displacement, for every member with a spring of its own."""
+    model = experiment.model.definition
+    if model.coordinates != 1:
+        return None
+    position, velocity = model.position, model.velocity
+    reach = max(
+        (
+            data.largest(data.of_level(record, position, member, len(record["level"]) - 1))
+            for member in data.everyone(record)
+            if f"{position}_finest" in record
+        ),
+        default=0.0,
+    )
+    if reach == 0.0:
+        return None
+    u = np.linspace(-reach, reach, POINTS)
+    curves: dict[bytes, tuple[str, Floats]] = {}
+    for case in range(len(record["case"])):
+        numbers, _ = series.numbers_of(experiment, record, case)
+        at = {**numbers, velocity: 0.0, "t": 0.0}
+        formula = tree(model, model.acceleration)
+        pull = values(formula, {**at, position: 0.0}) - values(formula, {**at, position: u})
+        force = np.broadcast_to(pull * numbers.get("m", 1.0), u.shape)
+        curves.setdefault(force.tobytes(), (data.case_name(record, case) or "spring", force))
+    (ax,) = panels.stacked([2.8])
+    for k, (text, force) in enumerate(list(curves.values())[: style.MANY]):
+        look = style.look(k)
+        ax.plot(u, force, color=look["color"], linestyle=look["linestyle"], label=style.entry(text))
+    letter = words.symbol(position)
+    ax.set_xlim(-reach, reach)
+    ax.set_xlabel(style.label(letter, data.unit(record, f"{position}_finest")))
+    ax.set_ylabel(f"s({letter})")
+    style.beside(ax)
+    return Picture(
+        "spring",
+        f"The spring force s against {letter}",
+        "The force that pulls back a body at rest, without friction and without driving, over the range of the motion.",
+        f"Spring force against {letter} for each member",
+        ax.get_figure(root=True),
+    )

@@ -1,0 +1,128 @@
+"""The figures of the source that an experiment file names, each drawn under its number there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+
+from vibsim.core.record import Record
+from vibsim.experiment.schema.figures import FigureOfSource
+from vibsim.report import choice, data
+from vibsim.report.figures import (
+    accuracy,
+    extrema,
+    local_frequency,
+    model_curves,
+    over_time,
+    plane,
+    theory,
+    time,
+)
+from vibsim.report.lead import Lead
+from vibsim.report.style import Picture
+from vibsim.report.tables.table import Column, Table
+from vibsim.report.types import Experiment
+
+PLAYER = "player"
+"""What is shown by the player of the page and not drawn here."""
+HEADERS = ("figure", "shows", "place")
+"""Of the table of figures; the place is the id of an element of the page."""
+Draw = Callable[[Experiment, Record, Lead], Picture | None]
+
+
+def _differences(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
+    return time.overlay(record, choice.position(experiment), lead.member)
+
+
+def _energy(experiment: Experiment, record: Record, lead: Lead) -> Picture | None:
+    known = "energy_deviation_scaled" in record
+    return time.energy(record, lead.member) if known else None
+
+
+DRAWN: Mapping[str, Draw] = {
+    "phase_plane": lambda e, r, _: plane.phase(e, r, data.everyone(r)),
+    "path": lambda e, r, _: plane.path(e, r, data.everyone(r)),
+    "peaks": lambda e, r, _: extrema.local(e, r, data.everyone(r)),
+    "local_frequency": lambda e, r, _: local_frequency.local_frequency(e, r),
+    "growth": lambda e, r, _: theory.growing(e, r),
+    "frequency": lambda e, r, _: accuracy.frequency(e, r),
+    "second_difference": lambda e, r, _: accuracy.second_difference(r),
+    "differences": _differences,
+    "energy_error": _energy,
+    "grids": lambda e, r, _: model_curves.grids(r),
+    "spring": lambda e, r, _: model_curves.spring(e, r),
+}
+"""What draws each kind, but those over time, which have options, and the player."""
+OF_SERIES = {
+    "over_time",
+    "phase_plane",
+    "path",
+    "peaks",
+    "growth",
+    "differences",
+    "energy_error",
+    "spring",
+}
+"""Kinds that need series over time, which a large sweep does not keep."""
+
+
+def pictures(
+    experiment: Experiment, record: Record, lead: Lead
+) -> list[tuple[FigureOfSource, list[Picture]]]:
+    """Return the pictures of every figure that is asked for; none where what it shows is not kept of the run."""
+    found, names = [], set[str]()
+    for i, asked in enumerate(experiment.figures, 1):
+        drawn = (
+            [] if asked.shows == PLAYER else _drawn(experiment, record, lead, asked, f"source_{i}")
+        )
+        named = []
+        for picture in drawn:
+            # one that is asked for twice is on the page twice
+            name = picture.name if picture.name not in names else f"source_{i}_{picture.name}"
+            names.add(name)
+            title = f"{opening(asked.source)}: {picture.title}"
+            named.append(replace(picture, name=name, title=title))
+        found.append((asked, named))
+    return found
+
+
+def _drawn(
+    experiment: Experiment, record: Record, lead: Lead, asked: FigureOfSource, name: str
+) -> list[Picture]:
+    if asked.shows in OF_SERIES and data.is_lean(record):
+        return []
+    if asked.shows == "over_time":
+        return over_time.pictures(experiment, record, asked, name)
+    picture = DRAWN[asked.shows](experiment, record, lead)
+    return [picture] if picture is not None and picture.figure is not None else []
+
+
+def undrawn(
+    found: Iterable[tuple[FigureOfSource, Sequence[Picture]]], *, has_player: bool
+) -> list[str]:
+    """Return the sources of what is asked for and not shown."""
+    return [
+        opening(asked.source)
+        for asked, drawn in found
+        if not (has_player if asked.shows == PLAYER else drawn)
+    ]
+
+
+def table(found: Iterable[tuple[FigureOfSource, Sequence[Picture]]]) -> Table | None:
+    """Return which figure of the source stands where on the page; None where none is asked for."""
+    rows = []
+    for asked, drawn in found:
+        places = [picture.name for picture in drawn] or [PLAYER] * (asked.shows == PLAYER)
+        rows += [(asked.source, asked.shows.replace("_", " "), place) for place in places]
+    columns = tuple(map(Column, HEADERS))
+    return Table("figures", "Figures of the source", columns, tuple(rows)) if rows else None
+
+
+def opening(source: str) -> str:
+    """Return a source as the beginning of a title."""
+    return source[:1].upper() + source[1:]
+
+
+def of_player(experiment: Experiment) -> str:
+    """Return the sources of the sketches that the player shows in motion; empty without any."""
+    return "; ".join(opening(row.source) for row in experiment.figures if row.shows == PLAYER)

@@ -1,0 +1,242 @@
+"""Quantities over time as a source shows them: several schemes, levels or members beside the exact solution.
+
+The exact solution is drawn at times of its own, so that it stays a smooth curve where a scheme has few points in a
+period. Where impacts make a velocity jump, its curve has a gap.
+
+Source: vibration text, figures 1, 4, 5, 7, 9 and 11, section 3.3, exercises 18 b, 20, 21 b and 22 a.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vibsim.core.array_types import Floats
+from vibsim.core.record import Record
+from vibsim.experiment.schema.figures import LEVEL, MEMBER, FigureOfSource
+from vibsim.formula import parse, values
+from vibsim.models.events import Impact
+from vibsim.report import choice, data, series, style
+from vibsim.report.data import Member
+from vibsim.report.figures import panels
+from vibsim.report.style import Picture
+from vibsim.report.text import words
+from vibsim.report.types import Axes, Experiment
+
+MOST = 6  # most panels of a figure, and most figures
+SMOOTH = 700  # points of an exact solution: with its gaps so few that none is thinned away
+FEW = 90  # points of a run up to which each has a marker
+LEAVES_FRAME = 8.0
+"""What is beyond so many times the exact solution leaves the frame."""
+SEEN = 0.2
+"""Only runs that stay within the frame for so much of the time leave it at all."""
+PALE = "#b0b0b0"  # colour of the exact solution
+SUBTLE: dict[str, Any] = {"linestyle": (0, (5, 2)), "linewidth": 1.2, "zorder": 1.5}
+"""The look of further curves."""
+
+
+@dataclass(frozen=True)
+class _Panel:
+    """What one panel shows."""
+
+    title: str
+    quantity: str
+    runs: tuple[tuple[str, Member], ...]
+    """The words of the legend, and whose curve it is."""
+    level: int
+
+
+def pictures(
+    experiment: Experiment, record: Record, asked: FigureOfSource, name: str
+) -> list[Picture]:
+    """Return the figures that are asked for, one or one for each value of what `asked.each` names."""
+    everyone = choice.with_levels(experiment, data.everyone(record))
+    groups = _divided(record, everyone, asked.each)
+    found = []
+    for k, i in enumerate(style.spaced(len(groups), MOST)):
+        text, members = groups[i]
+        stem = f"{name}_{k}" if len(groups) > 1 else name
+        found.append(_picture(experiment, record, asked, (stem, text, members)))
+    return [picture for picture in found if picture is not None]
+
+
+def _divided(
+    record: Record, everyone: list[Member], by: str | None
+) -> list[tuple[str, list[Member]]]:
+    """Divide members by what they have in common, with the words for it."""
+    groups: dict[str, list[Member]] = {}
+    for member in everyone:
+        groups.setdefault(_common(record, member, by), []).append(member)
+    return list(groups.items())
+
+
+def _common(record: Record, member: Member, by: str | None) -> str:
+    """Return the words of what divides members: nothing, the whole member, or a swept key."""
+    if by is None:
+        return ""
+    return member.case_name if by == MEMBER else data.case_name(record, member.case, by)
+
+
+def _picture(
+    experiment: Experiment,
+    record: Record,
+    asked: FigureOfSource,
+    of: tuple[str, str, list[Member]],
+) -> Picture | None:
+    name, text, members = of
+    shown = _panels(experiment, record, asked, members)
+    tall = 2.2 if len(shown) < 4 else 1.6
+    axes = panels.stacked([tall] * len(shown), style.TIME)
+    ends = [
+        float(data.times(record, member.case)[-1]) for panel in shown for _, member in panel.runs
+    ]
+    end = max(ends) if asked.until is None else min(asked.until, max(ends))
+    for ax, panel in zip(axes, shown, strict=True):
+        if not _draw(ax, experiment, record, asked, panel, end):
+            return None
+    axes[-1].set_xlabel(data.time_label(record))
+    letters = ", ".join(dict.fromkeys(words.symbol(panel.quantity) for panel in shown))
+    title = f"{letters} over time" + (f", {text}" if text else "")
+    is_known = experiment.model.definition.exact is not None
+    return Picture(
+        name,
+        title,
+        style.sentences(
+            f"Wide and grey: the exact solution{'' if is_known else ', or its reference'}, where it is known.",
+            f"Markers are steps. What grows beyond {LEAVES_FRAME:g} times the exact solution leaves the frame.",
+            f"At most {MOST} figures and {MOST} panels are drawn, and {style.MANY} runs in a panel."
+            if _is_thinned(record, asked, members)
+            else "",
+        ),
+        f"{letters} against time, {len(shown)} {'panel' if len(shown) == 1 else 'panels'}",
+        axes[0].get_figure(root=True),
+    )
+
+
+def _is_thinned(record: Record, asked: FigureOfSource, members: list[Member]) -> bool:
+    """Say whether figures, panels or runs are left out."""
+    is_by_level = asked.panels == LEVEL
+    figures = _divided(record, data.everyone(record), asked.each)
+    groups = _divided(record, members, None if is_by_level else asked.panels)
+    levels = data.whole(record, "level") if is_by_level else []
+    runs = max(len(group) for _, group in groups)
+    return max(len(figures), len(groups), len(levels)) > MOST or runs > style.MANY
+
+
+def _panels(
+    experiment: Experiment, record: Record, asked: FigureOfSource, members: list[Member]
+) -> list[_Panel]:
+    quantities = asked.quantities or (choice.position(experiment),)
+    levels = data.whole(record, "level")
+    finest = len(levels) - 1
+    if asked.panels == LEVEL:
+        dt = data.steps_of(record, members[0].case)
+        unit = data.time_unit(record, "dt")
+        runs = _named(record, members, asked)
+        return [
+            _Panel(
+                f"level {levels[i]}, dt = {words.number(float(dt[i]), 'step')} {unit}".rstrip(),
+                quantities[0],
+                runs,
+                i,
+            )
+            for i in style.spaced(len(levels), MOST)
+        ]
+    if asked.panels is not None:
+        groups = _divided(record, members, asked.panels)
+        return [
+            _Panel(groups[i][0], quantities[0], _named(record, groups[i][1], asked), finest)
+            for i in style.spaced(len(groups), MOST)
+        ]
+    runs = _named(record, members, asked)
+    return [_Panel(words.title(name), name, runs, finest) for name in quantities]
+
+
+def _named(
+    record: Record, members: list[Member], asked: FigureOfSource
+) -> tuple[tuple[str, Member], ...]:
+    """Name runs by what they do not have in common."""
+    several = len({member.scheme for member in members}) > 1
+    divided = {asked.each, asked.panels}
+    keys = [data.swept_label(record, name)[0] for name in data.swept(record)]
+    own = [] if MEMBER in divided else [key for key in keys if key not in divided]
+    found = []
+    for i in style.spaced(len(members), style.MANY):
+        member = members[i]
+        parts = [member.scheme_name] if several else []
+        parts += [data.case_name(record, member.case, key) for key in own]
+        found.append((", ".join(parts) or member.scheme_name, member))
+    return tuple(found)
+
+
+def _draw(
+    ax: Axes, experiment: Experiment, record: Record, asked: FigureOfSource, panel: _Panel, end: float
+) -> bool:  # fmt: skip
+    """Draw a panel up to the time `end`; return whether its quantity is known."""
+    model = experiment.model.definition
+    first = panel.runs[0][1]
+    exact: list[Floats] = []
+    if len({member.case for _, member in panel.runs}) == 1:
+        fine, best = _exact(experiment, record, panel.quantity, first, end)
+        if np.isfinite(best).any():
+            ax.plot(*style.thin(fine, best), color=PALE, linewidth=4.5, label="exact", zorder=1)
+            exact.append(best)
+    size = max(map(data.largest, exact), default=0.0)
+    drawn, jumps = [], isinstance(model.events, Impact)
+    for k, (text, member) in enumerate(panel.runs):
+        t = data.times(record, member.case)
+        found = series.on_level(experiment, record, panel.quantity, member, panel.level)
+        if found is None:
+            return False
+        there = t <= end * (1.0 + 1e-12)
+        t, found = t[there], found[there]
+        within = np.abs(found) <= LEAVES_FRAME * size
+        # an exact solution of zero is no measure
+        if within.mean() >= SEEN:
+            found = np.where(within, found, np.nan)
+        ax.plot(*style.thin(t, found), label=style.entry(text), **_look(k, t.size, jumps))
+        drawn.append(found)
+    fine = np.linspace(float(t[0]), end, SMOOTH)
+    parameters, _ = series.numbers_of(experiment, record, first.case)
+    for k, (text, formula) in enumerate(asked.beside.items()):
+        curve = values(parse(formula, ("t", *parameters)), {**parameters, "t": fine})
+        curve = np.broadcast_to(curve, fine.shape)
+        colour = style.COLOURS[(len(panel.runs) + k) % style.MANY]
+        ax.plot(*style.thin(fine, curve), color=colour, label=style.entry(text), **SUBTLE)
+        drawn.append(curve)
+    panels.fit_values(ax, drawn, *exact)
+    ax.set_xlim(float(t[0]), end if end > t[0] else float(t[0]) + 1.0)
+    unit = series.unit_of(experiment, record, panel.quantity)
+    ax.set_ylabel(style.label(words.symbol(panel.quantity), unit))
+    # values that hardly differ need long numbers
+    ax.yaxis.set_label_coords(-0.115, 0.5)
+    ax.set_title(panel.title)
+    style.beside(ax)
+    return True
+
+
+def _look(k: int, points: int, jumps: bool) -> dict[str, Any]:
+    look: dict[str, Any] = style.look(k) | {"linewidth": 1.2, "markersize": 3.0}
+    if points > FEW:
+        return look | {"marker": "none"}
+    # between points an impact may lie, which no line shows
+    return look | ({"linestyle": "none"} if jumps else {})
+
+
+def _exact(
+    experiment: Experiment, record: Record, quantity: str, member: Member, end: float
+) -> tuple[Floats, Floats]:
+    """Return the exact solution up to a time, at times of its own; at the common ones where only these are known."""
+    t = data.times(record, member.case)
+    fine = np.linspace(float(t[0]), min(end, float(t[-1])), SMOOTH)
+    best = series.exact(experiment, record, quantity, member, fine)
+    if best is None or not np.isfinite(best).any():
+        there = t <= end * (1.0 + 1e-12)
+        return t[there], data.exact_series(record, quantity, member)[there]
+    model = experiment.model.definition
+    if isinstance(model.events, Impact) and quantity in model.velocities:
+        rises = np.flatnonzero((best[:-1] < 0.0) & (best[1:] >= 0.0))
+        fine, best = np.insert(fine, rises + 1, fine[rises]), np.insert(best, rises + 1, np.nan)
+    return fine, best

@@ -1,0 +1,101 @@
+"""Series over time of one member: what the record holds, what follows from its states, and the exact solution."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from vibsim.core.array_types import Floats
+from vibsim.core.record import Record
+from vibsim.formula import values
+from vibsim.models.base import Formula, Model, tree
+from vibsim.report import data
+from vibsim.report.data import Member, pretty_unit
+from vibsim.report.types import Experiment
+from vibsim.simulation.members import members
+
+ENERGIES = ("energy", "kinetic_energy", "potential_energy")
+
+
+def numbers_of(
+    experiment: Experiment, record: Record, case: int
+) -> tuple[dict[str, Floats], dict[str, Floats]]:
+    """Return parameters and initial values of a member by its position in the record."""
+    index = int(record["case"][case])
+    found = members(experiment, index, index + 1)
+    parameters, initial = (
+        {name: column[0] for name, column in part.items()}
+        for part in (found.parameters, found.initial)
+    )
+    return parameters, initial
+
+
+def on_level(
+    experiment: Experiment, record: Record, quantity: str, member: Member, level: int
+) -> Floats | None:
+    """Return a quantity at the common times of a level, shape (t,); None where it is not known.
+
+    `level` is a position. What the record does not hold is worked out from the states by its formula.
+    """
+    if f"{quantity}_finest" in record:
+        return data.of_level(record, quantity, member, level)
+    model = experiment.model.definition
+    names = [state.name for state in model.states]
+    if any(f"{name}_finest" not in record for name in names):
+        return None
+    states = {name: data.of_level(record, name, member, level) for name in names}
+    return _of_states(experiment, record, quantity, member, states, data.times(record, member.case))
+
+
+def exact(
+    experiment: Experiment, record: Record, quantity: str, member: Member, t: Floats
+) -> Floats | None:
+    """Return the exact solution at any times; None where the model has none in closed form."""
+    model = experiment.model.definition
+    if model.exact is None:
+        return None
+    parameters, initial = numbers_of(experiment, record, member.case)
+    states = model.exact(t, initial, parameters)
+    if quantity in states:
+        return np.asarray(states[quantity])
+    return _of_states(experiment, record, quantity, member, states, t)
+
+
+def _of_states(
+    experiment: Experiment,
+    record: Record,
+    quantity: str,
+    member: Member,
+    states: Mapping[str, Floats],
+    t: Floats,
+) -> Floats | None:
+    """Work out an energy or an output of the model."""
+    model = experiment.model.definition
+    parameters, _ = numbers_of(experiment, record, member.case)
+    numbers = {**parameters, **states, "t": t}
+    found = [
+        np.broadcast_to(values(tree(model, formula), numbers), t.shape)
+        for formula in _formulas(model, quantity)
+    ]
+    return np.sum(found, axis=0) if found else None
+
+
+def _formulas(model: Model, quantity: str) -> list[Formula]:
+    """Return the formulas whose sum is a quantity; none where it has no formula in the states."""
+    energies = {"kinetic_energy": model.kinetic_energy, "potential_energy": model.potential_energy}
+    if quantity == "energy":
+        return list(energies.values())
+    of_outputs = {row.name: row.formula for row in model.outputs}
+    formula = {**energies, **of_outputs}.get(quantity)
+    return [] if formula is None else [formula]
+
+
+def unit_of(experiment: Experiment, record: Record, quantity: str) -> str:
+    """Return the unit of a quantity; empty where it has none."""
+    if f"{quantity}_finest" in record:
+        return data.unit(record, f"{quantity}_finest")
+    model = experiment.model.definition
+    rows = {state.name: state.unit for state in model.states}
+    rows |= {output.name: output.unit for output in model.outputs}
+    return pretty_unit(rows.get(quantity, model.energy_unit if quantity in ENERGIES else "1"))

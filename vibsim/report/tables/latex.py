@@ -1,0 +1,139 @@
+r"""Tables as LaTeX for the package ``booktabs``: in plain ASCII, so that pdflatex knows every character.
+
+What a text contains is printed and never run. Greek letters, signs of mathematics and raised or lowered characters
+become mathematics, accents the accents of LaTeX. What none of them can print stands as its number, such as ``U+4E2D``.
+Source: The Unicode Standard, chapter 4 (names, categories and decompositions of characters).
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from itertools import groupby
+
+from vibsim.report.tables.table import Table
+
+LATEX = r"""\begin{table}
+\centering
+\caption{%s}
+\begin{tabular}{%s}
+\toprule
+%s
+\bottomrule
+\end{tabular}
+\end{table}
+"""
+_SPECIAL = {
+    "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "&": r"\&", "%": r"\%",
+    "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}", "<": r"\textless{}", ">": r"\textgreater{}",
+    "|": r"\textbar{}", '"': "''", "\n": " ", "\r": " ", "\t": " ",
+    "\N{NO-BREAK SPACE}": "~", "\N{NARROW NO-BREAK SPACE}": r"\,", "\N{THIN SPACE}": r"\,",
+    "–": "--", "—": "---", "‘": "`", "’": "'", "“": "``", "”": "''", "„": ",,", "…": r"\ldots{}",
+    "ß": r"\ss{}", "æ": r"\ae{}", "Æ": r"\AE{}", "œ": r"\oe{}", "Œ": r"\OE{}", "ø": r"\o{}", "Ø": r"\O{}",
+    "ł": r"\l{}", "Ł": r"\L{}", "ı": r"\i{}", "§": r"\S{}", "¶": r"\P{}", "©": r"\copyright{}", "£": r"\pounds{}",
+    "\N{FRACTION SLASH}": "/",
+}  # fmt: skip
+_MATHEMATICS = {
+    "−": "-", "±": r"\pm", "∓": r"\mp", "·": r"\cdot", "⋅": r"\cdot", "×": r"\times", "÷": r"\div", "√": r"\surd",
+    "≤": r"\leq", "≥": r"\geq", "≠": r"\neq", "≈": r"\approx", "≡": r"\equiv", "∼": r"\sim", "∝": r"\propto",
+    "≪": r"\ll", "≫": r"\gg", "∞": r"\infty", "∂": r"\partial", "∇": r"\nabla", "∫": r"\int", "∑": r"\sum",
+    "∏": r"\prod", "∈": r"\in", "→": r"\rightarrow", "←": r"\leftarrow", "↔": r"\leftrightarrow",
+    "⇒": r"\Rightarrow", "°": r"^{\circ}", "′": "'", "″": "''", "‴": "'''", "✓": r"\surd", "✗": r"\times",
+    "¬": r"\neg", "µ": r"\mu", "ℓ": r"\ell", "ϑ": r"\vartheta", "ϕ": r"\varphi", "ϵ": r"\epsilon",
+}  # fmt: skip
+_SMALL = {
+    "BETA", "GAMMA", "DELTA", "ZETA", "ETA", "THETA", "IOTA", "KAPPA", "MU", "NU", "XI", "PI", "RHO", "SIGMA", "TAU",
+    "UPSILON", "PHI", "CHI", "PSI", "OMEGA", "ALPHA",
+}  # fmt: skip
+_GREEK = {name: rf"\{name.lower()}" for name in _SMALL} | {
+    "EPSILON": r"\varepsilon", "LAMDA": r"\lambda", "FINAL SIGMA": r"\varsigma", "OMICRON": "o",
+}  # fmt: skip
+"""Small letters by their names in Unicode."""
+_CAPITALS = {
+    name: rf"\{name.capitalize()}"
+    for name in ("GAMMA", "DELTA", "THETA", "XI", "PI", "SIGMA", "UPSILON", "PHI", "PSI", "OMEGA")
+} | {
+    "ALPHA": "A", "BETA": "B", "EPSILON": "E", "ZETA": "Z", "ETA": "H", "IOTA": "I", "KAPPA": "K", "MU": "M",
+    "NU": "N", "OMICRON": "O", "RHO": "P", "TAU": "T", "CHI": "X", "LAMDA": r"\Lambda",
+}  # fmt: skip
+"""Capital letters: those without a command look like Latin ones."""
+_ACCENTS = {
+    "\u0300": "`", "\u0301": "'", "\u0302": "^", "\u0303": "~", "\u0304": "=", "\u0306": "u", "\u0307": ".",
+    "\u0308": '"', "\u030a": "r", "\u030b": "H", "\u030c": "v", "\u0323": "d", "\u0327": "c", "\u0331": "b",
+}  # fmt: skip
+_SHIFTS = {"<super>": "^", "<sub>": "_"}
+_ROOT = re.compile("√([A-Za-z0-9]+)")
+_OPTION = ("[", "*")
+r"""With what a row may not begin: behind ``\\`` it would be an option of that command."""
+
+
+def to_latex(table: Table) -> str:
+    r"""Return a table as LaTeX for the package ``booktabs``: ``\input`` it into a document."""
+    alignment = "".join("l" if column.form == "text" else "r" for column in table.columns)
+    texts = [[column.title for column in table.columns], *table.text_rows()]
+    head, *body = [_row(row) for row in texts]
+    rows = "\n".join([head, r"\midrule", *body])
+    return LATEX % (escape(table.caption), alignment, rows)
+
+
+def _row(cells: list[str]) -> str:
+    line = " & ".join(map(escape, cells))
+    return f"{'{}' if line.lstrip().startswith(_OPTION) else ''}{line} \\\\"
+
+
+def escape(text: str) -> str:
+    """Return text that LaTeX prints as it stands, in ASCII."""
+    written, last = [], 0
+    for root in _ROOT.finditer(text):
+        written += [_plain(text[last : root.start()]), rf"$\sqrt{{\mathrm{{{root[1]}}}}}$"]
+        last = root.end()
+    return "".join([*written, _plain(text[last:])])
+
+
+def _plain(text: str) -> str:
+    """Write characters one by one, but raised and lowered ones that follow each other together."""
+    parts = []
+    for shift, group in groupby(text, _shift):
+        if shift:
+            parts.append(f"${_SHIFTS[shift]}{{{''.join(map(_on_line, group))}}}$")
+        else:
+            parts += map(_character, group)
+    return "".join(parts)
+
+
+def _shift(character: str) -> str:
+    """Say whether a character is raised or lowered and can be shifted in LaTeX; empty for one on the line."""
+    kind = unicodedata.decomposition(character).partition(" ")[0]
+    return kind if kind in _SHIFTS and _on_line(character) else ""
+
+
+def _on_line(character: str) -> str:
+    """Return a raised or lowered character on the line; within mathematics a minus is a hyphen."""
+    plain = unicodedata.normalize("NFKD", character).replace("−", "-")
+    return plain if plain.isascii() else ""
+
+
+def _character(character: str) -> str:
+    if character in _SPECIAL:
+        return _SPECIAL[character]
+    if character in _MATHEMATICS:
+        return f"${_MATHEMATICS[character]}$"
+    if character.isascii():
+        return character if character.isprintable() else ""
+    name = unicodedata.name(character, "")
+    greek = re.fullmatch(r"GREEK (SMALL|CAPITAL) LETTER ([A-Z ]+?)(?: WITH .*)?", name)
+    letter = {"SMALL": _GREEK, "CAPITAL": _CAPITALS}[greek[1]].get(greek[2]) if greek else None
+    if letter:
+        return f"${letter}$"
+    # what is not seen: controls, joiners, a combining mark by itself
+    if unicodedata.category(character) in {"Cc", "Cf", "Cs", "Mn", "Me"}:
+        return ""
+    apart = unicodedata.normalize("NFD", character)
+    base, marks = apart[0], apart[1:]
+    if marks and base.isascii() and base.isalpha():
+        accent = next((_ACCENTS[mark] for mark in marks if mark in _ACCENTS), "")
+        return f"\\{accent}{{{base}}}" if accent else base
+    alike = unicodedata.normalize("NFKD", character)
+    if alike != character:
+        return "".join(map(_character, alike))
+    return " " if unicodedata.category(character) == "Zs" else f"U+{ord(character):04X}"
