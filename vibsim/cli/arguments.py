@@ -89,39 +89,41 @@ def commands() -> Iterator[Command]:
     yield "run", "run.command", "Run experiments and show every verdict.", options
     file = _row("file", _path, "FILE", "experiment file")
     text = "Run an experiment file, and again whenever it is saved."
-    yield "watch", "watch", text, (results, file, cores, allow, *_detail())
-    yield "check", "plan", "Validate experiment files, without running them.", (files,)
+    yield "watch", "commands.watch", text, (results, file, cores, allow, *_detail())
+    yield "check", "commands.plan", "Validate experiment files, without running them.", (files,)
     text = "Show members, jobs, steps, memory, disk space and time of experiments before they run."
-    yield "plan", "plan", text, (results, files, _flag("--json", "print the plans as JSON"))
+    as_json = _flag("--json", "print the plans as JSON")
+    yield "plan", "commands.plan", text, (results, files, as_json)
     text = "Show verdicts, and the solution of the finest level down the screen."
-    yield "show", "show", text, (results, *_show())
-    yield "judge", "judge", "Judge whether the results of any solver converge.", tuple(_judge())
+    yield "show", "commands.show", text, (results, *_show())
+    text = "Judge whether the results of any solver converge."
+    yield "judge", "commands.judge", text, tuple(_judge())
     what: _Row = "what", {"choices": LISTS}
     yield (
         "list",
-        "listing",
+        "commands.listing",
         "List what there is to choose from, or print the JSON Schema of experiment files.",
         (what, _row("name", _word, "NAME", "one entry, in full", nargs="?")),
     )
     text = "Write a commented experiment file to begin with, and the JSON Schema for editors."
-    yield "new", "new", text, tuple(_new())
+    yield "new", "commands.new", text, tuple(_new())
     text = "experiment, FILE.yaml, or a folder of results"
     sides = (_row("first", _word, "A", text), _row("second", _word, "B", text))
     text = "Show which settings, verdicts and numbers of two experiments or two results differ."
-    yield "diff", "diff", text, (results, *sides)
+    yield "diff", "commands.diff", text, (results, *sides)
     text = "the reason of a verdict, such as order_low (default: list all of them)"
     reason = _row("reason", _word, "REASON", text, nargs="?")
     text = "Explain the reason of a verdict: what it means and what would settle the question."
-    yield "explain", "explain", text, (reason,)
+    yield "explain", "commands.explain", text, (reason,)
     text = "experiment whose report is opened (default: the index over all results)"
     page = _row("experiment", _word, "EXPERIMENT", text, nargs="?")
     text = "Open a report in the browser; print its path where there is none."
-    yield "open", "open", text, (results, page)
+    yield "open", "commands.open", text, (results, page)
 
     shell: _Row = "shell", {"choices": SHELLS, "help": "the shell; `words` is what its script asks"}
     text = "Print what a shell needs to complete commands, options and names."
     asked = _row("words", str, "WORD", "the command line so far", nargs="*")
-    yield "completion", "completion", text, (shell, asked)
+    yield "completion", "commands.completion", text, (shell, asked)
 
     digest = "refuse when the experiment or the code is not the one with this digest"
     discard = "delete a damaged or outdated input, so that the next run makes it again"
