@@ -268,7 +268,7 @@ def _packed(part: Part) -> dict[str, Any]:
         else _rounded(np.asarray(column))
         for column in part.at
     ]
-    return {"shape": part.shape, "at": columns}
+    return {"shape": part.shape, "at": columns} | ({"labelled": True} if part.label else {})
 
 
 def _rounded(values: Floats) -> list[int]:
@@ -287,6 +287,7 @@ def _still(lane: Lane) -> str:
             _shape(part, k) for part in scene.parts if part.look in ("wire", "body", "wheel")
         ]
     moving = [_shape(part, 0) for part in scene.parts]
+    moving += [_label(part) for part in scene.parts if part.label]
     return f'<g class="ghosts">{"".join(ghosts)}</g><g class="now">{"".join(moving)}</g>'
 
 
@@ -297,6 +298,13 @@ def _shape(part: Part, k: int) -> str:
         offset = float(np.ravel(part.at[0])[k])
         return f'<path class="{look}" transform="translate({-offset:.1f})" d="{part.outline}"/>'
     return f'<path class="{look}" d="{scenes.path_of(part, k)}"/>'
+
+
+def _label(part: Part) -> str:
+    """Return the label of a part at the first time as an element."""
+    place = scenes.place_of_label(part.shape, scenes.values_of(part, 0))
+    at = ' display="none"' if place is None else f' x="{place[0]:.1f}" y="{place[1]:.1f}"'
+    return f'<text class="{escape(part.look)}"{at}>{escape(part.label)}</text>'
 
 
 def _json(content: Any) -> str:
