@@ -120,6 +120,9 @@ def commands() -> Iterator[Command]:
     text = "Open a report in the browser; print its path where there is none."
     yield "open", "commands.open", text, (results, page)
 
+    text = "Write the movie of an experiment that has been run: MP4, WebM or GIF, or numbered PNG frames."
+    yield "movie", "commands.movie", text, (results, *_movie())
+
     shell: _Row = "shell", {"choices": SHELLS, "help": "the shell; `words` is what its script asks"}
     text = "Print what a shell needs to complete commands, options and names."
     asked = _row("words", str, "WORD", "the command line so far", nargs="*")
@@ -192,6 +195,29 @@ def _show() -> Iterator[_Row]:
     yield _row("--rows", _positive, "N", "lines of the plot (default: 40)", default=40)
     yield _row("--from", _finite, "T", "time at which the plot begins", default=0.0, dest="start")
     yield _flag("--no-plot", "show the verdicts alone")
+
+
+def _movie() -> Iterator[_Row]:
+    """Yield the options of ``vibsim movie``."""
+    text = "experiment, one member of its sweep (NAME@CASE), or FILE.yaml"
+    yield _row("experiment", _word, "EXPERIMENT", text)
+    text = "movie to write: .mp4, .webm or .gif (default: the name of the experiment, .mp4)"
+    yield _row("--output", _path, "FILE", text)
+    text = "folder for the frames, as frame_0000.png and so on; no movie is written unless --output names one"
+    yield _row("--frames-to", _path, "DIR", text)
+    text = "one scheme, or two side by side (default: the first, beside it what differs visibly)"
+    yield _row("--scheme", _word, "NAME", text, nargs="+", action="extend")
+    text = "one level, or two side by side (default: the finest, beside it the coarsest)"
+    yield _row("--level", _from_zero_whole, "L", text, nargs="+", action="extend")
+    yield _row("--case", _from_zero_whole, "K", "member of a sweep (default: 0)")
+    yield _row("--quantity", _word, "NAME", "what is shown over time (default: the first position)")
+    yield _row("--from", _finite, "T", "first time that is shown", dest="start")
+    yield _row("--to", _finite, "T", "last time that is shown", dest="end")
+    text = "periods in the moving window (default: 6 of a run of more than 9)"
+    yield _row("--window", _above_zero, "PERIODS", text)
+    yield _row("--fps", _above_zero, "N", "frames a second (default: 25, of a GIF 10)")
+    text = "number of frames over the whole time (default: as the motion needs, 1500 at most)"
+    yield _row("--frames", _positive, "N", text)
 
 
 def _judge() -> Iterator[_Row]:

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 
 from vibsim.cli.jobs.common import refusal
 from vibsim.core.errors import VibsimError, nearest
-from vibsim.plan import Plan
+from vibsim.plan import Plan, ShardJob
 
 if TYPE_CHECKING:
     from vibsim.core.record import Record
+
+OUTDATED = "note: these results were made before the experiment or vibsim changed; run it again for new ones"
 
 
 def made(plan: Plan, results: Path, case: int, word: str) -> tuple[list[int], list[int]]:
@@ -38,6 +40,11 @@ def of_level(plan: Plan, results: Path, level: int, case: int) -> Record:
     """Return one member at one level."""
     path, first = _place(plan, level, case)
     return read(results / path, case - first)
+
+
+def is_outdated(plan: Plan, record: Record, level: int, case: int) -> bool:
+    """Say whether a level was made before the experiment or vibsim changed."""
+    return record.attrs.get("digest") != _shard(plan, level, case).digest
 
 
 def read(path: Path, place: int) -> Record:
@@ -72,6 +79,9 @@ def chosen(option: str, wanted: str | None, names: Sequence[str]) -> str:
 
 def _place(plan: Plan, level: int, case: int) -> tuple[str, int]:
     """Return the file of a member at a level, and the first member in it."""
-    shards = plan.level(level).shards
-    shard = next(shard for shard in shards if shard.start <= case < shard.stop)
+    shard = _shard(plan, level, case)
     return shard.path, shard.start
+
+
+def _shard(plan: Plan, level: int, case: int) -> ShardJob:
+    return next(shard for shard in plan.level(level).shards if shard.start <= case < shard.stop)

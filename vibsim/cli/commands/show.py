@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from vibsim.core.array_types import Floats
     from vibsim.core.record import Record
 
-_OUTDATED = "note: these results were made before the experiment or vibsim changed; run it again for new ones"
-
 
 def show(options: Namespace) -> int:
     """Draw the finest level that is there, and show the verdicts below it, where they come last on the screen."""
@@ -54,7 +52,7 @@ def _verdicts(plan: Plan, results: Path) -> None:
         return
     summary = read_json(path, name=plan.key)
     if summary.get("digest") != plan.analysis:
-        print(_OUTDATED)
+        print(level_member.OUTDATED)
     print(*outcome_text.in_full([summary], terminal.columns()), sep="\n")
     page = results / plan.page
     if page.is_file():

@@ -14,6 +14,11 @@ from vibsim.report import data
 from vibsim.report.figures.scenes import Motion
 from vibsim.report.types import Experiment
 
+SECONDS_A_PERIOD = 2.0  # at speed 1
+WINDOW_PERIODS = 6.0  # a series over time is shown whole up to 1.5 times as many
+VISIBLE = 0.03  # difference of two motions that is seen, over the size of the motion
+UNBOUNDED = 3.0  # a motion larger than this, over the size of the finest one, is not drawn
+
 
 def motion(
     model: Model,
@@ -39,6 +44,11 @@ def parameters(experiment: Experiment, record: Record, case: int) -> Mapping[str
             found[key] = data.pick(record, name, case=case).item()
     # a declared parameter goes by its own name in formulas
     return {key.rpartition(".")[2]: value for key, value in found.items()}
+
+
+def window(span: float, period: float) -> float:
+    """Return how much of a time is shown at once: all of it, or some periods of a long run."""
+    return span if span <= 1.5 * WINDOW_PERIODS * period else WINDOW_PERIODS * period
 
 
 def period(t: Floats, u: Floats) -> float:

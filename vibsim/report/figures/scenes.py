@@ -32,7 +32,7 @@ COILS = 9  # turns of a spring
 ARC = 0.3  # radius of the arc of an angle over the length of the wire
 ARC_POINTS = 24
 LABELLED = 10.0  # least length of an arrow, and least angle [degree], that has its label
-BESIDE = 11.0  # pixels from the tip of an arrow, or from an arc, to the middle of its label
+BESIDE = 14.0  # pixels from the tip of an arrow, or from an arc, to the middle of its label
 AROUND = 1.2  # seen part of a road over the reach of the body, in its height
 
 

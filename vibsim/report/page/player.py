@@ -23,6 +23,7 @@ from vibsim.core.record import Record
 from vibsim.report import choice, data, frame, style
 from vibsim.report.data import Member
 from vibsim.report.figures import moments, scenes
+from vibsim.report.figures.moments import SECONDS_A_PERIOD, UNBOUNDED, VISIBLE
 from vibsim.report.figures.scenes import Motion, Part, Scene
 from vibsim.report.text import words
 from vibsim.report.types import Environment, Experiment
@@ -32,10 +33,6 @@ FEWEST_FRAMES_A_PERIOD = 20  # of a longer run the beginning is shown
 NUMBERS_A_FRAME = 8  # of one motion, about
 MOST_NUMBERS = 30_000  # of all series together, which keeps the data below 200 kB
 LEAST_FRAMES = 240
-SECONDS_A_PERIOD = 2.0  # at speed 1
-WINDOW_PERIODS = 6.0  # the position over time is shown whole up to 1.5 times as many
-VISIBLE = 0.03  # difference of two motions that is seen, over the size of the motion
-UNBOUNDED = 3.0  # a motion larger than this, over the size of the finest one, is not drawn
 POSITIONS = 6  # in the picture that stands still
 TRACE = 640.0, 150.0  # width and height of the position over time [pixel]
 EDGE = 8.0
@@ -163,7 +160,7 @@ def _context(record: Record, shown: list[Lane]) -> dict[str, Any]:
     """Return what the template shows."""
     t, period, position = shown[0].motion.t, shown[0].period, shown[0].motion.model.position
     whole = float(t[-1] - t[0])
-    window = whole if whole <= 1.5 * WINDOW_PERIODS * period else WINDOW_PERIODS * period
+    window = moments.window(whole, period)
     series = [lane.motion.states[position] for lane in shown]
     low, high = min(float(u.min()) for u in series), max(float(u.max()) for u in series)
     scale = (TRACE[1] - 2.0 * EDGE) / (high - low or 1.0)

@@ -32,18 +32,18 @@
   const place = {
     arrow(x, y, dx, dy) {
       const length = Math.hypot(dx, dy);
-      return length < 10 ? null : [x + dx - (11 * dy) / length, y + dy + (11 * dx) / length];
+      return length < 10 ? null : [x + dx - (14 * dy) / length, y + dy + (14 * dx) / length];
     },
     arc(x, y, r, degrees) {
       const middle = ((degrees % 360) * Math.PI) / 360;
-      return Math.abs(degrees % 360) < 10 ? null : [x + (r + 11) * Math.sin(middle), y + (r + 11) * Math.cos(middle)];
+      return Math.abs(degrees % 360) < 10 ? null : [x + (r + 14) * Math.sin(middle), y + (r + 14) * Math.cos(middle)];
     },
   };
   const moveLabel = (label, at, { width, height }) => {
     label.setAttribute("display", at ? "inline" : "none");
     if (!at) return;
-    label.setAttribute("x", text(Math.min(Math.max(at[0], 11), width - 11)));
-    label.setAttribute("y", text(Math.min(Math.max(at[1], 11), height - 11)));
+    label.setAttribute("x", text(Math.min(Math.max(at[0], 14), width - 14)));
+    label.setAttribute("y", text(Math.min(Math.max(at[1], 14), height - 14)));
   };
 
   for (const figure of document.querySelectorAll(".player")) {
