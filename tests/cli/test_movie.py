@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from vibsim.cli import main
 from vibsim.cli.commands.movie import MOST_GIF_FRAMES
 
 from .conftest import Made
@@ -146,6 +147,12 @@ def test_without_results_a_movie_says_what_to_run(made: Made, capsys: Capture) -
         path.unlink()
     assert made.vibsim("movie", made.file) == 1
     assert "there are no results yet: vibsim run" in capsys.readouterr().err
+
+
+def test_your_own_solver_has_no_movie(capsys: Capture) -> None:
+    file = Path(__file__).parents[2] / "examples/heat/heat.yaml"
+    assert main(["movie", str(file)]) == 2
+    assert "your own solver" in capsys.readouterr().err
 
 
 def test_a_terminal_is_told_how_many_frames_there_are(

@@ -13,7 +13,7 @@ from vibsim.cli import level_member
 from vibsim.cli.chosen_plans import one_plan_of
 from vibsim.cli.jobs.common import chosen_results, refusal
 from vibsim.cli.level_member import chosen
-from vibsim.core.errors import VibsimError, nearest
+from vibsim.core.errors import VibsimError
 from vibsim.plan import Plan
 from vibsim.store import write_bytes
 
@@ -72,8 +72,7 @@ def _form(output: Path) -> str:
     form = output.suffix.removeprefix(".").lower()
     if form not in encoding.FORMATS:
         known = [f".{one}" for one in encoding.FORMATS]
-        rule = f"must end in {', '.join(known[:-1])} or {known[-1]}"
-        raise refusal("--output", output, rule, nearest(output.suffix, known))
+        raise refusal("--output", output, f"must end in {', '.join(known[:-1])} or {known[-1]}")
     if not output.absolute().parent.is_dir():
         raise refusal("--output", output, "its folder does not exist")
     try:
@@ -105,7 +104,8 @@ def _film(plan: Plan, options: Namespace, form: str) -> Film:
     from vibsim.report.movie import film
 
     if plan.has_solver:
-        raise VibsimError(f"{plan.key}: a movie needs a model of vibsim; your own solver has none")
+        rule = "must have a model: a movie cannot show what your own solver does"
+        raise refusal("EXPERIMENT", options.experiment, rule)
     results, case = chosen_results(options), options.case or 0
     levels, made = level_member.made(plan, results, case, options.experiment)
     for level in options.level or ():
