@@ -11,7 +11,7 @@ import pytest
 
 from vibsim.cli import main
 from vibsim.cli.arguments import SHELLS, commands
-from vibsim.cli.completion import SCRIPTS, WORDS, candidates
+from vibsim.cli.commands.completion import SCRIPTS, WORDS, candidates
 from vibsim.core.vocabulary import REASONS
 from vibsim.models import MODELS
 from vibsim.schemes import SCHEMES

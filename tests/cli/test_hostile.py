@@ -232,7 +232,7 @@ def test_labels_of_any_kind_have_reports(tmp_path: Path) -> None:
 def test_a_fault_of_vibsim_is_told_in_short_and_kept_in_full(
     file: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from vibsim.cli import plan
+    from vibsim.cli.commands import plan
 
     def broken(*_: object, **__: object) -> None:
         raise KeyError("nobody expects this")

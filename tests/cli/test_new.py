@@ -11,7 +11,7 @@ import yaml
 
 from vibsim import Experiment, analyse, simulate, verdicts
 from vibsim.cli import main
-from vibsim.cli.new import SCHEMA
+from vibsim.cli.commands.new import SCHEMA
 from vibsim.models import MODELS
 from vibsim.plan import checkout
 
@@ -63,7 +63,7 @@ def test_within_the_checkout_the_line_names_the_schema_that_is_there(
 ) -> None:
     (tmp_path / "configs/mine").mkdir(parents=True)
     (tmp_path / "Snakefile").touch()
-    monkeypatch.setattr("vibsim.cli.new.find_checkout", lambda: tmp_path)
+    monkeypatch.setattr("vibsim.cli.commands.new.find_checkout", lambda: tmp_path)
     monkeypatch.chdir(tmp_path / "configs/mine")
     assert main(["new", "mine.yaml"]) == 0
     shipped = f"{LINE}../../workflow/schemas/experiment.schema.json"

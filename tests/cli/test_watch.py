@@ -11,7 +11,8 @@ from typing import IO
 
 import pytest
 
-from vibsim.cli import main, watch
+from vibsim.cli import main
+from vibsim.cli.commands import watch
 
 TEXT = """\
 title: A car on a road

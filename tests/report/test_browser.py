@@ -91,6 +91,18 @@ def paths(page):
     return [re.findall(r'<path [^>]*\bd="([^"]*)"', group) for group in moving]
 
 
+def labels(page):
+    """Return words and place of the labels of all motions; no place where a label is hidden."""
+    moving = re.findall(r'<g class="now">(.*?)</g>', page, re.DOTALL)
+    return [
+        [
+            (text, None if 'display="none"' in look else tuple(numbers(look)[-2:]))
+            for look, text in re.findall(r"<text class=([^>]*)>([^<]*)</text>", group)
+        ]
+        for group in moving
+    ]
+
+
 def numbers(text):
     return [float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", text)]
 
@@ -114,7 +126,8 @@ def test_the_script_draws_what_the_still_picture_draws(tmp_path, name):
     path, frame = tmp_path / "page.html", 37
     go = GO.replace("FRAME", str(frame))
     path.write_text(f"<!DOCTYPE html><body>{player.element(exp, record, environment())}{go}</body>")
-    found = paths(shown(path))
+    page = shown(path)
+    found = paths(page)
     assert len(found) == len(lanes)
     for lane, drawn in zip(lanes, found, strict=True):
         for part, text in zip(lane.scene.parts, drawn, strict=True):
@@ -122,6 +135,13 @@ def test_the_script_draws_what_the_still_picture_draws(tmp_path, name):
                 wanted = scenes.path_of(part, frame)
                 assert re.sub(r"[-\d. ]+", "", text) == re.sub(r"[-\d. ]+", "", wanted)
                 assert numbers(text) == pytest.approx(numbers(wanted), abs=0.25)
+    for lane, texts in zip(lanes, labels(page), strict=True):
+        labelled = [part for part in lane.scene.parts if part.label]
+        for part, (text, place) in zip(labelled, texts, strict=True):
+            assert text == part.label
+            wanted = scenes.place_of_label(part.shape, scenes.values_of(part, frame))
+            assert (place is None) == (wanted is None)
+            assert place is None or place == pytest.approx(wanted, abs=0.3)
 
 
 KEYS = """

@@ -118,6 +118,26 @@ def test_the_forces_on_a_pendulum_are_those_of_the_model(name):
         assert power.max() < 1e-3 * -power.min()
 
 
+@pytest.mark.parametrize("name", ["dragged", "over the top", "elastic_pendulum"])
+def test_forces_and_angle_are_labelled_and_the_legend_names_what_is_magnified(name):
+    exp, record = made(name)
+    lane = player.lanes(exp, record)[0]
+    labels = {part.look: part.label for part in lane.scene.parts if part.label}
+    assert labels.keys() >= {"angle", "gravity", "pull"}
+    told = dict(lane.scene.legend)
+    assert all(text.split()[-1] in told[look] for look, text in labels.items() if look in told)
+    assert ("drag" in labels) == ("5 times" in told.get("drag", ""))
+    # the arc goes from below to the wire, also after a whole turn
+    x0, y0, x1, y1 = (at(lane, "wire", k) for k in range(4))
+    arc = next(part for part in lane.scene.parts if part.look == "angle")
+    length = np.hypot(x1 - x0, y1 - y0)
+    for k in range(0, lane.motion.t.size, 7):
+        (line,) = scenes.strokes("arc", scenes.values_of(arc, k))
+        along = np.array([x1[k] - x0[k], y1[k] - y0[k]]) / length[k]
+        assert line[0] == pytest.approx((x0[k], y0[k] + arc.at[2]))
+        assert (np.array(line[-1]) - (x0[k], y0[k])) / arc.at[2] == pytest.approx(along, abs=1e-6)
+
+
 def test_the_wheel_stays_on_the_road_and_the_body_where_the_record_says():
     exp, record = made("vehicle")
     lane = player.lanes(exp, record)[0]

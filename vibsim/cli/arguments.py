@@ -89,39 +89,44 @@ def commands() -> Iterator[Command]:
     yield "run", "run.command", "Run experiments and show every verdict.", options
     file = _row("file", _path, "FILE", "experiment file")
     text = "Run an experiment file, and again whenever it is saved."
-    yield "watch", "watch", text, (results, file, cores, allow, *_detail())
-    yield "check", "plan", "Validate experiment files, without running them.", (files,)
+    yield "watch", "commands.watch", text, (results, file, cores, allow, *_detail())
+    yield "check", "commands.plan", "Validate experiment files, without running them.", (files,)
     text = "Show members, jobs, steps, memory, disk space and time of experiments before they run."
-    yield "plan", "plan", text, (results, files, _flag("--json", "print the plans as JSON"))
+    as_json = _flag("--json", "print the plans as JSON")
+    yield "plan", "commands.plan", text, (results, files, as_json)
     text = "Show verdicts, and the solution of the finest level down the screen."
-    yield "show", "show", text, (results, *_show())
-    yield "judge", "judge", "Judge whether the results of any solver converge.", tuple(_judge())
+    yield "show", "commands.show", text, (results, *_show())
+    text = "Judge whether the results of any solver converge."
+    yield "judge", "commands.judge", text, tuple(_judge())
     what: _Row = "what", {"choices": LISTS}
     yield (
         "list",
-        "listing",
+        "commands.listing",
         "List what there is to choose from, or print the JSON Schema of experiment files.",
         (what, _row("name", _word, "NAME", "one entry, in full", nargs="?")),
     )
     text = "Write a commented experiment file to begin with, and the JSON Schema for editors."
-    yield "new", "new", text, tuple(_new())
+    yield "new", "commands.new", text, tuple(_new())
     text = "experiment, FILE.yaml, or a folder of results"
     sides = (_row("first", _word, "A", text), _row("second", _word, "B", text))
     text = "Show which settings, verdicts and numbers of two experiments or two results differ."
-    yield "diff", "diff", text, (results, *sides)
+    yield "diff", "commands.diff", text, (results, *sides)
     text = "the reason of a verdict, such as order_low (default: list all of them)"
     reason = _row("reason", _word, "REASON", text, nargs="?")
     text = "Explain the reason of a verdict: what it means and what would settle the question."
-    yield "explain", "explain", text, (reason,)
+    yield "explain", "commands.explain", text, (reason,)
     text = "experiment whose report is opened (default: the index over all results)"
     page = _row("experiment", _word, "EXPERIMENT", text, nargs="?")
     text = "Open a report in the browser; print its path where there is none."
-    yield "open", "open", text, (results, page)
+    yield "open", "commands.open", text, (results, page)
+
+    text = "Write the movie of an experiment that has been run: MP4, WebM or GIF, or numbered PNG frames."
+    yield "movie", "commands.movie", text, (results, *_movie())
 
     shell: _Row = "shell", {"choices": SHELLS, "help": "the shell; `words` is what its script asks"}
     text = "Print what a shell needs to complete commands, options and names."
     asked = _row("words", str, "WORD", "the command line so far", nargs="*")
-    yield "completion", "completion", text, (shell, asked)
+    yield "completion", "commands.completion", text, (shell, asked)
 
     digest = "refuse when the experiment or the code is not the one with this digest"
     discard = "delete a damaged or outdated input, so that the next run makes it again"
@@ -190,6 +195,29 @@ def _show() -> Iterator[_Row]:
     yield _row("--rows", _positive, "N", "lines of the plot (default: 40)", default=40)
     yield _row("--from", _finite, "T", "time at which the plot begins", default=0.0, dest="start")
     yield _flag("--no-plot", "show the verdicts alone")
+
+
+def _movie() -> Iterator[_Row]:
+    """Yield the options of ``vibsim movie``."""
+    text = "experiment, one member of its sweep (NAME@CASE), or FILE.yaml"
+    yield _row("experiment", _word, "EXPERIMENT", text)
+    text = "movie to write: .mp4, .webm or .gif (default: the name of the experiment, .mp4)"
+    yield _row("--output", _path, "FILE", text)
+    text = "folder for the frames, as frame_0000.png and so on; no movie is written unless --output names one"
+    yield _row("--frames-to", _path, "DIR", text)
+    text = "one scheme, or two side by side (default: the first, beside it what differs visibly)"
+    yield _row("--scheme", _word, "NAME", text, nargs="+", action="extend")
+    text = "one level, or two side by side (default: the finest, beside it the coarsest)"
+    yield _row("--level", _from_zero_whole, "L", text, nargs="+", action="extend")
+    yield _row("--case", _from_zero_whole, "K", "member of a sweep (default: 0)")
+    yield _row("--quantity", _word, "NAME", "what is shown over time (default: the first position)")
+    yield _row("--from", _finite, "T", "first time that is shown", dest="start")
+    yield _row("--to", _finite, "T", "last time that is shown", dest="end")
+    text = "periods in the moving window (default: 6 of a run of more than 9)"
+    yield _row("--window", _above_zero, "PERIODS", text)
+    yield _row("--fps", _above_zero, "N", "frames a second (default: 25, of a GIF 10)")
+    text = "number of frames over the whole time (default: as the motion needs, 1500 at most)"
+    yield _row("--frames", _positive, "N", text)
 
 
 def _judge() -> Iterator[_Row]:

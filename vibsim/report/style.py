@@ -42,6 +42,8 @@ BESIDE = dict[str, Any](loc="upper left", bbox_to_anchor=(1.01, 1.03), borderaxe
 """The place of a legend at the right of its axes."""
 TIME, STEP = "time", "step"
 """Group ids of axes whose curves a page can read: over time, and against the step (`vibsim.report.figures.svg`)."""
+LONG, OVERVIEW = "long", "overview"
+"""The same of a long series, behind it the width of the window that a page shows at first; and of all of its time."""
 MISSING = "#d4d4d4"  # colour of what has no value
 WIDTH = 9.0  # of a figure [inch]
 THINNED_POINTS = 400  # horizontal resolution to which a long series is thinned

@@ -14,6 +14,7 @@ from vibsim.report.data import Member
 from vibsim.report.figures import (
     energy,
     extrema,
+    long_series,
     maps,
     members,
     motion,
@@ -78,6 +79,7 @@ def pictures(
         # beside the worst member a typical one
         typical = [member for member in series if member.role == "typical"]
         moving += [motion.motion(record, position, member) for member in typical[:1]]
+        moving += [long_series.long_series(record, position, lead.member)]
         moving += [plane.path(experiment, record, series)]
     own = [member for member in series if member.role != "typical"]
     own.sort(

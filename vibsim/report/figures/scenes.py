@@ -1,7 +1,8 @@
 """Drawings of systems that move: which lines, springs, bodies and forces, and where they are at every time.
 
 A drawing is a list of parts whose numbers are series over time, in the pixels of a frame of `WIDTH` times `HEIGHT`.
-The page draws a part in the same way at every time (`path_of`, and the same in ``player.js``).
+Pages and movies draw a part in the same way at every time (`path_of`, `strokes` and `place_of_label`, and the same in
+``player.js``).
 
 Source: vibration text, section 10.6 (pendulum with its forces, the drag five times larger), 10.7, 10.8 (vehicle), 10.9,
 10.3; sketches of figures 12 to 17.
@@ -10,7 +11,7 @@ Source: vibration text, section 10.6 (pendulum with its forces, the drag five ti
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,11 +25,17 @@ from vibsim.models.base import Formula
 WIDTH, HEIGHT = 320.0, 220.0
 WEIGHT = 0.45  # length of an arrow as long as the weight, over that of the wire
 MAGNIFIED = 5.0  # how much larger than other forces the drag is drawn
+MAGNIFIED_DRAG = f"{MAGNIFIED:g} D"
+DRAG = "drag", f"drag D, drawn {MAGNIFIED:g} times as large"
 LONGEST = 1.3  # longest arrow over the length of the wire
 REACH = 92.0  # pixels of the largest displacement of a body on a spring
 FORCE = 60.0  # pixels of the largest driving force
 CYLINDER = 26.0  # length of that of a dashpot [pixel]
 COILS = 9  # turns of a spring
+ARC = 0.3  # radius of the arc of an angle over the length of the wire
+ARC_POINTS = 24
+LABELLED = 10.0  # least length of an arrow, and least angle [degree], that has its label
+BESIDE = 14.0  # pixels from the tip of an arrow, or from an arc, to the middle of its label
 AROUND = 1.2  # seen part of a road over the reach of the body, in its height
 
 
@@ -69,12 +76,15 @@ class Part:
 
     shape: str
     """``line`` and ``spring`` between two points, ``circle`` with its radius, ``box`` with its sizes, ``arrow`` along a
-    vector, ``track``: a fixed outline that moves to the left."""
+    vector, ``arc`` around a point with its radius and an angle from below [degree], ``track``: a fixed outline that
+    moves to the left."""
     look: str
     """Class of the style."""
     at: tuple[Floats | float, ...]
     outline: str = ""
     """Of a track."""
+    label: str = ""
+    """Of an arrow or an arc, drawn beside it."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +113,7 @@ def pendulum(motion: Motion) -> Scene:
     x, y = x0 + length * along[0], y0 + length * along[1]
     parts = [
         Part("line", "guide", (x0, y0, x0, y0 + 1.1 * length)),
+        Part("arc", "angle", (x0, y0, ARC * length, np.degrees(theta)), label="θ"),
         Part("line", "wire", (x0, y0, x, y)),
         Part("circle", "pivot", (x0, y0, 3.0)),
         # beneath the arrows, so that a small force is seen
@@ -113,14 +124,16 @@ def pendulum(motion: Motion) -> Scene:
     for name, rod in (("wire_force", "wire"), ("pivot_force", "pivot")):
         if motion.has(name):
             pull = weight * _shortened(motion.output(name) / heavy)
-            parts.append(Part("arrow", "gravity", (x, y, 0.0, weight)))
-            parts.append(Part("arrow", "pull", (x, y, -pull * along[0], -pull * along[1])))
-            legend += [("gravity", "gravity"), ("pull", f"force of the {rod}")]
+            parts.append(Part("arrow", "gravity", (x, y, 0.0, weight), label="mg"))
+            towards = -pull * along[0], -pull * along[1]
+            parts.append(Part("arrow", "pull", (x, y, *towards), label="S"))
+            legend += [("gravity", "gravity mg"), ("pull", f"force S of the {rod}")]
     for name, arm in (("drag_force", 1.0), ("drag_moment", motion.number("L"))):
         if motion.has(name):
             drag = weight * _shortened(MAGNIFIED * motion.output(name) / (heavy * arm))
-            parts.append(Part("arrow", "drag", (x, y, drag * along[1], -drag * along[0])))
-            legend.append(("drag", f"drag, {MAGNIFIED:g} times larger"))
+            backwards = drag * along[1], -drag * along[0]
+            parts.append(Part("arrow", "drag", (x, y, *backwards), label=MAGNIFIED_DRAG))
+            legend.append(DRAG)
     return Scene(tuple(parts), tuple(legend))
 
 
@@ -141,21 +154,24 @@ def elastic_pendulum(motion: Motion) -> Scene:
     pull = _shortened(motion.output("wire_force"))
     length = np.maximum(np.hypot(across, 1.0 - up), 1e-9)
     weight = WEIGHT * scale
+    towards = -weight * pull * across / length, -weight * pull * (1.0 - up) / length
     parts = [
         Part("line", "guide", (x0, y0, x0, y0 + 1.05 * scale)),
+        Part("arc", "angle", (x0, y0, ARC * scale, np.degrees(np.arctan2(across, 1.0 - up))), label="θ"),
         Part("spring", "wire", (x0, y0, x, y)),
         Part("circle", "pivot", (x0, y0, 3.0)),
         Part("circle", "body", (x, y, 9.0)),
-        Part("arrow", "gravity", (x, y, 0.0, weight)),
-        Part("arrow", "pull", (x, y, -weight * pull * across / length, -weight * pull * (1.0 - up) / length)),
+        Part("arrow", "gravity", (x, y, 0.0, weight), label="mg"),
+        Part("arrow", "pull", (x, y, *towards), label="S"),
     ]  # fmt: skip
-    legend = [("gravity", "gravity"), ("pull", "force of the wire")]
+    legend = [("gravity", "gravity mg"), ("pull", "force S of the wire")]
     if motion.has("drag_force"):
         vx, vy = motion.states["vx"], motion.states["vy"]
         speed = np.maximum(np.hypot(vx, vy), 1e-300)
         size = weight * _shortened(MAGNIFIED * motion.output("drag_force"))
-        parts.append(Part("arrow", "drag", (x, y, -size * vx / speed, size * vy / speed)))
-        legend.append(("drag", f"drag, {MAGNIFIED:g} times larger"))
+        backwards = -size * vx / speed, size * vy / speed
+        parts.append(Part("arrow", "drag", (x, y, *backwards), label=MAGNIFIED_DRAG))
+        legend.append(DRAG)
     return Scene(tuple(parts), tuple(legend))
 
 
@@ -300,33 +316,69 @@ def _outline(x: Floats, y: Floats) -> str:
     return "M" + "L".join(f"{across} {height:g}" for across, height in kept.items())
 
 
-def path_of(part: Part, k: int) -> str:
-    """Return the data of the path of a part at the k-th time, as ``player.js`` does."""
-    values = [float(np.ravel(column)[k if np.size(column) > 1 else 0]) for column in part.at]
-    match part.shape, values:
+def values_of(part: Part, k: int) -> list[float]:
+    """Return the numbers of a part at the k-th time."""
+    return [float(np.ravel(column)[k if np.size(column) > 1 else 0]) for column in part.at]
+
+
+def strokes(shape: str, values: Sequence[float]) -> list[list[tuple[float, float]]]:
+    """Return the lines that a shape of these numbers consists of, as points; none of what is too small to be seen."""
+    match shape, values:
         case "line", [x0, y0, x1, y1]:
-            return f"M{x0:.1f} {y0:.1f}L{x1:.1f} {y1:.1f}"
+            return [[(x0, y0), (x1, y1)]]
         case "spring", [x0, y0, x1, y1]:
             length = math.hypot(x1 - x0, y1 - y0) or 1.0
             dx, dy = (x1 - x0) / length, (y1 - y0) / length
-            text = f"M{x0:.1f} {y0:.1f}"
-            for i in range(2 * COILS):
-                s, side = length * (0.1 + 0.8 * (i + 0.5) / (2 * COILS)), 5.0 - 10.0 * (i % 2)
-                text += f"L{x0 + s * dx - side * dy:.1f} {y0 + s * dy + side * dx:.1f}"
-            return f"{text}L{x1:.1f} {y1:.1f}"
+            turns = [
+                (length * (0.1 + 0.8 * (i + 0.5) / (2 * COILS)), 5.0 - 10.0 * (i % 2))
+                for i in range(2 * COILS)
+            ]
+            middle = [(x0 + s * dx - side * dy, y0 + s * dy + side * dx) for s, side in turns]
+            return [[(x0, y0), *middle, (x1, y1)]]
+        case "box", [x, y, w, h]:
+            left, right, top, bottom = x - w / 2, x + w / 2, y - h / 2, y + h / 2
+            return [[(left, top), (right, top), (right, bottom), (left, bottom), (left, top)]]
+        case ("circle", [x, y, r]) | ("arc", [x, y, r, _]):
+            angle = math.tau if shape == "circle" else math.radians(math.fmod(values[3], 360.0))
+            turned = [angle * i / ARC_POINTS for i in range(ARC_POINTS + 1)]
+            return [[(x + r * math.sin(a), y + r * math.cos(a)) for a in turned]]
+        case "arrow", [x, y, dx, dy]:
+            length = math.hypot(dx, dy)
+            if length < 2.0:
+                return []
+            head = min(8.0, 0.6 * length) / length
+            bx, by = x + dx * (1.0 - head), y + dy * (1.0 - head)
+            nx, ny = -dy * 0.45 * head, dx * 0.45 * head
+            tip = x + dx, y + dy
+            return [[(x, y), tip], [(bx + nx, by + ny), tip, (bx - nx, by - ny)]]
+    raise ValueError(f"{shape} of {len(values)} numbers")
+
+
+def path_of(part: Part, k: int) -> str:
+    """Return the data of the path of a part at the k-th time, as ``player.js`` does."""
+    values = values_of(part, k)
+    match part.shape, values:
         case "circle", [x, y, r]:
             return f"M{x - r:.1f} {y:.1f}a{r:g} {r:g} 0 1 0 {2 * r:g} 0a{r:g} {r:g} 0 1 0 {-2 * r:g} 0z"
         case "box", [x, y, w, h]:
             return f"M{x - w / 2:.1f} {y - h / 2:.1f}h{w:g}v{h:g}h{-w:g}z"
-        case "arrow", [x, y, dx, dy]:
-            length = math.hypot(dx, dy)
-            if length < 2.0:
-                return ""
-            head = min(8.0, 0.6 * length) / length
-            bx, by = x + dx * (1.0 - head), y + dy * (1.0 - head)
-            nx, ny = -dy * 0.45 * head, dx * 0.45 * head
-            return (
-                f"M{x:.1f} {y:.1f}L{x + dx:.1f} {y + dy:.1f}M{bx + nx:.1f} {by + ny:.1f}"
-                f"L{x + dx:.1f} {y + dy:.1f}L{bx - nx:.1f} {by - ny:.1f}"
-            )
-    raise ValueError(f"{part.shape} of {len(values)} numbers")
+    lines = strokes(part.shape, values)
+    return "".join("M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in line) for line in lines)
+
+
+def place_of_label(shape: str, values: Sequence[float]) -> tuple[float, float] | None:
+    """Return the middle of the label of an arrow or an arc; None where it is too small for one."""
+    if shape == "arrow":
+        x, y, dx, dy = values
+        length = math.hypot(dx, dy)
+        if length < LABELLED:
+            return None
+        x, y = x + dx - BESIDE * dy / length, y + dy + BESIDE * dx / length
+    else:
+        x, y, r, degrees = values
+        degrees = math.fmod(degrees, 360.0)
+        if abs(degrees) < LABELLED:
+            return None
+        middle = math.radians(degrees / 2.0)
+        x, y = x + (r + BESIDE) * math.sin(middle), y + (r + BESIDE) * math.cos(middle)
+    return min(max(x, BESIDE), WIDTH - BESIDE), min(max(y, BESIDE), HEIGHT - BESIDE)

@@ -7,6 +7,8 @@ replace, and what a script needs to find values again stands beside the curves:
 
 ``<g data-axis="time" data-box="left top width height" data-x="low high" data-y="low high" data-log="xy">``
     a panel whose axes have a group id (``ax.set_gid("time")``); its limits are in units of its labels
+``<g data-axis="long" data-window="width" ...>``, ``<g data-axis="overview" ...>``
+    panels of a long series (``ax.set_gid("long width")``), of which a page shows a part, and all of its time
 ``<g data-curve="label" data-key="key">``
     a curve, or what else has a place on the axes; the key is its group id, else its label. A label that begins with an
     underscore, which leaves it out of the legend, counts too
@@ -96,6 +98,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         self._low, self._high = np.zeros(2), np.array([width, height])
         self._tags: dict[str, str] = {}
         self._open: list[str] = []
+        self._decimals = 2
 
     def document(self) -> str:
         """Return all that was drawn, with a frame that holds every word."""
@@ -133,8 +136,12 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
             log = "".join(w for w in "xy" if getattr(ax, f"get_{w}scale")() == "log")
             place = _numbers(box.x0, self._size[1] - box.y1, box.width, box.height)
             x, y = (" ".join(f"{v:.9g}" for v in lim) for lim in (ax.get_xlim(), ax.get_ylim()))
+            kind, _, window = tag.partition(" ")
+            more = f' data-window="{window}"' if window else ""
+            # of what is shown much larger, hundredths of a point are seen
+            self._decimals = 3 if window else 2
             self._body.append(
-                f'<g data-axis="{tag}" data-box="{place}" data-x="{x}" data-y="{y}" data-log="{log}">'
+                f'<g data-axis="{kind}"{more} data-box="{place}" data-x="{x}" data-y="{y}" data-log="{log}">'
             )
         if ax.axison and (ax.patch.get_hatch() or to_hex(ax.get_facecolor()) != "#ffffff"):
             ax.patch.draw(self)
@@ -151,6 +158,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
                 self.add(artist)
         if tag:
             self._body.append("</g>")
+        self._decimals = 2
 
     def _curve(self, artist: Any) -> None:
         """Draw what belongs to a curve of a panel that a script can read."""
@@ -428,7 +436,7 @@ class Writer(RendererBase):  # type: ignore[misc, unused-ignore]
         simplify = bool(path.should_simplify and is_line)
         clip = (0.0, 0.0, *self._size) if is_line else None
         raw = cast(Any, _path).convert_to_string(
-            path, transform, clip, simplify, None, 2, COMMANDS, False
+            path, transform, clip, simplify, None, self._decimals, COMMANDS, False
         )
         return (
             str(raw.decode("ascii"))

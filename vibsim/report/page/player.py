@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 from typing import Any
@@ -23,7 +22,8 @@ from vibsim.core.array_types import Floats
 from vibsim.core.record import Record
 from vibsim.report import choice, data, frame, style
 from vibsim.report.data import Member
-from vibsim.report.figures import scenes
+from vibsim.report.figures import moments, scenes
+from vibsim.report.figures.moments import SECONDS_A_PERIOD, UNBOUNDED, VISIBLE
 from vibsim.report.figures.scenes import Motion, Part, Scene
 from vibsim.report.text import words
 from vibsim.report.types import Environment, Experiment
@@ -33,10 +33,6 @@ FEWEST_FRAMES_A_PERIOD = 20  # of a longer run the beginning is shown
 NUMBERS_A_FRAME = 8  # of one motion, about
 MOST_NUMBERS = 30_000  # of all series together, which keeps the data below 200 kB
 LEAST_FRAMES = 240
-SECONDS_A_PERIOD = 2.0  # at speed 1
-WINDOW_PERIODS = 6.0  # the position over time is shown whole up to 1.5 times as many
-VISIBLE = 0.03  # difference of two motions that is seen, over the size of the motion
-UNBOUNDED = 3.0  # a motion larger than this, over the size of the finest one, is not drawn
 POSITIONS = 6  # in the picture that stands still
 TRACE = 640.0, 150.0  # width and height of the position over time [pixel]
 EDGE = 8.0
@@ -78,20 +74,17 @@ def lanes(experiment: Experiment, record: Record) -> list[Lane]:
         return []
     first, _, states = chosen[0]
     samples = data.times(record, first.case)
-    period = _period(samples, states[model.position])
+    period = moments.period(samples, states[model.position])
     t = _times(samples, period, len(chosen))
     there = samples <= t[-1] * (1.0 + 1e-12)
     reach = {
         name: max(float(np.max(np.abs(series[name][there]))) for _, _, series in chosen)
         for name in states
     }
-    parameters = _parameters(experiment, record, first.case)
+    parameters = moments.parameters(experiment, record, first.case)
     found = []
     for one, level, series in chosen:
-        at = {name: _at(t, samples, x) for name, x in series.items()}
-        if model.kind == "bouncing_ball":
-            at["h"] = _flight(t, samples, series, at["h"], float(parameters["g"]))
-        motion = Motion(model, t, at, parameters, reach)
+        motion = moments.motion(model, t, samples, series, parameters, reach)
         found.append(
             Lane(
                 _title(record, one, level, chosen), motion, draw(motion), period, float(samples[-1])
@@ -155,25 +148,6 @@ def _title(
     return ", ".join(parts)
 
 
-def _parameters(experiment: Experiment, record: Record, case: int) -> Mapping[str, Any]:
-    """Return the parameters of a member: what is swept has its value."""
-    found: dict[str, Any] = dict(experiment.model.parameters)
-    for name in data.swept(record):
-        section, _, key = data.swept_label(record, name)[0].partition(".")
-        if section == "model":
-            found[key] = data.pick(record, name, case=case).item()
-    # a declared parameter goes by its own name in formulas
-    return {key.rpartition(".")[2]: value for key, value in found.items()}
-
-
-def _period(t: Floats, u: Floats) -> float:
-    """Return about how long the motion takes to come back, counted by its turns; the whole time without any."""
-    step = np.diff(u)
-    step = step[np.abs(step) > 1e-9 * data.largest(u)]
-    turns = int(np.sum(np.signbit(step[1:]) != np.signbit(step[:-1])))
-    return float(t[-1] - t[0]) / max(1.0, 0.5 * turns)
-
-
 def _times(t: Floats, period: float, count: int) -> Floats:
     """Return the times that are shown of samples `t`, for so many motions, shape (frame,)."""
     most = MOST_NUMBERS // (NUMBERS_A_FRAME * count)
@@ -182,38 +156,11 @@ def _times(t: Floats, period: float, count: int) -> Floats:
     return np.linspace(float(t[0]), float(t[0]) + end, min(most, wanted) + 1)
 
 
-def _at(times: Floats, t: Floats, x: Floats) -> Floats:
-    """Return a series at other times, by the cubic of each interval whose slopes are those of its neighbours."""
-    slope = np.gradient(x, t)
-    i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, t.size - 2)
-    h = t[i + 1] - t[i]
-    s = (times - t[i]) / h
-    a, b = x[i] + h * s * slope[i], x[i + 1] - h * (1.0 - s) * slope[i + 1]
-    weight = s * s * (3.0 - 2.0 * s)
-    return np.asarray(a + (b - a) * weight)
-
-
-def _flight(times: Floats, t: Floats, series: Mapping[str, Floats], h: Floats, g: float) -> Floats:
-    """Return the height of a ball, with its impacts: between samples it falls until it meets the rise to the next.
-
-    `h` is the height at `times` as if nothing happened between the samples at `t`.
-    """
-    i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, t.size - 2)
-    height, v = series["h"], series["v"]
-    falls, rises = (
-        height[j] + v[j] * x - 0.5 * g * x * x for j, x in ((i, times - t[i]), (i + 1, times - t[i + 1]))
-    )  # fmt: skip
-    # behind its last impact it lies
-    rises = np.where((height[i + 1] <= 0.0) & (v[i + 1] == 0.0), 0.0, rises)
-    meets = (v[i] < 0.0) & (v[i + 1] >= 0.0)
-    return np.maximum(np.where(meets, np.maximum(falls, rises), h), 0.0)
-
-
 def _context(record: Record, shown: list[Lane]) -> dict[str, Any]:
     """Return what the template shows."""
     t, period, position = shown[0].motion.t, shown[0].period, shown[0].motion.model.position
     whole = float(t[-1] - t[0])
-    window = whole if whole <= 1.5 * WINDOW_PERIODS * period else WINDOW_PERIODS * period
+    window = moments.window(whole, period)
     series = [lane.motion.states[position] for lane in shown]
     low, high = min(float(u.min()) for u in series), max(float(u.max()) for u in series)
     scale = (TRACE[1] - 2.0 * EDGE) / (high - low or 1.0)
@@ -268,7 +215,7 @@ def _packed(part: Part) -> dict[str, Any]:
         else _rounded(np.asarray(column))
         for column in part.at
     ]
-    return {"shape": part.shape, "at": columns}
+    return {"shape": part.shape, "at": columns} | ({"labelled": True} if part.label else {})
 
 
 def _rounded(values: Floats) -> list[int]:
@@ -287,6 +234,7 @@ def _still(lane: Lane) -> str:
             _shape(part, k) for part in scene.parts if part.look in ("wire", "body", "wheel")
         ]
     moving = [_shape(part, 0) for part in scene.parts]
+    moving += [_label(part) for part in scene.parts if part.label]
     return f'<g class="ghosts">{"".join(ghosts)}</g><g class="now">{"".join(moving)}</g>'
 
 
@@ -297,6 +245,13 @@ def _shape(part: Part, k: int) -> str:
         offset = float(np.ravel(part.at[0])[k])
         return f'<path class="{look}" transform="translate({-offset:.1f})" d="{part.outline}"/>'
     return f'<path class="{look}" d="{scenes.path_of(part, k)}"/>'
+
+
+def _label(part: Part) -> str:
+    """Return the label of a part at the first time as an element."""
+    place = scenes.place_of_label(part.shape, scenes.values_of(part, 0))
+    at = ' display="none"' if place is None else f' x="{place[0]:.1f}" y="{place[1]:.1f}"'
+    return f'<text class="{escape(part.look)}"{at}>{escape(part.label)}</text>'
 
 
 def _json(content: Any) -> str:

@@ -22,6 +22,28 @@
       const nx = -dy * 0.45 * head, ny = dx * 0.45 * head, end = `${text(x + dx)} ${text(y + dy)}`;
       return `M${text(x)} ${text(y)}L${end}M${text(bx + nx)} ${text(y0 + ny)}L${end}L${text(bx - nx)} ${text(y0 - ny)}`;
     },
+    arc(x, y, r, degrees) {
+      const angle = ((degrees % 360) * Math.PI) / 180, points = [];
+      for (let i = 0; i <= 24; i++) points.push(`${text(x + r * Math.sin((angle * i) / 24))} ${text(y + r * Math.cos((angle * i) / 24))}`);
+      return `M${points.join("L")}`;
+    },
+  };
+  // the middle of a label; null where the arrow or the arc is too small for one
+  const place = {
+    arrow(x, y, dx, dy) {
+      const length = Math.hypot(dx, dy);
+      return length < 10 ? null : [x + dx - (14 * dy) / length, y + dy + (14 * dx) / length];
+    },
+    arc(x, y, r, degrees) {
+      const middle = ((degrees % 360) * Math.PI) / 360;
+      return Math.abs(degrees % 360) < 10 ? null : [x + (r + 14) * Math.sin(middle), y + (r + 14) * Math.cos(middle)];
+    },
+  };
+  const moveLabel = (label, at, { width, height }) => {
+    label.setAttribute("display", at ? "inline" : "none");
+    if (!at) return;
+    label.setAttribute("x", text(Math.min(Math.max(at[0], 14), width - 14)));
+    label.setAttribute("y", text(Math.min(Math.max(at[1], 14), height - 14)));
   };
 
   for (const figure of document.querySelectorAll(".player")) {
@@ -29,7 +51,9 @@
     const one = (selector) => figure.querySelector(selector);
     const slider = one("input"), play = one(".play"), told = one("output"), speed = one("select");
     const frames = data.lanes[0].u.length - 1, [begin, end] = data.t, span = end - begin, [width, height] = data.size;
-    const stages = [...figure.querySelectorAll(".stages svg")].map((svg) => [...svg.querySelectorAll(".now path")]);
+    const stages = [...figure.querySelectorAll(".stages svg")].map((svg) => ({
+      frame: svg.viewBox.baseVal, paths: [...svg.querySelectorAll(".now path")], labels: [...svg.querySelectorAll(".now text")],
+    }));
     const curves = data.lanes.map((_, i) => one(`.curve.k${i}`));
     const still = matchMedia("(prefers-reduced-motion: reduce)");
     const digits = Math.min(8, Math.max(0, 2 - Math.floor(Math.log10(span / 20))));
@@ -51,11 +75,16 @@
     let shown = NaN;
     const draw = () => {
       const i = Math.min(frames, Math.floor(now)), part = now - i, time = begin + (now / frames) * span;
-      data.lanes.forEach((lane, k) => lane.parts.forEach(({ shape, at: columns }, j) => {
-        const values = columns.map((column) => at(column, i, part)), element = stages[k][j];
-        if (shape === "track") element.setAttribute("transform", `translate(${text(-values[0])})`);
-        else element.setAttribute("d", path[shape](...values));
-      }));
+      data.lanes.forEach((lane, k) => {
+        const { frame, paths, labels } = stages[k];
+        let label = 0;
+        lane.parts.forEach(({ shape, at: columns, labelled }, j) => {
+          const values = columns.map((column) => at(column, i, part));
+          if (shape === "track") paths[j].setAttribute("transform", `translate(${text(-values[0])})`);
+          else paths[j].setAttribute("d", path[shape](...values));
+          if (labelled) moveLabel(labels[label++], place[shape](...values), frame);
+        });
+      });
       const first = Math.min(Math.max(begin, time - 0.6 * data.window), end - data.window);
       if (first !== shown) {
         data.lanes.forEach((lane, k) => curves[k].setAttribute("d", curve(lane.u, first, data.window)));

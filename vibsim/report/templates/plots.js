@@ -3,12 +3,14 @@
 // Nothing is loaded; without this script every plot is as it was drawn.
 (() => {
 "use strict";
-const NAMES = { time: "t", step: "dt" };
+const NAMES = { time: "t", long: "t", step: "dt" };
 const LEAST = 1 / 200; // of the whole time, the least that is shown
 const NEAR = 8; // how far from a point its value is shown [point]
 const LETTER = 4.7; // about the width of a letter [point]
 const HINT = "Point at a plot to read its values. Drag to zoom in time, double-click to see all of it, click a legend "
   + "entry to hide it. Keys: arrows, + and −, Shift with arrows, 0.";
+const LONG_HINT = "Drag to move along the time, in the strip below to any of it. Wheel, + and − zoom, Shift with arrows moves on, "
+  + "0 shows all of it.";
 const LINEAR = { to: (v) => v, from: (v) => v };
 const LOGARITHMIC = { to: Math.log10, from: (v) => 10 ** v };
 const groups = new Map(); // by kind of axis: panels, view (null: whole), at (null: no line)
@@ -27,10 +29,11 @@ const make = (name, attributes, parent) =>
 // What a panel holds
 
 function readPanel(node) {
-  const kind = node.dataset.axis;
+  const isOverview = node.dataset.axis === "overview"; // of all the time of a long series
+  const kind = isOverview ? "long" : node.dataset.axis;
   const [left, top, width, height] = numbers(node.dataset.box);
   const scale = (axis) => (node.dataset.log.includes(axis) ? LOGARITHMIC : LINEAR);
-  const panel = { kind, left, top, width, height, svg: node.ownerSVGElement, across: scale("x"), up: scale("y") };
+  const panel = { kind, isOverview, left, top, width, height, svg: node.ownerSVGElement, across: scale("x"), up: scale("y") };
   panel.x = numbers(node.dataset.x);
   panel.y = numbers(node.dataset.y).map(panel.up.to);
   panel.moved = [...node.querySelectorAll("[data-key] :is(path, use)")]
@@ -41,6 +44,7 @@ function readPanel(node) {
   panel.ticks = node.querySelector("[data-ticks=x]");
   panel.drawnTicks = [...panel.ticks.children];
   panel.over = make("g", { class: "hair", "pointer-events": "none" }, node);
+  panel.first = Number(node.dataset.window); // width of the window that is shown at first
   if (!groups.has(kind)) groups.set(kind, { kind, panels: [], view: null, at: null, selected: null });
   groups.get(kind).panels.push(panel);
   return panel;
@@ -60,7 +64,7 @@ function readCurve(node) {
 // Places and values
 
 const whole = ({ panels }) => [Math.min(...panels.map((p) => p.x[0])), Math.max(...panels.map((p) => p.x[1]))];
-const shown = (panel) => groups.get(panel.kind).view || panel.x;
+const shown = (panel) => (!panel.isOverview && groups.get(panel.kind).view) || panel.x;
 const ends = ({ across, x }, view) => view.map((v) => across.to(across === LINEAR ? v : Math.max(v, x[0])));
 
 function toPoint(panel, value, view = shown(panel)) {
@@ -110,10 +114,12 @@ function draw(group) {
   for (const panel of group.panels) {
     panel.over.replaceChildren();
     const { left, top, width, height } = panel;
-    if (group.selected) {
-      const [a, b] = group.selected.map((value) => between(toPoint(panel, value), left, left + width));
+    const marked = panel.isOverview ? group.view : group.selected;
+    if (marked) {
+      const [a, b] = marked.map((value) => between(toPoint(panel, value), left, left + width));
       make("rect", { x: a, y: top, width: b - a, height, fill: "#0072b2", "fill-opacity": 0.15 }, panel.over);
     }
+    if (panel.isOverview) continue;
     const x = group.at === null ? NaN : toPoint(panel, group.at);
     panel.rows = x >= left && x <= left + width + 1e-6 ? valuesOf(panel, group.at) : null;
     if (!panel.rows) continue;
@@ -154,7 +160,7 @@ function show(group, view) {
   }
   group.view = view;
   group.panels.forEach(movePanel);
-  back.hidden = !view;
+  if (group.kind === "time") back.hidden = !view;
   draw(group);
 }
 
@@ -189,10 +195,17 @@ function newTicks(panel, low, high) {
 }
 
 function zoomBy(group, factor, around = group.at) {
-  if (group.kind !== "time") return;
+  if (group.kind === "step") return;
   const view = group.view || whole(group);
   const centre = around ?? (view[0] + view[1]) / 2;
   show(group, view.map((end) => centre + (end - centre) * factor));
+}
+
+// Move a long series by a part of its window; the strip below moves the other way, by a part of the whole time
+function pan(group, { panel, view, x }, to) {
+  const [low, high] = panel.isOverview ? panel.x : view;
+  const by = ((panel.isOverview ? to - x : x - to) / panel.width) * (high - low);
+  show(group, view.map((end) => end + by));
 }
 
 // Pointer and keys
@@ -223,12 +236,14 @@ function listen(svg) {
     else draw(group);
   };
   const on = (name, act) => svg.addEventListener(name, act, { passive: false });
-  setAll(svg, { tabindex: "0", role: "group", "aria-description": HINT });
+  setAll(svg, { tabindex: "0", role: "group", "aria-description": own[0].first ? LONG_HINT : HINT });
   svg.classList.add("live");
   on("pointermove", (event) => {
     const now = start ? { ...start, x: pointOf(event).x } : under(event);
     if (!now) return leave();
     const { panel, group, x } = now;
+    if (start?.view) return pan(group, start, x);
+    if (panel.isOverview) return leave();
     if (start) {
       group.at = toValue(panel, between(x, panel.left, panel.left + panel.width));
       group.selected = Math.abs(x - start.x) > 4 ? [start.value, group.at].sort((a, b) => a - b) : null;
@@ -239,10 +254,17 @@ function listen(svg) {
   on("pointerleave", (event) => start || event.pointerType === "touch" || leave());
   on("pointerdown", (event) => {
     const now = under(event);
-    if (event.button !== 0 || now?.group.kind !== "time") return;
-    start = now;
-    now.group.at = now.value;
-    draw(now.group);
+    if (event.button !== 0 || !now || now.group.kind === "step") return;
+    const { panel, group, value } = start = now;
+    if (group.kind === "long") {
+      const view = group.view ?? whole(group);
+      const by = panel.isOverview && (value < view[0] || value > view[1]) ? value - (view[0] + view[1]) / 2 : 0;
+      show(group, view.map((end) => end + by));
+      start.view = group.view ?? view;
+    } else {
+      group.at = value;
+      draw(group);
+    }
     if (event.isTrusted) svg.setPointerCapture(event.pointerId);
   });
   on("pointerup", finish(true));
@@ -251,7 +273,7 @@ function listen(svg) {
   on("wheel", (event) => {
     // a page scrolls over its plots until one has the focus
     const now = under(event);
-    if (now?.group.kind !== "time" || !(event.ctrlKey || svg === document.activeElement)) return;
+    if (!now || now.group.kind === "step" || now.panel.isOverview || !(event.ctrlKey || svg === document.activeElement)) return;
     event.preventDefault();
     zoomBy(now.group, 1.25 ** Math.sign(event.deltaY), now.value);
   });
@@ -310,11 +332,15 @@ if (!panels.length) return;
 const back = document.body.appendChild(document.createElement("button"));
 const said = document.body.appendChild(document.createElement("p"));
 Object.assign(back, { type: "button", className: "zoomed", textContent: "Show the whole time", hidden: true });
-back.addEventListener("click", () => groups.forEach((group) => show(group, null)));
+back.addEventListener("click", () => show(groups.get("time"), null));
 setAll(said, { class: "said", role: "status" });
-const hint = setAll(document.createElement("p"), { class: "soft hint" });
-hint.textContent = HINT;
-(panels[0].svg.closest("section") ?? document.body).append(hint);
+const hint = (text) => Object.assign(document.createElement("p"), { className: "soft hint", textContent: text });
+(panels[0].svg.closest("section") ?? document.body).append(hint(HINT));
 new Set(panels.map((panel) => panel.svg)).forEach(listen);
 document.querySelectorAll("[data-entry]").forEach(listenToEntry);
+const long = panels.find((panel) => panel.first);
+if (long) {
+  long.svg.after(hint(LONG_HINT));
+  show(groups.get("long"), [long.x[0], long.x[0] + long.first]);
+}
 })();

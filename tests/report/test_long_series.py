@@ -1,0 +1,103 @@
+"""A long series in panels below each other: which runs have it, what a page can move along, and how large it is."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+import samples
+
+from vibsim.report import style
+from vibsim.report.data import Member
+from vibsim.report.figures import drawing
+from vibsim.report.figures.long_series import MOST, PERIODS, long_series
+
+
+def made(periods=40, schemes=("central",), levels=(0, 1, 2), steps=20, **changes):
+    exp = samples.experiment(
+        **{"model": {"kind": "spring"}, "initial": {"u": 1.0}, "levels": list(levels), "checks": []}
+        | {"time": {"periods": periods, "steps_per_period": steps}, "schemes": list(schemes)}
+        | changes
+    )  # fmt: skip
+    record = samples.record(exp)
+    return record, record.words("scheme")
+
+
+def drawn(name="u", **changes):
+    record, schemes = made(**changes)
+    with style.applied():
+        picture = long_series(record, name, Member(0, 0, schemes[0]))
+        return picture, "" if picture is None else drawing.svg(picture.figure, picture.name)
+
+
+@pytest.mark.parametrize("periods", [9, 11])
+def test_a_run_of_more_than_ten_periods_is_long(periods):
+    picture, _ = drawn(periods=periods)
+    assert (picture is not None) == (periods > 10)
+
+
+@pytest.mark.parametrize(
+    ("changes", "labels"),
+    [
+        ({}, ["800 steps", "1 600 steps", "3 200 steps"]),
+        ({"schemes": ["central", "rk4"]}, ["central, level 0", "rk4, level 0"]),
+    ],
+)
+def test_levels_or_schemes_have_a_panel_each_beside_the_exact_solution(changes, labels):
+    picture, text = drawn(**changes)
+    axes = picture.figure.axes
+    told = [[line.get_label() for line in ax.get_lines()] for ax in axes[:-1]]
+    assert [row[0] for row in told] == ["exact"] * len(labels)
+    assert [row[1].replace("\u202f", " ").replace("\u2009", " ") for row in told] == labels
+    assert text.count('data-axis="long"') == len(labels)
+    assert text.count('data-axis="overview"') == 1
+    widths = [float(width) for width in re.findall(r'data-window="([\d.]+)"', text)]
+    assert widths == pytest.approx([PERIODS * 2 * np.pi] * len(labels), rel=0.02)
+
+
+def test_what_grows_without_bound_leaves_its_panel_and_hides_nothing():
+    picture, text = drawn(schemes=["central", "forward_euler"], levels=(0, 1))
+    low, high = picture.figure.axes[0].get_ylim()
+    assert (low, high) == pytest.approx((-1.25, 1.25))
+    assert "nan" not in text
+
+
+def test_a_very_long_run_keeps_its_extremes_and_a_small_figure():
+    picture, text = drawn(periods=1000)
+    assert len(text) < 400_000
+    for ax in picture.figure.axes[:-1]:
+        for line in ax.get_lines():
+            t, u = line.get_xdata(), line.get_ydata()
+            # each tenth of the run reaches both ends of the swing
+            for part in np.array_split(u, 10):
+                assert part.max() == pytest.approx(1.0, abs=0.02)
+                assert part.min() == pytest.approx(-1.0, abs=0.02)
+            assert t[-1] == pytest.approx(2000 * np.pi)
+
+
+def test_every_point_of_a_curve_is_in_the_page():
+    """A line that matplotlib simplified would lose its shape where the page shows a small part of it."""
+    picture, text = drawn()
+    line = picture.figure.axes[0].get_lines()[1]
+    path = re.search(
+        r'data-curve="800 steps".*?<path d="([^"]*)"', text.replace("\u202f", " "), re.DOTALL
+    )
+    assert path is not None
+    assert len(re.findall(r"[ML]", path[1])) == line.get_xdata().size == 801
+
+
+def test_there_are_at_most_so_many_panels():
+    picture, _ = drawn(periods=12, levels=tuple(range(8)), steps=8)
+    assert len(picture.figure.axes) == MOST + 1
+
+
+def test_few_samples_a_period_are_dots_on_a_smooth_exact_solution():
+    picture, text = drawn(periods=20, steps=5)
+    exact, own = picture.figure.axes[0].get_lines()
+    assert np.allclose(exact.get_ydata(), np.cos(exact.get_xdata()), atol=0.05)
+    assert text.count("<use") >= 3 * own.get_xdata().size == 3 * 101
+    assert "Dots" in picture.caption
+    picture, text = drawn(periods=20, steps=20)
+    assert "<use" not in text
+    assert "Dots" not in picture.caption

@@ -1,0 +1,86 @@
+"""A motion at other times than those of its samples, and the numbers that its drawing needs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from vibsim.core.array_types import Floats
+from vibsim.core.record import Record
+from vibsim.models import Model
+from vibsim.report import data
+from vibsim.report.figures.scenes import Motion
+from vibsim.report.types import Experiment
+
+SECONDS_A_PERIOD = 2.0  # at speed 1
+WINDOW_PERIODS = 6.0  # a series over time is shown whole up to 1.5 times as many
+VISIBLE = 0.03  # difference of two motions that is seen, over the size of the motion
+UNBOUNDED = 3.0  # a motion larger than this, over the size of the finest one, is not drawn
+
+
+def motion(
+    model: Model,
+    t: Floats,
+    samples: Floats,
+    series: Mapping[str, Floats],
+    parameters: Mapping[str, Any],
+    reach: Mapping[str, float],
+) -> Motion:
+    """Return a motion at times `t`, from the series of its states at the times of its `samples`."""
+    states = {name: at_times(t, samples, x) for name, x in series.items()}
+    if model.kind == "bouncing_ball":
+        states["h"] = _flight(t, samples, series, states["h"], float(parameters["g"]))
+    return Motion(model, t, states, parameters, reach)
+
+
+def parameters(experiment: Experiment, record: Record, case: int) -> Mapping[str, Any]:
+    """Return the parameters of a member: what is swept has its value."""
+    found: dict[str, Any] = dict(experiment.model.parameters)
+    for name in data.swept(record):
+        section, _, key = data.swept_label(record, name)[0].partition(".")
+        if section == "model":
+            found[key] = data.pick(record, name, case=case).item()
+    # a declared parameter goes by its own name in formulas
+    return {key.rpartition(".")[2]: value for key, value in found.items()}
+
+
+def window(span: float, period: float) -> float:
+    """Return how much of a time is shown at once: all of it, or some periods of a long run."""
+    return span if span <= 1.5 * WINDOW_PERIODS * period else WINDOW_PERIODS * period
+
+
+def period(t: Floats, u: Floats) -> float:
+    """Return about how long the motion takes to come back, counted by its turns; the whole time without any."""
+    step = np.diff(u)
+    step = step[np.abs(step) > 1e-9 * data.largest(u)]
+    turns = int(np.sum(np.signbit(step[1:]) != np.signbit(step[:-1])))
+    return float(t[-1] - t[0]) / max(1.0, 0.5 * turns)
+
+
+def at_times(times: Floats, t: Floats, x: Floats) -> Floats:
+    """Return a series at other times, by the cubic of each interval whose slopes are those of its neighbours."""
+    slope = np.gradient(x, t)
+    i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, t.size - 2)
+    h = t[i + 1] - t[i]
+    s = (times - t[i]) / h
+    a, b = x[i] + h * s * slope[i], x[i + 1] - h * (1.0 - s) * slope[i + 1]
+    weight = s * s * (3.0 - 2.0 * s)
+    return np.asarray(a + (b - a) * weight)
+
+
+def _flight(times: Floats, t: Floats, series: Mapping[str, Floats], h: Floats, g: float) -> Floats:
+    """Return the height of a ball, with its impacts: between samples it falls until it meets the rise to the next.
+
+    `h` is the height at `times` as if nothing happened between the samples at `t`.
+    """
+    i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, t.size - 2)
+    height, v = series["h"], series["v"]
+    falls, rises = (
+        height[j] + v[j] * x - 0.5 * g * x * x for j, x in ((i, times - t[i]), (i + 1, times - t[i + 1]))
+    )  # fmt: skip
+    # behind its last impact it lies
+    rises = np.where((height[i + 1] <= 0.0) & (v[i + 1] == 0.0), 0.0, rises)
+    meets = (v[i] < 0.0) & (v[i + 1] >= 0.0)
+    return np.maximum(np.where(meets, np.maximum(falls, rises), h), 0.0)

@@ -1,0 +1,178 @@
+"""What a movie shows: one or two runs, their drawn systems, the times of the frames, and the moving window.
+
+Source: vibration text, sections 3.1 (a window that moves along a long run, frames that are skipped) and 8.7, note
+hpl 2 (two runs side by side), 10.6 (the pendulum with its forces).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vibsim.core.array_types import Floats
+from vibsim.core.record import Record
+from vibsim.report import data, style
+from vibsim.report.figures import moments, scenes
+from vibsim.report.figures.scenes import Scene
+from vibsim.report.text import words
+from vibsim.report.types import Experiment
+
+MOST_FRAMES = 1500
+"""Of a longer run fewer frames a period are shown, and then its beginning only, unless the user names a number."""
+FEWEST_FRAMES_A_PERIOD = 12
+LEAST_SECONDS = 8.0
+
+
+@dataclass(frozen=True)
+class Run:
+    """One member by one scheme at one level."""
+
+    title: str
+    scheme: str
+    t: Floats
+    """Times of the samples, shape (sample,)."""
+    series: Floats
+    """The quantity over time at the samples; not finite where the run broke down."""
+    states: Mapping[str, Floats]
+    """Every state of the model at the samples."""
+    exact: Floats | None
+    """The exact solution of the quantity at the samples, where one is known."""
+    parameters: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Film:
+    """What is drawn in every frame."""
+
+    runs: tuple[Run, ...]
+    scenes: tuple[Scene, ...]
+    """A drawing of each run at the times of the frames; empty where the system cannot be drawn."""
+    t: Floats
+    """Time of every frame, shape (frame,)."""
+    start: float
+    """First time that is shown."""
+    stop: float
+    """Last time that is shown."""
+    window: float
+    """Width of the window over the series: the whole time shown, or some periods of a long run."""
+    label: str
+    """Of the series, with its unit."""
+    time_unit: str
+    end: float
+    """Last time that was asked for, of which the beginning may be all that is shown."""
+
+    @property
+    def is_cut(self) -> bool:
+        """Say whether only the beginning is shown."""
+        return self.stop < self.end
+
+
+def run(experiment: Experiment, record: Record, scheme: str, quantity: str) -> Run:
+    """Return a run from the level of a member, which has one member and the series over time."""
+    model, place = experiment.model.definition, record.words("scheme").index(scheme)
+    t = data.times(record, 0)
+    names = [state.name for state in model.states]
+    exact = f"{quantity}_exact"
+    step = words.number(float(t[-1]) / int(str(record.attrs["steps"])), "brief")
+    parts = [scheme] if len(record.words("scheme")) > 1 else []
+    parts += [f"level {int(record['level'])}, dt = {step} {data.time_unit(record)}".strip()]
+    parts += [name for name in [data.case_name(record, 0)] if name]
+    return Run(
+        title=", ".join(parts),
+        scheme=scheme,
+        t=t,
+        series=np.asarray(record[quantity][place, 0], dtype=np.float64),
+        states={name: record[name][place, 0] for name in names if name in record},
+        exact=np.asarray(record[exact][0], dtype=np.float64) if exact in record else None,
+        parameters=moments.parameters(experiment, record, 0),
+    )
+
+
+def differs_visibly(other: Run, first: Run) -> float:
+    """Return how far a run is from the first one, over its size; 0 where nobody sees it, or it leaves the frame."""
+    if not (np.isfinite(first.series).all() and np.isfinite(other.series).all()):
+        return 0.0
+    size = data.largest(first.series)
+    apart = data.largest(other.series - np.interp(other.t, first.t, first.series))
+    is_seen = moments.VISIBLE * size < apart
+    return (
+        apart / size if is_seen and data.largest(other.series) < moments.UNBOUNDED * size else 0.0
+    )
+
+
+def film(
+    experiment: Experiment,
+    record: Record,
+    runs: Sequence[Run],
+    quantity: str,
+    *,
+    fps: float,
+    frames: int | None = None,
+    start: float | None = None,
+    end: float | None = None,
+    periods: float | None = None,
+    most: int = MOST_FRAMES,
+) -> Film:
+    """Return what the movie of one or two runs shows.
+
+    Parameters
+    ----------
+    record
+        The level of the first run, for units.
+    fps
+        Frames a second: a period takes `moments.SECONDS_A_PERIOD` where there is room.
+    frames
+        Number of frames, spread evenly over the whole time; otherwise as many as movement needs, `most` at most.
+    start, end
+        First and last time shown; default: those of the shortest run.
+    periods
+        Width of the moving window; default: the whole time, or some periods of a long run.
+    """
+    first = runs[0]
+    period = moments.period(first.t, np.nan_to_num(first.series, posinf=0.0, neginf=0.0))
+    begin = float(first.t[0]) if start is None else start
+    stop = min(float(one.t[-1]) for one in runs) if end is None else end
+    last = stop
+    if frames is None:
+        frames, stop = _as_needed(begin, stop, period, fps, most)
+    t, span = np.linspace(begin, stop, frames), stop - begin
+    window = moments.window(span, period) if periods is None else min(span, periods * period)
+    unit = data.unit(record, quantity)
+    return Film(
+        runs=tuple(runs),
+        scenes=_scenes(experiment, runs, t),
+        t=t,
+        start=begin,
+        stop=stop,
+        window=window,
+        label=style.label(words.symbol(quantity), unit),
+        time_unit=data.time_unit(record),
+        end=last,
+    )
+
+
+def _as_needed(start: float, end: float, period: float, fps: float, most: int) -> tuple[int, float]:
+    """Return how many frames the motion needs, and the last time that they reach."""
+    periods = (end - start) / period
+    wanted = max(LEAST_SECONDS * fps, moments.SECONDS_A_PERIOD * fps * periods)
+    frames = math.ceil(min(most, wanted))
+    return frames, min(end, start + period * frames / FEWEST_FRAMES_A_PERIOD)
+
+
+def _scenes(experiment: Experiment, runs: Sequence[Run], t: Floats) -> tuple[Scene, ...]:
+    model = experiment.model.definition
+    draw = scenes.scene_of(model)
+    every = [x for one in runs for x in one.states.values()]
+    is_whole = all(len(one.states) == len(model.states) for one in runs)
+    if draw is None or not is_whole or not all(np.isfinite(x).all() for x in every):
+        return ()
+    reach = {
+        name: max(float(np.max(np.abs(one.states[name]))) for one in runs)
+        for name in runs[0].states
+    }
+    motions = [moments.motion(model, t, one.t, one.states, one.parameters, reach) for one in runs]
+    return tuple(draw(motion) for motion in motions)
