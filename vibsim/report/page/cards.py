@@ -19,7 +19,6 @@ from vibsim.report.tables import published
 from vibsim.report.text import assertions, changes, reasons, words
 from vibsim.report.types import Check, Experiment, Measurement
 
-BADGES = {"PASS": "passed", "INCONCLUSIVE": "undecided", "FAIL": "failed"}
 SAID_BY_THE_LINE = ("value", "equal", "converges")
 """Kinds of checks of which the line says all where they pass."""
 WIDE = 1.0  # an interval that reaches further below its order is worth a sentence
@@ -35,16 +34,6 @@ def cards(
         for check in summary["checks"]
         if check["id"] not in in_tables or check["status"] != "PASS"
     ]
-
-
-def badge(asserted: Check | None, status: str) -> str:
-    """Return the word on a check: passed, as claimed, trap caught, refuted, undecided or failed."""
-    if status == "PASS" and asserted is not None:
-        if asserted.kind == "claim":
-            return "as claimed" if asserted.holds else "refuted"
-        if is_trap(asserted):
-            return "trap caught"
-    return BADGES.get(status, status)
 
 
 def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> dict[str, Any]:
@@ -76,7 +65,7 @@ def card(experiment: Experiment, record: Record, check: Mapping[str, Any]) -> di
         "id": check["id"],
         "status": status,
         "measures": measured.kind if measured else check["kind"],
-        "badge": badge(asserted, status),
+        "badge": words.badge(check),
         "what": assertions.about(asserted) if asserted else assertions.OF_TOLERANCE,
         "source": assertions.source(asserted) if asserted else "",
         "wanted": _wanted(experiment, asserted, check),
