@@ -15,11 +15,9 @@ from vibsim.analysis import verdicts
 from vibsim.core.errors import VibsimError
 from vibsim.core.record import Record, Variable
 from vibsim.core.vocabulary import REASONS
-from vibsim.report import choice, style, sweep_layout
+from vibsim.report import choice, style
 from vibsim.report.data import Member
-from vibsim.report.figures import maps as figures_map
 from vibsim.report.figures import order as figures_order
-from vibsim.report.figures import sweep as figures_sweep
 from vibsim.report.figures import time
 from vibsim.report.page import cards
 from vibsim.report.page.page import TEMPLATES
@@ -27,7 +25,9 @@ from vibsim.report.tables import checks as check_tables
 from vibsim.report.text import reasons, setting
 
 PROVENANCE = {"versions": {"vibsim": "1.2", "python": "3.99", "numpy": "9.9"}, "digest": "d1"}
-PLOTS = (TEMPLATES / "plots.js").read_text(encoding="utf-8").strip()
+PLOTS, MEMBERS = (
+    (TEMPLATES / f"{name}.js").read_text(encoding="utf-8").strip() for name in ("plots", "members")
+)
 VOID = {"meta", "br", "img", "link", "hr", "input", "col"}
 
 
@@ -117,7 +117,8 @@ def test_the_page_is_well_formed_and_loads_nothing(which, request):
     assert len(reader.ids) == len(set(reader.ids))
     assert not {"link", "iframe", "object", "embed"} & set(reader.tags)
     assert "<script src" not in text
-    assert f"<script>\n{PLOTS}</script>" in text
+    assert PLOTS in text
+    assert ("members-data" in reader.ids) == (MEMBERS in text) == (which == "swept")
     inside = {f"#{name}" for name in reader.ids}
     for tag, address in reader.addresses:
         assert address in inside | {"../../index.html"} or address.startswith("data:image/png"), (
@@ -247,7 +248,7 @@ def test_nan_everywhere_makes_a_page_with_its_failures(tmp_path):
 
 def test_a_sweep_shows_period_orders_and_the_worst_member(swept):
     names = {path.stem for path in (swept / "figures").iterdir()}
-    assert {"period", "sweep_order_theta", "sweep_order_energy_deviation"} <= names
+    assert {"period", "sweep_order_theta", "sweep_error_energy_deviation"} <= names
     assert any(name.endswith("_worst") for name in names)
     assert any(name.endswith("_typical") for name in names)
     rows = (swept / "tables/members.csv").read_text().splitlines()
@@ -367,31 +368,22 @@ def test_one_promise_of_several_schemes_is_drawn_once():
     assert text.count(">slope 2 (promised)</text>") == 1
 
 
-PANELS = [
-    "Verdict",
-    "Order against the promised one",
-    "Error bar of the order",
-    "Levels used for the order",
-    "Error on level 10",
-    "Can the estimate be trusted?",
-]
-
-
 def test_a_sweep_shows_every_promise_and_the_map_is_relative_to_it():
-    sweep = {"initial.theta": [0.5, 1.0], "model.g": [1.0, 2.0]}
-    exp = samples.several(checks=TOLERANT, sweep=sweep)
-    record = promising(samples.record(exp), 2, 1)
+    def drawn(sweep):
+        exp = samples.several(checks=TOLERANT, sweep=sweep)
+        views, _ = samples.views(exp, promising(samples.record(exp), 2, 1), "theta")
+        return views
+
+    curves = drawn({"initial.theta": [0.5, 1.0], "model.g": [1.0, 2.0]})
     with style.applied():
-        keys = sweep_layout.keys(record)
-        along, grid = sweep_layout.along_of(keys), sweep_layout.grid_of(keys)
-        text = samples.svg(figures_sweep.orders(exp, record, along, "theta"))
-        maps = [figures_map.verdicts(exp, record, grid, "theta", s) for s in (0, 1)]
+        text = samples.svg(curves["sweep_order_theta"].picture)
     assert "promised, 1 ± 0.1" in text
     assert "promised, 2 ± 0.3" in text
-    for picture, label in zip(maps, ("order of θ − 2", "order of θ − 1"), strict=True):
-        panel, bars = picture.figure.axes[1], picture.figure.axes[len(PANELS) :]
-        assert [panel.get_title(loc="left") for panel in picture.figure.axes[:6]] == PANELS
-        assert bars[0].get_xlabel() == label
+    sweep = {"initial.theta": {"linspace": [0.5, 1.0, 6]}, "model.g": {"linspace": [1.0, 2.0, 6]}}
+    maps = drawn(sweep)
+    for s, label in enumerate(("Order of θ − 2", "Order of θ − 1")):
+        panel = maps[f"map_theta_order_{s}"].picture.figure.axes[0]
+        assert panel.get_title(loc="left") == label
         assert np.abs(panel.collections[0].get_array()).max() < 0.2
 
 

@@ -17,7 +17,8 @@ from vibsim.core.vocabulary import TYPICAL_NORM
 from vibsim.experiment.collection import ADHOC, ENDINGS
 from vibsim.report import choice, data, lead, style
 from vibsim.report.figures import drawing, gallery, thumbnail
-from vibsim.report.page import cards, hero, player
+from vibsim.report.figures.view import View
+from vibsim.report.page import cards, explorer, hero, player
 from vibsim.report.style import Picture
 from vibsim.report.tables import best, checks, degrees, levels, members, published, theory, work
 from vibsim.report.tables.scales import table as scales_table
@@ -83,10 +84,8 @@ def write(
         names = [picture.name for picture, _ in first]
         below = gallery.pictures(experiment, convergence, shown, decisive, names)
         drawings = {"hero": first, "motion": [drawn.add(picture) for picture in below.motion]}
-        tabs = {
-            "belief": drawn.tabs(below.belief, FIGURES),
-            "members": drawn.tabs(below.members, FIGURES),
-        }
+        tabs = {"belief": drawn.tabs(below.belief, FIGURES)}
+        views = drawn.views(below.members)
         small = thumbnail.thumbnail(experiment, convergence, shown[0])
     replace_files(directory / "figures", {**drawn.files, "thumbnail.svg": small.encode()})
     listed, others = _tables(experiment, convergence)
@@ -117,9 +116,13 @@ def write(
             "title": experiment.title,
             "status": summary["status"],
             "lead": next((c for c in made if decisive.entry and c["id"] == decisive.entry["id"]), None),
-            "figures": drawings | tabs,
+            "figures": drawings | tabs | {"members": views},
             "reading": {name: _captions(group) for name, group in drawings.items()}
-            | {name: _captions(p for _, group in found for p in group) for name, found in tabs.items()},
+            | {name: _captions(p for _, group in found for p in group) for name, found in tabs.items()}
+            | {"members": _captions((view.picture, "") for view, _ in views)},
+            "members": explorer.content(experiment, convergence, [view for view, _ in views]),
+            "worst": explorer.worst(experiment, convergence, [view for view, _ in views]),
+            "shared": below.shared,
             "checks": made,
             "reading_of_checks": _reading_of_checks(made),
             "failures": broken and cut(broken),
@@ -178,6 +181,18 @@ class _Drawn:
                 found.append((tab.label, added))
             else:
                 self.left_out.append(tab.label)
+        return found
+
+    def views(self, views: Sequence[View]) -> list[tuple[View, str]]:
+        """Return the views of members with their markup, as long as the page has room; the others are files only."""
+        found = []
+        for view in views:
+            picture, text = self.add(view.picture)
+            self.room -= len(text)
+            if self.room >= 0:
+                found.append((view, text))
+            else:
+                self.left_out.append(picture.title)
         return found
 
 
