@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
 import samples
 
+from vibsim import experiment as spec
 from vibsim import report
 from vibsim.analysis import verdicts
 from vibsim.core.errors import VibsimError
@@ -20,8 +23,9 @@ from vibsim.report.data import Member
 from vibsim.report.figures import order as figures_order
 from vibsim.report.figures import time
 from vibsim.report.page import cards
-from vibsim.report.page.page import TEMPLATES
+from vibsim.report.page.page import TEMPLATES, cut
 from vibsim.report.tables import checks as check_tables
+from vibsim.report.tables.table import Column, Table
 from vibsim.report.text import reasons, setting
 
 PROVENANCE = {"versions": {"vibsim": "1.2", "python": "3.99", "numpy": "9.9"}, "digest": "d1"}
@@ -543,3 +547,53 @@ def test_the_two_frequencies_of_a_stiff_model_have_labels_of_their_own():
     assert [term for term, _ in rows] == ["w dt", "Highest w dt"]
     assert "natural frequency" in rows[0][1]
     assert "fastest oscillation" in rows[1][1]
+
+
+MOST_WORDS = 3000  # of a page, with what is folded and what stands in its pictures
+CONFIGS = Path(__file__).parents[2] / "configs"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["elastic_pendulum_drag", "order_and_stability_map"])
+def test_the_longest_pages_are_short_enough_to_be_read(tmp_path, name):
+    exp = spec.Experiment.from_yaml(CONFIGS / f"vibration_text/{name}.yaml")
+    make(tmp_path, exp)
+    assert len(" ".join(read(tmp_path / "report.html").text).split()) <= MOST_WORDS
+    assert (tmp_path / "report.html").stat().st_size < 1_500_000
+
+
+def test_many_checks_that_passed_alike_are_a_table_and_the_others_lines():
+    checks = [{"id": f"p{i}", "value": "period", "above": 1.0 + 0.1 * i} for i in range(7)]
+    others = [{"id": "wrong", "value": "period", "below": 1.0}, {"converges": "theta", "order": 2}]
+    exp = samples.experiment(checks=[*checks, *others])
+    record = samples.record(exp)
+    made = cards.cards(exp, record, samples.summary(exp, record))
+    alone, (group,) = cards.gathered(made, "p3")
+    # the one that decides stands alone, and so does what failed
+    assert [card["id"] for card in alone] == ["p3", "wrong", "check_9"]
+    table = group["table"]
+    assert [column.header for column in table.columns] == ["check", "wanted", "got"]
+    assert [row[1] for row in table.rows] == [
+        c["wanted"] for c in made if c["id"] in "p0p1p2p4p5p6"
+    ]
+    few = [card for card in made if card["id"] in "p0p1p2p3p4"]
+    assert cards.gathered(few, None) == (few, [])
+
+
+def test_a_page_cuts_a_table_between_its_blocks():
+    def table(*sizes):
+        rows = tuple((f"m{k}", i, math.nan) for k, size in enumerate(sizes) for i in range(size))
+        return Table(
+            "t",
+            "A table",
+            (Column("member"), Column("level", form="integer"), Column("none")),
+            rows,
+            heads=1,
+        )
+
+    for sizes, kept in (((5, 3, 4), 8), ((5, 5), 5), ((11,), 8), ((3, 2), 5)):
+        _, shown, told = cut(table(*sizes))
+        assert len(shown.rows) == kept
+        assert [column.header for column in shown.columns] == ["member", "level"]
+        more = sum(sizes) - kept
+        assert told == (f"{more} more rows are in tables/t.csv." if more else "")

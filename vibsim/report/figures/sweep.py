@@ -210,8 +210,8 @@ class _Drawing:
         elif np.isfinite(error.best).any():
             (ax,) = stacked([self._tall])
             kind, leaves = _draw_errors(ax, self.record, self.along, quantity)
-            told = "True (dots), and what two levels alone say of it (lines)"
-            told = told if kind == "true" else "Estimated from two levels"
+            told = "At the finest level: true (dots), and what two levels alone say of it (lines)"
+            told = told if kind == "true" else "At the finest level, estimated from two levels"
             told = (
                 f"{told}, with the interval of the order."
                 if whole(self.record, "pair")
@@ -294,7 +294,6 @@ def _draw_orders(
         bottom, top = style.limits(value, np.array([least - 0.25, most + 0.25]))
         ax.set_ylim(max(bottom, least - 3), min(top, most + 2))
     ax.set_ylabel(f"order of {words.symbol(quantity)} ({TYPICAL_NORM})")
-    ax.set_title("Stated order with its interval")
     style.beside(ax, **({"fontsize": 7.5} if style.crowded(record) else {}))
 
 
@@ -336,8 +335,8 @@ def _draw_errors(ax: Axes, record: Record, along: Along, quantity: str) -> tuple
         if style.fit_log_axis(ax, "y", np.concatenate(values, axis=None), below=0.005, least=DEEP):
             leaves = _mark_members(ax, along, found.best)
             break
-    ax.set_ylabel(style.label(f"error of {words.symbol(quantity)}", norm_unit(record, quantity)))
-    ax.set_title(f"Error on level {whole(record, 'level')[-1]} ({TYPICAL_NORM} norm)")
+    text = f"error of {words.symbol(quantity)} ({TYPICAL_NORM})"
+    ax.set_ylabel(style.label(text, norm_unit(record, quantity)))
     if not style.crowded(record):
         style.beside(ax)
     return found.kind, leaves
@@ -441,7 +440,6 @@ def _draw_error_bars(ax: Axes, record: Record, along: Along, found: Measured, he
     shown = held if np.isfinite(held).any() else found.error
     style.fit_log_axis(ax, "y", shown, least=DEEP, room=2.0)
     ax.set_ylabel(style.label("estimated error", found.unit))
-    ax.set_title(f"Error bar of the {found.name}")
     if len(along.lines) > 1 and not style.crowded(record):
         style.beside(ax, fontsize=8)
 

@@ -31,7 +31,7 @@ NOTHING: Mapping[str, Any] = {}
 MOST_ROWS = 8  # of a table that the page itself holds; the CSV file holds all
 ROOM = 220  # cells of all tables of numbers together; a table beyond is a file only
 BYTES = 1_000_000  # of all figures behind tabs; figures beyond are files only
-FIGURES = 8  # most figures behind the tabs of a section
+FIGURES = 6  # most figures behind the tabs of a section
 LONG_HEADING = 90  # letters of a caption of which a heading has the first words only
 PYTHON = """\
 from vibsim import Experiment, analyse, simulate, verdicts
@@ -107,6 +107,7 @@ def write(
     made = cards.cards(experiment, convergence, summary)
     if "hero_evidence" in names and decisive.entry is not None:
         made = [c | {"picture": None} if c["id"] == decisive.entry["id"] else c for c in made]
+    alone, alike = cards.gathered(made, decisive.entry["id"] if decisive.entry else None)
     failures, more = words.broken(summary), len(summary.get("failures") or [])
     page = environment().get_template("report.html").render(
         hero.context(experiment, convergence, summary, decisive)
@@ -119,12 +120,13 @@ def write(
             "figures": drawings | tabs | {"members": views},
             "reading": {name: _captions(group) for name, group in drawings.items()}
             | {name: _captions(p for _, group in found for p in group) for name, found in tabs.items()}
-            | {"members": _captions((view.picture, "") for view, _ in views)},
+            | {"members": _readings(view.picture for view, _ in views)},
             "members": explorer.content(experiment, convergence, [view for view, _ in views]),
             "worst": explorer.worst(experiment, convergence, [view for view, _ in views]),
             "shared": below.shared,
-            "checks": made,
-            "reading_of_checks": _reading_of_checks(made),
+            "checks": alone,
+            "alike": alike,
+            "reading_of_checks": _reading_of_checks(alone),
             "failures": broken and cut(broken),
             "unlisted": f"In all {failures} runs broke down; listed are the first {more}."
             if failures > more
@@ -205,6 +207,15 @@ def _captions(drawn: Iterable[tuple[Picture, str]]) -> list[tuple[str, str]]:
     return list(found.values())
 
 
+def _readings(pictures: Iterable[Picture]) -> list[tuple[str, str]]:
+    """Return how to read pictures, each caption once, by the title of the first that has it."""
+    found: dict[str, str] = {}
+    for picture in pictures:
+        if picture.caption:
+            found.setdefault(picture.caption, picture.title)
+    return [(title, caption) for caption, title in found.items()]
+
+
 def _reading_of_checks(made: Iterable[Mapping[str, Any]]) -> list[tuple[str, str]]:
     """Return how to read the picture of each kind of check that passed, once."""
     found: dict[str, str] = {}
@@ -215,10 +226,15 @@ def _reading_of_checks(made: Iterable[Mapping[str, Any]]) -> list[tuple[str, str
 
 
 def cut(table: Table) -> tuple[str, Table, str]:
-    """Return the heading of a table, its first rows, and a sentence on the rows that only its file has."""
-    more = len(table.rows) - MOST_ROWS
-    told = f"{more} more rows are in tables/{table.name}.csv." if more > 0 else ""
-    return _heading(table.caption), replace(table, rows=table.rows[:MOST_ROWS]), told
+    """Return the heading of a table, its first rows in whole blocks, and a sentence on the rows of its file alone."""
+    shown = table.rows[:MOST_ROWS]
+    if len(shown) < len(table.rows) and (heads := table.heads):
+        # a block is shown whole, but the first
+        last = table.rows[len(shown)][:heads]
+        shown = tuple(row for row in shown if row[:heads] != last) or shown
+    more = len(table.rows) - len(shown)
+    told = f"{more} more rows are in tables/{table.name}.csv." if more else ""
+    return _heading(table.caption), replace(table, rows=shown).without_empty(), told
 
 
 @cache
