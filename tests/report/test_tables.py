@@ -56,6 +56,20 @@ def test_latex_is_booktabs_and_escaped():
     assert r"\begin{tabular}{lrr}" in text
 
 
+def test_latex_has_no_letter_that_pdflatex_does_not_know():
+    for text in (
+        "m √s",
+        "φ(u)",
+        "[D₂ₜu]",
+        "x₁₀",
+        "“a”",
+        "θ′ ≤ 10⁻³ … ∞",
+        "1\N{NARROW NO-BREAK SPACE}024 × ω²",
+    ):
+        assert table.escape(text).isascii(), text
+    assert table.escape("10⁻³ m √s") == r"10$^{-3}$ m $\surd$s"
+
+
 @given(st.text())
 def test_latex_escapes_every_special_character(text):
     bare = table.escape(text)

@@ -32,6 +32,9 @@ MOST_ROWS = 8  # of a table that the page itself holds; the CSV file holds all
 ROOM = 220  # cells of all tables of numbers together; a table beyond is a file only
 BYTES = 1_000_000  # of all figures behind tabs; figures beyond are files only
 FIGURES = 6  # most figures behind the tabs of a section
+COPIED = (
+    40_000  # letters of a table that a page holds whole, to be copied; a longer one is a file only
+)
 LONG_HEADING = 90  # letters of a caption of which a heading has the first words only
 PYTHON = """\
 from vibsim import Experiment, analyse, simulate, verdicts
@@ -132,6 +135,7 @@ def write(
             if failures > more
             else "",
             "numbers_shown": [cut(table) for table in listed],
+            "tables": {table.name: copied(table) for table in (*printed, *listed)},
             "scales": scales,
             "player": markup(player.element(experiment, convergence, environment())),
             "printed": printed,
@@ -235,6 +239,12 @@ def cut(table: Table) -> tuple[str, Table, str]:
     more = len(table.rows) - len(shown)
     told = f"{more} more rows are in tables/{table.name}.csv." if more else ""
     return _heading(table.caption), replace(table, rows=shown).without_empty(), told
+
+
+def copied(table: Table) -> dict[str, str]:
+    """Return what buttons copy of a table: all of it, by the name of the format; nothing of a very long one."""
+    found = {"CSV": to_csv(table), "LaTeX": to_latex(table)}
+    return found if max(map(len, found.values())) <= COPIED else {}
 
 
 @cache

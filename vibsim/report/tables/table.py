@@ -206,12 +206,21 @@ LATEX = r"""\begin{table}
 \end{tabular}
 \end{table}
 """
+_LETTERS = (
+    "alpha beta gamma delta varepsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau upsilon varphi chi "
+    "psi omega Gamma Delta Theta Lambda Xi Pi Sigma Phi Psi Omega"
+)
+GREEK = dict(zip("αβγδεζηθικλμνξπρστυφχψωΓΔΘΛΞΠΣΦΨΩ", _LETTERS.split(), strict=True))
+"""Greek letters that LaTeX has commands for."""
 _SPECIAL = {
     "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "&": r"\&", "%": r"\%",
     "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}", "<": r"\textless{}", ">": r"\textgreater{}",
     "|": r"\textbar{}", '"': r"\textquotedbl{}", "\n": " ", "\r": " ", "\t": " ", "–": "--", "−": "$-$",
-    "±": r"$\pm$", "·": r"$\cdot$", "∞": r"$\infty$", "θ": r"$\theta$", "ω": r"$\omega$", "Δ": r"$\Delta$",
-    "\N{NARROW NO-BREAK SPACE}": r"\,",
+    "±": r"$\pm$", "·": r"$\cdot$", "∞": r"$\infty$", "√": r"$\surd$", "×": r"$\times$", "→": r"$\to$",
+    "≤": r"$\le$", "≥": r"$\ge$", "≈": r"$\approx$", "″": "$''$", "′": "$'$", "ₜ": "$_t$", "₋": "$_-$",
+    "“": "``", "”": "''", "…": r"\dots{}", "\N{NARROW NO-BREAK SPACE}": r"\,", "\N{ZERO WIDTH SPACE}": "",
+    **{letter: rf"$\{name}$" for letter, name in GREEK.items()},
+    **{chr(0x2080 + digit): f"$_{digit}$" for digit in range(10)},
 }  # fmt: skip
 
 
