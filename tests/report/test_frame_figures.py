@@ -131,7 +131,8 @@ def test_no_word_leaves_a_figure(case):
     with style.applied():
         decisive = lead.find(exp, record, samples.summary(exp, record))
         below = gallery.pictures(exp, record, shown, decisive, [])
-        behind = [picture for tab in (*below.belief, *below.members) for picture in tab.pictures]
+        behind = [picture for tab in below.belief for picture in tab.pictures]
+        behind += [view.picture for view in below.members]
         for picture in [*hero.pictures(exp, record, decisive), *below.motion, *behind]:
             FigureCanvasAgg(picture.figure)
             assert not drawn_outside(picture.figure), picture.name
