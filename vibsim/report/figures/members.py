@@ -77,6 +77,17 @@ def histograms(experiment: Experiment, record: Record, quantity: str) -> Picture
     )
 
 
+def _legend(ax: Axes, masks: Masks) -> None:
+    """Say above a panel which colour is which verdict."""
+    from matplotlib.patches import Patch
+
+    handles = [
+        Patch(color=style.STATUS_COLOURS[word], label=word) for word in masks if masks[word].any()
+    ]
+    place: Any = {"loc": "lower left", "bbox_to_anchor": (0.0, 0.99), "borderaxespad": 0.1}
+    ax.legend(handles=handles, ncols=3, fontsize=7, handlelength=0.9, columnspacing=0.8, **place)
+
+
 def _explain(ax: Axes, status: NDArray[Any]) -> None:
     from matplotlib.patches import Patch
 
@@ -204,11 +215,6 @@ class _Projection:
         axes = self._axes()
         for ax, key in zip(axes, self.keys, strict=False):
             _draw_shares(ax, key, self.masks)
-        # beyond the first panel there may be no room
-        axes[0].legend(
-            loc="lower left", bbox_to_anchor=(0.0, 0.99), ncols=3, fontsize=7, handlelength=0.9,
-            columnspacing=0.8, borderaxespad=0.1,
-        )  # fmt: skip
         told = (
             "Shares of the verdicts near a value. A key whose shares do not vary does not matter."
         )
@@ -227,6 +233,8 @@ class _Projection:
         record, rings = self.record, []
         for i, (ax, key) in enumerate(zip(axes, self.keys, strict=False)):
             _frame(ax, key)
+            if i == 0:
+                _legend(ax, self.masks)
             if i % 3 == 0:
                 ax.set_ylabel(label, fontsize=8.5)
             if place is not None:

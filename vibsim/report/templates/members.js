@@ -99,17 +99,21 @@ function listen(details) {
   copy.addEventListener("click", () => copyText(copy, code.textContent));
   code.before(" ");
   caption.append(" ", copy);
+  const box = make("g", { class: "hair", "pointer-events": "none" }, svg);
   let at = null; // the member that is told, in the panel where it was found
 
   const show = (found) => {
     at = found;
+    box.replaceChildren();
     for (const panel of panels) {
       panel.over.replaceChildren();
       const here = found && panel.points.find((p) => p.i === found.i && p.scheme === found.scheme);
       if (!here) continue;
       make("circle", { cx: here.x, cy: here.y, r: 4.5, fill: "none", stroke: "#ffffff", "stroke-width": 3 }, panel.over);
       make("circle", { cx: here.x, cy: here.y, r: 4.5, fill: "none", stroke: "#000000", "stroke-width": 1.4 }, panel.over);
-      if (panel === found.panel) writeValues({ ...panel, top: between(here.y, panel.top, panel.top + panel.height / 2) }, here.x, tell(found).map((text) => ({ text })));
+      if (panel !== found.panel) continue;
+      const place = { over: box, left: 0, width: svg.viewBox.baseVal.width, top: Math.min(here.y, panel.top + panel.height / 2) };
+      writeValues(place, here.x, tell(found).map((text) => ({ text })));
     }
   };
   const take = () => {
